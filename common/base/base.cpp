@@ -1,0 +1,116 @@
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+
+#include "common/base/check.h"
+#include "common/base/file.h"
+#include "common/base/hash.h"
+#include "common/base/log.h"
+#include "common/base/profile.h"
+#include "common/base/result.h"
+
+namespace strandcast {
+
+const char* to_string(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::BadInput: return "bad input";
+    case ErrorCode::NotFound: return "not found";
+    case ErrorCode::LimitExceeded: return "limit exceeded";
+    case ErrorCode::Unsupported: return "unsupported";
+    case ErrorCode::Unavailable: return "unavailable";
+    case ErrorCode::Unauthorized: return "unauthorized";
+    case ErrorCode::Timeout: return "timeout";
+    case ErrorCode::Internal: return "internal error";
+  }
+  return "unknown";
+}
+
+void check_failed(const char* condition, const char* file, int line) {
+  std::fprintf(stderr, "%s:%d: broken invariant: %s\n", file, line, condition);
+  std::abort();
+}
+
+bool init_log(const std::string& level) {
+  const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
+  if (parsed == spdlog::level::off && level != "off") return false;
+  auto logger = spdlog::get("strandcast");
+  if (!logger) logger = spdlog::stderr_color_mt("strandcast");
+  logger->set_level(parsed);
+  logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  spdlog::set_default_logger(logger);
+  return true;
+}
+
+uint64_t hash_bytes(std::span<const std::byte> bytes, uint64_t seed) {
+  constexpr uint64_t kPrime = 0x100000001b3ull;
+  uint64_t hash = seed;
+  size_t offset = 0;
+  for (; offset + 8 <= bytes.size(); offset += 8) {
+    uint64_t word;
+    std::memcpy(&word, bytes.data() + offset, 8);
+    hash = (hash ^ word) * kPrime;
+    hash ^= hash >> 32;  // FNV over words alone leaves the low bits of high bytes unmixed
+  }
+  for (; offset < bytes.size(); ++offset) hash = (hash ^ static_cast<uint64_t>(bytes[offset])) * kPrime;
+  return hash;
+}
+
+Result<std::vector<std::byte>> load_file(const std::filesystem::path& path, uint64_t limit_bytes) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0)
+    return at(path.string(), make_error(ErrorCode::NotFound, "no such file or no permission to read it"));
+  if (!S_ISREG(info.st_mode)) return at(path.string(), make_error(ErrorCode::BadInput, "not a regular file"));
+  const auto size_bytes = static_cast<uint64_t>(info.st_size);
+  if (size_bytes > limit_bytes)
+    return at(path.string(), make_error(ErrorCode::LimitExceeded, "file has {} bytes, the limit is {}", size_bytes,
+                                        limit_bytes));
+  std::ifstream stream(path, std::ios::binary);
+  std::vector<std::byte> bytes(size_bytes);
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size_bytes));
+  if (!stream) return at(path.string(), make_error(ErrorCode::BadInput, "cannot read {} bytes", size_bytes));
+  return bytes;
+}
+
+Result<std::string> load_text(const std::filesystem::path& path, uint64_t limit_bytes) {
+  ASSIGN_OR_RETURN(const auto bytes, load_file(path, limit_bytes));
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+Status save_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  const std::filesystem::path temporary = path.string() + ".part";
+  {
+    std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
+    stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    stream.flush();
+    if (!stream) return at(path.string(), make_error(ErrorCode::Unavailable, "cannot write the file"));
+  }
+  std::error_code failure;
+  std::filesystem::rename(temporary, path, failure);
+  if (failure)
+    return at(path.string(), make_error(ErrorCode::Unavailable, "cannot write the file ({})", failure.message()));
+  return {};
+}
+
+void StageTimer::add_ms(double value_ms) {
+  if (window_ms_.size() < kStageWindow)
+    window_ms_.push_back(value_ms);
+  else
+    window_ms_[count_ % kStageWindow] = value_ms;
+  ++count_;
+}
+
+double StageTimer::quantile_ms(double quantile) const {
+  if (window_ms_.empty()) return 0.0;
+  std::vector<double> sorted = window_ms_;
+  const auto index = static_cast<size_t>(quantile * static_cast<double>(sorted.size() - 1) + 0.5);
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(index), sorted.end());
+  return sorted[index];
+}
+
+}  // namespace strandcast

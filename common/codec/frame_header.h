@@ -1,0 +1,53 @@
+// The 32-byte header in front of every media message. Layout in proto/WIRE.md. Pure functions, any thread.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+enum class Opcode : uint8_t {
+  Control = 0x01,         // protobuf follows at once, no header
+  Asset = 0x10,           // SceneAsset: groom topology and head mesh
+  StrandKeyframe = 0x20,
+  StrandDelta = 0x21,
+  JpegFrame = 0x30,
+};
+
+inline constexpr size_t kFrameHeaderBytes = 32;
+inline constexpr uint32_t kMaxMediaPayloadBytes = 64u << 20;
+
+struct FrameHeader {
+  Opcode opcode = Opcode::StrandDelta;
+  uint8_t flags = 0;           // reserved, 0
+  uint16_t stream_id = 0;
+  uint32_t sequence = 0;       // counts per stream, from 1
+  uint32_t base_sequence = 0;  // a delta decodes only right after this one; 0 = none needed
+  uint32_t payload_bytes = 0;
+  int64_t sim_time_ns = 0;
+  int64_t send_time_ns = 0;    // server clock
+
+  bool operator==(const FrameHeader&) const = default;
+};
+
+std::array<std::byte, kFrameHeaderBytes> pack(const FrameHeader& header);
+
+/// Reads a header and checks opcode, limit and that exactly payload_bytes follow in `message`.
+Result<FrameHeader> unpack_frame_header(std::span<const std::byte> message);
+
+/// One encoded media message: header and payload in one buffer, ready for the socket; shared by all sessions.
+struct EncodedFrame {
+  FrameHeader header;
+  std::vector<std::byte> message;  // header + payload
+};
+using EncodedFramePtr = std::shared_ptr<const EncodedFrame>;
+
+EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte> payload);
+
+}  // namespace strandcast

@@ -1,0 +1,51 @@
+// Pictures: JPEG by libjpeg-turbo (frame stream), PNG by libpng (screenshots), animated WebP by libwebp (clips).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+inline constexpr uint32_t kMaxImageSide = 8192;
+
+/// 8-bit sRGB pixels, 4 bytes each (alpha 255), top row first.
+struct Image {
+  uint32_t width = 0;
+  uint32_t height = 0;
+  std::vector<uint8_t> rgba;  // (height x width x 4)
+
+  bool operator==(const Image&) const = default;
+};
+
+/// quality 1..100, 4:2:0.
+Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality);
+/// Untrusted input: size is read from the header and checked against kMaxImageSide before allocation.
+Result<Image> decode_jpeg(std::span<const std::byte> bytes);
+
+Status save_png(const std::filesystem::path& path, const Image& image);
+Result<Image> load_png(const std::filesystem::path& path);
+
+/// Writes an animated WebP frame by frame; all frames have the size of the first.
+class ClipWriter {
+ public:
+  static Result<ClipWriter> make(const std::filesystem::path& path, double frames_per_s);
+  ClipWriter(ClipWriter&&) noexcept;
+  ClipWriter& operator=(ClipWriter&&) noexcept;
+  ~ClipWriter();
+  Status add(const Image& image);
+  /// Writes the file. Call once.
+  Status finish();
+
+ private:
+  struct State;
+  explicit ClipWriter(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace strandcast

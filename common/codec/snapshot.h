@@ -1,0 +1,41 @@
+// Snapshot: one published state of all strands, quantised in head space. Immutable once published
+// (shared_ptr<const Snapshot>), so any thread may read it. Server frames and clients draw from this, never from the
+// solver's floats.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <vector>
+
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+struct Snapshot {
+  uint64_t tick = 0;               // simulation step number
+  int64_t sim_time_ns = 0;         // tick x step, from 0
+  int64_t motion_time_ns = 0;      // server clock at arrival of the newest motion sample in this state, 0 = none
+  Pose world_from_head;
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;       // per strand
+  float quantum_m = 0.0f;          // lattice step; error of a vertex <= quantum * sqrt(3) / 2
+  std::vector<int32_t> lattice;    // (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest
+
+  size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
+};
+
+/// |lattice| stays below this, so that sums of three of them fit in 32 bits; positions outside are clamped to it.
+inline constexpr int32_t kMaxLattice = 1 << 28;
+
+/// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less a
+/// margin for float rounding.
+float quantum_for_bound(float bound_m);
+
+/// Head-space positions in metres, (vertex_count x strand_count x vec3), vertex-major, strand fastest.
+std::vector<glm::vec3> positions_in_head(const Snapshot& snapshot);
+
+/// Hash of everything in a snapshot but motion_time_ns; equal on server and client for the same tick.
+uint64_t state_hash(const Snapshot& snapshot);
+
+}  // namespace strandcast

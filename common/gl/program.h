@@ -1,0 +1,82 @@
+// Linked GL programs from embedded shader sources: #include flattened by the host with a line table (Mesa loses
+// #line file ids), variants declared in the source by "#pragma variant NAME v0 v1 ...". Needs a current context.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/gl/objects.h"
+
+namespace strandcast::gl {
+
+/// Values of declared variants, for example {{"HAS_WIND", 1}}. Undeclared names and values are errors.
+using Variant = std::map<std::string, int>;
+
+struct VariantAxis {
+  std::string name;
+  std::vector<int> values;  // the first is the default
+};
+
+/// One shader file after flattening, with the way back from a line of it to file:line.
+struct FlatSource {
+  std::string text;
+  std::vector<std::pair<uint16_t, uint32_t>> line_origin;  // (line count) file index and line
+  std::vector<std::string> files;
+  std::vector<VariantAxis> axes;
+};
+
+/// Reads shader files by their path below shaders/ from the binary, or from a folder when one is given.
+class ShaderLibrary {
+ public:
+  ShaderLibrary() = default;
+  explicit ShaderLibrary(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  /// NotFound names the file (and who includes it); include cycles are errors.
+  Result<FlatSource> flatten(const std::string& path) const;
+  /// Every file that is a shader stage (.vert .tesc .tese .geom .frag .comp), sorted.
+  std::vector<std::string> stage_files() const;
+
+ private:
+  Result<std::string> load(const std::string& path) const;
+  std::optional<std::filesystem::path> folder_;
+};
+
+/// All combinations of the axes' values.
+std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes);
+
+class Program {
+ public:
+  Program() = default;
+  /// Stages by file extension. `captured`: varyings for transform feedback, interleaved. Errors carry the compiler's
+  /// message with file:line of the original source.
+  static Result<Program> make(const ShaderLibrary& library, const std::vector<std::string>& stage_paths,
+                              const Variant& variant, const std::vector<std::string>& captured = {});
+  void use() const;
+  uint32_t name() const { return handle_.name(); }
+
+  // Uniforms by name; unknown (or optimised away) names are ignored. Do not change which program is in use.
+  void set(std::string_view name, int value) const;
+  void set(std::string_view name, uint32_t value) const;
+  void set(std::string_view name, float value) const;
+  void set(std::string_view name, const glm::vec2& value) const;
+  void set(std::string_view name, const glm::vec3& value) const;
+  void set(std::string_view name, const glm::vec4& value) const;
+  void set(std::string_view name, const glm::mat4& value) const;
+
+ private:
+  int location(std::string_view name) const;
+  Handle<delete_program> handle_;
+  std::map<std::string, int, std::less<>> locations_;
+};
+
+/// Largest dispatch group count per dimension that every GL 4.5 device accepts.
+inline constexpr uint32_t kMaxGroupCount = 65'535;
+
+}  // namespace strandcast::gl

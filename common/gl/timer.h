@@ -1,0 +1,24 @@
+// Times GPU work: timer queries on hardware, glFinish and a wall clock on software renderers (whose queries lie).
+#pragma once
+
+#include <cstdint>
+
+#include "common/gl/egl_context.h"
+#include "common/gl/objects.h"
+
+namespace strandcast::gl {
+
+class GpuTimer {
+ public:
+  explicit GpuTimer(const DeviceInfo& info);
+  void begin();
+  /// Waits for the work and returns milliseconds since begin().
+  double end_ms();
+
+ private:
+  bool is_software_;
+  int64_t begin_ns_ = 0;
+  Handle<delete_query> query_;
+};
+
+}  // namespace strandcast::gl

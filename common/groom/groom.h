@@ -1,0 +1,59 @@
+// A groom: strands at rest in head space, structure of arrays. Plain data, immutable after loading. Loaders are in
+// tfx_loader.h and hair_loader.h, growth in procedural.h, resampling in resample.h.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+// Limits of every groom, wherever it comes from; checked before anything is allocated.
+inline constexpr uint32_t kMaxStrandCount = 200'000;
+inline constexpr uint32_t kMinVertexCount = 2;   // per strand
+inline constexpr uint32_t kMaxVertexCount = 64;  // per strand, after resampling
+inline constexpr uint32_t kMaxSourceVertexCount = 4'096;  // per strand in a file, before resampling
+inline constexpr uint64_t kMaxGroomVertices = 16'000'000;
+inline constexpr uint64_t kMaxGroomFileBytes = 512ull << 20;
+
+/// Which vertices follow the head exactly; the rest is simulated.
+enum class Pinning { Root, RootPair, BothEnds };  // vertex 0 | vertices 0 and 1 | 0, 1 and the last two
+
+struct Groom {
+  std::string name;
+  std::vector<uint32_t> offset;            // (strand_count + 1) first vertex of each strand
+  std::vector<glm::vec3> rest_position_m;  // (vertex total) head space, root first
+  std::vector<uint8_t> pinned;             // (vertex total) 1 = follows the head
+  std::vector<glm::vec2> root_uv;          // (strand_count) or empty
+
+  uint32_t strand_count() const { return offset.empty() ? 0u : static_cast<uint32_t>(offset.size() - 1); }
+  uint32_t vertex_count(uint32_t strand_index) const { return offset[strand_index + 1] - offset[strand_index]; }
+  /// Vertices per strand when all strands have the same number, else 0. The simulation needs a uniform groom.
+  uint32_t uniform_vertex_count() const;
+  /// Arc length of one strand, m.
+  float length_m(uint32_t strand_index) const;
+};
+
+/// Checks sizes, limits, finite coordinates within kMaxGroomExtent and that every strand has >= 2 vertices.
+Status validate(const Groom& groom);
+
+inline constexpr float kMaxGroomExtentM = 100.0f;  // |coordinate| in head space
+
+/// Three key strands between which followers are interpolated.
+using RootTriangle = glm::uvec3;
+
+/// Triangles of neighbouring roots (at most about 2 per strand), deterministic. Strands without a triangle are
+/// still drawn as themselves.
+std::vector<RootTriangle> make_root_triangles(const Groom& groom);
+
+/// Order of strands such that every prefix covers the head evenly, so that a prefix is a valid subset.
+std::vector<uint32_t> make_prefix_order(const Groom& groom);
+
+/// The groom with its strands in the given order; `order` is a permutation of 0..strand_count-1.
+Groom reorder(const Groom& groom, const std::vector<uint32_t>& order);
+
+}  // namespace strandcast

@@ -1,0 +1,41 @@
+// Triangle meshes: the scalp that hair grows on and the head that is drawn under it. Plain data.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+inline constexpr uint32_t kMaxMeshTriangles = 500'000;
+inline constexpr uint64_t kMaxMeshFileBytes = 64ull << 20;
+
+struct Mesh {
+  std::vector<glm::vec3> position_m;   // (vertex_count) head space
+  std::vector<glm::vec3> normal;       // (vertex_count) unit, outwards
+  std::vector<glm::uvec3> triangle;    // (triangle_count) counter-clockwise seen from outside
+};
+
+/// Wavefront OBJ: v, vn and f (polygons are fanned); normals are computed when absent. Coordinates are multiplied
+/// by unit_m. BadInput names file and line.
+Result<Mesh> load_obj(const std::filesystem::path& path, float unit_m);
+
+/// Hemispherical scalp cap of the given radius about `center_m`, open at the face and neck; about
+/// `vertex_target` evenly spread vertices with outward normals.
+Mesh make_scalp_cap(const glm::vec3& center_m, float radius_m, uint32_t vertex_target);
+
+/// The built-in head: cranium, face, ears and neck in the given size (cranium radius); origin as in head space.
+Mesh make_head(float radius_m);
+
+struct FittedSphere {
+  glm::vec3 center_m{0.0f};
+  float radius_m = 0.1f;
+};
+
+/// Least-squares sphere through points (algebraic fit); falls back to the bounding sphere for degenerate sets.
+FittedSphere fit_sphere(const std::vector<glm::vec3>& points_m);
+
+}  // namespace strandcast

@@ -1,0 +1,58 @@
+// The one renderer, used by the server's frame stream and by every client: expands key strands and followers by
+// tessellation (isolines, cubic Hermite along the strand, barycentric between three key strands), draws camera-facing
+// quads with Kajiya-Kay diffuse and Sadeghi specular lobes, and the head. Same inputs on one driver give the same
+// pixels. Needs a current GL 4.5 core context; all calls from its thread. Does not simulate, decode or do I/O.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <vector>
+
+#include "common/base/profile.h"
+#include "common/base/result.h"
+#include "common/codec/image_codec.h"
+#include "common/codec/scene_asset.h"
+#include "common/gl/egl_context.h"
+#include "common/gl/program.h"
+#include "common/scene/scene_desc.h"
+
+namespace strandcast {
+
+/// What to draw: strands in head space as a viewer has them after decoding (and blending).
+struct StrandPicture {
+  Pose world_from_head;
+  std::vector<glm::vec3> position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
+};
+
+struct RenderSize {
+  uint32_t width = 640;
+  uint32_t height = 360;
+};
+
+/// Milliseconds of the last draw, by pass.
+struct RenderProfile {
+  double expand_ms = 0.0;
+  double strands_ms = 0.0;
+  double head_ms = 0.0;
+  double resolve_ms = 0.0;
+  uint64_t drawn_strands = 0;
+  uint64_t drawn_segments = 0;
+};
+
+class Renderer {
+ public:
+  /// Compiles, allocates and uploads only what asset and look need.
+  static Result<std::unique_ptr<Renderer>> make(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device,
+                                                const SceneAsset& asset, const LookDesc& look);
+  virtual ~Renderer() = default;
+
+  /// Draws into an internal target of the given size (4x multisampled), resolved to sRGB.
+  virtual Status draw(const StrandPicture& picture, const CameraDesc& camera, RenderSize size) = 0;
+  /// Pixels of the last draw, top row first.
+  virtual Image read_image() = 0;
+  /// Copies the last draw to the framebuffer object `target` (0 = window), scaled to its size.
+  virtual void blit_to(uint32_t target, RenderSize target_size) = 0;
+  virtual const RenderProfile& profile() const = 0;
+};
+
+}  // namespace strandcast

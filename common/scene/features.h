@@ -1,0 +1,42 @@
+// SceneFeatures: the only place that decides what runs. Passes, buffers and shader variants ask nothing else.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/scene/scene_desc.h"
+
+namespace strandcast {
+
+/// Facts that may change while running, kept apart from the scene's own.
+struct RuntimeFacts {
+  bool has_wind_stream = false;
+  uint32_t strand_viewers = 0;
+  uint32_t frame_viewers = 0;
+  bool is_recording_pictures = false;
+};
+
+/// Positive facts; all false = the barest simulation.
+struct SceneFeatures {
+  bool has_wind = false;           // mean, gusts or a wind stream
+  bool has_turbulence = false;     // wind varies over the head
+  bool has_colliders = false;
+  bool has_strand_viewers = false;
+  bool has_frame_viewers = false;
+  bool has_followers = false;
+  bool has_head_mesh = false;
+
+  bool operator==(const SceneFeatures&) const = default;
+};
+
+SceneFeatures analyse(const SceneDesc& scene, const RuntimeFacts& facts);
+
+/// One fact in words: name, value, and why it has that value ("scene.wind has no mean and no gusts").
+struct FeatureReason {
+  std::string name;
+  bool value = false;
+  std::string reason;
+};
+std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& facts);
+
+}  // namespace strandcast

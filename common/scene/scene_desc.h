@@ -1,0 +1,114 @@
+// SceneDesc: a validated scene in SI units. Made by scene_file.h from protobuf text (proto/strandcast/v1/scene.proto)
+// or by built_in_scene(); everything downstream reads only this. Plain data.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/groom/groom.h"
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+enum class UpAxis { Y, Z };
+
+/// Hair grown along the normals of a hemispherical scalp mesh.
+struct ProceduralGroomDesc {
+  uint32_t strand_count = 2000;
+  uint32_t vertex_count = 16;
+  float length_m = 0.28f;
+  float length_variation = 0.12f;  // relative, uniform +-
+  float curl_radius_m = 0.004f;    // 0 = straight
+  float curl_turns = 3.0f;         // along the strand
+  uint32_t seed = 1;
+};
+
+struct FileGroomDesc {
+  std::filesystem::path path;       // .tfx or .hair
+  float unit_m = 1.0f;              // metres per file unit
+  UpAxis up_axis = UpAxis::Y;
+  glm::vec3 origin{0.0f};           // point of the file (in file units, after the up axis) that becomes the head joint
+  uint32_t vertex_count = 0;        // resample to this many; 0 = keep (rounded into the limits)
+  Pinning pinning = Pinning::RootPair;
+  bool has_pinning = false;         // false: as the file says
+};
+
+struct SphereCollider {
+  glm::vec3 center_m{0.0f};  // head space: colliders follow the head
+  float radius_m = 0.1f;
+};
+inline constexpr uint32_t kMaxSphereColliders = 16;
+
+/// Wind from the scene itself; a wind stream, once one is connected, replaces it.
+struct WindDesc {
+  glm::vec3 mean_mps{0.0f};       // world
+  float gust_intensity = 0.0f;    // standard deviation over mean speed, 0 = steady
+  float gust_length_m = 9.0f;     // integral length of the turbulence
+  uint32_t seed = 1;
+};
+
+struct SolverDesc {
+  std::string name = "dftl";
+  std::map<std::string, double> parameters;  // by the names in the solver's table row; missing = its default
+};
+
+struct HeadDesc {
+  std::filesystem::path mesh_path;  // OBJ in the groom's units and axes; empty = built-in head
+  float radius_m = 0.095f;          // of the built-in cranium; 0 = fitted to the roots
+  bool is_visible = true;
+};
+
+struct LookDesc {
+  glm::vec3 root_color{0.11f, 0.055f, 0.025f};  // linear RGB, 0..1
+  glm::vec3 tip_color{0.36f, 0.19f, 0.085f};
+  float strand_radius_m = 0.00012f;  // as drawn: a drawn strand stands for several real ones
+  float tip_scale = 0.25f;           // radius at the tip over radius at the root
+  uint32_t followers = 3;            // drawn strands per root triangle, beside the key strands
+  uint32_t segments = 3;             // drawn segments between two simulated vertices, 1..8
+  glm::vec3 light_direction{-0.45f, -0.75f, -0.5f};  // travels this way, world
+  glm::vec3 light_color{1.0f, 0.97f, 0.92f};
+  float ambient = 0.22f;
+  glm::vec3 background{0.16f, 0.17f, 0.19f};
+  glm::vec3 skin_color{0.55f, 0.38f, 0.29f};
+};
+
+/// Camera about the head: it follows the head's position, not its rotation.
+struct CameraDesc {
+  glm::vec3 offset_m{0.25f, 0.08f, 0.75f};  // from the point looked at, world axes
+  glm::vec3 target_m{0.0f, -0.02f, 0.0f};   // from the head joint, world axes
+  float fov_y_rad = 0.61f;
+};
+
+struct StreamDesc {
+  std::string codec = "delta";  // "delta" or "raw"
+  float bound_m = 1e-4f;        // announced Euclidean error bound, 2e-5 .. 5e-4
+  uint32_t frame_width = 640, frame_height = 360;
+  uint32_t jpeg_quality = 80;
+  double frame_rate_hz = 15.0;  // rendered frames, at most
+};
+
+struct SceneDesc {
+  std::string name = "default";
+  std::variant<ProceduralGroomDesc, FileGroomDesc> groom;
+  HeadDesc head;
+  SolverDesc solver;
+  double step_rate_hz = 60.0;  // 10 .. 1000
+  uint32_t substeps = 1;       // 1 .. 64
+  glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
+  std::vector<SphereCollider> colliders;
+  bool has_auto_collider = true;  // one sphere fitted to the roots, when `colliders` is empty
+  WindDesc wind;
+  LookDesc look;
+  CameraDesc camera;
+  StreamDesc stream;
+};
+
+/// The scene that runs when no file is given: 2,000 procedural strands x 16, head, gentle gusts.
+SceneDesc built_in_scene();
+
+}  // namespace strandcast

@@ -1,0 +1,29 @@
+// Scene files: protobuf text against proto/strandcast/v1/scene.proto, validated into a SceneDesc. Unknown fields,
+// wrong types and values out of range are errors with file, line and column (or the field's path).
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/scene/scene_desc.h"
+
+namespace strandcast {
+
+inline constexpr uint64_t kMaxSceneFileBytes = 1u << 20;
+
+/// Loads a scene; relative paths in it are resolved against the scene file's folder. `overrides` are "path=value"
+/// pairs applied before validation, for example "stream.bound_m=0.0005" or "solver.name=dftl_parallel".
+Result<SceneDesc> load_scene(const std::filesystem::path& path, const std::vector<std::string>& overrides);
+
+/// Parses scene text; `place` names it in errors.
+Result<SceneDesc> parse_scene(const std::string& text, const std::string& place,
+                              const std::vector<std::string>& overrides);
+
+/// The built-in scene with overrides applied.
+Result<SceneDesc> built_in_scene_with(const std::vector<std::string>& overrides);
+
+/// The scene as protobuf text that parse_scene reads back to an equal SceneDesc.
+std::string to_text(const SceneDesc& scene);
+
+}  // namespace strandcast

@@ -1,0 +1,65 @@
+// Solver: one strand model behind a small interface; the table in solver_registry.h lists all of them. A solver is
+// used from one thread; GPU solvers need that thread's GL context. A solver never allocates in substep().
+//
+// Frame of the state: world axes with the origin at the head joint of the current step ("head-relative"). It keeps
+// float precision anywhere in the world; each step the origin moves by head_shift_m.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/groom/groom.h"
+#include "common/scene/features.h"
+#include "common/scene/scene_desc.h"
+
+namespace strandcast {
+
+/// A travelling wave of the gust field: velocity += amplitude * sin(dot(wave_vector, x) - phase).
+struct GustWave {
+  glm::vec3 amplitude_mps{0.0f};
+  glm::vec3 wave_vector_rad_per_m{0.0f};
+  float phase_rad = 0.0f;
+};
+inline constexpr uint32_t kMaxGustWaves = 8;
+
+/// Everything one substep needs, at its end time.
+struct StepInput {
+  double h_s = 1.0 / 60.0;                       // substep
+  glm::dquat world_from_head{1.0, 0.0, 0.0, 0.0};  // rotation of the head at the end of the substep
+  glm::dvec3 head_shift_m{0.0};                  // movement of the head joint during the substep, world
+  glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
+  glm::dvec3 wind_mps{0.0};                      // mean wind at the head, world
+  std::vector<GustWave> gusts;                   // at most kMaxGustWaves; x is relative to the head joint
+  std::vector<SphereCollider> colliders;         // centres in head-relative world axes, at the end of the substep
+};
+
+/// State as read back, head-relative world axes. (vertex_count x strand_count) vertex-major, strand fastest.
+struct SolverState {
+  std::vector<glm::vec3> position_m;
+  std::vector<glm::vec3> velocity_mps;
+};
+
+using SolverParameters = std::map<std::string, double>;
+
+class Solver {
+ public:
+  virtual ~Solver() = default;
+  /// Sets every strand to rest under the given head rotation; allocates. `groom` is uniform.
+  virtual Status load(const Groom& groom, const glm::dquat& world_from_head) = 0;
+  /// Advances by input.h_s.
+  virtual void substep(const StepInput& input) = 0;
+  /// Copies the state out; resizes `state` on first use only.
+  virtual void read(SolverState& state) = 0;
+  /// Replaces positions and velocities (same layout as read).
+  virtual void write(const SolverState& state) = 0;
+  /// Bytes the solver keeps on its device.
+  virtual uint64_t memory_bytes() const = 0;
+};
+
+}  // namespace strandcast

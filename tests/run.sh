@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds with warnings as errors and runs every test. Arguments go to ctest
+# (for example: bash tests/run.sh -L unit).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+bash deploy/install_deps.sh
+cmake --preset ci >/dev/null
+cmake --build --preset ci
+ctest --preset ci -j2 "$@"
