@@ -1,0 +1,54 @@
+// Head motion and wind as functions of time, for the feeder and for tests. Built-in generators are deterministic.
+// Files: bvh.h and wind_csv.h. Not the network streams themselves (common/wire, server/input).
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+/// Head poses at a fixed rate; loops seamlessly only if the data does.
+struct MotionClip {
+  double frame_s = 1.0 / 60.0;
+  std::vector<Pose> world_from_head;  // one per frame
+
+  double duration_s() const;
+  /// Pose at time t (lerp/slerp), clamped to the clip.
+  Pose sample(double t_s) const;
+};
+
+/// Wind velocity over time at the head, world axes.
+struct WindSeries {
+  std::vector<double> time_s;            // increasing, from 0
+  std::vector<glm::vec3> velocity_mps;
+
+  double duration_s() const;
+  glm::vec3 sample(double t_s) const;    // linear, clamped
+};
+
+/// Built-in head motion: walking bob, looks to the sides, nods and one fast turn, repeating every
+/// kBuiltInMotionPeriodS; smooth (twice differentiable) everywhere.
+Pose built_in_motion(double t_s);
+inline constexpr double kBuiltInMotionPeriodS = 12.0;
+
+/// Seeded turbulence about a mean wind: a sum of harmonics whose amplitudes follow the von Karman spectrum with the
+/// given intensity (standard deviation / mean speed) and integral length. Any t; same seed, same wind.
+class GustGenerator {
+ public:
+  GustGenerator(const glm::vec3& mean_mps, float intensity, float length_m, uint32_t seed);
+  glm::vec3 sample(double t_s) const;
+
+ private:
+  struct Harmonic {
+    glm::dvec3 amplitude_mps;
+    double omega_rad_per_s;
+    glm::dvec3 phase_rad;
+  };
+  glm::dvec3 mean_mps_;
+  std::vector<Harmonic> harmonics_;
+};
+
+}  // namespace strandcast
