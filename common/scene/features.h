@@ -18,8 +18,8 @@ struct RuntimeFacts {
 
 /// Positive facts; all false = the barest simulation.
 struct SceneFeatures {
-  bool has_wind = false;           // mean, gusts or a wind stream
-  bool has_turbulence = false;     // wind varies over the head
+  bool has_wind = false;        // mean, gusts or a wind stream
+  bool has_turbulence = false;  // wind varies over the head
   bool has_colliders = false;
   bool has_strand_viewers = false;
   bool has_frame_viewers = false;

@@ -1,5 +1,6 @@
-// SceneDesc: a validated scene in SI units. Made by scene_file.h from protobuf text (proto/strandcast/v1/scene.proto)
-// or by built_in_scene(); everything downstream reads only this. Plain data.
+// SceneDesc: a validated scene in SI units. Made by scene_file.h from protobuf text
+// (proto/strandcast/v1/scene.proto) or by built_in_scene(); everything downstream reads only this. Plain
+// data.
 #pragma once
 
 #include <cstdint>
@@ -26,41 +27,53 @@ struct ProceduralGroomDesc {
   float curl_radius_m = 0.004f;    // 0 = straight
   float curl_turns = 3.0f;         // along the strand
   uint32_t seed = 1;
+
+  bool operator==(const ProceduralGroomDesc&) const = default;
 };
 
 struct FileGroomDesc {
-  std::filesystem::path path;       // .tfx or .hair
-  float unit_m = 1.0f;              // metres per file unit
+  std::filesystem::path path;  // .tfx or .hair
+  float unit_m = 1.0f;         // metres per file unit
   UpAxis up_axis = UpAxis::Y;
-  glm::vec3 origin{0.0f};           // point of the file (in file units, after the up axis) that becomes the head joint
-  uint32_t vertex_count = 0;        // resample to this many; 0 = keep (rounded into the limits)
+  glm::vec3 origin{0.0f};  // point of the file (in file units, after the up axis) that becomes the head joint
+  uint32_t vertex_count = 0;  // resample to this many; 0 = keep (rounded into the limits)
   Pinning pinning = Pinning::RootPair;
-  bool has_pinning = false;         // false: as the file says
+  bool has_pinning = false;  // false: as the file says
+
+  bool operator==(const FileGroomDesc&) const = default;
 };
 
 struct SphereCollider {
   glm::vec3 center_m{0.0f};  // head space: colliders follow the head
   float radius_m = 0.1f;
+
+  bool operator==(const SphereCollider&) const = default;
 };
 inline constexpr uint32_t kMaxSphereColliders = 16;
 
 /// Wind from the scene itself; a wind stream, once one is connected, replaces it.
 struct WindDesc {
-  glm::vec3 mean_mps{0.0f};       // world
-  float gust_intensity = 0.0f;    // standard deviation over mean speed, 0 = steady
-  float gust_length_m = 9.0f;     // integral length of the turbulence
+  glm::vec3 mean_mps{0.0f};     // world
+  float gust_intensity = 0.0f;  // standard deviation over mean speed, 0 = steady
+  float gust_length_m = 9.0f;   // integral length of the turbulence
   uint32_t seed = 1;
+
+  bool operator==(const WindDesc&) const = default;
 };
 
 struct SolverDesc {
   std::string name = "dftl";
   std::map<std::string, double> parameters;  // by the names in the solver's table row; missing = its default
+
+  bool operator==(const SolverDesc&) const = default;
 };
 
 struct HeadDesc {
   std::filesystem::path mesh_path;  // OBJ in the groom's units and axes; empty = built-in head
   float radius_m = 0.095f;          // of the built-in cranium; 0 = fitted to the roots
   bool is_visible = true;
+
+  bool operator==(const HeadDesc&) const = default;
 };
 
 struct LookDesc {
@@ -75,6 +88,8 @@ struct LookDesc {
   float ambient = 0.22f;
   glm::vec3 background{0.16f, 0.17f, 0.19f};
   glm::vec3 skin_color{0.55f, 0.38f, 0.29f};
+
+  bool operator==(const LookDesc&) const = default;
 };
 
 /// Camera about the head: it follows the head's position, not its rotation.
@@ -82,6 +97,8 @@ struct CameraDesc {
   glm::vec3 offset_m{0.25f, 0.08f, 0.75f};  // from the point looked at, world axes
   glm::vec3 target_m{0.0f, -0.02f, 0.0f};   // from the head joint, world axes
   float fov_y_rad = 0.61f;
+
+  bool operator==(const CameraDesc&) const = default;
 };
 
 struct StreamDesc {
@@ -90,6 +107,8 @@ struct StreamDesc {
   uint32_t frame_width = 640, frame_height = 360;
   uint32_t jpeg_quality = 80;
   double frame_rate_hz = 15.0;  // rendered frames, at most
+
+  bool operator==(const StreamDesc&) const = default;
 };
 
 struct SceneDesc {
@@ -106,6 +125,8 @@ struct SceneDesc {
   LookDesc look;
   CameraDesc camera;
   StreamDesc stream;
+
+  bool operator==(const SceneDesc&) const = default;
 };
 
 /// The scene that runs when no file is given: 2,000 procedural strands x 16, head, gentle gusts.

@@ -1,5 +1,5 @@
-// Scene files: protobuf text against proto/strandcast/v1/scene.proto, validated into a SceneDesc. Unknown fields,
-// wrong types and values out of range are errors with file, line and column (or the field's path).
+// Scene files: protobuf text against proto/strandcast/v1/scene.proto, validated into a SceneDesc. Unknown
+// fields, wrong types and values out of range are errors with file, line and column (or the field's path).
 #pragma once
 
 #include <filesystem>
@@ -12,8 +12,10 @@ namespace strandcast {
 
 inline constexpr uint64_t kMaxSceneFileBytes = 1u << 20;
 
-/// Loads a scene; relative paths in it are resolved against the scene file's folder. `overrides` are "path=value"
-/// pairs applied before validation, for example "stream.bound_m=0.0005" or "solver.name=dftl_parallel".
+/// Loads a scene; relative paths in it are resolved against the scene file's folder. `overrides` are
+/// "path=value" pairs applied before validation, for example "stream.bound_m=0.0005",
+/// "solver.parameters.damping=0.9" or "colliders.0.radius_m=0.1"; relative paths in them start at the current
+/// folder. The solver's name and parameters are checked by whoever owns the solver table.
 Result<SceneDesc> load_scene(const std::filesystem::path& path, const std::vector<std::string>& overrides);
 
 /// Parses scene text; `place` names it in errors.
@@ -22,6 +24,9 @@ Result<SceneDesc> parse_scene(const std::string& text, const std::string& place,
 
 /// The built-in scene with overrides applied.
 Result<SceneDesc> built_in_scene_with(const std::vector<std::string>& overrides);
+
+/// A scene with overrides applied and validated again, for changes while running.
+Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::string>& overrides);
 
 /// The scene as protobuf text that parse_scene reads back to an equal SceneDesc.
 std::string to_text(const SceneDesc& scene);

@@ -1,0 +1,158 @@
+// The one list of scene fields with their ranges, walked by the reader and the writer of scene files so that
+// the two cannot disagree. Private to common/scene. Names are those of scene.proto; a name that scene.proto
+// lacks is a broken invariant found by the first test.
+#pragma once
+
+#include <limits>
+
+#include "common/scene/scene_desc.h"
+
+namespace strandcast::scene_fields {
+
+struct Range {
+  double minimum = 0.0;
+  double maximum = 0.0;
+  const char* unit = "";  // printed after the range
+};
+
+// What a person can mean; wider only costs clear errors.
+inline constexpr size_t kMaxNameBytes = 64;
+inline constexpr size_t kMaxPathBytes = 4096;
+inline constexpr size_t kMaxSolverParameters = 64;
+inline constexpr double kMinDirectionLength = 1e-3;
+
+inline constexpr Range kStrandCount{1, kMaxStrandCount, ""};
+inline constexpr Range kVertexCount{kMinVertexCount, kMaxVertexCount, ""};
+inline constexpr Range kResampledVertexCount{0, kMaxVertexCount, ""};
+inline constexpr Range kStrandLength{0.005, 3.0, "m"};
+inline constexpr Range kLengthVariation{0.0, 0.95, ""};
+inline constexpr Range kCurlRadius{0.0, 0.1, "m"};
+inline constexpr Range kCurlTurns{0.0, 100.0, "turns"};
+inline constexpr Range kSeed{0, std::numeric_limits<uint32_t>::max(), ""};
+inline constexpr Range kUnit{1e-6, 1e3, "m"};
+inline constexpr Range kFileOrigin{-1e6, 1e6, "file units"};
+inline constexpr Range kHeadRadius{0.0, 1.0, "m"};
+inline constexpr Range kSolverParameter{-std::numeric_limits<double>::max(),
+                                        std::numeric_limits<double>::max(), ""};
+inline constexpr Range kStepRate{10.0, 1000.0, "Hz"};
+inline constexpr Range kSubsteps{1, 64, ""};
+inline constexpr Range kGravity{-1000.0, 1000.0, "m/s^2"};
+inline constexpr Range kColliderCenter{-kMaxGroomExtentM, kMaxGroomExtentM, "m"};
+inline constexpr Range kColliderRadius{1e-4, 10.0, "m"};
+inline constexpr Range kWindSpeed{-100.0, 100.0, "m/s"};
+inline constexpr Range kGustIntensity{0.0, 3.0, ""};
+inline constexpr Range kGustLength{0.1, 1000.0, "m"};
+inline constexpr Range kFraction{0.0, 1.0, ""};
+inline constexpr Range kLightColor{0.0, 100.0, ""};
+inline constexpr Range kDrawnRadius{1e-6, 0.01, "m"};
+inline constexpr Range kFollowers{0, 64, ""};
+inline constexpr Range kSegments{1, 8, ""};
+inline constexpr Range kDirection{-1e3, 1e3, ""};
+inline constexpr Range kCameraOffset{-100.0, 100.0, "m"};
+inline constexpr Range kFieldOfView{0.02, 2.8, "rad"};
+inline constexpr Range kStreamBound{2e-5, 5e-4, "m"};
+inline constexpr Range kFrameSize{16, 4096, "pixels"};
+inline constexpr Range kJpegQuality{1, 100, ""};
+inline constexpr Range kFrameRate{0.1, 240.0, "Hz"};
+
+template <class Visitor>
+void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& groom) {
+  if (!v.chooses("file", std::holds_alternative<FileGroomDesc>(groom))) {
+    auto* procedural = std::get_if<ProceduralGroomDesc>(&groom);
+    if (!procedural) procedural = &groom.emplace<ProceduralGroomDesc>();
+    v.group("procedural", [&] {
+      v.number("strand_count", procedural->strand_count, kStrandCount);
+      v.number("vertex_count", procedural->vertex_count, kVertexCount);
+      v.number("length_m", procedural->length_m, kStrandLength);
+      v.number("length_variation", procedural->length_variation, kLengthVariation);
+      v.number("curl_radius_m", procedural->curl_radius_m, kCurlRadius);
+      v.number("curl_turns", procedural->curl_turns, kCurlTurns);
+      v.number("seed", procedural->seed, kSeed);
+    });
+    return;
+  }
+  auto* file = std::get_if<FileGroomDesc>(&groom);
+  if (!file) file = &groom.emplace<FileGroomDesc>();
+  v.group("file", [&] {
+    v.path("path", file->path);
+    v.require("path", !file->path.empty(),
+              "is empty: name the groom file, for example --set groom.file.path=FILE.tfx");
+    v.number("unit_m", file->unit_m, kUnit);
+    v.choice("up_axis", file->up_axis, UpAxis::Z);
+    v.vector("origin", file->origin, kFileOrigin);
+    v.number("vertex_count", file->vertex_count, kResampledVertexCount);
+    v.require("vertex_count", file->vertex_count == 0 || file->vertex_count >= kMinVertexCount,
+              "is 1, it must be 0 (keep) or within 2 .. 64");
+    file->has_pinning = v.chooses("pinning", file->has_pinning);
+    if (file->has_pinning) v.choice("pinning", file->pinning, Pinning::BothEnds);
+  });
+}
+
+template <class Visitor>
+void visit_look(Visitor& v, LookDesc& look) {
+  v.color("root_color", look.root_color, kFraction);
+  v.color("tip_color", look.tip_color, kFraction);
+  v.number("strand_radius_m", look.strand_radius_m, kDrawnRadius);
+  v.number("tip_scale", look.tip_scale, kFraction);
+  v.number("followers", look.followers, kFollowers);
+  v.number("segments", look.segments, kSegments);
+  v.vector("light_direction", look.light_direction, kDirection);
+  v.require("light_direction", glm::length(look.light_direction) >= kMinDirectionLength,
+            "is almost zero, it must be at least 0.001 long");
+  v.color("light_color", look.light_color, kLightColor);
+  v.number("ambient", look.ambient, kFraction);
+  v.color("background", look.background, kFraction);
+  v.color("skin_color", look.skin_color, kFraction);
+}
+
+template <class Visitor>
+void visit_stream(Visitor& v, StreamDesc& stream) {
+  v.text("codec", stream.codec, kMaxNameBytes);
+  v.require("codec", stream.codec == "delta" || stream.codec == "raw", "is unknown (known: delta, raw)");
+  v.number("bound_m", stream.bound_m, kStreamBound);
+  v.number("frame_width", stream.frame_width, kFrameSize);
+  v.number("frame_height", stream.frame_height, kFrameSize);
+  v.number("jpeg_quality", stream.jpeg_quality, kJpegQuality);
+  v.number("frame_rate_hz", stream.frame_rate_hz, kFrameRate);
+}
+
+/// Shows every field of `scene` to the visitor, in the order of scene.proto.
+template <class Visitor>
+void visit_scene(Visitor& v, SceneDesc& scene) {
+  v.text("name", scene.name, kMaxNameBytes);
+  v.group("groom", [&] { visit_groom(v, scene.groom); });
+  v.group("head", [&] {
+    v.path("mesh_path", scene.head.mesh_path);
+    v.number("radius_m", scene.head.radius_m, kHeadRadius);
+    v.flag("is_visible", scene.head.is_visible);
+  });
+  v.group("solver", [&] {
+    v.text("name", scene.solver.name, kMaxNameBytes);
+    v.map("parameters", scene.solver.parameters, kSolverParameter, kMaxSolverParameters);
+  });
+  v.number("step_rate_hz", scene.step_rate_hz, kStepRate);
+  v.number("substeps", scene.substeps, kSubsteps);
+  v.vector("gravity_mps2", scene.gravity_mps2, kGravity);
+  v.repeated("colliders", scene.colliders, kMaxSphereColliders, [&](SphereCollider& collider) {
+    v.vector("center_m", collider.center_m, kColliderCenter);
+    v.number("radius_m", collider.radius_m, kColliderRadius);
+  });
+  v.flag("has_auto_collider", scene.has_auto_collider);
+  v.group("wind", [&] {
+    v.vector("mean_mps", scene.wind.mean_mps, kWindSpeed);
+    v.number("gust_intensity", scene.wind.gust_intensity, kGustIntensity);
+    v.number("gust_length_m", scene.wind.gust_length_m, kGustLength);
+    v.number("seed", scene.wind.seed, kSeed);
+  });
+  v.group("look", [&] { visit_look(v, scene.look); });
+  v.group("camera", [&] {
+    v.vector("offset_m", scene.camera.offset_m, kCameraOffset);
+    v.require("offset_m", glm::length(scene.camera.offset_m) >= kMinDirectionLength,
+              "is almost zero, it must be at least 0.001 m long");
+    v.vector("target_m", scene.camera.target_m, kCameraOffset);
+    v.number("fov_y_rad", scene.camera.fov_y_rad, kFieldOfView);
+  });
+  v.group("stream", [&] { visit_stream(v, scene.stream); });
+}
+
+}  // namespace strandcast::scene_fields

@@ -1,0 +1,399 @@
+#include "common/scene/scene_file.h"
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/io/tokenizer.h>
+#include <google/protobuf/text_format.h>
+
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/base/file.h"
+#include "common/scene/scene_fields.h"
+#include "common/scene/scene_override.h"
+#include "strandcast/v1/scene.pb.h"
+
+namespace strandcast {
+namespace {
+
+namespace pb = google::protobuf;
+using scene_fields::Range;
+
+constexpr int kMaxNesting = 16;  // scene.proto nests four deep
+
+const pb::FieldDescriptor& field_of(const pb::Message& message, const char* name) {
+  const auto* field = message.GetDescriptor()->FindFieldByName(name);
+  CHECK(field != nullptr);
+  return *field;
+}
+
+std::string place_at(const std::string& place, int line, int column) {
+  return fmt::format("{}:{}:{}", place, line + 1, column + 1);
+}
+
+/// Where values came from, for error messages.
+struct Source {
+  std::string place;
+  const std::vector<std::string>* overrides = nullptr;
+};
+
+bool is_printable_utf8(const std::string& text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[i]);
+    if (lead < 0x20 || lead == 0x7f) return false;
+    const size_t length = lead < 0x80           ? 1
+                          : (lead >> 5) == 0x6  ? 2
+                          : (lead >> 4) == 0xe  ? 3
+                          : (lead >> 3) == 0x1e ? 4
+                                                : 0;
+    if (length == 0 || i + length > text.size()) return false;
+    uint32_t code = length == 1 ? lead : lead & (0x7fu >> length);
+    for (size_t k = 1; k < length; ++k) {
+      const auto next = static_cast<unsigned char>(text[i + k]);
+      if ((next >> 6) != 0x2) return false;
+      code = code << 6 | (next & 0x3fu);
+    }
+    constexpr uint32_t kSmallest[] = {0, 0, 0x80, 0x800, 0x10000};
+    if (code < kSmallest[length] || code > 0x10ffff || (code >= 0xd800 && code <= 0xdfff)) return false;
+    i += length;
+  }
+  return true;
+}
+
+/// Copies a parsed message into a SceneDesc and checks every value that was given; keeps the first error.
+class Reader {
+ public:
+  Reader(const pb::Message& message, const pb::TextFormat::ParseInfoTree* tree, Source source)
+      : message_(&message), tree_(tree), source_(std::move(source)) {}
+
+  Status status() const { return error_ ? Status(*error_) : Status(); }
+
+  bool chooses(const char* name, bool) { return has(name); }
+
+  template <class T>
+  void number(const char* name, T& value, const Range& range) {
+    const auto& field = field_of(*message_, name);
+    if (!has(name)) return;
+    value = get<T>(field);
+    const bool in_range = value >= static_cast<T>(range.minimum) && value <= static_cast<T>(range.maximum);
+    if (!std::isfinite(static_cast<double>(value)) || !in_range)
+      fail(name, fmt::format("is {}, it must be within {:g} .. {:g}{}{}", value, range.minimum, range.maximum,
+                             *range.unit ? " " : "", range.unit));
+  }
+  void flag(const char* name, bool& value) {
+    const auto& field = field_of(*message_, name);
+    if (has(name)) value = message_->GetReflection()->GetBool(*message_, &field);
+  }
+  template <class Enum>
+  void choice(const char* name, Enum& value, Enum last) {
+    const auto& field = field_of(*message_, name);
+    if (!has(name)) return;
+    const int given = message_->GetReflection()->GetEnumValue(*message_, &field);
+    if (given < 0 || given > static_cast<int>(last))
+      return fail(name, fmt::format("is {}, which is not one of its values", given));
+    value = static_cast<Enum>(given);
+  }
+  void text(const char* name, std::string& value, size_t limit_bytes) {
+    const auto& field = field_of(*message_, name);
+    if (!has(name)) return;
+    const std::string given = message_->GetReflection()->GetString(*message_, &field);
+    if (given.empty() || given.size() > limit_bytes || !is_printable_utf8(given))
+      return fail(name, fmt::format("must be 1 .. {} bytes of printable text", limit_bytes));
+    value = given;
+  }
+  void path(const char* name, std::filesystem::path& value) {
+    const auto& field = field_of(*message_, name);
+    if (!has(name)) return;
+    const std::string given = message_->GetReflection()->GetString(*message_, &field);
+    if (given.size() > scene_fields::kMaxPathBytes || !is_printable_utf8(given))
+      return fail(name,
+                  fmt::format("must be at most {} bytes of printable text", scene_fields::kMaxPathBytes));
+    value = given;
+  }
+  template <class Vector>
+  void vector(const char* name, Vector& value, const Range& range) {
+    components(name, value, range, {"x", "y", "z"});
+  }
+  void color(const char* name, glm::vec3& value, const Range& range) {
+    components(name, value, range, {"r", "g", "b"});
+  }
+  void map(const char* name, std::map<std::string, double>& value, const Range&, size_t limit) {
+    const auto& field = field_of(*message_, name);
+    const auto* reflection = message_->GetReflection();
+    const int size = reflection->FieldSize(*message_, &field);
+    for (int i = 0; i < size; ++i) {
+      const auto& entry = reflection->GetRepeatedMessage(*message_, &field, i);
+      const std::string key = entry.GetReflection()->GetString(entry, field.message_type()->map_key());
+      const double number = entry.GetReflection()->GetDouble(entry, field.message_type()->map_value());
+      if (key.empty() || key.size() > scene_fields::kMaxNameBytes || !is_printable_utf8(key))
+        return fail(name, "has a name that is empty, too long or not printable");
+      if (!std::isfinite(number))
+        return fail(name, fmt::format("gives {} the value {}, which is not finite", key, number));
+      value[key] = number;
+    }
+    if (value.size() > limit) fail(name, fmt::format("has {} entries, the limit is {}", value.size(), limit));
+  }
+  template <class Body>
+  void group(const char* name, Body body) {
+    const auto& field = field_of(*message_, name);
+    descend(name, message_->GetReflection()->GetMessage(*message_, &field), field, -1, body);
+  }
+  template <class T, class Body>
+  void repeated(const char* name, std::vector<T>& values, size_t limit, Body body) {
+    const auto& field = field_of(*message_, name);
+    const int size = message_->GetReflection()->FieldSize(*message_, &field);
+    if (static_cast<size_t>(size) > limit)
+      return fail(name, fmt::format("has {} entries, the limit is {}", size, limit));
+    values.assign(static_cast<size_t>(size), T{});
+    for (int i = 0; i < size; ++i)
+      descend(fmt::format("{}.{}", name, i),
+              message_->GetReflection()->GetRepeatedMessage(*message_, &field, i), field, i,
+              [&] { body(values[static_cast<size_t>(i)]); });
+  }
+  void require(const char* name, bool holds, const std::string& sentence) {
+    if (!holds) fail(name, sentence);
+  }
+
+ private:
+  bool has(const char* name) const {
+    return message_->GetReflection()->HasField(*message_, &field_of(*message_, name));
+  }
+
+  template <class T>
+  T get(const pb::FieldDescriptor& field) const {
+    const auto* reflection = message_->GetReflection();
+    switch (field.cpp_type()) {
+      case pb::FieldDescriptor::CPPTYPE_DOUBLE:
+        return static_cast<T>(reflection->GetDouble(*message_, &field));
+      case pb::FieldDescriptor::CPPTYPE_FLOAT:
+        return static_cast<T>(reflection->GetFloat(*message_, &field));
+      default:
+        return static_cast<T>(reflection->GetUInt32(*message_, &field));
+    }
+  }
+
+  template <class Vector>
+  void components(const char* name, Vector& value, const Range& range,
+                  const std::array<const char*, 3>& names) {
+    group(name, [&] {
+      for (int i = 0; i < 3; ++i) number(names[static_cast<size_t>(i)], value[i], range);
+    });
+  }
+
+  template <class Body>
+  void descend(const std::string& name, const pb::Message& inner, const pb::FieldDescriptor& field, int index,
+               Body body) {
+    const auto* outer_message = message_;
+    const auto* outer_tree = tree_;
+    const std::string outer_path = path_;
+    message_ = &inner;
+    tree_ = tree_ ? tree_->GetTreeForNested(&field, index) : nullptr;
+    path_ = path_.empty() ? name : fmt::format("{}.{}", path_, name);
+    body();
+    message_ = outer_message;
+    tree_ = outer_tree;
+    path_ = outer_path;
+  }
+
+  void fail(const char* name, const std::string& sentence) {
+    if (error_) return;
+    const std::string path = path_.empty() ? name : fmt::format("{}.{}", path_, name);
+    error_ = at(place_of(name, path), make_error(ErrorCode::BadInput, "{} {}", path, sentence));
+  }
+
+  /// The override that set the field (or a part or the whole of it), else its line and column, else the file.
+  std::string place_of(const char* name, const std::string& path) const {
+    for (auto item = source_.overrides->rbegin(); item != source_.overrides->rend(); ++item) {
+      const std::string set(override_path(*item));
+      if (set == path || path.starts_with(set + '.') || set.starts_with(path + '.')) return "--set " + *item;
+    }
+    const auto& field = field_of(*message_, name);
+    if (!tree_) return source_.place;
+    const auto location = tree_->GetLocation(&field, field.is_repeated() ? 0 : -1);
+    return location.line < 0 ? source_.place : place_at(source_.place, location.line, location.column);
+  }
+
+  const pb::Message* message_;
+  const pb::TextFormat::ParseInfoTree* tree_;
+  Source source_;
+  std::string path_;
+  std::optional<Error> error_;
+};
+
+/// Copies a SceneDesc into a message, every field.
+class Writer {
+ public:
+  explicit Writer(pb::Message& message) : message_(&message) {}
+
+  bool chooses(const char*, bool is_chosen) { return is_chosen; }
+
+  template <class T>
+  void number(const char* name, const T& value, const Range&) {
+    const auto& field = field_of(*message_, name);
+    const auto* reflection = message_->GetReflection();
+    switch (field.cpp_type()) {
+      case pb::FieldDescriptor::CPPTYPE_DOUBLE:
+        return reflection->SetDouble(message_, &field, static_cast<double>(value));
+      case pb::FieldDescriptor::CPPTYPE_FLOAT:
+        return reflection->SetFloat(message_, &field, static_cast<float>(value));
+      default:
+        return reflection->SetUInt32(message_, &field, static_cast<uint32_t>(value));
+    }
+  }
+  void flag(const char* name, bool value) {
+    message_->GetReflection()->SetBool(message_, &field_of(*message_, name), value);
+  }
+  template <class Enum>
+  void choice(const char* name, Enum value, Enum) {
+    message_->GetReflection()->SetEnumValue(message_, &field_of(*message_, name), static_cast<int>(value));
+  }
+  void text(const char* name, const std::string& value, size_t) {
+    message_->GetReflection()->SetString(message_, &field_of(*message_, name), value);
+  }
+  void path(const char* name, const std::filesystem::path& value) {
+    if (!value.empty()) text(name, value.generic_string(), 0);
+  }
+  template <class Vector>
+  void vector(const char* name, const Vector& value, const Range& range) {
+    group(name, [&] {
+      number("x", value.x, range);
+      number("y", value.y, range);
+      number("z", value.z, range);
+    });
+  }
+  void color(const char* name, const glm::vec3& value, const Range& range) {
+    group(name, [&] {
+      number("r", value.r, range);
+      number("g", value.g, range);
+      number("b", value.b, range);
+    });
+  }
+  void map(const char* name, const std::map<std::string, double>& value, const Range&, size_t) {
+    const auto& field = field_of(*message_, name);
+    for (const auto& [key, number] : value) {
+      auto* entry = message_->GetReflection()->AddMessage(message_, &field);
+      entry->GetReflection()->SetString(entry, field.message_type()->map_key(), key);
+      entry->GetReflection()->SetDouble(entry, field.message_type()->map_value(), number);
+    }
+  }
+  template <class Body>
+  void group(const char* name, Body body) {
+    descend(message_->GetReflection()->MutableMessage(message_, &field_of(*message_, name)), body);
+  }
+  template <class T, class Body>
+  void repeated(const char* name, std::vector<T>& values, size_t, Body body) {
+    for (T& value : values)
+      descend(message_->GetReflection()->AddMessage(message_, &field_of(*message_, name)),
+              [&] { body(value); });
+  }
+  void require(const char*, bool, const char*) {}
+
+ private:
+  template <class Body>
+  void descend(pb::Message* inner, Body body) {
+    pb::Message* const outer = std::exchange(message_, inner);
+    body();
+    message_ = outer;
+  }
+
+  pb::Message* message_;
+};
+
+/// Keeps the parser's first error, with line and column; an unknown field gets the list of known ones.
+class ParseErrors : public pb::io::ErrorCollector {
+ public:
+  void AddError(int line, int column, const std::string& message) override {
+    if (has_error_) return;
+    has_error_ = true;
+    line_ = std::max(line, 0);
+    column_ = std::max(column, 0);
+    message_ = message;
+  }
+  Error error(const std::string& place) const {
+    return at(place_at(place, line_, column_), make_error(ErrorCode::BadInput, "{}{}", message_, known()));
+  }
+
+ private:
+  std::string known() const {
+    constexpr std::string_view kBegin = "Message type \"";
+    const size_t end = message_.find("\" has no field");
+    if (!message_.starts_with(kBegin) || end == std::string::npos) return {};
+    const auto* type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(
+        message_.substr(kBegin.size(), end - kBegin.size()));
+    return type ? fmt::format(" ({})", known_fields(*type)) : std::string{};
+  }
+
+  bool has_error_ = false;
+  int line_ = 0, column_ = 0;
+  std::string message_ = "not protobuf text";
+};
+
+v1::Scene to_message(const SceneDesc& scene) {
+  v1::Scene message;
+  SceneDesc copy = scene;  // the visitor is shared with the reader, which writes
+  Writer writer(message);
+  scene_fields::visit_scene(writer, copy);
+  return message;
+}
+
+Result<SceneDesc> from_message(v1::Scene& message, const pb::TextFormat::ParseInfoTree* tree,
+                               const std::string& place, const std::vector<std::string>& overrides) {
+  for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
+  Reader reader(message, tree, {place, &overrides});
+  SceneDesc scene;
+  scene_fields::visit_scene(reader, scene);
+  RETURN_IF_ERROR(reader.status());
+  return scene;
+}
+
+void resolve(std::string& path, const std::filesystem::path& folder) {
+  if (!path.empty()) path = (folder / path).lexically_normal().generic_string();
+}
+
+Result<SceneDesc> parse(const std::string& text, const std::string& place,
+                        const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
+  if (text.size() > kMaxSceneFileBytes)
+    return at(place, make_error(ErrorCode::LimitExceeded, "the scene has {} bytes, the limit is {}",
+                                text.size(), kMaxSceneFileBytes));
+  v1::Scene message;
+  ParseErrors errors;
+  pb::TextFormat::ParseInfoTree tree;
+  pb::TextFormat::Parser parser;
+  parser.RecordErrorsTo(&errors);
+  parser.WriteLocationsTo(&tree);
+  parser.SetRecursionLimit(kMaxNesting);
+  if (!parser.ParseFromString(text, &message)) return errors.error(place);
+  // Before the overrides: a path typed on the command line starts at the current folder, as everywhere else.
+  if (message.groom().has_file() && message.groom().file().has_path())
+    resolve(*message.mutable_groom()->mutable_file()->mutable_path(), folder);
+  if (message.head().has_mesh_path()) resolve(*message.mutable_head()->mutable_mesh_path(), folder);
+  return from_message(message, &tree, place, overrides);
+}
+
+}  // namespace
+
+Result<SceneDesc> load_scene(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
+  ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxSceneFileBytes));
+  return parse(text, path.string(), path.parent_path(), overrides);
+}
+
+Result<SceneDesc> parse_scene(const std::string& text, const std::string& place,
+                              const std::vector<std::string>& overrides) {
+  return parse(text, place, {}, overrides);
+}
+
+Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::string>& overrides) {
+  v1::Scene message = to_message(scene);
+  return from_message(message, nullptr, "scene " + scene.name, overrides);
+}
+
+Result<SceneDesc> built_in_scene_with(const std::vector<std::string>& overrides) {
+  return with_overrides(built_in_scene(), overrides);
+}
+
+std::string to_text(const SceneDesc& scene) {
+  std::string text;
+  CHECK(pb::TextFormat::PrintToString(to_message(scene), &text));
+  return text;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,92 @@
+#include "common/scene/features.h"
+
+#include <random>
+
+namespace strandcast {
+namespace {
+
+TEST(Features, EmptySceneNeedsNothing) {
+  SceneDesc scene;
+  scene.has_auto_collider = false;
+  scene.head.is_visible = false;
+  scene.look.followers = 0;
+  EXPECT_EQ(analyse(scene, {}), SceneFeatures{});
+}
+
+TEST(Features, EachFactFollowsItsOwnCause) {
+  SceneDesc scene;
+  EXPECT_TRUE(analyse(scene, {}).has_colliders);
+  scene.has_auto_collider = false;
+  EXPECT_FALSE(analyse(scene, {}).has_colliders);
+  scene.colliders.resize(1);
+  EXPECT_TRUE(analyse(scene, {}).has_colliders);
+
+  scene.wind.gust_intensity = 1.0f;
+  EXPECT_FALSE(analyse(scene, {}).has_wind) << "gusts are relative to the mean";
+  EXPECT_FALSE(analyse(scene, {}).has_turbulence);
+  scene.wind.mean_mps = {0, 0, 0.1f};
+  EXPECT_TRUE(analyse(scene, {}).has_wind);
+  EXPECT_TRUE(analyse(scene, {}).has_turbulence);
+  EXPECT_FALSE(analyse(scene, {.has_wind_stream = true}).has_turbulence)
+      << "a stream replaces the scene's wind";
+  scene.wind = {};
+  EXPECT_TRUE(analyse(scene, {.has_wind_stream = true}).has_wind);
+
+  EXPECT_TRUE(analyse(scene, {.strand_viewers = 1}).has_strand_viewers);
+  EXPECT_FALSE(analyse(scene, {.strand_viewers = 1}).has_frame_viewers);
+  EXPECT_TRUE(analyse(scene, {.frame_viewers = 2}).has_frame_viewers);
+  EXPECT_TRUE(analyse(scene, {.is_recording_pictures = true}).has_frame_viewers);
+  EXPECT_TRUE(analyse(scene, {}).has_head_mesh);
+  EXPECT_TRUE(analyse(scene, {}).has_followers);
+}
+
+TEST(Features, ExplainAgreesWithAnalyse) {
+  std::mt19937 random(3);
+  const auto coin = [&] { return random() % 2 == 0; };
+  for (int round = 0; round < 500; ++round) {
+    SceneDesc scene;
+    scene.has_auto_collider = coin();
+    scene.colliders.resize(coin() ? 0 : 2);
+    scene.wind.mean_mps.x = coin() ? 0.0f : 1.0f;
+    scene.wind.gust_intensity = coin() ? 0.0f : 0.5f;
+    scene.look.followers = coin() ? 0 : 3;
+    scene.head.is_visible = coin();
+    if (coin()) scene.head.mesh_path = "x.obj";
+    const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u, coin()};
+    const SceneFeatures features = analyse(scene, facts);
+    SceneFeatures explained;
+    const std::map<std::string, bool*> fact{{"has_wind", &explained.has_wind},
+                                            {"has_turbulence", &explained.has_turbulence},
+                                            {"has_colliders", &explained.has_colliders},
+                                            {"has_strand_viewers", &explained.has_strand_viewers},
+                                            {"has_frame_viewers", &explained.has_frame_viewers},
+                                            {"has_followers", &explained.has_followers},
+                                            {"has_head_mesh", &explained.has_head_mesh}};
+    const auto reasons = explain(scene, facts);
+    ASSERT_EQ(reasons.size(), fact.size());
+    for (const FeatureReason& reason : reasons) {
+      ASSERT_TRUE(fact.contains(reason.name)) << reason.name;
+      *fact.at(reason.name) = reason.value;
+      EXPECT_FALSE(reason.reason.empty()) << reason.name;
+    }
+    EXPECT_EQ(explained, features);
+  }
+}
+
+TEST(Features, ReasonsDifferWithTheValue) {
+  SceneDesc bare;
+  bare.has_auto_collider = bare.head.is_visible = false;
+  bare.look.followers = 0;
+  SceneDesc full;
+  full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1};
+  const auto off = explain(bare, {});
+  const auto on = explain(full, {.strand_viewers = 1, .frame_viewers = 1});
+  for (size_t i = 0; i < off.size(); ++i) {
+    EXPECT_FALSE(off[i].value) << off[i].name;
+    EXPECT_TRUE(on[i].value) << on[i].name;
+    EXPECT_NE(off[i].reason, on[i].reason) << on[i].name;
+  }
+}
+
+}  // namespace
+}  // namespace strandcast

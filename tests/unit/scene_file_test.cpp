@@ -1,0 +1,292 @@
+#include "common/scene/scene_file.h"
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <functional>
+#include <random>
+#include <set>
+
+#include "strandcast/v1/scene.pb.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string error_of(const std::string& text, const std::vector<std::string>& overrides = {}) {
+  const auto scene = parse_scene(text, "s.textproto", overrides);
+  return scene ? "no error" : scene.error().to_string();
+}
+
+/// A scene in which no field has its default, so that a forgotten field cannot hide.
+SceneDesc unusual_scene() {
+  SceneDesc s;
+  s.name = "Zöpfe 2";
+  FileGroomDesc file{
+      .path = "../a folder/x.tfx", .unit_m = 0.1f, .up_axis = UpAxis::Z, .origin = {1.5f, -2, 1e-3f}};
+  file.vertex_count = 24;
+  file.pinning = Pinning::BothEnds;
+  file.has_pinning = true;
+  s.groom = file;
+  s.head = {.mesh_path = "head.obj", .radius_m = 0.11f, .is_visible = false};
+  s.solver = {.name = "other", .parameters = {{"damping", 0.1}, {"k", 1e-300}}};
+  s.step_rate_hz = 59.94005994005994;
+  s.substeps = 3;
+  s.gravity_mps2 = {0.1, -1.0 / 3.0, 2.0};
+  s.colliders = {{{0.1f, 0.2f, 0.3f}, 0.05f}, {{}, 0.2f}};
+  s.has_auto_collider = false;
+  s.wind = {.mean_mps = {1, 2, 3}, .gust_intensity = 0.7f, .gust_length_m = 3.3f, .seed = 4'000'000'000u};
+  s.look = {.root_color = {0.1f, 0.2f, 0.3f},
+            .tip_color = {0.4f, 0.5f, 0.6f},
+            .strand_radius_m = 1e-4f,
+            .tip_scale = 0.7f,
+            .followers = 5,
+            .segments = 2,
+            .light_direction = {0, -1, 0.3f},
+            .light_color = {2, 3, 4},
+            .ambient = 0.5f,
+            .background = {0, 0.5f, 1},
+            .skin_color = {1, 0, 0.5f}};
+  s.camera = {.offset_m = {0, 0, 2}, .target_m = {0.1f, 0.2f, 0.3f}, .fov_y_rad = 1.0f};
+  s.stream = {.codec = "raw",
+              .bound_m = 2e-5f,
+              .frame_width = 320,
+              .frame_height = 200,
+              .jpeg_quality = 33,
+              .frame_rate_hz = 7.5};
+  return s;
+}
+
+TEST(SceneFile, EmptyTextIsTheDefaultScene) {
+  const auto scene = parse_scene("", "s", {});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  EXPECT_EQ(*scene, SceneDesc{});
+}
+
+TEST(SceneFile, TextRoundTripsExactly) {
+  SceneDesc procedural = unusual_scene();
+  procedural.groom = ProceduralGroomDesc{.strand_count = 17,
+                                         .vertex_count = 9,
+                                         .length_m = 0.1f,
+                                         .length_variation = 0.3f,
+                                         .curl_radius_m = 0.01f,
+                                         .curl_turns = 1.7f,
+                                         .seed = 99};
+  for (const SceneDesc& scene : {SceneDesc{}, built_in_scene(), unusual_scene(), procedural}) {
+    const auto again = parse_scene(to_text(scene), "s", {});
+    ASSERT_TRUE(again) << again.error().to_string();
+    EXPECT_EQ(*again, scene) << to_text(scene);
+  }
+}
+
+TEST(SceneFile, EveryProtoFieldIsReadAndWritten) {
+  // Names of all fields reachable from Scene; each must be written for some scene, and (round trip above)
+  // read back.
+  std::set<std::string> names;
+  std::function<void(const google::protobuf::Descriptor&)> walk =
+      [&](const google::protobuf::Descriptor& type) {
+        if (type.options().map_entry()) return;
+        for (int i = 0; i < type.field_count(); ++i) {
+          names.insert(type.field(i)->name());
+          if (type.field(i)->message_type()) walk(*type.field(i)->message_type());
+        }
+      };
+  walk(*v1::Scene::descriptor());
+  const std::string text = to_text(SceneDesc{}) + to_text(unusual_scene());
+  for (const std::string& name : names)
+    EXPECT_TRUE(text.find(name + ":") != std::string::npos || text.find(name + " {") != std::string::npos)
+        << name;
+  EXPECT_GT(names.size(), 50u);
+}
+
+TEST(SceneFile, MissingFieldsAndComponentsKeepTheirDefaults) {
+  const auto scene = parse_scene(
+      "gravity_mps2 { y: -1.62 } camera { offset_m { z: 2 } } groom { file { path: 'x' } }", "s", {});
+  ASSERT_TRUE(scene);
+  EXPECT_EQ(scene->gravity_mps2, glm::dvec3(0, -1.62, 0));
+  EXPECT_EQ(scene->camera.offset_m, glm::vec3(CameraDesc{}.offset_m.x, CameraDesc{}.offset_m.y, 2.0f));
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom), FileGroomDesc{.path = "x"});
+}
+
+TEST(SceneFile, ErrorsNameLineColumnAndWhatIsKnown) {
+  EXPECT_THAT(error_of("name: 'a'\n  lenght_m: 3\n"), StartsWith("s.textproto:2:"));
+  EXPECT_THAT(error_of("stream {\n  bound: 1\n}"), HasSubstr("no field named \"bound\""));
+  EXPECT_THAT(error_of("stream {\n  bound: 1\n}"), HasSubstr("known: codec, bound_m,"));
+  EXPECT_THAT(error_of("substeps: 'x'"), StartsWith("s.textproto:1:11: "));
+  EXPECT_THAT(error_of("substeps: -1"), StartsWith("s.textproto:1:11: "));
+  EXPECT_THAT(error_of("substeps: 1 substeps: 2"), StartsWith("s.textproto:1:"));
+  EXPECT_THAT(error_of("groom { procedural {} file { path: 'x' } }"), StartsWith("s.textproto:1:"));
+  EXPECT_THAT(error_of("groom { file { path: 'x' up_axis: X } }"), StartsWith("s.textproto:1:"));
+  EXPECT_THAT(error_of("wind {"), StartsWith("s.textproto:1:"));
+  EXPECT_THAT(error_of(std::string("\0\xff\x01", 3)), StartsWith("s.textproto:1:"));
+}
+
+TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
+  EXPECT_EQ(error_of("wind {}\ngroom {\n  procedural { length_m: 99 }\n}"),
+            "s.textproto:3:16: groom.procedural.length_m is 99, it must be within 0.005 .. 3 m");
+  EXPECT_THAT(error_of("colliders { radius_m: 0.1 }\ncolliders { radius_m: -1 }"),
+              StartsWith("s.textproto:2:13: colliders.1.radius_m is -1"));
+  EXPECT_THAT(error_of("gravity_mps2 { y: nan }"), HasSubstr("gravity_mps2.y is nan"));
+  EXPECT_THAT(error_of("gravity_mps2 { y: 1e999 }"), HasSubstr("gravity_mps2.y is inf"));
+  EXPECT_THAT(error_of("look { root_color { g: 1.5 } }"), HasSubstr("look.root_color.g is 1.5"));
+  EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: delta, raw"));
+  EXPECT_THAT(error_of("camera { offset_m { x: 0 y: 0 z: 0 } }"),
+              HasSubstr("camera.offset_m is almost zero"));
+  EXPECT_THAT(error_of("groom { file { } }"), HasSubstr("--set groom.file.path=FILE"));
+  EXPECT_THAT(error_of("groom { file { path: 'x' vertex_count: 1 } }"), HasSubstr("vertex_count is 1"));
+  EXPECT_THAT(error_of("groom { file { path: 'x' up_axis: 7 } }"), HasSubstr("groom.file.up_axis is 7"));
+  EXPECT_THAT(error_of("groom { procedural { strand_count: 200001 } }"), HasSubstr("within 1 .. 200000"));
+  EXPECT_THAT(error_of("solver { parameters { key: 'd' value: inf } }"),
+              HasSubstr("solver.parameters gives d"));
+  EXPECT_THAT(error_of("name: 'line\\nbreak'"), HasSubstr("printable text"));
+  EXPECT_THAT(error_of("name: '\\xff'"), testing::Ne("no error"));
+  EXPECT_THAT(error_of("name: '" + std::string(65, 'a') + "'"), HasSubstr("1 .. 64 bytes"));
+  std::string crowd;
+  for (uint32_t i = 0; i <= kMaxSphereColliders; ++i) crowd += "colliders { }\n";
+  EXPECT_THAT(error_of(crowd), HasSubstr("colliders has 17 entries, the limit is 16"));
+}
+
+TEST(SceneFile, RangeEndsAreIncluded) {
+  for (const char* text :
+       {"stream { bound_m: 2e-5 }", "stream { bound_m: 5e-4 }", "step_rate_hz: 1000",
+        "groom { procedural { length_m: 0.005 } }", "groom { procedural { strand_count: 200000 } }"})
+    EXPECT_EQ(error_of(text), "no error") << text;
+  for (const char* text :
+       {"stream { bound_m: 1.99e-5 }", "stream { bound_m: 5.01e-4 }", "step_rate_hz: 1000.001"})
+    EXPECT_NE(error_of(text), "no error") << text;
+}
+
+TEST(SceneFile, OverridesReplaceWhatTheFileSays) {
+  const auto scene =
+      parse_scene("substeps: 2 colliders { radius_m: 0.1 }", "s",
+                  {"substeps=4", "stream.bound_m=0.0005", "camera.offset_m.z=3",
+                   "wind.mean_mps={ x: 2 z: 1 }", "colliders.0.center_m.y=0.5", "colliders.1.radius_m=0.2",
+                   "solver.name=dftl_parallel", "solver.parameters.damping=0.25",
+                   "groom.file.path=my = hair.tfx", "groom.file.up_axis=Z", "has_auto_collider=false"});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  EXPECT_EQ(scene->substeps, 4u);
+  EXPECT_EQ(scene->stream.bound_m, 0.0005f);
+  EXPECT_EQ(scene->camera.offset_m.z, 3.0f);
+  EXPECT_EQ(scene->wind.mean_mps, glm::vec3(2, 0, 1));
+  ASSERT_EQ(scene->colliders.size(), 2u);
+  EXPECT_EQ(scene->colliders[0].center_m, glm::vec3(0, 0.5f, 0));
+  EXPECT_EQ(scene->colliders[0].radius_m, 0.1f);
+  EXPECT_EQ(scene->colliders[1].radius_m, 0.2f);
+  EXPECT_EQ(scene->solver.name, "dftl_parallel");
+  EXPECT_EQ(scene->solver.parameters.at("damping"), 0.25);
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom).path, "my = hair.tfx");
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom).up_axis, UpAxis::Z);
+  EXPECT_FALSE(scene->has_auto_collider);
+}
+
+TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
+  EXPECT_EQ(error_of("", {"stream.bound=1"}),
+            "--set stream.bound=1: stream has no field \"bound\" (known: codec, bound_m, frame_width, "
+            "frame_height, "
+            "jpeg_quality, frame_rate_hz)");
+  EXPECT_THAT(error_of("", {"bogus=1"}), HasSubstr("a scene has no field \"bogus\" (known: name, groom,"));
+  EXPECT_THAT(error_of("", {"substeps"}), HasSubstr("expected path=value"));
+  EXPECT_THAT(error_of("", {"=1"}), HasSubstr("expected path=value"));
+  EXPECT_THAT(error_of("", {"substeps=2 3"}), StartsWith("--set substeps=2 3: "));
+  EXPECT_THAT(error_of("", {"substeps="}), StartsWith("--set substeps=: "));
+  EXPECT_THAT(error_of("", {"substeps=0"}), StartsWith("--set substeps=0: substeps is 0"));
+  EXPECT_THAT(error_of("", {"substeps.x=0"}), HasSubstr("single value"));
+  EXPECT_THAT(error_of("", {"camera=3"}), HasSubstr("known: offset_m, target_m, fov_y_rad"));
+  EXPECT_THAT(error_of("", {"camera={ fov_y_rad: 9 }"}),
+              StartsWith("--set camera={ fov_y_rad: 9 }: camera.fov_y_rad"));
+  EXPECT_THAT(error_of("", {"groom.file.up_axis=X"}), HasSubstr("(known: Y, Z)"));
+  EXPECT_THAT(error_of("", {"colliders.5.radius_m=1"}), HasSubstr("not an index"));
+  EXPECT_THAT(error_of("", {"colliders.-1.radius_m=1"}), HasSubstr("not an index"));
+  EXPECT_THAT(error_of("", {"colliders.99999999999999999999.radius_m=1"}), HasSubstr("not an index"));
+  EXPECT_THAT(error_of("", {"colliders=1"}), HasSubstr("is a list"));
+  EXPECT_THAT(error_of("", {"colliders.0=1"}), HasSubstr("is a list"));
+  EXPECT_THAT(error_of("", {"solver.parameters=1"}), HasSubstr("is a list"));
+  EXPECT_THAT(error_of("", {"solver.parameters.a=b"}), StartsWith("--set solver.parameters.a=b: "));
+  EXPECT_THAT(error_of("", {"name=" + std::string(20'000, 'x')}), HasSubstr("the limit is 16384"));
+  // A field set in the file is blamed on the file even when something else is overridden.
+  EXPECT_THAT(error_of("substeps: 0", {"name=x"}), StartsWith("s.textproto:1:1: substeps"));
+}
+
+TEST(SceneFile, RelativePathsStartAtTheScenesFolder) {
+  const auto folder = std::filesystem::temp_directory_path() / fmt::format("strandcast_scene_{}", getpid());
+  std::filesystem::create_directories(folder);
+  const auto path = folder / "s.textproto";
+  std::ofstream(path) << "groom { file { path: '../hair.tfx' } } head { mesh_path: '/abs/head.obj' }";
+  const auto scene = load_scene(path, {});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom).path, folder.parent_path() / "hair.tfx");
+  EXPECT_EQ(scene->head.mesh_path, "/abs/head.obj");
+  const auto typed = load_scene(path, {"groom.file.path=here.tfx"});
+  ASSERT_TRUE(typed);
+  EXPECT_EQ(std::get<FileGroomDesc>(typed->groom).path, "here.tfx");
+  std::ofstream(path) << std::string(kMaxSceneFileBytes + 1, ' ');
+  EXPECT_EQ(load_scene(path, {}).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(load_scene(folder / "none", {}).error().code, ErrorCode::NotFound);
+  EXPECT_THAT(load_scene(folder / "none", {}).error().to_string(), HasSubstr("none"));
+  std::filesystem::remove_all(folder);
+}
+
+TEST(SceneFile, BuiltInSceneIsValidAndTakesOverrides) {
+  const auto same = built_in_scene_with({});
+  ASSERT_TRUE(same) << same.error().to_string();
+  EXPECT_EQ(*same, built_in_scene());
+  const auto* groom = std::get_if<ProceduralGroomDesc>(&same->groom);
+  ASSERT_TRUE(groom);
+  EXPECT_EQ(groom->strand_count, 2000u);
+  EXPECT_EQ(groom->vertex_count, 16u);
+  EXPECT_NEAR(glm::length(same->wind.mean_mps), 1.5, 0.01);
+  EXPECT_GT(same->wind.gust_intensity, 0.0f);
+  EXPECT_TRUE(same->has_auto_collider);
+  EXPECT_EQ(built_in_scene_with({"substeps=2"})->substeps, 2u);
+  EXPECT_EQ(built_in_scene_with({"substeps=x"}).error().code, ErrorCode::BadInput);
+  const auto again = with_overrides(unusual_scene(), {"stream.codec=delta"});
+  ASSERT_TRUE(again) << again.error().to_string();
+  EXPECT_EQ(again->stream.codec, "delta");
+  EXPECT_EQ(again->solver, unusual_scene().solver);
+}
+
+TEST(SceneFile, BrokenTextNeverCrashesAndAlwaysHasAPlace) {
+  const std::string good = to_text(unusual_scene());
+  std::mt19937 random(7);
+  for (int round = 0; round < 3000; ++round) {
+    std::string text = good;
+    const int edits = 1 + static_cast<int>(random() % 4);
+    for (int i = 0; i < edits; ++i) {
+      const size_t where = random() % text.size();
+      if (random() % 3 == 0)
+        text.resize(where + 1);
+      else if (random() % 2 == 0)
+        text[where] = static_cast<char>(random());
+      else
+        text.insert(where, good.substr(random() % good.size(), random() % 40));
+    }
+    const auto scene = parse_scene(text, "s.textproto", {});
+    if (scene) continue;
+    EXPECT_THAT(scene.error().place, StartsWith("s.textproto"));
+    EXPECT_FALSE(scene.error().message.empty());
+  }
+}
+
+TEST(SceneFile, BrokenOverridesNeverCrash) {
+  const std::vector<std::string> parts{
+      "groom", "file", "path", "procedural", "colliders", "0",      "1",          "center_m", "x",    ".",
+      "=",     "{",    "}",    "-1",         "nan",       "solver", "parameters", "1e999",    "\xff", ""};
+  std::mt19937 random(11);
+  for (int round = 0; round < 3000; ++round) {
+    std::string assignment;
+    for (uint32_t i = 0; i < 1 + random() % 8; ++i) {
+      assignment += parts[random() % parts.size()];
+      if (random() % 2) assignment += random() % 3 ? "." : "=";
+    }
+    const auto scene = built_in_scene_with({assignment});
+    if (scene) continue;
+    EXPECT_FALSE(scene.error().message.empty());
+  }
+}
+
+}  // namespace
+}  // namespace strandcast
