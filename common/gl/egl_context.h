@@ -1,5 +1,5 @@
-// Headless OpenGL 4.5 core context through EGL: hardware devices first, then llvmpipe. One context belongs to one
-// thread at a time. No window system, no environment variables.
+// Headless OpenGL 4.5 core context through EGL: hardware devices first, then llvmpipe. One context belongs to
+// one thread at a time. No window system, no environment variables.
 #pragma once
 
 #include <memory>
@@ -21,8 +21,8 @@ struct DeviceInfo {
 
 class EglContext {
  public:
-  /// `device`: "auto", "software", "hardware" or a device number. Makes the context current on the calling thread.
-  /// Unavailable lists what was tried.
+  /// `device`: "auto", "software", "hardware" or a device number. Makes the context current on the calling
+  /// thread. Unavailable lists what was tried.
   static Result<std::unique_ptr<EglContext>> make(const std::string& device);
   ~EglContext();
   EglContext(const EglContext&) = delete;

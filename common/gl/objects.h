@@ -1,5 +1,5 @@
-// Move-only GL objects, direct state access only, labelled for debuggers. All calls need a current context; the
-// destructor needs the same one. No global state.
+// Move-only GL objects, direct state access only, labelled for debuggers. All calls need a current context;
+// the destructor needs the same one. No global state.
 #pragma once
 
 #include <cstddef>
@@ -76,12 +76,13 @@ class Buffer {
   size_t size_bytes_ = 0;
 };
 
-/// 2-D colour or depth texture without mipmaps.
+/// 2-D colour or depth texture without mipmaps; nearest filter, clamped to its edge.
 class Texture {
  public:
   Texture() = default;
   /// `samples` > 1 makes a multisample texture.
-  Texture(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height, uint32_t samples);
+  Texture(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
+          uint32_t samples);
   void bind(uint32_t unit) const;
   uint32_t name() const { return handle_.name(); }
   uint32_t width() const { return width_; }
@@ -98,6 +99,9 @@ class Framebuffer {
  public:
   Framebuffer() = default;
   Framebuffer(const std::string& label, std::span<const Texture* const> colors, const Texture* depth);
+  /// 1 x 1 without storage: what to bind for transform feedback with the rasteriser off, since a context
+  /// without a surface has no framebuffer of its own and refuses every draw.
+  static Framebuffer without_attachments(const std::string& label);
   void bind() const;
   uint32_t name() const { return handle_.name(); }
 

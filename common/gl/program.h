@@ -1,5 +1,7 @@
-// Linked GL programs from embedded shader sources: #include flattened by the host with a line table (Mesa loses
-// #line file ids), variants declared in the source by "#pragma variant NAME v0 v1 ...". Needs a current context.
+// Linked GL programs from embedded shader sources: #include flattened by the host with a line table (Mesa
+// loses #line file ids), variants declared in the source by "#pragma variant NAME v0 v1 ...". Files carry no
+// #version: the host puts "#version 450 core" and the variants' #defines in front. ShaderLibrary is pure text
+// work for any thread; programs need a current context.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +40,9 @@ class ShaderLibrary {
   ShaderLibrary() = default;
   explicit ShaderLibrary(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// NotFound names the file (and who includes it); include cycles are errors.
+  /// Each file enters once, where it is first included; <angle bracket> includes (for C++) are dropped.
+  /// NotFound names the file and who includes it; include cycles and differing declarations of a variant are
+  /// BadInput.
   Result<FlatSource> flatten(const std::string& path) const;
   /// Every file that is a shader stage (.vert .tesc .tese .geom .frag .comp), sorted.
   std::vector<std::string> stage_files() const;
@@ -48,14 +52,23 @@ class ShaderLibrary {
   std::optional<std::filesystem::path> folder_;
 };
 
-/// All combinations of the axes' values.
+/// All combinations of the axes' values; one empty variant when there are no axes.
 std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes);
+
+/// Puts file:line of the original sources where a compiler log names lines of the flattened text, of which
+/// `header_lines` were put in front. Knows the forms of Mesa "0:LINE(COLUMN)", NVIDIA "0(LINE)" and others
+/// "0:LINE".
+std::string map_compiler_log(const FlatSource& source, uint32_t header_lines, const std::string& log);
+
+/// Compiles one stage file alone, without linking. For checks that walk stage_files() and all_variants().
+Status compile_stage(const ShaderLibrary& library, const std::string& stage_path, const Variant& variant);
 
 class Program {
  public:
   Program() = default;
-  /// Stages by file extension. `captured`: varyings for transform feedback, interleaved. Errors carry the compiler's
-  /// message with file:line of the original source.
+  /// Stages by file extension. A variant's name must be declared by at least one stage; each stage gets
+  /// #defines for its own axes, missing ones with their default. `captured`: varyings for transform feedback,
+  /// interleaved. Errors carry the compiler's message with file:line of the original source.
   static Result<Program> make(const ShaderLibrary& library, const std::vector<std::string>& stage_paths,
                               const Variant& variant, const std::vector<std::string>& captured = {});
   void use() const;

@@ -1,4 +1,5 @@
-// Times GPU work: timer queries on hardware, glFinish and a wall clock on software renderers (whose queries lie).
+// Times GPU work: timer queries on hardware, glFinish and a wall clock on software renderers (whose queries
+// lie).
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ class GpuTimer {
  private:
   bool is_software_;
   int64_t begin_ns_ = 0;
-  Handle<delete_query> query_;
+  Handle<delete_query> begin_query_;  // time stamps, so that timers may nest
+  Handle<delete_query> end_query_;
 };
 
 }  // namespace strandcast::gl

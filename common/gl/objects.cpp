@@ -1,0 +1,150 @@
+#include "common/gl/objects.h"
+
+#include <epoxy/gl.h>
+
+#include "common/base/check.h"
+
+namespace strandcast::gl {
+namespace {
+
+void label_object(GLenum kind, uint32_t name, const std::string& label) {
+  glObjectLabel(kind, name, static_cast<GLsizei>(label.size()), label.data());
+}
+
+uint32_t create_buffer(const std::string& label, size_t size_bytes, const void* bytes) {
+  if (size_bytes == 0) return 0;
+  GLuint name = 0;
+  glCreateBuffers(1, &name);
+  label_object(GL_BUFFER, name, label);
+  glNamedBufferStorage(name, static_cast<GLsizeiptr>(size_bytes), bytes, GL_DYNAMIC_STORAGE_BIT);
+  return name;
+}
+
+}  // namespace
+
+void delete_buffer(uint32_t name) {
+  glDeleteBuffers(1, &name);
+}
+void delete_texture(uint32_t name) {
+  glDeleteTextures(1, &name);
+}
+void delete_framebuffer(uint32_t name) {
+  glDeleteFramebuffers(1, &name);
+}
+void delete_program(uint32_t name) {
+  glDeleteProgram(name);
+}
+void delete_vertex_array(uint32_t name) {
+  glDeleteVertexArrays(1, &name);
+}
+void delete_query(uint32_t name) {
+  glDeleteQueries(1, &name);
+}
+
+Buffer::Buffer(const std::string& label, size_t size_bytes)
+    : handle_(create_buffer(label, size_bytes, nullptr)), size_bytes_(size_bytes) {
+  // Fresh storage is undefined and differs between drivers.
+  if (handle_) glClearNamedBufferData(name(), GL_R8UI, GL_RED_INTEGER, GL_UNSIGNED_BYTE, nullptr);
+}
+
+Buffer::Buffer(const std::string& label, std::span<const std::byte> bytes)
+    : handle_(create_buffer(label, bytes.size(), bytes.data())), size_bytes_(bytes.size()) {}
+
+void Buffer::write(size_t offset_bytes, std::span<const std::byte> bytes) {
+  CHECK(offset_bytes <= size_bytes_ && bytes.size() <= size_bytes_ - offset_bytes);
+  if (bytes.empty()) return;
+  glNamedBufferSubData(name(), static_cast<GLintptr>(offset_bytes), static_cast<GLsizeiptr>(bytes.size()),
+                       bytes.data());
+}
+
+void Buffer::read(size_t offset_bytes, std::span<std::byte> bytes) const {
+  CHECK(offset_bytes <= size_bytes_ && bytes.size() <= size_bytes_ - offset_bytes);
+  if (bytes.empty()) return;
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glGetNamedBufferSubData(name(), static_cast<GLintptr>(offset_bytes), static_cast<GLsizeiptr>(bytes.size()),
+                          bytes.data());
+}
+
+void Buffer::bind_storage(uint32_t binding) const {
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, name());
+}
+
+void Buffer::bind_storage_range(uint32_t binding, size_t offset_bytes, size_t size_bytes) const {
+  CHECK(offset_bytes <= size_bytes_ && size_bytes <= size_bytes_ - offset_bytes);
+  glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name(), static_cast<GLintptr>(offset_bytes),
+                    static_cast<GLsizeiptr>(size_bytes));
+}
+
+void Buffer::bind_uniform(uint32_t binding) const {
+  glBindBufferBase(GL_UNIFORM_BUFFER, binding, name());
+}
+
+Texture::Texture(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
+                 uint32_t samples)
+    : width_(width), height_(height) {
+  CHECK(width > 0 && height > 0);
+  GLuint name = 0;
+  const auto w = static_cast<GLsizei>(width);
+  const auto h = static_cast<GLsizei>(height);
+  if (samples > 1) {
+    glCreateTextures(GL_TEXTURE_2D_MULTISAMPLE, 1, &name);
+    glTextureStorage2DMultisample(name, static_cast<GLsizei>(samples), internal_format, w, h, GL_TRUE);
+  } else {
+    glCreateTextures(GL_TEXTURE_2D, 1, &name);
+    glTextureStorage2D(name, 1, internal_format, w, h);
+    // The default filters would make it incomplete: no mipmaps, and integer formats cannot be filtered.
+    glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  }
+  label_object(GL_TEXTURE, name, label);
+  handle_ = Handle<delete_texture>(name);
+}
+
+void Texture::bind(uint32_t unit) const {
+  glBindTextureUnit(unit, name());
+}
+
+Framebuffer::Framebuffer(const std::string& label, std::span<const Texture* const> colors,
+                         const Texture* depth) {
+  GLuint name = 0;
+  glCreateFramebuffers(1, &name);
+  label_object(GL_FRAMEBUFFER, name, label);
+  handle_ = Handle<delete_framebuffer>(name);
+  std::vector<GLenum> draw_buffers;
+  for (const Texture* color : colors) {
+    const auto attachment = static_cast<GLenum>(GL_COLOR_ATTACHMENT0 + draw_buffers.size());
+    glNamedFramebufferTexture(name, attachment, color->name(), 0);
+    draw_buffers.push_back(attachment);
+  }
+  if (draw_buffers.empty()) draw_buffers.push_back(GL_NONE);
+  glNamedFramebufferDrawBuffers(name, static_cast<GLsizei>(draw_buffers.size()), draw_buffers.data());
+  if (depth != nullptr) glNamedFramebufferTexture(name, GL_DEPTH_ATTACHMENT, depth->name(), 0);
+  if (colors.empty() && depth == nullptr) {
+    glNamedFramebufferParameteri(name, GL_FRAMEBUFFER_DEFAULT_WIDTH, 1);
+    glNamedFramebufferParameteri(name, GL_FRAMEBUFFER_DEFAULT_HEIGHT, 1);
+  }
+  CHECK(glCheckNamedFramebufferStatus(name, GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE);
+}
+
+Framebuffer Framebuffer::without_attachments(const std::string& label) {
+  return Framebuffer(label, {}, nullptr);
+}
+
+void Framebuffer::bind() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, name());
+}
+
+VertexArray::VertexArray(const std::string& label) {
+  GLuint name = 0;
+  glCreateVertexArrays(1, &name);
+  label_object(GL_VERTEX_ARRAY, name, label);
+  handle_ = Handle<delete_vertex_array>(name);
+}
+
+void VertexArray::bind() const {
+  glBindVertexArray(name());
+}
+
+}  // namespace strandcast::gl

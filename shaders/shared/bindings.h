@@ -1,0 +1,39 @@
+// Binding numbers of buffers, shared by C++ and GLSL. Storage and uniform blocks count separately; simulation and
+// rendering never share a context, so both start at 0. Every block has an instance name: equal member names in two
+// stages of one program do not link otherwise.
+#ifndef STRANDCAST_SHADERS_SHARED_BINDINGS_H
+#define STRANDCAST_SHADERS_SHARED_BINDINGS_H
+
+#ifdef __cplusplus
+#include <cstdint>
+namespace strandcast::shader {
+using uint = uint32_t;
+#endif
+
+// Storage blocks of the simulation.
+const uint kBindingPosition = 0u;
+const uint kBindingVelocity = 1u;
+const uint kBindingPrevious = 2u;
+const uint kBindingRestLength = 3u;
+const uint kBindingRestPosition = 4u;
+const uint kBindingCorrection = 5u;
+
+// Uniform blocks of the simulation.
+const uint kBindingStep = 0u;
+const uint kBindingCollider = 1u;
+const uint kBindingGust = 2u;
+
+// Storage blocks of the renderer.
+const uint kBindingKeyPosition = 0u;
+const uint kBindingRootTriangle = 1u;
+const uint kBindingExpanded = 2u;
+
+// Uniform blocks of the renderer.
+const uint kBindingView = 0u;
+const uint kBindingLook = 1u;
+
+#ifdef __cplusplus
+}  // namespace strandcast::shader
+#endif
+
+#endif

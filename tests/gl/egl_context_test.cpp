@@ -1,0 +1,82 @@
+#include "common/gl/egl_context.h"
+
+#include <epoxy/gl.h>
+
+#include <thread>
+
+#include "common/gl/objects.h"
+#include "tests/support/gl_fixture.h"
+
+namespace strandcast::gl {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(EglContext, GivesAContextWithTheFactsOfItsDevice) {
+  const auto context = EglContext::make("auto");
+  ASSERT_TRUE(context) << context.error().to_string();
+  const DeviceInfo& info = (*context)->info();
+  EXPECT_FALSE(info.renderer.empty());
+  EXPECT_GE(info.max_samples, 4);  // every GL 4.5 device has 4
+  EXPECT_EQ(info.is_software, info.renderer.find("llvmpipe") != std::string::npos);
+}
+
+TEST(EglContext, TakesSoftwareAndDeviceNumbers) {
+  for (const char* device : {"software", "0"}) {
+    const auto context = EglContext::make(device);
+    ASSERT_TRUE(context) << device << ": " << context.error().to_string();
+    EXPECT_TRUE(device != std::string("software") || (*context)->info().is_software);
+  }
+}
+
+TEST(EglContext, HardwareIsNeverASoftwareRenderer) {
+  const auto context = EglContext::make("hardware");
+  if (context) {
+    EXPECT_FALSE((*context)->info().is_software);
+  } else {
+    EXPECT_THAT(context.error().message, HasSubstr("tried: "));
+  }
+}
+
+TEST(EglContext, NamesTheKnownDevicesForAnUnknownOne) {
+  for (const char* device : {"", "gpu", "999", "-1", "0x"}) {
+    const auto context = EglContext::make(device);
+    ASSERT_FALSE(context) << device;
+    EXPECT_EQ(context.error().code, ErrorCode::NotFound);
+    EXPECT_THAT(context.error().message, HasSubstr("known: auto, software, hardware"));
+  }
+}
+
+TEST(EglContext, TwoContextsOfOneDeviceLiveSideBySide) {
+  auto first = EglContext::make("auto");
+  auto second = EglContext::make("auto");
+  ASSERT_TRUE(first && second);
+  second->reset();  // must not take the display away from the first
+  ASSERT_TRUE((*first)->make_current());
+  EXPECT_EQ(Buffer::of("four", std::vector<int>{1, 2, 3, 4}).read_all<int>(), (std::vector<int>{1, 2, 3, 4}));
+}
+
+TEST(EglContext, MovesToAnotherThread) {
+  auto context = EglContext::make("auto");
+  ASSERT_TRUE(context);
+  (*context)->release();
+  std::vector<int> seen;
+  std::thread([&] {
+    ASSERT_TRUE((*context)->make_current());
+    seen = Buffer::of("two", std::vector<int>{5, 6}).read_all<int>();
+    (*context)->release();
+  }).join();
+  EXPECT_EQ(seen, (std::vector<int>{5, 6}));
+}
+
+TEST(DeviceInfo, ADebugMessageIsNoError) {
+  const auto context = EglContext::make("auto");
+  ASSERT_TRUE(context);
+  enable_debug_log();
+  glDebugMessageInsert(GL_DEBUG_SOURCE_APPLICATION, GL_DEBUG_TYPE_OTHER, 1, GL_DEBUG_SEVERITY_MEDIUM, -1,
+                       "hello");
+  EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
+}
+
+}  // namespace
+}  // namespace strandcast::gl
