@@ -1,0 +1,47 @@
+#include "client/net/address.h"
+
+#include <charconv>
+
+namespace strandcast {
+
+std::string Address::to_string() const {
+  const bool is_ipv6 = host.find(':') != std::string::npos;
+  return is_ipv6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
+}
+
+Result<Address> parse_address(const std::string& text) {
+  constexpr size_t kMaxHostLength = 253;  // of a DNS name
+  const auto bad = [&](const char* why) {
+    return make_error(ErrorCode::BadInput,
+                      "'{}' is not an address: {} (use HOST:PORT, for example 127.0.0.1:{})",
+                      text.substr(0, kMaxHostLength), why, kDefaultPort);
+  };
+  Address address;
+  std::string host = text;
+  std::string port;
+  if (text.starts_with('[')) {
+    const size_t end = text.find(']');
+    if (end == std::string::npos) return bad("the bracket is not closed");
+    host = text.substr(1, end - 1);
+    if (end + 1 < text.size()) {
+      if (text[end + 1] != ':') return bad("a colon must follow the bracket");
+      port = text.substr(end + 2);
+      if (port.empty()) return bad("the port is missing");
+    }
+  } else if (const size_t colon = text.rfind(':'); colon != std::string::npos) {
+    if (text.find(':') != colon) return bad("an IPv6 host needs brackets");
+    host = text.substr(0, colon);
+    port = text.substr(colon + 1);
+    if (port.empty()) return bad("the port is missing");
+  }
+  if (host.size() > kMaxHostLength) return bad("the host name is too long");
+  if (!host.empty()) address.host = host;
+  if (!port.empty()) {
+    const auto [end, failure] = std::from_chars(port.data(), port.data() + port.size(), address.port);
+    if (failure != std::errc() || end != port.data() + port.size() || address.port == 0)
+      return bad("the port must be a number from 1 to 65535");
+  }
+  return address;
+}
+
+}  // namespace strandcast

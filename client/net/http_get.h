@@ -1,0 +1,24 @@
+// One HTTP GET to a server's own port, for health checks. Blocks up to the timeout.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "client/net/address.h"
+#include "common/base/result.h"
+
+namespace strandcast {
+
+inline constexpr uint64_t kMaxHttpBodyBytes = 1u << 20;
+
+struct HttpAnswer {
+  unsigned status = 0;
+  std::string body;
+};
+
+/// Unavailable when nobody listens or the answer is not HTTP, Timeout when it takes too long.
+Result<HttpAnswer> http_get(const Address& address, const std::string& target,
+                            std::chrono::milliseconds timeout);
+
+}  // namespace strandcast

@@ -1,0 +1,107 @@
+#include "client/net/mailbox.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace strandcast {
+namespace {
+
+bool is_strand_frame(Opcode opcode) {
+  return opcode == Opcode::StrandKeyframe || opcode == Opcode::StrandDelta;
+}
+
+}  // namespace
+
+template <class Predicate>
+size_t Mailbox::erase_media(Predicate predicate) {
+  return std::erase_if(events_, [&](const ClientEvent& event) {
+    const auto* media = std::get_if<MediaEvent>(&event);
+    return media != nullptr && predicate(media->header.opcode);
+  });
+}
+
+void Mailbox::append(ClientEvent event) {
+  events_.push_back(std::move(event));
+  arrived_.notify_one();
+}
+
+Mailbox::Outcome Mailbox::push(MediaEvent event) {
+  const std::lock_guard lock(mutex_);
+  if (is_closed_) return Outcome::Kept;
+  const Opcode opcode = event.header.opcode;
+  if (!is_strand_frame(opcode)) {
+    erase_media([opcode](Opcode other) { return other == opcode; });
+    append(std::move(event));
+    return Outcome::Kept;
+  }
+
+  if (opcode == Opcode::StrandKeyframe) is_waiting_for_keyframe_ = false;
+  if (is_waiting_for_keyframe_) {
+    ++dropped_strand_frames_;
+    return Outcome::KeyframeNeeded;
+  }
+  const bool overflows = strand_frame_count_ + 1 > limits_.strand_frames ||
+                         strand_bytes_ + event.message.size() > limits_.strand_bytes;
+  if (overflows) {
+    dropped_strand_frames_ += erase_media(is_strand_frame);
+    strand_frame_count_ = 0;
+    strand_bytes_ = 0;
+    // A keyframe stands alone, so it may start the queue afresh; a delta cannot be used any more.
+    if (opcode == Opcode::StrandDelta) {
+      ++dropped_strand_frames_;
+      is_waiting_for_keyframe_ = true;
+      return Outcome::KeyframeNeeded;
+    }
+  }
+  ++strand_frame_count_;
+  strand_bytes_ += event.message.size();
+  append(std::move(event));
+  return Outcome::Kept;
+}
+
+void Mailbox::push(const ServerStatus& status) {
+  const std::lock_guard lock(mutex_);
+  if (is_closed_) return;
+  std::erase_if(events_,
+                [](const ClientEvent& event) { return std::holds_alternative<ServerStatus>(event); });
+  append(status);
+}
+
+void Mailbox::push(Notice notice) {
+  const std::lock_guard lock(mutex_);
+  if (is_closed_) return;
+  const auto is_notice = [](const ClientEvent& event) { return std::holds_alternative<Notice>(event); };
+  if (static_cast<size_t>(std::count_if(events_.begin(), events_.end(), is_notice)) >= limits_.notices)
+    events_.erase(std::find_if(events_.begin(), events_.end(), is_notice));
+  append(std::move(notice));
+}
+
+void Mailbox::close(Error error) {
+  const std::lock_guard lock(mutex_);
+  if (is_closed_) return;
+  is_closed_ = true;
+  append(ClosedEvent{std::move(error)});
+}
+
+std::vector<ClientEvent> Mailbox::take() {
+  return wait(std::chrono::milliseconds(0));
+}
+
+std::vector<ClientEvent> Mailbox::wait(std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  if (timeout.count() > 0) arrived_.wait_for(lock, timeout, [this] { return !events_.empty(); });
+  std::vector<ClientEvent> taken(std::make_move_iterator(events_.begin()),
+                                 std::make_move_iterator(events_.end()));
+  events_.clear();
+  strand_frame_count_ = 0;
+  strand_bytes_ = 0;
+  return taken;
+}
+
+uint64_t Mailbox::dropped_strand_frames() const {
+  const std::lock_guard lock(mutex_);
+  return dropped_strand_frames_;
+}
+
+}  // namespace strandcast

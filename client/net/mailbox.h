@@ -1,0 +1,82 @@
+// Mailbox: hands what the network thread received to the application thread; bounded in every kind. Strand
+// frames keep their order (a delta needs every frame before it); pictures, assets and status keep only the
+// newest. Any thread. Does not decode.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/codec/frame_header.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+/// One media message as received: asset, strand frame or JPEG picture. Header checked, payload not.
+struct MediaEvent {
+  FrameHeader header;
+  std::vector<std::byte> message;  // header + payload
+  int64_t receive_time_ns = 0;     // client clock
+
+  std::span<const std::byte> payload() const { return std::span(message).subspan(kFrameHeaderBytes); }
+};
+
+/// The last event of a connection: it is over and says why.
+struct ClosedEvent {
+  Error error;
+};
+
+using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, ClosedEvent>;
+
+struct MailboxLimits {
+  size_t strand_frames = 240;            // four seconds at 60 Hz
+  uint64_t strand_bytes = 128ull << 20;  // at least one message of the largest size fits
+  size_t notices = 64;
+};
+
+class Mailbox {
+ public:
+  explicit Mailbox(MailboxLimits limits = {}) : limits_(limits) {}
+
+  enum class Outcome { Kept, KeyframeNeeded };
+
+  /// Takes a media message. When strand frames pass their limit all of them are dropped, and so is every
+  /// delta until the next keyframe; KeyframeNeeded tells the caller to ask for one.
+  Outcome push(MediaEvent event);
+  void push(const ServerStatus& status);
+  /// The oldest notice gives way when there are too many.
+  void push(Notice notice);
+  /// Adds the final event; later pushes are ignored.
+  void close(Error error);
+
+  /// Everything received since the last call, in order of arrival.
+  std::vector<ClientEvent> take();
+  /// As take(), but waits for the first event up to `timeout`.
+  std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
+
+  /// Strand frames thrown away because the application did not keep up.
+  uint64_t dropped_strand_frames() const;
+
+ private:
+  template <class Predicate>
+  size_t erase_media(Predicate predicate);
+  void append(ClientEvent event);
+
+  const MailboxLimits limits_;
+  mutable std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<ClientEvent> events_;
+  size_t strand_frame_count_ = 0;
+  uint64_t strand_bytes_ = 0;
+  uint64_t dropped_strand_frames_ = 0;
+  bool is_waiting_for_keyframe_ = false;
+  bool is_closed_ = false;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,82 @@
+// ViewerClient: one WebSocket connection to a server, for viewers, controllers and sources. An own thread
+// does all network work; the application takes events from a bounded mailbox and sends through a bounded
+// queue, so neither side can make the other grow. Every received byte is untrusted. Does not decode frames
+// and does not reconnect.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/net/address.h"
+#include "client/net/mailbox.h"
+#include "common/base/result.h"
+#include "common/wire/clock_offset.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+struct ClientConfig {
+  Address address;
+  std::string path = "/v1";
+  Hello hello;
+  std::chrono::milliseconds connect_timeout{5000};  // name, TCP and WebSocket handshake together
+  std::chrono::milliseconds welcome_timeout{5000};  // from the handshake to the Welcome
+  std::chrono::milliseconds idle_timeout{15'000};   // nothing received for this long: the server is gone
+  MailboxLimits mailbox;
+};
+
+inline constexpr size_t kMaxSendQueueMessages = 1024;
+inline constexpr size_t kMaxSendQueueBytes = 1u << 20;
+inline constexpr int kQuickPings = 10;  // clock probes right after the Welcome
+inline constexpr std::chrono::milliseconds kQuickPingInterval{20};
+inline constexpr std::chrono::milliseconds kPingInterval{1000};
+inline constexpr std::chrono::milliseconds kKeyframeRequestInterval{
+    1000};  // at most one request in this time
+
+struct NetCounters {
+  uint64_t received_bytes = 0;  // payload of WebSocket messages
+  uint64_t received_messages = 0;
+  uint64_t sent_messages = 0;
+  uint64_t dropped_strand_frames = 0;  // the application was too slow
+};
+
+class ViewerClient {
+ public:
+  /// Blocks until the server has sent its Welcome. Unavailable: nobody listens or the connection broke;
+  /// Timeout; Unauthorized, LimitExceeded, Unsupported: the server refused; BadInput: it does not speak this
+  /// protocol.
+  static Result<std::unique_ptr<ViewerClient>> connect(const ClientConfig& config);
+  /// Says goodbye to the server (waiting a fraction of a second at most) and ends the network thread.
+  ~ViewerClient();
+  ViewerClient(const ViewerClient&) = delete;
+  ViewerClient& operator=(const ViewerClient&) = delete;
+
+  const Welcome& welcome() const;
+
+  /// Events since the last call, in order; after a ClosedEvent nothing more comes. One application thread.
+  std::vector<ClientEvent> poll();
+  /// As poll(), waiting up to `timeout` for the first event.
+  std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
+
+  /// Queues a message. LimitExceeded when the queue is full (the message is dropped), Unavailable when the
+  /// connection is over. Any thread.
+  Status send(const ClientMessage& message);
+  /// Asks for a keyframe, at most once in kKeyframeRequestInterval; extra calls do nothing. Any thread.
+  void request_keyframe();
+  /// Messages queued and not yet written. Any thread.
+  size_t queued_messages() const;
+
+  /// Copy of the clock estimate; has no value until the first probe returned. Any thread.
+  ClockOffset clock() const;
+  NetCounters counters() const;
+
+ private:
+  class Connection;
+  explicit ViewerClient(std::unique_ptr<Connection> connection);
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,174 @@
+#include <set>
+#include <thread>
+
+#include "client/net/address.h"
+#include "client/net/mailbox.h"
+#include "client/net/reconnect_policy.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+MediaEvent media(Opcode opcode, uint32_t sequence, size_t size_bytes = 100) {
+  MediaEvent event;
+  event.header.opcode = opcode;
+  event.header.sequence = sequence;
+  event.message.resize(size_bytes);
+  return event;
+}
+
+std::vector<uint32_t> sequences(const std::vector<ClientEvent>& events, Opcode opcode) {
+  std::vector<uint32_t> found;
+  for (const ClientEvent& event : events)
+    if (const auto* part = std::get_if<MediaEvent>(&event); part && part->header.opcode == opcode)
+      found.push_back(part->header.sequence);
+  return found;
+}
+
+TEST(Mailbox, KeepsEveryStrandFrameInOrderAndOnlyTheNewestPicture) {
+  Mailbox mailbox;
+  mailbox.push(media(Opcode::StrandKeyframe, 1));
+  mailbox.push(media(Opcode::JpegFrame, 7));
+  mailbox.push(media(Opcode::StrandDelta, 2));
+  mailbox.push(media(Opcode::JpegFrame, 8));
+  mailbox.push(media(Opcode::StrandDelta, 3));
+  const auto events = mailbox.take();
+  EXPECT_EQ(sequences(events, Opcode::StrandDelta), (std::vector<uint32_t>{2, 3}));
+  EXPECT_EQ(sequences(events, Opcode::JpegFrame), (std::vector<uint32_t>{8}));
+  EXPECT_EQ(events.size(), 4u);
+  EXPECT_TRUE(mailbox.take().empty());
+  EXPECT_EQ(mailbox.dropped_strand_frames(), 0u);
+}
+
+TEST(Mailbox, DropsAllStrandFramesOnOverflowUntilTheNextKeyframe) {
+  Mailbox mailbox({.strand_frames = 3});
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 1)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 2)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 3)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 4)), Mailbox::Outcome::KeyframeNeeded);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 5)), Mailbox::Outcome::KeyframeNeeded);
+  EXPECT_TRUE(mailbox.take().empty());
+  // Emptied in between: a delta still has no base.
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 6)), Mailbox::Outcome::KeyframeNeeded);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 7)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 8)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(mailbox.take().size(), 2u);
+  EXPECT_EQ(mailbox.dropped_strand_frames(), 6u);
+}
+
+TEST(Mailbox, StaysWithinItsByteLimitAndLetsAKeyframeStartAfresh) {
+  Mailbox mailbox({.strand_bytes = 1000});
+  mailbox.push(media(Opcode::StrandKeyframe, 1, 600));
+  mailbox.push(media(Opcode::StrandDelta, 2, 400));
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 3, 700)), Mailbox::Outcome::Kept);
+  const auto events = mailbox.take();
+  EXPECT_EQ(sequences(events, Opcode::StrandKeyframe), (std::vector<uint32_t>{3}));
+  EXPECT_EQ(events.size(), 1u);
+  EXPECT_EQ(mailbox.dropped_strand_frames(), 2u);
+}
+
+TEST(Mailbox, BoundsStatusAndNotices) {
+  Mailbox mailbox({.notices = 4});
+  for (uint64_t i = 0; i < 100; ++i) {
+    mailbox.push(ServerStatus{.tick = i});
+    mailbox.push(Notice{false, std::to_string(i)});
+  }
+  const auto events = mailbox.take();
+  ASSERT_EQ(events.size(), 5u);
+  std::vector<std::string> notices;
+  for (const auto& event : events) {
+    if (const auto* status = std::get_if<ServerStatus>(&event)) {
+      EXPECT_EQ(status->tick, 99u);
+    }
+    if (const auto* notice = std::get_if<Notice>(&event)) notices.push_back(notice->text);
+  }
+  EXPECT_EQ(notices, (std::vector<std::string>{"96", "97", "98", "99"}));
+}
+
+TEST(Mailbox, EndsWithOneClosedEvent) {
+  Mailbox mailbox;
+  mailbox.close(make_error(ErrorCode::Timeout, "first"));
+  mailbox.close(make_error(ErrorCode::Internal, "second"));
+  mailbox.push(media(Opcode::StrandKeyframe, 1));
+  mailbox.push(ServerStatus{});
+  const auto events = mailbox.take();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(std::get<ClosedEvent>(events[0]).error.message, "first");
+}
+
+TEST(Mailbox, WaitWakesForAnEventAndGivesUpAfterTheTimeout) {
+  Mailbox mailbox;
+  EXPECT_TRUE(mailbox.wait(milliseconds(1)).empty());
+  std::thread sender([&mailbox] { mailbox.push(ServerStatus{.tick = 5}); });
+  EXPECT_EQ(mailbox.wait(std::chrono::minutes(1)).size(), 1u);
+  sender.join();
+}
+
+TEST(ReconnectPolicy, DoublesFromAQuarterSecondToFiveSecondsWithJitter) {
+  ReconnectPolicy policy(1);
+  const Error lost = make_error(ErrorCode::Unavailable, "connection lost");
+  double nominal_ms = 250.0;
+  for (int i = 0; i < 12; ++i) {
+    const auto delay = policy.next_delay(lost, milliseconds(0));
+    ASSERT_TRUE(delay);
+    EXPECT_GE(delay->count(), nominal_ms * (1.0 - kReconnectJitter) - 1.0) << "attempt " << i;
+    EXPECT_LE(delay->count(), nominal_ms * (1.0 + kReconnectJitter)) << "attempt " << i;
+    nominal_ms = std::min(nominal_ms * 2.0, 5000.0);
+  }
+}
+
+TEST(ReconnectPolicy, StartsOverOnlyAfterAConnectionThatLasted) {
+  ReconnectPolicy policy(2);
+  const Error lost = make_error(ErrorCode::Timeout, "nothing received");
+  for (int i = 0; i < 6; ++i) (void)policy.next_delay(lost, milliseconds(100));
+  EXPECT_GT(policy.next_delay(lost, milliseconds(100))->count(), 3000);
+  EXPECT_LT(policy.next_delay(lost, kStableConnection)->count(), 400);
+}
+
+TEST(ReconnectPolicy, SpreadsManyViewers) {
+  std::set<int64_t> delays;
+  const Error lost = make_error(ErrorCode::Unavailable, "connection lost");
+  for (uint32_t seed = 0; seed < 50; ++seed)
+    delays.insert(ReconnectPolicy(seed).next_delay(lost, milliseconds(0))->count());
+  EXPECT_GT(delays.size(), 25u);
+}
+
+TEST(ReconnectPolicy, StopsWhereTryingAgainCannotHelp) {
+  for (const char* reason :
+       {"bad token", "the server is full (64 viewers)", "protocol version 2 is not known",
+        "origin not allowed", "too many connections"}) {
+    ReconnectPolicy policy(3);
+    EXPECT_FALSE(policy.next_delay(error_from_goodbye(reason), milliseconds(0))) << reason;
+  }
+  for (const char* reason : {"the server is stopping", "you are too slow", ""}) {
+    ReconnectPolicy policy(3);
+    EXPECT_TRUE(policy.next_delay(error_from_goodbye(reason), milliseconds(0))) << reason;
+  }
+  ReconnectPolicy policy(3);
+  EXPECT_FALSE(policy.next_delay(make_error(ErrorCode::BadInput, "garbage"), milliseconds(0)));
+}
+
+TEST(Address, ReadsWhatPeopleType) {
+  EXPECT_EQ(*parse_address("10.0.0.2:9000"), (Address{"10.0.0.2", 9000}));
+  EXPECT_EQ(*parse_address("studio"), (Address{"studio", kDefaultPort}));
+  EXPECT_EQ(*parse_address(":81"), (Address{"127.0.0.1", 81}));
+  EXPECT_EQ(*parse_address("[::1]:82"), (Address{"::1", 82}));
+  EXPECT_EQ(*parse_address("[::1]"), (Address{"::1", kDefaultPort}));
+  EXPECT_EQ(*parse_address(""), Address{});
+  EXPECT_EQ((Address{"::1", 82}).to_string(), "[::1]:82");
+}
+
+TEST(Address, RefusesTheRestAndNamesIt) {
+  for (const char* text : {"host:", "host:0", "host:65536", "host:-1", "host:80x", "::1", "[::1", "[::1]80",
+                           "[::1]:", "a:b:c"}) {
+    const auto parsed = parse_address(text);
+    ASSERT_FALSE(parsed) << text;
+    EXPECT_EQ(parsed.error().code, ErrorCode::BadInput);
+    EXPECT_NE(parsed.error().message.find(text), std::string::npos) << parsed.error().message;
+  }
+  EXPECT_FALSE(parse_address(std::string(10'000, 'a')));
+}
+
+}  // namespace
+}  // namespace strandcast
