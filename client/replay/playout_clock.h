@@ -1,0 +1,43 @@
+// PlayoutClock: which simulation time to show at a given client time so that motion stays even although
+// frames arrive unevenly. Fits a line through recent (receive, simulation) times, so it also follows a server
+// that runs slower than real time. Pure arithmetic, one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+
+namespace strandcast {
+
+inline constexpr size_t kPlayoutWindow = 64;  // frames, about a second
+inline constexpr int64_t kMaxPlayoutDelayNs = 100'000'000;
+inline constexpr int64_t kPlayoutGapNs =
+    500'000'000;  // a longer silence (pause, stall) starts the fit afresh
+
+class PlayoutClock {
+ public:
+  /// A frame of simulation time `sim_time_ns` was received at client time `receive_time_ns`.
+  void add(int64_t receive_time_ns, int64_t sim_time_ns);
+
+  bool has_value() const { return samples_.size() >= 2; }
+  /// Simulation time to show at `client_time_ns`: one frame behind the fitted line, and further behind by the
+  /// lateness that all but 5 % of recent frames stay under, at most kMaxPlayoutDelayNs in all.
+  int64_t sim_time_at(int64_t client_time_ns) const;
+  /// The delay behind the newest frame that sim_time_at uses, client ns.
+  int64_t delay_ns() const { return delay_ns_; }
+
+ private:
+  struct Sample {
+    int64_t receive_time_ns;
+    int64_t sim_time_ns;
+  };
+  void fit();
+
+  std::deque<Sample> samples_;
+  double sim_per_client_ = 1.0;   // slope of the fit
+  double mean_receive_ns_ = 0.0;  // the fit passes through these, relative to the first sample
+  double mean_sim_ns_ = 0.0;
+  int64_t delay_ns_ = 0;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,131 @@
+#include "client/replay/strand_replay.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace strandcast {
+
+StrandPicture picture_of(const Snapshot& snapshot) {
+  return StrandPicture{snapshot.world_from_head, positions_in_head(snapshot)};
+}
+
+StrandPicture blend(const Snapshot& from, const Snapshot& to, double blend) {
+  if (blend >= 1.0) return picture_of(to);
+  if (blend <= 0.0) return picture_of(from);
+  StrandPicture picture{interpolate(from.world_from_head, to.world_from_head, blend),
+                        positions_in_head(from)};
+  const std::vector<glm::vec3> target = positions_in_head(to);
+  const auto weight = static_cast<float>(blend);
+  for (size_t i = 0; i < target.size(); ++i)
+    picture.position_m[i] += weight * (target[i] - picture.position_m[i]);
+  return picture;
+}
+
+Result<std::unique_ptr<StrandReplay>> StrandReplay::make(const Welcome& welcome,
+                                                         KeyframeRequester request_keyframe) {
+  const StrandStreamLimits limits{welcome.strand_count, welcome.vertex_count};
+  ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(welcome.codec, limits));
+  return std::unique_ptr<StrandReplay>(new StrandReplay(std::move(decoder), std::move(request_keyframe)));
+}
+
+StrandReplay::StrandReplay(std::unique_ptr<StrandDecoder> decoder, KeyframeRequester request_keyframe)
+    : decoder_(std::move(decoder)), request_keyframe_(std::move(request_keyframe)) {}
+
+std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte> message,
+                                                      int64_t receive_time_ns, const ClockOffset& clock) {
+  ++stats_.received_frames;
+  stats_.received_bytes += message.size();
+  const auto header = unpack_frame_header(message);
+  if (!header) {
+    reject(header.error(), receive_time_ns);
+    return nullptr;
+  }
+  note_sequence(*header);
+
+  const int64_t begin_ns = now_ns();
+  auto decoded = decoder_->decode(message);
+  if (!decoded) {
+    reject(decoded.error(), receive_time_ns);
+    return nullptr;
+  }
+  std::shared_ptr<const Snapshot> snapshot = std::move(decoded).value();
+  const int64_t decoded_ns = now_ns();
+  decode_timer_.add_ms(static_cast<double>(decoded_ns - begin_ns) * 1e-6);
+  ++stats_.decoded_frames;
+  if (header->opcode == Opcode::StrandKeyframe) ++stats_.keyframes;
+  newest_send_time_ns_ = header->send_time_ns;
+
+  // Only the first state with a new motion sample counts: the same sample in later states is not late, it is
+  // held.
+  const int64_t motion_time_ns = snapshot->motion_time_ns;
+  if (motion_time_ns != 0 && motion_time_ns != last_motion_time_ns_ && clock.has_value()) {
+    // Waiting in the mailbox is part of the way, so the clock is read now and not at the frame's arrival.
+    const int64_t latency_ns = clock.to_server_ns(decoded_ns) - motion_time_ns;
+    if (last_motion_time_ns_ != 0) motion_latency_timer_.add_ms(static_cast<double>(latency_ns) * 1e-6);
+    last_motion_time_ns_ = motion_time_ns;
+  }
+  keep(snapshot, receive_time_ns);
+  return snapshot;
+}
+
+void StrandReplay::note_sequence(const FrameHeader& header) {
+  // A keyframe for a late joiner repeats the number of the chain's present state, so equal is no gap.
+  if (last_sequence_ != 0 && header.sequence > last_sequence_ + 1) {
+    ++stats_.gaps;
+    stats_.missed_frames += header.sequence - last_sequence_ - 1;
+  }
+  last_sequence_ = header.sequence;
+}
+
+void StrandReplay::reject(const Error& error, int64_t receive_time_ns) {
+  ++stats_.rejected_frames;
+  stats_.last_error = error.to_string();
+  if (last_keyframe_request_ns_ && receive_time_ns - *last_keyframe_request_ns_ < kReplayKeyframeRequestNs)
+    return;
+  last_keyframe_request_ns_ = receive_time_ns;
+  ++stats_.keyframe_requests;
+  if (request_keyframe_) request_keyframe_();
+}
+
+void StrandReplay::keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns) {
+  // A keyframe on request repeats the state that is already here.
+  if (!snapshots_.empty() && snapshot->sim_time_ns == snapshots_.back()->sim_time_ns) {
+    snapshots_.back() = std::move(snapshot);
+    return;
+  }
+  playout_clock_.add(receive_time_ns, snapshot->sim_time_ns);
+  // A reset server starts at zero again: blending across it would sweep the hair through the head.
+  const bool goes_back = !snapshots_.empty() && snapshot->sim_time_ns < snapshots_.back()->sim_time_ns;
+  if (goes_back) snapshots_.clear();
+  snapshots_.push_back(std::move(snapshot));
+  const size_t kept = playout_ == Playout::Smooth ? kKeptSnapshots : 1;
+  while (snapshots_.size() > kept) snapshots_.pop_front();
+}
+
+std::shared_ptr<const Snapshot> StrandReplay::newest() const {
+  return snapshots_.empty() ? nullptr : snapshots_.back();
+}
+
+std::optional<StrandPicture> StrandReplay::picture_at(int64_t client_time_ns) const {
+  if (snapshots_.empty()) return std::nullopt;
+  if (playout_ == Playout::LowLatency || snapshots_.size() < 2 || !playout_clock_.has_value())
+    return picture_of(*snapshots_.back());
+
+  const int64_t sim_time_ns = playout_clock_.sim_time_at(client_time_ns);
+  const auto later = std::find_if(snapshots_.begin(), snapshots_.end(), [sim_time_ns](const auto& snapshot) {
+    return snapshot->sim_time_ns > sim_time_ns;
+  });
+  if (later == snapshots_.end()) return picture_of(*snapshots_.back());
+  if (later == snapshots_.begin()) return picture_of(**later);
+  const Snapshot& from = **std::prev(later);
+  const Snapshot& to = **later;
+  const auto span_ns = static_cast<double>(to.sim_time_ns - from.sim_time_ns);
+  return blend(from, to, static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
+}
+
+double StrandReplay::state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const {
+  if (snapshots_.empty() || newest_send_time_ns_ == 0 || !clock.has_value()) return 0.0;
+  return static_cast<double>(clock.to_server_ns(client_time_ns) - newest_send_time_ns_) * 1e-6;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,103 @@
+// StrandReplay: received strand frames -> what to draw now. Decodes, keeps the newest snapshots, blends
+// between them, asks for keyframes and measures. A viewer never simulates: between snapshots it only
+// interpolates. One thread; no network, no GL.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "client/replay/playout_clock.h"
+#include "common/base/profile.h"
+#include "common/base/result.h"
+#include "common/codec/snapshot.h"
+#include "common/codec/strand_codec.h"
+#include "common/render/renderer.h"
+#include "common/wire/clock_offset.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+enum class Playout {
+  LowLatency,  // the newest snapshot as it is: the same picture the server would draw
+  Smooth,      // interpolated between snapshots, behind by an adaptive delay
+};
+
+struct ReplayStats {
+  uint64_t decoded_frames = 0;
+  uint64_t keyframes = 0;
+  uint64_t received_frames = 0;
+  uint64_t received_bytes = 0;
+  uint64_t rejected_frames = 0;  // malformed, or their base was missing
+  uint64_t gaps = 0;             // places where the sequence jumped
+  uint64_t missed_frames = 0;    // frames the server numbered and this client never saw
+  uint64_t keyframe_requests = 0;
+  std::string last_error;  // of the newest rejected frame
+};
+
+/// Asks the server for a keyframe; called at most once in kKeyframeRequestInterval.
+using KeyframeRequester = std::function<void()>;
+
+class StrandReplay {
+ public:
+  /// `welcome` names codec and sizes; NotFound or BadInput when this program cannot decode them.
+  static Result<std::unique_ptr<StrandReplay>> make(const Welcome& welcome,
+                                                    KeyframeRequester request_keyframe);
+
+  /// Decodes one strand frame (header + payload), received at `receive_time_ns` on the client's clock. A
+  /// frame that cannot be used is counted, asks for a keyframe and returns null. `clock` may have no value
+  /// yet.
+  std::shared_ptr<const Snapshot> receive(std::span<const std::byte> message, int64_t receive_time_ns,
+                                          const ClockOffset& clock);
+
+  void set_playout(Playout playout) { playout_ = playout; }
+  Playout playout() const { return playout_; }
+
+  /// Newest snapshot, null before the first keyframe.
+  std::shared_ptr<const Snapshot> newest() const;
+  /// What to draw at client time `client_time_ns`; nothing before the first keyframe.
+  std::optional<StrandPicture> picture_at(int64_t client_time_ns) const;
+  /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
+  double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;
+
+  const ReplayStats& stats() const { return stats_; }
+  const StageTimer& decode_timer() const { return decode_timer_; }
+  /// From the arrival of a motion sample at the server to the decoded state that contains it, ms.
+  const StageTimer& motion_latency_timer() const { return motion_latency_timer_; }
+  /// How far smooth playout stays behind, ms.
+  double playout_delay_ms() const { return static_cast<double>(playout_clock_.delay_ns()) * 1e-6; }
+
+ private:
+  StrandReplay(std::unique_ptr<StrandDecoder> decoder, KeyframeRequester request_keyframe);
+  void reject(const Error& error, int64_t receive_time_ns);
+  void note_sequence(const FrameHeader& header);
+  void keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns);
+
+  std::unique_ptr<StrandDecoder> decoder_;
+  KeyframeRequester request_keyframe_;
+  Playout playout_ = Playout::LowLatency;
+  PlayoutClock playout_clock_;
+  std::deque<std::shared_ptr<const Snapshot>> snapshots_;  // oldest first
+  ReplayStats stats_;
+  StageTimer decode_timer_;
+  StageTimer motion_latency_timer_;
+  uint32_t last_sequence_ = 0;
+  int64_t last_motion_time_ns_ = 0;
+  int64_t newest_send_time_ns_ = 0;
+  std::optional<int64_t> last_keyframe_request_ns_;
+};
+
+inline constexpr int64_t kReplayKeyframeRequestNs = 1'000'000'000;
+inline constexpr size_t kKeptSnapshots = 8;  // smooth playout at 60 Hz spans at most 100 ms
+
+/// Strands between two snapshots of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
+/// space, so a turning head carries the hair round instead of cutting through it.
+StrandPicture blend(const Snapshot& from, const Snapshot& to, double blend);
+
+/// The picture of one snapshot, as the server draws it.
+StrandPicture picture_of(const Snapshot& snapshot);
+
+}  // namespace strandcast

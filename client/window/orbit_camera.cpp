@@ -1,0 +1,65 @@
+#include "client/window/orbit_camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace strandcast {
+namespace {
+
+struct Polar {
+  float distance_m;
+  float yaw_rad;    // about +Y, 0 looks along -Z
+  float pitch_rad;  // above the horizon
+};
+
+Polar to_polar(const glm::vec3& offset_m) {
+  const float distance_m = glm::length(offset_m);
+  return {distance_m, std::atan2(offset_m.x, offset_m.z),
+          std::asin(std::clamp(offset_m.y / distance_m, -1.0f, 1.0f))};
+}
+
+glm::vec3 from_polar(const Polar& polar) {
+  const float level = std::cos(polar.pitch_rad);
+  return polar.distance_m * glm::vec3(level * std::sin(polar.yaw_rad), std::sin(polar.pitch_rad),
+                                      level * std::cos(polar.yaw_rad));
+}
+
+}  // namespace
+
+OrbitCamera::OrbitCamera(const CameraDesc& home) : home_(home) {
+  const CameraDesc fallback;
+  if (!(glm::length(home_.offset_m) >= kMinOrbitDistanceM)) home_.offset_m = fallback.offset_m;
+  camera_ = home_;
+}
+
+void OrbitCamera::orbit(const glm::vec2& drag_heights) {
+  Polar polar = to_polar(camera_.offset_m);
+  polar.yaw_rad -= drag_heights.x * kOrbitRadPerHeight;
+  polar.pitch_rad = std::clamp(polar.pitch_rad + drag_heights.y * kOrbitRadPerHeight, -kMaxOrbitPitchRad,
+                               kMaxOrbitPitchRad);
+  camera_.offset_m = from_polar(polar);
+}
+
+void OrbitCamera::pan(const glm::vec2& drag_heights) {
+  const glm::vec3 forward = -glm::normalize(camera_.offset_m);
+  glm::vec3 right = glm::cross(forward, glm::vec3(0.0f, 1.0f, 0.0f));
+  if (glm::length(right) < 1e-4f) right = glm::vec3(1.0f, 0.0f, 0.0f);
+  right = glm::normalize(right);
+  const glm::vec3 up = glm::cross(right, forward);
+  const float visible_height_m = 2.0f * glm::length(camera_.offset_m) * std::tan(0.5f * camera_.fov_y_rad);
+  camera_.target_m += visible_height_m * (-drag_heights.x * right + drag_heights.y * up);
+  camera_.target_m = glm::clamp(camera_.target_m, glm::vec3(-kMaxOrbitPanM), glm::vec3(kMaxOrbitPanM));
+}
+
+void OrbitCamera::zoom(float wheel_steps) {
+  const float distance_m = glm::length(camera_.offset_m);
+  const float wanted_m = std::clamp(distance_m * std::pow(kZoomPerWheelStep, wheel_steps), kMinOrbitDistanceM,
+                                    kMaxOrbitDistanceM);
+  camera_.offset_m *= wanted_m / distance_m;
+}
+
+void OrbitCamera::reset() {
+  camera_ = home_;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,88 @@
+#include "client/replay/playout_clock.h"
+
+#include <cmath>
+
+#include "common/base/hash.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kStepNs = 16'666'667;
+constexpr int64_t kStartNs = 5'000'000'000'000;  // client clocks do not start at zero
+
+TEST(PlayoutClock, StaysOneFrameBehindAnEvenStream) {
+  PlayoutClock clock;
+  EXPECT_FALSE(clock.has_value());
+  for (int64_t i = 0; i < 100; ++i) clock.add(kStartNs + i * kStepNs, i * kStepNs);
+  ASSERT_TRUE(clock.has_value());
+  EXPECT_NEAR(static_cast<double>(clock.delay_ns()), kStepNs, 1000.0);
+  const int64_t now_ns = kStartNs + 99 * kStepNs + 4 * kMs;
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs + 4 * kMs, 1000.0);
+}
+
+TEST(PlayoutClock, FollowsASlowServer) {
+  PlayoutClock clock;
+  for (int64_t i = 0; i < 100; ++i)
+    clock.add(kStartNs + 3 * i * kStepNs, i * kStepNs);  // a third of real time
+  const int64_t now_ns = kStartNs + 3 * 99 * kStepNs;
+  const int64_t later_ns = now_ns + 30 * kMs;
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(later_ns) - clock.sim_time_at(now_ns)), 10.0 * kMs,
+              0.05 * kMs);
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs, 0.1 * kMs);
+}
+
+TEST(PlayoutClock, JitterGrowsTheDelayButNotBeyondItsLimit) {
+  for (const int64_t jitter_ns : {5 * kMs, 20 * kMs, 1000 * kMs}) {
+    PlayoutClock clock;
+    int64_t last_ns = 0;
+    for (int64_t i = 0; i < 200; ++i) {
+      const double late = unit_float(mix_u32(static_cast<uint32_t>(i)));
+      // Frames keep their order: a late one holds up those behind it.
+      last_ns = std::max(
+          last_ns, kStartNs + i * kStepNs + static_cast<int64_t>(late * static_cast<double>(jitter_ns)));
+      clock.add(last_ns, i * kStepNs);
+    }
+    EXPECT_GT(clock.delay_ns(), kStepNs + std::min(jitter_ns / 8, 10 * kMs)) << jitter_ns;
+    EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs) << jitter_ns;
+  }
+}
+
+TEST(PlayoutClock, SmoothPlayoutNeedsNoFrameThatIsNotThereYet) {
+  PlayoutClock clock;
+  int shown = 0;
+  int starved = 0;
+  for (int64_t i = 0; i < 400; ++i) {
+    const double late = unit_float(mix_u32(static_cast<uint32_t>(i) + 77u));
+    clock.add(kStartNs + i * kStepNs + static_cast<int64_t>(late * 8.0 * kMs), i * kStepNs);
+    if (i < 64) continue;
+    // Just before the next frame comes at its latest, playout must still be within what has arrived.
+    const double next_late = unit_float(mix_u32(static_cast<uint32_t>(i) + 78u));
+    const int64_t before_next_ns =
+        kStartNs + (i + 1) * kStepNs + static_cast<int64_t>(next_late * 8.0 * kMs) - 1;
+    ++shown;
+    if (clock.sim_time_at(before_next_ns) > i * kStepNs) ++starved;
+  }
+  EXPECT_LT(starved, shown / 10) << "the delay covers 95 % of lateness";
+}
+
+TEST(PlayoutClock, ForgetsThePastAfterAResetOrAPause) {
+  PlayoutClock clock;
+  for (int64_t i = 0; i < 50; ++i) clock.add(kStartNs + i * kStepNs, i * kStepNs);
+  clock.add(kStartNs + 50 * kStepNs, 0);
+  EXPECT_FALSE(clock.has_value());
+  for (int64_t i = 1; i < 10; ++i) clock.add(kStartNs + (50 + i) * kStepNs, i * kStepNs);
+  ASSERT_TRUE(clock.has_value());
+  clock.add(kStartNs + 60 * kStepNs + kPlayoutGapNs, 10 * kStepNs);
+  EXPECT_FALSE(clock.has_value());
+}
+
+TEST(PlayoutClock, SurvivesABurstAndEqualTimes) {
+  PlayoutClock clock;
+  for (int64_t i = 0; i < 100; ++i) clock.add(kStartNs, i * kStepNs);
+  EXPECT_TRUE(std::isfinite(static_cast<double>(clock.sim_time_at(kStartNs + kMs))));
+  EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs);
+}
+
+}  // namespace
+}  // namespace strandcast
