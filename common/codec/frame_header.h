@@ -36,6 +36,7 @@ struct FrameHeader {
   bool operator==(const FrameHeader&) const = default;
 };
 
+/// The header as sent, little-endian.
 std::array<std::byte, kFrameHeaderBytes> pack(const FrameHeader& header);
 
 /// Reads a header and checks opcode, limit and that exactly payload_bytes follow in `message`.
@@ -48,6 +49,7 @@ struct EncodedFrame {
 };
 using EncodedFramePtr = std::shared_ptr<const EncodedFrame>;
 
+/// Sets header.payload_bytes. Null when the payload has more than kMaxMediaPayloadBytes.
 EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte> payload);
 
 }  // namespace strandcast

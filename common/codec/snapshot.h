@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/math/pose.h"
@@ -25,12 +26,36 @@ struct Snapshot {
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };
 
-/// |lattice| stays below this, so that sums of three of them fit in 32 bits; positions outside are clamped to it.
+/// |lattice| stays below this, so that sums of three of them fit in 32 bits; positions outside are clamped.
 inline constexpr int32_t kMaxLattice = 1 << 28;
 
-/// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less a
-/// margin for float rounding.
+/// The announced bound holds for vertices within this distance of the head joint along every axis; farther out the
+/// float positions themselves become coarser.
+inline constexpr float kBoundReachM = 2.0f;
+
+/// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less the
+/// rounding of float positions within kBoundReachM. `bound_m` is at least 1e-6.
 float quantum_for_bound(float bound_m);
+
+struct QuantiseInput {
+  uint64_t tick = 0;
+  int64_t sim_time_ns = 0;
+  int64_t motion_time_ns = 0;
+  Pose world_from_head;
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  float quantum_m = 0.0f;
+  std::span<const glm::vec3> position_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
+  std::span<const glm::vec3> fallback_m;          // same shape, or empty: zero; used where a position is not finite
+};
+
+struct Quantised {
+  Snapshot snapshot;
+  uint64_t replaced_count = 0;  // vertices that were not finite
+};
+
+/// Rounds positions to the lattice. Positions beyond the lattice are clamped to it.
+Quantised quantise(const QuantiseInput& input);
 
 /// Head-space positions in metres, (vertex_count x strand_count x vec3), vertex-major, strand fastest.
 std::vector<glm::vec3> positions_in_head(const Snapshot& snapshot);

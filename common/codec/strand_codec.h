@@ -21,10 +21,11 @@ class StrandEncoder {
  public:
   virtual ~StrandEncoder() = default;
   /// Appends `snapshot` to the chain. The result is a delta against the previous call (a keyframe the first time
-  /// and whenever strand_count, vertex_count or quantum change).
+  /// and whenever strand_count, vertex_count or quantum change). Null, with the chain restarted, when the frame
+  /// would pass kMaxMediaPayloadBytes.
   virtual EncodedFramePtr encode(const Snapshot& snapshot) = 0;
   /// A keyframe for a late joiner at the chain's present state: after it, that client decodes the same deltas as
-  /// everybody else. Does not disturb the chain. Null before the first encode().
+  /// everybody else. Does not disturb the chain. Null before the first encode() and above kMaxMediaPayloadBytes.
   virtual EncodedFramePtr encode_keyframe() = 0;
 };
 

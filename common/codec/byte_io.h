@@ -1,0 +1,67 @@
+// Little-endian packing of numbers into bytes and checked reading back. Header only, any thread.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace strandcast {
+
+static_assert(std::endian::native == std::endian::little, "byte_io.h copies numbers as they lie in memory");
+
+/// Appends numbers to a byte vector.
+class ByteWriter {
+ public:
+  explicit ByteWriter(std::vector<std::byte>& bytes) : bytes_(bytes) {}
+
+  template <class T>
+  void put(T value) {
+    static_assert(std::is_arithmetic_v<T>);
+    put_bytes(std::as_bytes(std::span(&value, 1)));
+  }
+  void put_bytes(std::span<const std::byte> source) {
+    bytes_.insert(bytes_.end(), source.begin(), source.end());
+  }
+
+ private:
+  std::vector<std::byte>& bytes_;
+};
+
+/// Reads numbers from untrusted bytes. Reading past the end gives zero and is remembered: ask ok()
+/// afterwards.
+class ByteReader {
+ public:
+  explicit ByteReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+
+  template <class T>
+  T take() {
+    static_assert(std::is_arithmetic_v<T>);
+    T value{};
+    const auto source = take_bytes(sizeof(T));
+    if (!source.empty()) std::memcpy(&value, source.data(), sizeof(T));
+    return value;
+  }
+  /// The next `count` bytes, or none at all when fewer are left.
+  std::span<const std::byte> take_bytes(size_t count) {
+    if (count > bytes_.size()) {
+      ok_ = false;
+      bytes_ = {};
+      return {};
+    }
+    const auto taken = bytes_.first(count);
+    bytes_ = bytes_.subspan(count);
+    return taken;
+  }
+  bool ok() const { return ok_; }
+  std::span<const std::byte> rest() const { return bytes_; }
+
+ private:
+  std::span<const std::byte> bytes_;
+  bool ok_ = true;
+};
+
+}  // namespace strandcast
