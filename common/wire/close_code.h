@@ -1,0 +1,21 @@
+// WebSocket close codes of the protocol: a client decides by them whether to try again. Meaning:
+// proto/WIRE.md.
+#pragma once
+
+#include <cstdint>
+
+namespace strandcast {
+
+enum class CloseCode : uint16_t {
+  Normal = 1000,
+  GoingAway = 1001,     // the server stops: try again
+  BadData = 1007,       // malformed message
+  Policy = 1008,        // wrong order, wrong role or too many messages
+  TooBig = 1009,        // message above kMaxControlBytes
+  Internal = 1011,      // ours: please report
+  TryLater = 1013,      // this client reads too slowly for its control messages
+  Unauthorized = 4001,  // token refused: do not try again
+  Full = 4003,          // no place for another session: do not try again at once
+};
+
+}  // namespace strandcast

@@ -1,0 +1,44 @@
+// Who may talk to the server: listening address, token, Host and Origin headers, message rate. Pure functions
+// on untrusted text, any thread.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+/// Refuses to listen beyond loopback without a token of at least kMinRemoteTokenCharacters.
+Status check_listening(bool is_loopback, const std::string& address, const std::string& token);
+
+/// Compares in a time that depends on the length of `given` only.
+bool is_token_equal(std::string_view expected, std::string_view given);
+
+/// Host header without its port, lower case, IPv6 without brackets; empty when malformed.
+std::string host_name_of(std::string_view host_header);
+
+/// True for names that a foreign web page cannot make a browser send for an address of ours (DNS rebinding):
+/// loopback names when the connection came in on loopback, the address it came in on, and the allowed names.
+bool is_host_allowed(std::string_view host_header, const std::string& local_address, bool is_loopback,
+                     const std::vector<std::string>& allowed_names);
+
+/// Absent (empty: not a browser), or the page came from this very server.
+bool is_origin_allowed(std::string_view origin_header, std::string_view host_header);
+
+/// Token bucket: `rate_per_s` on average, as many at once.
+class RateLimit {
+ public:
+  explicit RateLimit(double rate_per_s) : rate_per_s_(rate_per_s), tokens_(rate_per_s) {}
+  /// False when this one is too many.
+  bool take(int64_t time_ns);
+
+ private:
+  double rate_per_s_;
+  double tokens_;
+  int64_t last_ns_ = 0;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,53 @@
+// What the listener, the HTTP connections and the sessions of one NetServer share. Network thread, except
+// counters.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "server/net/net_server.h"
+
+namespace strandcast::net {
+
+class Connection;
+class Session;
+
+/// Bytes handed to the kernel at once: a write without progress is noticed per chunk, not per frame.
+inline constexpr size_t kWriteChunkBytes = 64u << 10;
+/// Connections beyond the sessions: HTTP requests, and those that are told that the server is full.
+inline constexpr size_t kSpareConnections = 64;
+inline constexpr size_t kSpareConnectionsPerAddress = 16;
+
+struct Context {
+  Context(const NetConfig& net_config, NetHandler& net_handler) : config(net_config), handler(net_handler) {}
+
+  void count(uint64_t NetCounters::*field, uint64_t amount = 1) {
+    const std::lock_guard lock(mutex);
+    counters.*field += amount;
+  }
+  NetCounters counters_now() const {
+    const std::lock_guard lock(mutex);
+    return counters;
+  }
+  /// True while another session of this peer fits; sessions that are closing do not count.
+  bool has_room(const std::string& peer_address) const;
+  /// Publishes the number of open and joined sessions.
+  void update_session_counts();
+
+  const NetConfig config;
+  NetHandler& handler;
+  boost::asio::io_context io{1};
+  std::map<SessionId, std::shared_ptr<Session>> sessions;
+  std::set<std::shared_ptr<Connection>> connections;
+  SessionId next_session = 1;
+  bool is_stopping = false;
+
+ private:
+  mutable std::mutex mutex;
+  NetCounters counters;
+};
+
+}  // namespace strandcast::net

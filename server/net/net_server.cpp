@@ -1,0 +1,263 @@
+#include "server/net/net_server.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <future>
+#include <thread>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/base/log.h"
+#include "common/base/profile.h"
+#include "server/net/access.h"
+#include "server/net/connection_private.h"
+#include "server/net/session_private.h"
+
+namespace strandcast {
+namespace net {
+namespace {
+
+constexpr auto kSweepInterval = std::chrono::milliseconds(50);
+/// Pause after a failed accept (no file descriptors left): the others are served meanwhile.
+constexpr auto kAcceptPause = std::chrono::milliseconds(100);
+constexpr int kListenBacklog = 128;
+
+std::string own_host_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : std::string();
+}
+
+}  // namespace
+
+bool Context::has_room(const std::string& peer_address) const {
+  size_t all = 0;
+  size_t of_peer = 0;
+  for (const auto& [id, session] : sessions) {
+    if (session->state() == Session::State::Closing) continue;
+    ++all;
+    if (session->peer_address() == peer_address) ++of_peer;
+  }
+  return all < config.limits.sessions && of_peer < config.limits.sessions_per_address;
+}
+
+void Context::update_session_counts() {
+  uint64_t joined = 0;
+  for (const auto& [id, session] : sessions)
+    if (session->state() == Session::State::Joined) ++joined;
+  const std::lock_guard lock(mutex);
+  counters.open_sessions = sessions.size();
+  counters.joined_sessions = joined;
+}
+
+}  // namespace net
+
+using net::beast::error_code;
+
+struct NetServer::State {
+  State(const NetConfig& config, NetHandler& handler)
+      : context(config, handler), acceptor(context.io), sweep_timer(context.io), accept_timer(context.io) {}
+
+  Status open();
+  void accept();
+  void on_accept(const error_code& error, net::tcp::socket socket);
+  bool has_place(const std::string& peer_address) const;
+  void sweep();
+  void begin_stop();
+  void end_if_done(int64_t time_ns);
+  void run();
+  template <class Work>
+  void post_to_all(Work work);
+
+  net::Context context;
+  net::tcp::acceptor acceptor;
+  net::asio::steady_timer sweep_timer;
+  net::asio::steady_timer accept_timer;
+  uint16_t port = 0;
+  int64_t stop_deadline_ns = 0;
+  std::atomic<bool> has_stopped{false};
+  std::thread thread;
+};
+
+Status NetServer::State::open() {
+  const NetConfig& config = context.config;
+  error_code error;
+  const std::string numeric = config.address == "localhost" ? "127.0.0.1" : config.address;
+  const auto address = net::asio::ip::make_address(numeric, error);
+  if (error)
+    return make_error(ErrorCode::BadInput,
+                      "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)",
+                      config.address);
+  RETURN_IF_ERROR(check_listening(address.is_loopback(), config.address, config.token));
+  const net::tcp::endpoint endpoint(address, config.port);
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(net::asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(net::kListenBacklog, error);
+  if (error == net::asio::error::address_in_use)
+    return make_error(ErrorCode::Unavailable,
+                      "port {} on {} is in use by another program (--port 0 takes a free one)", config.port,
+                      config.address);
+  if (error)
+    return make_error(ErrorCode::Unavailable, "cannot listen on {} port {}: {}", config.address, config.port,
+                      error.message());
+  port = acceptor.local_endpoint(error).port();
+  return {};
+}
+
+void NetServer::State::accept() {
+  acceptor.async_accept(
+      [this](const error_code& error, net::tcp::socket socket) { on_accept(error, std::move(socket)); });
+}
+
+void NetServer::State::on_accept(const error_code& error, net::tcp::socket socket) {
+  if (error == net::asio::error::operation_aborted || context.is_stopping) return;
+  if (error) {
+    context.count(&NetCounters::accept_errors);
+    log_warn("net", "cannot accept a connection: {}", error.message());
+    accept_timer.expires_after(net::kAcceptPause);
+    accept_timer.async_wait([this](const error_code& wait_error) {
+      if (!wait_error) accept();
+    });
+    return;
+  }
+  context.count(&NetCounters::connections);
+  auto connection = std::make_shared<net::Connection>(context, std::move(socket));
+  if (has_place(connection->peer_address())) {
+    context.connections.insert(connection);
+    connection->start();
+  } else {
+    context.count(&NetCounters::refused_full);
+  }
+  accept();
+}
+
+bool NetServer::State::has_place(const std::string& peer_address) const {
+  size_t of_peer = 0;
+  for (const auto& connection : context.connections)
+    of_peer += connection->peer_address() == peer_address ? 1 : 0;
+  for (const auto& [id, session] : context.sessions)
+    of_peer += session->peer_address() == peer_address ? 1 : 0;
+  const NetLimits& limits = context.config.limits;
+  return context.connections.size() + context.sessions.size() < limits.sessions + net::kSpareConnections &&
+         of_peer < limits.sessions_per_address + net::kSpareConnectionsPerAddress;
+}
+
+void NetServer::State::sweep() {
+  sweep_timer.expires_after(net::kSweepInterval);
+  sweep_timer.async_wait([this](const error_code& error) {
+    if (error) return;
+    const int64_t time_ns = now_ns();
+    const auto sessions = context.sessions;  // a deadline may remove a session
+    for (const auto& [id, session] : sessions) session->check_deadlines(time_ns);
+    if (context.is_stopping) end_if_done(time_ns);
+    sweep();
+  });
+}
+
+void NetServer::State::begin_stop() {
+  if (std::exchange(context.is_stopping, true)) return;
+  error_code ignored;
+  acceptor.close(ignored);
+  stop_deadline_ns = now_ns() + context.config.limits.close_ms * 1'000'000;
+  const auto connections = context.connections;
+  for (const auto& connection : connections) connection->abort();
+  const auto sessions = context.sessions;
+  for (const auto& [id, session] : sessions) session->close(CloseCode::GoingAway, "The server is stopping.");
+}
+
+void NetServer::State::end_if_done(int64_t time_ns) {
+  if (!context.sessions.empty() && time_ns < stop_deadline_ns) return;
+  const auto sessions = context.sessions;
+  for (const auto& [id, session] : sessions) session->abort();
+  context.io.stop();
+}
+
+void NetServer::State::run() {
+  while (!context.io.stopped()) {
+    try {
+      context.io.run();
+    } catch (const std::exception& exception) {
+      log_error("net", "{}", exception.what());
+    }
+  }
+}
+
+template <class Work>
+void NetServer::State::post_to_all(Work work) {
+  net::asio::post(context.io, [this, work = std::move(work)] {
+    const auto sessions = context.sessions;
+    for (const auto& [id, session] : sessions) work(*session);
+  });
+}
+
+NetServer::NetServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+
+NetServer::~NetServer() {
+  stop();
+}
+
+Result<std::unique_ptr<NetServer>> NetServer::listen(const NetConfig& config, NetHandler& handler) {
+  NetConfig complete = config;
+  complete.allowed_hosts.push_back(net::own_host_name());
+  auto state = std::make_unique<State>(complete, handler);
+  RETURN_IF_ERROR(state->open());
+  return std::unique_ptr<NetServer>(new NetServer(std::move(state)));
+}
+
+void NetServer::start() {
+  State* state = state_.get();
+  CHECK(!state->thread.joinable());
+  state->accept();
+  state->sweep();
+  state->thread = std::thread([state] { state->run(); });
+}
+
+uint16_t NetServer::port() const {
+  return state_->port;
+}
+
+void NetServer::publish_strands(EncodedFramePtr frame) {
+  state_->post_to_all([frame = std::move(frame)](net::Session& session) { session.deliver_strands(frame); });
+}
+
+void NetServer::publish_picture(PictureClass picture_class, EncodedFramePtr frame) {
+  state_->post_to_all([picture_class, frame = std::move(frame)](net::Session& session) {
+    session.deliver_picture(picture_class, frame);
+  });
+}
+
+void NetServer::set_picture_class(SessionId session, PictureClass picture_class) {
+  net::asio::post(state_->context.io, [state = state_.get(), session, picture_class] {
+    const auto found = state->context.sessions.find(session);
+    if (found != state->context.sessions.end()) found->second->set_picture_class(picture_class);
+  });
+}
+
+void NetServer::broadcast(ServerMessage message) {
+  state_->post_to_all([message = std::move(message)](net::Session& session) { session.send(message); });
+}
+
+void NetServer::send(SessionId session, ServerMessage message) {
+  net::asio::post(state_->context.io, [state = state_.get(), session, message = std::move(message)] {
+    const auto found = state->context.sessions.find(session);
+    // A copy of the pointer: a full queue ends the session under our feet.
+    if (found != state->context.sessions.end()) std::shared_ptr(found->second)->send(message);
+  });
+}
+
+NetCounters NetServer::counters() const {
+  return state_->context.counters_now();
+}
+
+void NetServer::stop() {
+  if (state_->has_stopped.exchange(true) || !state_->thread.joinable()) return;
+  net::asio::post(state_->context.io, [state = state_.get()] { state->begin_stop(); });
+  state_->thread.join();
+  state_->context.sessions.clear();
+  state_->context.connections.clear();
+}
+
+}  // namespace strandcast

@@ -1,0 +1,132 @@
+// NetServer: one TCP port with HTTP (/healthz, /metrics) and the WebSocket protocol of proto/WIRE.md at /v1.
+// One network thread; every public function may be called from any thread and never waits for a client. It
+// does not simulate, encode pictures or strands, or decide what a session may see: that is the NetHandler's.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/codec/frame_header.h"
+#include "common/wire/close_code.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+inline constexpr uint32_t kMaxSessions = 256;
+inline constexpr uint32_t kMaxSessionsPerAddress = 64;
+inline constexpr size_t kMinRemoteTokenCharacters = 16;
+
+using SessionId = uint64_t;     // never reused by one server
+using PictureClass = uint32_t;  // viewers of one class get the same rendered frames
+
+/// Limits of one session; tests shorten the times.
+struct NetLimits {
+  uint32_t sessions = kMaxSessions;
+  uint32_t sessions_per_address = kMaxSessionsPerAddress;
+  int64_t handshake_ms = 5'000;        // TCP accept to a complete HTTP request
+  int64_t hello_ms = 5'000;            // WebSocket open to Hello
+  int64_t idle_ms = 15'000;            // nothing received, pings included
+  int64_t stalled_write_ms = 5'000;    // no progress of one write
+  int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
+  int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
+  double messages_per_s = 1'000.0;     // per session, and as many at once
+};
+
+struct NetConfig {
+  std::string address = "127.0.0.1";  // numeric, or "localhost"
+  uint16_t port = kDefaultPort;       // 0 = any free port
+  std::string token;                  // needed beyond loopback; never logged
+  std::vector<std::string>
+      allowed_hosts;  // accepted in the Host header, besides the server's own address and name
+  NetLimits limits;
+};
+
+/// Answer to a Hello. Without an asset none is sent; strands or pictures follow by welcome.mode.
+struct Admission {
+  Welcome welcome;
+  EncodedFramePtr asset;
+  PictureClass picture_class = 0;  // of a viewer in frames mode
+};
+
+/// What the application does with sessions. Called on the network thread: return quickly, never wait.
+class NetHandler {
+ public:
+  virtual ~NetHandler() = default;
+  /// An error closes the session with its sentence: LimitExceeded as Full, Unauthorized as Unauthorized, else
+  /// Policy.
+  virtual Result<Admission> on_hello(SessionId session, const Hello& hello) = 0;
+  virtual void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) = 0;
+  virtual void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) = 0;
+  virtual void on_command(SessionId session, const ControlCommand& command) = 0;
+  virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
+  virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
+  virtual void on_ack(SessionId session, const FrameAck& ack) = 0;
+  /// The session waits for a keyframe given to publish_strands(). Repeated until one comes.
+  virtual void on_keyframe_request(SessionId session) = 0;
+  /// Once for every session whose on_hello succeeded.
+  virtual void on_left(SessionId session) = 0;
+  /// Lines added to /metrics, in Prometheus text form.
+  virtual std::string metrics() { return {}; }
+};
+
+/// Totals since start, except the first two.
+struct NetCounters {
+  uint64_t open_sessions = 0;    // WebSocket sessions, joined or not
+  uint64_t joined_sessions = 0;  // after Welcome
+  uint64_t connections = 0;
+  uint64_t accept_errors = 0;
+  uint64_t refused_full = 0;
+  uint64_t refused_token = 0;
+  uint64_t refused_http = 0;  // wrong path, host, origin or request
+  uint64_t bad_messages = 0;  // malformed, out of order, wrong role or too many
+  uint64_t stalled = 0;       // dropped for a write without progress
+  uint64_t timeouts = 0;      // no request or no Hello in time
+  uint64_t messages_received = 0;
+  uint64_t frames_sent = 0;
+  uint64_t frames_dropped = 0;  // media a session was too slow for
+  uint64_t chain_losses = 0;    // sessions that had to wait for a keyframe
+  uint64_t keyframe_requests = 0;
+  uint64_t bytes_sent = 0;  // WebSocket payload
+};
+
+class NetServer {
+ public:
+  /// Opens the port; connections wait until start(). `handler` must outlive the server. Unavailable when the
+  /// port is in use, BadInput for an address that is none, Unauthorized beyond loopback without a token.
+  static Result<std::unique_ptr<NetServer>> listen(const NetConfig& config, NetHandler& handler);
+  /// stop(), if it was not called.
+  ~NetServer();
+  NetServer(const NetServer&) = delete;
+  NetServer& operator=(const NetServer&) = delete;
+
+  /// Starts the network thread. Call once.
+  void start();
+  uint16_t port() const;
+
+  /// Strand frames in the order of their chain. A delta goes to sessions whose last frame it builds on, a
+  /// keyframe to those that wait for one.
+  void publish_strands(EncodedFramePtr frame);
+  /// The newest picture for the viewers of one class; replaces one not yet being sent.
+  void publish_picture(PictureClass picture_class, EncodedFramePtr frame);
+  void set_picture_class(SessionId session, PictureClass picture_class);
+  /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
+  void broadcast(ServerMessage message);
+  /// Ignored when the session is gone.
+  void send(SessionId session, ServerMessage message);
+
+  NetCounters counters() const;
+
+  /// Goodbye and close GoingAway to all, at most limits.close_ms, then ends the thread. Not from a handler.
+  void stop();
+
+ private:
+  struct State;
+  explicit NetServer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,375 @@
+#include "server/net/session_private.h"
+
+#include <algorithm>
+#include <exception>
+#include <type_traits>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/base/profile.h"
+
+namespace strandcast::net {
+namespace {
+
+constexpr int64_t kNsPerMs = 1'000'000;
+/// Enough for a keyframe in flight, small enough that a late frame is dropped here and not queued in the
+/// kernel.
+constexpr int kSendBufferBytes = 256 << 10;
+/// Longest sentence of ours put into a Goodbye.
+constexpr size_t kMaxReasonCharacters = 500;
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+
+CloseCode close_code_for(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::LimitExceeded:
+      return CloseCode::Full;
+    case ErrorCode::Unauthorized:
+      return CloseCode::Unauthorized;
+    default:
+      return CloseCode::Policy;
+  }
+}
+
+const char* message_name(const ClientMessage& message) {
+  constexpr const char* kNames[] = {"Hello",        "MotionSamples",   "WindSamples",
+                                    "CameraChange", "KeyframeRequest", "FrameAck",
+                                    "Ping",         "ControlCommand",  "SetParameter"};
+  static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
+  return kNames[message.index()];
+}
+
+bool may_send(Role role, const ClientMessage& message) {
+  return std::visit(
+      Overloaded{[](const Hello&) { return false; },
+                 [&](const MotionSamples&) { return role == Role::Source; },
+                 [&](const WindSamples&) { return role == Role::Source; },
+                 [&](const CameraChange&) { return role != Role::Source; },
+                 [&](const KeyframeRequest&) { return role != Role::Source; },
+                 [&](const FrameAck&) { return role != Role::Source; }, [](const Ping&) { return true; },
+                 [&](const ControlCommand&) { return role == Role::Controller; },
+                 [&](const SetParameter&) { return role == Role::Controller; }},
+      message);
+}
+
+}  // namespace
+
+Session::Session(Context& context, SessionId id, beast::tcp_stream stream, std::string peer_address)
+    : context_(context),
+      id_(id),
+      socket_(std::move(stream)),
+      peer_address_(std::move(peer_address)),
+      rate_(context.config.limits.messages_per_s),
+      state_since_ns_(now_ns()) {}
+
+template <class Work>
+void Session::guarded(Work&& work) {
+  try {
+    work();
+  } catch (const std::exception& exception) {
+    log_error("net", "session {}: {}", id_, exception.what());
+    if (state_ == State::Closing) return abort();
+    close(CloseCode::Internal, "The server failed to handle this session.");
+  }
+}
+
+void Session::start(http::request<http::empty_body> request, bool has_room) {
+  request_ = std::move(request);
+  const NetLimits& limits = context_.config.limits;
+  beast::get_lowest_layer(socket_).expires_never();
+  beast::error_code ignored;
+  auto& tcp_socket = beast::get_lowest_layer(socket_).socket();
+  tcp_socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+
+  websocket::stream_base::timeout timeout;
+  timeout.handshake_timeout = std::chrono::milliseconds(limits.handshake_ms);
+  timeout.idle_timeout = std::chrono::milliseconds(limits.idle_ms);
+  timeout.keep_alive_pings = true;
+  socket_.set_option(timeout);
+  socket_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+    response.set(http::field::sec_websocket_protocol, kWebSocketProtocol);
+    response.set(http::field::server, "strandcast");
+  }));
+  socket_.read_message_max(kMaxControlBytes);
+  socket_.auto_fragment(false);
+  socket_.binary(true);
+  socket_.async_accept(request_, [self = shared_from_this(), has_room](const beast::error_code& error) {
+    if (error) return self->finish();
+    self->guarded([&] { self->on_open(has_room); });
+  });
+}
+
+void Session::on_open(bool has_room) {
+  if (state_ != State::Handshake) return;
+  state_ = State::AwaitHello;
+  state_since_ns_ = now_ns();
+  read();
+  if (context_.is_stopping) return close(CloseCode::GoingAway, "The server is stopping.");
+  if (!has_room) {
+    context_.count(&NetCounters::refused_full);
+    close(CloseCode::Full,
+          fmt::format("The server is full: at most {} sessions and {} from one address.",
+                      context_.config.limits.sessions, context_.config.limits.sessions_per_address));
+  }
+}
+
+void Session::read() {
+  socket_.async_read(read_buffer_, [self = shared_from_this()](const beast::error_code& error, size_t) {
+    self->guarded([&] { self->on_read(error); });
+  });
+}
+
+void Session::on_read(const beast::error_code& error) {
+  if (state_ == State::Closed) return;
+  if (error) {
+    // Beast has answered an oversized or malformed frame with the fitting close code already.
+    if (error == websocket::error::message_too_big || error == websocket::error::buffer_overflow ||
+        error == websocket::condition::protocol_violation)
+      context_.count(&NetCounters::bad_messages);
+    if (error != websocket::error::closed) log_debug("net", "session {}: {}", id_, error.message());
+    return finish();
+  }
+  if (state_ == State::Closing) return;  // the close under way drains the rest
+  const auto data = read_buffer_.cdata();
+  const int64_t arrival_ns = now_ns();
+  if (!rate_.take(arrival_ns))
+    return reject(CloseCode::Policy, fmt::format("More than {:.0f} messages per second.",
+                                                 context_.config.limits.messages_per_s));
+  context_.count(&NetCounters::messages_received);
+  on_message({static_cast<const std::byte*>(data.data()), data.size()}, arrival_ns);
+  read_buffer_.consume(read_buffer_.size());
+  if (state_ == State::AwaitHello || state_ == State::Joined) read();
+}
+
+void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
+  if (socket_.got_text()) return reject(CloseCode::BadData, "Text messages are not part of the protocol.");
+  const Result<ClientMessage> message = decode_client_message(bytes);
+  if (!message) return reject(CloseCode::BadData, message.error().to_string());
+  if (state_ == State::AwaitHello) {
+    const Hello* hello = std::get_if<Hello>(&*message);
+    if (hello == nullptr)
+      return reject(CloseCode::Policy,
+                    fmt::format("The first message must be Hello, not {}.", message_name(*message)));
+    return join(*hello);
+  }
+  if (!may_send(hello_.role, *message))
+    return reject(CloseCode::Policy,
+                  fmt::format("A {} may not send {}{}.", to_string(hello_.role), message_name(*message),
+                              std::holds_alternative<Hello>(*message) ? " twice" : ""));
+  dispatch(*message, arrival_ns);
+}
+
+void Session::join(const Hello& hello) {
+  if (!context_.config.token.empty() && !is_token_equal(context_.config.token, hello.token)) {
+    context_.count(&NetCounters::refused_token);
+    log_warn("net", "session {} from {}: wrong token", id_, peer_address_);
+    return close(CloseCode::Unauthorized, "The token is wrong or missing.");
+  }
+  Result<Admission> admission = context_.handler.on_hello(id_, hello);
+  if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
+  hello_ = hello;
+  hello_.token.clear();
+  mode_ = admission->welcome.mode;
+  picture_class_ = admission->picture_class;
+  has_joined_ = true;
+  state_ = State::Joined;
+  context_.update_session_counts();
+  log_info("net", "session {} from {} joined: {} '{}', {}", id_, peer_address_, to_string(hello.role),
+           hello.name, to_string(mode_));
+  // The asset is set before anything is written, and strands start only once it is: nothing can overtake it.
+  if (hello.role != Role::Source) {
+    queue_.set_asset(admission->asset);
+    if (mode_ == StreamMode::Strands) queue_.start_strands();
+  }
+  queue_control(std::move(admission->welcome));
+  ask_for_keyframe(now_ns());
+}
+
+void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
+  NetHandler& handler = context_.handler;
+  std::visit(Overloaded{[](const Hello&) {},
+                        [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
+                        [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
+                        [&](const CameraChange& camera) { handler.on_camera(id_, camera); },
+                        [&](const KeyframeRequest&) {
+                          queue_.lose_chain();
+                          account_drops();
+                          ask_for_keyframe(arrival_ns);
+                        },
+                        [&](const FrameAck& ack) { handler.on_ack(id_, ack); },
+                        [&](const Ping& ping) {
+                          queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
+                        },
+                        [&](const ControlCommand& command) { handler.on_command(id_, command); },
+                        [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); }},
+             message);
+}
+
+void Session::reject(CloseCode code, const std::string& reason) {
+  context_.count(&NetCounters::bad_messages);
+  log_warn("net", "session {} from {}: {}", id_, peer_address_, reason);
+  close(code, reason);
+}
+
+void Session::send(ServerMessage message) {
+  if (state_ != State::Joined) return;
+  if (auto* status = std::get_if<ServerStatus>(&message)) status->dropped_frames = queue_.dropped_frames();
+  guarded([&] { queue_control(std::move(message)); });
+}
+
+void Session::queue_control(ServerMessage message) {
+  if (!queue_.push_control(std::move(message)))
+    return close(
+        CloseCode::TryLater,
+        fmt::format("{} control messages are waiting: this client reads too slowly.", kMaxQueuedControl));
+  pump();
+}
+
+void Session::deliver_strands(const EncodedFramePtr& frame) {
+  if (state_ != State::Joined) return;
+  guarded([&] {
+    queue_.offer_strands(frame);
+    account_drops();
+    pump();
+  });
+}
+
+void Session::deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame) {
+  if (state_ != State::Joined || mode_ != StreamMode::Frames || picture_class != picture_class_) return;
+  if (hello_.role == Role::Source) return;
+  guarded([&] {
+    queue_.offer_picture(frame);
+    account_drops();
+    pump();
+  });
+}
+
+void Session::account_drops() {
+  context_.count(&NetCounters::frames_dropped,
+                 queue_.dropped_frames() - std::exchange(counted_drops_, queue_.dropped_frames()));
+  context_.count(&NetCounters::chain_losses,
+                 queue_.chain_losses() - std::exchange(counted_losses_, queue_.chain_losses()));
+}
+
+void Session::ask_for_keyframe(int64_t time_ns) {
+  if (state_ != State::Joined || !queue_.needs_keyframe()) return;
+  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
+  if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
+  keyframe_asked_ns_ = time_ns;
+  context_.count(&NetCounters::keyframe_requests);
+  context_.handler.on_keyframe_request(id_);
+}
+
+void Session::pump() {
+  if (is_writing_ || is_close_started_ || state_ == State::Closed || state_ == State::Handshake) return;
+  std::optional<SendQueue::Item> item = queue_.take_next();
+  if (!item) {
+    if (state_ == State::Closing) start_close();
+    return;
+  }
+  if (auto* message = std::get_if<ServerMessage>(&*item)) {
+    // Stamped as late as possible, so that the time in the queue does not blur the client's clock.
+    if (auto* pong = std::get_if<Pong>(message)) pong->server_send_ns = now_ns();
+    control_bytes_ = encode(*message);
+    unwritten_ = control_bytes_;
+  } else {
+    media_ = std::get<EncodedFramePtr>(std::move(*item));
+    unwritten_ = media_->message;
+  }
+  is_writing_ = true;
+  write_chunk();
+}
+
+void Session::write_chunk() {
+  write_since_ns_ = now_ns();
+  const size_t byte_count = std::min(unwritten_.size(), kWriteChunkBytes);
+  const bool is_last = byte_count == unwritten_.size();
+  socket_.async_write_some(is_last, asio::buffer(unwritten_.data(), byte_count),
+                           [self = shared_from_this()](const beast::error_code& error, size_t written_count) {
+                             self->guarded([&] { self->on_written(error, written_count); });
+                           });
+}
+
+void Session::on_written(const beast::error_code& error, size_t byte_count) {
+  if (state_ == State::Closed) return;
+  if (error) return finish();
+  context_.count(&NetCounters::bytes_sent, byte_count);
+  unwritten_ = unwritten_.subspan(byte_count);
+  if (!unwritten_.empty()) return write_chunk();
+  is_writing_ = false;
+  if (media_ != nullptr) {
+    media_ = nullptr;
+    queue_.written();
+    context_.count(&NetCounters::frames_sent);
+  }
+  ask_for_keyframe(now_ns());
+  pump();
+}
+
+void Session::close(CloseCode code, const std::string& reason) {
+  if (state_ == State::Closing || state_ == State::Closed) return;
+  if (state_ == State::Handshake) return abort();
+  leave();
+  state_ = State::Closing;
+  state_since_ns_ = now_ns();
+  close_code_ = code;
+  context_.update_session_counts();
+  queue_.clear();
+  (void)queue_.push_control(Goodbye{reason.substr(0, kMaxReasonCharacters)});  // cannot be full: just cleared
+  pump();
+}
+
+void Session::start_close() {
+  is_close_started_ = true;
+  socket_.async_close(websocket::close_reason(static_cast<uint16_t>(close_code_)),
+                      [self = shared_from_this()](const beast::error_code&) { self->finish(); });
+}
+
+void Session::check_deadlines(int64_t time_ns) {
+  const NetLimits& limits = context_.config.limits;
+  const int64_t in_state_ms = (time_ns - state_since_ns_) / kNsPerMs;
+  if (state_ == State::Closing) {
+    if (in_state_ms >= limits.close_ms) abort();
+    return;
+  }
+  if (state_ == State::AwaitHello && in_state_ms >= limits.hello_ms) {
+    context_.count(&NetCounters::timeouts);
+    return close(CloseCode::Policy, fmt::format("No Hello within {} ms.", limits.hello_ms));
+  }
+  if (is_writing_ && (time_ns - write_since_ns_) / kNsPerMs >= limits.stalled_write_ms) {
+    context_.count(&NetCounters::stalled);
+    log_warn("net", "session {} from {}: reads nothing for {} ms, dropped", id_, peer_address_,
+             limits.stalled_write_ms);
+    return abort();
+  }
+  guarded([&] { ask_for_keyframe(time_ns); });
+}
+
+void Session::abort() {
+  finish();
+}
+
+void Session::leave() {
+  if (!std::exchange(has_joined_, false)) return;
+  log_info("net", "session {} left", id_);
+  context_.handler.on_left(id_);
+}
+
+void Session::finish() {
+  if (state_ == State::Closed) return;
+  state_ = State::Closed;
+  queue_.clear();
+  beast::get_lowest_layer(socket_).close();
+  context_.sessions.erase(id_);
+  context_.update_session_counts();
+  try {
+    leave();
+  } catch (const std::exception& exception) {
+    log_error("net", "session {} leaving: {}", id_, exception.what());
+  }
+}
+
+}  // namespace strandcast::net

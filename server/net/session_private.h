@@ -1,0 +1,89 @@
+// Session: one WebSocket client from the opening handshake to the end. Network thread only; keeps itself
+// alive while an operation is under way. Order of what it sends: Welcome, asset, keyframe, deltas.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/net/access.h"
+#include "server/net/beast_private.h"
+#include "server/net/context_private.h"
+#include "server/net/send_queue.h"
+
+namespace strandcast::net {
+
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  enum class State { Handshake, AwaitHello, Joined, Closing, Closed };
+
+  Session(Context& context, SessionId id, beast::tcp_stream stream, std::string peer_address);
+
+  /// Answers the upgrade request. With `has_room` false the session is told so and closed.
+  void start(http::request<http::empty_body> request, bool has_room);
+
+  void deliver_strands(const EncodedFramePtr& frame);
+  void deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame);
+  void set_picture_class(PictureClass picture_class) { picture_class_ = picture_class; }
+  /// Queues a control message; ignored before Welcome and while closing.
+  void send(ServerMessage message);
+  /// Goodbye with one sentence, then the closing handshake.
+  void close(CloseCode code, const std::string& reason);
+  /// Ends what takes too long.
+  void check_deadlines(int64_t time_ns);
+  /// Drops the connection at once.
+  void abort();
+
+  State state() const { return state_; }
+  const std::string& peer_address() const { return peer_address_; }
+
+ private:
+  template <class Work>
+  void guarded(Work&& work);
+  void on_open(bool has_room);
+  void read();
+  void on_read(const beast::error_code& error);
+  void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
+  void join(const Hello& hello);
+  void dispatch(const ClientMessage& message, int64_t arrival_ns);
+  void reject(CloseCode code, const std::string& reason);
+  void queue_control(ServerMessage message);
+  void pump();
+  void write_chunk();
+  void on_written(const beast::error_code& error, size_t byte_count);
+  void start_close();
+  void ask_for_keyframe(int64_t time_ns);
+  void account_drops();
+  void leave();
+  void finish();
+
+  Context& context_;
+  const SessionId id_;
+  websocket::stream<beast::tcp_stream> socket_;
+  const std::string peer_address_;
+  http::request<http::empty_body> request_;
+  State state_ = State::Handshake;
+  Hello hello_;
+  StreamMode mode_ = StreamMode::Strands;
+  PictureClass picture_class_ = 0;
+  bool has_joined_ = false;
+
+  beast::flat_buffer read_buffer_;
+  RateLimit rate_;
+  SendQueue queue_;
+  uint64_t counted_drops_ = 0;
+  uint64_t counted_losses_ = 0;
+
+  std::vector<std::byte> control_bytes_;  // being written, or
+  EncodedFramePtr media_;                 // this
+  std::span<const std::byte> unwritten_;
+  bool is_writing_ = false;
+  bool is_close_started_ = false;
+  CloseCode close_code_ = CloseCode::Normal;
+  int64_t state_since_ns_ = 0;
+  int64_t write_since_ns_ = 0;
+  int64_t keyframe_asked_ns_ = 0;
+};
+
+}  // namespace strandcast::net

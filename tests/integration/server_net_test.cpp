@@ -1,0 +1,525 @@
+// NetServer against raw clients that behave and misbehave: joining, overload, refusals and the end of the
+// server.
+#include "server/net/net_server.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <set>
+#include <stdexcept>
+#include <thread>
+
+#include "common/base/profile.h"
+#include "tests/support/raw_client.h"
+
+namespace strandcast {
+namespace {
+
+using test::eventually;
+using test::RawClient;
+
+uint16_t code(CloseCode close_code) {
+  return static_cast<uint16_t>(close_code);
+}
+
+EncodedFramePtr media(Opcode opcode, uint32_t sequence, uint32_t base_sequence, size_t payload_bytes = 64) {
+  FrameHeader header;
+  header.opcode = opcode;
+  header.sequence = sequence;
+  header.base_sequence = base_sequence;
+  return make_encoded_frame(header, std::vector<std::byte>(payload_bytes, std::byte{0x5a}));
+}
+
+/// A chain of strand frames like an encoder's; also the handler that counts what reached the application.
+class FakeApp : public NetHandler {
+ public:
+  Result<Admission> on_hello(SessionId session, const Hello& hello) override {
+    if (hello.name == "throw") throw std::runtime_error("handler failed on purpose");
+    if (hello.name == "refuse") return make_error(ErrorCode::BadInput, "Refused on purpose.");
+    const std::lock_guard lock(mutex_);
+    joined_.insert(session);
+    Admission admission;
+    admission.welcome.scene_name = "fake";
+    admission.welcome.mode = hello.mode;
+    admission.welcome.strand_count = 1;
+    admission.welcome.vertex_count = 2;
+    admission.welcome.bound_m = 1e-4f;
+    admission.asset = media(Opcode::Asset, 1, 0, asset_bytes);
+    return admission;
+  }
+  void on_motion(SessionId, const MotionSamples& samples, int64_t) override {
+    motion += samples.samples.size();
+  }
+  void on_wind(SessionId, const WindSamples& samples, int64_t) override { wind += samples.samples.size(); }
+  void on_command(SessionId session, const ControlCommand&) override {
+    ++commands;
+    server->send(session, Notice{false, "done"});
+  }
+  void on_parameter(SessionId, const SetParameter&) override { ++parameters; }
+  void on_camera(SessionId, const CameraChange&) override { ++cameras; }
+  void on_ack(SessionId, const FrameAck& ack) override { last_ack = ack.sequence; }
+  void on_keyframe_request(SessionId) override {
+    const std::lock_guard lock(mutex_);
+    ++keyframe_requests;
+    if (sequence_ > 0) server->publish_strands(media(Opcode::StrandKeyframe, sequence_, 0, frame_bytes));
+  }
+  void on_left(SessionId session) override {
+    const std::lock_guard lock(mutex_);
+    left_twice = left_twice || joined_.count(session) == 0;
+    joined_.erase(session);
+  }
+
+  void publish_next() {
+    const std::lock_guard lock(mutex_);
+    ++sequence_;
+    server->publish_strands(sequence_ == 1
+                                ? media(Opcode::StrandKeyframe, 1, 0, frame_bytes)
+                                : media(Opcode::StrandDelta, sequence_, sequence_ - 1, frame_bytes));
+  }
+  uint32_t sequence() const {
+    const std::lock_guard lock(mutex_);
+    return sequence_;
+  }
+  size_t joined_count() const {
+    const std::lock_guard lock(mutex_);
+    return joined_.size();
+  }
+
+  NetServer* server = nullptr;
+  size_t frame_bytes = 256;
+  size_t asset_bytes = 1'000;
+  std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0};
+  std::atomic<uint32_t> last_ack{0};
+  std::atomic<bool> left_twice{false};
+
+ private:
+  mutable std::mutex mutex_;
+  std::set<SessionId> joined_;
+  uint32_t sequence_ = 0;
+};
+
+class ServerNet : public testing::Test {
+ protected:
+  void start(NetConfig config = {}) {
+    config.port = 0;
+    auto server = NetServer::listen(config, app_);
+    ASSERT_TRUE(server.ok()) << server.error().to_string();
+    server_ = std::move(*server);
+    app_.server = server_.get();
+    server_->start();
+  }
+  void TearDown() override {
+    if (server_ != nullptr) server_->stop();
+    EXPECT_EQ(app_.joined_count(), 0u) << "every session that joined must leave";
+    EXPECT_FALSE(app_.left_twice);
+  }
+
+  static Hello hello(Role role = Role::Viewer, const std::string& token = {}) {
+    Hello message;
+    message.role = role;
+    message.name = "test";
+    message.token = token;
+    return message;
+  }
+  /// A client that is past Welcome.
+  std::unique_ptr<RawClient> join(const Hello& message = hello(), int receive_buffer_bytes = 0) {
+    auto client = std::make_unique<RawClient>(server_->port(), receive_buffer_bytes);
+    EXPECT_TRUE(client->handshake());
+    client->send(message);
+    EXPECT_TRUE(client->read_control<Welcome>().has_value());
+    return client;
+  }
+
+  FakeApp app_;
+  std::unique_ptr<NetServer> server_;
+};
+
+TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
+  start();
+  EXPECT_NE(test::http_get(server_->port(), "/healthz").find("200 OK"), std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/metrics").find("strandcast_net_connections_total"),
+            std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/").find("404"), std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/../etc/passwd").find("404"), std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/healthz", "evil.example").find("403"), std::string::npos);
+}
+
+TEST_F(ServerNet, RefusesLongHeadersAndBodies) {
+  start();
+  EXPECT_EQ(test::http_get(server_->port(), "/" + std::string(20'000, 'a')).find("200 OK"),
+            std::string::npos);
+  RawClient client(server_->port());
+  client.send_raw("POST /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 5\r\n\r\nhello");
+  EXPECT_EQ(client.read_raw_to_end().find("200 OK"), std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/healthz").find("200 OK"), std::string::npos);
+}
+
+TEST_F(ServerNet, HandshakeNeedsPathProtocolHostAndOrigin) {
+  start();
+  const uint16_t port = server_->port();
+  EXPECT_TRUE(RawClient(port).handshake());
+  EXPECT_FALSE(RawClient(port).handshake({.path = "/v2", .host = {}, .origin = {}}));
+  EXPECT_FALSE(RawClient(port).handshake({.path = "/v1", .host = {}, .origin = {}, .protocol = "other.v1"}));
+  EXPECT_FALSE(RawClient(port).handshake({.path = "/v1", .host = "evil.example", .origin = {}}));
+  EXPECT_FALSE(RawClient(port).handshake({.path = "/v1", .host = {}, .origin = "http://evil.example"}));
+  EXPECT_TRUE(RawClient(port).handshake({.path = "/v1", .host = "localhost", .origin = "http://localhost"}));
+}
+
+TEST_F(ServerNet, JoinOrderIsWelcomeAssetKeyframeDeltas) {
+  app_.asset_bytes = 3'000'000;  // takes many writes, while deltas are published all the time
+  start();
+  for (int i = 0; i < 5; ++i) app_.publish_next();
+  RawClient client(server_->port());
+  ASSERT_TRUE(client.handshake());
+  client.send(hello());
+  std::vector<Opcode> order;
+  uint32_t last_sequence = 0;
+  while (order.size() < 20) {
+    app_.publish_next();
+    const test::Received received = client.read();
+    ASSERT_FALSE(received.is_end) << "closed with " << received.close_code;
+    order.push_back(received.opcode());
+    if (received.opcode() == Opcode::Control) continue;
+    const auto header = unpack_frame_header(received.bytes);
+    ASSERT_TRUE(header.ok()) << header.error().to_string();
+    if (header->opcode == Opcode::StrandDelta) {
+      EXPECT_EQ(header->base_sequence, last_sequence);
+    }
+    if (header->opcode != Opcode::Asset) last_sequence = header->sequence;
+  }
+  EXPECT_EQ(order[0], Opcode::Control);
+  EXPECT_EQ(order[1], Opcode::Asset);
+  EXPECT_EQ(order[2], Opcode::StrandKeyframe);
+}
+
+TEST_F(ServerNet, RolesReachTheirHandlersAndPingIsAnswered) {
+  start();
+  app_.publish_next();
+  auto source = join(hello(Role::Source));
+  source->send(MotionSamples{{MotionSamples::Sample{1, Pose{}}, MotionSamples::Sample{2, Pose{}}}});
+  source->send(WindSamples{{WindSamples::Sample{1, glm::vec3(1.0f)}}});
+  EXPECT_TRUE(eventually([&] { return app_.motion == 2 && app_.wind == 1; }));
+
+  auto controller = join(hello(Role::Controller));
+  controller->send(ControlCommand{Command::Pause});
+  EXPECT_TRUE(controller->read_control<Notice>().has_value());
+  controller->send(SetParameter{"solver.name=dftl"});
+  controller->send(CameraChange{});
+  controller->send(FrameAck{7, 1, 1});
+  EXPECT_TRUE(eventually([&] { return app_.parameters == 1 && app_.cameras == 1 && app_.last_ack == 7; }));
+
+  controller->send(Ping{42});
+  const auto pong = controller->read_control<Pong>();
+  ASSERT_TRUE(pong.has_value());
+  EXPECT_EQ(pong->client_time_ns, 42);
+  EXPECT_LE(pong->server_receive_ns, pong->server_send_ns);
+}
+
+TEST_F(ServerNet, WrongRoleIsClosedWithPolicy) {
+  start();
+  const std::vector<std::pair<Role, ClientMessage>> cases = {
+      {Role::Viewer, MotionSamples{{MotionSamples::Sample{1, Pose{}}}}},
+      {Role::Viewer, WindSamples{{WindSamples::Sample{1, glm::vec3(0.0f)}}}},
+      {Role::Viewer, ControlCommand{Command::Pause}},
+      {Role::Viewer, SetParameter{"solver.name=dftl"}},
+      {Role::Controller, MotionSamples{{MotionSamples::Sample{1, Pose{}}}}},
+      {Role::Source, ControlCommand{Command::Pause}},
+      {Role::Source, KeyframeRequest{}},
+      {Role::Viewer, hello()}};
+  for (const auto& [role, message] : cases) {
+    auto client = join(hello(role));
+    client->send(message);
+    const RawClient::End end = client->read_end();
+    EXPECT_EQ(end.close_code, code(CloseCode::Policy)) << "message " << message.index();
+    EXPECT_FALSE(end.reason.empty());
+  }
+  EXPECT_EQ(app_.motion + app_.wind + app_.commands + app_.parameters, 0u);
+}
+
+TEST_F(ServerNet, GarbageAtEveryStateClosesThatSessionOnly) {
+  start();
+  app_.publish_next();
+  auto healthy = join();
+  const std::vector<std::byte> garbage(100, std::byte{0xff});
+
+  RawClient at_http(server_->port());
+  at_http.send_raw(std::string("\x16\x03\x01 not http at all\r\n\r\n"));
+  EXPECT_EQ(at_http.read_raw_to_end().find("200"), std::string::npos);
+
+  RawClient before_hello(server_->port());
+  ASSERT_TRUE(before_hello.handshake());
+  before_hello.send_bytes(garbage);
+  RawClient::End end = before_hello.read_end();
+  EXPECT_EQ(end.close_code, code(CloseCode::BadData));
+  EXPECT_FALSE(end.reason.empty());
+
+  RawClient other_first(server_->port());
+  ASSERT_TRUE(other_first.handshake());
+  other_first.send(Ping{1});
+  EXPECT_EQ(other_first.read_end().close_code, code(CloseCode::Policy));
+
+  auto joined = join();
+  joined->send_bytes(garbage);
+  EXPECT_EQ(joined->read_end().close_code, code(CloseCode::BadData));
+
+  auto texting = join();
+  texting->send_text("hello");
+  EXPECT_EQ(texting->read_end().close_code, code(CloseCode::BadData));
+
+  auto broken_frame = join();
+  broken_frame->send_raw(std::string(64, '\xff'));
+  (void)broken_frame->read_end();
+
+  healthy->send(Ping{1});
+  EXPECT_TRUE(healthy->read_control<Pong>().has_value());
+  EXPECT_GE(server_->counters().bad_messages, 5u);
+}
+
+TEST_F(ServerNet, OneByteTooMuchIsTooBig) {
+  start();
+  auto client = join();
+  client->send_bytes(std::vector<std::byte>(kMaxControlBytes + 1, std::byte{1}));
+  EXPECT_EQ(client->read_end().close_code, code(CloseCode::TooBig));
+}
+
+TEST_F(ServerNet, TokenIsNeededWhenSet) {
+  NetConfig config;
+  config.token = "0123456789abcdef";
+  start(config);
+  for (const char* token : {"", "0123456789abcdee", "0123456789abcdef0123456789abcdef"}) {
+    RawClient client(server_->port());
+    ASSERT_TRUE(client.handshake());
+    client.send(hello(Role::Viewer, token));
+    const RawClient::End end = client.read_end();
+    EXPECT_EQ(end.close_code, code(CloseCode::Unauthorized));
+    EXPECT_EQ(end.reason.find("0123456789"), std::string::npos) << "the token must not leak";
+  }
+  EXPECT_EQ(server_->counters().refused_token, 3u);
+  EXPECT_NE(join(hello(Role::Viewer, config.token)), nullptr);
+}
+
+TEST_F(ServerNet, HandlerErrorsAndExceptionsEndOneSession) {
+  start();
+  app_.publish_next();
+  auto healthy = join();
+  for (const char* name : {"throw", "refuse"}) {
+    RawClient client(server_->port());
+    ASSERT_TRUE(client.handshake());
+    Hello message = hello();
+    message.name = name;
+    client.send(message);
+    const RawClient::End end = client.read_end();
+    EXPECT_EQ(end.close_code,
+              name == std::string("throw") ? code(CloseCode::Internal) : code(CloseCode::Policy));
+    EXPECT_FALSE(end.reason.empty());
+  }
+  healthy->send(Ping{1});
+  EXPECT_TRUE(healthy->read_control<Pong>().has_value());
+}
+
+TEST_F(ServerNet, FullServerSaysSoAndHasRoomAgainLater) {
+  NetConfig config;
+  config.limits.sessions = 3;
+  config.limits.sessions_per_address = 2;
+  start(config);
+  auto first = join();
+  auto second = join();
+  RawClient third(server_->port());
+  ASSERT_TRUE(third.handshake());
+  const RawClient::End end = third.read_end();
+  EXPECT_EQ(end.close_code, code(CloseCode::Full));
+  EXPECT_NE(end.reason.find("full"), std::string::npos);
+  EXPECT_EQ(server_->counters().refused_full, 1u);
+  first->close();
+  EXPECT_TRUE(eventually([&] { return server_->counters().joined_sessions == 1; }));
+  EXPECT_NE(join(), nullptr);
+}
+
+TEST_F(ServerNet, SilentConnectionsAreEndedInTime) {
+  NetConfig config;
+  config.limits.handshake_ms = 200;
+  config.limits.hello_ms = 200;
+  start(config);
+  RawClient nothing(server_->port());
+  RawClient half(server_->port());
+  half.send_raw("GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: webso");
+  RawClient no_hello(server_->port());
+  ASSERT_TRUE(no_hello.handshake());
+  EXPECT_EQ(nothing.read_raw_to_end(), "");
+  EXPECT_EQ(half.read_raw_to_end(), "");
+  EXPECT_EQ(no_hello.read_end().close_code, code(CloseCode::Policy));
+  EXPECT_TRUE(eventually([&] { return server_->counters().timeouts == 3; }));
+}
+
+TEST_F(ServerNet, ResetAtEveryStateLeavesNothingBehind) {
+  start();
+  app_.publish_next();
+  for (int state = 0; state < 5; ++state) {
+    for (int repeat = 0; repeat < 5; ++repeat) {
+      RawClient client(server_->port());
+      if (state == 1) client.send_raw("GET /v1 HTT");
+      if (state >= 2) {
+        ASSERT_TRUE(client.handshake());
+      }
+      if (state >= 3) client.send(hello());
+      if (state >= 4) {
+        EXPECT_TRUE(client.read_media(Opcode::StrandKeyframe).has_value());
+      }
+      client.reset();
+    }
+  }
+  EXPECT_TRUE(eventually([&] { return server_->counters().open_sessions == 0 && app_.joined_count() == 0; }));
+  EXPECT_NE(join(), nullptr);
+}
+
+TEST_F(ServerNet, SlowReaderSkipsToKeyframesAndOthersGetEveryDelta) {
+  app_.frame_bytes = 200'000;
+  start();
+  app_.publish_next();
+  auto healthy = join();
+  ASSERT_TRUE(healthy->read_media(Opcode::StrandKeyframe).has_value());
+  auto slow = join(hello(), 4'096);
+  ASSERT_TRUE(slow->read_media(Opcode::StrandKeyframe).has_value());
+
+  const uint32_t first = app_.sequence() + 1;
+  constexpr uint32_t kFrames = 60;
+  for (uint32_t i = 0; i < kFrames; ++i) {
+    app_.publish_next();
+    const auto bytes = healthy->read_media(Opcode::StrandDelta);
+    ASSERT_TRUE(bytes.has_value());
+    EXPECT_EQ(unpack_frame_header(*bytes)->sequence, first + i) << "a healthy viewer misses nothing";
+  }
+  EXPECT_TRUE(eventually([&] { return server_->counters().frames_dropped > 0; }));
+  EXPECT_GE(server_->counters().chain_losses, 1u);
+
+  // It reads again: what comes is decodable, and it is led back by a keyframe.
+  uint32_t last_sequence = 1;
+  bool has_keyframe = false;
+  while (!has_keyframe) {
+    const test::Received received = slow->read();
+    ASSERT_FALSE(received.is_end) << received.close_code;
+    if (received.opcode() == Opcode::Control) continue;
+    const FrameHeader header = *unpack_frame_header(received.bytes);
+    has_keyframe = header.opcode == Opcode::StrandKeyframe;
+    if (!has_keyframe) {
+      EXPECT_EQ(header.base_sequence, last_sequence);
+    }
+    last_sequence = header.sequence;
+  }
+  EXPECT_GT(last_sequence, first);
+  slow->send(Ping{1});
+  EXPECT_TRUE(slow->read_control<Pong>().has_value());
+}
+
+TEST_F(ServerNet, StalledReaderIsDroppedAndCounted) {
+  app_.frame_bytes = 4'000'000;
+  NetConfig config;
+  config.limits.stalled_write_ms = 200;
+  start(config);
+  app_.publish_next();
+  auto stalled = join(hello(), 4'096);
+  EXPECT_TRUE(eventually([&] { return server_->counters().stalled == 1; }));
+  EXPECT_TRUE(eventually([&] { return server_->counters().open_sessions == 0; }));
+}
+
+TEST_F(ServerNet, UnreadControlMessagesCloseTheSession) {
+  app_.asset_bytes = 8'000'000;  // the first write never ends, so control messages pile up behind it
+  start();
+  auto client = std::make_unique<RawClient>(server_->port(), 4'096);
+  ASSERT_TRUE(client->handshake());
+  client->send(hello());
+  ASSERT_TRUE(client->read_control<Welcome>().has_value());
+  for (int i = 0; i < 200; ++i) server_->broadcast(ServerStatus{});
+  EXPECT_TRUE(eventually([&] { return app_.joined_count() == 0; }));
+}
+
+TEST_F(ServerNet, TooManyMessagesAreRefused) {
+  NetConfig config;
+  config.limits.messages_per_s = 20.0;
+  start(config);
+  auto client = join();
+  for (int i = 0; i < 100; ++i) client->send(FrameAck{1, 1, 1});
+  EXPECT_TRUE(eventually([&] { return app_.joined_count() == 0; }));
+  EXPECT_EQ(server_->counters().bad_messages, 1u);
+}
+
+TEST_F(ServerNet, KeyframeRequestsAreRateLimited) {
+  NetConfig config;
+  config.limits.keyframe_interval_ms = 60'000;
+  start(config);
+  app_.publish_next();
+  auto client = join();
+  ASSERT_TRUE(client->read_media(Opcode::StrandKeyframe).has_value());
+  const uint64_t before = app_.keyframe_requests;
+  for (int i = 0; i < 100; ++i) client->send(KeyframeRequest{});
+  client->send(Ping{1});
+  ASSERT_TRUE(client->read_control<Pong>().has_value());
+  EXPECT_EQ(app_.keyframe_requests, before);
+}
+
+TEST_F(ServerNet, PicturesReachTheirClassOnly) {
+  start();
+  Hello message = hello();
+  message.mode = StreamMode::Frames;
+  auto viewer = join(message);
+  auto strands = join();
+  server_->publish_picture(1, media(Opcode::JpegFrame, 1, 0));
+  server_->publish_picture(0, media(Opcode::JpegFrame, 2, 0));
+  const auto picture = viewer->read_media(Opcode::JpegFrame);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(unpack_frame_header(*picture)->sequence, 2u);
+  server_->broadcast(Notice{false, "end"});
+  test::Received received;
+  do {
+    received = strands->read();
+    EXPECT_NE(received.opcode(), Opcode::JpegFrame);
+  } while (!received.is_end && received.opcode() != Opcode::Control);
+}
+
+TEST_F(ServerNet, StopSaysGoodbyeToAll) {
+  start();
+  app_.publish_next();
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 5; ++i) clients.push_back(join());
+  RawClient silent(server_->port());  // never answers the closing handshake
+  ASSERT_TRUE(silent.handshake());
+  std::atomic<int> said_goodbye{0};
+  std::vector<std::thread> readers;
+  for (auto& client : clients)
+    readers.emplace_back([&said_goodbye, &client] {
+      const RawClient::End end = client->read_end();
+      if (end.close_code == code(CloseCode::GoingAway) && !end.reason.empty()) ++said_goodbye;
+    });
+  server_->stop();
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_EQ(said_goodbye, 5);
+}
+
+TEST_F(ServerNet, PortInUseNamesThePort) {
+  start();
+  NetConfig config;
+  config.port = server_->port();
+  const auto second = NetServer::listen(config, app_);
+  ASSERT_FALSE(second.ok());
+  EXPECT_EQ(second.error().code, ErrorCode::Unavailable);
+  EXPECT_NE(second.error().message.find(std::to_string(config.port)), std::string::npos);
+}
+
+TEST(NetServerListen, RefusesBadAddressesAndOpenPortsWithoutToken) {
+  FakeApp app;
+  NetConfig config;
+  config.port = 0;
+  config.address = "0.0.0.0";
+  auto server = NetServer::listen(config, app);
+  ASSERT_FALSE(server.ok());
+  EXPECT_EQ(server.error().code, ErrorCode::Unauthorized);
+  config.address = "nonsense";
+  server = NetServer::listen(config, app);
+  ASSERT_FALSE(server.ok());
+  EXPECT_NE(server.error().message.find("nonsense"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace strandcast

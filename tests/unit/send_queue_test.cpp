@@ -1,0 +1,144 @@
+// Laws of the send queue: order of joining, one frame pending, and that a viewer only ever gets deltas it can
+// decode.
+#include "server/net/send_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace strandcast {
+namespace {
+
+EncodedFramePtr frame(Opcode opcode, uint32_t sequence, uint32_t base_sequence) {
+  auto result = std::make_shared<EncodedFrame>();
+  result->header.opcode = opcode;
+  result->header.sequence = sequence;
+  result->header.base_sequence = base_sequence;
+  return result;
+}
+EncodedFramePtr delta(uint32_t sequence) {
+  return frame(Opcode::StrandDelta, sequence, sequence - 1);
+}
+EncodedFramePtr keyframe(uint32_t sequence) {
+  return frame(Opcode::StrandKeyframe, sequence, 0);
+}
+
+Opcode taken_opcode(SendQueue& queue) {
+  const auto item = queue.take_next();
+  if (!item) return Opcode::Asset;
+  const auto* media = std::get_if<EncodedFramePtr>(&*item);
+  return media == nullptr ? Opcode::Control : (*media)->header.opcode;
+}
+
+TEST(SendQueue, SendsWelcomeThenAssetThenKeyframeThenDeltas) {
+  SendQueue queue;
+  queue.set_asset(frame(Opcode::Asset, 1, 0));
+  queue.start_strands();
+  ASSERT_TRUE(queue.push_control(Welcome{}));
+  EXPECT_EQ(queue.offer_strands(delta(5)), SendQueue::Offer::Ignored);
+  EXPECT_EQ(queue.offer_strands(keyframe(5)), SendQueue::Offer::Ignored) << "the asset is not written yet";
+  EXPECT_EQ(taken_opcode(queue), Opcode::Control);
+  queue.written();
+  EXPECT_EQ(taken_opcode(queue), Opcode::Asset);
+  EXPECT_FALSE(queue.needs_keyframe()) << "while the asset is being written";
+  queue.written();
+  EXPECT_TRUE(queue.needs_keyframe());
+  EXPECT_EQ(queue.offer_strands(delta(6)), SendQueue::Offer::Ignored);
+  EXPECT_EQ(queue.offer_strands(keyframe(6)), SendQueue::Offer::Queued);
+  EXPECT_EQ(taken_opcode(queue), Opcode::StrandKeyframe);
+  EXPECT_EQ(queue.offer_strands(delta(7)), SendQueue::Offer::Queued);
+  queue.written();
+  EXPECT_EQ(taken_opcode(queue), Opcode::StrandDelta);
+  EXPECT_EQ(queue.dropped_frames(), 0u);
+}
+
+TEST(SendQueue, SecondPendingDeltaLosesTheChainAndIsCounted) {
+  SendQueue queue;
+  queue.start_strands();
+  ASSERT_EQ(queue.offer_strands(keyframe(1)), SendQueue::Offer::Queued);
+  (void)queue.take_next();
+  ASSERT_EQ(queue.offer_strands(delta(2)), SendQueue::Offer::Queued);
+  EXPECT_EQ(queue.offer_strands(delta(3)), SendQueue::Offer::LostChain);
+  EXPECT_EQ(queue.dropped_frames(), 2u);
+  EXPECT_EQ(queue.chain_losses(), 1u);
+  EXPECT_EQ(queue.offer_strands(delta(4)), SendQueue::Offer::Ignored);
+  queue.written();
+  EXPECT_TRUE(queue.needs_keyframe());
+  EXPECT_FALSE(queue.take_next().has_value()) << "nothing of the broken chain may follow";
+}
+
+TEST(SendQueue, KeyframeForAnotherViewerIsIgnoredByAViewerWithThatState) {
+  SendQueue queue;
+  queue.start_strands();
+  ASSERT_EQ(queue.offer_strands(keyframe(4)), SendQueue::Offer::Queued);
+  (void)queue.take_next();
+  queue.written();
+  EXPECT_EQ(queue.offer_strands(keyframe(4)), SendQueue::Offer::Ignored);
+  EXPECT_EQ(queue.offer_strands(delta(5)), SendQueue::Offer::Queued);
+}
+
+TEST(SendQueue, WhateverIsOfferedTheViewerCanDecodeWhatItGets) {
+  std::mt19937 random(7);
+  for (int round = 0; round < 200; ++round) {
+    SendQueue queue;
+    queue.set_asset(frame(Opcode::Asset, 1, 0));
+    queue.start_strands();
+    uint32_t sequence = 1;
+    uint32_t decoded_sequence = 0;  // 0 = the viewer has no state
+    bool is_writing = false;
+    for (int step = 0; step < 200; ++step) {
+      switch (random() % 5) {
+        case 0:
+        case 1:
+          queue.offer_strands(delta(++sequence));
+          break;
+        case 2:
+          if (random() % 4 == 0) queue.offer_strands(keyframe(sequence));
+          break;
+        case 3:
+          if (random() % 50 == 0) queue.lose_chain();
+          break;
+        default:
+          if (is_writing) queue.written();
+          is_writing = false;
+          if (const auto item = queue.take_next()) {
+            is_writing = true;
+            const FrameHeader& header = std::get<EncodedFramePtr>(*item)->header;
+            if (header.opcode == Opcode::Asset) break;
+            if (header.opcode == Opcode::StrandDelta) {
+              ASSERT_EQ(header.base_sequence, decoded_sequence);
+              ASSERT_NE(decoded_sequence, 0u);
+            }
+            decoded_sequence = header.sequence;
+          }
+      }
+    }
+  }
+}
+
+TEST(SendQueue, ControlIsBoundedAndGoesAheadOfMedia) {
+  SendQueue queue;
+  queue.set_asset(frame(Opcode::Asset, 1, 0));
+  for (size_t i = 0; i < kMaxQueuedControl; ++i) ASSERT_TRUE(queue.push_control(Notice{}));
+  EXPECT_FALSE(queue.push_control(Notice{}));
+  for (size_t i = 0; i < kMaxQueuedControl; ++i) EXPECT_EQ(taken_opcode(queue), Opcode::Control);
+  EXPECT_TRUE(queue.take_next().has_value());
+  EXPECT_FALSE(queue.take_next().has_value());
+}
+
+TEST(SendQueue, NewestPictureReplacesTheOneNotYetSent) {
+  SendQueue queue;
+  queue.set_asset(frame(Opcode::Asset, 1, 0));
+  queue.offer_picture(frame(Opcode::JpegFrame, 1, 0));
+  EXPECT_EQ(taken_opcode(queue), Opcode::Asset) << "a picture never replaces the asset";
+  queue.offer_picture(frame(Opcode::JpegFrame, 2, 0));
+  queue.offer_picture(frame(Opcode::JpegFrame, 3, 0));
+  queue.written();
+  const auto item = queue.take_next();
+  ASSERT_TRUE(item.has_value());
+  EXPECT_EQ(std::get<EncodedFramePtr>(*item)->header.sequence, 3u);
+  EXPECT_EQ(queue.dropped_frames(), 2u);
+}
+
+}  // namespace
+}  // namespace strandcast
