@@ -1,5 +1,5 @@
-// A groom: strands at rest in head space, structure of arrays. Plain data, immutable after loading. Loaders are in
-// tfx_loader.h and hair_loader.h, growth in procedural.h, resampling in resample.h.
+// A groom: strands at rest in head space, structure of arrays. Plain data, immutable after loading. Loaders
+// are in groom_file.h, tfx_loader.h and hair_loader.h, growth in procedural.h, resampling in resample.h.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ namespace strandcast {
 
 // Limits of every groom, wherever it comes from; checked before anything is allocated.
 inline constexpr uint32_t kMaxStrandCount = 200'000;
-inline constexpr uint32_t kMinVertexCount = 2;   // per strand
-inline constexpr uint32_t kMaxVertexCount = 64;  // per strand, after resampling
+inline constexpr uint32_t kMinVertexCount = 2;            // per strand
+inline constexpr uint32_t kMaxVertexCount = 64;           // per strand, after resampling
 inline constexpr uint32_t kMaxSourceVertexCount = 4'096;  // per strand in a file, before resampling
 inline constexpr uint64_t kMaxGroomVertices = 16'000'000;
 inline constexpr uint64_t kMaxGroomFileBytes = 512ull << 20;
@@ -31,14 +31,17 @@ struct Groom {
   std::vector<glm::vec2> root_uv;          // (strand_count) or empty
 
   uint32_t strand_count() const { return offset.empty() ? 0u : static_cast<uint32_t>(offset.size() - 1); }
-  uint32_t vertex_count(uint32_t strand_index) const { return offset[strand_index + 1] - offset[strand_index]; }
+  uint32_t vertex_count(uint32_t strand_index) const {
+    return offset[strand_index + 1] - offset[strand_index];
+  }
   /// Vertices per strand when all strands have the same number, else 0. The simulation needs a uniform groom.
   uint32_t uniform_vertex_count() const;
   /// Arc length of one strand, m.
   float length_m(uint32_t strand_index) const;
 };
 
-/// Checks sizes, limits, finite coordinates within kMaxGroomExtent and that every strand has >= 2 vertices.
+/// Checks sizes, limits, coordinates within kMaxGroomExtentM, that every strand has >= 2 vertices and that
+/// vertex 0 of every strand is pinned. BadInput or LimitExceeded name the strand and vertex.
 Status validate(const Groom& groom);
 
 inline constexpr float kMaxGroomExtentM = 100.0f;  // |coordinate| in head space
@@ -46,12 +49,15 @@ inline constexpr float kMaxGroomExtentM = 100.0f;  // |coordinate| in head space
 /// Three key strands between which followers are interpolated.
 using RootTriangle = glm::uvec3;
 
-/// Triangles of neighbouring roots (at most about 2 per strand), deterministic. Strands without a triangle are
-/// still drawn as themselves.
+/// Triangles of neighbouring roots (at most about 2 per strand), deterministic. Strands without a triangle
+/// are still drawn as themselves.
 std::vector<RootTriangle> make_root_triangles(const Groom& groom);
 
 /// Order of strands such that every prefix covers the head evenly, so that a prefix is a valid subset.
 std::vector<uint32_t> make_prefix_order(const Groom& groom);
+
+/// The groom with the given vertices of every strand pinned and all others free.
+Groom with_pinning(Groom groom, Pinning pinning);
 
 /// The groom with its strands in the given order; `order` is a permutation of 0..strand_count-1.
 Groom reorder(const Groom& groom, const std::vector<uint32_t>& order);

@@ -1,0 +1,68 @@
+#include "common/groom/groom_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "common/groom/hair_loader.h"
+#include "common/groom/resample.h"
+#include "common/groom/tfx_loader.h"
+
+namespace strandcast {
+namespace {
+
+Status check_options(const GroomFileOptions& options) {
+  if (!std::isfinite(options.unit_m) || options.unit_m <= 0.0f) {
+    return make_error(ErrorCode::BadInput, "unit_m is {}, it has to be above 0", options.unit_m);
+  }
+  if (!std::isfinite(options.origin.x) || !std::isfinite(options.origin.y) ||
+      !std::isfinite(options.origin.z)) {
+    return make_error(ErrorCode::BadInput, "origin is ({}, {}, {}), it has to be finite", options.origin.x,
+                      options.origin.y, options.origin.z);
+  }
+  const uint32_t count = options.vertex_count;
+  if (count != 0 && (count < kMinVertexCount || count > kMaxVertexCount)) {
+    return make_error(ErrorCode::BadInput, "vertex_count is {}, allowed are 0 (keep) and {} to {}", count,
+                      kMinVertexCount, kMaxVertexCount);
+  }
+  return {};
+}
+
+Result<Groom> load_by_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".tfx") return load_tfx(path);
+  if (extension == ".hair") return load_hair(path);
+  return at(path.string(), make_error(ErrorCode::Unsupported,
+                                      "unknown groom file extension '{}', known: .tfx, .hair", extension));
+}
+
+uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
+  if (wanted != 0) return wanted;
+  uint32_t largest = 0;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    largest = std::max(largest, groom.vertex_count(strand));
+  }
+  return std::clamp(largest, kMinVertexCount, kMaxVertexCount);
+}
+
+}  // namespace
+
+Result<Groom> load_groom(const GroomFileOptions& options) {
+  if (const Status checked = check_options(options); !checked)
+    return at(options.path.string(), checked.error());
+  ASSIGN_OR_RETURN(Groom groom, load_by_extension(options.path));
+  for (glm::vec3& point : groom.rest_position_m) {
+    const glm::vec3 upright = options.is_z_up ? glm::vec3(point.x, point.z, -point.y) : point;
+    point = (upright - options.origin) * options.unit_m;
+  }
+  // Before resampling, so that overflown coordinates never enter its sums.
+  if (const Status checked = validate(groom); !checked) return at(options.path.string(), checked.error());
+  const uint32_t vertex_count = target_vertex_count(groom, options.vertex_count);
+  if (groom.uniform_vertex_count() != vertex_count) groom = resample(groom, vertex_count);
+  if (options.pinning) groom = with_pinning(std::move(groom), *options.pinning);
+  return groom;
+}
+
+}  // namespace strandcast

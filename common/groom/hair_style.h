@@ -1,0 +1,28 @@
+// HairStyle: the direction in which hair at rest runs, point by point, and where it must not be. Lengths are
+// in skull radii about the skull's centre; +Y up, +Z out of the face. Hair is parted in the middle, combed to
+// the sides and back and then hangs. Values, any thread.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+namespace strandcast {
+
+/// What one strand (or one clump) does differently from its neighbours.
+struct StrandCharacter {
+  glm::vec3 root{0.0f};     // in skull radii
+  float side = 1.0f;        // -1 .. 1: which side of the parting it is combed to
+  float clearance = 0.05f;  // height above the skull at which it settles; upper hair lies over lower hair
+  glm::vec3 sway{0.0f};     // added to the direction it is combed in
+};
+
+/// The character of a strand rooted at `root`; varies slowly over the scalp, and a little with `strand_hash`.
+StrandCharacter make_character(const glm::vec3& root, uint32_t strand_hash, uint32_t seed);
+
+/// Unit direction that hair at `point` turns towards.
+glm::vec3 combed_direction(const glm::vec3& point, const StrandCharacter& character);
+
+/// Moves a point at arc length `arc` (in skull radii) out of the skull, the face and the neck.
+glm::vec3 keep_outside(const glm::vec3& point, float arc, const StrandCharacter& character);
+
+}  // namespace strandcast

@@ -1,0 +1,129 @@
+// Meshes the built-in head by dual vertices: one vertex in every grid cell that the surface crosses, one quad
+// round every grid edge that it crosses. The grid is finer where the face has detail.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "common/groom/head_field.h"
+#include "common/groom/mesh.h"
+
+namespace strandcast {
+namespace {
+
+constexpr float kCoarse = 0.095f;  // cell width in skull radii
+constexpr float kFine = 0.05f;
+constexpr int kProjections = 4;  // of each vertex onto the surface
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
+struct Range {
+  float low, high;
+};
+constexpr std::array<Range, 3> kDetail = {Range{-0.62f, 0.62f}, Range{-1.30f, 0.12f}, Range{0.45f, 1.25f}};
+
+/// Grid coordinates of one axis: fine inside of its detail range, coarse outside.
+std::vector<float> grid_line(int axis) {
+  std::vector<float> line{kHeadLow[axis]};
+  while (line.back() < kHeadHigh[axis]) {
+    const bool is_fine = line.back() >= kDetail[axis].low - kFine && line.back() < kDetail[axis].high;
+    line.push_back(line.back() + (is_fine ? kFine : kCoarse));
+  }
+  return line;
+}
+
+class HeadMesher {
+ public:
+  HeadMesher() {
+    for (int axis = 0; axis < 3; ++axis) line_[axis] = grid_line(axis);
+    size_ = glm::ivec3(line_[0].size(), line_[1].size(), line_[2].size());
+    distance_.resize(static_cast<size_t>(size_.x) * size_.y * size_.z);
+    vertex_.assign(distance_.size(), kNone);
+    for_each(size_, [&](const glm::ivec3& at) { distance_[index_of(at)] = head_distance(corner(at)); });
+  }
+
+  /// In skull radii.
+  Mesh build() {
+    for_each(size_ - 1, [&](const glm::ivec3& cell) { add_vertex(cell); });
+    for_each(size_ - 1, [&](const glm::ivec3& at) {
+      for (int axis = 0; axis < 3; ++axis) add_quad(at, axis);
+    });
+    return std::move(mesh_);
+  }
+
+ private:
+  template <class Visit>
+  static void for_each(const glm::ivec3& size, const Visit& visit) {
+    for (int z = 0; z < size.z; ++z) {
+      for (int y = 0; y < size.y; ++y) {
+        for (int x = 0; x < size.x; ++x) visit(glm::ivec3(x, y, z));
+      }
+    }
+  }
+
+  size_t index_of(const glm::ivec3& at) const {
+    return (static_cast<size_t>(at.z) * size_.y + at.y) * size_.x + at.x;
+  }
+  glm::vec3 corner(const glm::ivec3& at) const { return {line_[0][at.x], line_[1][at.y], line_[2][at.z]}; }
+  bool is_inside(const glm::ivec3& at) const { return distance_[index_of(at)] < 0.0f; }
+  static glm::ivec3 step(int axis) { return {axis == 0, axis == 1, axis == 2}; }
+
+  /// A vertex at the mean of the crossings on the cell's edges, then moved onto the surface.
+  void add_vertex(const glm::ivec3& cell) {
+    glm::vec3 sum(0.0f);
+    int crossings = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const glm::ivec3 along = step(axis), side = step((axis + 1) % 3), up = step((axis + 2) % 3);
+      for (int edge = 0; edge < 4; ++edge) {
+        const glm::ivec3 from = cell + (edge & 1) * side + (edge >> 1) * up, to = from + along;
+        if (is_inside(from) == is_inside(to)) continue;
+        const float a = distance_[index_of(from)], b = distance_[index_of(to)];
+        sum += glm::mix(corner(from), corner(to), a / (a - b));
+        ++crossings;
+      }
+    }
+    if (crossings == 0) return;
+    const glm::vec3 low = corner(cell), high = corner(cell + 1);
+    glm::vec3 point = sum / static_cast<float>(crossings);
+    for (int i = 0; i < kProjections; ++i) {
+      // Kept inside of its cell, so that neighbouring quads never fold over each other.
+      point = glm::clamp(point - head_distance(point) * head_normal(point), low, high);
+    }
+    vertex_[index_of(cell)] = static_cast<uint32_t>(mesh_.position_m.size());
+    mesh_.position_m.push_back(point);
+    mesh_.normal.push_back(head_normal(point));
+  }
+
+  /// The quad of the four cells round a grid edge that crosses the surface.
+  void add_quad(const glm::ivec3& at, int axis) {
+    const glm::ivec3 side = step((axis + 1) % 3), up = step((axis + 2) % 3);
+    if (at[(axis + 1) % 3] == 0 || at[(axis + 2) % 3] == 0) return;
+    const bool is_from_inside = is_inside(at);
+    if (is_from_inside == is_inside(at + step(axis))) return;
+    std::array<uint32_t, 4> quad = {vertex_[index_of(at - side - up)], vertex_[index_of(at - up)],
+                                    vertex_[index_of(at)], vertex_[index_of(at - side)]};
+    if (!is_from_inside) std::swap(quad[1], quad[3]);
+    const auto span = [&](int a, int b) {
+      return glm::distance(mesh_.position_m[quad[a]], mesh_.position_m[quad[b]]);
+    };
+    const int turn = span(0, 2) <= span(1, 3) ? 0 : 1;
+    const auto corner_at = [&](int i) { return quad[(i + turn) % 4]; };
+    mesh_.triangle.emplace_back(corner_at(0), corner_at(1), corner_at(2));
+    mesh_.triangle.emplace_back(corner_at(0), corner_at(2), corner_at(3));
+  }
+
+  std::array<std::vector<float>, 3> line_;
+  glm::ivec3 size_{0};
+  std::vector<float> distance_;   // by grid corner
+  std::vector<uint32_t> vertex_;  // by cell
+  Mesh mesh_;
+};
+
+}  // namespace
+
+Mesh make_head(float radius_m) {
+  Mesh mesh = HeadMesher().build();
+  for (glm::vec3& point : mesh.position_m) point *= radius_m;
+  return mesh;
+}
+
+}  // namespace strandcast

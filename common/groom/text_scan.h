@@ -1,0 +1,80 @@
+// TextScan: lines and words of a text file with LF, CRLF, CR or mixed line ends, and number parsing that does
+// not depend on the locale. Used by the text loaders of this folder. Any thread; views into the text, which
+// must outlive it.
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace strandcast {
+
+class TextScan {
+ public:
+  explicit TextScan(std::string_view text) : text_(text) {}
+
+  /// Moves to the next line; false at the end of the text.
+  bool next_line() {
+    if (begin_ >= text_.size()) return false;
+    size_t end = text_.find_first_of("\r\n", begin_);
+    if (end == std::string_view::npos) end = text_.size();
+    rest_ = text_.substr(begin_, end - begin_);
+    const bool is_crlf = end + 1 < text_.size() && text_[end] == '\r' && text_[end + 1] == '\n';
+    begin_ = end + (is_crlf ? 2 : 1);
+    ++line_;
+    return true;
+  }
+
+  /// Moves to the next line that has a word on it.
+  bool next_filled_line() {
+    while (next_line()) {
+      skip_space();
+      if (!rest_.empty()) return true;
+    }
+    return false;
+  }
+
+  /// The next word of the line; empty at its end. Blanks, tabs and commas separate words.
+  std::string_view next_word() {
+    skip_space();
+    size_t end = rest_.find_first_of(kSpace);
+    if (end == std::string_view::npos) end = rest_.size();
+    const std::string_view word = rest_.substr(0, end);
+    rest_.remove_prefix(end);
+    return word;
+  }
+
+  uint32_t line() const { return line_; }  // 1-based
+  uint64_t left_bytes() const { return begin_ >= text_.size() ? 0 : text_.size() - begin_; }
+
+ private:
+  static constexpr std::string_view kSpace = " \t,\v\f";
+  void skip_space() { rest_.remove_prefix(std::min(rest_.find_first_not_of(kSpace), rest_.size())); }
+
+  std::string_view text_, rest_;
+  size_t begin_ = 0;
+  uint32_t line_ = 0;
+};
+
+/// The whole word as a number; empty when it is not one or does not fit. Infinities and NaN are numbers here.
+template <class T>
+std::optional<T> parse_number(std::string_view word) {
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  T value{};
+  const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (code != std::errc{} || end != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+/// A word from a file for an error message: at most 40 characters, unprintable ones as '?'.
+inline std::string quoted(std::string_view word) {
+  constexpr size_t kMaxQuoted = 40;
+  std::string text = "'";
+  for (const char c : word.substr(0, kMaxQuoted)) text += c >= ' ' && c <= '~' ? c : '?';
+  return text + (word.size() > kMaxQuoted ? "...'" : "'");
+}
+
+}  // namespace strandcast

@@ -1,0 +1,226 @@
+#include "common/groom/tfx_loader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "common/base/file.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint64_t kFloatBytes = sizeof(float);
+constexpr std::string_view kTextMark = "version";
+
+/// An array that the header points to. An offset of 0 means that it is absent.
+struct TfxArray {
+  const char* name;
+  uint64_t offset;
+  uint64_t count;  // items
+  uint64_t item_bytes;
+  uint64_t end() const { return offset + count * item_bytes; }
+};
+
+struct TfxHeader {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;  // per strand
+  uint64_t header_bytes = 0;
+  uint64_t position_bytes = 0;  // per vertex
+  bool has_both_ends = false;
+  bool has_pin_flags = false;
+  std::vector<TfxArray> arrays;  // positions first, strand coordinates second
+
+  uint64_t vertex_total() const { return uint64_t{strand_count} * vertex_count; }
+  const TfxArray& positions() const { return arrays[0]; }
+  const TfxArray& strand_uv() const { return arrays[1]; }
+};
+
+Status check_counts(uint32_t strand_count, uint32_t vertex_count) {
+  if (strand_count == 0) return make_error(ErrorCode::BadInput, "0 strands");
+  if (strand_count > kMaxStrandCount) {
+    return make_error(ErrorCode::LimitExceeded, "{} strands, at most {} are allowed", strand_count,
+                      kMaxStrandCount);
+  }
+  if (vertex_count < kMinVertexCount || vertex_count > kMaxSourceVertexCount) {
+    return make_error(ErrorCode::BadInput, "{} vertices per strand, allowed are {} to {}", vertex_count,
+                      kMinVertexCount, kMaxSourceVertexCount);
+  }
+  const uint64_t total = uint64_t{strand_count} * vertex_count;
+  if (total > kMaxGroomVertices) {
+    return make_error(ErrorCode::LimitExceeded, "{} strands x {} vertices, at most {} vertices are allowed",
+                      strand_count, vertex_count, kMaxGroomVertices);
+  }
+  return {};
+}
+
+/// Every array lies behind the header and inside the file, no two overlap, and nothing is left over.
+Status check_arrays(const ByteView& file, const TfxHeader& header) {
+  std::vector<TfxArray> arrays;
+  for (const TfxArray& array : header.arrays) {
+    if (array.offset != 0) arrays.push_back(array);
+  }
+  std::sort(arrays.begin(), arrays.end(), [](const auto& a, const auto& b) { return a.offset < b.offset; });
+  uint64_t end = header.header_bytes;
+  for (const TfxArray& array : arrays) {
+    if (array.offset < end) {
+      return make_error(ErrorCode::BadInput, "offset {} of the {} overlaps what ends at byte {}",
+                        array.offset, array.name, end);
+    }
+    if (!file.has(array.offset, array.count, array.item_bytes)) {
+      return make_error(ErrorCode::BadInput, "{} x {} bytes of {} at offset {} do not fit into {} bytes",
+                        array.count, array.item_bytes, array.name, array.offset, file.size_bytes());
+    }
+    end = array.end();
+  }
+  if (end != file.size_bytes()) {
+    return make_error(ErrorCode::BadInput, "{} bytes are left after the last array, which ends at byte {}",
+                      file.size_bytes() - end, end);
+  }
+  return {};
+}
+
+Result<TfxHeader> read_header_v4(const ByteView& file) {
+  TfxHeader header;
+  header.header_bytes = 160;
+  if (!file.has(0, header.header_bytes, 1)) {
+    return make_error(ErrorCode::BadInput, "{} bytes, a version 4 header alone has {}", file.size_bytes(),
+                      header.header_bytes);
+  }
+  header.strand_count = file.get<uint32_t>(4);
+  header.vertex_count = file.get<uint32_t>(8);
+  RETURN_IF_ERROR(check_counts(header.strand_count, header.vertex_count));
+  header.position_bytes = 4 * kFloatBytes;
+  header.has_pin_flags = true;
+  const uint64_t strands = header.strand_count, vertices = header.vertex_total();
+  header.arrays = {{"vertex positions", file.get<uint32_t>(12), vertices, header.position_bytes},
+                   {"strand coordinates", file.get<uint32_t>(16), strands, 2 * kFloatBytes},
+                   {"vertex coordinates", file.get<uint32_t>(20), vertices, 2 * kFloatBytes},
+                   {"strand thickness", file.get<uint32_t>(24), strands, kFloatBytes},
+                   {"vertex colours", file.get<uint32_t>(28), vertices, 4 * kFloatBytes}};
+  return header;
+}
+
+Result<TfxHeader> read_header_v3(const ByteView& file) {
+  TfxHeader header;
+  header.header_bytes = 296;
+  if (!file.has(0, header.header_bytes, 1)) {
+    return make_error(ErrorCode::BadInput, "{} bytes, a version 3 header alone has {}", file.size_bytes(),
+                      header.header_bytes);
+  }
+  header.strand_count = file.get<uint32_t>(4);
+  header.vertex_count = file.get<uint32_t>(8);
+  RETURN_IF_ERROR(check_counts(header.strand_count, header.vertex_count));
+  const auto both_ends = file.get<int32_t>(16);
+  if (both_ends != 0 && both_ends != 1) {
+    return make_error(ErrorCode::BadInput, "the both-ends flag is {}, allowed are 0 and 1", both_ends);
+  }
+  header.has_both_ends = both_ends == 1;
+  header.position_bytes = 3 * kFloatBytes;
+  const uint64_t strands = header.strand_count, vertices = header.vertex_total();
+  header.arrays = {{"vertex positions", file.get<uint32_t>(144), vertices, header.position_bytes},
+                   {"strand coordinates", file.get<uint32_t>(152), strands, 2 * kFloatBytes},
+                   {"strand thickness", file.get<uint32_t>(148), strands, kFloatBytes},
+                   {"vertex colours", file.get<uint32_t>(156), vertices, 4 * kFloatBytes},
+                   {"guide flags", file.get<uint32_t>(160), strands, sizeof(uint32_t)},
+                   {"vertex coordinates", file.get<uint32_t>(164), vertices, 2 * kFloatBytes}};
+  return header;
+}
+
+Result<TfxHeader> read_header(const ByteView& file) {
+  if (!file.has(0, 1, kFloatBytes)) {
+    return make_error(ErrorCode::BadInput, "{} bytes are too few for a .tfx file", file.size_bytes());
+  }
+  const auto version = file.get<float>(0);
+  if (version >= 4.0f && version < 5.0f) return read_header_v4(file);
+  if (version >= 3.0f && version < 4.0f) return read_header_v3(file);
+  return make_error(
+      ErrorCode::BadInput,
+      "the first four bytes give version {}, known are 4 and 3 (binary) and text that begins with "
+      "'version 2.0'",
+      version);
+}
+
+Result<float> read_float(const ByteView& file, uint64_t offset, uint64_t item, uint64_t items_per_strand,
+                         const char* what) {
+  const auto value = file.get<float>(offset);
+  if (std::isfinite(value)) return value;
+  return make_error(ErrorCode::BadInput, "strand {} vertex {} (byte {}) has the {} {}",
+                    item / items_per_strand, item % items_per_strand, offset, what, value);
+}
+
+Status read_positions(const ByteView& file, const TfxHeader& header, Groom& groom) {
+  groom.rest_position_m.resize(header.vertex_total());
+  for (uint64_t i = 0; i < header.vertex_total(); ++i) {
+    const uint64_t offset = header.positions().offset + i * header.position_bytes;
+    for (int axis = 0; axis < 3; ++axis) {
+      ASSIGN_OR_RETURN(groom.rest_position_m[i][axis],
+                       read_float(file, offset + static_cast<uint64_t>(axis) * kFloatBytes, i,
+                                  header.vertex_count, "coordinate"));
+    }
+  }
+  return {};
+}
+
+/// Pin flags of version 4: the fourth float is an inverse mass, 0 = pinned.
+Status read_pins(const ByteView& file, const TfxHeader& header, Groom& groom) {
+  groom.pinned.resize(header.vertex_total());
+  for (uint64_t i = 0; i < header.vertex_total(); ++i) {
+    const uint64_t offset = header.positions().offset + i * header.position_bytes + 3 * kFloatBytes;
+    ASSIGN_OR_RETURN(const float inverse_mass,
+                     read_float(file, offset, i, header.vertex_count, "inverse mass"));
+    if (inverse_mass < 0.0f) {
+      return make_error(ErrorCode::BadInput,
+                        "strand {} vertex {} has the inverse mass {}, allowed is 0 or more",
+                        i / header.vertex_count, i % header.vertex_count, inverse_mass);
+    }
+    const bool is_root = i % header.vertex_count == 0;
+    groom.pinned[i] = is_root || inverse_mass == 0.0f ? 1 : 0;
+  }
+  return {};
+}
+
+Status read_root_uv(const ByteView& file, const TfxHeader& header, Groom& groom) {
+  if (header.strand_uv().offset == 0) return {};
+  groom.root_uv.resize(header.strand_count);
+  for (uint64_t i = 0; i < header.strand_count; ++i) {
+    const uint64_t offset = header.strand_uv().offset + i * header.strand_uv().item_bytes;
+    ASSIGN_OR_RETURN(groom.root_uv[i].x, read_float(file, offset, i, 1, "texture coordinate"));
+    ASSIGN_OR_RETURN(groom.root_uv[i].y, read_float(file, offset + kFloatBytes, i, 1, "texture coordinate"));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Groom> read_tfx_binary(const ByteView& file) {
+  ASSIGN_OR_RETURN(const TfxHeader header, read_header(file));
+  if (header.positions().offset == 0) {
+    return make_error(ErrorCode::BadInput,
+                      "the offset of the vertex positions is 0, they start at {} or later",
+                      header.header_bytes);
+  }
+  RETURN_IF_ERROR(check_arrays(file, header));
+  Groom groom;
+  groom.offset.resize(header.strand_count + size_t{1});
+  for (uint32_t strand = 0; strand <= header.strand_count; ++strand) {
+    groom.offset[strand] = strand * header.vertex_count;
+  }
+  RETURN_IF_ERROR(read_positions(file, header, groom));
+  RETURN_IF_ERROR(read_root_uv(file, header, groom));
+  if (header.has_pin_flags) {
+    RETURN_IF_ERROR(read_pins(file, header, groom));
+    return groom;
+  }
+  return with_pinning(std::move(groom), header.has_both_ends ? Pinning::BothEnds : Pinning::RootPair);
+}
+
+Result<Groom> load_tfx(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string bytes, load_text(path, kMaxGroomFileBytes));
+  const bool is_text = std::string_view(bytes).substr(0, kTextMark.size()) == kTextMark;
+  auto groom = is_text ? read_tfx_text(bytes) : read_tfx_binary(ByteView(std::as_bytes(std::span(bytes))));
+  if (!groom) return at(path.string(), groom.error());
+  groom->name = path.stem().string();
+  return groom;
+}
+
+}  // namespace strandcast
