@@ -1,0 +1,341 @@
+#include "common/motion/bvh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "common/base/file.h"
+#include "common/motion/text_cursor.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kMaxJointChannels = 6;
+constexpr double kMaxChannelValue = 1e9;
+constexpr size_t kMaxListedJoints = 40;
+constexpr uint32_t kNoJoint = UINT32_MAX;
+constexpr glm::dvec3 kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+// A first frame is a calibration pose when most of its rotations are almost zero, clearly more than one frame
+// later, and the head then jumps much further than it usually moves.
+constexpr double kTPoseAngleDeg = 1.0;
+constexpr double kTPoseRestShare = 0.6;
+constexpr double kTPoseRestDrop = 0.2;
+constexpr double kTPoseStepRatio = 10.0;
+
+struct Channel {
+  bool is_rotation = false;
+  uint8_t axis = 0;
+};
+
+struct Joint {
+  std::string name;
+  uint32_t parent = kNoJoint;
+  glm::dvec3 offset{0.0};
+  std::vector<Channel> channels;
+  uint32_t first_channel = 0;
+};
+
+struct Skeleton {
+  std::vector<Joint> joints;
+  uint32_t channel_count = 0;
+};
+
+class HierarchyParser {
+ public:
+  explicit HierarchyParser(TextCursor& cursor) : cursor_(cursor) {}
+
+  /// Reads from HIERARCHY up to and including the word MOTION.
+  Result<Skeleton> parse() {
+    if (!equals_ignoring_case(cursor_.next_token(), "HIERARCHY"))
+      return cursor_.fail(ErrorCode::BadInput, "a BVH file begins with HIERARCHY");
+    for (;;) {
+      const auto word = cursor_.next_token();
+      if (equals_ignoring_case(word, "MOTION")) break;
+      if (!equals_ignoring_case(word, "ROOT")) return unexpected(word, "ROOT or MOTION");
+      RETURN_IF_ERROR(parse_joint_head(kNoJoint));
+      RETURN_IF_ERROR(parse_tree());
+    }
+    if (skeleton_.joints.empty()) return cursor_.fail(ErrorCode::BadInput, "the hierarchy has no ROOT");
+    return std::move(skeleton_);
+  }
+
+ private:
+  Error unexpected(std::string_view word, const char* expected) const {
+    if (word.empty())
+      return cursor_.fail(ErrorCode::BadInput, "the file ends where {} is expected", expected);
+    return cursor_.fail(ErrorCode::BadInput, "found \"{}\" where {} is expected", printable(word), expected);
+  }
+
+  /// Name and opening brace. The name is the rest of the line: it may hold blanks.
+  Status parse_joint_head(uint32_t parent) {
+    std::string_view name = cursor_.rest_of_line();
+    const bool has_brace = name.ends_with('{');
+    if (has_brace) name = trim(name.substr(0, name.size() - 1));
+    if (skeleton_.joints.size() >= kMaxBvhJoints)
+      return cursor_.fail(ErrorCode::LimitExceeded, "more than {} joints", kMaxBvhJoints);
+    Joint joint;
+    joint.name = std::string(name);
+    joint.parent = parent;
+    joint.first_channel = skeleton_.channel_count;
+    skeleton_.joints.push_back(std::move(joint));
+    return has_brace ? Status{} : expect_brace();
+  }
+
+  Status expect_brace() {
+    const auto word = cursor_.next_token();
+    return word == "{" ? Status{} : Status(unexpected(word, "{"));
+  }
+
+  /// Body of a root and everything under it, up to its closing brace. A loop, so that depth costs no stack.
+  Status parse_tree() {
+    std::vector<uint32_t> open{static_cast<uint32_t>(skeleton_.joints.size() - 1)};  // kNoJoint = an end site
+    while (!open.empty()) {
+      const auto word = cursor_.next_token();
+      const bool is_end_site = open.back() == kNoJoint;
+      if (word == "}") {
+        open.pop_back();
+      } else if (equals_ignoring_case(word, "OFFSET")) {
+        ASSIGN_OR_RETURN(const glm::dvec3 offset, parse_offset());
+        if (!is_end_site) skeleton_.joints[open.back()].offset = offset;
+      } else if (equals_ignoring_case(word, "CHANNELS") && !is_end_site) {
+        RETURN_IF_ERROR(parse_channels(open.back()));
+      } else if (equals_ignoring_case(word, "JOINT") && !is_end_site) {
+        if (open.size() >= kMaxBvhDepth)
+          return cursor_.fail(ErrorCode::LimitExceeded, "joints nest deeper than {}", kMaxBvhDepth);
+        RETURN_IF_ERROR(parse_joint_head(open.back()));
+        open.push_back(static_cast<uint32_t>(skeleton_.joints.size() - 1));
+      } else if (equals_ignoring_case(word, "End") && !is_end_site) {
+        const auto site = cursor_.next_token();
+        if (!equals_ignoring_case(site, "Site")) return unexpected(site, "Site");
+        RETURN_IF_ERROR(expect_brace());
+        open.push_back(kNoJoint);
+      } else {
+        return unexpected(word, "OFFSET, CHANNELS, JOINT, End Site or }");
+      }
+    }
+    return {};
+  }
+
+  Result<glm::dvec3> parse_offset() {
+    glm::dvec3 offset{0.0};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto word = cursor_.next_token();
+      const auto value = parse_number(word);
+      if (!value || std::abs(*value) > kMaxChannelValue)
+        return unexpected(word, "a number (OFFSET takes three)");
+      offset[axis] = *value;
+    }
+    return offset;
+  }
+
+  Status parse_channels(uint32_t joint_index) {
+    Joint& joint = skeleton_.joints[joint_index];
+    if (!joint.channels.empty())
+      return cursor_.fail(ErrorCode::BadInput, "a second CHANNELS for joint {}", printable(joint.name));
+    const auto word = cursor_.next_token();
+    const auto count = parse_number(word);
+    if (!count || *count < 0 || *count > kMaxJointChannels || *count != std::floor(*count))
+      return unexpected(word, "a channel count within 0 .. 6");
+    joint.first_channel = skeleton_.channel_count;
+    for (int i = 0; i < static_cast<int>(*count); ++i) {
+      const auto name = cursor_.next_token();
+      Channel channel;
+      channel.is_rotation = name.size() > 1 && equals_ignoring_case(name.substr(1), "rotation");
+      const bool is_position = name.size() > 1 && equals_ignoring_case(name.substr(1), "position");
+      const size_t axis = name.empty() ? std::string::npos : std::string_view("XYZxyz").find(name[0]);
+      if (axis == std::string::npos || !(channel.is_rotation || is_position))
+        return unexpected(name, "a channel name (Xposition .. Zrotation)");
+      channel.axis = static_cast<uint8_t>(axis % 3);
+      joint.channels.push_back(channel);
+    }
+    skeleton_.channel_count += static_cast<uint32_t>(joint.channels.size());
+    return {};
+  }
+
+  TextCursor& cursor_;
+  Skeleton skeleton_;
+};
+
+/// True for "Head", "mixamorig:Head", "joint_head".
+bool is_head_name(std::string_view name) {
+  const size_t separator = name.find_last_of(":_");
+  if (separator != std::string_view::npos) name.remove_prefix(separator + 1);
+  return equals_ignoring_case(name, "head");
+}
+
+Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) {
+  for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
+    const std::string& name = skeleton.joints[i].name;
+    if (wanted.empty() ? is_head_name(name) : name == wanted) return i;
+  }
+  std::string known;
+  for (size_t i = 0; i < std::min(skeleton.joints.size(), kMaxListedJoints); ++i)
+    known += fmt::format("{}{}", i ? ", " : "", printable(skeleton.joints[i].name));
+  return make_error(ErrorCode::NotFound, "no joint named {} (known: {}{})",
+                    wanted.empty() ? "Head or head" : printable(wanted), known,
+                    skeleton.joints.size() > kMaxListedJoints ? ", ..." : "");
+}
+
+/// Joints from the root down to the head.
+std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index) {
+  std::vector<const Joint*> path;
+  for (; joint_index != kNoJoint; joint_index = skeleton.joints[joint_index].parent)
+    path.push_back(&skeleton.joints[joint_index]);
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
+/// Pose of the last joint of the path in the file's axes and units.
+Pose evaluate(const std::vector<const Joint*>& path, std::span<const double> row) {
+  Pose pose;
+  for (const Joint* joint : path) {
+    Pose local{joint->offset, {1, 0, 0, 0}};
+    for (size_t i = 0; i < joint->channels.size(); ++i) {
+      const Channel& channel = joint->channels[i];
+      const double value = row[joint->first_channel + i];
+      if (channel.is_rotation)
+        local.rotation = local.rotation * glm::angleAxis(glm::radians(value), kAxis[channel.axis]);
+      else
+        local.position_m[channel.axis] = value;
+    }
+    pose = {pose * local.position_m, glm::normalize(pose.rotation * local.rotation)};
+  }
+  return pose;
+}
+
+/// Share of the rotation channels within kTPoseAngleDeg of zero.
+double share_at_rest(const Skeleton& skeleton, std::span<const double> row) {
+  uint32_t at_rest = 0, rotations = 0;
+  for (const Joint& joint : skeleton.joints) {
+    for (size_t i = 0; i < joint.channels.size(); ++i) {
+      if (!joint.channels[i].is_rotation) continue;
+      ++rotations;
+      if (std::abs(row[joint.first_channel + i]) < kTPoseAngleDeg) ++at_rest;
+    }
+  }
+  return rotations ? static_cast<double>(at_rest) / rotations : 0.0;
+}
+
+struct MotionHeader {
+  uint32_t frame_count = 0;
+  double frame_s = 0.0;
+};
+
+Result<MotionHeader> parse_motion_header(TextCursor& cursor, uint32_t channel_count) {
+  MotionHeader header;
+  if (!equals_ignoring_case(cursor.next_token(), "Frames:"))
+    return cursor.fail(ErrorCode::BadInput, "expected \"Frames:\" after MOTION");
+  const auto frames = parse_number(cursor.next_token());
+  if (!frames || *frames < 1 || *frames != std::floor(*frames))
+    return cursor.fail(ErrorCode::BadInput, "Frames must be a whole number of at least 1");
+  if (*frames > kMaxBvhFrames)
+    return cursor.fail(ErrorCode::LimitExceeded, "{:g} frames, the limit is {}", *frames, kMaxBvhFrames);
+  header.frame_count = static_cast<uint32_t>(*frames);
+  if (!equals_ignoring_case(cursor.next_token(), "Frame") ||
+      !equals_ignoring_case(cursor.next_token(), "Time:"))
+    return cursor.fail(ErrorCode::BadInput, "expected \"Frame Time:\" after Frames");
+  const auto word = cursor.next_token();
+  const auto frame_s = parse_number(word);
+  if (!frame_s || *frame_s < kMinFrameTimeS || *frame_s > kMaxFrameTimeS)
+    return cursor.fail(ErrorCode::BadInput, "frame time is \"{}\", it must be within {} .. {} s",
+                       printable(word), kMinFrameTimeS, kMaxFrameTimeS);
+  header.frame_s = *frame_s;
+  // Each value takes a digit and a separator: a file too short for its own frame count must not size a
+  // buffer.
+  if (cursor.remaining_bytes() + 1 < uint64_t{2} * channel_count * header.frame_count)
+    return cursor.fail(ErrorCode::BadInput, "{} frames of {} values cannot fit into the {} bytes that follow",
+                       header.frame_count, channel_count, cursor.remaining_bytes());
+  return header;
+}
+
+Status parse_row(TextCursor& cursor, uint32_t frame, std::span<double> row) {
+  auto line = cursor.next_line();
+  if (!line) return cursor.fail(ErrorCode::BadInput, "the file ends before frame {}", frame);
+  std::string_view rest = *line;
+  for (size_t i = 0; i < row.size(); ++i) {
+    const auto word = take_token(rest);
+    if (word.empty())
+      return cursor.fail(ErrorCode::BadInput, "frame {} has {} values, the hierarchy has {} channels", frame,
+                         i, row.size());
+    const auto value = parse_number(word);
+    if (!value || std::abs(*value) > kMaxChannelValue)
+      return cursor.fail(ErrorCode::BadInput, "value {} of frame {} is \"{}\", not a number within 1e9", i,
+                         frame, printable(word));
+    row[i] = *value;
+  }
+  if (!trim(rest).empty())
+    return cursor.fail(ErrorCode::BadInput, "frame {} has more values than the {} channels of the hierarchy",
+                       frame, row.size());
+  return {};
+}
+
+bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first, double rest_share_second) {
+  if (poses.size() < 4 || rest_share_first < kTPoseRestShare ||
+      rest_share_first < rest_share_second + kTPoseRestDrop)
+    return false;
+  std::vector<double> steps;
+  for (size_t i = 1; i < poses.size(); ++i)
+    steps.push_back(glm::distance(poses[i - 1].position_m, poses[i].position_m));
+  const double first = steps.front();
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  return first > kTPoseStepRatio * steps[steps.size() / 2];
+}
+
+/// From the file's axes and units to world axes and metres.
+void to_world(std::vector<Pose>& poses, const BvhOptions& options) {
+  const double quarter_turn_rad = glm::radians(90.0);
+  const glm::dquat world_from_file =
+      options.is_z_up ? glm::angleAxis(-quarter_turn_rad, kAxis[0]) : glm::dquat(1, 0, 0, 0);
+  for (Pose& pose : poses) {
+    pose.position_m = world_from_file * (pose.position_m * options.unit_m);
+    // On both sides: the file's rest pose is turned upright too, so that it becomes the identity.
+    pose.rotation = glm::normalize(world_from_file * pose.rotation * glm::conjugate(world_from_file));
+  }
+  if (!options.recentre) return;
+  const glm::dvec3 start = poses.front().position_m * glm::dvec3(1, 0, 1);
+  for (Pose& pose : poses) pose.position_m -= start;
+}
+
+}  // namespace
+
+Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, const BvhOptions& options) {
+  if (!(options.unit_m > 0.0) || !std::isfinite(options.unit_m))
+    return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0", options.unit_m);
+  TextCursor cursor(text, place);
+  ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor).parse());
+  const auto head = find_head(skeleton, options.head_joint);
+  if (!head) return at(place, head.error());
+  const auto path = path_to(skeleton, *head);
+  ASSIGN_OR_RETURN(const MotionHeader header, parse_motion_header(cursor, skeleton.channel_count));
+  if (skeleton.channel_count == 0) return cursor.fail(ErrorCode::BadInput, "the hierarchy has no channels");
+
+  static_cast<void>(cursor.rest_of_line());
+  MotionClip clip;
+  clip.frame_s = header.frame_s;
+  clip.world_from_head.reserve(header.frame_count);
+  std::vector<double> row(skeleton.channel_count);
+  std::array<double, 2> rest_share{};
+  for (uint32_t frame = 0; frame < header.frame_count; ++frame) {
+    RETURN_IF_ERROR(parse_row(cursor, frame, row));
+    if (frame < rest_share.size()) rest_share[frame] = share_at_rest(skeleton, row);
+    clip.world_from_head.push_back(evaluate(path, row));
+  }
+  if (cursor.next_line())
+    return cursor.fail(ErrorCode::BadInput, "more lines follow after the {} frames announced",
+                       header.frame_count);
+
+  if (options.skip_first_frame_if_t_pose &&
+      begins_with_t_pose(clip.world_from_head, rest_share[0], rest_share[1]))
+    clip.world_from_head.erase(clip.world_from_head.begin());
+  to_world(clip.world_from_head, options);
+  return clip;
+}
+
+Result<MotionClip> load_bvh(const std::filesystem::path& path, const BvhOptions& options) {
+  ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxBvhFileBytes));
+  return parse_bvh(text, path.string(), options);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,37 @@
+// Head motion out of BVH motion capture files: the whole hierarchy is parsed, only the path from the root to
+// the head is evaluated, in double. Input is untrusted: every limit is checked before anything is allocated.
+// Any thread.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/motion/motion_clip.h"
+
+namespace strandcast {
+
+inline constexpr uint64_t kMaxBvhFileBytes = 256ull << 20;
+inline constexpr uint32_t kMaxBvhJoints = 1'024;
+inline constexpr uint32_t kMaxBvhDepth = 128;
+inline constexpr uint32_t kMaxBvhFrames = 1'000'000;
+inline constexpr double kMinFrameTimeS = 1e-4, kMaxFrameTimeS = 10.0;
+
+struct BvhOptions {
+  double unit_m = 0.01;      // metres per file unit
+  bool is_z_up = false;      // else +Y is up
+  std::string head_joint{};  // empty: "Head" or "head", with or without a prefix ending in ':' or '_'
+  bool skip_first_frame_if_t_pose = true;
+  bool recentre = true;  // subtract the first pose's horizontal position
+};
+
+/// World poses of the head joint, one per frame. The rest pose of the file (all rotations zero) is taken to
+/// look along +Z when +Y is up, and along -Y when +Z is up (all known files do); it becomes the identity, +Z
+/// forward, +Y up. Rotations are applied in the order of CHANNELS; a position channel on any joint replaces
+/// that axis of its OFFSET. BadInput and LimitExceeded name file and line; NotFound lists the joints.
+Result<MotionClip> load_bvh(const std::filesystem::path& path, const BvhOptions& options);
+
+/// As load_bvh, from text; `place` names it in errors.
+Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, const BvhOptions& options);
+
+}  // namespace strandcast

@@ -1,0 +1,288 @@
+#include "common/motion/bvh.h"
+
+#include <algorithm>
+#include <random>
+
+#include "common/base/file.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+// Hips at a channel-given place, head two up and half a unit forward, with line ends and blanks mixed as in
+// real files.
+constexpr const char* kSmall =
+    "HIERARCHY\r\nROOT Hips\n{\n\tOFFSET 9 9 9\n\tCHANNELS 6 Xposition Yposition Zposition Zrotation "
+    "Yrotation "
+    "Xrotation \n\tJOINT Neck\n\t{\n\t\tOFFSET 0 1 0\r\n\t\tCHANNELS 3 Zrotation Yrotation "
+    "Xrotation\n\t\tJOINT Head\n"
+    "\t\t{\n\t\t\tOFFSET 0 1 .5\n\t\t\tCHANNELS 3 Zrotation Yrotation Xrotation\n\t\t\tEnd "
+    "Site\n\t\t\t{\n\t\t\t\t"
+    "OFFSET 0 1 0\n\t\t\t}\n\t\t}\n\t}\n}\nMOTION\nFrames:\t2\r\nFrame Time: .0083333\n";
+
+std::string small_with(const std::string& rows) {
+  return kSmall + rows;
+}
+
+const BvhOptions kPlain{.unit_m = 1.0,
+                        .is_z_up = false,
+                        .head_joint = "",
+                        .skip_first_frame_if_t_pose = false,
+                        .recentre = false};
+
+MotionClip parsed(const std::string& text, const BvhOptions& options = kPlain) {
+  auto clip = parse_bvh(text, "m.bvh", options);
+  EXPECT_TRUE(clip) << clip.error().to_string();
+  return clip ? *clip : MotionClip{};
+}
+
+std::string error_of(const std::string& text, const BvhOptions& options = kPlain) {
+  const auto clip = parse_bvh(text, "m.bvh", options);
+  return clip ? "no error" : clip.error().to_string();
+}
+
+TEST(Bvh, RestPoseIsUprightAndOffsetsAddUp) {
+  const MotionClip clip = parsed(small_with("1 2 3 0 0 0 0 0 0 0 0 0\n4 5 6 0 0 0 0 0 0 0 0 0"));
+  ASSERT_EQ(clip.world_from_head.size(), 2u);
+  EXPECT_DOUBLE_EQ(clip.frame_s, 0.0083333);
+  EXPECT_EQ(clip.world_from_head[0].position_m, glm::dvec3(1, 4, 3.5))
+      << "the root's channels replace its OFFSET";
+  EXPECT_NEAR(angle_between_rad(clip.world_from_head[1].rotation, glm::dquat(1, 0, 0, 0)), 0.0, 1e-12);
+}
+
+TEST(Bvh, RotationsApplyInTheOrderOfTheChannels) {
+  // Rz(90) Ry(90) Rx(90) on the neck: a vector first turns about X, then Y, then Z.
+  const MotionClip clip = parsed(small_with("0 0 0 0 0 0 90 90 90 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0"));
+  const glm::dvec3 forward = clip.world_from_head[0].rotation * glm::dvec3(0, 0, 1);
+  // z -> Rx: -y -> Ry: -y -> Rz: +x.
+  EXPECT_NEAR(glm::distance(forward, glm::dvec3(1, 0, 0)), 0.0, 1e-12);
+  // Head offset (0,1,.5): Rx -> (0,-.5,1), Ry -> (1,-.5,0), Rz -> (.5,1,0); the neck is at (0,1,0).
+  EXPECT_NEAR(glm::distance(clip.world_from_head[0].position_m, glm::dvec3(0.5, 2, 0)), 0.0, 1e-12);
+  std::string other = kSmall;
+  const std::string neck = "OFFSET 0 1 0\r\n\t\tCHANNELS 3 Zrotation Yrotation Xrotation";
+  other.replace(other.find(neck), neck.size(), "OFFSET 0 1 0\n CHANNELS 3 Xrotation Yrotation Zrotation");
+  const MotionClip reordered = parsed(other + "0 0 0 0 0 0 90 90 90 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0");
+  // Rx(Ry(Rz z)): z -> z -> x -> x.
+  EXPECT_NEAR(glm::distance(reordered.world_from_head[0].rotation * glm::dvec3(0, 0, 1), glm::dvec3(1, 0, 0)),
+              0, 1e-12);
+  EXPECT_NEAR(glm::distance(reordered.world_from_head[0].rotation * glm::dvec3(1, 0, 0), glm::dvec3(0, 0, 1)),
+              0, 1e-12);
+}
+
+TEST(Bvh, ParentRotationCarriesTheHead) {
+  const MotionClip clip = parsed(small_with("0 0 0 0 180 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0"));
+  EXPECT_NEAR(glm::distance(clip.world_from_head[0].position_m, glm::dvec3(0, 2, -0.5)), 0.0, 1e-12);
+  EXPECT_NEAR(glm::distance(clip.world_from_head[0].rotation * glm::dvec3(0, 0, 1), glm::dvec3(0, 0, -1)),
+              0.0, 1e-12);
+}
+
+TEST(Bvh, PositionChannelsOnAnyJointReplaceThatAxisOfItsOffset) {
+  std::string text = kSmall;
+  const std::string head = "OFFSET 0 1 .5\n\t\t\tCHANNELS 3 Zrotation Yrotation Xrotation";
+  text.replace(text.find(head), head.size(), "OFFSET 0 1 .5\nCHANNELS 1 Yposition");
+  const MotionClip clip = parsed(text + "0 0 0 0 0 0 0 0 0 7\n0 0 0 0 0 0 0 0 0 8\n");
+  EXPECT_EQ(clip.world_from_head[0].position_m, glm::dvec3(0, 8, 0.5));
+  EXPECT_EQ(clip.world_from_head[1].position_m, glm::dvec3(0, 9, 0.5));
+}
+
+TEST(Bvh, UnitUpAxisAndRecentring) {
+  BvhOptions options = kPlain;
+  options.unit_m = 0.5;
+  options.is_z_up = true;
+  options.recentre = true;
+  // In the file: Z up, looking along -Y at rest; a turn about the file's Z is a turn about the world's Y.
+  const MotionClip clip = parsed(small_with("2 0 4 0 0 0 0 0 0 0 0 0\n4 0 6 90 0 0 0 0 0 0 0 0"), options);
+  const Pose& first = clip.world_from_head[0];
+  EXPECT_NEAR(glm::distance(first.position_m, glm::dvec3(0, 2.25, 0)), 0.0, 1e-12)
+      << "height stays, ground is centred";
+  EXPECT_NEAR(angle_between_rad(first.rotation, glm::dquat(1, 0, 0, 0)), 0.0, 1e-12);
+  const Pose& second = clip.world_from_head[1];
+  EXPECT_NEAR(glm::distance(second.rotation * glm::dvec3(0, 0, 1), glm::dvec3(1, 0, 0)), 0.0, 1e-12);
+  EXPECT_NEAR(second.position_m.y, 3.25, 1e-12);
+}
+
+TEST(Bvh, FindsTheHeadByCommonNames) {
+  const std::string rows = "0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0\n";
+  for (const char* name : {"head", "mixamorig:Head", "joint_Head", "HEAD"}) {
+    std::string text = small_with(rows);
+    text.replace(text.find("JOINT Head"), 10, std::string("JOINT ") + name);
+    EXPECT_EQ(error_of(text), "no error") << name;
+  }
+  std::string text = small_with(rows);
+  text.replace(text.find("JOINT Head"), 10, "JOINT Forehead joint");
+  EXPECT_THAT(error_of(text), HasSubstr("no joint named Head or head (known: Hips, Neck, Forehead joint)"));
+  BvhOptions options = kPlain;
+  options.head_joint = "Forehead joint";
+  EXPECT_EQ(error_of(text, options), "no error");
+}
+
+TEST(Bvh, ErrorsNameFileAndLine) {
+  const std::string row = "0 0 0 0 0 0 0 0 0 0 0 0\n";
+  const std::string long_row = "0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00 0.00\n";
+  EXPECT_THAT(error_of(""), StartsWith("m.bvh:1: a BVH file begins with HIERARCHY"));
+  EXPECT_THAT(error_of(small_with(long_row)), HasSubstr("ends before frame 1"));
+  EXPECT_THAT(error_of(small_with(long_row + "0 0 0\n")), StartsWith("m.bvh:25: frame 1 has 3 values"));
+  EXPECT_THAT(error_of(small_with(row + "0 0 0 0 0 x 0 0 0 0 0 0\n")),
+              StartsWith("m.bvh:25: value 5 of frame 1 is \"x\""));
+  EXPECT_THAT(error_of(small_with(row + "0 0 0 0 0 nan 0 0 0 0 0 0\n")), HasSubstr("\"nan\""));
+  EXPECT_THAT(error_of(small_with(row + "0 0 0 0 0 1e10 0 0 0 0 0 0\n")), HasSubstr("\"1e10\""));
+  EXPECT_THAT(error_of(small_with(row + "0 0 0 0 0 0 0 0 0 0 0 0 0\n")),
+              HasSubstr("more values than the 12 channels"));
+  EXPECT_THAT(error_of(small_with(row + row + row)),
+              StartsWith("m.bvh:26: more lines follow after the 2 frames"));
+  std::string text = small_with(row + row);
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    return error_of(changed);
+  };
+  EXPECT_THAT(with("Frames:\t2", "Frames:\t4000000000"), StartsWith("m.bvh:22: "));
+  EXPECT_THAT(with("Frames:\t2", "Frames:\t999999"), HasSubstr("cannot fit into the"));
+  EXPECT_THAT(with("Frames:\t2", "Frames:\t-2"), HasSubstr("whole number"));
+  EXPECT_THAT(with(".0083333", "0"), HasSubstr("frame time is \"0\""));
+  EXPECT_THAT(with(".0083333", "nan"), HasSubstr("frame time is \"nan\""));
+  EXPECT_THAT(with("CHANNELS 3", "CHANNELS 7"), StartsWith("m.bvh:9: found \"7\""));
+  EXPECT_THAT(with("CHANNELS 3 Zrot", "CHANNELS 3 Wrot"),
+              HasSubstr("found \"Wrotation\" where a channel name"));
+  EXPECT_THAT(with("OFFSET 0 1 0", "OFFSET 0 1 inf"), HasSubstr("found \"inf\""));
+  EXPECT_THAT(with("End Site", "End Sight"), HasSubstr("found \"Sight\""));
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  EXPECT_THAT(error_of(text, options), HasSubstr("unit"));
+}
+
+TEST(Bvh, LimitsHoldBeforeAnythingGrows) {
+  std::string deep = "HIERARCHY\nROOT a\n{\n";
+  for (uint32_t i = 0; i < kMaxBvhDepth; ++i) deep += "JOINT b\n{\n";
+  EXPECT_THAT(error_of(deep), HasSubstr("nest deeper than 128"));
+  std::string wide = "HIERARCHY\nROOT a\n{\n";
+  for (uint32_t i = 0; i < kMaxBvhJoints; ++i) wide += "JOINT b\n{\n}\n";
+  EXPECT_THAT(error_of(wide), HasSubstr("more than 1024 joints"));
+}
+
+TEST(Bvh, TruncatedAndMutatedTextNeverCrashes) {
+  const std::string good = small_with("1 2 3 10 20 30 1 2 3 4 5 6\n4 5 6 0 0 0 0 0 0 0 0 0");
+  for (size_t size = 0; size < good.size(); ++size) {
+    const std::string cut = good.substr(0, size);
+    // The last row stays complete while only its last zero's line end is cut.
+    if (!parse_bvh(cut, "m", kPlain)) continue;
+    EXPECT_GE(size, good.size() - 1);
+  }
+  std::mt19937 random(5);
+  for (int round = 0; round < 5000; ++round) {
+    std::string text = good;
+    for (uint32_t i = 0; i < 1 + random() % 4; ++i) {
+      const size_t where = random() % text.size();
+      if (random() % 2)
+        text[where] = static_cast<char>(random());
+      else
+        text.insert(where, good.substr(random() % good.size(), random() % 30));
+    }
+    const auto clip = parse_bvh(text, "m.bvh", kPlain);
+    if (!clip) {
+      EXPECT_THAT(clip.error().to_string(), StartsWith("m.bvh"));
+      continue;
+    }
+    for (const Pose& pose : clip->world_from_head) EXPECT_TRUE(is_finite(pose));
+  }
+}
+
+// ---- real files: frame counts as printed in the files, peaks as measured by others (data/ORIGINS.md,
+// rounded to one decimal and to whole degrees); the first frame of two of them is a calibration pose.
+struct RealFile {
+  const char* name;
+  double unit_m;
+  bool is_z_up;
+  size_t pose_count;
+  double peak_mps;  // 0 = only the group's bound below is known
+  double peak_deg_per_s;
+};
+constexpr RealFile kRealFiles[] = {
+    {"cmu_01_01_playground_jumps.bvh", 0.0564, false, 2751, 2.6, 839},
+    {"cmu_05_20_mb.bvh", 0.0564, false, 1095, 3.0, 846},
+    {"pirouette.bvh", 0.01, false, 591, 5.3, 1199},
+    {"cmu_131_01.bvh", 0.0564, false, 994, 0, 0},
+    {"cmu_131_03.bvh", 0.0564, false, 1102, 2.0, 425},
+    {"cmu_61_05_scaled.bvh", 1.0, false, 1678, 0, 1902},
+    {"cmu_60_02_scaled.bvh", 1.0, false, 2101, 0, 0},
+    {"fair1_dab.bvh", 0.0254, true, 339, 0, 0},
+    {"fair1_jumping.bvh", 0.0254, true, 654, 0, 0},
+};
+
+std::filesystem::path mocap_path(const char* name) {
+  return std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap" / name;
+}
+
+struct Peaks {
+  double speed_mps = 0.0, rotation_deg_per_s = 0.0;
+};
+
+Peaks peaks_of(const MotionClip& clip) {
+  Peaks peaks;
+  for (size_t i = 1; i < clip.world_from_head.size(); ++i) {
+    const Pose &a = clip.world_from_head[i - 1], &b = clip.world_from_head[i];
+    peaks.speed_mps = std::max(peaks.speed_mps, glm::distance(a.position_m, b.position_m) / clip.frame_s);
+    peaks.rotation_deg_per_s = std::max(
+        peaks.rotation_deg_per_s, glm::degrees(angle_between_rad(a.rotation, b.rotation)) / clip.frame_s);
+  }
+  return peaks;
+}
+
+TEST(BvhRealFiles, PeaksAndPosesAreThoseOfPeople) {
+  if (!std::filesystem::exists(mocap_path(kRealFiles[0].name)))
+    GTEST_SKIP() << "no motion capture data beside the project";
+  for (const RealFile& file : kRealFiles) {
+    SCOPED_TRACE(file.name);
+    const auto clip = load_bvh(mocap_path(file.name), {.unit_m = file.unit_m, .is_z_up = file.is_z_up});
+    ASSERT_TRUE(clip) << clip.error().to_string();
+    EXPECT_EQ(clip->world_from_head.size(), file.pose_count);
+    const Peaks peaks = peaks_of(*clip);
+    if (file.peak_mps > 0) {
+      EXPECT_NEAR(peaks.speed_mps, file.peak_mps, 0.05);  // half a printed digit
+    }
+    if (file.peak_deg_per_s > 0) {
+      EXPECT_NEAR(peaks.rotation_deg_per_s, file.peak_deg_per_s, 0.5);
+    }
+    EXPECT_LT(peaks.speed_mps, 6.0);
+    EXPECT_LT(peaks.rotation_deg_per_s, 2000.0);
+
+    double lowest_m = 1e9, highest_m = -1e9, upright = 0.0;
+    for (const Pose& pose : clip->world_from_head) {
+      EXPECT_TRUE(is_finite(pose));
+      lowest_m = std::min(lowest_m, pose.position_m.y);
+      highest_m = std::max(highest_m, pose.position_m.y);
+      upright += (pose.rotation * glm::dvec3(0, 1, 0)).y;
+    }
+    EXPECT_GT(lowest_m, 0.3) << "a head does not touch the ground in these takes";
+    EXPECT_LT(highest_m, 2.5);
+    EXPECT_GT(upright / static_cast<double>(clip->world_from_head.size()), 0.7) << "mostly upright";
+    const glm::dvec3 start = clip->world_from_head.front().position_m;
+    EXPECT_NEAR(std::hypot(start.x, start.z), 0.0, 1e-12) << "recentred";
+  }
+}
+
+TEST(BvhRealFiles, CalibrationPoseIsKeptOnRequest) {
+  if (!std::filesystem::exists(mocap_path("cmu_05_20_mb.bvh")))
+    GTEST_SKIP() << "no motion capture data beside the project";
+  const auto clip =
+      load_bvh(mocap_path("cmu_05_20_mb.bvh"), {.unit_m = 0.0564, .skip_first_frame_if_t_pose = false});
+  ASSERT_TRUE(clip);
+  EXPECT_EQ(clip->world_from_head.size(), 1096u);
+}
+
+TEST(BvhRealFiles, CutAnywhereIsAnError) {
+  if (!std::filesystem::exists(mocap_path("cmu_131_01.bvh")))
+    GTEST_SKIP() << "no motion capture data beside the project";
+  const auto text = load_text(mocap_path("cmu_131_01.bvh"), kMaxBvhFileBytes);
+  ASSERT_TRUE(text);
+  for (int tenth = 0; tenth < 10; ++tenth) {
+    const auto clip = parse_bvh(text->substr(0, text->size() * static_cast<size_t>(tenth) / 10), "cut", {});
+    ASSERT_FALSE(clip) << tenth;
+    EXPECT_THAT(clip.error().to_string(), StartsWith("cut:"));
+  }
+}
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,223 @@
+#include "common/motion/motion_clip.h"
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include "common/motion/wind_csv.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+TEST(MotionClip, InterpolatesAndClamps) {
+  MotionClip clip;
+  EXPECT_EQ(clip.sample(1.0), Pose{});
+  EXPECT_EQ(clip.duration_s(), 0.0);
+  clip.frame_s = 0.5;
+  clip.world_from_head = {{{0, 0, 0}, {1, 0, 0, 0}},
+                          {{2, 0, 0}, glm::angleAxis(1.0, glm::dvec3(0, 1, 0))},
+                          {{2, 4, 0}, glm::angleAxis(1.0, glm::dvec3(0, 1, 0))}};
+  EXPECT_EQ(clip.duration_s(), 1.0);
+  EXPECT_EQ(clip.sample(-1.0), clip.world_from_head[0]);
+  EXPECT_EQ(clip.sample(9.0), clip.world_from_head[2]);
+  EXPECT_EQ(clip.sample(std::nan("")), clip.world_from_head[0]);
+  EXPECT_NEAR(clip.sample(0.125).position_m.x, 0.5, 1e-12);
+  EXPECT_NEAR(angle_between_rad(clip.sample(0.125).rotation, {1, 0, 0, 0}), 0.25, 1e-12);
+  EXPECT_NEAR(clip.sample(0.75).position_m.y, 2.0, 1e-12);
+}
+
+TEST(WindSeries, InterpolatesAndClamps) {
+  WindSeries series;
+  EXPECT_EQ(series.sample(1.0), glm::vec3(0.0f));
+  series.time_s = {0.0, 0.1, 1.1};
+  series.velocity_mps = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}};
+  EXPECT_EQ(series.duration_s(), 1.1);
+  EXPECT_NEAR(series.sample(0.05).x, 0.5f, 1e-6);
+  EXPECT_NEAR(series.sample(0.6).y, 1.0f, 1e-6);
+  EXPECT_EQ(series.sample(-5.0), series.velocity_mps.front());
+  EXPECT_EQ(series.sample(5.0), series.velocity_mps.back());
+}
+
+TEST(BuiltInMotion, RepeatsWithoutASeamAndIsTwiceDifferentiable) {
+  const double h = 1e-4;
+  glm::dvec3 previous_acceleration{0.0};
+  double largest_jump = 0.0, largest_acceleration = 0.0;
+  for (double t = 0.0; t < kBuiltInMotionPeriodS + 0.1; t += h) {
+    // Second differences of a point in front of the face: they see position and rotation.
+    const auto point = [](double at_s) { return built_in_motion(at_s) * glm::dvec3(0.02, 0.05, 0.1); };
+    const glm::dvec3 acceleration = (point(t + h) - 2.0 * point(t) + point(t - h)) / (h * h);
+    if (t > 0.0) largest_jump = std::max(largest_jump, glm::distance(acceleration, previous_acceleration));
+    largest_acceleration = std::max(largest_acceleration, glm::length(acceleration));
+    previous_acceleration = acceleration;
+  }
+  // A kink in the velocity would show as ~ 1/h; a step of the acceleration as its size. The quintic's third
+  // derivative bounds the change over one h: 60 * 2.2 rad * 0.12 m / (0.35 s)^3 * h = 0.04 m/s^2, and as much
+  // again for rounding.
+  EXPECT_LT(largest_jump, 0.1);
+  EXPECT_GT(largest_acceleration, 5.0) << "there is a fast turn";
+  EXPECT_NEAR(
+      glm::distance(built_in_motion(0.3).position_m, built_in_motion(0.3 + kBuiltInMotionPeriodS).position_m),
+      0.0, 1e-9);
+  EXPECT_TRUE(is_finite(built_in_motion(-7.0)));
+}
+
+TEST(BuiltInMotion, StaysWithinWhatPeopleDo) {
+  double fastest_rad_per_s = 0.0, fastest_mps = 0.0;
+  const double h = 1e-3;
+  for (double t = 0.0; t < kBuiltInMotionPeriodS; t += h) {
+    const Pose a = built_in_motion(t), b = built_in_motion(t + h);
+    fastest_rad_per_s = std::max(fastest_rad_per_s, angle_between_rad(a.rotation, b.rotation) / h);
+    fastest_mps = std::max(fastest_mps, glm::distance(a.position_m, b.position_m) / h);
+    EXPECT_NEAR(glm::length(a.rotation), 1.0, 1e-12);
+    EXPECT_NEAR(a.position_m.y, 1.6, 0.1);
+  }
+  EXPECT_GT(glm::degrees(fastest_rad_per_s), 400.0) << "the fast turn shows the hair off";
+  EXPECT_LT(glm::degrees(fastest_rad_per_s), 1200.0) << "motion capture peaks at about 1200 deg/s";
+  EXPECT_LT(fastest_mps, 3.0);
+}
+
+struct Statistics {
+  glm::dvec3 mean{0.0}, deviation{0.0};
+};
+
+Statistics statistics_of(const GustGenerator& wind, double duration_s, double step_s) {
+  Statistics result;
+  glm::dvec3 square{0.0};
+  const auto count = static_cast<int>(duration_s / step_s);
+  for (int i = 0; i < count; ++i) {
+    const glm::dvec3 v = wind.sample(i * step_s);
+    result.mean += v;
+    square += v * v;
+  }
+  result.mean /= count;
+  result.deviation = glm::sqrt(square / static_cast<double>(count) - result.mean * result.mean);
+  return result;
+}
+
+TEST(Gusts, MeanAndDeviationAreThoseAskedFor) {
+  constexpr double kDurationS = 20'000.0;
+  for (const uint32_t seed : {1u, 2u, 77u}) {
+    const float speed_mps = 3.0f, intensity = 0.6f, length_m = 9.0f;
+    const auto s =
+        statistics_of(GustGenerator({speed_mps, 0, 0}, intensity, length_m, seed), kDurationS, 0.3);
+    const double deviation = speed_mps * intensity;
+    // Standard error of the mean of a process with integral time length/speed, four times.
+    const double error = 4.0 * deviation * std::sqrt(2.0 * length_m / speed_mps / kDurationS);
+    EXPECT_NEAR(s.mean.x, speed_mps, error);
+    EXPECT_NEAR(s.mean.y, 0.0, error);
+    EXPECT_NEAR(s.mean.z, 0.0, error);
+    // The variance of the same process is known to sqrt(2 * 2 T / duration) of itself (3.5 %), its root to
+    // half.
+    EXPECT_NEAR(s.deviation.x / deviation, 1.0, 4 * 0.0175);
+    EXPECT_NEAR(s.deviation.z / deviation, 0.8, 4 * 0.0175);
+    EXPECT_NEAR(s.deviation.y / deviation, 0.5, 4 * 0.0175);
+  }
+}
+
+TEST(Gusts, StrengthTurnsWithTheMean) {
+  const auto s = statistics_of(GustGenerator({0, 0, -2}, 0.5f, 5.0f, 3), 20'000.0, 0.3);
+  EXPECT_NEAR(s.deviation.z, 1.0, 0.07);
+  EXPECT_NEAR(s.deviation.x, 0.8, 0.07);
+  EXPECT_NEAR(s.deviation.y, 0.5, 0.07);
+}
+
+/// Energy of the x component between two frequencies, by a windowed Fourier sum.
+double band_energy(const GustGenerator& wind, double low_hz, double high_hz) {
+  constexpr int kCount = 8192;
+  constexpr double kStepS = 1.0 / 32.0;
+  std::vector<double> signal(kCount);
+  for (int i = 0; i < kCount; ++i) {
+    const double hann = 0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * i / kCount);
+    signal[static_cast<size_t>(i)] = hann * (wind.sample(i * kStepS).x - 3.0);
+  }
+  double energy = 0.0;
+  const double bin_hz = 1.0 / (kCount * kStepS);
+  for (int bin = static_cast<int>(low_hz / bin_hz); bin < static_cast<int>(high_hz / bin_hz); ++bin) {
+    const auto turn = std::polar(1.0, -2.0 * std::numbers::pi * bin / kCount);
+    std::complex<double> phase = 1.0, sum = 0.0;
+    for (const double value : signal) {
+      sum += value * phase;
+      phase *= turn;
+    }
+    energy += std::norm(sum);
+  }
+  return energy;
+}
+
+TEST(Gusts, SpectrumFallsWithTheFiveThirdsPower) {
+  double low = 0.0, high = 0.0;
+  for (uint32_t seed = 1; seed <= 6; ++seed) {
+    const GustGenerator wind({3, 0, 0}, 0.6f, 9.0f, seed);
+    low += band_energy(wind, 1.0, 2.0);
+    high += band_energy(wind, 4.0, 8.0);
+  }
+  // Energy in an octave is density times width: over two octaves the density falls by high/low/4.
+  EXPECT_NEAR(std::log2(high / low / 4.0) / 2.0, -5.0 / 3.0, 0.1);
+}
+
+TEST(Gusts, SameSeedSameWindAndOtherSeedOtherWind) {
+  const GustGenerator a({1, 0, 1}, 0.5f, 9.0f, 5), b({1, 0, 1}, 0.5f, 9.0f, 5), c({1, 0, 1}, 0.5f, 9.0f, 6);
+  double difference = 0.0;
+  for (double t = 0.0; t < 50.0; t += 0.37) {
+    EXPECT_EQ(a.sample(t), b.sample(t));
+    difference = std::max<double>(difference, glm::distance(a.sample(t), c.sample(t)));
+  }
+  EXPECT_GT(difference, 0.3);
+}
+
+TEST(Gusts, NoMeanOrNoIntensityIsSteady) {
+  for (const double t : {0.0, 1.0, 1e6}) {
+    EXPECT_EQ(GustGenerator({0, 0, 0}, 0.5f, 9.0f, 1).sample(t), glm::vec3(0.0f));
+    EXPECT_EQ(GustGenerator({1, 2, 3}, 0.0f, 9.0f, 1).sample(t), glm::vec3(1, 2, 3));
+  }
+  const glm::vec3 straight_up = GustGenerator({0, 4, 0}, 0.5f, 9.0f, 1).sample(2.0);
+  EXPECT_TRUE(std::isfinite(straight_up.x) && std::isfinite(straight_up.y) && std::isfinite(straight_up.z));
+}
+
+std::string wind_error(const std::string& text) {
+  const auto series = parse_wind_csv(text, "w.csv");
+  return series ? "no error" : series.error().to_string();
+}
+
+TEST(WindCsv, ReadsWorldColumnsInAnyOrder) {
+  const auto series = parse_wind_csv(
+      "\xef\xbb\xbf# made up\n\"z_mps\", t_s ,note,x_mps,y_mps\r\n3,10.5,a,1,2\n\n-3,11,,.5,+2e-1\n",
+      "w.csv");
+  ASSERT_TRUE(series) << series.error().to_string();
+  EXPECT_EQ(series->time_s, (std::vector<double>{0.0, 0.5}));
+  EXPECT_EQ(series->velocity_mps[0], glm::vec3(1, 2, 3));
+  EXPECT_EQ(series->velocity_mps[1], glm::vec3(0.5f, 0.2f, -3));
+}
+
+TEST(WindCsv, ReadsTheLoggersColumns) {
+  // 2.63 m/s from 249 degrees: towards east 2.454, towards north 0.945 (the record the format note checks).
+  const auto series = parse_wind_csv(
+      "logger_ms,gps_utc_hhmmsscc,u,v,w,s2,dir_deg,temp_c\n"
+      "512100,12345678,2.454,0.945,0.1,2.63,249,17.5\n512200,12345678,0,-1,0,1,0,17.5\n",
+      "w.csv");
+  ASSERT_TRUE(series) << series.error().to_string();
+  EXPECT_NEAR(series->time_s[1], 0.1, 1e-9);
+  EXPECT_EQ(series->velocity_mps[0], glm::vec3(2.454f, 0.1f, -0.945f)) << "north is -z";
+  EXPECT_EQ(series->velocity_mps[1], glm::vec3(0, 0, 1)) << "wind from the north blows towards +z";
+}
+
+TEST(WindCsv, ErrorsNameLineAndKnownColumns) {
+  EXPECT_THAT(wind_error(""), HasSubstr("no header row"));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n"), HasSubstr("header but no rows"));
+  EXPECT_THAT(wind_error("time,u,v,w\n1,2,3,4\n"), HasSubstr("known: t_s, time_s, logger_ms"));
+  EXPECT_THAT(wind_error("t_s,u,v\n1,2,3\n"), HasSubstr("known: x_mps, y_mps, z_mps or u, v, w"));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,2,3\n1,2,3\n"), StartsWith("w.csv:3: the row has 3 values"));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,x,3\n"), StartsWith("w.csv:2: column 3 is \"x\""));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,nan,3\n"), HasSubstr("\"nan\""));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,1e9,3\n"), HasSubstr("\"1e9\""));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,,3\n"), HasSubstr("column 3 is \"\""));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n1,0,0,0\n1,0,0,0\n"), StartsWith("w.csv:3: time goes from 1 s to 1 s"));
+  EXPECT_THAT(wind_error(std::string(1000, ',')), HasSubstr("more than 256 columns"));
+  EXPECT_EQ(load_wind_csv("/no/such/file.csv").error().code, ErrorCode::NotFound);
+}
+
+}  // namespace
+}  // namespace strandcast
