@@ -1,8 +1,9 @@
-// Solver: one strand model behind a small interface; the table in solver_registry.h lists all of them. A solver is
-// used from one thread; GPU solvers need that thread's GL context. A solver never allocates in substep().
+// Solver: one strand model behind a small interface; the table in solver_registry.h lists all of them. A
+// solver is used from one thread; GPU solvers need that thread's GL context. A solver never allocates in
+// substep().
 //
-// Frame of the state: world axes with the origin at the head joint of the current step ("head-relative"). It keeps
-// float precision anywhere in the world; each step the origin moves by head_shift_m.
+// Frame of the state: world axes with the origin at the head joint of the current step ("head-relative"). It
+// keeps float precision anywhere in the world; each step the origin moves by head_shift_m.
 #pragma once
 
 #include <cstdint>
@@ -30,13 +31,13 @@ inline constexpr uint32_t kMaxGustWaves = 8;
 
 /// Everything one substep needs, at its end time.
 struct StepInput {
-  double h_s = 1.0 / 60.0;                       // substep
+  double h_s = 1.0 / 60.0;                         // substep
   glm::dquat world_from_head{1.0, 0.0, 0.0, 0.0};  // rotation of the head at the end of the substep
-  glm::dvec3 head_shift_m{0.0};                  // movement of the head joint during the substep, world
+  glm::dvec3 head_shift_m{0.0};                    // movement of the head joint during the substep, world
   glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
-  glm::dvec3 wind_mps{0.0};                      // mean wind at the head, world
-  std::vector<GustWave> gusts;                   // at most kMaxGustWaves; x is relative to the head joint
-  std::vector<SphereCollider> colliders;         // centres in head-relative world axes, at the end of the substep
+  glm::dvec3 wind_mps{0.0};               // mean wind at the head, world
+  std::vector<GustWave> gusts;            // at most kMaxGustWaves; x is relative to the head joint
+  std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
 };
 
 /// State as read back, head-relative world axes. (vertex_count x strand_count) vertex-major, strand fastest.

@@ -1,5 +1,5 @@
-// The table of strand models. Everything that must cover all solvers walks it: --list-solvers, scene validation,
-// property tests, stability runs, reports and benches.
+// The table of strand models. Everything that must cover all solvers walks it: --list-solvers, scene
+// validation, property tests, stability runs, reports and benches.
 #pragma once
 
 #include <functional>
@@ -17,7 +17,7 @@ struct SolverParameterInfo {
   double default_value = 0.0;
   double minimum = 0.0;
   double maximum = 1.0;
-  std::string unit;     // "" = dimensionless
+  std::string unit;  // "" = dimensionless
   std::string summary;
 };
 
@@ -33,7 +33,8 @@ struct SolverRow {
   std::string source;  // paper, section and equation
   std::vector<SolverParameterInfo> parameters;
   std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const GpuSolverContext&)> make_gpu;
-  std::function<std::unique_ptr<Solver>(const SolverParameters&)> make_reference;  // double precision, one thread
+  std::function<std::unique_ptr<Solver>(const SolverParameters&)>
+      make_reference;  // double precision, one thread
 };
 
 const std::vector<SolverRow>& solver_table();

@@ -13,15 +13,14 @@ using uint = uint32_t;
 // Storage blocks of the simulation.
 const uint kBindingPosition = 0u;
 const uint kBindingVelocity = 1u;
-const uint kBindingPrevious = 2u;
-const uint kBindingRestLength = 3u;
-const uint kBindingRestPosition = 4u;
-const uint kBindingCorrection = 5u;
 
-// Uniform blocks of the simulation.
+// Uniform block of the simulation.
 const uint kBindingStep = 0u;
-const uint kBindingCollider = 1u;
-const uint kBindingGust = 2u;
+
+// Texture units of the buffer textures through which the simulation reads.
+const uint kUnitRest = 0u;
+const uint kUnitPosition = 1u;
+const uint kUnitVelocity = 2u;
 
 // Storage blocks of the renderer.
 const uint kBindingKeyPosition = 0u;

@@ -13,6 +13,9 @@ using uint = uint32_t;
 // llvmpipe and one or two warps elsewhere.
 const uint kStrandLocalSize = 64u;
 
+// Invocations per group of kernels with one vertex per invocation: as many whole strands as fit.
+const uint kVertexLocalSize = 128u;
+
 // llvmpipe indexes tessellated vertices of one draw with 16 bits and draws wrongly past that, without an error:
 // patches x lines x (segments + 1) of a draw stays at or below this.
 const uint kMaxTessellatedVerticesPerDraw = 65535u;

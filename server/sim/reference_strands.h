@@ -1,0 +1,68 @@
+// ReferenceStrands: the parts that the double-precision reference solvers share. Written from the equations,
+// vertex by vertex on one thread, without a line in common with the shaders; slow on purpose.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <vector>
+
+#include "server/sim/solver.h"
+#include "server/sim/strand_layout.h"
+#include "server/sim/strand_parameters.h"
+
+namespace strandcast {
+
+/// One strand during one substep, in head-relative world axes, seen from the moving head joint.
+struct ReferenceStrand {
+  std::vector<glm::dvec3> target_m;     // groomed shape, turned with the head
+  std::vector<glm::dvec3> old_m;        // position before the substep, as stored then
+  std::vector<glm::dvec3> predicted_m;  // where forces alone would take it
+  std::vector<glm::dvec3> placed_m;     // after the constraints
+  std::vector<glm::dvec3> pushed_m;     // of that way, what colliders did
+  std::vector<glm::dvec3> contact_normal;
+  std::vector<double> contact_depth_m;  // sum over all pushes, 0 = no contact
+  std::vector<double> segment_m;        // before vertex i
+};
+
+class ReferenceStrands : public Solver {
+ public:
+  Status load(const Groom& groom, const glm::dquat& world_from_head) final;
+  void substep(const StepInput& input) final;
+  void read(SolverState& state) final;
+  void write(const SolverState& state) final;
+  uint64_t memory_bytes() const final;
+
+ protected:
+  explicit ReferenceStrands(const StrandParameters& parameters) : parameters_(parameters) {}
+
+  /// Moves placed_m of all vertices that are not pinned, by place() or rigidly with their segment.
+  virtual void solve(ReferenceStrand& strand) const = 0;
+
+  /// Puts vertex i at its segment's length from vertex i-1, outside the colliders and within reach of a
+  /// pinned tail.
+  void place(ReferenceStrand& strand, uint32_t i) const;
+  const StrandLayout& layout() const { return layout_; }
+  bool is_pinned(uint32_t i) const { return i < layout_.pinned_root_count || i >= layout_.tail_begin(); }
+
+ private:
+  void begin(ReferenceStrand& strand, uint32_t strand_index) const;
+  glm::dvec3 predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const;
+  glm::dvec3 air_velocity(const glm::dvec3& point_m) const;
+  void push_out(ReferenceStrand& strand, uint32_t i, const glm::dvec3& start, glm::dvec3& end) const;
+  glm::dvec3 finish_velocity(const ReferenceStrand& strand, uint32_t i) const;
+
+  StrandParameters parameters_;
+  StrandLayout layout_;
+  std::vector<glm::dvec3> position_m_;
+  std::vector<glm::dvec3> velocity_mps_;
+  glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
+
+  // The substep in progress, within the limits of strand_layout.h.
+  const StepInput* input_ = nullptr;
+  double h_s_ = 0.0;
+  glm::dquat rotation_{1.0, 0.0, 0.0, 0.0};
+  glm::dvec3 head_velocity_mps_{0.0};
+  ReferenceStrand scratch_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,49 @@
+#include "server/sim/solver_registry.h"
+
+#include <algorithm>
+
+#include "server/sim/solvers/dftl/dftl.h"
+#include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
+
+namespace strandcast {
+
+const std::vector<SolverRow>& solver_table() {
+  static const std::vector<SolverRow> table = {dftl_row(), dftl_parallel_row()};
+  return table;
+}
+
+Result<const SolverRow*> find_solver(const std::string& name) {
+  std::string known;
+  for (const SolverRow& row : solver_table()) {
+    if (row.name == name) return &row;
+    known += (known.empty() ? "" : ", ") + row.name;
+  }
+  return make_error(ErrorCode::NotFound, "unknown solver '{}' (known: {})", name, known);
+}
+
+Result<SolverParameters> complete_parameters(const SolverRow& row, const SolverParameters& given) {
+  SolverParameters complete;
+  std::string known;
+  for (const SolverParameterInfo& info : row.parameters) {
+    complete[info.name] = info.default_value;
+    known += (known.empty() ? "" : ", ") + info.name;
+  }
+  for (const auto& [name, value] : given) {
+    const auto info =
+        std::find_if(row.parameters.begin(), row.parameters.end(),
+                     [&name](const SolverParameterInfo& candidate) { return candidate.name == name; });
+    if (info == row.parameters.end()) {
+      return make_error(ErrorCode::BadInput, "solver '{}' has no parameter '{}' (known: {})", row.name, name,
+                        known);
+    }
+    // Written so that NaN is refused as well.
+    if (!(value >= info->minimum && value <= info->maximum)) {
+      return make_error(ErrorCode::BadInput, "{} of solver '{}' is {} {} (allowed: {} to {})", name, row.name,
+                        value, info->unit, info->minimum, info->maximum);
+    }
+    complete[name] = value;
+  }
+  return complete;
+}
+
+}  // namespace strandcast

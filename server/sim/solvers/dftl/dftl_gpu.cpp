@@ -1,0 +1,31 @@
+#include "server/sim/solvers/dftl/dftl.h"
+#include "server/sim/strand_kernel.h"
+#include "server/sim/strand_parameters.h"
+#include "shaders/shared/limits.h"
+
+namespace strandcast {
+
+Result<std::unique_ptr<Solver>> make_dftl_gpu(const SolverParameters& parameters,
+                                              const GpuSolverContext& context) {
+  StrandKernelDesc desc;
+  desc.name = "dftl";
+  desc.shader_path = "sim/dftl.comp";
+  desc.local_size = shader::kStrandLocalSize;
+  return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
+}
+
+SolverRow dftl_row() {
+  SolverRow row;
+  row.name = "dftl";
+  row.summary = "serial Dynamic Follow-The-Leader: one pass from root to tip, exact lengths";
+  row.source =
+      "Woodhouse, Real-Time Hair Rendering and Simulation, University of Bristol 2017, sections 2.1.4 "
+      "(equations of "
+      "d_i and v_i) and 4.2.3 (gpu version)";
+  row.parameters = shared_parameter_infos();
+  row.make_gpu = make_dftl_gpu;
+  row.make_reference = make_dftl_reference;
+  return row;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,41 @@
+#include <cmath>
+
+#include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
+#include "server/sim/strand_kernel.h"
+#include "server/sim/strand_parameters.h"
+#include "shaders/shared/limits.h"
+
+namespace strandcast {
+
+Result<std::unique_ptr<Solver>> make_dftl_parallel_gpu(const SolverParameters& parameters,
+                                                       const GpuSolverContext& context) {
+  StrandKernelDesc desc;
+  desc.name = "dftl_parallel";
+  desc.shader_path = "sim/dftl_parallel.comp";
+  desc.is_per_vertex = true;
+  desc.local_size = shader::kVertexLocalSize;
+  desc.iterations = static_cast<uint32_t>(std::lround(parameters.at("iterations")));
+  desc.has_exact_length = parameters.at("exact_length") >= 0.5;
+  return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
+}
+
+SolverRow dftl_parallel_row() {
+  SolverRow row;
+  row.name = "dftl_parallel";
+  row.summary = "odd-even Dynamic Follow-The-Leader: all vertices at once, a few iterations";
+  row.source =
+      "Woodhouse, Real-Time Hair Rendering and Simulation, University of Bristol 2017, section 4.2.3 "
+      "(optimised_gpu "
+      "version)";
+  row.parameters = shared_parameter_infos();
+  row.parameters.push_back({"iterations", kDefaultOddEvenIterations, 1.0, kMaxOddEvenIterations, "",
+                            "times the odd and the even vertices follow their leaders (rounded)"});
+  row.parameters.push_back(
+      {"exact_length", 1.0, 0.0, 1.0, "",
+       "1 = lay the segments end to end with exact lengths at the end, 0 = as iterated"});
+  row.make_gpu = make_dftl_parallel_gpu;
+  row.make_reference = make_dftl_parallel_reference;
+  return row;
+}
+
+}  // namespace strandcast

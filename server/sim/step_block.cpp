@@ -1,0 +1,53 @@
+#include "server/sim/step_block.h"
+
+#include <algorithm>
+
+namespace strandcast {
+namespace {
+
+std::array<glm::vec4, 3> columns(const glm::dmat3& matrix) {
+  return {glm::vec4(glm::vec3(matrix[0]), 0.0f), glm::vec4(glm::vec3(matrix[1]), 0.0f),
+          glm::vec4(glm::vec3(matrix[2]), 0.0f)};
+}
+
+glm::vec4 pack(const glm::dvec3& vector, double w) {
+  return glm::vec4(glm::dvec4(vector, w));
+}
+
+}  // namespace
+
+StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
+                          const StrandLayout& layout, const glm::dquat& previous_world_from_head) {
+  const double h_s = limited_substep_s(input);
+  const glm::dquat rotation = limited_rotation(input.world_from_head);
+  const glm::dvec3 head_velocity = limited(input.head_shift_m, kMaxHeadShiftM) / h_s;
+  const glm::dvec3 relative_wind = limited(input.wind_mps, kMaxWindMps) - head_velocity;
+  const glm::dvec3 acceleration =
+      limited(input.gravity_mps2, kMaxGravityMps2) + parameters.air_drag_per_s * relative_wind;
+
+  StepBlock block{};
+  block.world_from_head = columns(glm::mat3_cast(rotation));
+  block.carry = columns(glm::mat3_cast(rotation * glm::conjugate(previous_world_from_head)));
+  block.head_velocity = pack(head_velocity, h_s);
+  block.push = pack(h_s * acceleration, 1.0 / h_s);
+  block.style = glm::vec4(glm::dvec4(parameters.style_stiffness_per_s2, parameters.style_tip_share,
+                                     parameters.s_damping, parameters.max_speed_mps));
+  block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s, 0.0, 0.0));
+  block.shape = {layout.strand_count, layout.vertex_count, layout.pinned_root_count, layout.tail_begin()};
+  const size_t wave_count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);
+  for (size_t i = 0; i < wave_count; ++i) {
+    const GustWave& wave = input.gusts[i];
+    const glm::dvec3 amplitude = limited(glm::dvec3(wave.amplitude_mps), kMaxWindMps);
+    block.gust_amplitude[i] = pack(amplitude, limited(wave.phase_rad, kMaxPhaseRad));
+    block.gust_wave[i] = pack(limited(glm::dvec3(wave.wave_vector_rad_per_m), kMaxPhaseRad), 0.0);
+  }
+  const size_t collider_count = std::min<size_t>(input.colliders.size(), kMaxSphereColliders);
+  for (size_t i = 0; i < collider_count; ++i) {
+    const SphereCollider& sphere = input.colliders[i];
+    block.collider[i] = pack(limited(glm::dvec3(sphere.center_m), kMaxColliderM),
+                             std::max(0.0, limited(sphere.radius_m, kMaxColliderM)));
+  }
+  return block;
+}
+
+}  // namespace strandcast

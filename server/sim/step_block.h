@@ -1,0 +1,36 @@
+// StepBlock: the uniform block of shaders/sim/step.glsl (std140), filled once per substep. Plain data.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+
+#include "server/sim/strand_layout.h"
+#include "server/sim/strand_parameters.h"
+#include "shaders/shared/limits.h"
+
+namespace strandcast {
+
+struct StepBlock {
+  std::array<glm::vec4, 3> world_from_head;
+  std::array<glm::vec4, 3> carry;
+  glm::vec4 head_velocity;
+  glm::vec4 push;
+  glm::vec4 style;
+  glm::vec4 contact;
+  glm::uvec4 shape;
+  glm::uvec4 odd_even;
+  std::array<glm::vec4, shader::kMaxGustWaves> gust_amplitude;
+  std::array<glm::vec4, shader::kMaxGustWaves> gust_wave;
+  std::array<glm::vec4, shader::kMaxSphereColliders> collider;
+};
+static_assert(sizeof(StepBlock) ==
+              16 * (3 + 3 + 6 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
+static_assert(shader::kMaxGustWaves == kMaxGustWaves && shader::kMaxSphereColliders == kMaxSphereColliders);
+
+/// The block for one substep; the odd-even fields stay zero. Inputs are held to the limits of
+/// strand_layout.h.
+StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
+                          const StrandLayout& layout, const glm::dquat& previous_world_from_head);
+
+}  // namespace strandcast

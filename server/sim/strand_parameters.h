@@ -1,0 +1,25 @@
+// Parameters that the Follow-The-Leader solvers share, with their table entries. Plain data, any thread.
+#pragma once
+
+#include <vector>
+
+#include "server/sim/solver_registry.h"
+
+namespace strandcast {
+
+struct StrandParameters {
+  double s_damping = 0.0;               // share of the velocity correction, 0..1
+  double air_drag_per_s = 0.0;          // rate at which a strand takes on the air's velocity
+  double style_stiffness_per_s2 = 0.0;  // pull to the groomed shape at the root
+  double style_tip_share = 0.0;         // of that pull, what is left at the tip
+  double collider_friction = 0.0;       // Coulomb coefficient
+  double max_speed_mps = 0.0;           // relative to the head
+};
+
+/// Table entries of the shared parameters, to which a solver appends its own.
+std::vector<SolverParameterInfo> shared_parameter_infos();
+
+/// Reads the shared parameters out of a completed map.
+StrandParameters read_strand_parameters(const SolverParameters& parameters);
+
+}  // namespace strandcast

@@ -1,0 +1,98 @@
+// Odd-even Dynamic Follow-The-Leader: one invocation per vertex, whole strands per group, positions in shared memory.
+#include "sim/follow.glsl"
+
+layout(local_size_x = kVertexLocalSize) in;
+
+// (vertices x strands of the group), strand fastest; later reused for sums and for corrections.
+shared vec3 s_point[kVertexLocalSize];
+shared vec3 s_target[kVertexLocalSize];
+shared float s_segment[kVertexLocalSize];
+
+struct Lane {
+  uint local;    // element of the shared arrays
+  uint stride;   // strands per group
+  uint index;    // vertex in its strand
+  bool is_free;  // exists and does not follow the head
+};
+
+void place_in_turn(Lane lane, Vertex vertex, uint parity, vec3 anchor, float reach, inout Contact contact) {
+  if (lane.is_free && (lane.index & 1u) == parity) {
+    const uint leader = lane.local - lane.stride;
+    s_point[lane.local] = placed(s_point[leader], s_target[leader], vertex, s_point[lane.local], anchor, reach,
+                                 lane.index + 1u == u_step.shape.w, contact);
+  }
+  barrier();
+}
+
+// Keeps every segment's direction and lays the segments end to end: an inclusive sum along the strand in log2 steps.
+void restore_lengths(Lane lane, Vertex vertex) {
+  vec3 sum = s_point[lane.local];
+  if (lane.is_free) {
+    const uint leader = lane.local - lane.stride;
+    const vec3 along = sum - s_point[leader];
+    const float squared = dot(along, along);
+    sum = squared > kTinySquared ? along * (vertex.segment * inversesqrt(squared)) : vertex.target - s_target[leader];
+  } else if (lane.index + 1u != u_step.shape.z) {
+    sum = vec3(0.0);  // the last pinned vertex is where the sum starts
+  }
+  barrier();
+  s_point[lane.local] = sum;
+  barrier();
+  for (uint reach = 1u; reach < u_step.shape.y; reach *= 2u) {
+    const vec3 below = lane.is_free && lane.index >= reach ? s_point[lane.local - reach * lane.stride] : vec3(0.0);
+    barrier();
+    if (lane.is_free) s_point[lane.local] += below;
+    barrier();
+  }
+}
+
+void main() {
+  const uint strands = u_step.shape.x;
+  const uint vertices = u_step.shape.y;
+  Lane lane;
+  lane.local = gl_LocalInvocationIndex;
+  lane.stride = kVertexLocalSize / vertices;
+  lane.index = lane.local / lane.stride;
+  const uint strand = gl_WorkGroupID.x * lane.stride + lane.local % lane.stride;
+  const bool exists = lane.index < vertices && strand < strands;
+  lane.is_free = exists && lane.index >= u_step.shape.z && lane.index < u_step.shape.w;
+  // Idle lanes shadow the first vertex: barriers need every invocation.
+  const uint at = exists ? lane.index * strands + strand : 0u;
+
+  Vertex vertex = predict(at);
+  Contact contact = Contact(vec3(0.0), vec3(0.0), 0.0);
+  if (!lane.is_free) vertex.predicted = vertex.target;
+  s_point[lane.local] = vertex.predicted;
+  s_target[lane.local] = vertex.target;
+  s_segment[lane.local] = vertex.segment;
+  barrier();
+
+  vec3 anchor = vec3(0.0);
+  float reach = 0.0;
+#if HAS_PINNED_TAIL
+  const uint column = lane.local % lane.stride;
+  anchor = s_target[u_step.shape.w * lane.stride + column];
+  if (lane.is_free) {
+    for (uint i = lane.index + 1u; i <= u_step.shape.w; ++i) reach += s_segment[i * lane.stride + column];
+  }
+#endif
+
+  for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) {
+    place_in_turn(lane, vertex, 1u, anchor, reach, contact);
+    place_in_turn(lane, vertex, 0u, anchor, reach, contact);
+  }
+#if !HAS_PINNED_TAIL
+  if (u_step.odd_even.y != 0u) restore_lengths(lane, vertex);
+#endif
+
+  const vec3 end = lane.is_free ? s_point[lane.local] : vertex.target;
+  barrier();
+  s_point[lane.local] = lane.is_free ? end - vertex.predicted - contact.pushed : vec3(0.0);
+  barrier();
+  if (!exists) return;
+  vec3 velocity = velocity_after(vertex, end, contact);
+  const bool has_next = lane.is_free && lane.index + 1u < u_step.shape.w;
+  if (has_next) velocity -= (u_step.style.z * u_step.push.w) * s_point[lane.local + lane.stride];
+  store_vertex(at, end, vertex.arc);
+  store_velocity(at, velocity);
+}

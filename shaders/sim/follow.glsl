@@ -1,0 +1,137 @@
+// Prediction, Follow-The-Leader placement with colliders, and contact friction of one vertex. Document 003, sections
+// 2.1.4 and 4.2.3.
+#pragma variant HAS_TURBULENCE 0 1
+#pragma variant COLLIDERS 0 1 4 16
+#pragma variant HAS_PINNED_TAIL 0 1
+#include "sim/step.glsl"
+
+// Times a vertex inside several colliders is pushed, out of the deepest first.
+const int kPushRounds = COLLIDERS > 1 ? 2 : 1;
+
+struct Vertex {
+  vec3 target;     // groomed shape, turned with the head
+  float segment;   // rest length of the segment before it
+  vec3 old;        // position before the substep
+  float arc;       // 0 at the root, 1 at the tip
+  vec3 predicted;  // where forces alone would take it
+};
+
+struct Contact {
+  vec3 pushed;  // what colliders moved the vertex by, so far
+  vec3 normal;  // of the last push
+  float depth;  // sum of the depths, 0 = no contact
+};
+
+// Wind beside the mean wind; waves that are not there have no amplitude.
+vec3 gust_velocity(vec3 point) {
+  vec3 gust = vec3(0.0);
+#if HAS_TURBULENCE
+  for (uint i = 0u; i < kMaxGustWaves; ++i) {
+    const vec4 amplitude = u_step.gust_amplitude[i];
+    gust += amplitude.xyz * sin(dot(u_step.gust_wave[i].xyz, point) - amplitude.w);
+  }
+#endif
+  return gust;
+}
+
+// Backward Euler in the drag and in the pull to the groomed shape, seen from the head joint (see predict() in
+// server/sim/reference_strands.cpp for the equation). A broken state starts again from the groomed shape.
+Vertex predict(uint at) {
+  const vec4 rest = texelFetch(u_rest, int(at));
+  const vec4 state = texelFetch(u_position, int(at));
+  const vec3 state_velocity = texelFetch(u_velocity, int(at)).xyz;
+  Vertex vertex;
+  vertex.target = turned_with_head(rest.xyz);
+  vertex.segment = rest.w;
+  vertex.arc = state.w;
+  const bool is_sane = dot(state.xyz, state.xyz) < kBrokenSquared && dot(state_velocity, state_velocity) < kBrokenSquared;
+  vertex.old = is_sane ? state.xyz : vertex.target;
+  const vec3 velocity = is_sane ? state_velocity - u_step.head_velocity.xyz : vec3(0.0);
+
+  const float h = u_step.head_velocity.w;
+  const float drag = u_step.contact.y;
+  const float from_tip = 1.0 - vertex.arc;
+  const float pull = h * u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
+  const vec3 push = u_step.push.xyz + (h * drag) * gust_velocity(vertex.old);
+  const vec3 moved = (velocity + push + pull * (vertex.target - vertex.old)) / (1.0 + h * (drag + pull));
+  vertex.predicted = vertex.old + h * within_speed_limit(moved);
+  return vertex;
+}
+
+// The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at once,
+// by the law of cosines; the nearest end that can be had when there is none. `direction` is the segment's now.
+vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, float radius) {
+  const vec3 to_center = center - start;
+  const float squared = dot(to_center, to_center);
+  const float inverse = inversesqrt(max(squared, kTinySquared));
+  const vec3 axis = to_center * inverse;
+  const float cosine = clamp(
+      (segment * segment + squared - radius * radius) * inverse / max(2.0 * segment, kTinySquared), -1.0, 1.0);
+  vec3 side = direction - axis * dot(direction, axis);
+  // Straight at the centre: any side will do.
+  const vec3 other = abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
+  side = dot(side, side) > 1e-12 ? side : other;
+  const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
+  const vec3 end = start + segment * (cosine * axis + sine * side);
+  return squared > kTinySquared ? end : start + segment * direction;
+}
+
+// The nearest point to `point` at the segment's length from `start`, outside the colliders and, with a pinned tail,
+// not further from `anchor` than `reach` (exactly there for the last free vertex).
+vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 point, vec3 anchor, float reach, bool is_last,
+            inout Contact contact) {
+  vec3 along = point - start;
+  float squared = dot(along, along);
+  // No direction to keep: take the groomed one.
+  const vec3 groomed = vertex.target - start_target;
+  const bool has_direction = squared > kTinySquared;
+  along = has_direction ? along : groomed;
+  squared = has_direction ? squared : max(dot(groomed, groomed), kTinySquared);
+  vec3 direction = along * inversesqrt(squared);
+  vec3 end = start + vertex.segment * direction;
+
+#if COLLIDERS >= 1
+  for (int round = 0; round < kPushRounds; ++round) {
+    vec4 deepest = vec4(0.0);
+    float most = 0.0;
+    // Constant count and indices: uniform loads stay scalar on llvmpipe.
+    for (uint i = 0u; i < uint(COLLIDERS); ++i) {
+      const vec4 sphere = u_step.collider[i];
+      const vec3 outward = end - sphere.xyz;
+      const float inside = sphere.w * sphere.w - dot(outward, outward);
+      deepest = inside > most ? sphere : deepest;
+      most = max(inside, most);
+    }
+    if (!(most > 0.0)) break;
+    const vec3 turned = turned_onto_sphere(start, direction, vertex.segment, deepest.xyz, deepest.w);
+    const vec3 outward = turned - deepest.xyz;
+    contact.depth += deepest.w - distance(end, deepest.xyz);
+    contact.normal = outward * inversesqrt(max(dot(outward, outward), kTinySquared));
+    contact.pushed += turned - end;
+    end = turned;
+    direction = (end - start) / max(vertex.segment, kTinySquared);
+  }
+#endif
+
+#if HAS_PINNED_TAIL
+  if (is_last || distance(end, anchor) > reach) {
+    end = turned_onto_sphere(start, direction, vertex.segment, anchor, reach);
+  }
+#endif
+  return end;
+}
+
+// Velocity relative to the head joint after the constraints, with the friction of a contact: Coulomb, limited to the
+// sliding speed over the collider, which turns rigidly with the head.
+vec3 velocity_after(Vertex vertex, vec3 end, Contact contact) {
+  const float per_step = u_step.push.w;
+  vec3 velocity = (end - vertex.old) * per_step;
+#if COLLIDERS >= 1
+  const vec3 slip = (end - carried_by_head(vertex.old)) * per_step;
+  const vec3 sliding = slip - contact.normal * dot(slip, contact.normal);
+  const float speed_squared = max(dot(sliding, sliding), kTinySquared);
+  const float stopped = u_step.contact.x * contact.depth * per_step * inversesqrt(speed_squared);
+  velocity -= sliding * min(1.0, stopped);
+#endif
+  return velocity;
+}

@@ -1,0 +1,56 @@
+// What a strand kernel reads: the step's uniform block (server/sim/step_block.h) and the state of the strands.
+// Element of vertex i of strand s: i * strand_count + s, so that neighbouring lanes are neighbouring strands.
+#include "shared/limits.h"
+#include "shared/bindings.h"
+
+layout(std140, binding = kBindingStep) uniform StepBlock {
+  vec4 world_from_head[3];  // columns; w unused
+  vec4 carry[3];            // columns: turn of the head during the substep
+  vec4 head_velocity;       // m/s; w = substep, s
+  vec4 push;                // velocity gained from gravity and mean wind, m/s; w = 1 / substep
+  vec4 style;               // stiffness at the root 1/s^2, share at the tip, s_damping, speed limit m/s
+  vec4 contact;             // friction, air drag 1/s; rest unused
+  uvec4 shape;              // strands, vertices per strand, pinned at the root, first vertex of the pinned tail
+  uvec4 odd_even;           // iterations, 1 = restore exact lengths
+  vec4 gust_amplitude[kMaxGustWaves];  // m/s; w = phase, rad
+  vec4 gust_wave[kMaxGustWaves];       // rad/m
+  vec4 collider[kMaxSphereColliders];    // centre, m; w = radius (0 = none)
+} u_step;
+
+// Buffer textures: on llvmpipe a texel fetch costs half of a storage-block load or less. They show the buffers that
+// the storage blocks write. Every vertex is fetched by one invocation only, before it stores a value computed from
+// what it fetched, so the order cannot change.
+layout(binding = kUnitRest) uniform samplerBuffer u_rest;           // head space, m; w = segment before it, m
+layout(binding = kUnitPosition) uniform samplerBuffer u_position;   // head-relative world, m; w = arc, 0..1
+layout(binding = kUnitVelocity) uniform samplerBuffer u_velocity;   // world, m/s; w unused
+
+layout(std430, binding = kBindingPosition) writeonly restrict buffer PositionBlock { vec4 position[]; } b_position;
+layout(std430, binding = kBindingVelocity) writeonly restrict buffer VelocityBlock { vec4 velocity[]; } b_velocity;
+
+// A squared length below this has no direction.
+const float kTinySquared = 1e-20;
+// A squared position or velocity above this, or NaN, is broken.
+const float kBrokenSquared = 1e24;
+
+vec3 turned_with_head(vec3 point) {
+  return u_step.world_from_head[0].xyz * point.x + u_step.world_from_head[1].xyz * point.y +
+         u_step.world_from_head[2].xyz * point.z;
+}
+
+vec3 carried_by_head(vec3 point) {
+  return u_step.carry[0].xyz * point.x + u_step.carry[1].xyz * point.y + u_step.carry[2].xyz * point.z;
+}
+
+// The velocity, no longer than the speed limit.
+vec3 within_speed_limit(vec3 velocity) {
+  const float limit = u_step.style.w;
+  const float squared = dot(velocity, velocity);
+  return squared > limit * limit ? velocity * (limit * inversesqrt(squared)) : velocity;
+}
+
+void store_vertex(uint at, vec3 position, float arc) { b_position.position[at] = vec4(position, arc); }
+
+// `velocity` is relative to the head joint.
+void store_velocity(uint at, vec3 velocity) {
+  b_velocity.velocity[at] = vec4(within_speed_limit(velocity) + u_step.head_velocity.xyz, 0.0);
+}

@@ -1,0 +1,123 @@
+// Every GPU solver against its double-precision reference over a few steps of the same motion.
+#include "server/sim/solver_registry.h"
+#include "tests/support/gl_fixture.h"
+#include "tests/support/sim_scene.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kSubstepS = 1.0 / 60.0;
+
+// A float position of 0.3 m is good to 1.5e-8 m. One step divides differences of positions by a segment of a
+// few millimetres and adds them up over the strand, and the next step starts from the result: a few hundred
+// roundings.
+constexpr double kBoundM = 5e-6;
+// A strand held at both ends is nearly straight: the side of a flat triangle answers to rounding with its
+// square root, sqrt(1.5e-8 m x 0.25 m) = 6e-5 m, in each step.
+constexpr double kHeldBoundM = 5e-4;
+
+struct ParityCase {
+  std::string name;
+  Pinning pinning = Pinning::RootPair;
+  uint32_t vertex_count = 16;
+  bool has_wind = false;
+  bool has_gusts = false;
+  bool has_colliders = false;
+  SolverParameters parameters = {};
+  int steps = 6;
+};
+
+StepInput input_for(const ParityCase& test, int step) {
+  StepInput input = moving_input(step, kSubstepS);
+  if (!test.has_wind) input.wind_mps = glm::dvec3(0.0);
+  if (!test.has_gusts) input.gusts.clear();
+  if (!test.has_colliders) input.colliders.clear();
+  return input;
+}
+
+SceneFeatures features_for(const ParityCase& test) {
+  SceneFeatures features;
+  features.has_wind = test.has_wind;
+  features.has_turbulence = test.has_gusts;
+  features.has_colliders = test.has_colliders;
+  return features;
+}
+
+std::vector<ParityCase> parity_cases() {
+  return {
+      {"motion only"},
+      {"root pinned once", Pinning::Root},
+      {"both ends pinned", Pinning::BothEnds},
+      {"wind", Pinning::RootPair, 16, true},
+      {"wind and gusts", Pinning::RootPair, 16, true, true},
+      {"colliders", Pinning::RootPair, 16, false, false, true},
+      {"everything, both ends", Pinning::BothEnds, 16, true, true, true},
+      {"everything, 2 vertices", Pinning::Root, 2, true, true, true},
+      {"everything, 7 vertices", Pinning::RootPair, 7, true, true, true},
+      {"wind and gusts, 64 vertices", Pinning::RootPair, 64, true, true},
+      // Short segments driven straight into a collider may evade to either side, and rounding decides: few
+      // steps.
+      {"everything, 64 vertices", Pinning::RootPair, 64, true, true, true, {}, 3},
+      {"limp, rough",
+       Pinning::RootPair,
+       16,
+       true,
+       true,
+       true,
+       {{"style_stiffness_per_s2", 0.0}, {"collider_friction", 2.0}, {"s_damping", 1.0}}},
+  };
+}
+
+/// Rest positions in the order of SolverState.
+std::vector<glm::vec3> groom_positions(const Groom& groom) {
+  std::vector<glm::vec3> result;
+  for (uint32_t i = 0; i < groom.vertex_count(0); ++i) {
+    for (uint32_t s = 0; s < groom.strand_count(); ++s) {
+      result.push_back(groom.rest_position_m[groom.offset[s] + i]);
+    }
+  }
+  return result;
+}
+
+class SolverParity : public GlTest {
+ protected:
+  gl::ShaderLibrary shaders_;
+};
+
+TEST_F(SolverParity, EveryGpuSolverFollowsItsReference) {
+  for (const SolverRow& row : solver_table()) {
+    for (const ParityCase& test : parity_cases()) {
+      SCOPED_TRACE(row.name + ", " + test.name);
+      TestGroomDesc desc;
+      desc.pinning = test.pinning;
+      desc.vertex_count = test.vertex_count;
+      const Groom groom = make_test_groom(desc);
+      const auto parameters = complete_parameters(row, test.parameters);
+      ASSERT_TRUE(parameters);
+      auto gpu = row.make_gpu(*parameters, {&shaders_, features_for(test)});
+      ASSERT_TRUE(gpu) << gpu.error().to_string();
+      const auto reference = row.make_reference(*parameters);
+      const glm::dquat start = moving_input(0, kSubstepS).world_from_head;
+      ASSERT_TRUE((*gpu)->load(groom, start));
+      ASSERT_TRUE(reference->load(groom, start));
+      SolverState from_gpu;
+      SolverState expected;
+      const double bound_m = test.pinning == Pinning::BothEnds ? kHeldBoundM : kBoundM;
+      for (int step = 1; step <= test.steps; ++step) {
+        (*gpu)->substep(input_for(test, step));
+        reference->substep(input_for(test, step));
+        (*gpu)->read(from_gpu);
+        reference->read(expected);
+        ASSERT_LE(largest_distance_m(from_gpu.position_m, expected.position_m), bound_m) << "step " << step;
+        // A velocity is a difference of positions over the substep, twice with the correction.
+        ASSERT_LE(largest_distance_m(from_gpu.velocity_mps, expected.velocity_mps), 3.0 * bound_m / kSubstepS)
+            << "step " << step;
+      }
+      // The motion is not the rest: a kernel that does nothing would be seen.
+      ASSERT_GT(largest_distance_m(from_gpu.position_m, groom_positions(groom)), 1e-3);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace strandcast
