@@ -1,5 +1,6 @@
 #include "common/codec/frame_header.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "common/base/check.h"
@@ -78,6 +79,14 @@ EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte
   writer.put_bytes(pack(header));
   writer.put_bytes(payload);
   return frame;
+}
+
+EncodedFramePtr with_send_time(const EncodedFrame& frame, int64_t send_time_ns) {
+  auto stamped = std::make_shared<EncodedFrame>(frame);
+  stamped->header.send_time_ns = send_time_ns;
+  const auto packed = pack(stamped->header);
+  std::copy(packed.begin(), packed.end(), stamped->message.begin());
+  return stamped;
 }
 
 }  // namespace strandcast

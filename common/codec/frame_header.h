@@ -52,4 +52,7 @@ using EncodedFramePtr = std::shared_ptr<const EncodedFrame>;
 /// Sets header.payload_bytes. Null when the payload has more than kMaxMediaPayloadBytes.
 EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte> payload);
 
+/// A copy of the frame with send_time_ns set, in the header and in the message.
+EncodedFramePtr with_send_time(const EncodedFrame& frame, int64_t send_time_ns);
+
 }  // namespace strandcast
