@@ -1,0 +1,124 @@
+// FrameWorker: a thread that decodes the strand stream as a client would, draws it for the viewers who asked
+// for frames and encodes JPEG. It sleeps while there are none, and nothing waits for it. All functions from
+// any thread.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "common/base/profile.h"
+#include "common/base/result.h"
+#include "common/codec/frame_header.h"
+#include "common/codec/strand_codec.h"
+#include "server/encode/picture_painter.h"
+#include "server/encode/picture_views.h"
+
+namespace strandcast {
+
+/// Totals since start; medians cover the last kStageWindow frames.
+struct FrameCounters {
+  uint64_t frames = 0;
+  uint64_t bytes = 0;            // header and payload
+  uint64_t decoded = 0;          // strand frames
+  uint64_t chain_losses = 0;     // times the decoder had to wait for a keyframe
+  double paint_median_ms = 0.0;  // draw and read back
+  double jpeg_median_ms = 0.0;
+};
+
+class FrameWorker {
+ public:
+  struct Hooks {
+    /// Takes a frame of one picture class (PictureViews), on the worker's thread.
+    std::function<void(uint32_t picture_class, EncodedFramePtr frame)> sink;
+    /// Asks whoever encodes strands for a keyframe, on any thread.
+    std::function<void()> request_keyframe;
+    /// Called once, on the worker's thread, when no frames can be drawn any more (no GL, say). May be empty.
+    std::function<void(const Error& error)> on_failure;
+  };
+
+  /// Starts the thread. `frame_rate_hz`: at most so many frames of each view in a second.
+  FrameWorker(std::unique_ptr<StrandDecoder> decoder, MakePicturePainter make_painter, double frame_rate_hz,
+              Hooks hooks);
+  /// Ends the thread after the frame that is being drawn.
+  ~FrameWorker();
+  FrameWorker(const FrameWorker&) = delete;
+  FrameWorker& operator=(const FrameWorker&) = delete;
+
+  /// Every strand frame in the order of the chain. Returns at once; dropped while there are no views.
+  void offer(EncodedFramePtr strand_frame);
+  /// What to draw from now on, by picture class; none: the painter is destroyed and strand frames are not
+  /// needed.
+  void set_views(std::map<uint32_t, PictureView> views);
+  /// True while strand frames must be offered.
+  bool has_views() const;
+
+  /// Why no frames can be had; nothing while all is well.
+  std::optional<Error> failure() const;
+  FrameCounters counters() const;
+
+ private:
+  /// One view's progress.
+  struct Drawn {
+    PictureView view;
+    uint64_t decode_count = 0;  // when last drawn, 0 = never with this view
+    int64_t begin_ns = 0;       // when that drawing began
+    uint32_t sequence = 0;
+  };
+  /// What other threads left for the worker.
+  struct Job {
+    std::deque<EncodedFramePtr> strand_frames;
+    std::map<uint32_t, PictureView> views;
+    bool is_stopping = false;
+  };
+  struct Due {
+    uint32_t picture_class = 0;
+    int64_t time_ns = 0;
+  };
+
+  void run();
+  Job wait_for_job();
+  bool can_draw() const { return !views_.empty() && !failure_; }  // mutex_ is held
+  void begin();
+  void rest();
+  void update_views(const std::map<uint32_t, PictureView>& views);
+  void decode(const std::deque<EncodedFramePtr>& strand_frames);
+  std::optional<Due> next_due() const;
+  Status draw(uint32_t picture_class);
+  void fail(const Error& error);
+
+  std::unique_ptr<StrandDecoder> decoder_;
+  MakePicturePainter make_painter_;
+  const int64_t frame_interval_ns_;
+  Hooks hooks_;
+
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable changed_;
+  std::deque<EncodedFramePtr> pending_;
+  size_t pending_bytes_ = 0;
+  std::map<uint32_t, PictureView> views_;
+  bool has_new_views_ = false;
+  bool is_stopping_ = false;
+  std::optional<Error> failure_;
+  FrameCounters counters_;
+  StageTimer paint_timer_;
+  StageTimer jpeg_timer_;
+
+  // Of the worker's thread.
+  bool is_active_ = false;
+  std::unique_ptr<PicturePainter> painter_;
+  std::shared_ptr<const Snapshot> snapshot_;
+  uint64_t decode_count_ = 0;
+  bool is_chain_lost_ = true;  // until a keyframe comes
+  std::map<uint32_t, Drawn> drawn_;
+
+  std::thread thread_;  // last: starts when everything else is there
+};
+
+}  // namespace strandcast

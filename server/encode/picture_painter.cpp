@@ -1,0 +1,49 @@
+#include "server/encode/picture_painter.h"
+
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/gl/egl_context.h"
+#include "common/gl/program.h"
+#include "common/render/renderer.h"
+
+namespace strandcast {
+namespace {
+
+class GlPicturePainter : public PicturePainter {
+ public:
+  GlPicturePainter(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Renderer> renderer)
+      : context_(std::move(context)), renderer_(std::move(renderer)) {}
+
+  Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
+    // Several views of one snapshot share its positions.
+    if (painted_tick_ != snapshot.tick || picture_.position_m.empty()) {
+      picture_ = {snapshot.world_from_head, positions_in_head(snapshot)};
+      painted_tick_ = snapshot.tick;
+    }
+    RETURN_IF_ERROR(renderer_->draw(picture_, view.camera, view.size));
+    return renderer_->read_image();
+  }
+
+ private:
+  std::unique_ptr<gl::EglContext> context_;  // outlives the renderer's GL objects
+  std::unique_ptr<Renderer> renderer_;
+  StrandPicture picture_;
+  uint64_t painted_tick_ = 0;
+};
+
+}  // namespace
+
+MakePicturePainter gl_picture_painter(GlPainterConfig config) {
+  return [config = std::move(config)]() -> Result<std::unique_ptr<PicturePainter>> {
+    ASSIGN_OR_RETURN(auto context, gl::EglContext::make(config.gl_device));
+    const gl::ShaderLibrary shaders =
+        config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
+    ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), *config.asset, config.look));
+    log_info("render", "frames are drawn by {}", context->info().renderer);
+    return std::unique_ptr<PicturePainter>(
+        std::make_unique<GlPicturePainter>(std::move(context), std::move(renderer)));
+  };
+}
+
+}  // namespace strandcast

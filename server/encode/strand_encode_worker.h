@@ -1,0 +1,79 @@
+// StrandEncodeWorker: a thread that encodes the newest snapshot once for everybody who watches strands, and
+// keyframes for those who join. Nothing is encoded while nobody listens. All functions from any thread.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "common/base/profile.h"
+#include "common/codec/frame_header.h"
+#include "common/codec/strand_codec.h"
+#include "server/publish/snapshot_slot.h"
+
+namespace strandcast {
+
+/// Totals since start; the median covers the last kStageWindow encodes.
+struct StrandEncodeCounters {
+  uint64_t encodes = 0;      // snapshots appended to the chain
+  uint64_t keyframes = 0;    // keyframes made (not: handed out again)
+  uint64_t too_large = 0;    // snapshots that did not fit into one message
+  uint64_t delta_bytes = 0;  // header and payload
+  uint64_t keyframe_bytes = 0;
+  double encode_median_ms = 0.0;
+  double keyframe_median_ms = 0.0;
+};
+
+class StrandEncodeWorker {
+ public:
+  /// Called on the worker's thread, frames in the order of the chain: the keyframe of sequence s comes after
+  /// delta s and before delta s + 1, so whoever starts with it goes on with delta s + 1. send_time_ns is set.
+  using Sink = std::function<void(EncodedFramePtr)>;
+
+  /// Starts the thread. `slot` outlives the worker.
+  StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink);
+  /// Ends the thread after the encode that is under way.
+  ~StrandEncodeWorker();
+  StrandEncodeWorker(const StrandEncodeWorker&) = delete;
+  StrandEncodeWorker& operator=(const StrandEncodeWorker&) = delete;
+
+  /// False: nothing is encoded. From false to true the chain goes on with a keyframe of the newest snapshot.
+  void set_has_listeners(bool has_listeners);
+  /// Asks for a keyframe at the chain's present state and returns at once. Requests that come before it is
+  /// made share it; later ones for the same state get the same frame again.
+  void request_keyframe();
+
+  StrandEncodeCounters counters() const;
+
+ private:
+  void run();
+  bool has_work(const SnapshotSlot::View& view) const;
+  void encode_newest(const Snapshot& snapshot);
+  void give_keyframe();
+  void give(const EncodedFrame& frame);
+
+  SnapshotSlot& slot_;
+  std::unique_ptr<StrandEncoder> encoder_;
+  Sink sink_;
+
+  std::atomic<bool> is_stopping_{false};
+  std::atomic<bool> has_listeners_{false};
+  std::atomic<bool> is_keyframe_wanted_{false};
+  std::atomic<bool> is_restarting_{false};  // nobody has the chain's last frame
+
+  // Of the worker's thread.
+  uint64_t encoded_version_ = 0;
+  EncodedFramePtr keyframe_;  // of the chain's present state, once one was made
+
+  mutable std::mutex counters_mutex_;
+  StrandEncodeCounters counters_;
+  StageTimer encode_timer_;
+  StageTimer keyframe_timer_;
+
+  std::thread thread_;  // last: starts when everything else is there
+};
+
+}  // namespace strandcast

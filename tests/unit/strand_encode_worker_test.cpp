@@ -1,0 +1,297 @@
+#include "server/encode/strand_encode_worker.h"
+
+#include <atomic>
+#include <condition_variable>
+#include <random>
+#include <thread>
+
+#include "common/base/profile.h"
+#include "tests/support/eventually.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kStrands = 6;
+constexpr uint32_t kVertices = 4;
+
+std::shared_ptr<const Snapshot> make_state(uint64_t tick) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->tick = tick;
+  snapshot->sim_time_ns = static_cast<int64_t>(tick) * 1000;
+  snapshot->strand_count = kStrands;
+  snapshot->vertex_count = kVertices;
+  snapshot->quantum_m = 1e-4f;
+  for (uint32_t i = 0; i < 3 * kStrands * kVertices; ++i)
+    snapshot->lattice.push_back(static_cast<int32_t>(i * 100 + (tick * (i + 1)) % 17));
+  return snapshot;
+}
+
+/// Keeps the frames that a worker gives.
+class FrameList {
+ public:
+  StrandEncodeWorker::Sink sink() {
+    return [this](EncodedFramePtr frame) {
+      const std::lock_guard lock(mutex_);
+      frames_.push_back(std::move(frame));
+    };
+  }
+  std::vector<EncodedFramePtr> frames() const {
+    const std::lock_guard lock(mutex_);
+    return frames_;
+  }
+  size_t count() const { return frames().size(); }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<EncodedFramePtr> frames_;
+};
+
+/// Writes the tick as payload; can be held inside encode() and can refuse.
+class FakeEncoder : public StrandEncoder {
+ public:
+  struct Control {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool is_held = false;
+    bool is_inside = false;
+    bool is_refusing = false;
+    std::vector<uint64_t> ticks;
+
+    void hold() {
+      const std::lock_guard lock(mutex);
+      is_held = true;
+    }
+    void release() {
+      const std::lock_guard lock(mutex);
+      is_held = false;
+      changed.notify_all();
+    }
+    bool inside() {
+      const std::lock_guard lock(mutex);
+      return is_inside;
+    }
+    std::vector<uint64_t> seen() {
+      const std::lock_guard lock(mutex);
+      return ticks;
+    }
+  };
+
+  explicit FakeEncoder(std::shared_ptr<Control> control) : control_(std::move(control)) {}
+
+  EncodedFramePtr encode(const Snapshot& snapshot) override {
+    std::unique_lock lock(control_->mutex);
+    control_->ticks.push_back(snapshot.tick);
+    control_->is_inside = true;
+    control_->changed.wait(lock, [&] { return !control_->is_held; });
+    control_->is_inside = false;
+    if (control_->is_refusing) return nullptr;
+    tick_ = snapshot.tick;
+    ++sequence_;
+    return frame(sequence_ == 1 ? Opcode::StrandKeyframe : Opcode::StrandDelta);
+  }
+  EncodedFramePtr encode_keyframe() override {
+    return sequence_ == 0 ? nullptr : frame(Opcode::StrandKeyframe);
+  }
+
+ private:
+  EncodedFramePtr frame(Opcode opcode) const {
+    FrameHeader header;
+    header.opcode = opcode;
+    header.sequence = sequence_;
+    header.base_sequence = opcode == Opcode::StrandDelta ? sequence_ - 1 : 0;
+    return make_encoded_frame(header, std::as_bytes(std::span(&tick_, 1)));
+  }
+
+  std::shared_ptr<Control> control_;
+  uint64_t tick_ = 0;
+  uint32_t sequence_ = 0;
+};
+
+class StrandEncoding : public testing::Test {
+ protected:
+  StrandEncoding() : control_(std::make_shared<FakeEncoder::Control>()) {}
+  std::unique_ptr<StrandEncodeWorker> start() {
+    return std::make_unique<StrandEncodeWorker>(slot_, std::make_unique<FakeEncoder>(control_), list_.sink());
+  }
+
+  SnapshotSlot slot_;
+  std::shared_ptr<FakeEncoder::Control> control_;
+  FrameList list_;
+};
+
+TEST_F(StrandEncoding, NothingIsEncodedWhileNobodyListens) {
+  const auto worker = start();
+  for (uint64_t tick = 1; tick <= 5; ++tick) slot_.put(make_state(tick));
+  worker->request_keyframe();
+  give_time_to_misbehave();
+  EXPECT_EQ(worker->counters().encodes, 0u);
+  worker->set_has_listeners(true);
+  ASSERT_TRUE(eventually([&] { return list_.count() >= 1; }));
+  EXPECT_EQ(list_.frames()[0]->header.opcode, Opcode::StrandKeyframe);
+  EXPECT_EQ(control_->seen(), std::vector<uint64_t>{5}) << "only the newest state";
+}
+
+TEST_F(StrandEncoding, AfterAPauseTheChainGoesOnWithAKeyframe) {
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  worker->set_has_listeners(false);
+  slot_.put(make_state(2));
+  slot_.put(make_state(3));
+  give_time_to_misbehave();
+  EXPECT_EQ(list_.count(), 1u);
+  worker->set_has_listeners(true);
+  ASSERT_TRUE(eventually([&] { return list_.count() >= 2; }));
+  const auto frame = list_.frames()[1];
+  EXPECT_EQ(frame->header.opcode, Opcode::StrandKeyframe) << "a delta would be of use to nobody";
+  EXPECT_EQ(frame->header.sequence, 2u);
+  slot_.put(make_state(4));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 3; }));
+  EXPECT_EQ(list_.frames()[2]->header.base_sequence, 2u);
+}
+
+TEST_F(StrandEncoding, RequestsBetweenTwoTicksShareOneKeyframe) {
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  control_->hold();
+  slot_.put(make_state(2));
+  ASSERT_TRUE(eventually([&] { return control_->inside(); }));
+  std::vector<std::thread> joiners;
+  for (int i = 0; i < 8; ++i) joiners.emplace_back([&] { worker->request_keyframe(); });
+  for (std::thread& joiner : joiners) joiner.join();  // returns although the encoder is busy
+  const uint64_t keyframes_before = worker->counters().keyframes;
+  control_->release();
+  ASSERT_TRUE(eventually([&] { return list_.count() == 3; }));
+  give_time_to_misbehave();
+  EXPECT_EQ(worker->counters().keyframes, keyframes_before + 1);
+  EXPECT_EQ(list_.count(), 3u);
+}
+
+TEST_F(StrandEncoding, ALateRequestForTheSameStateGetsTheSameKeyframeAgain) {
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  worker->request_keyframe();
+  ASSERT_TRUE(eventually([&] { return list_.count() == 2; })) << "also while the simulation is paused";
+  EXPECT_EQ(worker->counters().keyframes, 1u);
+  EXPECT_EQ(list_.frames()[1]->header.sequence, 1u);
+}
+
+TEST_F(StrandEncoding, ASlowEncoderSkipsToTheNewestState) {
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  control_->hold();
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return control_->inside(); }));
+  for (uint64_t tick = 2; tick <= 50; ++tick) slot_.put(make_state(tick));
+  control_->release();
+  ASSERT_TRUE(eventually([&] { return list_.count() == 2; }));
+  EXPECT_EQ(control_->seen(), (std::vector<uint64_t>{1, 50}));
+}
+
+TEST_F(StrandEncoding, AStateThatFitsNoMessageIsSkippedAndCounted) {
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  control_->is_refusing = true;
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return worker->counters().too_large == 1; }));
+  {
+    const std::lock_guard lock(control_->mutex);
+    control_->is_refusing = false;
+  }
+  slot_.put(make_state(2));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+}
+
+TEST_F(StrandEncoding, StopsWhileIdleAndWithTheSlot) {
+  { const auto worker = start(); }
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  slot_.stop();
+  slot_.put(make_state(1));
+  give_time_to_misbehave();
+  EXPECT_EQ(list_.count(), 0u);
+}
+
+TEST_F(StrandEncoding, CountsBytesAndStampsTheSendTime) {
+  const int64_t begin_ns = now_ns();
+  const auto worker = start();
+  worker->set_has_listeners(true);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  slot_.put(make_state(2));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 2; }));
+  const auto frames = list_.frames();
+  for (const EncodedFramePtr& frame : frames) {
+    const auto header = unpack_frame_header(frame->message);
+    ASSERT_TRUE(header);
+    EXPECT_EQ(*header, frame->header);
+    EXPECT_GE(header->send_time_ns, begin_ns);
+    EXPECT_LE(header->send_time_ns, now_ns());
+  }
+  const StrandEncodeCounters counters = worker->counters();
+  EXPECT_EQ(counters.keyframe_bytes, frames[0]->message.size());
+  EXPECT_EQ(counters.delta_bytes, frames[1]->message.size());
+}
+
+/// Whoever starts at any keyframe of a busy stream decodes everything after it to the published states.
+TEST(StrandEncodingWithCodec, EveryKeyframeIsAWayIntoTheChain) {
+  for (const char* codec : {"delta", "raw"}) {
+    auto encoder = make_strand_encoder(codec);
+    ASSERT_TRUE(encoder);
+    SnapshotSlot slot;
+    FrameList list;
+    StrandEncodeWorker worker(slot, std::move(encoder).value(), list.sink());
+    worker.set_has_listeners(true);
+    std::atomic<bool> is_done{false};
+    std::thread joiner([&] {
+      std::mt19937 random(5);
+      while (!is_done) {
+        worker.request_keyframe();
+        std::this_thread::sleep_for(std::chrono::microseconds(random() % 400));
+      }
+    });
+    constexpr uint64_t kTicks = 300;
+    for (uint64_t tick = 1; tick <= kTicks; ++tick) {
+      slot.put(make_state(tick));
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    }
+    is_done = true;
+    joiner.join();
+    const auto last_hash = state_hash(*make_state(kTicks));
+    const auto frames_reach_the_end = [&] {
+      const auto frames = list.frames();
+      return !frames.empty() && frames.back()->header.sim_time_ns == static_cast<int64_t>(kTicks) * 1000;
+    };
+    ASSERT_TRUE(eventually(frames_reach_the_end)) << codec;
+    const auto frames = list.frames();
+    int starts = 0;
+    for (size_t start = 0; start < frames.size(); ++start) {
+      if (frames[start]->header.opcode != Opcode::StrandKeyframe) continue;
+      if (++starts > 40) break;
+      auto decoder = make_strand_decoder(codec, {kStrands, kVertices});
+      ASSERT_TRUE(decoder);
+      uint32_t sequence = 0;
+      uint64_t hash = 0;
+      for (size_t i = start; i < frames.size(); ++i) {
+        // A session ignores keyframes while its own chain is whole.
+        if (i > start && frames[i]->header.sequence == sequence) continue;
+        ASSERT_EQ(frames[i]->header.sequence, i == start ? frames[i]->header.sequence : sequence + 1);
+        const auto snapshot = (*decoder)->decode(frames[i]->message);
+        ASSERT_TRUE(snapshot) << codec << ": " << snapshot.error().to_string();
+        sequence = frames[i]->header.sequence;
+        hash = state_hash(**snapshot);
+        EXPECT_EQ(hash, state_hash(*make_state((*snapshot)->tick)));
+      }
+      EXPECT_EQ(hash, last_hash);
+    }
+    EXPECT_GT(starts, 1) << "no late joiner was ever served";
+  }
+}
+
+}  // namespace
+}  // namespace strandcast
