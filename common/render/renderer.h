@@ -1,7 +1,8 @@
-// The one renderer, used by the server's frame stream and by every client: expands key strands and followers by
-// tessellation (isolines, cubic Hermite along the strand, barycentric between three key strands), draws camera-facing
-// quads with Kajiya-Kay diffuse and Sadeghi specular lobes, and the head. Same inputs on one driver give the same
-// pixels. Needs a current GL 4.5 core context; all calls from its thread. Does not simulate, decode or do I/O.
+// The one renderer, used by the server's frame stream and by every client: expands key strands and followers
+// by tessellation (isolines, cubic Hermite along the strand, barycentric between three key strands), draws
+// camera-facing quads with Kajiya-Kay diffuse and Sadeghi specular lobes, and the head. Same inputs on one
+// driver give the same pixels. Needs a current GL 4.5 core context; all calls from its thread. Does not
+// simulate, decode or do I/O.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -21,7 +22,8 @@ namespace strandcast {
 /// What to draw: strands in head space as a viewer has them after decoding (and blending).
 struct StrandPicture {
   Pose world_from_head;
-  std::vector<glm::vec3> position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
+  std::vector<glm::vec3>
+      position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
 };
 
 struct RenderSize {
@@ -42,8 +44,9 @@ struct RenderProfile {
 class Renderer {
  public:
   /// Compiles, allocates and uploads only what asset and look need.
-  static Result<std::unique_ptr<Renderer>> make(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device,
-                                                const SceneAsset& asset, const LookDesc& look);
+  static Result<std::unique_ptr<Renderer>> make(const gl::ShaderLibrary& shaders,
+                                                const gl::DeviceInfo& device, const SceneAsset& asset,
+                                                const LookDesc& look);
   virtual ~Renderer() = default;
 
   /// Draws into an internal target of the given size (4x multisampled), resolved to sRGB.

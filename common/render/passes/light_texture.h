@@ -1,0 +1,33 @@
+// The light volume on the GPU, with the uniforms of shaders/render/light.glsl. All calls from the context's
+// thread.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "common/gl/objects.h"
+#include "common/gl/program.h"
+#include "common/render/light_volume.h"
+#include "common/render/view.h"
+#include "common/scene/scene_desc.h"
+
+namespace strandcast {
+
+class LightTexture {
+ public:
+  void upload(const LightVolume& volume);
+  /// Light and surroundings as the shaders see them, in head space.
+  void set_light(const LookDesc& look, const View& view, const glm::vec3& to_light_in_head);
+  void set_uniforms(const gl::Program& program, uint32_t unit) const;
+
+ private:
+  gl::Handle<gl::delete_texture> texture_;
+  glm::ivec3 size_{0};
+  glm::vec3 origin_m_{0.0f};
+  glm::vec3 volume_from_m_{1.0f};
+  glm::vec3 to_light_{0.0f, 1.0f, 0.0f};
+  glm::vec3 up_{0.0f, 1.0f, 0.0f};
+  glm::vec3 light_color_{1.0f};
+  float ambient_ = 0.0f;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,17 @@
+// From linear light to what a screen shows.
+
+// Keeps dark and middle tones as they are and bends values above the knee towards 1, colour by colour.
+const float kToneKnee = 0.7;
+
+vec3 tone_map(vec3 linear) {
+  vec3 over = max(linear - kToneKnee, 0.0);
+  float room = 1.0 - kToneKnee;
+  return min(linear, kToneKnee) + room * over / (over + room);
+}
+
+// sRGB transfer function, IEC 61966-2-1.
+vec3 srgb_from_linear(vec3 linear) {
+  vec3 low = 12.92 * linear;
+  vec3 high = 1.055 * pow(max(linear, 0.0), vec3(1.0 / 2.4)) - 0.055;
+  return mix(high, low, lessThanEqual(linear, vec3(0.0031308)));
+}

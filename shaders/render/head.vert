@@ -1,0 +1,15 @@
+// Head pass: the mesh under the hair.
+
+layout(location = 0) in vec3 in_position_m;  // head space
+layout(location = 1) in vec3 in_normal;
+
+uniform mat4 u_clip_from_head;
+
+out vec3 v_position_m;
+out vec3 v_normal;
+
+void main() {
+  v_position_m = in_position_m;
+  v_normal = in_normal;
+  gl_Position = u_clip_from_head * vec4(in_position_m, 1.0);
+}

@@ -1,0 +1,12 @@
+// What reaches a point of the picture: the light volume holds, per cell, the part of the direct light and of the
+// surrounding light that hair and skull let through.
+
+uniform sampler3D u_light_volume;     // (direct, surrounding), each 0..1
+uniform vec3 u_volume_origin_m;       // corner of cell (0, 0, 0), head space
+uniform vec3 u_volume_from_m;         // 1 / (cells x cell size)
+uniform vec3 u_to_light;              // unit, head space
+uniform vec3 u_light_color;
+uniform float u_ambient;
+uniform vec3 u_up;                    // world's up, head space
+
+vec2 light_at(vec3 point_m) { return texture(u_light_volume, (point_m - u_volume_origin_m) * u_volume_from_m).rg; }

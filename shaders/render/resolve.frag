@@ -1,0 +1,27 @@
+// Resolve pass: the mean of a pixel's samples over the background, as sRGB. Row 0 of the target is the top of the
+// picture, so that it is read back without turning it over.
+#include "lib/tone.glsl"
+
+uniform sampler2D u_scene;     // (samples per pixel side) times larger than the target; alpha 1 = drawn
+uniform int u_samples;         // per pixel side
+uniform int u_target_height;
+uniform vec3 u_background;     // linear, at middle height
+
+layout(location = 0) out vec4 out_color;
+
+// The background is lighter at the top of the picture and darker at its bottom by this share.
+const float kGradient = 0.35;
+
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 from_bottom = ivec2(pixel.x, u_target_height - 1 - pixel.y);
+  vec4 sum = vec4(0.0);
+  for (int y = 0; y < u_samples; ++y)
+    for (int x = 0; x < u_samples; ++x) sum += texelFetch(u_scene, from_bottom * u_samples + ivec2(x, y), 0);
+  float share = 1.0 / float(u_samples * u_samples);
+  float drawn = sum.a * share;
+  vec3 scene = drawn > 0.0 ? tone_map(sum.rgb / sum.a) : vec3(0.0);
+  float height = (float(from_bottom.y) + 0.5) / float(u_target_height);
+  vec3 background = u_background * (1.0 + kGradient * (2.0 * height - 1.0));
+  out_color = vec4(srgb_from_linear(mix(background, scene, drawn)), 1.0);
+}
