@@ -41,10 +41,12 @@ class FakeApp : public NetHandler {
     const std::lock_guard lock(mutex_);
     joined_.insert(session);
     Admission admission;
+    admission.welcome.session_id = "0123456789abcdef";
     admission.welcome.scene_name = "fake";
+    admission.welcome.codec = "delta";
     admission.welcome.mode = hello.mode;
     admission.welcome.strand_count = 1;
-    admission.welcome.vertex_count = 2;
+    admission.welcome.vertex_count = 16;
     admission.welcome.bound_m = 1e-4f;
     admission.asset = media(Opcode::Asset, 1, 0, asset_bytes);
     return admission;
