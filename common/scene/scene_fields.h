@@ -1,6 +1,6 @@
 // The one list of scene fields with their ranges, walked by the reader and the writer of scene files so that
-// the two cannot disagree. Private to common/scene. Names are those of scene.proto; a name that scene.proto
-// lacks is a broken invariant found by the first test.
+// the two cannot disagree. For common/scene; common/wire takes the ranges. Names are those of scene.proto; a
+// name that scene.proto lacks is a broken invariant found by the first test.
 #pragma once
 
 #include <limits>

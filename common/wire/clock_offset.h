@@ -1,6 +1,7 @@
 // Clock offset between a client and the server from ping round trips. Pure arithmetic, no I/O.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 
@@ -10,12 +11,12 @@ namespace strandcast {
 class ClockOffset {
  public:
   /// Client send, server receive, server send, client receive; all ns, each in its own clock. Probes with a negative
-  /// round trip or one above 10 s are ignored.
+  /// round trip, one above 10 s or times that run backwards are ignored.
   void add(int64_t client_send_ns, int64_t server_receive_ns, int64_t server_send_ns, int64_t client_receive_ns);
   bool has_value() const { return !probes_.empty(); }
-  /// server clock minus client clock, ns.
+  /// server clock minus client clock, ns; 0 without a probe.
   int64_t offset_ns() const;
-  /// Half the best round trip: the largest possible error, ns.
+  /// Half the best round trip: the largest possible error, ns; 0 without a probe.
   int64_t error_ns() const;
   int64_t to_server_ns(int64_t client_ns) const { return client_ns + offset_ns(); }
 

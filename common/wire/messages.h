@@ -1,5 +1,6 @@
-// Control messages as domain types; protobuf never leaves common/wire. Conversion checks every field: finite numbers,
-// ranges, counts. No I/O. Sizes and versions: proto/WIRE.md.
+// Control messages as domain types; protobuf never leaves common/wire. Decoding checks every field: finite numbers,
+// ranges, counts, text. The one exception are the values of motion and wind samples: they pass as they are, NaN
+// included, because the server's input hub judges and counts them. No I/O. Sizes and versions: proto/WIRE.md.
 #pragma once
 
 #include <cstddef>
@@ -20,6 +21,11 @@ inline constexpr const char* kWebSocketProtocol = "strandcast.v1";
 inline constexpr size_t kMaxControlBytes = 64u << 10;
 inline constexpr uint32_t kMaxSamplesPerMessage = 256;
 inline constexpr uint16_t kDefaultPort = 7878;
+inline constexpr size_t kMaxNameChars = 64;         // names of clients, scenes, codecs, versions
+inline constexpr size_t kMaxTextChars = 1024;       // reasons and notices
+inline constexpr size_t kMaxTokenBytes = 256;
+inline constexpr size_t kMaxAssignmentBytes = 4096;  // SetParameter
+inline constexpr size_t kSessionIdChars = 16;
 
 enum class Role { Viewer, Controller, Source };
 enum class StreamMode { Strands, Frames, Auto };
@@ -110,7 +116,8 @@ struct Notice {                   // answer to SetParameter and ControlCommand, 
 };
 using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice>;
 
-/// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes.
+/// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their limits.
+/// Names, reasons and notices are shortened to theirs, and characters that cannot be printed become spaces or '?'.
 std::vector<std::byte> encode(const ClientMessage& message);
 std::vector<std::byte> encode(const ServerMessage& message);
 

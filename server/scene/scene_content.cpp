@@ -1,0 +1,100 @@
+#include "server/scene/scene_content.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/groom/groom_file.h"
+#include "common/groom/procedural.h"
+
+namespace strandcast {
+namespace {
+
+/// Cranium when neither the scene nor a groom gives one: an adult head.
+constexpr float kDefaultHeadRadiusM = 0.095f;
+constexpr uint32_t kScalpVertices = 2'000;
+/// This part of the roots may lie inside the fitted collider (ears, neck, stray roots).
+constexpr double kInsideQuantile = 0.05;
+/// Collider radius over the radius at that quantile.
+constexpr float kColliderScale = 0.98f;
+
+Result<Groom> make_groom(const SceneDesc& scene) {
+  if (const auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
+    GroomFileOptions options;
+    options.path = file->path;
+    options.unit_m = file->unit_m;
+    options.is_z_up = file->up_axis == UpAxis::Z;
+    options.origin = file->origin;
+    options.vertex_count = file->vertex_count;
+    if (file->has_pinning) options.pinning = file->pinning;
+    ASSIGN_OR_RETURN(Groom groom, load_groom(options));
+    return reorder(groom, make_prefix_order(groom));
+  }
+  const auto& procedural = std::get<ProceduralGroomDesc>(scene.groom);
+  const float radius_m = scene.head.radius_m > 0.0f ? scene.head.radius_m : kDefaultHeadRadiusM;
+  ProceduralGroomOptions options;
+  options.strand_count = procedural.strand_count;
+  options.vertex_count = procedural.vertex_count;
+  options.length_m = procedural.length_m;
+  options.length_variation = procedural.length_variation;
+  options.curl_radius_m = procedural.curl_radius_m;
+  options.curl_turns = procedural.curl_turns;
+  options.seed = procedural.seed;
+  // Grown strands come in prefix order already.
+  return grow_groom(make_scalp_cap(glm::vec3(0.0f), radius_m, kScalpVertices), options);
+}
+
+std::vector<glm::vec3> roots_of(const Groom& groom) {
+  std::vector<glm::vec3> roots(groom.strand_count());
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
+    roots[strand] = groom.rest_position_m[groom.offset[strand]];
+  return roots;
+}
+
+/// A mesh of the groom's file: the same unit, axes and origin.
+Result<Mesh> load_head_mesh(const SceneDesc& scene) {
+  const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
+  ASSIGN_OR_RETURN(Mesh mesh, load_obj(scene.head.mesh_path, 1.0f));
+  if (file == nullptr) return mesh;
+  const bool is_z_up = file->up_axis == UpAxis::Z;
+  const auto turn = [&](const glm::vec3& v) { return is_z_up ? glm::vec3(v.x, v.z, -v.y) : v; };
+  for (glm::vec3& position : mesh.position_m) position = (turn(position) - file->origin) * file->unit_m;
+  for (glm::vec3& normal : mesh.normal) normal = turn(normal);
+  return mesh;
+}
+
+Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom) {
+  if (!scene.head.is_visible) return Mesh{};
+  if (!scene.head.mesh_path.empty()) return load_head_mesh(scene);
+  if (std::holds_alternative<ProceduralGroomDesc>(scene.groom))
+    return make_head(scene.head.radius_m > 0.0f ? scene.head.radius_m : kDefaultHeadRadiusM);
+  // Under a groom from a file the built-in head is put where its roots are.
+  const FittedSphere fitted = fit_sphere(roots_of(groom));
+  Mesh mesh = make_head(scene.head.radius_m > 0.0f ? scene.head.radius_m : fitted.radius_m);
+  for (glm::vec3& position : mesh.position_m) position += fitted.center_m;
+  return mesh;
+}
+
+}  // namespace
+
+SphereCollider fit_head_collider(const Groom& groom) {
+  const std::vector<glm::vec3> roots = roots_of(groom);
+  const FittedSphere fitted = fit_sphere(roots);
+  std::vector<float> distance_m(roots.size());
+  std::transform(roots.begin(), roots.end(), distance_m.begin(),
+                 [&](const glm::vec3& root) { return glm::length(root - fitted.center_m); });
+  std::sort(distance_m.begin(), distance_m.end());
+  const auto index = static_cast<size_t>(kInsideQuantile * static_cast<double>(distance_m.size() - 1));
+  return {fitted.center_m, std::min(distance_m[index], fitted.radius_m) * kColliderScale};
+}
+
+Result<SceneContent> load_scene_content(const SceneDesc& scene) {
+  SceneContent content;
+  ASSIGN_OR_RETURN(content.groom, make_groom(scene));
+  ASSIGN_OR_RETURN(content.head, make_head_mesh(scene, content.groom));
+  content.colliders = scene.colliders;
+  if (content.colliders.empty() && scene.has_auto_collider)
+    content.colliders.push_back(fit_head_collider(content.groom));
+  return content;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,136 @@
+#include "server/scene/step_builder.h"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "common/base/hash.h"
+
+namespace strandcast {
+namespace {
+
+/// Bounds of the wave bands, m: from some head sizes down to a lock of hair.
+constexpr std::array kWavelengthBoundsM = {1.2, 0.7, 0.4, 0.24, 0.14};
+constexpr size_t kWaveCount = kWavelengthBoundsM.size() - 1;
+static_assert(kWaveCount <= kMaxGustWaves);
+/// In the von Karman spectrum of the along-wind component, S(k) ~ (1 + (1.339 k L)^2)^(-5/6), k in rad/m.
+constexpr double kVonKarmanFactor = 1.339;
+/// Integral of the normalised spectrum above k, where (1.339 k L)^2 >> 1: kTailFactor * (1.339 k L)^(-2/3).
+/// With S = (2 L / pi) (1 + (aLk)^2)^(-5/6) the tail integral is (2 / (pi a)) (3 / 2) (aLk)^(-2/3).
+constexpr double kTailFactor = 3.0 / (std::numbers::pi * kVonKarmanFactor);
+
+double wave_number(double wavelength_m) {
+  return 2.0 * std::numbers::pi / wavelength_m;
+}
+
+/// Part of the variance in wavelengths below `wavelength_m`.
+double variance_below(double wavelength_m, double length_m) {
+  return kTailFactor * std::pow(kVonKarmanFactor * wave_number(wavelength_m) * length_m, -2.0 / 3.0);
+}
+
+/// Uniform on the sphere (Archimedes: height and longitude are independent and uniform).
+glm::dvec3 random_direction(uint32_t seed, uint32_t index) {
+  const double height = 2.0 * unit_float(mix_u32(mix_u32(seed) ^ (2 * index))) - 1.0;
+  const double longitude = 2.0 * std::numbers::pi * unit_float(mix_u32(mix_u32(seed) ^ (2 * index + 1)));
+  const double radius = std::sqrt(1.0 - height * height);
+  return {radius * std::cos(longitude), height, radius * std::sin(longitude)};
+}
+
+}  // namespace
+
+std::vector<GustWave> make_gust_waves(const WindDesc& wind) {
+  const double mean_speed_mps = glm::length(glm::dvec3(wind.mean_mps));
+  const double deviation_mps = mean_speed_mps * wind.gust_intensity;
+  if (deviation_mps <= 0.0 || wind.gust_length_m <= 0.0f) return {};
+  std::vector<GustWave> waves;
+  for (size_t band = 0; band < kWaveCount; ++band) {
+    const double part = variance_below(kWavelengthBoundsM[band], wind.gust_length_m) -
+                        variance_below(kWavelengthBoundsM[band + 1], wind.gust_length_m);
+    // A sine of amplitude a has the variance a^2 / 2.
+    const double amplitude_mps = deviation_mps * std::sqrt(2.0 * part);
+    const auto index = static_cast<uint32_t>(band);
+    const glm::dvec3 along = random_direction(wind.seed, 2 * index);
+    const glm::dvec3 other = random_direction(wind.seed, 2 * index + 1);
+    const glm::dvec3 across = glm::cross(along, other);
+    if (glm::length(across) < 1e-3) continue;  // nearly parallel: no direction across the wave
+    const double wavelength_m = std::sqrt(kWavelengthBoundsM[band] * kWavelengthBoundsM[band + 1]);
+    GustWave wave;
+    wave.amplitude_mps = glm::vec3(amplitude_mps * glm::normalize(across));
+    wave.wave_vector_rad_per_m = glm::vec3(wave_number(wavelength_m) * along);
+    wave.phase_rad = 2.0f * std::numbers::pi_v<float> * unit_float(mix_u32(wind.seed ^ mix_u32(index + 100)));
+    waves.push_back(wave);
+  }
+  return waves;
+}
+
+StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders) {
+  change(scene, std::move(colliders));
+}
+
+void StepBuilder::change(const SceneDesc& scene, std::vector<SphereCollider> colliders) {
+  scene_ = scene;
+  colliders_ = std::move(colliders);
+  const WindDesc& wind = scene.wind;
+  gust_generator_.emplace(wind.mean_mps, wind.gust_intensity, wind.gust_length_m, wind.seed);
+  waves_ = make_gust_waves(wind);
+  step_.substeps.resize(scene.substeps);
+}
+
+void StepBuilder::set_wind(StepInput& substep, const InputFrame& input, const SceneFeatures& features,
+                           double time_s, const glm::dvec3& head_position_m) const {
+  substep.wind_mps = glm::dvec3(0.0);
+  substep.gusts.clear();
+  if (!features.has_wind) return;
+  if (input.has_wind_stream) {
+    substep.wind_mps = input.wind_mps;
+    return;
+  }
+  substep.wind_mps = gust_generator_->sample(time_s);
+  if (!features.has_turbulence) return;
+  const glm::dvec3 mean_mps = scene_.wind.mean_mps;
+  for (GustWave wave : waves_) {
+    // The waves stand still in air that moves with the mean wind; x counts from the head.
+    const glm::dvec3 k = wave.wave_vector_rad_per_m;
+    const double phase_rad = wave.phase_rad + glm::dot(k, mean_mps) * time_s - glm::dot(k, head_position_m);
+    wave.phase_rad = static_cast<float>(std::remainder(phase_rad, 2.0 * std::numbers::pi));
+    substep.gusts.push_back(wave);
+  }
+}
+
+const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures& features,
+                                    double end_time_s) {
+  const Pose target = input.has_motion ? input.world_from_head : world_from_head_;
+  Pose from = world_from_head_;
+  step_.rigid_turn.reset();
+  // The first pose is a jump too: until then the head stood at the origin.
+  if (input.has_motion && (input.has_teleported || !has_motion_)) {
+    step_.rigid_turn = target.rotation * glm::inverse(world_from_head_.rotation);
+    from = target;
+  }
+  has_motion_ = has_motion_ || input.has_motion;
+
+  const auto count = static_cast<double>(step_.substeps.size());
+  const double step_s = 1.0 / scene_.step_rate_hz;
+  Pose previous = from;
+  for (size_t i = 0; i < step_.substeps.size(); ++i) {
+    const double blend = static_cast<double>(i + 1) / count;
+    const Pose pose = i + 1 == step_.substeps.size() ? target : interpolate(from, target, blend);
+    StepInput& substep = step_.substeps[i];
+    substep.h_s = step_s / count;
+    substep.world_from_head = pose.rotation;
+    substep.head_shift_m = pose.position_m - previous.position_m;
+    substep.gravity_mps2 = scene_.gravity_mps2;
+    set_wind(substep, input, features, end_time_s - step_s * (1.0 - blend), pose.position_m);
+    substep.colliders.clear();
+    for (const SphereCollider& collider : colliders_)
+      substep.colliders.push_back(
+          {glm::vec3(pose.rotation * glm::dvec3(collider.center_m)), collider.radius_m});
+    previous = pose;
+  }
+  world_from_head_ = target;
+  step_.world_from_head = target;
+  return step_;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,54 @@
+// StepBuilder: turns the input at the end of a step into what each substep of the solver needs: head movement
+// and turn, wind and gusts, colliders in head-relative world axes. Simulation thread; deterministic.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/motion/motion_clip.h"
+#include "common/scene/features.h"
+#include "common/scene/scene_desc.h"
+#include "server/input/input_frame.h"
+#include "server/sim/solver.h"
+
+namespace strandcast {
+
+struct SceneStep {
+  Pose world_from_head;             // at the end of the step
+  std::vector<StepInput> substeps;  // scene.substeps of them
+  /// Set when the head jumped: strands are first turned by this, about the head joint, and move along
+  /// otherwise.
+  std::optional<glm::dquat> rigid_turn;
+};
+
+class StepBuilder {
+ public:
+  /// `colliders` in head space.
+  StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders);
+
+  /// Changed scene values; the head stays where it is.
+  void change(const SceneDesc& scene, std::vector<SphereCollider> colliders);
+
+  /// The step that ends at `end_time_s` of simulated time. Valid until the next call.
+  const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
+
+  const Pose& world_from_head() const { return world_from_head_; }
+
+ private:
+  void set_wind(StepInput& substep, const InputFrame& input, const SceneFeatures& features, double time_s,
+                const glm::dvec3& head_position_m) const;
+
+  SceneDesc scene_;
+  std::vector<SphereCollider> colliders_;
+  std::optional<GustGenerator> gust_generator_;
+  std::vector<GustWave> waves_;  // at time 0 with the head at the origin
+  Pose world_from_head_;
+  bool has_motion_ = false;
+  SceneStep step_;
+};
+
+/// Waves that vary the wind over the size of a head: the part of the turbulence (von Karman, inertial range)
+/// between their wavelengths, carried by the mean wind; each is divergence-free. Empty without gusts.
+std::vector<GustWave> make_gust_waves(const WindDesc& wind);
+
+}  // namespace strandcast

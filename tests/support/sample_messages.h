@@ -1,0 +1,64 @@
+// One message of every kind with every field away from its default, for wire tests.
+#pragma once
+
+#include <vector>
+
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+inline std::vector<ClientMessage> sample_client_messages() {
+  MotionSamples motion;
+  WindSamples wind;
+  for (int i = 0; i < 5; ++i) {
+    motion.samples.push_back({1'000 + i, {{0.1 * i, -2.0, 1e5}, {0.5, 0.5, -0.5, 0.5}}});
+    wind.samples.push_back({-7 + i, {1.5f * static_cast<float>(i), -3.0f, 0.25f}});
+  }
+  CameraChange camera;
+  camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
+  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360},
+          motion,
+          wind,
+          camera,
+          KeyframeRequest{},
+          FrameAck{4'000'000'000u, -5, 1234},
+          Ping{INT64_MIN},
+          ControlCommand{Command::Reset},
+          SetParameter{"solver.name=dftl"}};
+}
+
+inline std::vector<ServerMessage> sample_server_messages() {
+  Welcome welcome;
+  welcome.session_id = "0123456789abcdef";
+  welcome.server_version = "0.1.0";
+  welcome.scene_name = "walk";
+  welcome.mode = StreamMode::Frames;
+  welcome.mode_reason = "the viewer asked for frames";
+  welcome.codec = "delta";
+  welcome.strand_count = 2000;
+  welcome.vertex_count = 16;
+  welcome.bound_m = 2e-5f;
+  welcome.step_rate_hz = 120.0;
+  welcome.look.root_color = {0.5f, 0.25f, 0.0f};
+  welcome.look.followers = 7;
+  welcome.look.light_direction = {0.0f, -1.0f, 0.0f};
+  welcome.look.ambient = 0.0f;
+  welcome.camera.offset_m = {0.0f, 0.0f, 2.0f};
+  welcome.frame_width = 1280;
+  welcome.frame_height = 720;
+  ServerStatus status;
+  status.tick = 1ull << 40;
+  status.sim_ms = 2.5;
+  status.encode_ms = 0.5;
+  status.render_ms = 12.0;
+  status.realtime_factor = 0.99;
+  status.is_paused = true;
+  status.is_motion_stale = false;
+  status.viewer_count = 3;
+  status.dropped_frames = 17;
+  status.rejected_samples = 19;
+  return {welcome, Pong{1, -2, INT64_MAX}, status, Goodbye{"the server is shutting down"},
+          Notice{true, "unknown field 'x'"}};
+}
+
+}  // namespace strandcast

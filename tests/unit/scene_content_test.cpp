@@ -1,0 +1,85 @@
+// Loading what a scene names: grown and real grooms, the collider under them, and clear errors.
+#include "server/scene/scene_content.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+namespace strandcast {
+namespace {
+
+/// Part of the roots that lie inside the collider.
+double part_inside(const SceneContent& content) {
+  const SphereCollider& sphere = content.colliders.front();
+  uint32_t inside = 0;
+  for (uint32_t strand = 0; strand < content.groom.strand_count(); ++strand)
+    if (glm::length(content.groom.rest_position_m[content.groom.offset[strand]] - sphere.center_m) <
+        sphere.radius_m)
+      ++inside;
+  return static_cast<double>(inside) / content.groom.strand_count();
+}
+
+TEST(SceneContent, BuiltInSceneIsUniformAndRestsOnItsCollider) {
+  const SceneDesc scene = built_in_scene();
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok()) << content.error().to_string();
+  const auto& procedural = std::get<ProceduralGroomDesc>(scene.groom);
+  EXPECT_EQ(content->groom.strand_count(), procedural.strand_count);
+  EXPECT_EQ(content->groom.uniform_vertex_count(), procedural.vertex_count);
+  EXPECT_FALSE(content->head.triangle.empty());
+  ASSERT_EQ(content->colliders.size(), 1u);
+  EXPECT_NEAR(content->colliders[0].radius_m, scene.head.radius_m, 0.1f * scene.head.radius_m);
+  EXPECT_LT(part_inside(*content), 0.06);
+}
+
+TEST(SceneContent, OwnCollidersReplaceTheFittedOneAndNoneMeansNone) {
+  SceneDesc scene = built_in_scene();
+  scene.head.is_visible = false;
+  scene.colliders = {{glm::vec3(0.0f), 0.05f}, {glm::vec3(0.0f, -0.2f, 0.0f), 0.08f}};
+  auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  EXPECT_EQ(content->colliders.size(), 2u);
+  EXPECT_TRUE(content->head.triangle.empty());
+  scene.colliders.clear();
+  scene.has_auto_collider = false;
+  content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  EXPECT_TRUE(content->colliders.empty());
+}
+
+TEST(SceneContent, RealGroomGetsAHeadWhereItsRootsAre) {
+  const std::filesystem::path path =
+      std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/Ratboy_mohawk.tfx";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "needs the groom " << path;
+  SceneDesc scene = built_in_scene();
+  FileGroomDesc file;
+  file.path = path;
+  file.unit_m = 1.0f;
+  scene.groom = file;
+  scene.head.radius_m = 0.0f;
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok()) << content.error().to_string();
+  EXPECT_EQ(content->groom.strand_count(), 2'228u);
+  ASSERT_EQ(content->colliders.size(), 1u);
+  EXPECT_LT(part_inside(*content), 0.06);
+  ASSERT_FALSE(content->head.position_m.empty());
+}
+
+TEST(SceneContent, MissingFilesAreNamed) {
+  SceneDesc scene = built_in_scene();
+  FileGroomDesc file;
+  file.path = "no/such/groom.tfx";
+  scene.groom = file;
+  auto content = load_scene_content(scene);
+  ASSERT_FALSE(content.ok());
+  EXPECT_NE(content.error().to_string().find("groom.tfx"), std::string::npos);
+
+  scene = built_in_scene();
+  scene.head.mesh_path = "no/such/head.obj";
+  content = load_scene_content(scene);
+  ASSERT_FALSE(content.ok());
+  EXPECT_NE(content.error().to_string().find("head.obj"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,143 @@
+// What each substep gets: movement adds up, turns are shared out evenly, jumps move strands rigidly, and what
+// the scene does not need is absent.
+#include "server/scene/step_builder.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace strandcast {
+namespace {
+
+SceneDesc still_scene() {
+  SceneDesc scene = built_in_scene();
+  scene.wind.mean_mps = glm::vec3(0.0f);
+  scene.substeps = 4;
+  return scene;
+}
+
+InputFrame moved(const glm::dvec3& position_m, double turn_rad) {
+  InputFrame input;
+  input.has_motion = true;
+  input.world_from_head.position_m = position_m;
+  input.world_from_head.rotation = glm::angleAxis(turn_rad, glm::dvec3(0.0, 1.0, 0.0));
+  return input;
+}
+
+TEST(StepBuilder, SubstepsAddUpToTheHeadMovement) {
+  const SceneDesc scene = still_scene();
+  StepBuilder builder(scene, {});
+  builder.build(moved({1000.0, 0.0, 0.0}, 0.0), {}, 0.0);
+  const SceneStep& step = builder.build(moved({1000.1, 0.02, -0.03}, 0.4), {}, 1.0 / 60.0);
+  ASSERT_EQ(step.substeps.size(), 4u);
+  EXPECT_FALSE(step.rigid_turn.has_value());
+  glm::dvec3 shift_m(0.0);
+  double time_s = 0.0;
+  for (size_t i = 0; i < 4; ++i) {
+    shift_m += step.substeps[i].head_shift_m;
+    time_s += step.substeps[i].h_s;
+    const glm::dquat expected = glm::angleAxis(0.1 * static_cast<double>(i + 1), glm::dvec3(0.0, 1.0, 0.0));
+    EXPECT_NEAR(angle_between_rad(step.substeps[i].world_from_head, expected), 0.0, 1e-7);
+  }
+  EXPECT_NEAR(glm::length(shift_m - glm::dvec3(0.1, 0.02, -0.03)), 0.0, 1e-9);
+  EXPECT_NEAR(time_s, 1.0 / scene.step_rate_hz, 1e-12);
+}
+
+TEST(StepBuilder, JumpsAndTheFirstPoseMoveStrandsRigidly) {
+  StepBuilder builder(still_scene(), {});
+  const SceneStep& first = builder.build(moved({5.0, 0.0, 0.0}, 1.0), {}, 0.0);
+  ASSERT_TRUE(first.rigid_turn.has_value());
+  for (const StepInput& substep : first.substeps) EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
+  InputFrame jump = moved({-50.0, 3.0, 0.0}, 2.5);
+  jump.has_teleported = true;
+  const SceneStep& second = builder.build(jump, {}, 0.0);
+  ASSERT_TRUE(second.rigid_turn.has_value());
+  EXPECT_NEAR(angle_between_rad(*second.rigid_turn, glm::angleAxis(1.5, glm::dvec3(0.0, 1.0, 0.0))), 0.0,
+              1e-7);
+  for (const StepInput& substep : second.substeps) EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
+}
+
+TEST(StepBuilder, WithoutMotionTheHeadStaysWhereItWas) {
+  StepBuilder builder(still_scene(), {});
+  builder.build(moved({1.0, 2.0, 3.0}, 0.5), {}, 0.0);
+  InputFrame none;
+  const SceneStep& step = builder.build(none, {}, 0.0);
+  EXPECT_EQ(step.world_from_head.position_m, glm::dvec3(1.0, 2.0, 3.0));
+  for (const StepInput& substep : step.substeps) EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
+}
+
+TEST(StepBuilder, CollidersTurnWithTheHead) {
+  StepBuilder builder(still_scene(), {{glm::vec3(0.0f, 0.0f, 0.1f), 0.09f}});
+  const SceneStep& step = builder.build(moved({7.0, 0.0, 0.0}, std::numbers::pi / 2), {}, 0.0);
+  ASSERT_EQ(step.substeps.back().colliders.size(), 1u);
+  const SphereCollider& collider = step.substeps.back().colliders[0];
+  EXPECT_NEAR(glm::length(collider.center_m - glm::vec3(0.1f, 0.0f, 0.0f)), 0.0f, 1e-6f);
+  EXPECT_EQ(collider.radius_m, 0.09f);
+}
+
+TEST(StepBuilder, StreamReplacesSceneWindAndNoFactMeansNoWind) {
+  SceneDesc scene = still_scene();
+  scene.wind.mean_mps = {3.0f, 0.0f, 0.0f};
+  scene.wind.gust_intensity = 0.5f;
+  StepBuilder builder(scene, {});
+  InputFrame input;
+  const SceneStep& without = builder.build(input, SceneFeatures{}, 1.0);
+  EXPECT_EQ(without.substeps[0].wind_mps, glm::dvec3(0.0));
+  EXPECT_TRUE(without.substeps[0].gusts.empty());
+
+  const SceneStep& with = builder.build(input, analyse(scene, {}), 1.0);
+  EXPECT_GT(glm::length(with.substeps[0].wind_mps), 0.0);
+  EXPECT_FALSE(with.substeps[0].gusts.empty());
+
+  input.has_wind_stream = true;
+  input.wind_mps = {0.0f, 0.0f, -4.0f};
+  RuntimeFacts facts;
+  facts.has_wind_stream = true;
+  const SceneStep& streamed = builder.build(input, analyse(scene, facts), 1.0);
+  EXPECT_EQ(streamed.substeps[0].wind_mps, glm::dvec3(0.0, 0.0, -4.0));
+  EXPECT_TRUE(streamed.substeps[0].gusts.empty());
+}
+
+TEST(StepBuilder, GustWavesAreDivergenceFreeAndFixedInTheMovingAir) {
+  WindDesc wind;
+  wind.mean_mps = {2.0f, 0.0f, 1.0f};
+  wind.gust_intensity = 0.4f;
+  const std::vector<GustWave> waves = make_gust_waves(wind);
+  ASSERT_FALSE(waves.empty());
+  double variance = 0.0;
+  for (const GustWave& wave : waves) {
+    const double across = glm::dot(wave.amplitude_mps, wave.wave_vector_rad_per_m) /
+                          (glm::length(wave.amplitude_mps) * glm::length(wave.wave_vector_rad_per_m));
+    EXPECT_NEAR(across, 0.0, 1e-5);
+    variance += 0.5 * glm::dot(wave.amplitude_mps, wave.amplitude_mps);
+  }
+  const double deviation_mps = glm::length(wind.mean_mps) * wind.gust_intensity;
+  EXPECT_LT(variance, deviation_mps * deviation_mps) << "a part of the turbulence";
+
+  // A head that drifts with the mean wind always meets the same waves.
+  SceneDesc scene = still_scene();
+  scene.wind = wind;
+  scene.substeps = 1;
+  StepBuilder builder(scene, {});
+  const SceneFeatures features = analyse(scene, {});
+  const auto phases_at = [&](double time_s) {
+    const SceneStep& step = builder.build(moved(glm::dvec3(wind.mean_mps) * time_s, 0.0), features, time_s);
+    std::vector<float> phases;
+    for (const GustWave& wave : step.substeps[0].gusts) phases.push_back(wave.phase_rad);
+    return phases;
+  };
+  const std::vector<float> before = phases_at(1.0);
+  const std::vector<float> after = phases_at(21.7);
+  for (size_t i = 0; i < before.size(); ++i)
+    EXPECT_NEAR(std::remainder(after[i] - before[i], 2.0f * std::numbers::pi_v<float>), 0.0f, 1e-3f);
+}
+
+TEST(StepBuilder, GustWavesVanishWithoutWind) {
+  WindDesc wind;
+  EXPECT_TRUE(make_gust_waves(wind).empty());
+  wind.mean_mps = {1.0f, 0.0f, 0.0f};
+  EXPECT_TRUE(make_gust_waves(wind).empty()) << "steady";
+}
+
+}  // namespace
+}  // namespace strandcast

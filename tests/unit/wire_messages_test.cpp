@@ -1,0 +1,311 @@
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "common/codec/frame_header.h"
+#include "common/wire/clock_offset.h"
+#include "common/wire/messages.h"
+#include "tests/support/sample_messages.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+
+template <class Message>
+Message round_trip(const Message& message) {
+  const auto decoded = [&] {
+    if constexpr (std::is_constructible_v<ClientMessage, Message>)
+      return decode_client_message(encode(ClientMessage(message)));
+    else
+      return decode_server_message(encode(ServerMessage(message)));
+  }();
+  EXPECT_TRUE(decoded) << decoded.error().to_string();
+  if (!decoded || !std::holds_alternative<Message>(*decoded)) {
+    ADD_FAILURE() << "another kind of message came back";
+    return {};
+  }
+  return std::get<Message>(*decoded);
+}
+
+template <class Message>
+const Message& sample_of(const std::vector<ClientMessage>& messages) {
+  for (const auto& message : messages)
+    if (const auto* found = std::get_if<Message>(&message)) return *found;
+  throw std::logic_error("no such sample");
+}
+
+TEST(WireMessages, EncodingIsStableThroughARoundTrip) {
+  for (const auto& message : sample_client_messages()) {
+    const auto bytes = encode(message);
+    EXPECT_EQ(bytes[0], static_cast<std::byte>(Opcode::Control));
+    const auto decoded = decode_client_message(bytes);
+    ASSERT_TRUE(decoded) << decoded.error().to_string();
+    EXPECT_EQ(decoded->index(), message.index());
+    EXPECT_EQ(encode(*decoded), bytes);
+  }
+  for (const auto& message : sample_server_messages()) {
+    const auto bytes = encode(message);
+    const auto decoded = decode_server_message(bytes);
+    ASSERT_TRUE(decoded) << decoded.error().to_string();
+    EXPECT_EQ(decoded->index(), message.index());
+    EXPECT_EQ(encode(*decoded), bytes);
+  }
+}
+
+TEST(WireMessages, EveryFieldComesBack) {
+  const auto messages = sample_client_messages();
+  const auto hello = round_trip(sample_of<Hello>(messages));
+  EXPECT_EQ(hello.role, Role::Controller);
+  EXPECT_EQ(hello.mode, StreamMode::Auto);
+  EXPECT_EQ(hello.name, "Zoë");
+  EXPECT_EQ(hello.token, "secret");
+  EXPECT_EQ(hello.frame_width, 640u);
+  EXPECT_EQ(hello.frame_height, 360u);
+  const auto motion = round_trip(sample_of<MotionSamples>(messages));
+  ASSERT_EQ(motion.samples.size(), 5u);
+  EXPECT_EQ(motion.samples[4].time_ns, 1'004);
+  EXPECT_EQ(motion.samples[4].world_from_head, sample_of<MotionSamples>(messages).samples[4].world_from_head);
+  const auto wind = round_trip(sample_of<WindSamples>(messages));
+  ASSERT_EQ(wind.samples.size(), 5u);
+  EXPECT_EQ(wind.samples[4].time_ns, -3);
+  EXPECT_EQ(wind.samples[4].velocity_mps, glm::vec3(6.0f, -3.0f, 0.25f));
+  const auto camera = round_trip(sample_of<CameraChange>(messages)).camera;
+  EXPECT_EQ(camera.offset_m, glm::vec3(1.0f, 2.0f, -3.0f));
+  EXPECT_EQ(camera.target_m, glm::vec3(0.5f, 0.25f, 0.125f));
+  EXPECT_EQ(camera.fov_y_rad, 1.25f);
+  const auto ack = round_trip(sample_of<FrameAck>(messages));
+  EXPECT_EQ(ack.sequence, 4'000'000'000u);
+  EXPECT_EQ(ack.receive_time_ns, -5);
+  EXPECT_EQ(ack.decode_us, 1234u);
+  EXPECT_EQ(round_trip(Ping{INT64_MIN}).client_time_ns, INT64_MIN);
+  for (const Command command : {Command::Pause, Command::Resume, Command::StepOnce, Command::Reset})
+    EXPECT_EQ(round_trip(ControlCommand{command}).command, command);
+  for (const Role role : {Role::Viewer, Role::Controller, Role::Source}) {
+    Hello one;
+    one.role = role;
+    EXPECT_EQ(round_trip(one).role, role);
+  }
+  EXPECT_EQ(round_trip(SetParameter{"a.b=c"}).assignment, "a.b=c");
+}
+
+TEST(WireMessages, EveryServerFieldComesBack) {
+  const auto messages = sample_server_messages();
+  const auto& sent = std::get<Welcome>(messages[0]);
+  const Welcome welcome = round_trip(sent);
+  EXPECT_EQ(welcome.session_id, sent.session_id);
+  EXPECT_EQ(welcome.server_version, sent.server_version);
+  EXPECT_EQ(welcome.scene_name, sent.scene_name);
+  EXPECT_EQ(welcome.mode, sent.mode);
+  EXPECT_EQ(welcome.mode_reason, sent.mode_reason);
+  EXPECT_EQ(welcome.codec, sent.codec);
+  EXPECT_EQ(welcome.strand_count, sent.strand_count);
+  EXPECT_EQ(welcome.vertex_count, sent.vertex_count);
+  EXPECT_EQ(welcome.bound_m, sent.bound_m);
+  EXPECT_EQ(welcome.step_rate_hz, sent.step_rate_hz);
+  EXPECT_EQ(welcome.look.root_color, sent.look.root_color);
+  EXPECT_EQ(welcome.look.tip_color, sent.look.tip_color);
+  EXPECT_EQ(welcome.look.strand_radius_m, sent.look.strand_radius_m);
+  EXPECT_EQ(welcome.look.tip_scale, sent.look.tip_scale);
+  EXPECT_EQ(welcome.look.followers, sent.look.followers);
+  EXPECT_EQ(welcome.look.segments, sent.look.segments);
+  EXPECT_EQ(welcome.look.light_direction, sent.look.light_direction);
+  EXPECT_EQ(welcome.look.light_color, sent.look.light_color);
+  EXPECT_EQ(welcome.look.ambient, sent.look.ambient);
+  EXPECT_EQ(welcome.look.background, sent.look.background);
+  EXPECT_EQ(welcome.look.skin_color, sent.look.skin_color);
+  EXPECT_EQ(welcome.camera.offset_m, sent.camera.offset_m);
+  EXPECT_EQ(welcome.frame_width, sent.frame_width);
+  EXPECT_EQ(welcome.frame_height, sent.frame_height);
+  const Pong pong = round_trip(Pong{1, -2, INT64_MAX});
+  EXPECT_EQ(pong.client_time_ns, 1);
+  EXPECT_EQ(pong.server_receive_ns, -2);
+  EXPECT_EQ(pong.server_send_ns, INT64_MAX);
+  const auto& status = std::get<ServerStatus>(messages[2]);
+  const ServerStatus back = round_trip(status);
+  EXPECT_EQ(back.tick, status.tick);
+  EXPECT_EQ(back.sim_ms, status.sim_ms);
+  EXPECT_EQ(back.encode_ms, status.encode_ms);
+  EXPECT_EQ(back.render_ms, status.render_ms);
+  EXPECT_EQ(back.realtime_factor, status.realtime_factor);
+  EXPECT_EQ(back.is_paused, status.is_paused);
+  EXPECT_EQ(back.is_motion_stale, status.is_motion_stale);
+  EXPECT_EQ(back.viewer_count, status.viewer_count);
+  EXPECT_EQ(back.dropped_frames, status.dropped_frames);
+  EXPECT_EQ(back.rejected_samples, status.rejected_samples);
+  EXPECT_EQ(round_trip(Goodbye{"bye"}).reason, "bye");
+  EXPECT_TRUE(round_trip(Notice{true, "no"}).is_error);
+  EXPECT_EQ(round_trip(Notice{true, "no"}).text, "no");
+}
+
+TEST(WireMessages, ImpossiblePosesReachTheInputHubToBeCounted) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  MotionSamples motion;
+  motion.samples.push_back({1, {{nan, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}}});
+  motion.samples.push_back({0, {{1e300, 0.0, 0.0}, {nan, 0.0, INFINITY, 0.0}}});
+  const auto back = round_trip(motion);
+  ASSERT_EQ(back.samples.size(), 2u);
+  EXPECT_TRUE(std::isnan(back.samples[0].world_from_head.position_m.x));
+  EXPECT_EQ(back.samples[0].world_from_head.rotation.w, 0.0);
+  EXPECT_TRUE(std::isnan(back.samples[1].world_from_head.rotation.w));
+  WindSamples wind;
+  wind.samples.push_back({1, {std::numeric_limits<float>::quiet_NaN(), 0.0f, 0.0f}});
+  EXPECT_TRUE(std::isnan(round_trip(wind).samples[0].velocity_mps.x));
+}
+
+TEST(WireMessages, SamplesPerMessageLimitIsExactAndFitsTheByteLimit) {
+  MotionSamples motion;
+  motion.samples.resize(kMaxSamplesPerMessage, {INT64_MAX, {glm::dvec3(1e300), {1.0, 2.0, 3.0, 4.0}}});
+  EXPECT_LE(encode(ClientMessage(motion)).size(), kMaxControlBytes);
+  EXPECT_EQ(round_trip(motion).samples.size(), kMaxSamplesPerMessage);
+  motion.samples.emplace_back();
+  const auto refused = decode_client_message(encode(ClientMessage(motion)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(refused.error().place, "motion.samples");
+  WindSamples wind;
+  wind.samples.resize(kMaxSamplesPerMessage + 1);
+  EXPECT_EQ(decode_client_message(encode(ClientMessage(wind))).error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(WireMessages, WhatEncodeMakesOfAnyTextDecodes) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 300; ++trial) {
+    std::string text(random() % 3000, ' ');
+    for (char& character : text) character = static_cast<char>(random());
+    EXPECT_TRUE(decode_server_message(encode(ServerMessage(Goodbye{text}))));
+    EXPECT_TRUE(decode_server_message(encode(ServerMessage(Notice{false, text}))));
+    Hello hello;
+    hello.name = text;
+    EXPECT_TRUE(decode_client_message(encode(ClientMessage(hello))));
+  }
+  EXPECT_EQ(round_trip(Goodbye{"line\nbreak \xff end"}).reason, "line break ? end");
+  const std::string longest(kMaxTextChars, 'a');
+  Goodbye too_long;
+  too_long.reason = longest;
+  too_long.reason.push_back('b');
+  EXPECT_EQ(round_trip(too_long).reason, longest);
+  std::string long_name;
+  for (size_t i = 0; i < kMaxNameChars; ++i) long_name += "é";  // two bytes each: the limit counts characters
+  Hello hello;
+  hello.name = long_name + "é";
+  EXPECT_EQ(round_trip(hello).name, long_name);
+}
+
+Result<ServerMessage> send_welcome(const std::function<void(Welcome&)>& change) {
+  auto welcome = std::get<Welcome>(sample_server_messages()[0]);
+  change(welcome);
+  return decode_server_message(encode(ServerMessage(welcome)));
+}
+
+TEST(WireMessages, WelcomeFieldsOutOfRangeAreNamed) {
+  ASSERT_TRUE(send_welcome([](Welcome&) {}));
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<std::pair<std::string, std::function<void(Welcome&)>>> changes = {
+      {"welcome.session_id", [](Welcome& w) { w.session_id = "0123456789ABCDEF"; }},
+      {"welcome.session_id", [](Welcome& w) { w.session_id.pop_back(); }},
+      {"welcome.mode", [](Welcome& w) { w.mode = StreamMode::Auto; }},
+      {"welcome.codec", [](Welcome& w) { w.codec = std::string(65, 'x'); }},
+      {"welcome.strand_count", [](Welcome& w) { w.strand_count = 0; }},
+      {"welcome.strand_count", [](Welcome& w) { w.strand_count = kMaxStrandCount + 1; }},
+      {"welcome.vertex_count", [](Welcome& w) { w.vertex_count = 1; }},
+      {"welcome.vertex_count", [](Welcome& w) { w.vertex_count = 65; }},
+      {"welcome.bound_m", [](Welcome& w) { w.bound_m = 0.0f; }},
+      {"welcome.bound_m", [&](Welcome& w) { w.bound_m = nan; }},
+      {"welcome.step_rate_hz", [](Welcome& w) { w.step_rate_hz = 1e9; }},
+      {"welcome.frame_width", [](Welcome& w) { w.frame_width = 4097; }},
+      {"welcome.frame_height", [](Welcome& w) { w.frame_height = 1; }},
+      {"look.root_color", [&](Welcome& w) { w.look.root_color.y = nan; }},
+      {"look.segments", [](Welcome& w) { w.look.segments = 9; }},
+      {"look.followers", [](Welcome& w) { w.look.followers = 1000; }},
+      {"look.light_direction", [](Welcome& w) { w.look.light_direction = glm::vec3(0.0f); }},
+      {"camera.offset_m", [](Welcome& w) { w.camera.offset_m = glm::vec3(0.0f); }},
+      {"camera.target_m", [](Welcome& w) { w.camera.target_m.z = 1e9f; }},
+      {"camera.fov_y_rad", [&](Welcome& w) { w.camera.fov_y_rad = nan; }},
+  };
+  for (const auto& [field, change] : changes) {
+    const auto refused = send_welcome(change);
+    ASSERT_FALSE(refused) << field;
+    EXPECT_EQ(refused.error().place, field);
+  }
+}
+
+TEST(WireMessages, StatusNumbersMustBeFinite) {
+  ServerStatus status;
+  status.realtime_factor = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(decode_server_message(encode(ServerMessage(status))).error().place, "status.realtime_factor");
+  status.realtime_factor = -1.0;
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(status))));
+}
+
+TEST(WireMessages, ClientLimitsAreExact) {
+  Hello hello;
+  hello.token = std::string(kMaxTokenBytes, 't');
+  EXPECT_TRUE(decode_client_message(encode(ClientMessage(hello))));
+  hello.token += 't';
+  const auto refused = decode_client_message(encode(ClientMessage(hello)));
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_THAT(refused.error().to_string(), testing::Not(HasSubstr("ttt")));  // tokens are never printed
+  SetParameter parameter{std::string(kMaxAssignmentBytes, 'a')};
+  EXPECT_TRUE(decode_client_message(encode(ClientMessage(parameter))));
+  parameter.assignment += 'a';
+  EXPECT_EQ(decode_client_message(encode(ClientMessage(parameter))).error().code, ErrorCode::LimitExceeded);
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(SetParameter{"a\nb"}))));
+}
+
+constexpr int64_t kMs = 1'000'000;
+
+TEST(ClockOffset, SymmetricPathsGiveTheExactOffset) {
+  for (const int64_t truth_ns : {int64_t{0}, int64_t{-3'600'000} * kMs, int64_t{7} * kMs}) {
+    ClockOffset clock;
+    EXPECT_FALSE(clock.has_value());
+    clock.add(100 * kMs, 105 * kMs + truth_ns, 108 * kMs + truth_ns, 113 * kMs);
+    ASSERT_TRUE(clock.has_value());
+    EXPECT_EQ(clock.offset_ns(), truth_ns);
+    EXPECT_EQ(clock.error_ns(), 5 * kMs);
+    EXPECT_EQ(clock.to_server_ns(1), truth_ns + 1);
+  }
+}
+
+TEST(ClockOffset, ErrorStaysBelowHalfTheBestRoundTripForAnyDelays) {
+  std::mt19937_64 random(9);
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto truth_ns = static_cast<int64_t>(random() % 1'000'000'000'000);
+    ClockOffset clock;
+    for (int probe = 0; probe < 20; ++probe) {
+      const auto there_ns = static_cast<int64_t>(random() % (50 * kMs));
+      const auto held_ns = static_cast<int64_t>(random() % kMs);
+      const auto back_ns = static_cast<int64_t>(random() % (50 * kMs));
+      const int64_t send_ns = probe * 100 * kMs;
+      clock.add(send_ns, send_ns + there_ns + truth_ns, send_ns + there_ns + held_ns + truth_ns,
+                send_ns + there_ns + held_ns + back_ns);
+      EXPECT_LE(std::abs(clock.offset_ns() - truth_ns), clock.error_ns());
+    }
+  }
+}
+
+TEST(ClockOffset, KeepsTheBestProbeOfTheWindowOnly) {
+  ClockOffset clock;
+  clock.add(0, 1, 1, 2);  // excellent, but soon out of date
+  for (size_t i = 0; i + 1 < kClockWindow; ++i) clock.add(0, 50 * kMs, 50 * kMs, 90 * kMs);
+  EXPECT_EQ(clock.error_ns(), 1);
+  clock.add(0, 50 * kMs, 50 * kMs, 90 * kMs);
+  EXPECT_EQ(clock.error_ns(), 45 * kMs);
+}
+
+TEST(ClockOffset, IgnoresImpossibleProbes) {
+  ClockOffset clock;
+  clock.add(10, 0, 0, 5);                 // received before sent
+  clock.add(0, 5, 4, 10);                 // server runs backwards
+  clock.add(0, 0, 20, 10);                // held longer than the round trip
+  clock.add(0, 0, 0, 10'000'000'001);     // above 10 s
+  clock.add(INT64_MIN, 0, 0, INT64_MAX);  // does not fit
+  clock.add(0, INT64_MIN, INT64_MAX, 10);
+  clock.add(INT64_MAX - 1, INT64_MIN, INT64_MIN, INT64_MAX);
+  EXPECT_FALSE(clock.has_value());
+  clock.add(0, INT64_MAX, INT64_MAX, 2);  // far apart, but it fits
+  EXPECT_TRUE(clock.has_value());
+}
+
+}  // namespace
+}  // namespace strandcast
