@@ -23,12 +23,17 @@ struct Image {
   bool operator==(const Image&) const = default;
 };
 
-/// quality 1..100, 4:2:0.
+/// quality 1..100, 4:2:0; alpha is dropped. BadInput for an empty image or one whose sizes disagree, LimitExceeded
+/// above kMaxImageSide.
 Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality);
-/// Untrusted input: size is read from the header and checked against kMaxImageSide before allocation.
+/// Untrusted input: size is read from the header and checked against kMaxImageSide before allocation; damaged or
+/// cut-off pictures are BadInput.
 Result<Image> decode_jpeg(std::span<const std::byte> bytes);
 
+inline constexpr uint64_t kMaxPngFileBytes = 256ull << 20;
+
 Status save_png(const std::filesystem::path& path, const Image& image);
+/// Untrusted input like decode_jpeg; errors name the file.
 Result<Image> load_png(const std::filesystem::path& path);
 
 /// Writes an animated WebP frame by frame; all frames have the size of the first.

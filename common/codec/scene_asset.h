@@ -14,6 +14,9 @@
 
 namespace strandcast {
 
+inline constexpr uint32_t kMaxTrianglesPerStrand = 4;
+inline constexpr uint32_t kMaxMeshVertices = 3 * kMaxMeshTriangles;
+
 struct SceneAsset {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;               // per strand
@@ -22,12 +25,13 @@ struct SceneAsset {
   Mesh head;                               // may be empty
 };
 
-/// From a uniform groom.
+/// From a uniform groom and a head mesh with one normal per vertex.
 SceneAsset make_scene_asset(const Groom& groom, Mesh head);
 
+/// Payload of an Asset message.
 std::vector<std::byte> encode_scene_asset(const SceneAsset& asset);
 
-/// BadInput or LimitExceeded; every index is checked against its array.
+/// Untrusted input. BadInput or LimitExceeded: every number is checked to be finite, every index against its array.
 Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload);
 
 }  // namespace strandcast

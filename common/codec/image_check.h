@@ -1,0 +1,12 @@
+// Checks shared by the picture writers and readers. Private to common/codec.
+#pragma once
+
+#include "common/codec/image_codec.h"
+
+namespace strandcast {
+
+/// BadInput for empty pictures and sizes that disagree, LimitExceeded above kMaxImageSide.
+Status check_image(const Image& image);
+Status check_image_size(uint64_t width, uint64_t height);
+
+}  // namespace strandcast
