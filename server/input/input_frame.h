@@ -9,14 +9,16 @@
 namespace strandcast {
 
 struct InputFrame {
-  Pose world_from_head;          // resampled to the asked time
-  glm::vec3 wind_mps{0.0f};      // valid when has_wind_stream
-  bool has_motion = false;       // a motion sample was ever accepted
+  Pose world_from_head;      // resampled to the asked time
+  glm::vec3 wind_mps{0.0f};  // valid when has_wind_stream
+  bool has_motion = false;   // a motion sample was ever used
   bool has_wind_stream = false;
-  bool is_motion_stale = true;   // none accepted for kMotionStaleS
-  bool has_teleported = false;   // the pose jumped since the last frame: strands follow rigidly
-  int64_t motion_time_ns = 0;    // server clock at arrival of the newest sample used, 0 = none
-  uint64_t rejected_samples = 0; // since start
+  bool is_motion_stale = true;    // none accepted for kMotionStaleNs (input_hub.h)
+  bool has_teleported = false;    // the pose jumped since the last frame: strands follow rigidly
+  int64_t motion_time_ns = 0;     // server clock at arrival of the newest sample used, 0 = none
+  uint64_t rejected_samples = 0;  // since start
+
+  bool operator==(const InputFrame&) const = default;
 };
 
 }  // namespace strandcast

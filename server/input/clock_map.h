@@ -1,0 +1,45 @@
+// Maps one source's clock to the server's from one-way traffic. Pure arithmetic; not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace strandcast {
+
+inline constexpr int64_t kNsPerSecond = 1'000'000'000;
+inline constexpr int64_t kClockWindowS = 10;
+
+/// The fastest sample on its way within the last kClockWindowS tells the offset best: arrival minus sample
+/// time is clock offset plus delay, and only the delay varies. Its smallest value removes the jitter and
+/// leaves the smallest delay, so that samples never map after their arrival. The window lets slow clock drift
+/// be followed.
+class ClockMap {
+ public:
+  /// Notes a sample; `arrival_ns` never decreases.
+  void add(int64_t sample_ns, int64_t arrival_ns) {
+    const int64_t second = arrival_ns / kNsPerSecond;
+    Bucket& bucket =
+        buckets_[static_cast<size_t>(((second % kClockWindowS) + kClockWindowS) % kClockWindowS)];
+    const int64_t difference_ns = arrival_ns - sample_ns;
+    if (!bucket.is_used || bucket.second != second || difference_ns < bucket.smallest_ns)
+      bucket = {true, second, difference_ns};
+    offset_ns_ = difference_ns;
+    for (const Bucket& other : buckets_)
+      if (other.is_used && second - other.second < kClockWindowS && other.smallest_ns < offset_ns_)
+        offset_ns_ = other.smallest_ns;
+  }
+  /// Server clock minus source clock, ns.
+  int64_t offset_ns() const { return offset_ns_; }
+  int64_t to_source_ns(int64_t server_ns) const { return server_ns - offset_ns_; }
+
+ private:
+  struct Bucket {
+    bool is_used = false;
+    int64_t second = 0;
+    int64_t smallest_ns = 0;
+  };
+  std::array<Bucket, kClockWindowS> buckets_{};
+  int64_t offset_ns_ = 0;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,218 @@
+#include "server/input/input_hub.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace strandcast {
+namespace {
+
+constexpr double kSecondsPerNs = 1e-9;
+
+bool is_possible(const Pose& pose) {
+  if (!is_finite(pose)) return false;
+  const double norm = glm::length(pose.rotation);
+  return norm >= kMinQuaternionNorm && norm <= kMaxQuaternionNorm &&
+         glm::length(pose.position_m) <= kMaxHeadDistanceM;
+}
+
+bool is_possible(const glm::dvec3& wind_mps) {
+  // Also false for NaN, which compares false.
+  return glm::length(wind_mps) <= kMaxWindStreamMps;
+}
+
+/// True when going from a to b in `duration_s` is faster than any head.
+bool is_teleport(const Pose& a, const Pose& b, double duration_s) {
+  return glm::distance(a.position_m, b.position_m) > kTeleportSpeedMps * duration_s ||
+         angle_between_rad(a.rotation, b.rotation) > kTeleportTurnRadPerS * duration_s;
+}
+
+bool is_teleport(const TimedSample<Pose>& a, const TimedSample<Pose>& b) {
+  const double apart_s = static_cast<double>(b.time_ns - a.time_ns) * kSecondsPerNs;
+  return is_teleport(a.value, b.value, std::max(apart_s, kTeleportShortestS));
+}
+
+/// How far `time_ns` lies from one sample to the next, 0..1; it is not before the first.
+template <class Sample>
+double blend_at(const Sample& before, const Sample& after, int64_t time_ns) {
+  const double whole = static_cast<double>(after.time_ns - before.time_ns);
+  return std::clamp(static_cast<double>(time_ns - before.time_ns) / whole, 0.0, 1.0);
+}
+
+/// A time that cannot overflow when the offset is taken from it.
+int64_t bounded(int64_t time_ns) {
+  return std::clamp(time_ns, -kMaxSampleTimeNs, kMaxSampleTimeNs);
+}
+
+}  // namespace
+
+template <class Value>
+bool InputHub::take_allowance(Stream<Value>& stream, uint64_t source_id, int64_t arrival_ns) {
+  auto found = stream.allowances.find(source_id);
+  if (found == stream.allowances.end()) {
+    if (stream.allowances.size() >= kMaxInputSources) return false;
+    found = stream.allowances.emplace(source_id, Allowance{kMaxSampleBurst, arrival_ns}).first;
+  }
+  Allowance& allowance = found->second;
+  const double gained =
+      static_cast<double>(arrival_ns - allowance.updated_ns) * kSecondsPerNs * kMaxSampleRateHz;
+  allowance.samples = std::min(kMaxSampleBurst, allowance.samples + gained);
+  allowance.updated_ns = arrival_ns;
+  if (allowance.samples < 1.0) return false;
+  allowance.samples -= 1.0;
+  return true;
+}
+
+template <class Value>
+void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSample<Value>& sample,
+                      int64_t stale_ns) {
+  if (stream.owner != source_id) {
+    if (stream.owner && sample.arrival_ns - stream.accepted_ns <= stale_ns) {
+      ++counters_.not_owner;
+      return;
+    }
+    stream.owner = source_id;
+    stream.clock = {};
+    stream.track.clear();
+  }
+  // A step of the source's clock: late samples would be refused for ever, or the mapping would be off by the
+  // step.
+  if (!stream.track.samples().empty()) {
+    const auto& newest = stream.track.samples().back();
+    const int64_t passed_ns = sample.arrival_ns - newest.arrival_ns;
+    const int64_t stepped_ns = sample.time_ns - newest.time_ns;
+    if (stepped_ns < -kClockJumpNs || stepped_ns > passed_ns + kClockJumpNs) {
+      stream.clock = {};
+      stream.track.clear();
+      ++counters_.clock_restarts;
+    }
+  }
+  switch (stream.track.insert(sample)) {
+    case InsertOutcome::Late:
+      ++counters_.late;
+      return;
+    case InsertOutcome::Duplicate:
+      ++counters_.duplicate;
+      return;
+    case InsertOutcome::Accepted:
+      break;
+  }
+  stream.clock.add(sample.time_ns, sample.arrival_ns);
+  stream.accepted_ns = sample.arrival_ns;
+  ++counters_.accepted;
+}
+
+void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns) {
+  const std::lock_guard lock(mutex_);
+  newest_arrival_ns_ = std::max(newest_arrival_ns_, bounded(arrival_ns));
+  for (const MotionSamples::Sample& sample : samples.samples) {
+    if (!take_allowance(motion_, source_id, newest_arrival_ns_)) {
+      ++counters_.over_rate;
+    } else if (!is_possible(sample.world_from_head) || bounded(sample.time_ns) != sample.time_ns) {
+      ++counters_.impossible;
+    } else {
+      Pose pose = sample.world_from_head;
+      pose.rotation = glm::normalize(pose.rotation);
+      accept(motion_, source_id, {sample.time_ns, newest_arrival_ns_, pose}, kMotionStaleNs);
+    }
+  }
+}
+
+void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
+  const std::lock_guard lock(mutex_);
+  newest_arrival_ns_ = std::max(newest_arrival_ns_, bounded(arrival_ns));
+  for (const WindSamples::Sample& sample : samples.samples) {
+    const glm::dvec3 velocity_mps = sample.velocity_mps;
+    if (!take_allowance(wind_, source_id, newest_arrival_ns_))
+      ++counters_.over_rate;
+    else if (!is_possible(velocity_mps) || bounded(sample.time_ns) != sample.time_ns)
+      ++counters_.impossible;
+    else
+      accept(wind_, source_id, {sample.time_ns, newest_arrival_ns_, velocity_mps}, kWindStaleNs);
+  }
+}
+
+template <class Value>
+void InputHub::forget(Stream<Value>& stream, uint64_t source_id) {
+  stream.allowances.erase(source_id);
+  if (stream.owner != source_id) return;
+  stream.owner.reset();
+  stream.track.clear();
+  stream.clock = {};
+}
+
+void InputHub::remove_source(uint64_t source_id) {
+  const std::lock_guard lock(mutex_);
+  forget(motion_, source_id);
+  forget(wind_, source_id);
+}
+
+/// Moves the frame's pose to the asked time; true when a jump between samples was passed on the way.
+bool InputHub::update_pose(int64_t server_time_ns) {
+  const auto& samples = motion_.track.samples();
+  if (samples.empty()) return false;
+  const int64_t time_ns = motion_.clock.to_source_ns(server_time_ns);
+  const size_t index = motion_.track.index_at(time_ns);
+  bool has_jumped = false;
+  // Everything older than the last frame's sample is gone from the track, so this looks at each pair once.
+  for (size_t i = 0; i < index; ++i) has_jumped = has_jumped || is_teleport(samples[i], samples[i + 1]);
+
+  const bool interpolates = index + 1 < samples.size() && time_ns > samples[index].time_ns &&
+                            !is_teleport(samples[index], samples[index + 1]);
+  const size_t newest = interpolates ? index + 1 : index;
+  Pose pose = samples[index].value;
+  if (interpolates)
+    pose = interpolate(pose, samples[newest].value, blend_at(samples[index], samples[newest], time_ns));
+  // Both signs are the same rotation; consecutive frames keep to one so that their difference is small.
+  if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
+  frame_.world_from_head = pose;
+  frame_.motion_time_ns = samples[newest].arrival_ns;
+  motion_.track.use(index, newest);
+  return has_jumped;
+}
+
+void InputHub::finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped) {
+  const double passed_s = last_frame_ns_
+                              ? static_cast<double>(server_time_ns - *last_frame_ns_) * kSecondsPerNs
+                              : kTeleportShortestS;
+  const double travel_s = std::clamp(passed_s, kTeleportShortestS, kTeleportLongestS);
+  frame_.has_teleported = has_jumped || is_teleport(before, frame_.world_from_head, travel_s);
+  if (frame_.has_teleported) ++counters_.teleports;
+}
+
+InputFrame InputHub::sample(int64_t server_time_ns) {
+  const std::lock_guard lock(mutex_);
+  const int64_t now_ns = bounded(server_time_ns);
+  const Pose before = frame_.world_from_head;
+  const bool is_first = !frame_.has_motion && !motion_.track.samples().empty();
+  const bool has_jumped = update_pose(now_ns);
+  frame_.has_motion = frame_.has_motion || is_first;
+  // The first pose replaces none: strands must not be dragged there from the origin.
+  finish_teleport_check(before, now_ns, has_jumped || is_first);
+  frame_.is_motion_stale = !motion_.owner || now_ns - motion_.accepted_ns > kMotionStaleNs;
+
+  const auto& winds = wind_.track.samples();
+  frame_.has_wind_stream = !winds.empty() && now_ns - wind_.accepted_ns <= kWindStaleNs;
+  if (frame_.has_wind_stream) {
+    const int64_t time_ns = wind_.clock.to_source_ns(now_ns);
+    const size_t index = wind_.track.index_at(time_ns);
+    const bool interpolates = index + 1 < winds.size() && time_ns > winds[index].time_ns;
+    const size_t newest = interpolates ? index + 1 : index;
+    const double blend = interpolates ? blend_at(winds[index], winds[newest], time_ns) : 0.0;
+    frame_.wind_mps = glm::mix(winds[index].value, winds[newest].value, blend);
+    wind_.track.use(index, newest);
+  } else {
+    frame_.wind_mps = glm::vec3(0.0f);
+  }
+  frame_.rejected_samples = counters_.rejected();
+  last_frame_ns_ = now_ns;
+  return frame_;
+}
+
+InputCounters InputHub::counters() const {
+  const std::lock_guard lock(mutex_);
+  InputCounters counters = counters_;
+  counters.dropped_oldest = motion_.track.dropped() + wind_.track.dropped();
+  return counters;
+}
+
+}  // namespace strandcast

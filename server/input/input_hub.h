@@ -1,0 +1,117 @@
+// InputHub: merges head motion and wind from any number of network sources into one InputFrame per simulation
+// step. Any thread may call any function; each holds one short lock. Does no I/O, reads no clock and never
+// waits: the same calls give the same frames.
+//
+// Policy (the numbers are the constants below):
+// * A source's clock is mapped to the server's by the fastest sample of the last 10 s (clock_map.h), so
+// network jitter
+//   does not reach the hair. A source clock that steps by more than kClockJumpNs starts a new mapping.
+// * One source at a time drives the head, and one the wind: the first that sends a possible sample, until it
+// is removed
+//   or has been silent for kMotionStaleNs / kWindStaleNs. Samples of others are refused meanwhile.
+// * Between two samples the pose is interpolated (lerp, slerp); when none is later the newest is held, so
+// that live
+//   feeding adds no delay. Without motion for kMotionStaleNs the frame says so and the last pose stays.
+//   Without wind for kWindStaleNs the scene's own wind returns.
+// * Refused and counted: samples not newer than the newest one used, duplicates, impossible values, more than
+//   kMaxSampleRateHz per source and kind, more than kMaxInputSources sources. Buffers are bounded; the oldest
+//   samples go first.
+// * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples, or between frames, is carried
+// out in one
+//   frame, flagged as a teleport and never interpolated.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+
+#include "common/wire/messages.h"
+#include "server/input/clock_map.h"
+#include "server/input/input_frame.h"
+#include "server/input/sample_track.h"
+
+namespace strandcast {
+
+inline constexpr int64_t kMotionStaleNs = 1'000'000'000;
+inline constexpr int64_t kWindStaleNs = 3'000'000'000;
+inline constexpr int64_t kClockJumpNs = 1'000'000'000;
+inline constexpr int64_t kMaxSampleTimeNs = int64_t{1} << 61;  // 73 years either way: no difference overflows
+inline constexpr double kMinQuaternionNorm = 0.5, kMaxQuaternionNorm = 2.0;
+inline constexpr double kMaxHeadDistanceM = 1e4;
+inline constexpr double kMaxWindStreamMps = 200.0;
+inline constexpr double kTeleportSpeedMps = 50.0;
+inline constexpr double kTeleportTurnRadPerS = 100.0;
+inline constexpr double kTeleportShortestS = 1e-3;  // closer samples count as this far apart
+inline constexpr double kTeleportLongestS = 0.1;    // a pause between frames is not time to travel in
+inline constexpr double kMaxSampleRateHz = 1000.0;
+inline constexpr double kMaxSampleBurst = 1000.0;  // samples at once, after a second of silence
+inline constexpr size_t kMaxInputSources = 64;
+
+/// What happened to samples since the start.
+struct InputCounters {
+  uint64_t accepted = 0;
+  uint64_t late = 0;
+  uint64_t duplicate = 0;
+  uint64_t impossible = 0;
+  uint64_t over_rate = 0;
+  uint64_t not_owner = 0;       // another source drives the head or the wind
+  uint64_t dropped_oldest = 0;  // accepted, but pushed out of a full buffer
+  uint64_t clock_restarts = 0;
+  uint64_t teleports = 0;  // frames flagged
+
+  uint64_t rejected() const { return late + duplicate + impossible + over_rate + not_owner; }
+};
+
+class InputHub {
+ public:
+  /// Takes samples of one message; `source_id` is the session's, `arrival_ns` the server clock when it was
+  /// read.
+  void push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
+  void push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
+
+  /// Forgets a source. The head keeps its last pose (stale at once); the scene's own wind returns.
+  void remove_source(uint64_t source_id);
+
+  /// The inputs at a server time, for one simulation step. `motion_time_ns` of the frame is the server's
+  /// clock at the arrival of the newest motion sample used, so that a viewer can tell its age through the
+  /// whole pipeline.
+  InputFrame sample(int64_t server_time_ns);
+
+  InputCounters counters() const;
+
+ private:
+  /// Samples a source may still send: a bucket that fills at kMaxSampleRateHz.
+  struct Allowance {
+    double samples = kMaxSampleBurst;
+    int64_t updated_ns = 0;
+  };
+
+  template <class Value>
+  struct Stream {
+    std::optional<uint64_t> owner;
+    int64_t accepted_ns = 0;  // arrival of the newest accepted sample
+    ClockMap clock;
+    SampleTrack<Value> track;
+    std::map<uint64_t, Allowance> allowances;  // by source
+  };
+
+  template <class Value>
+  void accept(Stream<Value>& stream, uint64_t source_id, const TimedSample<Value>& sample, int64_t stale_ns);
+  template <class Value>
+  bool take_allowance(Stream<Value>& stream, uint64_t source_id, int64_t arrival_ns);
+  template <class Value>
+  void forget(Stream<Value>& stream, uint64_t source_id);
+  bool update_pose(int64_t server_time_ns);
+  void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
+
+  mutable std::mutex mutex_;
+  Stream<Pose> motion_;
+  Stream<glm::dvec3> wind_;
+  int64_t newest_arrival_ns_ = 0;
+  std::optional<int64_t> last_frame_ns_;
+  InputFrame frame_;  // the last one given out
+  InputCounters counters_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,362 @@
+#include "server/input/input_hub.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <thread>
+
+namespace strandcast {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kStart = 5'000'000 * kMs;  // some server time
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+Pose pose_at(double x_m, double yaw_rad = 0.0) {
+  return {{x_m, 0.0, 0.0}, glm::angleAxis(yaw_rad, glm::dvec3(0, 1, 0))};
+}
+
+MotionSamples motion(int64_t time_ns, const Pose& pose) {
+  return {{{time_ns, pose}}};
+}
+WindSamples wind(int64_t time_ns, const glm::vec3& velocity_mps) {
+  return {{{time_ns, velocity_mps}}};
+}
+
+TEST(InputHub, StartsWithoutMotionOrWind) {
+  InputHub hub;
+  const InputFrame frame = hub.sample(kStart);
+  EXPECT_FALSE(frame.has_motion);
+  EXPECT_FALSE(frame.has_wind_stream);
+  EXPECT_TRUE(frame.is_motion_stale);
+  EXPECT_FALSE(frame.has_teleported);
+  EXPECT_EQ(frame.motion_time_ns, 0);
+  EXPECT_EQ(frame.world_from_head, Pose{});
+}
+
+TEST(InputHub, HoldsTheNewestSampleWithoutDelay) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  hub.push(1, motion(10 * kMs, pose_at(0.1)), kStart + 10 * kMs);
+  const InputFrame frame = hub.sample(kStart + 10 * kMs);
+  EXPECT_EQ(frame.world_from_head, pose_at(0.1));
+  EXPECT_EQ(frame.motion_time_ns, kStart + 10 * kMs) << "arrival of the newest sample used";
+  EXPECT_EQ(hub.sample(kStart + 300 * kMs).world_from_head, pose_at(0.1));
+  EXPECT_EQ(hub.sample(kStart + 300 * kMs).motion_time_ns, kStart + 10 * kMs);
+}
+
+TEST(InputHub, InterpolatesBetweenSamples) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0, 0.0)), kStart);
+  hub.push(1, motion(20 * kMs, pose_at(0.2, 0.4)), kStart + 20 * kMs);
+  const InputFrame frame = hub.sample(kStart + 5 * kMs);
+  EXPECT_NEAR(frame.world_from_head.position_m.x, 0.05, 1e-12);
+  EXPECT_NEAR(angle_between_rad(frame.world_from_head.rotation, pose_at(0, 0.1).rotation), 0.0, 1e-9);
+  EXPECT_EQ(frame.motion_time_ns, kStart + 20 * kMs);
+}
+
+TEST(InputHub, NetworkJitterDoesNotReachThePose) {
+  // 120 Hz samples of a head at 1 m/s, source clock far off, delays of 2 .. 22 ms; asked 30 ms behind.
+  InputHub hub;
+  std::mt19937 random(1);
+  const int64_t source_offset = 777'777 * kMs;
+  struct Packet {
+    int64_t arrival_ns, time_ns;
+    double x_m;
+  };
+  std::vector<Packet> packets;
+  int64_t last_arrival = 0;
+  for (int i = 0; i < 600; ++i) {
+    const int64_t true_ns = kStart + i * 25 * kMs / 3;
+    const int64_t arrival =
+        std::max(last_arrival, true_ns + 2 * kMs + static_cast<int64_t>(random() % 20) * kMs);
+    packets.push_back({arrival, true_ns - source_offset, static_cast<double>(true_ns - kStart) * 1e-9});
+    last_arrival = arrival;  // TCP keeps the order
+  }
+  size_t next = 0;
+  for (int64_t now = kStart + 2000 * kMs; now < kStart + 4000 * kMs; now += 7 * kMs) {
+    for (; next < packets.size() && packets[next].arrival_ns <= now; ++next)
+      hub.push(1, motion(packets[next].time_ns, pose_at(packets[next].x_m)), packets[next].arrival_ns);
+    const double x_m = hub.sample(now - 30 * kMs).world_from_head.position_m.x;
+    // The best delay of 2 ms stays in the mapping, up to one more when no sample was that fast.
+    EXPECT_NEAR(x_m, static_cast<double>(now - 30 * kMs - 2 * kMs - kStart) * 1e-9, 0.0011);
+  }
+  EXPECT_EQ(hub.counters().rejected(), 0u);
+}
+
+TEST(InputHub, SaysWhenMotionIsStaleAndKeepsThePose) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.5)), kStart);
+  EXPECT_FALSE(hub.sample(kStart).is_motion_stale);
+  EXPECT_FALSE(hub.sample(kStart + kMotionStaleNs).is_motion_stale);
+  const InputFrame stale = hub.sample(kStart + kMotionStaleNs + 1);
+  EXPECT_TRUE(stale.is_motion_stale);
+  EXPECT_TRUE(stale.has_motion);
+  EXPECT_EQ(stale.world_from_head, pose_at(0.5));
+  hub.push(1, motion(2000 * kMs, pose_at(0.5)), kStart + 2000 * kMs);
+  EXPECT_FALSE(hub.sample(kStart + 2000 * kMs).is_motion_stale);
+}
+
+TEST(InputHub, LateAndDuplicateSamplesAreCountedAndChangeNothing) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  hub.push(1, motion(20 * kMs, pose_at(0.2)), kStart + 20 * kMs);
+  hub.push(1, motion(10 * kMs, pose_at(0.15)),
+           kStart + 21 * kMs);  // late on the way, but nothing newer was used
+  EXPECT_NEAR(hub.sample(kStart + 10 * kMs).world_from_head.position_m.x, 0.15, 1e-12);
+  hub.push(1, motion(20 * kMs, pose_at(9.0)), kStart + 22 * kMs);
+  EXPECT_EQ(hub.counters().duplicate, 1u);
+  const InputFrame before = hub.sample(kStart + 30 * kMs);
+  EXPECT_EQ(before.world_from_head, pose_at(0.2));
+  hub.push(1, motion(19 * kMs, pose_at(9.0)), kStart + 31 * kMs);
+  hub.push(1, motion(20 * kMs, pose_at(9.0)), kStart + 31 * kMs);
+  const InputFrame after = hub.sample(kStart + 31 * kMs);
+  EXPECT_EQ(after.world_from_head, before.world_from_head);
+  EXPECT_EQ(hub.counters().late, 1u);
+  EXPECT_EQ(hub.counters().duplicate, 2u);
+  EXPECT_EQ(after.rejected_samples, 3u);
+}
+
+TEST(InputHub, ImpossibleSamplesAreRefusedAndDoNotTakeTheHead) {
+  InputHub hub;
+  const glm::dquat upright(1, 0, 0, 0);
+  const std::vector<Pose> bad{
+      {{kNan, 0, 0}, upright},      {{0, kInf, 0}, upright},      {{0, 0, 0}, {kNan, 0, 0, 0}},
+      {{0, 0, 0}, {0, 0, 0, 0}},    {{0, 0, 0}, {0.49, 0, 0, 0}}, {{0, 0, 0}, {0, 0, 2.01, 0}},
+      {{0, 0, 0}, {0, kInf, 0, 0}}, {{1e4, 1e3, 0}, upright},     {{1e308, 1e308, 1e308}, upright}};
+  for (const Pose& pose : bad) hub.push(1, motion(0, pose), kStart);
+  hub.push(1, motion(std::numeric_limits<int64_t>::max(), pose_at(0)), kStart);
+  hub.push(1, motion(std::numeric_limits<int64_t>::min(), pose_at(0)), kStart);
+  EXPECT_EQ(hub.counters().impossible, bad.size() + 2);
+  EXPECT_FALSE(hub.sample(kStart).has_motion);
+  hub.push(2, motion(0, {{1, 0, 0}, {0, 1.9, 0, 0}}), kStart);
+  const InputFrame frame = hub.sample(kStart);
+  EXPECT_TRUE(frame.has_motion);
+  EXPECT_NEAR(glm::length(frame.world_from_head.rotation), 1.0, 1e-12) << "normalised";
+  EXPECT_EQ(hub.counters().not_owner, 0u);
+
+  for (const glm::vec3& v : {glm::vec3(std::nanf(""), 0, 0), glm::vec3(0, INFINITY, 0), glm::vec3(0, 0, 201)})
+    hub.push(1, wind(0, v), kStart);
+  EXPECT_EQ(hub.counters().impossible, bad.size() + 5);
+  EXPECT_FALSE(hub.sample(kStart).has_wind_stream);
+}
+
+TEST(InputHub, TeleportsAreFlaggedOnceAndNotInterpolated) {
+  for (const Pose& far : {pose_at(1.2), pose_at(0.0, 2.5)}) {  // 60 m/s; 125 rad/s
+    InputHub hub;
+    hub.push(1, motion(0, pose_at(0.0)), kStart);
+    EXPECT_TRUE(hub.sample(kStart).has_teleported) << "the first pose replaces none";
+    hub.push(1, motion(20 * kMs, far), kStart + 20 * kMs);
+    const InputFrame between = hub.sample(kStart + 10 * kMs);
+    EXPECT_EQ(between.world_from_head, pose_at(0.0));
+    EXPECT_FALSE(between.has_teleported);
+    const InputFrame there = hub.sample(kStart + 20 * kMs);
+    EXPECT_EQ(there.world_from_head.position_m, far.position_m);
+    EXPECT_TRUE(there.has_teleported);
+    EXPECT_FALSE(hub.sample(kStart + 21 * kMs).has_teleported);
+  }
+}
+
+TEST(InputHub, AJumpAcrossSkippedSamplesOrAGapIsStillATeleport) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  hub.sample(kStart);
+  hub.push(1, motion(1 * kMs, pose_at(0.5)), kStart + 1 * kMs);  // 500 m/s there
+  hub.push(1, motion(2 * kMs, pose_at(0.0)), kStart + 2 * kMs);  // and back
+  EXPECT_TRUE(hub.sample(kStart + 16 * kMs).has_teleported);
+  // A gap of 5 s hides the speed between samples, but the strands see the jump between two frames.
+  hub.sample(kStart + 5000 * kMs);
+  hub.push(1, motion(5010 * kMs, pose_at(2.0)), kStart + 5010 * kMs);
+  EXPECT_TRUE(hub.sample(kStart + 5016 * kMs).has_teleported);
+}
+
+TEST(InputHub, FastHumanMotionIsNoTeleport) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  hub.sample(kStart);
+  for (int i = 1; i < 200; ++i) {  // 10 m/s and 35 rad/s, beyond any person
+    const double t = i * 0.0083333;
+    const auto time_ns = static_cast<int64_t>(t * 1e9);
+    hub.push(1, motion(time_ns, pose_at(10.0 * t, 35.0 * t)), kStart + time_ns);
+    EXPECT_FALSE(hub.sample(kStart + time_ns).has_teleported) << i;
+  }
+}
+
+TEST(InputHub, RotationsStayInOneHemisphere) {
+  InputHub hub;
+  glm::dquat last(1, 0, 0, 0);
+  for (int i = 0; i < 400; ++i) {  // two turns, with the sign of every other sample flipped
+    Pose pose = pose_at(0.0, i * 0.03);
+    if (i % 2) pose.rotation = -pose.rotation;
+    hub.push(1, motion(i * 10 * kMs, pose), kStart + i * 10 * kMs);
+    const glm::dquat rotation = hub.sample(kStart + i * 10 * kMs - 4 * kMs).world_from_head.rotation;
+    EXPECT_GT(glm::dot(rotation, last), 0.99) << i;
+    last = rotation;
+  }
+}
+
+TEST(InputHub, FirstSourceOwnsTheHeadUntilStaleOrRemoved) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.1)), kStart);
+  hub.push(2, motion(0, pose_at(0.2)), kStart + 1 * kMs);
+  EXPECT_EQ(hub.sample(kStart + 2 * kMs).world_from_head, pose_at(0.1));
+  EXPECT_EQ(hub.counters().not_owner, 1u);
+  hub.push(2, motion(1000 * kMs, pose_at(0.2)), kStart + kMotionStaleNs);
+  EXPECT_EQ(hub.sample(kStart + kMotionStaleNs).world_from_head, pose_at(0.1));
+  hub.push(2, motion(1001 * kMs, pose_at(0.2)), kStart + kMotionStaleNs + 1);
+  EXPECT_EQ(hub.sample(kStart + kMotionStaleNs + 1).world_from_head, pose_at(0.2));
+  hub.push(1, motion(1002 * kMs, pose_at(0.1)), kStart + kMotionStaleNs + 2);
+  EXPECT_EQ(hub.counters().not_owner, 3u) << "the first one has lost the head";
+  hub.remove_source(1);
+  EXPECT_FALSE(hub.sample(kStart + kMotionStaleNs + 3).is_motion_stale);
+  hub.remove_source(2);
+  const InputFrame removed = hub.sample(kStart + kMotionStaleNs + 3);
+  EXPECT_TRUE(removed.is_motion_stale);
+  EXPECT_EQ(removed.world_from_head, pose_at(0.2));
+  hub.push(3, motion(-55, pose_at(0.3)), kStart + kMotionStaleNs + 4);
+  EXPECT_EQ(hub.sample(kStart + kMotionStaleNs + 4).world_from_head, pose_at(0.3));
+}
+
+TEST(InputHub, AStepOfTheSourceClockRestartsItsMapping) {
+  for (const int64_t step : {-3'600'000 * kMs, 3'600'000 * kMs}) {
+    InputHub hub;
+    int64_t shift = 0;
+    for (int i = 0; i < 100; ++i) {
+      if (i == 50) shift = step;
+      const int64_t now = kStart + i * 10 * kMs;
+      hub.push(1, motion(i * 10 * kMs + shift, pose_at(0.01 * i)), now);
+      EXPECT_NEAR(hub.sample(now).world_from_head.position_m.x, 0.01 * i, 1e-12) << "no freeze at " << i;
+    }
+    EXPECT_EQ(hub.counters().clock_restarts, 1u);
+    EXPECT_EQ(hub.counters().rejected(), 0u);
+  }
+}
+
+TEST(InputHub, FollowsASlowlyDriftingClock) {
+  // 100 ppm fast or slow for two minutes: 12 ms in all; with a window of 10 s at most 1 ms of it shows.
+  for (const double drift : {-1e-4, 1e-4}) {
+    InputHub hub;
+    double worst_m = 0.0;
+    for (int i = 0; i < 12'000; ++i) {
+      const int64_t now = kStart + i * 10 * kMs;
+      const double t = i * 0.01;
+      hub.push(1, motion(static_cast<int64_t>(t * (1.0 + drift) * 1e9), pose_at(std::fmod(t, 50.0))), now);
+      const double x_m = hub.sample(now - 5 * kMs).world_from_head.position_m.x;
+      if (std::fmod(t, 50.0) > 0.1) worst_m = std::max(worst_m, std::abs(x_m - (std::fmod(t, 50.0) - 0.005)));
+    }
+    EXPECT_LT(worst_m, 0.0012) << drift;
+  }
+}
+
+TEST(InputHub, RateAndBuffersAreBounded) {
+  InputHub hub;
+  MotionSamples flood;
+  for (int i = 0; i < 256; ++i) flood.samples.push_back({i * 10'000, pose_at(0.0)});
+  for (int message = 0; message < 40; ++message) {
+    for (auto& sample : flood.samples) sample.time_ns += 256 * 10'000;
+    hub.push(1, flood, kStart + message * 25 * kMs);  // 10,240 samples in a second
+  }
+  const InputCounters counters = hub.counters();
+  EXPECT_LE(counters.accepted, 2000u) << "a burst of 1,000 and 1,000 per second";
+  EXPECT_GE(counters.accepted, 1900u);
+  EXPECT_EQ(counters.accepted + counters.over_rate, 10'240u);
+  EXPECT_EQ(counters.dropped_oldest, counters.accepted - kMaxBufferedSamples);
+  for (uint64_t source = 2; source < 500; ++source) hub.push(source, motion(0, pose_at(0)), kStart);
+  EXPECT_EQ(hub.counters().not_owner, kMaxInputSources - 1) << "no memory for sources without end";
+}
+
+TEST(InputHub, WindStreamReplacesTheScenesWindWhileItLives) {
+  InputHub hub;
+  hub.push(7, wind(0, {1, 0, 0}), kStart);
+  hub.push(7, wind(100 * kMs, {3, 0, 0}), kStart + 100 * kMs);
+  hub.push(8, wind(100 * kMs, {9, 9, 9}), kStart + 100 * kMs);
+  InputFrame frame = hub.sample(kStart + 50 * kMs);
+  EXPECT_TRUE(frame.has_wind_stream);
+  EXPECT_FALSE(frame.has_motion);
+  EXPECT_NEAR(frame.wind_mps.x, 2.0f, 1e-6);
+  frame = hub.sample(kStart + 100 * kMs + kWindStaleNs);
+  EXPECT_EQ(frame.wind_mps, glm::vec3(3, 0, 0));
+  EXPECT_FALSE(hub.sample(kStart + 101 * kMs + kWindStaleNs).has_wind_stream);
+  EXPECT_EQ(hub.counters().not_owner, 1u);
+  hub.push(8, wind(0, {4, 0, 0}), kStart + 102 * kMs + kWindStaleNs);
+  EXPECT_TRUE(hub.sample(kStart + 102 * kMs + kWindStaleNs).has_wind_stream);
+  hub.remove_source(8);
+  EXPECT_FALSE(hub.sample(kStart + 102 * kMs + kWindStaleNs).has_wind_stream);
+}
+
+/// One random call sequence; numbers from tiny to impossible.
+std::vector<InputFrame> play_garbage(uint32_t seed) {
+  InputHub hub;
+  std::mt19937_64 random(seed);
+  const auto number = [&]() -> double {
+    switch (random() % 12) {
+      case 0:
+        return kNan;
+      case 1:
+        return -kInf;
+      case 2:
+        return 1e300;
+      case 3:
+        return 0.0;
+      default:
+        return static_cast<double>(random() % 2001) * 1e-3 - 1.0;
+    }
+  };
+  std::vector<InputFrame> frames;
+  int64_t now = kStart;
+  for (int i = 0; i < 400; ++i) {
+    now += static_cast<int64_t>(random() % 40) * kMs - 2 * kMs;
+    const uint64_t source = random() % 3;
+    const int64_t time_ns = random() % 10 == 0 ? static_cast<int64_t>(random())
+                                               : now - static_cast<int64_t>(random() % 100) * kMs;
+    MotionSamples samples;
+    WindSamples winds;
+    for (uint64_t k = 0; k < random() % 5; ++k) {
+      const Pose pose{{number(), number(), number()}, {number(), number(), number(), number()}};
+      samples.samples.push_back(
+          {time_ns + static_cast<int64_t>(k) * kMs, random() % 2 ? pose : pose_at(0.001 * i)});
+      winds.samples.push_back({time_ns, {static_cast<float>(number()), 0.0f, static_cast<float>(number())}});
+    }
+    hub.push(source, samples, now);
+    hub.push(source, winds, now);
+    if (random() % 30 == 0) hub.remove_source(source);
+    frames.push_back(hub.sample(random() % 50 ? now : static_cast<int64_t>(random())));
+  }
+  return frames;
+}
+
+TEST(InputHub, GarbageNeverReachesAFrameAndReplaysTheSame) {
+  for (uint32_t seed = 0; seed < 100; ++seed) {
+    const auto frames = play_garbage(seed);
+    EXPECT_EQ(frames, play_garbage(seed));
+    uint64_t rejected = 0;
+    for (const InputFrame& frame : frames) {
+      ASSERT_TRUE(is_finite(frame.world_from_head));
+      ASSERT_NEAR(glm::length(frame.world_from_head.rotation), 1.0, 1e-9);
+      ASSERT_LE(glm::length(frame.world_from_head.position_m), kMaxHeadDistanceM);
+      ASSERT_TRUE(std::isfinite(glm::length(frame.wind_mps)));
+      ASSERT_GE(frame.rejected_samples, rejected);
+      rejected = frame.rejected_samples;
+    }
+    EXPECT_GT(rejected, 0u);
+  }
+}
+
+TEST(InputHub, AnyThreadMayPushWhileAnotherSamples) {
+  InputHub hub;
+  std::thread source([&] {
+    for (int i = 0; i < 900; ++i) {
+      hub.push(1, motion(i * kMs, pose_at(0.001 * i)), kStart + i * kMs);
+      hub.push(2, wind(i * kMs, {1, 0, 0}), kStart + i * kMs);
+    }
+    hub.remove_source(2);
+  });
+  for (int i = 0; i < 900; ++i) EXPECT_TRUE(is_finite(hub.sample(kStart + i * kMs).world_from_head));
+  source.join();
+  EXPECT_EQ(hub.counters().accepted, 1800u - hub.counters().rejected());
+  EXPECT_EQ(hub.sample(kStart + 900 * kMs).world_from_head, pose_at(0.899));
+}
+
+}  // namespace
+}  // namespace strandcast
