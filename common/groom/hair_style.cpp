@@ -22,8 +22,28 @@ constexpr float kClearanceArc = 0.35f;  // arc length over which a strand rises 
 constexpr glm::vec3 kFaceCenter{0.0f, -0.42f, 0.22f};
 constexpr float kFaceRadius = 0.86f;
 
-float smooth(float low, float high, float value) {
-  const float t = std::clamp((value - low) / (high - low), 0.0f, 1.0f);
+struct Ramp {
+  float low, high;
+};
+
+// Where a strand is combed one way or the other, by its point or its direction from the centre; gravity pulls
+// with 1.
+constexpr Ramp kCombed = {-0.7f, 0.1f};         // height: below and away from the head, gravity alone
+constexpr Ramp kFront = {-0.15f, 0.65f};        // towards the face
+constexpr Ramp kTop = {0.35f, 0.95f};           // towards the crown
+constexpr Ramp kBeforeCrown = {-0.75f, -0.2f};  // the parting ends at the crown
+constexpr Ramp kCheek = {0.2f, 0.6f};           // in front of the ears
+constexpr Ramp kBelowHead = {-1.2f, -0.5f};     // where hair gathers towards the neck
+constexpr float kFrontAside = 1.5f, kTopAside = 1.3f;
+constexpr float kFrontBack = 0.55f, kTopBack = 0.45f, kCheekBack = 0.8f;
+constexpr float kGather = 0.14f;
+constexpr float kNeckZ = -0.35f;
+constexpr float kHangingSway = 0.25f;      // sway is stronger where hair lies on the head
+constexpr Ramp kHeight = {-0.5f, 1.0f};    // of the root, for the clearance
+constexpr Ramp kFromRoot = {0.0f, 0.05f};  // arc over which a root below the sphere comes up to it
+
+float smooth(const Ramp& ramp, float value) {
+  const float t = std::clamp((value - ramp.low) / (ramp.high - ramp.low), 0.0f, 1.0f);
   return t * t * (3.0f - 2.0f * t);
 }
 
@@ -68,7 +88,7 @@ StrandCharacter make_character(const glm::vec3& root, uint32_t strand_hash, uint
   const glm::vec3 place = root * kNoiseCells;
   const float parting = kPartingAt + kPartingWave * noise(place * 2.0f, mix_u32(seed + 11));
   character.side = std::tanh((root.x - parting) / kPartingWidth);
-  const float height = smooth(-0.5f, 1.0f, root.y / std::max(glm::length(root), 1e-6f));
+  const float height = smooth(kHeight, root.y / std::max(glm::length(root), 1e-6f));
   const float lift = noise(place * 1.7f, mix_u32(seed + 23)) + (unit_float(mix_u32(strand_hash + 5)) - 0.5f);
   character.clearance =
       std::max(kMinClearance, kMinClearance + kTopClearance * height + kClearanceNoise * lift);
@@ -80,23 +100,23 @@ StrandCharacter make_character(const glm::vec3& root, uint32_t strand_hash, uint
 
 glm::vec3 combed_direction(const glm::vec3& point, const StrandCharacter& character) {
   const glm::vec3 outward = point / std::max(glm::length(point), 1e-6f);
-  // Combed only while the strand lies on the head; below and away from it, gravity alone.
-  const float on_head = smooth(-0.7f, 0.1f, point.y);
-  const float front = smooth(-0.15f, 0.65f, outward.z) * on_head;
-  const float top = smooth(0.35f, 0.95f, outward.y);
-  const float before_crown = smooth(-0.75f, -0.2f, outward.z);
+  const float on_head = smooth(kCombed, point.y);
+  const float front = smooth(kFront, outward.z) * on_head;
+  const float top = smooth(kTop, outward.y);
+  const float gather = kGather * (1.0f - smooth(kBelowHead, point.y));
   glm::vec3 direction(0.0f, -1.0f, 0.0f);
-  direction.x += character.side * (1.5f * front + 1.3f * top * before_crown);
-  direction.z -= 0.85f * front + 0.45f * top + 0.8f * smooth(0.05f, 0.6f, point.z) * (1.0f - top);
-  direction += character.sway * (0.25f + 0.75f * on_head);
+  direction.x += character.side * (kFrontAside * front + kTopAside * top * smooth(kBeforeCrown, outward.z));
+  direction.x -= gather * point.x;
+  direction.z -= kFrontBack * front + kTopBack * top + kCheekBack * smooth(kCheek, point.z) * (1.0f - top);
+  direction.z -= gather * (point.z - kNeckZ);
+  direction += character.sway * glm::mix(kHangingSway, 1.0f, on_head);
   return glm::normalize(direction);
 }
 
 glm::vec3 keep_outside(const glm::vec3& point, float arc, const StrandCharacter& character) {
   const float risen = 1.0f - std::exp(-arc / kClearanceArc);
   const float root_distance = glm::length(character.root);
-  const float floor =
-      std::min(1.0f, root_distance) * (1.0f - smooth(0.0f, 0.05f, arc)) + smooth(0.0f, 0.05f, arc);
+  const float floor = glm::mix(std::min(1.0f, root_distance), 1.0f, smooth(kFromRoot, arc));
   const glm::vec3 outside = push_out(point, glm::vec3(0.0f), floor + character.clearance * risen);
   // A scalp that itself reaches into the face sphere keeps its roots where they are.
   const float face_radius = std::min(kFaceRadius, 0.99f * glm::distance(character.root, kFaceCenter));

@@ -33,30 +33,29 @@ Part capsule(Blend blend, float softness, const glm::vec3& from, float from_radi
 // of that.
 const std::array kParts = {
     ellipsoid(Blend::Add, 0.00f, {0.00f, 0.00f, 0.00f}, {0.985f, 0.985f, 0.985f}),               // cranium
-    capsule(Blend::Add, 0.22f, {0.00f, -0.70f, -0.22f}, 0.56f, {0.00f, -1.75f, -0.36f}, 0.53f),  // neck
-    capsule(Blend::Add, 0.30f, {0.00f, -2.25f, -0.40f}, 0.56f, {0.55f, -2.55f, -0.42f}, 0.50f),  // its base
-    ellipsoid(Blend::Add, 0.20f, {0.00f, -0.48f, 0.30f}, {0.68f, 0.80f, 0.60f}),                 // face
-    ellipsoid(Blend::Add, 0.16f, {0.00f, -0.90f, 0.28f}, {0.56f, 0.40f, 0.56f}),                 // jaw
-    ellipsoid(Blend::Add, 0.16f, {0.00f, -1.20f, 0.66f}, {0.22f, 0.15f, 0.19f}),                 // chin
-    ellipsoid(Blend::Add, 0.20f, {0.46f, -0.40f, 0.60f}, {0.18f, 0.15f, 0.18f}),                 // cheekbone
-    ellipsoid(Blend::Add, 0.16f, {0.00f, -0.84f, 0.70f}, {0.28f, 0.24f, 0.23f}),  // round the mouth
-    ellipsoid(Blend::Cut, 0.14f, {0.33f, -0.19f, 1.04f}, {0.24f, 0.15f, 0.24f}),  // eye socket
-    capsule(Blend::Add, 0.12f, {0.10f, -0.02f, 0.89f}, 0.07f, {0.46f, 0.01f, 0.74f}, 0.06f),  // brow
-    ellipsoid(Blend::Add, 0.03f, {0.32f, -0.20f, 0.755f}, {0.155f, 0.135f, 0.145f}),          // eyeball
-    capsule(Blend::Add, 0.10f, {0.00f, -0.10f, 0.89f}, 0.06f, {0.00f, -0.50f, 1.10f},
-            0.085f),                                                                // bridge of the nose
-    ellipsoid(Blend::Add, 0.06f, {0.00f, -0.53f, 1.12f}, {0.10f, 0.085f, 0.10f}),   // its tip
-    ellipsoid(Blend::Add, 0.06f, {0.10f, -0.56f, 1.00f}, {0.075f, 0.065f, 0.10f}),  // its wing
-    capsule(Blend::Add, 0.06f, {0.03f, -0.80f, 0.945f}, 0.045f, {0.20f, -0.845f, 0.83f}, 0.02f),  // upper lip
-    capsule(Blend::Add, 0.06f, {0.00f, -0.915f, 0.925f}, 0.055f, {0.19f, -0.865f, 0.82f},
-            0.02f),                                                                               // lower lip
-    capsule(Blend::Cut, 0.04f, {0.00f, -0.855f, 1.00f}, 0.012f, {0.21f, -0.86f, 0.86f}, 0.012f),  // mouth
-    ellipsoid(Blend::Cut, 0.10f, {0.00f, -1.04f, 0.98f}, {0.16f, 0.05f, 0.10f}),    // below the lips
-    ellipsoid(Blend::Add, 0.06f, {0.985f, -0.26f, -0.06f}, {0.09f, 0.29f, 0.16f}),  // ear
-    ellipsoid(Blend::Cut, 0.06f, {1.09f, -0.24f, -0.03f}, {0.05f, 0.17f, 0.08f}),   // its shell
+    capsule(Blend::Add, 0.14f, {0.00f, -0.70f, -0.14f}, 0.52f, {0.00f, -1.75f, -0.34f}, 0.52f),  // neck
+    capsule(Blend::Add, 0.30f, {0.00f, -2.25f, -0.38f}, 0.54f, {0.45f, -2.60f, -0.40f}, 0.50f),  // its base
+    ellipsoid(Blend::Add, 0.22f, {0.00f, -0.50f, 0.28f}, {0.74f, 0.84f, 0.62f}),                 // face
+    ellipsoid(Blend::Add, 0.26f, {0.00f, -0.86f, 0.26f}, {0.60f, 0.44f, 0.58f}),                 // jaw
+    ellipsoid(Blend::Add, 0.16f, {0.00f, -1.22f, 0.64f}, {0.24f, 0.17f, 0.20f}),                 // chin
+    ellipsoid(Blend::Add, 0.20f, {0.46f, -0.42f, 0.60f}, {0.20f, 0.16f, 0.20f}),                 // cheekbone
+    ellipsoid(Blend::Add, 0.16f, {0.00f, -0.84f, 0.70f}, {0.30f, 0.26f, 0.24f}),  // round the mouth
+    ellipsoid(Blend::Cut, 0.18f, {0.34f, -0.20f, 1.03f}, {0.24f, 0.15f, 0.24f}),  // eye socket
+    capsule(Blend::Add, 0.14f, {0.00f, -0.03f, 0.88f}, 0.07f, {0.44f, 0.00f, 0.76f}, 0.05f),  // brow
+    ellipsoid(Blend::Add, 0.05f, {0.33f, -0.20f, 0.755f}, {0.165f, 0.115f, 0.145f}),          // closed eye
+    capsule(Blend::Add, 0.14f, {0.00f, -0.08f, 0.88f}, 0.07f, {0.00f, -0.50f, 1.08f},
+            0.10f),                                                                // bridge of the nose
+    ellipsoid(Blend::Add, 0.08f, {0.00f, -0.53f, 1.11f}, {0.12f, 0.10f, 0.11f}),   // its tip
+    ellipsoid(Blend::Add, 0.07f, {0.13f, -0.56f, 1.00f}, {0.08f, 0.075f, 0.11f}),  // its wing
+    capsule(Blend::Add, 0.09f, {0.04f, -0.805f, 0.93f}, 0.055f, {0.20f, -0.85f, 0.83f}, 0.03f),  // upper lip
+    capsule(Blend::Add, 0.09f, {0.00f, -0.925f, 0.92f}, 0.065f, {0.18f, -0.87f, 0.82f}, 0.03f),  // lower lip
+    capsule(Blend::Cut, 0.07f, {0.00f, -0.865f, 1.03f}, 0.025f, {0.25f, -0.865f, 0.895f}, 0.025f),  // mouth
+    ellipsoid(Blend::Cut, 0.12f, {0.00f, -1.05f, 0.99f}, {0.16f, 0.05f, 0.10f}),   // below the lips
+    ellipsoid(Blend::Add, 0.06f, {0.965f, -0.28f, 0.02f}, {0.09f, 0.28f, 0.16f}),  // ear
+    ellipsoid(Blend::Cut, 0.06f, {1.07f, -0.26f, 0.05f}, {0.05f, 0.17f, 0.08f}),   // its shell
 };
 constexpr float kNeckCutAt = -2.35f;
-constexpr float kNeckCutSoftness = 0.06f;
+constexpr float kNeckCutSoftness = 0.25f;
 
 float ellipsoid_distance(const glm::vec3& point, const glm::vec3& radii) {
   const float scaled = glm::length(point / radii);

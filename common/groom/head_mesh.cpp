@@ -11,24 +11,29 @@
 namespace strandcast {
 namespace {
 
-constexpr float kCoarse = 0.095f;  // cell width in skull radii
-constexpr float kFine = 0.05f;
+constexpr float kCoarse = 0.105f;  // cell width in skull radii
+constexpr float kFine = 0.037f;
 constexpr int kProjections = 4;  // of each vertex onto the surface
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 struct Range {
   float low, high;
 };
-constexpr std::array<Range, 3> kDetail = {Range{-0.62f, 0.62f}, Range{-1.30f, 0.12f}, Range{0.45f, 1.25f}};
+constexpr std::array<Range, 3> kDetail = {Range{-0.55f, 0.55f}, Range{-1.12f, 0.06f}, Range{0.62f, 1.25f}};
 
 /// Grid coordinates of one axis: fine inside of its detail range, coarse outside.
 std::vector<float> grid_line(int axis) {
-  std::vector<float> line{kHeadLow[axis]};
+  const bool is_mirrored = axis == 0;
+  std::vector<float> line{is_mirrored ? 0.0f : kHeadLow[axis]};
   while (line.back() < kHeadHigh[axis]) {
     const bool is_fine = line.back() >= kDetail[axis].low - kFine && line.back() < kDetail[axis].high;
     line.push_back(line.back() + (is_fine ? kFine : kCoarse));
   }
-  return line;
+  if (!is_mirrored) return line;
+  std::vector<float> whole;
+  for (size_t i = line.size() - 1; i > 0; --i) whole.push_back(-line[i]);
+  whole.insert(whole.end(), line.begin(), line.end());
+  return whole;
 }
 
 class HeadMesher {

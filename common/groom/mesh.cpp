@@ -12,7 +12,7 @@ constexpr double kPi = 3.14159265358979323846;
 
 /// Polar angle from the crown axis down to the hairline, by azimuth (0 = face, pi = neck).
 double hairline_rad(double azimuth_rad) {
-  constexpr double kMean_rad = 1.56, kFrontToBack_rad = -0.22;  // face 1.34, above the ears 1.56, neck 1.78
+  constexpr double kMean_rad = 1.60, kFrontToBack_rad = -0.15;  // face 1.45, above the ears 1.60, neck 1.75
   return kMean_rad + kFrontToBack_rad * std::cos(azimuth_rad);
 }
 

@@ -13,9 +13,9 @@ namespace {
 
 constexpr float kTwoPi = 6.28318530718f;
 constexpr float kStepsPerSegment = 4.0f;  // fine steps of growth per segment of the result
-constexpr float kStepsPerRadius = 40.0f;  // at least, but
+constexpr float kStepsPerRadius = 24.0f;  // at least, but
 constexpr float kMaxSteps = 256.0f;       // per strand, however long it is
-constexpr float kSpareLength = 1.35f;     // grown beyond the length: clumping shortens the curve
+constexpr float kSpareLength = 1.25f;     // grown beyond the length: clumping shortens the curve
 constexpr float kBendArc = 0.10f;  // arc (skull radii) over which a strand turns towards its combed direction
 constexpr uint32_t kStrandsPerClump = 14;
 constexpr uint32_t kClumpChoices = 4;   // nearest clumps looked at for one on the same side of the parting

@@ -1,0 +1,259 @@
+// Broken groom files: whatever is wrong, the loader says so in one sentence that names the file and the
+// value, and no allocation is larger than what the file's real size explains.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/base/file.h"
+#include "common/base/hash.h"
+#include "common/groom/groom_file.h"
+#include "common/groom/hair_loader.h"
+#include "common/groom/tfx_loader.h"
+#include "tests/support/groom_files.h"
+#include "tests/support/largest_allocation.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using ::testing::AllOf;
+using testing::ByteFile;
+using ::testing::HasSubstr;
+using testing::shared_data;
+
+constexpr size_t kSmallAllocations = 64 << 10;  // messages, streams, paths
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+/// The error message of loading `file` under `name`, or "accepted". Checks the law on allocations and that
+/// the file is named.
+std::string refusal(const TemporaryFolder& folder, const ByteFile& file, const std::string& name) {
+  const auto path = folder.write(name, file.text());
+  testing::reset_largest_allocation();
+  GroomFileOptions options;
+  options.path = path;
+  options.unit_m = 0.01f;
+  const auto groom = load_groom(options);
+  EXPECT_LE(testing::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
+  if (groom) return "accepted";
+  EXPECT_THAT(groom.error().to_string(), HasSubstr(path.string()));
+  EXPECT_EQ(groom.error().to_string().find('\n'), std::string::npos);
+  return groom.error().to_string();
+}
+
+ByteFile read_real(const char* name) {
+  const auto bytes = load_file(shared_data() / "grooms" / name, kMaxGroomFileBytes);
+  return {bytes ? *bytes : std::vector<std::byte>{}};
+}
+
+/// Version 4 with two strands of four vertices, root coordinates, and one pinned vertex each.
+ByteFile small_v4() {
+  ByteFile file;
+  file.add(4.0f).add(2u).add(4u).add(160u).add(160u + 2 * 4 * 16).add(0u).add(0u).add(0u).zeros(128);
+  for (int strand = 0; strand < 2; ++strand) {
+    for (int vertex = 0; vertex < 4; ++vertex) {
+      file.add(static_cast<float>(strand))
+          .add(static_cast<float>(vertex))
+          .add(0.5f)
+          .add(vertex == 0 ? 0.0f : 1.0f);
+    }
+  }
+  for (const float uv : {0.1f, 0.2f, 0.3f, 0.4f}) file.add(uv);
+  return file;
+}
+
+/// Version 3 with two strands of `vertex_count` vertices.
+ByteFile small_v3(uint32_t vertex_count, int32_t both_ends) {
+  ByteFile file;
+  file.add(3.0f).add(2u).add(vertex_count).add(0u).add(both_ends).zeros(124).add(296u).zeros(296 - 148);
+  for (uint32_t i = 0; i < 2 * vertex_count; ++i) file.add(0.0f).add(static_cast<float>(i)).add(0.25f);
+  return file;
+}
+
+TEST(BrokenTfx, TheSmallFilesThatTestsBreakAreGood) {
+  const ByteFile four = small_v4();
+  const auto v4 = read_tfx_binary(ByteView(four.bytes));
+  ASSERT_TRUE(v4) << v4.error().to_string();
+  EXPECT_EQ(v4->rest_position_m[6], glm::vec3(1.0f, 2.0f, 0.5f));
+  EXPECT_EQ(v4->root_uv[1], glm::vec2(0.3f, 0.4f));
+  EXPECT_EQ(v4->pinned, (std::vector<uint8_t>{1, 0, 0, 0, 1, 0, 0, 0}));
+  const ByteFile three = small_v3(6, 1);
+  const auto v3 = read_tfx_binary(ByteView(three.bytes));
+  ASSERT_TRUE(v3) << v3.error().to_string();
+  EXPECT_EQ(v3->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 1, 1}));
+  EXPECT_EQ(v3->rest_position_m[7], glm::vec3(0.0f, 7.0f, 0.25f));
+}
+
+TEST(BrokenTfx, TruncatedAnywhereIsRefused) {
+  const TemporaryFolder folder;
+  for (const ByteFile& whole : {small_v4(), small_v3(5, 0)}) {
+    for (size_t size = 0; size < whole.bytes.size(); ++size) {
+      ByteFile cut = whole;
+      cut.bytes.resize(size);
+      ASSERT_NE(refusal(folder, cut, "cut.tfx"), "accepted") << size << " bytes of " << whole.bytes.size();
+    }
+  }
+}
+
+TEST(BrokenTfx, TruncatedOrPaddedRealFilesAreRefused) {
+  REQUIRE_SHARED_DATA();
+  const TemporaryFolder folder;
+  for (const char* name :
+       {"Ratboy_mohawk.tfx", "TestHair1.tfx", "ponytail_side.tfx", "sintel_11400x16.tfx"}) {
+    const ByteFile whole = read_real(name);
+    ASSERT_GT(whole.bytes.size(), 300u);
+    for (const size_t size : {size_t{0}, size_t{3}, size_t{4}, size_t{159}, size_t{160}, size_t{295},
+                              size_t{296}, whole.bytes.size() / 2, whole.bytes.size() - 1}) {
+      ByteFile cut = whole;
+      cut.bytes.resize(size);
+      ASSERT_NE(refusal(folder, cut, name), "accepted") << name << " cut to " << size;
+    }
+    ByteFile padded = whole;
+    EXPECT_THAT(refusal(folder, padded.zeros(5), name), HasSubstr("5 bytes are left after the last array"));
+  }
+}
+
+TEST(BrokenTfx, WrongHeaderFieldsOfRealFilesAreNamed) {
+  REQUIRE_SHARED_DATA();
+  const TemporaryFolder folder;
+  const ByteFile mohawk = read_real("Ratboy_mohawk.tfx"), test_hair = read_real("TestHair1.tfx");
+  struct Change {
+    bool is_v4;
+    size_t offset;
+    uint32_t value;
+    const char* expected;
+  };
+  const std::vector<Change> changes = {
+      {true, 4, 0u, "0 strands"},
+      {true, 4, 0xffffffffu, "4294967295 strands, at most 200000"},
+      {true, 4, 200'001u, "200001 strands, at most 200000"},
+      {true, 4, 200'000u, "6400000 x 16 bytes of vertex positions at offset 160 do not fit"},
+      {true, 4, 2229u, "overlaps"},  // the larger array reaches into the next one
+      {true, 4, 2227u, "bytes are left"},
+      {true, 8, 0u, "0 vertices per strand, allowed are 2 to 4096"},
+      {true, 8, 1u, "1 vertices per strand"},
+      {true, 8, 0x80000000u, "2147483648 vertices per strand"},
+      {true, 12, 0u, "offset of the vertex positions is 0"},
+      {true, 12, 159u, "offset 159 of the vertex positions overlaps"},
+      {true, 12, 0xfffffff0u, "at offset 4294967280 do not fit into 1158720 bytes"},
+      {true, 16, 160u, "overlaps"},
+      {true, 16, 0xffffffffu, "at offset 4294967295 do not fit"},
+      {true, 20, 0x7fffffffu, "vertex coordinates at offset 2147483647 do not fit"},
+      {true, 24, 1u, "offset 1 of the strand thickness overlaps"},
+      {true, 28, 1'158'719u, "vertex colours"},
+      {false, 4, 0u, "0 strands"},
+      {false, 4, 0x80000000u, "2147483648 strands"},
+      {false, 8, 0xffffu, "65535 vertices per strand"},
+      {false, 16, 2u, "both-ends flag is 2"},
+      {false, 16, 0xffffffffu, "both-ends flag is -1"},
+      {false, 144, 0u, "offset of the vertex positions is 0"},
+      {false, 144, 295u, "offset 295 of the vertex positions overlaps"},
+      {false, 144, 297u, "at offset 297 do not fit into 481592 bytes"},
+      {false, 148, 0xfffffff0u, "strand thickness at offset 4294967280 do not fit"},
+      {false, 152, 400u, "overlaps"},
+      {false, 160, 481'600u, "guide flags at offset 481600 do not fit"},
+  };
+  for (const Change& change : changes) {
+    ByteFile broken = change.is_v4 ? mohawk : test_hair;
+    EXPECT_THAT(refusal(folder, broken.patch(change.offset, change.value), "broken.tfx"),
+                HasSubstr(change.expected))
+        << "byte " << change.offset << " set to " << change.value;
+  }
+}
+
+TEST(BrokenTfx, UnknownVersionsNameTheKnownOnes) {
+  const TemporaryFolder folder;
+  for (const float version : {0.0f, 1.0f, 2.0f, 2.99f, 5.0f, -4.0f, 1e30f, kNan}) {
+    ByteFile broken = small_v4();
+    EXPECT_THAT(refusal(folder, broken.patch(0, version), "broken.tfx"),
+                AllOf(HasSubstr(fmt::format("version {},", version)), HasSubstr("known are 4 and 3")));
+  }
+}
+
+TEST(BrokenTfx, NonFiniteValuesNameStrandAndVertex) {
+  const TemporaryFolder folder;
+  for (const float value : {kNan, HUGE_VALF, -HUGE_VALF}) {
+    ByteFile broken = small_v4();
+    EXPECT_THAT(refusal(folder, broken.patch(160 + 6 * 16 + 4, value), "broken.tfx"),
+                HasSubstr(fmt::format("strand 1 vertex 2 (byte 260) has the coordinate {}", value)));
+    broken = small_v4();
+    EXPECT_THAT(refusal(folder, broken.patch(160 + 6 * 16 + 12, value), "broken.tfx"),
+                HasSubstr(fmt::format("has the inverse mass {}", value)));
+    broken = small_v4();
+    EXPECT_THAT(refusal(folder, broken.patch(160 + 8 * 16 + 8, value), "broken.tfx"),
+                HasSubstr(fmt::format("has the texture coordinate {}", value)));
+  }
+  ByteFile broken = small_v4();
+  EXPECT_THAT(refusal(folder, broken.patch(160 + 12, -1.0f), "broken.tfx"), HasSubstr("inverse mass -1"));
+  // Finite, but farther away than any head: the unit must be wrong.
+  broken = small_v4();
+  EXPECT_THAT(refusal(folder, broken.patch(160 + 2 * 16, 3e38f), "broken.tfx"),
+              AllOf(HasSubstr("strand 0 vertex 2"), HasSubstr("check the unit")));
+}
+
+TEST(BrokenTfx, ARootIsPinnedWhateverItsFlagSays) {
+  const ByteFile file = small_v4().patch(160 + 12, 1.0f);
+  const auto groom = read_tfx_binary(ByteView(file.bytes));
+  ASSERT_TRUE(groom);
+  EXPECT_EQ(groom->pinned[0], 1);
+}
+
+/// Random damage to the header: the loader either refuses or gives a groom that fits the file.
+TEST(BrokenTfx, RandomHeadersNeverGiveAGroomLargerThanTheFile) {
+  for (uint32_t round = 0; round < 20'000; ++round) {
+    ByteFile file = round % 2 == 0 ? small_v4() : small_v3(4, 0);
+    for (uint32_t change = 0; change < 1 + round % 3; ++change) {
+      const uint32_t hash = mix_u32(round * 4 + change);
+      file.patch(hash % 176, static_cast<uint8_t>(mix_u32(hash)));
+    }
+    testing::reset_largest_allocation();
+    const auto groom = read_tfx_binary(ByteView(file.bytes));
+    ASSERT_LE(testing::largest_allocation_bytes(), file.bytes.size() + kSmallAllocations);
+    ASSERT_LE(groom ? groom->rest_position_m.size() * 12 : 0, file.bytes.size());
+  }
+}
+
+TEST(GroomFile, NamesTheKnownExtensionsAndWrongOptions) {
+  const TemporaryFolder folder;
+  const ByteFile file = small_v4();
+  EXPECT_THAT(refusal(folder, file, "groom.abc"),
+              AllOf(HasSubstr("'.abc'"), HasSubstr("known: .tfx, .hair")));
+  EXPECT_THAT(refusal(folder, file, "groom"), HasSubstr("known: .tfx, .hair"));
+  GroomFileOptions options;
+  options.path = folder.path() / "missing.tfx";
+  EXPECT_EQ(load_groom(options).error().code, ErrorCode::NotFound);
+  options.path = folder.write("good.TFX", file.text());
+  EXPECT_TRUE(load_groom(options));
+  for (const float unit_m : {0.0f, -1.0f, kNan, HUGE_VALF}) {
+    options.unit_m = unit_m;
+    EXPECT_THAT(load_groom(options).error().to_string(),
+                AllOf(HasSubstr("good.TFX"), HasSubstr("unit_m is")));
+  }
+  options.unit_m = 1.0f;
+  options.vertex_count = 65;
+  EXPECT_THAT(load_groom(options).error().message, HasSubstr("vertex_count is 65"));
+  options.vertex_count = 0;
+  options.origin.y = kNan;
+  EXPECT_THAT(load_groom(options).error().message, HasSubstr("origin is (0, nan, 0)"));
+}
+
+TEST(GroomFile, TurnsMovesAndScalesInThatOrder) {
+  const TemporaryFolder folder;
+  ByteFile file = small_v4();
+  file.patch(160 + 16, 1.0f).patch(160 + 20, 2.0f).patch(160 + 24, 3.0f);  // strand 0 vertex 1
+  GroomFileOptions options;
+  options.path = folder.write("a.tfx", file.text());
+  options.unit_m = 0.1f;
+  options.origin = {0.0f, 1.0f, 0.0f};
+  const auto upright = load_groom(options);
+  ASSERT_TRUE(upright);
+  EXPECT_NEAR(glm::distance(upright->rest_position_m[1], glm::vec3(0.1f, 0.1f, 0.3f)), 0.0f, 1e-6f);
+  options.is_z_up = true;  // the file's +Z becomes +Y, its +Y becomes -Z
+  const auto turned = load_groom(options);
+  ASSERT_TRUE(turned);
+  EXPECT_NEAR(glm::distance(turned->rest_position_m[1], glm::vec3(0.1f, 0.2f, -0.2f)), 0.0f, 1e-6f);
+  options.pinning = Pinning::RootPair;
+  EXPECT_EQ(load_groom(options)->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 0, 0}));
+}
+
+}  // namespace
+}  // namespace strandcast
