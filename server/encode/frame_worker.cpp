@@ -162,13 +162,14 @@ void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
       ++losses;
       log_warn("render", "strand frame {}: {}; waiting for a keyframe", frame->header.sequence,
                snapshot.error().to_string());
-      hooks_.request_keyframe();
       continue;
     }
     snapshot_ = std::move(snapshot).value();
     ++decode_count_;
     ++decoded;
   }
+  // Also when a keyframe that was asked for has been crowded out of the queue since.
+  if (is_chain_lost_ && !strand_frames.empty()) hooks_.request_keyframe();
   const std::lock_guard lock(mutex_);
   counters_.decoded += decoded;
   counters_.chain_losses += losses;

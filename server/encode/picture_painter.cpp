@@ -14,6 +14,10 @@ class GlPicturePainter : public PicturePainter {
  public:
   GlPicturePainter(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Renderer> renderer)
       : context_(std::move(context)), renderer_(std::move(renderer)) {}
+  ~GlPicturePainter() override {
+    if (context_->make_current())
+      renderer_.reset();  // GL objects are deleted from the context that made them
+  }
 
   Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
     // Several views of one snapshot share its positions.

@@ -1,0 +1,134 @@
+#include "server/encode/picture_painter.h"
+
+#include <epoxy/gl.h>
+
+#include <array>
+#include <atomic>
+#include <mutex>
+
+#include "common/codec/strand_codec.h"
+#include "common/groom/procedural.h"
+#include "common/render/renderer.h"
+#include "server/encode/frame_worker.h"
+#include "tests/support/eventually.h"
+#include "tests/support/gl_fixture.h"
+
+namespace strandcast {
+namespace {
+
+constexpr float kHeadRadiusM = 0.095f;
+constexpr float kQuantumM = 1e-4f;
+
+std::shared_ptr<const SceneAsset> make_asset() {
+  ProceduralGroomOptions options;
+  options.strand_count = 80;
+  options.vertex_count = 8;
+  const auto groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadRadiusM, 200), options);
+  return std::make_shared<SceneAsset>(make_scene_asset(groom.value(), make_head(kHeadRadiusM)));
+}
+
+/// The asset's rest shape, blown sideways a bit more at every tick.
+Snapshot make_state(const SceneAsset& asset, uint64_t tick) {
+  std::vector<glm::vec3> positions = asset.rest_position_m;
+  for (size_t i = 0; i < positions.size(); ++i)
+    positions[i].x += 0.002f * static_cast<float>(tick * (i / asset.strand_count));
+  QuantiseInput input;
+  input.tick = tick;
+  input.world_from_head.position_m = {3.0, 1.7, -2.0};
+  input.world_from_head.rotation = glm::angleAxis(0.3, glm::dvec3(0.0, 1.0, 0.0));
+  input.strand_count = asset.strand_count;
+  input.vertex_count = asset.vertex_count;
+  input.quantum_m = kQuantumM;
+  input.position_in_head_m = positions;
+  return quantise(input).snapshot;
+}
+
+PictureView small_view() {
+  PictureView view;
+  view.size = {160, 90};
+  view.jpeg_quality = 90;
+  return view;
+}
+
+class GlPainting : public GlTest {
+ protected:
+  GlPainting() : asset_(make_asset()) { config_.asset = asset_; }
+
+  std::shared_ptr<const SceneAsset> asset_;
+  GlPainterConfig config_;
+};
+
+TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
+  auto renderer = Renderer::make(gl::ShaderLibrary(), context_->info(), *asset_, config_.look);
+  ASSERT_TRUE(renderer) << renderer.error().to_string();
+  auto encoder = std::move(*make_strand_encoder("delta"));
+  auto server_decoder =
+      std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count}));
+  auto client_decoder =
+      std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count}));
+  auto painter = gl_picture_painter(config_)();  // its context is current from here on
+  ASSERT_TRUE(painter) << painter.error().to_string();
+  std::vector<Image> painted, drawn;
+  std::vector<EncodedFramePtr> frames;
+  for (uint64_t tick = 1; tick <= 3; ++tick) {
+    frames.push_back(encoder->encode(make_state(*asset_, tick)));
+    auto image = (*painter)->paint(**server_decoder->decode(frames.back()->message), small_view());
+    ASSERT_TRUE(image) << image.error().to_string();
+    painted.push_back(std::move(image).value());
+  }
+  ASSERT_TRUE(context_->make_current());
+  for (const EncodedFramePtr& frame : frames) {
+    const auto snapshot = *client_decoder->decode(frame->message);
+    const StrandPicture picture{snapshot->world_from_head, positions_in_head(*snapshot)};
+    ASSERT_TRUE((*renderer)->draw(picture, small_view().camera, small_view().size));
+    drawn.push_back((*renderer)->read_image());
+  }
+  for (size_t i = 0; i < painted.size(); ++i) EXPECT_TRUE(painted[i] == drawn[i]) << "frame " << i;
+  EXPECT_FALSE(painted[0] == painted[2]) << "the hair moved";
+  renderer->reset();  // while its context is current
+}
+
+TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {
+  auto encoder = std::move(*make_strand_encoder("delta"));
+  encoder->encode(make_state(*asset_, 1));
+  std::mutex mutex;
+  std::vector<EncodedFramePtr> pictures;
+  std::atomic<int> requests{0};
+  FrameWorker::Hooks hooks;
+  hooks.sink = [&](uint32_t, EncodedFramePtr frame) {
+    const std::lock_guard lock(mutex);
+    pictures.push_back(std::move(frame));
+  };
+  hooks.request_keyframe = [&] { ++requests; };
+  FrameWorker worker(std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count})),
+                     gl_picture_painter(config_), 1000.0, std::move(hooks));
+  worker.set_views({{1, small_view()}});
+  ASSERT_TRUE(eventually([&] { return requests > 0; }));
+  worker.offer(encoder->encode_keyframe());
+  const auto has_picture = [&] {
+    const std::lock_guard lock(mutex);
+    return !pictures.empty();
+  };
+  ASSERT_TRUE(eventually([&] { return has_picture() || worker.failure(); }));
+  ASSERT_FALSE(worker.failure()) << worker.failure()->to_string();
+  const auto image = decode_jpeg(std::span(pictures[0]->message).subspan(kFrameHeaderBytes));
+  ASSERT_TRUE(image) << image.error().to_string();
+  ASSERT_EQ(image->width, 160u);
+  ASSERT_EQ(image->height, 90u);
+  // The camera looks at the head: the middle differs from a corner, which shows the background.
+  const uint8_t* corner = image->rgba.data();
+  const uint8_t* middle = image->rgba.data() + 4 * (45 * 160 + 80);
+  const int difference =
+      std::abs(corner[0] - middle[0]) + std::abs(corner[1] - middle[1]) + std::abs(corner[2] - middle[2]);
+  EXPECT_GT(difference, 20);
+}
+
+TEST_F(GlPainting, AnUnknownDeviceIsAnErrorThatNamesTheKnownOnes) {
+  config_.gl_device = "abacus";
+  const auto painter = gl_picture_painter(config_)();
+  ASSERT_FALSE(painter);
+  EXPECT_THAT(painter.error().message, testing::HasSubstr("known: auto, software, hardware"));
+}
+
+}  // namespace
+}  // namespace strandcast

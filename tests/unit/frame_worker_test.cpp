@@ -1,0 +1,299 @@
+#include "server/encode/frame_worker.h"
+
+#include <atomic>
+#include <condition_variable>
+#include <set>
+#include <thread>
+
+#include "common/codec/image_codec.h"
+#include "tests/support/eventually.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kStrands = 6;
+constexpr uint32_t kVertices = 4;
+constexpr double kFastHz = 1e6;    // no pause between frames
+constexpr double kNeverHz = 1e-6;  // the first frame and no other
+
+Snapshot make_state(uint64_t tick) {
+  Snapshot snapshot;
+  snapshot.tick = tick;
+  snapshot.sim_time_ns = static_cast<int64_t>(tick) * 1000;
+  snapshot.strand_count = kStrands;
+  snapshot.vertex_count = kVertices;
+  snapshot.quantum_m = 1e-4f;
+  for (uint32_t i = 0; i < 3 * kStrands * kVertices; ++i)
+    snapshot.lattice.push_back(static_cast<int32_t>(i * 100 + (tick * (i + 1)) % 17));
+  return snapshot;
+}
+
+/// What the painters of one test did, and a gate that can hold them inside paint().
+struct Studio {
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool is_held = false;
+  bool is_inside = false;
+  bool is_failing = false;
+  int painters_made = 0;
+  int painters_alive = 0;
+  std::set<std::thread::id> threads;
+  std::vector<uint64_t> hashes;
+
+  template <class Read>
+  auto get(Read read) {
+    const std::lock_guard lock(mutex);
+    return read(*this);
+  }
+  void hold(bool is_now_held) {
+    const std::lock_guard lock(mutex);
+    is_held = is_now_held;
+    changed.notify_all();
+  }
+};
+
+class FakePainter : public PicturePainter {
+ public:
+  explicit FakePainter(Studio& studio) : studio_(studio) {
+    const std::lock_guard lock(studio_.mutex);
+    ++studio_.painters_made;
+    ++studio_.painters_alive;
+    studio_.threads.insert(std::this_thread::get_id());
+  }
+  ~FakePainter() override {
+    const std::lock_guard lock(studio_.mutex);
+    --studio_.painters_alive;
+    studio_.threads.insert(std::this_thread::get_id());
+  }
+  Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
+    std::unique_lock lock(studio_.mutex);
+    studio_.threads.insert(std::this_thread::get_id());
+    studio_.hashes.push_back(state_hash(snapshot));
+    studio_.is_inside = true;
+    studio_.changed.wait(lock, [&] { return !studio_.is_held; });
+    studio_.is_inside = false;
+    if (studio_.is_failing) return make_error(ErrorCode::Unavailable, "out of paint");
+    const auto [width, height] = view.size;
+    return Image{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height * 4, 255)};
+  }
+
+ private:
+  Studio& studio_;
+};
+
+/// A frame worker with a chain of strand frames to offer.
+class FrameWork : public testing::Test {
+ protected:
+  FrameWork() : encoder_(std::move(*make_strand_encoder("delta"))) {}
+
+  std::unique_ptr<FrameWorker> start(double frame_rate_hz) {
+    FrameWorker::Hooks hooks;
+    hooks.sink = [this](uint32_t picture_class, EncodedFramePtr frame) {
+      const std::lock_guard lock(mutex_);
+      frames_.emplace_back(picture_class, std::move(frame));
+    };
+    hooks.request_keyframe = [this] { ++requests_; };
+    hooks.on_failure = [this](const Error&) { ++failures_; };
+    return std::make_unique<FrameWorker>(
+        std::move(*make_strand_decoder("delta", {kStrands, kVertices})),
+        [this]() -> Result<std::unique_ptr<PicturePainter>> {
+          if (has_no_gl_) return make_error(ErrorCode::Unavailable, "no OpenGL");
+          return std::unique_ptr<PicturePainter>(std::make_unique<FakePainter>(studio_));
+        },
+        frame_rate_hz, std::move(hooks));
+  }
+  std::vector<std::pair<uint32_t, EncodedFramePtr>> frames() {
+    const std::lock_guard lock(mutex_);
+    return frames_;
+  }
+  size_t frame_count() { return frames().size(); }
+  EncodedFramePtr next_delta() { return encoder_->encode(make_state(++tick_)); }
+  EncodedFramePtr keyframe() { return encoder_->encode_keyframe(); }
+  /// Waits for the request and answers it as the encode worker does.
+  void join_chain(FrameWorker& worker) {
+    ASSERT_TRUE(eventually([&] { return requests_ > 0; }));
+    requests_ = 0;
+    worker.offer(keyframe());
+  }
+  static std::map<uint32_t, PictureView> one_view() {
+    PictureView view;
+    view.size = {32, 16};
+    return {{1, view}};
+  }
+
+  std::unique_ptr<StrandEncoder> encoder_;
+  uint64_t tick_ = 0;
+  Studio studio_;
+  std::atomic<bool> has_no_gl_{false};
+  std::atomic<int> requests_{0};
+  std::atomic<int> failures_{0};
+  std::mutex mutex_;
+  std::vector<std::pair<uint32_t, EncodedFramePtr>> frames_;
+};
+
+TEST_F(FrameWork, NothingIsDecodedOrMadeWithoutViews) {
+  const auto worker = start(kFastHz);
+  for (int i = 0; i < 20; ++i) worker->offer(next_delta());
+  give_time_to_misbehave();
+  EXPECT_FALSE(worker->has_views());
+  EXPECT_EQ(worker->counters().decoded, 0u);
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.painters_made; }), 0);
+  EXPECT_EQ(requests_, 0);
+}
+
+TEST_F(FrameWork, DrawsTheDecodedStateForEveryView) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  views[7].size = {64, 48};
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  for (const auto& [picture_class, frame] : frames()) {
+    const auto header = unpack_frame_header(frame->message);
+    ASSERT_TRUE(header);
+    EXPECT_EQ(header->opcode, Opcode::JpegFrame);
+    EXPECT_EQ(header->sequence, 1u);
+    EXPECT_EQ(header->sim_time_ns, 1000);
+    const auto image = decode_jpeg(std::span(frame->message).subspan(kFrameHeaderBytes));
+    ASSERT_TRUE(image) << image.error().to_string();
+    EXPECT_EQ(image->width, views[picture_class].size.width);
+    EXPECT_EQ(image->height, views[picture_class].size.height);
+  }
+  const auto hashes = studio_.get([](Studio& s) { return s.hashes; });
+  EXPECT_EQ(std::set<uint64_t>(hashes.begin(), hashes.end()), std::set<uint64_t>{state_hash(make_state(1))});
+}
+
+TEST_F(FrameWork, WithoutANewStateNothingIsDrawnAgainUnlessTheCameraMoves) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  worker->set_views(views);
+  give_time_to_misbehave();
+  EXPECT_EQ(frame_count(), 1u);
+  views[1].camera.offset_m.x += 0.5f;
+  worker->set_views(views);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  EXPECT_EQ(frames()[1].second->header.sequence, 2u);
+}
+
+TEST_F(FrameWork, TheFrameRateIsALimitAndTheDecoderKeepsUp) {
+  const auto worker = start(kNeverHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  for (int i = 0; i < 10; ++i) worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return worker->counters().decoded == 11; }));
+  EXPECT_EQ(frame_count(), 1u);
+  auto views = one_view();
+  views[2].size = {48, 48};
+  worker->set_views(views);  // a new viewer need not wait for the old one's turn
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  EXPECT_EQ(frames()[1].second->header.sim_time_ns, 11'000);
+}
+
+TEST_F(FrameWork, ASlowPainterHoldsUpNobodyAndRejoinsTheChain) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  studio_.hold(true);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.is_inside; }); }));
+  for (int i = 0; i < 1000; ++i) worker->offer(next_delta());  // returns although nothing is taken
+  studio_.hold(false);
+  join_chain(*worker);  // too many to keep: a keyframe is asked for
+  ASSERT_TRUE(eventually([&] {
+    const auto given = frames();
+    return !given.empty() && given.back().second->header.sim_time_ns == 1'001'000;
+  }));
+  EXPECT_EQ(worker->counters().chain_losses, 1u);
+}
+
+TEST_F(FrameWork, AKeyframeCrowdedOutOfTheQueueIsAskedForAgain) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  next_delta();  // lost on the way
+  worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return requests_ > 0; }));
+  studio_.hold(true);
+  views[1].jpeg_quality = 50;
+  worker->set_views(views);
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.is_inside; }); }));
+  requests_ = 0;
+  worker->offer(keyframe());
+  for (int i = 0; i < 400; ++i) worker->offer(next_delta());
+  studio_.hold(false);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frames().back().second->header.sim_time_ns == 403'000; }));
+}
+
+TEST_F(FrameWork, BrokenStrandFramesCostAKeyframeAndNothingElse) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  auto broken = std::make_shared<EncodedFrame>(*next_delta());
+  broken->message.back() ^= std::byte{0x55};
+  broken->message[kFrameHeaderBytes] ^= std::byte{0xff};
+  worker->offer(broken);
+  worker->offer(next_delta());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frames().back().second->header.sim_time_ns == 3000; }));
+  EXPECT_EQ(worker->counters().chain_losses, 1u);
+}
+
+TEST_F(FrameWork, ThePainterLivesWithTheViewsOnOneThread) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  for (int round = 1; round <= 3; ++round) {
+    worker->set_views(one_view());
+    join_chain(*worker);
+    ASSERT_TRUE(eventually([&] { return frame_count() == static_cast<size_t>(round); }));
+    worker->set_views({});
+    ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
+    requests_ = 0;
+  }
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.painters_made; }), 3);
+  const auto threads = studio_.get([](Studio& s) { return s.threads; });
+  EXPECT_EQ(threads.size(), 1u);
+  EXPECT_FALSE(threads.contains(std::this_thread::get_id()));
+}
+
+TEST_F(FrameWork, NoGlIsReportedOnceAndTheRestLivesOn) {
+  has_no_gl_ = true;
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return failures_ == 1; }));
+  ASSERT_TRUE(worker->failure());
+  EXPECT_EQ(worker->failure()->message, "no OpenGL");
+  EXPECT_FALSE(worker->has_views());
+  worker->set_views(one_view());
+  for (int i = 0; i < 5; ++i) worker->offer(next_delta());
+  give_time_to_misbehave();
+  EXPECT_EQ(failures_, 1);
+  EXPECT_EQ(frame_count(), 0u);
+}
+
+TEST_F(FrameWork, AFailedDrawingEndsFramesToo) {
+  studio_.is_failing = true;
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return worker->failure().has_value(); }));
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
+}
+
+}  // namespace
+}  // namespace strandcast
