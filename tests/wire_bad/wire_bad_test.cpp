@@ -1,0 +1,350 @@
+// Bytes that no honest peer sends: every truncation, random damage, bombs and limits, for every kind of
+// message. All of it also runs through the fuzz entries, which check what comes out when something decodes.
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <random>
+
+#include "common/codec/byte_io.h"
+#include "common/codec/image_codec.h"
+#include "common/codec/strand_payload.h"
+#include "common/codec/zstd_block.h"
+#include "common/wire/messages.h"
+#include "tests/support/hair_motion.h"
+#include "tests/support/sample_asset.h"
+#include "tests/support/sample_messages.h"
+
+extern "C" int fuzz_control(const uint8_t* data, size_t size);
+extern "C" int fuzz_strand(const uint8_t* data, size_t size);
+extern "C" int fuzz_asset(const uint8_t* data, size_t size);
+
+namespace strandcast {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+using Entry = int (*)(const uint8_t*, size_t);
+
+void feed(Entry entry, const Bytes& bytes) {
+  entry(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size());
+}
+
+/// Calls visit with copies of `good`: some bytes changed, a part repeated, a part missing.
+template <class Visit>
+void for_each_damage(const Bytes& good, int trials, uint32_t seed, Visit visit) {
+  std::mt19937 random(seed);
+  for (int trial = 0; trial < trials; ++trial) {
+    Bytes bad = good;
+    for (uint32_t flips = 1 + random() % 4; flips > 0; --flips)
+      bad[random() % bad.size()] ^= static_cast<std::byte>(1 + random() % 255);
+    if (trial % 5 == 3) {
+      const auto from = static_cast<std::ptrdiff_t>(random() % bad.size());
+      bad.erase(bad.begin() + from,
+                bad.begin() + from + static_cast<std::ptrdiff_t>(random() % (bad.size() - from)));
+    }
+    if (trial % 5 == 4)
+      bad.insert(bad.begin() + static_cast<std::ptrdiff_t>(random() % bad.size()), 8, std::byte{0xff});
+    visit(bad);
+  }
+}
+
+Bytes random_bytes(size_t size, std::mt19937& random) {
+  Bytes bytes(size);
+  for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
+  return bytes;
+}
+
+// ---- control messages ----
+
+std::vector<Bytes> control_samples() {
+  std::vector<Bytes> samples;
+  for (const auto& message : sample_client_messages()) samples.push_back(encode(message));
+  for (const auto& message : sample_server_messages()) samples.push_back(encode(message));
+  return samples;
+}
+
+TEST(ControlBytes, TruncatedDamagedAndRandomMessagesNeverCrash) {
+  for (const Bytes& good : control_samples()) {
+    for (size_t size = 0; size <= good.size(); ++size)
+      feed(fuzz_control, Bytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)));
+    for_each_damage(good, 500, 7, [](const Bytes& bad) { feed(fuzz_control, bad); });
+  }
+  std::mt19937 random(2);
+  for (int i = 0; i < 3000; ++i) {
+    Bytes bytes = random_bytes(1 + random() % 200, random);
+    bytes[0] = std::byte{1};
+    feed(fuzz_control, bytes);
+  }
+}
+
+TEST(ControlBytes, OtherOpcodesAndNothingAreRefused) {
+  EXPECT_EQ(decode_client_message({}).error().code, ErrorCode::BadInput);
+  for (int opcode = 0; opcode < 256; ++opcode) {
+    Bytes bytes = encode(ClientMessage(Ping{5}));
+    bytes[0] = static_cast<std::byte>(opcode);
+    EXPECT_EQ(decode_client_message(bytes).ok(), opcode == 1) << opcode;
+  }
+  const Bytes empty = {std::byte{1}};
+  EXPECT_EQ(decode_client_message(empty).error().code, ErrorCode::BadInput);
+  EXPECT_EQ(decode_server_message(empty).error().code, ErrorCode::BadInput);
+}
+
+/// Appends an unknown protobuf field of exactly `size` bytes.
+void append_unknown_field(Bytes& bytes, size_t size) {
+  constexpr uint32_t kTag = 2000 << 3 | 2;  // field 2000, length-delimited; two bytes of tag
+  std::vector<uint8_t> field = {(kTag & 0x7f) | 0x80, ((kTag >> 7) & 0x7f) | 0x80, kTag >> 14};
+  const size_t length = size - 6;  // three bytes of length
+  field.push_back(static_cast<uint8_t>((length & 0x7f) | 0x80));
+  field.push_back(static_cast<uint8_t>(((length >> 7) & 0x7f) | 0x80));
+  field.push_back(static_cast<uint8_t>(length >> 14));
+  for (const uint8_t byte : field) bytes.push_back(static_cast<std::byte>(byte));
+  bytes.resize(bytes.size() + length);
+}
+
+TEST(ControlBytes, ExactlyTheLimitPassesAndOneByteMoreFails) {
+  const Bytes good = encode(ClientMessage(Ping{5}));
+  Bytes longest = good;
+  append_unknown_field(longest, kMaxControlBytes - good.size());
+  ASSERT_EQ(longest.size(), kMaxControlBytes);
+  const auto passed = decode_client_message(longest);
+  ASSERT_TRUE(passed) << passed.error().to_string();
+  EXPECT_EQ(std::get<Ping>(*passed).client_time_ns, 5);
+  Bytes too_long = good;
+  append_unknown_field(too_long, kMaxControlBytes + 1 - good.size());
+  ASSERT_EQ(too_long.size(), kMaxControlBytes + 1);
+  EXPECT_EQ(decode_client_message(too_long).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(decode_server_message(Bytes(1 << 20, std::byte{1})).error().code, ErrorCode::LimitExceeded);
+}
+
+Bytes control_of(std::initializer_list<int> protobuf) {
+  Bytes bytes = {std::byte{1}};
+  for (const int byte : protobuf) bytes.push_back(static_cast<std::byte>(byte));
+  return bytes;
+}
+
+TEST(ControlBytes, UnknownEnumValuesAreNamed) {
+  // hello (field 1) { role (field 1) = 9 }
+  const auto role = decode_client_message(control_of({0x0a, 0x02, 0x08, 0x09}));
+  ASSERT_FALSE(role);
+  EXPECT_EQ(role.error().place, "hello.role");
+  // hello { mode (field 2) = 3 }
+  EXPECT_EQ(decode_client_message(control_of({0x0a, 0x02, 0x10, 0x03})).error().place, "hello.mode");
+  // command (field 8) { }: nothing is asked for
+  EXPECT_EQ(decode_client_message(control_of({0x42, 0x00})).error().place, "command");
+  // command { command = 5 }
+  EXPECT_EQ(decode_client_message(control_of({0x42, 0x02, 0x08, 0x05})).error().place, "command");
+  // hello { role = -1 }, as ten bytes of varint
+  EXPECT_FALSE(decode_client_message(
+      control_of({0x0a, 0x0b, 0x08, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x01})));
+}
+
+TEST(ControlBytes, DeepNestingIsRefused) {
+  // Groups of an unknown field, opened only, or opened and closed again.
+  for (const size_t depth : {size_t{8}, size_t{17}, size_t{10'000}}) {
+    Bytes bytes = {std::byte{1}};
+    bytes.insert(bytes.end(), depth, std::byte{0x7b});  // field 15, start of group
+    EXPECT_FALSE(decode_client_message(bytes)) << depth;
+    bytes.insert(bytes.end(), depth, std::byte{0x7c});
+    EXPECT_FALSE(decode_client_message(bytes)) << depth;
+  }
+  Bytes too_deep = encode(ClientMessage(Ping{5}));
+  too_deep.insert(too_deep.end(), 10'000, std::byte{0x7b});
+  too_deep.insert(too_deep.end(), 10'000, std::byte{0x7c});
+  EXPECT_FALSE(decode_client_message(too_deep));
+}
+
+TEST(ControlBytes, TextThatIsNotUtf8IsRefused) {
+  Bytes bytes = encode(ClientMessage(Hello{Role::Viewer, StreamMode::Strands, "abc", "", 0, 0}));
+  constexpr std::array kName = {std::byte{'a'}, std::byte{'b'}, std::byte{'c'}};
+  const auto name = std::search(bytes.begin(), bytes.end(), kName.begin(), kName.end());
+  ASSERT_NE(name, bytes.end());
+  *name = std::byte{0xff};
+  EXPECT_FALSE(decode_client_message(bytes));
+  *name = std::byte{'\n'};
+  EXPECT_EQ(decode_client_message(bytes).error().place, "hello.name");
+}
+
+// ---- strand messages ----
+
+constexpr uint32_t kStrands = 5;  // as in the fuzz entry
+constexpr uint32_t kVertices = 4;
+
+struct Stream {
+  std::string codec;
+  std::unique_ptr<StrandEncoder> encoder;
+  std::unique_ptr<StrandDecoder> decoder;
+  HairMotion hair{{kStrands, kVertices, MotionKind::Active}};
+
+  explicit Stream(const std::string& name) : codec(name) {
+    encoder = std::move(make_strand_encoder(name)).value();
+    decoder = std::move(make_strand_decoder(name, {kStrands, kVertices})).value();
+  }
+  EncodedFramePtr next() {
+    hair.step();
+    return encoder->encode(hair.snapshot(quantum_for_bound(1e-4f)));
+  }
+};
+
+/// The message with its payload length corrected to what it carries.
+Bytes with_length(Bytes message) {
+  const auto length = static_cast<uint32_t>(message.size() - kFrameHeaderBytes);
+  std::memcpy(message.data() + 12, &length, sizeof(length));
+  return message;
+}
+
+TEST(StrandBytes, EveryTruncationIsRefusedAndTheStreamGoesOn) {
+  for (const StrandCodecInfo& codec : strand_codecs()) {
+    Stream stream(codec.name);
+    for (int i = 0; i < 3; ++i) {
+      const auto frame = stream.next();
+      for (size_t size = 0; size < frame->message.size(); ++size) {
+        const Bytes cut(frame->message.begin(), frame->message.begin() + static_cast<std::ptrdiff_t>(size));
+        EXPECT_FALSE(stream.decoder->decode(cut)) << codec.name << " " << size;
+        if (size < kFrameHeaderBytes) continue;
+        EXPECT_FALSE(stream.decoder->decode(with_length(cut))) << codec.name << " " << size;
+      }
+      Bytes longer = frame->message;
+      longer.push_back(std::byte{0});
+      EXPECT_FALSE(stream.decoder->decode(with_length(longer)));
+      EXPECT_TRUE(stream.decoder->decode(frame->message));
+    }
+  }
+}
+
+TEST(StrandBytes, DamageGivesAnErrorOrAValidSnapshot) {
+  for (const StrandCodecInfo& codec : strand_codecs()) {
+    Stream stream(codec.name);
+    for (int i = 0; i < 4; ++i) {
+      const auto frame = stream.next();
+      for_each_damage(frame->message, 1000, 3, [&](const Bytes& bad) {
+        for (const int how : {0, 1}) {
+          Bytes input = {static_cast<std::byte>(how)};
+          input.insert(input.end(), bad.begin(), bad.end());
+          feed(fuzz_strand, input);
+        }
+      });
+      // Behind a valid header, and behind a valid fixed part.
+      for (const int how : {4, 5, 7, 12, 13, 15}) {
+        const size_t skipped = kFrameHeaderBytes + ((how & 8) != 0 ? kStrandFixedBytes : 0);
+        const Bytes rest(frame->message.begin() + static_cast<std::ptrdiff_t>(skipped), frame->message.end());
+        for_each_damage(rest, 300, 5, [&](const Bytes& bad) {
+          Bytes input = {static_cast<std::byte>(how)};
+          input.insert(input.end(), bad.begin(), bad.end());
+          feed(fuzz_strand, input);
+        });
+      }
+    }
+  }
+}
+
+TEST(StrandBytes, FixedPartIsCheckedFieldByField) {
+  Stream stream("raw");
+  const auto frame = stream.next();
+  const auto with = [&](size_t offset, auto value) {
+    Bytes bytes = frame->message;
+    std::memcpy(bytes.data() + kFrameHeaderBytes + offset, &value, sizeof(value));
+    return stream.decoder->decode(bytes);
+  };
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(with(0, uint8_t{9}));  // codec
+  for (const float quantum_m : {0.0f, -1e-4f, kNan, INFINITY, 1.5f}) EXPECT_FALSE(with(4, quantum_m));
+  EXPECT_FALSE(with(8, kStrands + 1));        // strand_count
+  EXPECT_FALSE(with(12, ~0u));                // vertex_count
+  EXPECT_FALSE(with(16, uint64_t{1} << 60));  // tick: no longer the announced state
+  EXPECT_TRUE(with(24, int64_t{77}));         // motion_time is not part of the state
+  for (size_t i = 0; i < 7; ++i) EXPECT_FALSE(with(32 + 8 * i, std::nan("")));
+  EXPECT_FALSE(with(88, uint64_t{0}));  // state hash
+  EXPECT_FALSE(with(kStrandFixedBytes, kMaxLattice));
+  EXPECT_TRUE(stream.decoder->decode(frame->message));
+}
+
+enum class ContentSize { Declared, Absent };
+
+Bytes compressed(const Bytes& content, ContentSize mode) {
+  Bytes packed(ZSTD_compressBound(content.size()));
+  ZSTD_CCtx* context = ZSTD_createCCtx();
+  ZSTD_CCtx_setParameter(context, ZSTD_c_contentSizeFlag, mode == ContentSize::Declared ? 1 : 0);
+  packed.resize(ZSTD_compress2(context, packed.data(), packed.size(), content.data(), content.size()));
+  ZSTD_freeCCtx(context);
+  return packed;
+}
+
+TEST(ZstdBlocks, MustDeclareExactlyTheExpectedSize) {
+  ZstdDecompressor zstd;
+  const Bytes content(1000, std::byte{3});
+  Bytes room(1000);
+  const Bytes good = compressed(content, ContentSize::Declared);
+  ASSERT_TRUE(zstd.fill(good, room));
+  EXPECT_EQ(room, content);
+  EXPECT_FALSE(zstd.fill(compressed(content, ContentSize::Absent), room));
+  Bytes smaller(999), larger(1001);
+  EXPECT_EQ(zstd.fill(good, smaller).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(zstd.fill(good, larger).error().code, ErrorCode::BadInput);
+  Bytes twice = good;
+  twice.insert(twice.end(), good.begin(), good.end());
+  EXPECT_FALSE(zstd.fill(twice, room));
+  EXPECT_FALSE(zstd.fill({}, room));
+  // 64 MiB of zeros in a few kilobytes: refused by its declared size, before anything is unpacked.
+  const Bytes bomb = compressed(Bytes(size_t{64} << 20), ContentSize::Declared);
+  EXPECT_LT(bomb.size(), 20'000u);
+  EXPECT_EQ(zstd.fill(bomb, room).error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(StrandBytes, BombsInsideAValidMessageAreRefused) {
+  Stream stream("delta");
+  const auto key = stream.next();
+  ASSERT_TRUE(stream.decoder->decode(key->message));
+  const auto delta = stream.next();
+  for (const ContentSize mode : {ContentSize::Declared, ContentSize::Absent}) {
+    const Bytes bomb = compressed(Bytes(size_t{16} << 20), mode);
+    for (const auto& good : {key, delta}) {
+      const size_t weights = good == delta ? 90 : 0;
+      Bytes message(good->message.begin(),
+                    good->message.begin() +
+                        static_cast<std::ptrdiff_t>(kFrameHeaderBytes + kStrandFixedBytes + weights));
+      ByteWriter writer(message);
+      writer.put(static_cast<uint32_t>(bomb.size()));
+      writer.put_bytes(bomb);
+      EXPECT_FALSE(stream.decoder->decode(with_length(message)));
+    }
+  }
+  EXPECT_TRUE(stream.decoder->decode(delta->message));
+}
+
+// ---- assets and pictures ----
+
+TEST(AssetBytes, TruncatedDamagedAndRandomAssetsNeverCrash) {
+  const Bytes good = encode_scene_asset(sample_asset(20, 5));
+  for (size_t size = 0; size < good.size(); ++size)
+    EXPECT_FALSE(decode_scene_asset(std::span(good).first(size))) << size;
+  Bytes longer = good;
+  longer.push_back(std::byte{0});
+  EXPECT_FALSE(decode_scene_asset(longer));
+  for_each_damage(good, 5000, 11, [](const Bytes& bad) { feed(fuzz_asset, bad); });
+  std::mt19937 random(4);
+  for (int i = 0; i < 1000; ++i) feed(fuzz_asset, random_bytes(random() % 300, random));
+}
+
+TEST(AssetBytes, AnAssetThatUnpacksToLessThanItDeclaresIsRefused) {
+  SceneAsset asset = sample_asset(20, 5);
+  Bytes payload = encode_scene_asset(asset);
+  payload.resize(24);  // keep the counts
+  const Bytes wrong = compressed(Bytes(100), ContentSize::Declared);
+  payload.insert(payload.end(), wrong.begin(), wrong.end());
+  EXPECT_FALSE(decode_scene_asset(payload));
+  payload.resize(24);
+  const Bytes absent = compressed(Bytes(5000), ContentSize::Absent);
+  payload.insert(payload.end(), absent.begin(), absent.end());
+  EXPECT_EQ(decode_scene_asset(payload).error().code, ErrorCode::BadInput);
+}
+
+TEST(PictureBytes, DamagedJpegsNeverCrash) {
+  Image image{40, 30, std::vector<uint8_t>(40 * 30 * 4, 200)};
+  for (size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = static_cast<uint8_t>(i * i >> 6);
+  const auto good = encode_jpeg(image, 70);
+  ASSERT_TRUE(good);
+  for_each_damage(*good, 3000, 13, [](const Bytes& bad) { feed(fuzz_asset, bad); });
+}
+
+}  // namespace
+}  // namespace strandcast
