@@ -58,8 +58,6 @@ Status ReferenceStrands::load(const Groom& groom, const glm::dquat& world_from_h
   scratch_.predicted_m.resize(n);
   scratch_.placed_m.resize(n);
   scratch_.pushed_m.resize(n);
-  scratch_.contact_normal.resize(n);
-  scratch_.contact_depth_m.resize(n);
   scratch_.segment_m.resize(n);
   return {};
 }
@@ -94,8 +92,6 @@ void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) con
     strand.segment_m[i] =
         i == 0 ? 0.0 : glm::distance(rest, glm::dvec3(layout_.rest[layout_.index(i - 1, strand_index)]));
     strand.pushed_m[i] = glm::dvec3(0.0);
-    strand.contact_depth_m[i] = 0.0;
-    strand.contact_normal[i] = glm::dvec3(0.0);
   }
 }
 
@@ -124,8 +120,8 @@ glm::dvec3 ReferenceStrands::air_velocity(const glm::dvec3& point_m) const {
   const size_t count = std::min<size_t>(input_->gusts.size(), kMaxGustWaves);
   for (size_t i = 0; i < count; ++i) {
     const GustWave& wave = input_->gusts[i];
-    const double angle =
-        glm::dot(glm::dvec3(wave.wave_vector_rad_per_m), point_m) - static_cast<double>(wave.phase_rad);
+    const glm::dvec3 wave_vector = limited(glm::dvec3(wave.wave_vector_rad_per_m), kMaxPhaseRad);
+    const double angle = glm::dot(wave_vector, point_m) - limited(wave.phase_rad, kMaxPhaseRad);
     result += limited(glm::dvec3(wave.amplitude_mps), kMaxWindMps) * std::sin(angle);
   }
   return result;
@@ -134,12 +130,13 @@ glm::dvec3 ReferenceStrands::air_velocity(const glm::dvec3& point_m) const {
 void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
   const glm::dvec3 start = strand.placed_m[i - 1];
   const double length = strand.segment_m[i];
-  glm::dvec3 direction = strand.placed_m[i] - start;
+  glm::dvec3 direction = strand.predicted_m[i] - start;
   // No direction to keep: take the groomed one.
   if (glm::length(direction) < kTinyLength) direction = strand.target_m[i] - strand.target_m[i - 1];
   const double norm = glm::length(direction);
   glm::dvec3 end = norm < kTinyLength ? start : start + length * (direction / norm);
 
+  strand.pushed_m[i] = glm::dvec3(0.0);
   push_out(strand, i, start, end);
   if (layout_.pinned_tail_count > 0) {
     const uint32_t tail = layout_.tail_begin();
@@ -175,29 +172,32 @@ void ReferenceStrands::push_out(ReferenceStrand& strand, uint32_t i, const glm::
       radius = r;
     }
     if (most <= 0.0) return;
-    strand.contact_depth_m[i] += radius - glm::distance(end, center);
-    const glm::dvec3 turned = turned_onto_sphere(start, end, strand.segment_m[i], center, radius);
+    const glm::dvec3 held = held_by_friction(strand.old_m[i], end, center, radius);
+    const glm::dvec3 turned = turned_onto_sphere(start, held, strand.segment_m[i], center, radius);
     strand.pushed_m[i] += turned - end;
     end = turned;
-    const double distance = glm::distance(end, center);
-    strand.contact_normal[i] = distance > kTinyLength ? (end - center) / distance : glm::dvec3(0.0);
   }
+}
+
+// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
+// up to the friction coefficient times the depth that the collider has to push back.
+glm::dvec3 ReferenceStrands::held_by_friction(const glm::dvec3& old, const glm::dvec3& end,
+                                              const glm::dvec3& center, double radius) const {
+  const double distance = glm::distance(end, center);
+  if (distance < kTinyLength) return end;
+  const glm::dvec3 normal = (end - center) / distance;
+  const glm::dvec3 carried = rotation_ * (glm::conjugate(previous_rotation_) * old);
+  const glm::dvec3 slip = end - carried;
+  const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
+  const double way = glm::length(sliding);
+  if (way < kTinyLength) return end;
+  return end - sliding * std::min(1.0, parameters_.collider_friction * (radius - distance) / way);
 }
 
 // 003 section 2.1.4: v_i = (p_i(t+h) - p_i(t)) / h - s_damping d_(i+1) / h, where d is what the length
 // constraint moved a vertex by; friction and the speed limit are ours.
 glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint32_t i) const {
   glm::dvec3 u = (strand.placed_m[i] - strand.old_m[i]) / h_s_;
-  if (strand.contact_depth_m[i] > 0.0) {
-    // Sliding speed over the collider, which turns rigidly with the head.
-    const glm::dvec3 carried = rotation_ * (glm::conjugate(previous_rotation_) * strand.old_m[i]);
-    const glm::dvec3 slip = (strand.placed_m[i] - carried) / h_s_;
-    const glm::dvec3 normal = strand.contact_normal[i];
-    const glm::dvec3 tangential = slip - normal * glm::dot(slip, normal);
-    const double speed = glm::length(tangential);
-    const double stopped = parameters_.collider_friction * strand.contact_depth_m[i] / h_s_;
-    if (speed > kTinyLength) u -= tangential * std::min(1.0, stopped / speed);
-  }
   const bool has_next = i + 1 < layout_.vertex_count && !is_pinned(i) && !is_pinned(i + 1);
   if (has_next) {
     const glm::dvec3 correction = strand.placed_m[i + 1] - strand.predicted_m[i + 1] - strand.pushed_m[i + 1];

@@ -18,9 +18,7 @@ struct ReferenceStrand {
   std::vector<glm::dvec3> old_m;        // position before the substep, as stored then
   std::vector<glm::dvec3> predicted_m;  // where forces alone would take it
   std::vector<glm::dvec3> placed_m;     // after the constraints
-  std::vector<glm::dvec3> pushed_m;     // of that way, what colliders did
-  std::vector<glm::dvec3> contact_normal;
-  std::vector<double> contact_depth_m;  // sum over all pushes, 0 = no contact
+  std::vector<glm::dvec3> pushed_m;     // of that way, what colliders and their friction did
   std::vector<double> segment_m;        // before vertex i
 };
 
@@ -38,8 +36,8 @@ class ReferenceStrands : public Solver {
   /// Moves placed_m of all vertices that are not pinned, by place() or rigidly with their segment.
   virtual void solve(ReferenceStrand& strand) const = 0;
 
-  /// Puts vertex i at its segment's length from vertex i-1, outside the colliders and within reach of a
-  /// pinned tail.
+  /// Puts vertex i as near to its prediction as its segment's length from vertex i-1, the colliders and the
+  /// reach of a pinned tail allow. pinned tail.
   void place(ReferenceStrand& strand, uint32_t i) const;
   const StrandLayout& layout() const { return layout_; }
   bool is_pinned(uint32_t i) const { return i < layout_.pinned_root_count || i >= layout_.tail_begin(); }
@@ -49,6 +47,8 @@ class ReferenceStrands : public Solver {
   glm::dvec3 predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const;
   glm::dvec3 air_velocity(const glm::dvec3& point_m) const;
   void push_out(ReferenceStrand& strand, uint32_t i, const glm::dvec3& start, glm::dvec3& end) const;
+  glm::dvec3 held_by_friction(const glm::dvec3& old, const glm::dvec3& end, const glm::dvec3& center,
+                              double radius) const;
   glm::dvec3 finish_velocity(const ReferenceStrand& strand, uint32_t i) const;
 
   StrandParameters parameters_;

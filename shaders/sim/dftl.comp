@@ -7,8 +7,7 @@ uint follow_head(uint at, uint begin, uint end, uint stride) {
   for (uint i = begin; i < end; ++i) {
     const vec4 state = texelFetch(u_position, int(at));
     const vec3 target = turned_with_head(texelFetch(u_rest, int(at)).xyz);
-    const bool is_sane = dot(state.xyz, state.xyz) < kBrokenSquared;
-    const vec3 velocity = is_sane ? (target - state.xyz) * u_step.push.w : vec3(0.0);
+    const vec3 velocity = is_broken(state.xyz) ? vec3(0.0) : (target - state.xyz) * u_step.push.w;
     store_vertex(at, target, state.w);
     store_velocity(at, velocity);
     at += stride;
@@ -37,17 +36,17 @@ void main() {
   vec3 waiting = vec3(0.0);
   for (uint i = first; i < tail; ++i) {
     const Vertex vertex = predict(at);
-    Contact contact = Contact(vec3(0.0), vec3(0.0), 0.0);
     const bool is_last = i + 1u == tail;
 #if HAS_PINNED_TAIL
     reach -= vertex.segment;
     if (is_last) reach = texelFetch(u_rest, int(at + stride)).w;
 #endif
-    const vec3 end = placed(start, start_target, vertex, vertex.predicted, anchor, reach, is_last, contact);
-    const vec3 correction = end - vertex.predicted - contact.pushed;
+    vec3 pushed;
+    const vec3 end = placed(start, start_target, vertex, anchor, reach, is_last, pushed);
+    const vec3 correction = end - vertex.predicted - pushed;
     store_vertex(at, end, vertex.arc);
     if (i > first) store_velocity(at - stride, waiting - (u_step.style.z * u_step.push.w) * correction);
-    waiting = velocity_after(vertex, end, contact);
+    waiting = (end - vertex.old) * u_step.push.w;
     start = end;
     start_target = vertex.target;
     at += stride;

@@ -1,4 +1,6 @@
 // Odd-even Dynamic Follow-The-Leader: one invocation per vertex, whole strands per group, positions in shared memory.
+// It starts from the predicted directions laid end to end; every placement starts again from the prediction, so two
+// more vertices are final after each iteration, and half as many iterations as vertices give the serial result.
 #include "sim/follow.glsl"
 
 layout(local_size_x = kVertexLocalSize) in;
@@ -15,11 +17,11 @@ struct Lane {
   bool is_free;  // exists and does not follow the head
 };
 
-void place_in_turn(Lane lane, Vertex vertex, uint parity, vec3 anchor, float reach, inout Contact contact) {
+void place_in_turn(Lane lane, Vertex vertex, uint parity, vec3 anchor, float reach, inout vec3 pushed) {
   if (lane.is_free && (lane.index & 1u) == parity) {
     const uint leader = lane.local - lane.stride;
-    s_point[lane.local] = placed(s_point[leader], s_target[leader], vertex, s_point[lane.local], anchor, reach,
-                                 lane.index + 1u == u_step.shape.w, contact);
+    s_point[lane.local] = placed(s_point[leader], s_target[leader], vertex, anchor, reach,
+                                 lane.index + 1u == u_step.shape.w, pushed);
   }
   barrier();
 }
@@ -60,7 +62,7 @@ void main() {
   const uint at = exists ? lane.index * strands + strand : 0u;
 
   Vertex vertex = predict(at);
-  Contact contact = Contact(vec3(0.0), vec3(0.0), 0.0);
+  vec3 pushed = vec3(0.0);
   if (!lane.is_free) vertex.predicted = vertex.target;
   s_point[lane.local] = vertex.predicted;
   s_target[lane.local] = vertex.target;
@@ -77,9 +79,12 @@ void main() {
   }
 #endif
 
+#if !HAS_PINNED_TAIL
+  restore_lengths(lane, vertex);
+#endif
   for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) {
-    place_in_turn(lane, vertex, 1u, anchor, reach, contact);
-    place_in_turn(lane, vertex, 0u, anchor, reach, contact);
+    place_in_turn(lane, vertex, 1u, anchor, reach, pushed);
+    place_in_turn(lane, vertex, 0u, anchor, reach, pushed);
   }
 #if !HAS_PINNED_TAIL
   if (u_step.odd_even.y != 0u) restore_lengths(lane, vertex);
@@ -87,10 +92,10 @@ void main() {
 
   const vec3 end = lane.is_free ? s_point[lane.local] : vertex.target;
   barrier();
-  s_point[lane.local] = lane.is_free ? end - vertex.predicted - contact.pushed : vec3(0.0);
+  s_point[lane.local] = lane.is_free ? end - vertex.predicted - pushed : vec3(0.0);
   barrier();
   if (!exists) return;
-  vec3 velocity = velocity_after(vertex, end, contact);
+  vec3 velocity = (end - vertex.old) * u_step.push.w;
   const bool has_next = lane.is_free && lane.index + 1u < u_step.shape.w;
   if (has_next) velocity -= (u_step.style.z * u_step.push.w) * s_point[lane.local + lane.stride];
   store_vertex(at, end, vertex.arc);

@@ -1,4 +1,4 @@
-// Prediction, Follow-The-Leader placement with colliders, and contact friction of one vertex. Document 003, sections
+// Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Document 003, sections
 // 2.1.4 and 4.2.3.
 #pragma variant HAS_TURBULENCE 0 1
 #pragma variant COLLIDERS 0 1 4 16
@@ -14,12 +14,6 @@ struct Vertex {
   vec3 old;        // position before the substep
   float arc;       // 0 at the root, 1 at the tip
   vec3 predicted;  // where forces alone would take it
-};
-
-struct Contact {
-  vec3 pushed;  // what colliders moved the vertex by, so far
-  vec3 normal;  // of the last push
-  float depth;  // sum of the depths, 0 = no contact
 };
 
 // Wind beside the mean wind; waves that are not there have no amplitude.
@@ -44,7 +38,7 @@ Vertex predict(uint at) {
   vertex.target = turned_with_head(rest.xyz);
   vertex.segment = rest.w;
   vertex.arc = state.w;
-  const bool is_sane = dot(state.xyz, state.xyz) < kBrokenSquared && dot(state_velocity, state_velocity) < kBrokenSquared;
+  const bool is_sane = !is_broken(state.xyz) && !is_broken(state_velocity);
   vertex.old = is_sane ? state.xyz : vertex.target;
   const vec3 velocity = is_sane ? state_velocity - u_step.head_velocity.xyz : vec3(0.0);
 
@@ -76,11 +70,25 @@ vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, 
   return squared > kTinySquared ? end : start + segment * direction;
 }
 
-// The nearest point to `point` at the segment's length from `start`, outside the colliders and, with a pinned tail,
-// not further from `anchor` than `reach` (exactly there for the last free vertex).
-vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 point, vec3 anchor, float reach, bool is_last,
-            inout Contact contact) {
-  vec3 along = point - start;
+// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone up to the
+// friction coefficient times the depth that the collider has to push back.
+vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
+  const vec3 outward = end - sphere.xyz;
+  const float squared = max(dot(outward, outward), kTinySquared);
+  const float inverse = inversesqrt(squared);
+  const vec3 normal = outward * inverse;
+  const vec3 slip = end - carried_by_head(old);
+  const vec3 sliding = slip - normal * dot(slip, normal);
+  const float most = u_step.contact.x * (sphere.w - squared * inverse);
+  return end - sliding * min(1.0, most * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
+}
+
+// The end of a vertex's segment: as near to its prediction as the segment's length from `start`, the colliders and,
+// with a pinned tail, the distance `reach` to `anchor` allow (exactly there for the last free vertex). `pushed` is what
+// colliders moved it by.
+vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float reach, bool is_last, out vec3 pushed) {
+  pushed = vec3(0.0);
+  vec3 along = vertex.predicted - start;
   float squared = dot(along, along);
   // No direction to keep: take the groomed one.
   const vec3 groomed = vertex.target - start_target;
@@ -103,11 +111,9 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 point, vec3 ancho
       most = max(inside, most);
     }
     if (!(most > 0.0)) break;
-    const vec3 turned = turned_onto_sphere(start, direction, vertex.segment, deepest.xyz, deepest.w);
-    const vec3 outward = turned - deepest.xyz;
-    contact.depth += deepest.w - distance(end, deepest.xyz);
-    contact.normal = outward * inversesqrt(max(dot(outward, outward), kTinySquared));
-    contact.pushed += turned - end;
+    const vec3 held = (held_by_friction(vertex.old, end, deepest) - start) / max(vertex.segment, kTinySquared);
+    const vec3 turned = turned_onto_sphere(start, held, vertex.segment, deepest.xyz, deepest.w);
+    pushed += turned - end;
     end = turned;
     direction = (end - start) / max(vertex.segment, kTinySquared);
   }
@@ -119,19 +125,4 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 point, vec3 ancho
   }
 #endif
   return end;
-}
-
-// Velocity relative to the head joint after the constraints, with the friction of a contact: Coulomb, limited to the
-// sliding speed over the collider, which turns rigidly with the head.
-vec3 velocity_after(Vertex vertex, vec3 end, Contact contact) {
-  const float per_step = u_step.push.w;
-  vec3 velocity = (end - vertex.old) * per_step;
-#if COLLIDERS >= 1
-  const vec3 slip = (end - carried_by_head(vertex.old)) * per_step;
-  const vec3 sliding = slip - contact.normal * dot(slip, contact.normal);
-  const float speed_squared = max(dot(sliding, sliding), kTinySquared);
-  const float stopped = u_step.contact.x * contact.depth * per_step * inversesqrt(speed_squared);
-  velocity -= sliding * min(1.0, stopped);
-#endif
-  return velocity;
 }

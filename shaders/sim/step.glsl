@@ -29,8 +29,13 @@ layout(std430, binding = kBindingVelocity) writeonly restrict buffer VelocityBlo
 
 // A squared length below this has no direction.
 const float kTinySquared = 1e-20;
-// A squared position or velocity above this, or NaN, is broken.
-const float kBrokenSquared = 1e24;
+
+// True for NaN, infinity and absurdly large numbers (2^40 and up). By bits: compilers may turn comparisons around,
+// which changes what they say about NaN.
+bool is_broken(vec3 value) {
+  const uvec3 magnitude = floatBitsToUint(value) & 0x7fffffffu;
+  return max(max(magnitude.x, magnitude.y), magnitude.z) >= 0x53800000u;
+}
 
 vec3 turned_with_head(vec3 point) {
   return u_step.world_from_head[0].xyz * point.x + u_step.world_from_head[1].xyz * point.y +

@@ -11,7 +11,7 @@ constexpr double kSubstepS = 1.0 / 60.0;
 // A float position of 0.3 m is good to 1.5e-8 m. One step divides differences of positions by a segment of a
 // few millimetres and adds them up over the strand, and the next step starts from the result: a few hundred
 // roundings.
-constexpr double kBoundM = 5e-6;
+constexpr double kBoundM = 1e-5;
 // A strand held at both ends is nearly straight: the side of a flat triangle answers to rounding with its
 // square root, sqrt(1.5e-8 m x 0.25 m) = 6e-5 m, in each step.
 constexpr double kHeldBoundM = 5e-4;

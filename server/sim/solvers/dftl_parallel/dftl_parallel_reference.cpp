@@ -15,12 +15,14 @@ class DftlParallelReference final : public ReferenceStrands {
 
  private:
   void solve(ReferenceStrand& strand) const override {
+    // A pinned tail fixes the sum of the segments, which laying them end to end would shift.
+    const bool is_tip_free = layout().pinned_tail_count == 0;
+    if (is_tip_free) restore_lengths(strand);
     for (uint32_t iteration = 0; iteration < iterations_; ++iteration) {
       place_every_second(strand, 1);
       place_every_second(strand, 0);
     }
-    // A pinned tail fixes the sum of the segments, which the finish would shift.
-    if (has_exact_length_ && layout().pinned_tail_count == 0) restore_lengths(strand);
+    if (is_tip_free && has_exact_length_) restore_lengths(strand);
   }
 
   void place_every_second(ReferenceStrand& strand, uint32_t parity) const {

@@ -1,0 +1,97 @@
+// Fixture that walks the solver table: every row on the GPU and as its double-precision reference.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/sim/solver_registry.h"
+#include "tests/support/gl_fixture.h"
+#include "tests/support/sim_scene.h"
+
+namespace strandcast {
+
+/// One way to make a solver of one row.
+struct SolverKind {
+  const SolverRow* row = nullptr;
+  bool is_gpu = false;
+  std::string name() const { return row->name + (is_gpu ? " (GPU)" : " (reference)"); }
+};
+
+class SolverTest : public GlTest {
+ protected:
+  static std::vector<SolverKind> all_kinds() {
+    std::vector<SolverKind> kinds;
+    for (const SolverRow& row : solver_table()) {
+      kinds.push_back({&row, true});
+      kinds.push_back({&row, false});
+    }
+    return kinds;
+  }
+
+  /// A loaded solver; `given` holds only what differs from the defaults and is known to the row.
+  std::unique_ptr<Solver> make(const SolverKind& kind, const Groom& groom, const SolverParameters& given = {},
+                               const glm::dquat& world_from_head = {1.0, 0.0, 0.0, 0.0},
+                               const SceneFeatures& features = all_features()) {
+    const auto parameters = complete_parameters(*kind.row, given);
+    EXPECT_TRUE(parameters) << parameters.error().to_string();
+    std::unique_ptr<Solver> solver;
+    if (kind.is_gpu) {
+      auto made = kind.row->make_gpu(*parameters, {&shaders_, features});
+      EXPECT_TRUE(made) << made.error().to_string();
+      solver = std::move(made).value();
+    } else {
+      solver = kind.row->make_reference(*parameters);
+    }
+    const Status loaded = solver->load(groom, world_from_head);
+    EXPECT_TRUE(loaded) << loaded.error().to_string();
+    return solver;
+  }
+
+  static SolverState read(Solver& solver) {
+    SolverState state;
+    solver.read(state);
+    return state;
+  }
+
+  gl::ShaderLibrary shaders_;
+};
+
+/// No gravity, no wind, no motion.
+inline StepInput calm_input(double h_s = 1.0 / 60.0) {
+  StepInput input;
+  input.h_s = h_s;
+  input.gravity_mps2 = glm::dvec3(0.0);
+  return input;
+}
+
+inline bool is_finite(const SolverState& state) {
+  for (const auto* values : {&state.position_m, &state.velocity_mps}) {
+    for (const glm::vec3& value : *values) {
+      if (!std::isfinite(value.x) || !std::isfinite(value.y) || !std::isfinite(value.z)) return false;
+    }
+  }
+  return true;
+}
+
+/// Largest excess of |length - rest length| over `relative` times the rest length plus what float positions
+/// allow.
+inline double length_excess_m(const Groom& groom, const SolverState& state, double relative) {
+  constexpr double kFloatStep = 6e-8;
+  const uint32_t strand_count = groom.strand_count();
+  double worst = -1.0;
+  for (uint32_t s = 0; s < strand_count; ++s) {
+    const glm::vec3* rest = groom.rest_position_m.data() + groom.offset[s];
+    for (uint32_t i = 1; i < groom.vertex_count(s); ++i) {
+      const glm::dvec3 a(state.position_m[(i - 1) * strand_count + s]);
+      const glm::dvec3 b(state.position_m[i * strand_count + s]);
+      const double rest_m = glm::distance(glm::dvec3(rest[i]), glm::dvec3(rest[i - 1]));
+      const double rounding_m = 4.0 * kFloatStep * (glm::length(a) + glm::length(b));
+      worst = std::fmax(worst, std::abs(glm::distance(a, b) - rest_m) - relative * rest_m - rounding_m);
+    }
+  }
+  return worst;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,109 @@
+#include "server/sim/solver_registry.h"
+
+#include <limits>
+#include <set>
+
+#include "server/sim/strand_layout.h"
+#include "tests/support/sim_scene.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(SolverRegistry, RowsAreComplete) {
+  std::set<std::string> names;
+  for (const SolverRow& row : solver_table()) {
+    EXPECT_TRUE(names.insert(row.name).second) << row.name << " twice";
+    EXPECT_FALSE(row.summary.empty());
+    EXPECT_FALSE(row.source.empty());
+    EXPECT_TRUE(row.make_gpu && row.make_reference);
+    for (const SolverParameterInfo& info : row.parameters) {
+      EXPECT_LE(info.minimum, info.default_value) << info.name;
+      EXPECT_GE(info.maximum, info.default_value) << info.name;
+      EXPECT_FALSE(info.summary.empty()) << info.name;
+    }
+    const auto found = find_solver(row.name);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(*found, &row);
+  }
+}
+
+TEST(SolverRegistry, UnknownSolversListTheKnownOnes) {
+  const auto found = find_solver("dftl2");
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::NotFound);
+  EXPECT_EQ(found.error().message, "unknown solver 'dftl2' (known: dftl, dftl_parallel)");
+}
+
+TEST(SolverRegistry, ParametersAreFilledInAndChecked) {
+  const SolverRow& row = **find_solver("dftl");
+  const auto complete = complete_parameters(row, {{"s_damping", 0.5}});
+  ASSERT_TRUE(complete);
+  EXPECT_EQ(complete->size(), row.parameters.size());
+  EXPECT_EQ(complete->at("s_damping"), 0.5);
+  EXPECT_GT(complete->at("max_speed_mps"), 0.0);
+
+  const auto unknown = complete_parameters(row, {{"s_dumping", 0.5}});
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::BadInput);
+  EXPECT_THAT(unknown.error().message,
+              testing::AllOf(HasSubstr("'s_dumping'"), HasSubstr("known: s_damping")));
+  for (const double value : {-0.01, 1.01, std::numeric_limits<double>::quiet_NaN()}) {
+    const auto outside = complete_parameters(row, {{"s_damping", value}});
+    ASSERT_FALSE(outside);
+    EXPECT_THAT(outside.error().message,
+                testing::AllOf(HasSubstr("s_damping"), HasSubstr("allowed: 0 to 1")));
+  }
+}
+
+TEST(StrandLayout, IsVertexMajorWithLengthsAndArc) {
+  const Groom groom = groom_from({{{0.f, 0.f, 0.f}, {0.f, 1.f, 0.f}, {0.f, 1.f, 3.f}},
+                                  {{5.f, 0.f, 0.f}, {6.f, 0.f, 0.f}, {7.f, 0.f, 0.f}}},
+                                 Pinning::Root);
+  const auto layout = make_strand_layout(groom);
+  ASSERT_TRUE(layout);
+  EXPECT_EQ(layout->strand_count, 2u);
+  EXPECT_EQ(layout->vertex_count, 3u);
+  EXPECT_EQ(layout->pinned_root_count, 1u);
+  EXPECT_EQ(layout->tail_begin(), 3u);
+  EXPECT_EQ(layout->rest[layout->index(2, 0)], glm::vec4(0.f, 1.f, 3.f, 3.f));
+  EXPECT_EQ(layout->rest[1], glm::vec4(5.f, 0.f, 0.f, 0.f));
+  EXPECT_FLOAT_EQ(layout->arc[layout->index(1, 0)], 0.25f);
+  EXPECT_FLOAT_EQ(layout->length_m[0], 4.0f);
+}
+
+TEST(StrandLayout, RefusesWhatTheKernelsCannotRun) {
+  const auto refused = [](const std::function<void(Groom&)>& damage) {
+    Groom groom = make_test_groom({});
+    damage(groom);
+    const auto layout = make_strand_layout(groom);
+    return layout ? std::string("accepted") : layout.error().message;
+  };
+  EXPECT_THAT(refused([](Groom& groom) { groom.offset.clear(); }), HasSubstr("no strands"));
+  EXPECT_THAT(refused([](Groom& groom) { --groom.offset[4]; }),
+              HasSubstr("strand 3 does not have 16 vertices"));
+  EXPECT_THAT(refused([](Groom& groom) { groom.pinned.pop_back(); }), HasSubstr("335 pinned flags"));
+  EXPECT_THAT(refused([](Groom& groom) { groom.rest_position_m.clear(); }), HasSubstr("0 positions"));
+  EXPECT_THAT(refused([](Groom& groom) { groom.pinned[0] = 0; }),
+              HasSubstr("vertex 0 of strand 0 is not pinned"));
+  EXPECT_THAT(refused([](Groom& groom) { groom.pinned[9] = 1; }), HasSubstr("vertex 9 of strand 0"));
+  EXPECT_THAT(refused([](Groom& groom) { groom.pinned[16 * 2 + 1] = 0; }), HasSubstr("strand 2 pins 1 + 0"));
+}
+
+TEST(StrandLayout, LimitsWhatAStepMayAskFor) {
+  StepInput input;
+  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    input.h_s = bad;
+    EXPECT_EQ(limited_substep_s(input), kMinSubstepS);
+  }
+  input.h_s = 5.0;
+  EXPECT_EQ(limited_substep_s(input), kMaxSubstepS);
+  EXPECT_EQ(limited(std::numeric_limits<double>::quiet_NaN(), 3.0), 0.0);
+  EXPECT_EQ(limited(-std::numeric_limits<double>::infinity(), 3.0), -3.0);
+  EXPECT_EQ(limited_rotation({0.0, 0.0, 0.0, 0.0}), glm::dquat(1.0, 0.0, 0.0, 0.0));
+  EXPECT_EQ(limited_rotation({2.0, 0.0, 0.0, 0.0}), glm::dquat(1.0, 0.0, 0.0, 0.0));
+}
+
+}  // namespace
+}  // namespace strandcast
