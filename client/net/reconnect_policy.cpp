@@ -1,30 +1,40 @@
 #include "client/net/reconnect_policy.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 
 #include "common/base/hash.h"
+#include "common/wire/close_code.h"
 
 namespace strandcast {
 namespace {
 
-bool has_any(const std::string& text, std::initializer_list<const char*> words) {
-  return std::any_of(words.begin(), words.end(),
-                     [&](const char* word) { return text.find(word) != std::string::npos; });
+ErrorCode code_for(uint16_t close_code) {
+  switch (static_cast<CloseCode>(close_code)) {
+    case CloseCode::Unauthorized:
+      return ErrorCode::Unauthorized;
+    case CloseCode::Full:
+      return ErrorCode::LimitExceeded;
+    case CloseCode::BadData:
+    case CloseCode::Policy:
+    case CloseCode::TooBig:
+      return ErrorCode::BadInput;
+    case CloseCode::Normal:
+    case CloseCode::GoingAway:
+    case CloseCode::Internal:
+    case CloseCode::TryLater:
+      return ErrorCode::Unavailable;
+  }
+  constexpr uint16_t kProtocolError = 1002;  // RFC 6455, section 7.4.1
+  constexpr uint16_t kUnsupportedData = 1003;
+  return close_code == kProtocolError || close_code == kUnsupportedData ? ErrorCode::BadInput
+                                                                        : ErrorCode::Unavailable;
 }
 
 }  // namespace
 
-Error error_from_goodbye(const std::string& reason) {
-  std::string lower = reason;
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  ErrorCode code = ErrorCode::Unavailable;
-  if (has_any(lower, {"token", "role", "origin", "not allowed"})) code = ErrorCode::Unauthorized;
-  if (has_any(lower, {"full", "too many"})) code = ErrorCode::LimitExceeded;
-  if (has_any(lower, {"version", "protocol"})) code = ErrorCode::Unsupported;
-  return make_error(code, "the server said goodbye: {}", reason.empty() ? "no reason given" : reason);
+Error error_from_close(uint16_t close_code, const std::string& reason) {
+  return make_error(code_for(close_code), "the server closed the connection: {}",
+                    reason.empty() ? fmt::format("no reason given (code {})", close_code) : reason);
 }
 
 std::optional<std::chrono::milliseconds> ReconnectPolicy::next_delay(

@@ -11,9 +11,11 @@
 
 namespace strandcast {
 
-/// Turns a server's farewell into an error whose code says whether another attempt makes sense: Unauthorized
-/// (token, role or origin refused), LimitExceeded (server full), Unsupported (version), else Unavailable.
-Error error_from_goodbye(const std::string& reason);
+/// Turns a server's farewell, close code and Goodbye sentence, into an error whose code says whether another
+/// attempt makes sense: Unauthorized (token), LimitExceeded (server full) and BadInput (it understood us
+/// wrongly, or we it) will not go away by themselves, Unavailable and Timeout may. Close code 0: the
+/// connection broke without one.
+Error error_from_close(uint16_t close_code, const std::string& reason);
 
 class ReconnectPolicy {
  public:

@@ -32,6 +32,7 @@ using tcp = asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::chrono::milliseconds kCloseTimeout{250};
+constexpr std::chrono::milliseconds kFarewellTimeout{1000};  // from Goodbye to the close frame
 constexpr size_t kMaxCloseReasonBytes =
     123;  // RFC 6455, section 5.5: control frames carry 125 bytes, 2 are the code
 constexpr size_t kMaxOutstandingPings = 32;
@@ -247,13 +248,11 @@ class ViewerClient::Connection {
   }
 
   Error error_from_read(const error_code& failure) {
-    if (failure == websocket::error::closed) {
-      const auto& reason = ws_.reason();
-      Error error =
-          error_from_goodbye(printable(std::string_view(reason.reason.data(), reason.reason.size())));
-      if (reason.code == websocket::close_code::policy_error) error.code = ErrorCode::Unauthorized;
-      return error;
-    }
+    const auto& close = ws_.reason();
+    const std::string reason =
+        goodbye_.empty() ? printable(std::string_view(close.reason.data(), close.reason.size())) : goodbye_;
+    if (failure == websocket::error::closed) return error_from_close(close.code, reason);
+    if (!goodbye_.empty()) return error_from_close(0, reason);
     if (failure == beast::error::timeout)
       return make_error(ErrorCode::Timeout, "nothing received for {} ms", config_.idle_timeout.count());
     if (failure == websocket::error::message_too_big || failure == websocket::error::buffer_overflow)
@@ -304,7 +303,13 @@ class ViewerClient::Connection {
   }
 
   Status handle_control(Goodbye& goodbye) {
-    finish(error_from_goodbye(printable(goodbye.reason)));
+    // The close code that follows says whether to come back; a server that sends none gets no more patience.
+    goodbye_ = printable(goodbye.reason);
+    if (goodbye_.empty()) goodbye_ = "no reason given";
+    deadline_.expires_after(kFarewellTimeout);
+    deadline_.async_wait([this](error_code failure) {
+      if (!failure && !is_finished_) finish(error_from_close(0, goodbye_));
+    });
     return {};
   }
 
@@ -396,12 +401,12 @@ class ViewerClient::Connection {
   }
 
   void publish_end(Error error) {
-    mailbox_.close(error);
     {
       const std::lock_guard lock(mutex_);
       is_over_ = true;
-      if (!outcome_) outcome_ = Status(std::move(error));
+      if (!outcome_) outcome_ = Status(error);
     }
+    mailbox_.close(std::move(error));
     opened_.notify_all();
   }
 
@@ -426,7 +431,8 @@ class ViewerClient::Connection {
   bool is_welcome_ = false;
   bool is_writing_ = false;
   bool is_finished_ = false;
-  Welcome welcome_;  // written before outcome_, read after it
+  std::string goodbye_;  // the server's last sentence
+  Welcome welcome_;      // written before outcome_, read after it
   Mailbox mailbox_;
 
   mutable std::mutex mutex_;

@@ -4,6 +4,7 @@
 #include "client/net/address.h"
 #include "client/net/mailbox.h"
 #include "client/net/reconnect_policy.h"
+#include "common/wire/close_code.h"
 
 namespace strandcast {
 namespace {
@@ -135,18 +136,20 @@ TEST(ReconnectPolicy, SpreadsManyViewers) {
 }
 
 TEST(ReconnectPolicy, StopsWhereTryingAgainCannotHelp) {
-  for (const char* reason :
-       {"bad token", "the server is full (64 viewers)", "protocol version 2 is not known",
-        "origin not allowed", "too many connections"}) {
-    ReconnectPolicy policy(3);
-    EXPECT_FALSE(policy.next_delay(error_from_goodbye(reason), milliseconds(0))) << reason;
+  for (const CloseCode code :
+       {CloseCode::Unauthorized, CloseCode::Full, CloseCode::Policy, CloseCode::BadData}) {
+    const Error error = error_from_close(static_cast<uint16_t>(code), "The reason.");
+    EXPECT_FALSE(ReconnectPolicy(3).next_delay(error, milliseconds(0))) << static_cast<int>(code);
+    EXPECT_THAT(error.message, testing::HasSubstr("The reason."));
   }
-  for (const char* reason : {"the server is stopping", "you are too slow", ""}) {
-    ReconnectPolicy policy(3);
-    EXPECT_TRUE(policy.next_delay(error_from_goodbye(reason), milliseconds(0))) << reason;
-  }
-  ReconnectPolicy policy(3);
-  EXPECT_FALSE(policy.next_delay(make_error(ErrorCode::BadInput, "garbage"), milliseconds(0)));
+  for (const CloseCode code :
+       {CloseCode::GoingAway, CloseCode::Normal, CloseCode::TryLater, CloseCode::Internal})
+    EXPECT_TRUE(
+        ReconnectPolicy(3).next_delay(error_from_close(static_cast<uint16_t>(code), ""), milliseconds(0)));
+  EXPECT_TRUE(ReconnectPolicy(3).next_delay(error_from_close(0, ""), milliseconds(0)));
+  EXPECT_TRUE(ReconnectPolicy(3).next_delay(error_from_close(4999, ""), milliseconds(0)));
+  for (const ErrorCode code : {ErrorCode::BadInput, ErrorCode::Unsupported, ErrorCode::Internal})
+    EXPECT_FALSE(ReconnectPolicy(3).next_delay(make_error(code, "no"), milliseconds(0)));
 }
 
 TEST(Address, ReadsWhatPeopleType) {

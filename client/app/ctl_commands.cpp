@@ -1,0 +1,203 @@
+#include "client/app/ctl_commands.h"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <utility>
+
+#include "client/app/feed.h"
+#include "client/app/stream_check.h"
+#include "client/app/view_options.h"
+#include "client/net/http_get.h"
+#include "common/motion/bvh.h"
+#include "common/motion/wind_csv.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kAnswerTimeout{5000};
+constexpr milliseconds kHealthTimeout{3000};
+constexpr float kGustLengthM = 9.0f;
+
+int fail(const Error& error, int exit_code = kBadInputExit) {
+  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
+  return exit_code;
+}
+
+Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
+  ClientConfig config;
+  ASSIGN_OR_RETURN(config.address, parse_address(target.connect));
+  config.hello.role = role;
+  config.hello.mode = StreamMode::Strands;
+  config.hello.name = "strandcast-ctl";
+  config.hello.token = target.token;
+  if (!target.token_file.empty()) {
+    ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file));
+  }
+  return config;
+}
+
+Result<std::unique_ptr<ViewerClient>> connect(const CtlTarget& target, Role role) {
+  ASSIGN_OR_RETURN(const ClientConfig config, config_for(target, role));
+  return ViewerClient::connect(config);
+}
+
+// ---- feed ----
+
+/// t wrapped into the duration when looped; clips clamp by themselves.
+double wrapped(double t_s, double duration_s, bool is_looped) {
+  return is_looped && duration_s > 0.0 ? std::fmod(t_s, duration_s) : t_s;
+}
+
+Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) {
+  if (options.motion == "none") return {};
+  if (options.motion == "builtin") {
+    plan.motion = built_in_motion;
+    return {};
+  }
+  if (options.up != "y" && options.up != "z")
+    return make_error(ErrorCode::BadInput, "unknown up axis '{}' (known: y, z)", options.up);
+  BvhOptions bvh;
+  bvh.unit_m = options.unit_m;
+  bvh.is_z_up = options.up == "z";
+  bvh.head_joint = options.joint;
+  ASSIGN_OR_RETURN(MotionClip loaded, load_bvh(options.motion, bvh));
+  auto clip = std::make_shared<const MotionClip>(std::move(loaded));
+  length_s = clip->duration_s();
+  plan.motion = [clip, is_looped = options.is_looped](double t_s) {
+    return clip->sample(wrapped(t_s, clip->duration_s(), is_looped));
+  };
+  return {};
+}
+
+Status add_wind(const FeedOptions& options, FeedPlan& plan) {
+  if (options.wind == "none") return {};
+  if (options.wind == "gusts") {
+    auto gusts = std::make_shared<const GustGenerator>(options.wind_mps, options.gust_intensity, kGustLengthM,
+                                                       options.seed);
+    plan.wind = [gusts](double t_s) { return gusts->sample(t_s); };
+    return {};
+  }
+  ASSIGN_OR_RETURN(WindSeries loaded, load_wind_csv(options.wind));
+  auto series = std::make_shared<const WindSeries>(std::move(loaded));
+  plan.wind = [series, is_looped = options.is_looped](double t_s) {
+    return series->sample(wrapped(t_s, series->duration_s(), is_looped));
+  };
+  return {};
+}
+
+Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
+  FeedPlan plan;
+  plan.rate_hz = options.rate_hz;
+  plan.speed = options.speed;
+  double length_s = 0.0;  // of a motion file; 0 = without end
+  RETURN_IF_ERROR(add_motion(options, plan, length_s));
+  RETURN_IF_ERROR(add_wind(options, plan));
+  if (!plan.motion && !plan.wind)
+    return make_error(ErrorCode::BadInput, "nothing to feed: both --motion and --wind are none");
+  plan.duration_s = options.seconds;
+  if (plan.duration_s == 0.0 && !options.is_looped) plan.duration_s = length_s / options.speed;
+  return plan;
+}
+
+void print_progress(const FeedProgress& progress) {
+  std::cerr << fmt::format("\r  {:7.1f} s, {} motion and {} wind samples", progress.elapsed_s,
+                           progress.motion_samples, progress.wind_samples)
+            << std::flush;
+}
+
+// ---- the others ----
+
+std::string to_line(const ServerStatus& status) {
+  return fmt::format(
+      "tick {:8} | step {:6.2f} ms | encode {:5.2f} ms | render {:6.2f} ms | x{:.2f} real time | {} "
+      "viewer{}{}{}{}",
+      status.tick, status.sim_ms, status.encode_ms, status.render_ms, status.realtime_factor,
+      status.viewer_count, status.viewer_count == 1 ? "" : "s", status.is_paused ? " | paused" : "",
+      status.is_motion_stale ? " | no motion" : "",
+      status.rejected_samples > 0 ? fmt::format(" | {} samples rejected", status.rejected_samples) : "");
+}
+
+}  // namespace
+
+int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
+  // Files first: a typing error must not need a server to be found.
+  const auto plan = make_feed_plan(options);
+  if (!plan) return fail(plan.error());
+  auto client = connect(target, Role::Source);
+  if (!client) return fail(client.error());
+  std::cerr << fmt::format("feeding {}: motion {}, wind {}, {} samples per second\n", target.connect,
+                           options.motion, options.wind, options.rate_hz);
+  const bool is_terminal = isatty(STDERR_FILENO) != 0;
+  const auto done = feed(**client, *plan, stop, is_terminal ? FeedListener(print_progress) : FeedListener());
+  if (is_terminal) std::cerr << '\n';
+  if (!done) return fail(done.error(), kRefusedExit);
+  std::cout << fmt::format(
+      "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
+      "rejected\n",
+      done->elapsed_s, done->motion_samples, done->wind_samples, done->worst_lateness_ms,
+      done->skipped_samples, done->unsent_samples, done->rejected_samples);
+  if (!done->last_notice.empty()) std::cout << "the server says: " << done->last_notice << '\n';
+  return kDoneExit;
+}
+
+int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop) {
+  // A source gets status but no frames.
+  auto client = connect(target, Role::Source);
+  if (!client) return fail(client.error());
+  const int64_t begin_ns = now_ns();
+  while (!stop && (seconds == 0.0 || static_cast<double>(now_ns() - begin_ns) * 1e-9 < seconds)) {
+    for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
+      if (const auto* status = std::get_if<ServerStatus>(&event)) std::cout << to_line(*status) << std::endl;
+      if (const auto* notice = std::get_if<Notice>(&event)) std::cout << notice->text << std::endl;
+      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
+    }
+  }
+  return kDoneExit;
+}
+
+int run_command(const CtlTarget& target, const ClientMessage& message) {
+  auto client = connect(target, Role::Controller);
+  if (!client) return fail(client.error());
+  if (const auto sent = (*client)->send(message); !sent) return fail(sent.error(), kRefusedExit);
+  const int64_t begin_ns = now_ns();
+  while (now_ns() - begin_ns < std::chrono::nanoseconds(kAnswerTimeout).count()) {
+    for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
+      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
+      const auto* notice = std::get_if<Notice>(&event);
+      if (notice == nullptr) continue;
+      (notice->is_error ? std::cerr : std::cout) << notice->text << '\n';
+      return notice->is_error ? kRefusedExit : kDoneExit;
+    }
+  }
+  return fail(
+      make_error(ErrorCode::Timeout, "the server did not answer within {} ms", kAnswerTimeout.count()),
+      kRefusedExit);
+}
+
+int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {
+  const auto config = config_for(target, Role::Viewer);
+  if (!config) return fail(config.error());
+  const auto check = check_stream(*config, frames, timeout_s);
+  if (!check)
+    return fail(check.error(), check.error().code == ErrorCode::Timeout ? kRefusedExit : kBadInputExit);
+  std::cout << check->to_string() << '\n';
+  return check->is_good() ? kDoneExit : kRefusedExit;
+}
+
+int run_health(const CtlTarget& target) {
+  const auto address = parse_address(target.connect);
+  if (!address) return fail(address.error());
+  const auto answer = http_get(*address, "/healthz", kHealthTimeout);
+  if (!answer) return fail(answer.error());
+  constexpr unsigned kHttpOk = 200;
+  std::cout << answer->body;
+  if (!answer->body.ends_with('\n')) std::cout << '\n';
+  return answer->status == kHttpOk ? kDoneExit : kRefusedExit;
+}
+
+}  // namespace strandcast

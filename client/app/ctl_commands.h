@@ -1,0 +1,49 @@
+// The sub-commands of strandcast-ctl behind their parsed options. Each prints what it did and returns the
+// exit code: 0 done, 1 the server said no or a check failed, 2 bad input or no server.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "client/net/viewer_client.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+inline constexpr int kDoneExit = 0;
+inline constexpr int kRefusedExit = 1;
+inline constexpr int kBadInputExit = 2;
+
+/// Where the server is and how to be let in.
+struct CtlTarget {
+  std::string connect;
+  std::string token;
+  std::filesystem::path token_file;  // read when not empty
+};
+
+struct FeedOptions {
+  std::string motion = "builtin";  // "builtin", "none" or a BVH file
+  std::string wind = "gusts";      // "gusts", "none" or a CSV file
+  double unit_m = 0.01;            // metres per unit of the BVH file
+  std::string up = "y";            // up axis of the BVH file
+  std::string joint;               // head joint; empty = found by name
+  bool is_looped = false;
+  double speed = 1.0;
+  double seconds = 0.0;  // 0 = the length of the motion, or without end when looped or built in
+  double rate_hz = 120.0;
+  glm::vec3 wind_mps{1.5f, 0.0f, 1.0f};  // mean of the gusts, world
+  float gust_intensity = 0.6f;
+  uint32_t seed = 1;
+};
+
+int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop);
+/// Prints a line per status; `seconds` 0 = until stopped.
+int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop);
+/// Sends one command or assignment and prints the server's answer.
+int run_command(const CtlTarget& target, const ClientMessage& message);
+int run_check(const CtlTarget& target, uint64_t frames, double timeout_s);
+int run_health(const CtlTarget& target);
+
+}  // namespace strandcast

@@ -1,0 +1,120 @@
+// strandcast-ctl: feeds, watches, steers and checks a running server from the command line.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+
+#include "client/app/ctl_commands.h"
+#include "client/app/feed.h"
+#include "client/app/stop_signal.h"
+#include "common/base/log.h"
+
+namespace {
+
+using namespace strandcast;
+
+struct CommandLine {
+  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}};
+  std::string log_level = "warn";
+  FeedOptions feed;
+  std::vector<float> wind_mps;
+  double monitor_s = 0.0;
+  std::string assignment;
+  uint64_t check_frames = 120;
+  double check_timeout_s = 60.0;
+};
+
+void declare_feed(CLI::App& app, CommandLine& line) {
+  constexpr double kMaxSpeed = 100.0;
+  FeedOptions& feed = line.feed;
+  app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
+  app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
+  app.add_option("--unit", feed.unit_m, "Metres per unit of the BVH file")
+      ->check(CLI::Range(1e-6, 1e3))
+      ->capture_default_str();
+  app.add_option("--up", feed.up, "Up axis of the BVH file")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->capture_default_str();
+  app.add_option("--joint", feed.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_flag("--loop", feed.is_looped, "Start over at the end of the files");
+  app.add_option("--speed", feed.speed, "Playing speed")
+      ->check(CLI::Range(1e-3, kMaxSpeed))
+      ->capture_default_str();
+  app.add_option("--seconds", feed.seconds, "Stop after this long (default: the length of the motion file)")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--rate", feed.rate_hz, "Samples per second")
+      ->check(CLI::Range(kMinFeedRateHz, kMaxFeedRateHz))
+      ->capture_default_str();
+  app.add_option("--wind-mean", line.wind_mps, "Mean of the gusts, x y z in m/s")->expected(3);
+  app.add_option("--gust-intensity", feed.gust_intensity,
+                 "Standard deviation of the gusts over their mean speed")
+      ->check(CLI::Range(0.0f, 2.0f))
+      ->capture_default_str();
+  app.add_option("--seed", feed.seed, "Seed of the gusts")->capture_default_str();
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Strandcast control: feeds, watches, steers and checks a running strandcast-server.",
+               "strandcast-ctl");
+  CommandLine line;
+  app.require_subcommand(1);
+  app.fallthrough();  // --connect may stand behind the sub-command too
+  app.add_option("--connect", line.target.connect, "Server as HOST:PORT")->capture_default_str();
+  app.add_option("--token", line.target.token, "Token of a server that is not on loopback");
+  app.add_option("--token-file", line.target.token_file, "File with the token in its first line");
+  app.add_option("--log", line.log_level, "error, warn, info, debug or off")->capture_default_str();
+
+  CLI::App* feed = app.add_subcommand("feed", "Send head motion and wind in real time");
+  declare_feed(*feed, line);
+  CLI::App* monitor = app.add_subcommand("monitor", "Print the server's status twice a second");
+  monitor->add_option("--seconds", line.monitor_s, "Stop after this long")->check(CLI::Range(0.0, 1e6));
+  CLI::App* pause = app.add_subcommand("pause", "Halt the simulation");
+  CLI::App* resume = app.add_subcommand("resume", "Let the simulation run");
+  CLI::App* step = app.add_subcommand("step", "One simulation step while paused");
+  CLI::App* reset = app.add_subcommand("reset", "Set every strand to rest");
+  CLI::App* set = app.add_subcommand("set", "Change a scene parameter");
+  set->add_option("assignment", line.assignment, "path=value, for example solver.name=dftl")->required();
+  CLI::App* check = app.add_subcommand("check", "Decode frames with two viewers and compare their states");
+  check->add_option("--frames", line.check_frames, "Frames to decode")
+      ->check(CLI::Range(uint64_t{2}, uint64_t{1'000'000}))
+      ->capture_default_str();
+  check->add_option("--timeout", line.check_timeout_s, "Seconds to wait for them")
+      ->check(CLI::Range(0.1, 1e6))
+      ->capture_default_str();
+  CLI::App* health = app.add_subcommand("health", "Ask /healthz");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& stop) {
+    return app.exit(stop) == 0 ? kDoneExit : kBadInputExit;
+  }
+  if (!init_log(line.log_level)) {
+    std::cerr << "strandcast-ctl: unknown log level '" << line.log_level
+              << "' (known: error, warn, info, debug, off)\n";
+    return kBadInputExit;
+  }
+  if (line.wind_mps.size() == 3)
+    line.feed.wind_mps = glm::vec3(line.wind_mps[0], line.wind_mps[1], line.wind_mps[2]);
+
+  const auto& stop = catch_stop_signals();
+  if (*feed) return run_feed(line.target, line.feed, stop);
+  if (*monitor) return run_monitor(line.target, line.monitor_s, stop);
+  if (*pause) return run_command(line.target, ControlCommand{Command::Pause});
+  if (*resume) return run_command(line.target, ControlCommand{Command::Resume});
+  if (*step) return run_command(line.target, ControlCommand{Command::StepOnce});
+  if (*reset) return run_command(line.target, ControlCommand{Command::Reset});
+  if (*set) return run_command(line.target, SetParameter{line.assignment});
+  if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);
+  if (*health) return run_health(line.target);
+  return kBadInputExit;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& failure) {
+    std::cerr << "strandcast-ctl: " << failure.what() << '\n';
+    return strandcast::kBadInputExit;
+  }
+}

@@ -1,0 +1,46 @@
+// Feeds a running server with head motion and wind as a network source, in real time: one sample per message,
+// sent when its time has come. Motion and wind are functions of time here; files are loaded by the caller.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "client/net/viewer_client.h"
+#include "common/base/result.h"
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+struct FeedPlan {
+  std::function<Pose(double t_s)> motion;     // empty = none
+  std::function<glm::vec3(double t_s)> wind;  // world, m/s; empty = none
+  double rate_hz = 120.0;                     // samples per second of each
+  double speed = 1.0;                         // motion time per real time
+  double duration_s = 0.0;                    // real time; 0 = until stopped
+};
+
+inline constexpr double kMinFeedRateHz = 1.0;
+inline constexpr double kMaxFeedRateHz = 400.0;
+
+struct FeedProgress {
+  double elapsed_s = 0.0;
+  uint64_t motion_samples = 0;
+  uint64_t wind_samples = 0;
+  uint64_t skipped_samples = 0;    // their time had passed: this process was held up
+  uint64_t unsent_samples = 0;     // the server did not read fast enough
+  uint64_t rejected_samples = 0;   // as the server reports it, of all sources
+  double worst_lateness_ms = 0.0;  // of a sample behind its time
+  std::string last_notice;         // from the server
+};
+
+/// Called about once a second.
+using FeedListener = std::function<void(const FeedProgress&)>;
+
+/// Runs until the plan's duration is over, `stop` is set or the connection ends (an error).
+Result<FeedProgress> feed(ViewerClient& client, const FeedPlan& plan, const std::atomic<bool>& stop,
+                          const FeedListener& listener);
+
+}  // namespace strandcast

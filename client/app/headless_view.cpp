@@ -1,0 +1,181 @@
+#include "client/app/headless_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/gl/egl_context.h"
+#include "common/gl/program.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPumpWait{20};
+constexpr double kFirstPictureTimeoutS = 15.0;
+constexpr double kStallTimeoutS = 15.0;  // no frame for this long although more are wanted
+
+/// What was received and is to be written.
+struct Collected {
+  std::vector<std::shared_ptr<const Snapshot>> clip_snapshots;
+  std::vector<Image> clip_images;
+  std::shared_ptr<const Snapshot> screenshot_snapshot;
+  std::optional<Image> screenshot_image;
+};
+
+class Collector {
+ public:
+  Collector(const ViewOptions& options, ViewerSession& session, const std::atomic<bool>& stop)
+      : options_(options), session_(session), stop_(stop), sampler_(options.clip_fps, options.clip_s) {
+    session_.set_snapshot_listener([this](const auto& snapshot) { take(snapshot); });
+  }
+  ~Collector() { session_.set_snapshot_listener({}); }
+
+  Result<Collected> run() {
+    RETURN_IF_ERROR(wait_for_first_picture());
+    uint64_t seen_frames = session_.decoded_frames();
+    int64_t last_frame_ns = now_ns();
+    while (!stop_ && !is_complete()) {
+      RETURN_IF_ERROR(session_.pump(kPumpWait));
+      if (session_.welcome().mode == StreamMode::Frames) take_image();
+      if (session_.decoded_frames() != seen_frames) {
+        seen_frames = session_.decoded_frames();
+        last_frame_ns = now_ns();
+      }
+      if (static_cast<double>(now_ns() - last_frame_ns) * 1e-9 > kStallTimeoutS)
+        return make_error(ErrorCode::Timeout, "no new frame for {} s (is the server paused?)",
+                          kStallTimeoutS);
+    }
+    if (!collected_.screenshot_snapshot) collected_.screenshot_snapshot = session_.replay().newest();
+    if (!collected_.screenshot_image && session_.image()) collected_.screenshot_image = *session_.image();
+    return std::move(collected_);
+  }
+
+ private:
+  Status wait_for_first_picture() {
+    const int64_t begin_ns = now_ns();
+    while (!stop_ && !session_.has_picture()) {
+      RETURN_IF_ERROR(session_.pump(kPumpWait));
+      if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
+        return make_error(ErrorCode::Timeout, "the server sent nothing to show for {} s{}",
+                          kFirstPictureTimeoutS,
+                          session_.replay().stats().last_error.empty()
+                              ? std::string()
+                              : "; last problem: " + session_.replay().stats().last_error);
+    }
+    return {};
+  }
+
+  bool is_complete() const {
+    const bool wants_clip = !options_.clip.empty();
+    if (wants_clip && !sampler_.is_full()) return false;
+    if (options_.seconds) return session_.connected_s() >= *options_.seconds;
+    if (wants_clip && options_.screenshot.empty()) return true;
+    return session_.decoded_frames() >= options_.after_frames;
+  }
+
+  void take(const std::shared_ptr<const Snapshot>& snapshot) {
+    if (!options_.clip.empty() && sampler_.wants(snapshot->sim_time_ns))
+      collected_.clip_snapshots.push_back(snapshot);
+    if (!collected_.screenshot_snapshot && session_.decoded_frames() >= options_.after_frames)
+      collected_.screenshot_snapshot = snapshot;
+  }
+
+  /// Pictures carry no simulation time to the listener, so the clip takes them as they come, on the wall
+  /// clock.
+  void take_image() {
+    if (session_.image_count() == taken_images_ || session_.image() == nullptr) return;
+    taken_images_ = session_.image_count();
+    if (!options_.clip.empty() && sampler_.wants(now_ns()))
+      collected_.clip_images.push_back(*session_.image());
+    if (!collected_.screenshot_image && taken_images_ >= options_.after_frames)
+      collected_.screenshot_image = *session_.image();
+  }
+
+  const ViewOptions& options_;
+  ViewerSession& session_;
+  const std::atomic<bool>& stop_;
+  ClipSampler sampler_;
+  Collected collected_;
+  uint64_t taken_images_ = 0;
+};
+
+Status write_images(const ViewOptions& options, const Collected& collected) {
+  if (!options.screenshot.empty() && collected.screenshot_image)
+    RETURN_IF_ERROR(save_png(options.screenshot, *collected.screenshot_image));
+  if (options.clip.empty() || collected.clip_images.empty()) return {};
+  ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
+  for (const Image& image : collected.clip_images) RETURN_IF_ERROR(clip.add(image));
+  return clip.finish();
+}
+
+/// Draws the collected snapshots with the same renderer as the server and the window.
+Status render_snapshots(const ViewOptions& options, const SceneAsset& asset, const Welcome& welcome,
+                        const Collected& collected, StageTimer& render_timer) {
+  ASSIGN_OR_RETURN(auto context, gl::EglContext::make(options.device));
+  const gl::ShaderLibrary shaders =
+      options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir);
+  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, welcome.look));
+
+  const auto draw = [&](const Snapshot& snapshot) -> Result<Image> {
+    const int64_t begin_ns = now_ns();
+    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot), welcome.camera, options.size));
+    Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
+    render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    return image;
+  };
+  if (!options.screenshot.empty() && collected.screenshot_snapshot) {
+    ASSIGN_OR_RETURN(const Image image, draw(*collected.screenshot_snapshot));
+    RETURN_IF_ERROR(save_png(options.screenshot, image));
+  }
+  if (options.clip.empty()) return {};
+  ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
+  for (const auto& snapshot : collected.clip_snapshots) {
+    ASSIGN_OR_RETURN(const Image image, draw(*snapshot));
+    RETURN_IF_ERROR(clip.add(image));
+  }
+  return clip.finish();
+}
+
+}  // namespace
+
+ClipSampler::ClipSampler(double frames_per_s, double duration_s)
+    : period_ns_(1e9 / frames_per_s),
+      wanted_(static_cast<size_t>(std::max(1.0, std::round(frames_per_s * duration_s)))) {}
+
+bool ClipSampler::wants(int64_t sim_time_ns) {
+  if (is_full()) return false;
+  const auto time_ns = static_cast<double>(sim_time_ns);
+  // Time that runs backwards is a reset of the server: the clip goes on from there.
+  if (taken_ == 0 || sim_time_ns < last_ns_) next_ns_ = time_ns;
+  last_ns_ = sim_time_ns;
+  if (time_ns < next_ns_) return false;
+  ++taken_;
+  // Kept on the grid, so that a late state does not shift all that follow; after a gap the grid starts anew.
+  next_ns_ += period_ns_;
+  if (next_ns_ <= time_ns) next_ns_ = time_ns + period_ns_;
+  return true;
+}
+
+Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bool>& stop) {
+  ASSIGN_OR_RETURN(auto session, ViewerSession::open(client_config(options)));
+  session->replay().set_playout(options.playout);
+  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *session, stop).run());
+
+  StageTimer render_timer;
+  ViewReport report = make_report(*session);
+  const bool wants_render = !options.screenshot.empty() || !options.clip.empty();
+  const Welcome welcome = session->welcome();
+  const std::optional<SceneAsset> asset =
+      session->asset() ? std::optional<SceneAsset>(*session->asset()) : std::nullopt;
+  session.reset();  // the server need not serve a viewer that only draws now
+  if (wants_render && welcome.mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
+  if (wants_render && welcome.mode == StreamMode::Strands && asset)
+    RETURN_IF_ERROR(render_snapshots(options, *asset, welcome, collected, render_timer));
+  set_render_times(report, render_timer);
+  return report;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,73 @@
+#include "client/app/live_connection.h"
+
+#include <thread>
+#include <utility>
+
+#include "common/base/log.h"
+
+namespace strandcast {
+
+Result<std::unique_ptr<LiveConnection>> LiveConnection::open(const ClientConfig& config) {
+  ASSIGN_OR_RETURN(auto session, ViewerSession::open(config));
+  return std::unique_ptr<LiveConnection>(new LiveConnection(config, std::move(session)));
+}
+
+LiveConnection::LiveConnection(const ClientConfig& config, std::unique_ptr<ViewerSession> session)
+    : config_(config), session_(std::move(session)), policy_(static_cast<uint32_t>(now_ns())) {}
+
+bool LiveConnection::pump(std::chrono::milliseconds timeout) {
+  if (is_connected_) {
+    if (auto pumped = session_->pump(timeout); !pumped) lose(pumped.error());
+    return false;
+  }
+  if (!attempt_.valid()) {
+    if (!final_error_ && Clock::now() >= next_attempt_) start_attempt();
+    std::this_thread::sleep_for(timeout);
+    return false;
+  }
+  if (attempt_.wait_for(timeout) != std::future_status::ready) return false;
+  auto opened = attempt_.get();
+  if (!opened) {
+    lose(opened.error());
+    return false;
+  }
+  session_ = std::move(opened).value();
+  is_connected_ = true;
+  log_info("net", "connected to {} again", config_.address.to_string());
+  return true;
+}
+
+void LiveConnection::change_mode(StreamMode mode) {
+  config_.hello.mode = mode;
+  if (attempt_.valid()) return;  // the attempt under way ends first; the mode then applies to the next one
+  is_connected_ = false;
+  final_error_.reset();
+  last_error_ = make_error(ErrorCode::Unavailable, "changing to {}", to_string(mode));
+  start_attempt();
+}
+
+void LiveConnection::lose(const Error& error) {
+  const double lived_s = is_connected_ ? session_->connected_s() : 0.0;
+  is_connected_ = false;
+  last_error_ = error;
+  const auto delay =
+      policy_.next_delay(error, std::chrono::milliseconds(static_cast<int64_t>(lived_s * 1e3)));
+  if (!delay) {
+    final_error_ = error;
+    log_error("net", "{}", error.to_string());
+    return;
+  }
+  next_attempt_ = Clock::now() + *delay;
+  log_warn("net", "{}; next attempt in {} ms", error.to_string(), delay->count());
+}
+
+void LiveConnection::start_attempt() {
+  attempt_ = std::async(std::launch::async, [config = config_] { return ViewerSession::open(config); });
+}
+
+std::string LiveConnection::trouble() const {
+  if (is_connected_) return {};
+  return last_error_.to_string() + (final_error_ ? "" : " - trying again");
+}
+
+}  // namespace strandcast

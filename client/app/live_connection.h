@@ -1,0 +1,51 @@
+// LiveConnection: a viewer session that comes back by itself when the server was away. Connecting happens
+// beside the caller's thread, so a window stays alive meanwhile. One thread otherwise.
+#pragma once
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+
+#include "client/app/viewer_session.h"
+#include "client/net/reconnect_policy.h"
+
+namespace strandcast {
+
+class LiveConnection {
+ public:
+  /// The first connection must succeed: its error is the caller's.
+  static Result<std::unique_ptr<LiveConnection>> open(const ClientConfig& config);
+
+  /// Handles what arrived; starts and finishes attempts to reconnect. True when the session is a new one.
+  bool pump(std::chrono::milliseconds timeout);
+  /// Drops the session and connects again with this mode.
+  void change_mode(StreamMode mode);
+
+  /// The running session, or the last one: its snapshots stay readable while the server is away.
+  ViewerSession& session() { return *session_; }
+  bool is_connected() const { return is_connected_; }
+  /// Why there is no connection, and what happens next; empty while connected.
+  std::string trouble() const;
+  /// The reason, when trying again cannot help.
+  const std::optional<Error>& final_error() const { return final_error_; }
+
+ private:
+  using Attempt = std::future<Result<std::unique_ptr<ViewerSession>>>;
+  using Clock = std::chrono::steady_clock;
+
+  LiveConnection(const ClientConfig& config, std::unique_ptr<ViewerSession> session);
+  void lose(const Error& error);
+  void start_attempt();
+
+  ClientConfig config_;
+  std::unique_ptr<ViewerSession> session_;
+  ReconnectPolicy policy_;
+  bool is_connected_ = true;
+  Error last_error_;
+  std::optional<Error> final_error_;
+  Clock::time_point next_attempt_;
+  Attempt attempt_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,75 @@
+#include "client/app/stream_check.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "client/app/viewer_session.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPumpWait{5};
+
+/// A viewer that keeps the hash of every tick it decoded.
+struct HashingViewer {
+  std::unique_ptr<ViewerSession> session;
+  std::map<uint64_t, uint64_t> hash_by_tick;
+
+  void listen() {
+    session->set_snapshot_listener(
+        [this](const auto& snapshot) { hash_by_tick[snapshot->tick] = state_hash(*snapshot); });
+  }
+};
+
+}  // namespace
+
+std::string StreamCheck::to_string() const {
+  std::string text =
+      fmt::format("{} frames decoded, {} ticks compared between two viewers, {} differ, {} frames rejected",
+                  decoded_frames, compared_ticks, differing_ticks, rejected_frames);
+  if (differing_ticks > 0) text += fmt::format(" (first at tick {})", first_differing_tick);
+  return text;
+}
+
+Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, double timeout_s) {
+  const int64_t begin_ns = now_ns();
+  HashingViewer first;
+  HashingViewer second;
+  ASSIGN_OR_RETURN(first.session, ViewerSession::open(config));
+  first.listen();
+  const auto is_done = [&] {
+    return first.session->decoded_frames() >= frames && second.session &&
+           second.hash_by_tick.size() >= frames / 2;
+  };
+  while (!is_done()) {
+    RETURN_IF_ERROR(first.session->pump(kPumpWait));
+    if (second.session) RETURN_IF_ERROR(second.session->pump(milliseconds(0)));
+    // Half way in, so that the second one starts from a keyframe of its own in the middle of the chain.
+    if (!second.session && first.session->decoded_frames() >= std::max<uint64_t>(frames / 2, 1)) {
+      ASSIGN_OR_RETURN(second.session, ViewerSession::open(config));
+      second.listen();
+    }
+    if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > timeout_s)
+      return make_error(ErrorCode::Timeout, "only {} of {} frames decoded in {} s{}{}",
+                        first.session->decoded_frames(), frames, timeout_s,
+                        first.session->replay().stats().last_error.empty() ? "" : "; last problem: ",
+                        first.session->replay().stats().last_error);
+  }
+
+  StreamCheck check;
+  check.decoded_frames = first.session->decoded_frames();
+  check.rejected_frames =
+      first.session->replay().stats().rejected_frames + second.session->replay().stats().rejected_frames;
+  for (const auto& [tick, hash] : second.hash_by_tick) {
+    const auto other = first.hash_by_tick.find(tick);
+    if (other == first.hash_by_tick.end()) continue;
+    ++check.compared_ticks;
+    if (other->second != hash && check.differing_ticks++ == 0) check.first_differing_tick = tick;
+  }
+  return check;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,50 @@
+// strandcast-view: shows the hair of a running server, in a window or (--headless) as pictures and a report.
+#include <exception>
+#include <iostream>
+
+#include "client/app/headless_view.h"
+#include "client/app/stop_signal.h"
+#include "client/app/view_options.h"
+#include "client/app/view_report.h"
+#include "client/app/windowed_view.h"
+#include "common/base/log.h"
+
+namespace {
+
+using namespace strandcast;
+
+constexpr int kBadInputExit = 2;
+
+int fail(const std::string& sentence) {
+  std::cerr << "strandcast-view: " << sentence << '\n';
+  return kBadInputExit;
+}
+
+int run(int argc, char** argv) {
+  const ViewCommandLine line = read_view_command_line(argc, argv);
+  if (!line.options) return line.exit_code;
+  const ViewOptions& options = *line.options;
+  if (!init_log(options.log_level))
+    return fail(
+        fmt::format("unknown log level '{}' (known: error, warn, info, debug, off)", options.log_level));
+
+  const auto& stop = catch_stop_signals();
+  auto report = options.is_headless ? run_headless(options, stop) : run_windowed(options, stop);
+  if (!report) return fail(report.error().to_string());
+  std::cout << to_summary(*report);
+  if (!options.screenshot.empty()) std::cout << "  picture         " << options.screenshot.string() << '\n';
+  if (!options.clip.empty()) std::cout << "  clip            " << options.clip.string() << '\n';
+  if (options.report.empty()) return 0;
+  const auto saved = save_report(options.report, *report);
+  return saved ? 0 : fail(saved.error().to_string());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& failure) {
+    return fail(failure.what());
+  }
+}

@@ -1,0 +1,128 @@
+#include "client/app/view_options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <iostream>
+
+#include "common/base/file.h"
+
+namespace strandcast {
+
+Result<RenderSize> parse_size(const std::string& text) {
+  RenderSize size;
+  const char* const end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width);
+  bool is_size = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+  if (is_size) {
+    const auto height = std::from_chars(width.ptr + 1, end, size.height);
+    is_size = height.ec == std::errc() && height.ptr == end;
+  }
+  const auto fits = [](uint32_t side) { return side >= kMinViewSide && side <= kMaxImageSide; };
+  if (!is_size || !fits(size.width) || !fits(size.height))
+    return make_error(ErrorCode::BadInput, "'{}' is not a picture size (use WIDTHxHEIGHT, each {} to {})",
+                      text, kMinViewSide, kMaxImageSide);
+  return size;
+}
+
+Result<StreamMode> parse_mode(const std::string& text) {
+  for (const StreamMode mode : {StreamMode::Strands, StreamMode::Frames, StreamMode::Auto})
+    if (text == to_string(mode)) return mode;
+  return make_error(ErrorCode::BadInput, "unknown mode '{}' (known: strands, frames, auto)", text);
+}
+
+Result<std::string> load_token(const std::filesystem::path& path) {
+  constexpr uint64_t kMaxTokenFileBytes = 4096;
+  ASSIGN_OR_RETURN(std::string text, load_text(path, kMaxTokenFileBytes));
+  text = text.substr(0, text.find_first_of("\r\n"));
+  if (text.empty())
+    return at(path.string(), make_error(ErrorCode::BadInput, "the first line, the token, is empty"));
+  return text;
+}
+
+ClientConfig client_config(const ViewOptions& options) {
+  ClientConfig config;
+  config.address = options.address;
+  config.hello.role = Role::Controller;
+  config.hello.mode = options.mode;
+  config.hello.name = "strandcast-view";
+  config.hello.token = options.token;
+  config.hello.frame_width = options.size.width;
+  config.hello.frame_height = options.size.height;
+  return config;
+}
+
+namespace {
+
+/// Values that need more than CLI11's own conversion.
+struct RawOptions {
+  std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
+  std::string mode = "strands";
+  std::string size = "960x540";
+  std::string token_file;
+  double seconds = 0.0;
+  bool is_smooth = false;
+};
+
+void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
+  app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
+  app.add_option("--mode", raw.mode, "strands, frames or auto")->capture_default_str();
+  app.add_option("--token", options.token, "Token of a server that is not on loopback");
+  app.add_option("--token-file", raw.token_file, "File with the token in its first line");
+  app.add_option("--size", raw.size, "Picture or window size, WIDTHxHEIGHT")->capture_default_str();
+  app.add_flag("--smooth", raw.is_smooth, "Interpolate between states, a little behind them");
+  app.add_flag("--headless", options.is_headless, "No window: pictures, clip and report only");
+  app.add_option("--screenshot", options.screenshot, "Write a PNG (headless)");
+  app.add_option("--after-frames", options.after_frames, "Decoded frames before the screenshot")
+      ->check(CLI::Range(uint64_t{1}, uint64_t{1'000'000}))
+      ->capture_default_str();
+  app.add_option("--clip", options.clip, "Write an animated WebP (headless)");
+  app.add_option("--clip-seconds", options.clip_s, "Length of the clip, simulated seconds")
+      ->check(CLI::Range(0.1, kMaxClipS))
+      ->capture_default_str();
+  app.add_option("--clip-fps", options.clip_fps, "Pictures per second of the clip")
+      ->check(CLI::Range(1.0, kMaxClipFps))
+      ->capture_default_str();
+  app.add_option("--seconds", raw.seconds, "Stop after this long")->check(CLI::Range(0.1, 1e6));
+  app.add_option("--report", options.report, "Write what was measured: .json, else key=value lines");
+  app.add_option("--shader-dir", options.shader_dir, "Read shaders from this folder");
+  app.add_option("--device", options.device, "GL device for --headless: auto, software, hardware or a number")
+      ->capture_default_str();
+  app.add_option("--log", options.log_level, "error, warn, info, debug or off")->capture_default_str();
+}
+
+Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
+  ASSIGN_OR_RETURN(options.address, parse_address(raw.connect));
+  ASSIGN_OR_RETURN(options.mode, parse_mode(raw.mode));
+  ASSIGN_OR_RETURN(options.size, parse_size(raw.size));
+  if (!raw.token_file.empty()) {
+    ASSIGN_OR_RETURN(options.token, load_token(raw.token_file));
+  }
+  if (raw.seconds > 0.0) options.seconds = raw.seconds;
+  if (raw.is_smooth) options.playout = Playout::Smooth;
+  if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
+    return make_error(ErrorCode::BadInput,
+                      "--screenshot and --clip need --headless (in the window, S takes a picture)");
+  return options;
+}
+
+}  // namespace
+
+ViewCommandLine read_view_command_line(int argc, const char* const* argv) {
+  CLI::App app("Strandcast viewer: shows the hair of a running strandcast-server.", "strandcast-view");
+  RawOptions raw;
+  ViewOptions options;
+  declare(app, raw, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& stop) {
+    return {std::nullopt, app.exit(stop) == 0 ? 0 : 2};
+  }
+  auto completed = complete(raw, std::move(options));
+  if (!completed) {
+    std::cerr << "strandcast-view: " << completed.error().to_string() << '\n';
+    return {std::nullopt, 2};
+  }
+  return {std::move(completed).value(), 0};
+}
+
+}  // namespace strandcast

@@ -1,0 +1,56 @@
+// Command line of strandcast-view. Pure parsing, no I/O but the token file.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "client/net/viewer_client.h"
+#include "client/replay/strand_replay.h"
+#include "common/base/result.h"
+#include "common/render/renderer.h"
+
+namespace strandcast {
+
+struct ViewOptions {
+  Address address;
+  StreamMode mode = StreamMode::Auto;
+  Playout playout = Playout::LowLatency;
+  std::string token;
+  RenderSize size{960, 540};
+  bool is_headless = false;
+  std::filesystem::path screenshot;  // empty = none
+  uint64_t after_frames = 60;        // the screenshot shows the state after this many decoded frames
+  std::filesystem::path clip;        // empty = none
+  double clip_s = 3.0;
+  double clip_fps = 15.0;
+  std::optional<double> seconds;     // stop after this long
+  std::filesystem::path report;      // empty = none
+  std::filesystem::path shader_dir;  // empty = the shaders in the program
+  std::string device = "auto";
+  std::string log_level = "warn";
+};
+
+inline constexpr double kMaxClipS = 60.0;
+inline constexpr double kMaxClipFps = 60.0;
+inline constexpr uint32_t kMinViewSide = 16;
+
+/// Outcome of reading a command line: options, or an exit code after something was printed (help or an
+/// error).
+struct ViewCommandLine {
+  std::optional<ViewOptions> options;
+  int exit_code = 0;
+};
+ViewCommandLine read_view_command_line(int argc, const char* const* argv);
+
+/// "640x360" with sides from kMinViewSide to kMaxImageSide.
+Result<RenderSize> parse_size(const std::string& text);
+/// "strands", "frames" or "auto".
+Result<StreamMode> parse_mode(const std::string& text);
+/// First line of a file of at most 4 KiB.
+Result<std::string> load_token(const std::filesystem::path& path);
+
+/// Connection settings for these options.
+ClientConfig client_config(const ViewOptions& options);
+
+}  // namespace strandcast

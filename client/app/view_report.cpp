@@ -1,0 +1,147 @@
+#include "client/app/view_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/file.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kBitsPerByte = 8.0;
+
+class Builder {
+ public:
+  void number(const char* key, double value, int decimals) {
+    report_.push_back({key, std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "0", true});
+  }
+  void count(const char* key, uint64_t value) { report_.push_back({key, std::to_string(value), true}); }
+  void word(const char* key, const std::string& value) { report_.push_back({key, value, false}); }
+  ViewReport take() { return std::move(report_); }
+
+ private:
+  ViewReport report_;
+};
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+std::string find(const ViewReport& report, const std::string& key) {
+  const auto entry = std::find_if(report.begin(), report.end(), [&](const auto& e) { return e.key == key; });
+  return entry == report.end() ? "?" : entry->text;
+}
+
+}  // namespace
+
+ViewReport make_report(ViewerSession& session) {
+  constexpr double kP99 = 0.99;
+  const Welcome& welcome = session.welcome();
+  const ReplayStats& strands = session.replay().stats();
+  const PictureStats& pictures = session.picture_stats();
+  const NetCounters net = session.client().counters();
+  const ClockOffset clock = session.client().clock();
+  const ServerStatus& server = session.status();
+  const bool is_frames = welcome.mode == StreamMode::Frames;
+  const uint64_t received_frames = is_frames ? pictures.received_frames : strands.received_frames;
+  const auto received_bytes =
+      static_cast<double>(is_frames ? pictures.received_bytes : strands.received_bytes);
+  const StageTimer& decode = is_frames ? session.picture_decode_timer() : session.replay().decode_timer();
+  const StageTimer& motion = session.replay().motion_latency_timer();
+  const double seconds = session.connected_s();
+
+  Builder out;
+  out.word("mode", to_string(welcome.mode));
+  out.word("scene", welcome.scene_name);
+  out.word("codec", is_frames ? "jpeg" : welcome.codec);
+  out.count("strands", welcome.strand_count);
+  out.count("vertices_per_strand", welcome.vertex_count);
+  out.number("bound_mm", static_cast<double>(welcome.bound_m) * 1e3, 3);
+  out.number("seconds", seconds, 2);
+  out.count("decoded_frames", session.decoded_frames());
+  out.number("frames_per_s", static_cast<double>(session.decoded_frames()) / seconds, 2);
+  out.number("bytes_per_frame", received_bytes / static_cast<double>(std::max<uint64_t>(received_frames, 1)),
+             0);
+  out.number("mbit_per_s", received_bytes * kBitsPerByte * 1e-6 / seconds, 3);
+  out.number("decode_ms_median", decode.median_ms(), 3);
+  out.number("decode_ms_p99", decode.quantile_ms(kP99), 3);
+  out.number("render_ms_median", 0.0, 3);
+  out.count("rendered_frames", 0);
+  out.number("motion_to_decoded_ms_median", motion.median_ms(), 3);
+  out.number("motion_to_decoded_ms_p99", motion.quantile_ms(kP99), 3);
+  out.count("motion_samples_seen", motion.count());
+  out.number("clock_error_ms", clock.has_value() ? static_cast<double>(clock.error_ns()) * 1e-6 : 0.0, 3);
+  out.count("keyframes", strands.keyframes);
+  out.count("gaps", strands.gaps);
+  out.count("missed_frames", is_frames ? pictures.missed_frames : strands.missed_frames);
+  out.count("rejected_frames", is_frames ? pictures.rejected_frames : strands.rejected_frames);
+  out.count("keyframe_requests", strands.keyframe_requests);
+  out.count("dropped_by_client", net.dropped_strand_frames);
+  out.count("dropped_by_server", server.dropped_frames);
+  out.number("server_sim_ms", server.sim_ms, 3);
+  out.number("server_encode_ms", server.encode_ms, 3);
+  out.number("server_render_ms", server.render_ms, 3);
+  out.number("server_realtime_factor", server.realtime_factor, 3);
+  out.count("server_tick", server.tick);
+  return out.take();
+}
+
+void set_render_times(ViewReport& report, const StageTimer& render_timer) {
+  for (ReportEntry& entry : report) {
+    if (entry.key == "render_ms_median") entry.text = fmt::format("{:.3f}", render_timer.median_ms());
+    if (entry.key == "rendered_frames") entry.text = std::to_string(render_timer.count());
+  }
+}
+
+std::string to_lines(const ViewReport& report) {
+  std::string text;
+  for (const auto& entry : report) text += fmt::format("{}={}\n", entry.key, entry.text);
+  return text;
+}
+
+std::string to_json(const ViewReport& report) {
+  std::string text = "{\n";
+  for (size_t i = 0; i < report.size(); ++i) {
+    const auto& entry = report[i];
+    text += fmt::format("  {}: {}{}\n", quoted(entry.key), entry.is_number ? entry.text : quoted(entry.text),
+                        i + 1 < report.size() ? "," : "");
+  }
+  return text + "}\n";
+}
+
+Status save_report(const std::filesystem::path& path, const ViewReport& report) {
+  const std::string text = path.extension() == ".json" ? to_json(report) : to_lines(report);
+  return save_file(path, std::as_bytes(std::span(text)));
+}
+
+std::string to_summary(const ViewReport& report) {
+  const auto v = [&](const char* key) { return find(report, key); };
+  const std::string dropped = fmt::format("{} by the server, {} missed, {} by this viewer",
+                                          v("dropped_by_server"), v("missed_frames"), v("dropped_by_client"));
+  return fmt::format(
+      "scene {} ({} strands x {}), {} by {}\n"
+      "  decoded         {} frames in {} s ({} per second), {} bytes per frame, {} Mbit/s\n"
+      "  decode          {} ms (p99 {} ms)\n"
+      "  render          {} ms ({} frames)\n"
+      "  motion->decoded {} ms median, {} ms p99 ({} samples, clock +-{} ms)\n"
+      "  dropped         {}\n"
+      "  server          {} ms per step, realtime factor {}\n",
+      v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("decoded_frames"),
+      v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"), v("decode_ms_median"),
+      v("decode_ms_p99"), v("render_ms_median"), v("rendered_frames"), v("motion_to_decoded_ms_median"),
+      v("motion_to_decoded_ms_p99"), v("motion_samples_seen"), v("clock_error_ms"), dropped,
+      v("server_sim_ms"), v("server_realtime_factor"));
+}
+
+}  // namespace strandcast

@@ -1,0 +1,35 @@
+// ViewReport: what a viewer measured, for people, for scripts and for tests. Pure text, any thread.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/app/viewer_session.h"
+
+namespace strandcast {
+
+/// One measured value; `text` is a plain number or word.
+struct ReportEntry {
+  std::string key;  // snake_case with its unit
+  std::string text;
+  bool is_number = true;
+};
+using ViewReport = std::vector<ReportEntry>;
+
+/// Everything a session measured, without render times.
+ViewReport make_report(ViewerSession& session);
+/// Fills in the render times of a report.
+void set_render_times(ViewReport& report, const StageTimer& render_timer);
+
+/// key=value lines.
+std::string to_lines(const ViewReport& report);
+/// One flat JSON object.
+std::string to_json(const ViewReport& report);
+/// Writes JSON when the file ends in .json, else key=value lines.
+Status save_report(const std::filesystem::path& path, const ViewReport& report);
+
+/// A short paragraph for the end of a run.
+std::string to_summary(const ViewReport& report);
+
+}  // namespace strandcast

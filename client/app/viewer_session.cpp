@@ -1,0 +1,110 @@
+#include "client/app/viewer_session.h"
+
+#include <utility>
+
+#include "common/base/log.h"
+
+namespace strandcast {
+
+Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
+  ASSIGN_OR_RETURN(auto client, ViewerClient::connect(config));
+  std::unique_ptr<ViewerSession> session(new ViewerSession(std::move(client)));
+  ViewerClient* requester = session->client_.get();
+  auto replay = StrandReplay::make(session->welcome(), [requester] { requester->request_keyframe(); });
+  if (!replay) return at(config.address.to_string(), replay.error());
+  session->replay_ = std::move(replay).value();
+  session->opened_ns_ = now_ns();
+  return session;
+}
+
+ViewerSession::ViewerSession(std::unique_ptr<ViewerClient> client) : client_(std::move(client)) {}
+
+Status ViewerSession::pump(std::chrono::milliseconds timeout) {
+  for (ClientEvent& event : client_->wait(timeout)) {
+    if (auto* media = std::get_if<MediaEvent>(&event)) {
+      RETURN_IF_ERROR(handle(*media));
+    } else if (const auto* status = std::get_if<ServerStatus>(&event)) {
+      status_ = *status;
+      has_status_ = true;
+    } else if (auto* notice = std::get_if<Notice>(&event)) {
+      notices_.push_back(std::move(*notice));
+    } else {
+      return std::get<ClosedEvent>(event).error;
+    }
+  }
+  return {};
+}
+
+Status ViewerSession::handle(MediaEvent& event) {
+  const int64_t begin_ns = now_ns();
+  switch (event.header.opcode) {
+    case Opcode::Asset:
+      return take_asset(event);
+    case Opcode::StrandKeyframe:
+    case Opcode::StrandDelta:
+      if (const auto snapshot = replay_->receive(event.message, event.receive_time_ns, client_->clock())) {
+        acknowledge(event, begin_ns);
+        if (listener_) listener_(snapshot);
+      } else {
+        log_debug("replay", "frame {} not used: {}", event.header.sequence, replay_->stats().last_error);
+      }
+      return {};
+    case Opcode::JpegFrame:
+      take_picture(event);
+      return {};
+    case Opcode::Control:
+      break;
+  }
+  return make_error(ErrorCode::Internal, "a control message came as media");
+}
+
+Status ViewerSession::take_asset(const MediaEvent& event) {
+  ASSIGN_OR_RETURN(SceneAsset asset, decode_scene_asset(event.payload()));
+  const Welcome& announced = welcome();
+  if (asset.strand_count != announced.strand_count || asset.vertex_count != announced.vertex_count)
+    return make_error(ErrorCode::BadInput, "the asset has {} x {} vertices, the Welcome announced {} x {}",
+                      asset.strand_count, asset.vertex_count, announced.strand_count, announced.vertex_count);
+  asset_ = std::move(asset);
+  return {};
+}
+
+void ViewerSession::take_picture(const MediaEvent& event) {
+  const int64_t begin_ns = now_ns();
+  ++picture_stats_.received_frames;
+  picture_stats_.received_bytes += event.message.size();
+  auto image = decode_jpeg(event.payload());
+  if (!image) {
+    ++picture_stats_.rejected_frames;
+    log_debug("replay", "picture {} not used: {}", event.header.sequence, image.error().to_string());
+    return;
+  }
+  if (last_picture_sequence_ != 0 && event.header.sequence > last_picture_sequence_ + 1)
+    picture_stats_.missed_frames += event.header.sequence - last_picture_sequence_ - 1;
+  last_picture_sequence_ = event.header.sequence;
+  picture_decode_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+  image_ = std::move(image).value();
+  ++image_count_;
+  acknowledge(event, begin_ns);
+}
+
+void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns) {
+  const auto decode_us = static_cast<uint32_t>((now_ns() - decode_begin_ns) / 1000);
+  // An acknowledgement that does not fit is not needed: the server drops frames for this client already.
+  const auto sent = client_->send(FrameAck{event.header.sequence, event.receive_time_ns, decode_us});
+  if (!sent) log_debug("net", "acknowledgement not sent: {}", sent.error().to_string());
+}
+
+bool ViewerSession::has_picture() const {
+  if (welcome().mode == StreamMode::Frames) return image_.has_value();
+  return asset_.has_value() && replay_->newest() != nullptr;
+}
+
+uint64_t ViewerSession::decoded_frames() const {
+  return welcome().mode == StreamMode::Frames ? image_count_ : replay_->stats().decoded_frames;
+}
+
+double ViewerSession::connected_s() const {
+  return static_cast<double>(now_ns() - opened_ns_) * 1e-9;
+}
+
+}  // namespace strandcast

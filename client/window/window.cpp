@@ -1,0 +1,206 @@
+#include "client/window/window.h"
+
+#include <epoxy/gl.h>
+// epoxy first: GLFW must not bring in another set of GL declarations.
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+#include <imgui/backends/imgui_impl_glfw.h>
+#include <imgui/backends/imgui_impl_opengl3.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/window/hud_panel.h"
+#include "common/base/log.h"
+#include "common/gl/objects.h"
+
+namespace strandcast {
+namespace {
+
+std::string& last_glfw_error() {
+  static std::string text;
+  return text;
+}
+
+void remember_glfw_error(int, const char* description) {
+  last_glfw_error() = description;
+  log_debug("window", "GLFW: {}", description);
+}
+
+Error no_window(const char* what) {
+  return make_error(ErrorCode::Unavailable,
+                    "{}: {} (without a display use --headless --screenshot FILE or --headless --clip FILE)",
+                    what, last_glfw_error().empty() ? "no reason given" : last_glfw_error());
+}
+
+}  // namespace
+
+struct Window::State {
+  GLFWwindow* window = nullptr;
+  bool has_imgui = false;
+  bool is_hud_visible = true;
+  bool is_help_visible = false;
+  glm::dvec2 cursor{0.0};
+  WindowActions actions;
+  gl::Texture picture;
+  uint64_t picture_number = 0;
+
+  ~State() {
+    picture = gl::Texture();  // needs the context that goes below
+    if (has_imgui) {
+      ImGui_ImplOpenGL3_Shutdown();
+      ImGui_ImplGlfw_Shutdown();
+      ImGui::DestroyContext();
+    }
+    if (window != nullptr) glfwDestroyWindow(window);
+    glfwTerminate();
+  }
+
+  void on_key(int key) {
+    switch (key) {
+      case GLFW_KEY_ESCAPE:
+      case GLFW_KEY_Q:
+        actions.wants_quit = true;
+        break;
+      case GLFW_KEY_SPACE:
+        actions.wants_pause_toggle = true;
+        break;
+      case GLFW_KEY_N:
+        actions.wants_step = true;
+        break;
+      case GLFW_KEY_R:
+        actions.wants_view_reset = true;
+        break;
+      case GLFW_KEY_S:
+        actions.wants_screenshot = true;
+        break;
+      case GLFW_KEY_M:
+        actions.wants_mode_toggle = true;
+        break;
+      case GLFW_KEY_P:
+        actions.wants_playout_toggle = true;
+        break;
+      case GLFW_KEY_U:
+        is_hud_visible = !is_hud_visible;
+        break;
+      case GLFW_KEY_H:
+      case GLFW_KEY_F1:
+        is_help_visible = !is_help_visible;
+        break;
+      default:
+        break;
+    }
+  }
+
+  void on_cursor(const glm::dvec2& position) {
+    const glm::dvec2 moved = position - cursor;
+    cursor = position;
+    int width = 0;
+    int height = 0;
+    glfwGetWindowSize(window, &width, &height);
+    if (height <= 0 || ImGui::GetIO().WantCaptureMouse) return;
+    const glm::vec2 heights(moved / static_cast<double>(height));
+    const auto is_down = [this](int button) { return glfwGetMouseButton(window, button) == GLFW_PRESS; };
+    if (is_down(GLFW_MOUSE_BUTTON_LEFT)) actions.orbit_heights += heights;
+    if (is_down(GLFW_MOUSE_BUTTON_MIDDLE) || is_down(GLFW_MOUSE_BUTTON_RIGHT)) actions.pan_heights += heights;
+  }
+
+  void install_callbacks() {
+    glfwSetWindowUserPointer(window, this);
+    glfwSetKeyCallback(window, [](GLFWwindow* source, int key, int, int action, int) {
+      if (action == GLFW_PRESS) static_cast<State*>(glfwGetWindowUserPointer(source))->on_key(key);
+    });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* source, double x, double y) {
+      static_cast<State*>(glfwGetWindowUserPointer(source))->on_cursor({x, y});
+    });
+    glfwSetScrollCallback(window, [](GLFWwindow* source, double, double steps) {
+      static_cast<State*>(glfwGetWindowUserPointer(source))->actions.zoom_steps += static_cast<float>(steps);
+    });
+  }
+};
+
+Window::Window(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Window::~Window() = default;
+
+Result<std::unique_ptr<Window>> Window::open(const std::string& title, RenderSize size) {
+  glfwSetErrorCallback(remember_glfw_error);
+  if (glfwInit() != GLFW_TRUE) return no_window("cannot open a display");
+  auto state = std::make_unique<State>();
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  state->window = glfwCreateWindow(static_cast<int>(size.width), static_cast<int>(size.height), title.c_str(),
+                                   nullptr, nullptr);
+  if (state->window == nullptr) return no_window("cannot open a window with OpenGL 4.5");
+  glfwMakeContextCurrent(state->window);
+  glfwSwapInterval(1);
+  glfwGetCursorPos(state->window, &state->cursor.x, &state->cursor.y);
+
+  // Ours first: the panel's own callbacks call those that were there before.
+  state->install_callbacks();
+  ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // leaves no files behind
+  ImGui_ImplGlfw_InitForOpenGL(state->window, true);
+  ImGui_ImplOpenGL3_Init("#version 450 core");
+  state->has_imgui = true;
+  return std::unique_ptr<Window>(new Window(std::move(state)));
+}
+
+WindowActions Window::begin_frame() {
+  glfwPollEvents();
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+  WindowActions actions = std::exchange(state_->actions, {});
+  if (glfwWindowShouldClose(state_->window) == GLFW_TRUE) actions.wants_quit = true;
+  return actions;
+}
+
+RenderSize Window::framebuffer_size() const {
+  int width = 0;
+  int height = 0;
+  glfwGetFramebufferSize(state_->window, &width, &height);
+  return {static_cast<uint32_t>(std::max(width, 0)), static_cast<uint32_t>(std::max(height, 0))};
+}
+
+void Window::show_image(const Image& image, uint64_t image_number) {
+  gl::Texture& picture = state_->picture;
+  if (picture.width() != image.width || picture.height() != image.height) {
+    picture = gl::Texture("received picture", GL_RGBA8, image.width, image.height, 1);
+    glTextureParameteri(picture.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTextureParameteri(picture.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    state_->picture_number = 0;
+  }
+  if (state_->picture_number != image_number) {
+    glTextureSubImage2D(picture.name(), 0, 0, 0, static_cast<GLsizei>(image.width),
+                        static_cast<GLsizei>(image.height), GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
+    state_->picture_number = image_number;
+  }
+  const ImVec2 area = ImGui::GetIO().DisplaySize;
+  const float scale =
+      std::min(area.x / static_cast<float>(image.width), area.y / static_cast<float>(image.height));
+  const ImVec2 shown(scale * static_cast<float>(image.width), scale * static_cast<float>(image.height));
+  const ImVec2 corner((area.x - shown.x) * 0.5f, (area.y - shown.y) * 0.5f);
+  ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(uintptr_t{picture.name()}), corner,
+                                           ImVec2(corner.x + shown.x, corner.y + shown.y));
+}
+
+void Window::end_frame(const HudState& hud) {
+  if (state_->is_hud_visible) draw_hud_panel(hud);
+  if (state_->is_help_visible) draw_help_panel();
+  if (!hud.is_connected) draw_connection_banner(hud);
+  ImGui::Render();
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(state_->window);
+}
+
+void Window::clear() {
+  const RenderSize size = framebuffer_size();
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, static_cast<GLsizei>(size.width), static_cast<GLsizei>(size.height));
+  constexpr float kDarkGrey = 0.1f;
+  glClearColor(kDarkGrey, kDarkGrey, kDarkGrey, 1.0f);
+  glClear(GL_COLOR_BUFFER_BIT);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,153 @@
+// ViewerSession against servers whose messages are well framed but whose contents are not what they should
+// be.
+#include <zstd.h>
+
+#include <atomic>
+
+#include "client/app/viewer_session.h"
+#include "tests/support/fake_server.h"
+#include "tests/support/hair_motion.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+using test::FakePeer;
+using test::FakeServer;
+using test::make_welcome;
+using testing::HasSubstr;
+
+constexpr uint32_t kStrands = 20;
+constexpr uint32_t kVertices = 8;
+constexpr milliseconds kLong{20'000};  // never reached by code that works
+
+ClientConfig config_for(uint16_t port) {
+  ClientConfig config;
+  config.address = {"127.0.0.1", port};
+  config.hello.name = "test";
+  return config;
+}
+
+/// Zeros that zstd makes a thousandth of.
+std::vector<std::byte> zstd_bomb(size_t zeros) {
+  const std::vector<std::byte> source(zeros);
+  std::vector<std::byte> bomb(ZSTD_compressBound(zeros));
+  bomb.resize(ZSTD_compress(bomb.data(), bomb.size(), source.data(), source.size(), 1));
+  return bomb;
+}
+
+TEST(ClientSession, UnusableStrandFramesAreCountedAndAKeyframeAskedFor) {
+  std::atomic<int> requests{0};
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(kStrands, kVertices));
+    const std::vector<std::byte> bomb = zstd_bomb(64u << 20);
+    const std::vector<std::byte> noise(5000, std::byte{0xa5});
+    for (uint32_t sequence = 1; sequence <= 20; ++sequence) {
+      const Opcode opcode = sequence % 2 == 0 ? Opcode::StrandDelta : Opcode::StrandKeyframe;
+      const FrameHeader header{.opcode = opcode, .sequence = sequence};
+      peer.send(*make_encoded_frame(header, sequence % 3 == 0 ? bomb : noise));
+    }
+    if (peer.read_until<KeyframeRequest>()) ++requests;
+    peer.send(Notice{false, "done"});
+    peer.read_to_end();
+  });
+  auto session = ViewerSession::open(config_for(server.port()));
+  ASSERT_TRUE(session) << session.error().to_string();
+  while ((*session)->take_notices().empty()) ASSERT_TRUE((*session)->pump(kLong));
+  EXPECT_EQ(requests, 1);
+  EXPECT_EQ((*session)->replay().stats().rejected_frames, 20u);
+  EXPECT_EQ((*session)->replay().stats().decoded_frames, 0u);
+  EXPECT_FALSE((*session)->replay().stats().last_error.empty());
+  EXPECT_FALSE((*session)->has_picture());
+}
+
+TEST(ClientSession, AWrongAssetEndsTheSession) {
+  const std::vector<std::vector<std::byte>> payloads = {
+      {}, std::vector<std::byte>(1000, std::byte{0x11}), zstd_bomb(64u << 20)};
+  for (const auto& payload : payloads) {
+    const FakeServer server([&](FakePeer& peer) {
+      peer.welcome(make_welcome(kStrands, kVertices));
+      peer.send(*make_encoded_frame({.opcode = Opcode::Asset, .sequence = 1}, payload));
+      peer.read_to_end();
+    });
+    auto session = ViewerSession::open(config_for(server.port()));
+    ASSERT_TRUE(session) << session.error().to_string();
+    Status pumped;
+    while (pumped && (*session)->client().counters().received_messages < 100)
+      pumped = (*session)->pump(kLong);
+    EXPECT_FALSE(pumped) << payload.size();
+    EXPECT_EQ((*session)->asset(), nullptr);
+  }
+}
+
+TEST(ClientSession, AnAssetOfOtherSizesThanAnnouncedIsRefused) {
+  SceneAsset asset;
+  asset.strand_count = kStrands + 1;
+  asset.vertex_count = kVertices;
+  asset.rest_position_m.resize((kStrands + 1) * kVertices);
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(kStrands, kVertices));
+    peer.send(*make_encoded_frame({.opcode = Opcode::Asset, .sequence = 1}, encode_scene_asset(asset)));
+    peer.read_to_end();
+  });
+  auto session = ViewerSession::open(config_for(server.port()));
+  ASSERT_TRUE(session) << session.error().to_string();
+  const auto pumped = (*session)->pump(kLong);
+  ASSERT_FALSE(pumped);
+  EXPECT_EQ(pumped.error().code, ErrorCode::BadInput);
+  EXPECT_THAT(pumped.error().message, HasSubstr("21 x 8"));
+}
+
+TEST(ClientSession, BrokenPicturesAreSkipped) {
+  const FakeServer server([&](FakePeer& peer) {
+    Welcome welcome = make_welcome(kStrands, kVertices);
+    welcome.mode = StreamMode::Frames;
+    peer.welcome(welcome);
+    const std::vector<std::byte> noise(500, std::byte{0x42});
+    peer.send(*make_encoded_frame({.opcode = Opcode::JpegFrame, .sequence = 1}, noise));
+    peer.send(Notice{false, "picture"});
+    peer.read_until<KeyframeRequest>();
+    const Image image{16, 16, std::vector<uint8_t>(16 * 16 * 4, 128)};
+    const auto jpeg = encode_jpeg(image, 80);
+    if (jpeg) peer.send(*make_encoded_frame({.opcode = Opcode::JpegFrame, .sequence = 3}, *jpeg));
+    peer.read_to_end();
+  });
+  auto session = ViewerSession::open(config_for(server.port()));
+  ASSERT_TRUE(session) << session.error().to_string();
+  while ((*session)->take_notices().empty()) ASSERT_TRUE((*session)->pump(kLong));
+  EXPECT_EQ((*session)->picture_stats().rejected_frames, 1u);
+  (*session)->client().request_keyframe();  // only to wake the script
+  while (!(*session)->has_picture()) ASSERT_TRUE((*session)->pump(kLong));
+  EXPECT_EQ((*session)->image()->width, 16u);
+  EXPECT_EQ((*session)->decoded_frames(), 1u);
+}
+
+TEST(ClientSession, ALateKeyframeBringsTheStreamBack) {
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(kStrands, kVertices));
+    HairMotion hair({.strand_count = kStrands, .vertex_count = kVertices});
+    auto encoder = make_strand_encoder("delta");
+    const auto next = [&] {
+      hair.step();
+      return (*encoder)->encode(hair.snapshot(quantum_for_bound(1e-4f)));
+    };
+    (void)next();  // the keyframe is lost
+    for (int i = 0; i < 5; ++i) peer.send(*next());
+    peer.read_until<KeyframeRequest>();
+    peer.send(*(*encoder)->encode_keyframe());
+    for (int i = 0; i < 5; ++i) peer.send(*next());
+    peer.send(Notice{false, "done"});
+    peer.read_to_end();
+  });
+  auto session = ViewerSession::open(config_for(server.port()));
+  ASSERT_TRUE(session) << session.error().to_string();
+  std::vector<uint64_t> ticks;
+  (*session)->set_snapshot_listener([&](const auto& snapshot) { ticks.push_back(snapshot->tick); });
+  while ((*session)->take_notices().empty()) ASSERT_TRUE((*session)->pump(kLong));
+  EXPECT_EQ(ticks, (std::vector<uint64_t>{6, 7, 8, 9, 10, 11}));
+  EXPECT_EQ((*session)->replay().stats().rejected_frames, 5u);
+  EXPECT_EQ((*session)->replay().stats().keyframe_requests, 1u);
+}
+
+}  // namespace
+}  // namespace strandcast

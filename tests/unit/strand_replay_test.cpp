@@ -1,0 +1,195 @@
+#include "client/replay/strand_replay.h"
+
+#include "tests/support/hair_motion.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kStrands = 30;
+constexpr uint32_t kVertices = 8;
+constexpr float kQuantumM = 1e-4f;
+constexpr int64_t kStepNs = 16'666'667;
+constexpr int64_t kMs = 1'000'000;
+
+Welcome make_welcome() {
+  Welcome welcome;
+  welcome.codec = "delta";
+  welcome.strand_count = kStrands;
+  welcome.vertex_count = kVertices;
+  return welcome;
+}
+
+/// A server's strand stream and the replay that follows it, without a network.
+class StrandReplayTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto replay = StrandReplay::make(make_welcome(), [this] { ++requests_; });
+    ASSERT_TRUE(replay) << replay.error().to_string();
+    replay_ = std::move(replay).value();
+    auto encoder = make_strand_encoder("delta");
+    ASSERT_TRUE(encoder);
+    encoder_ = std::move(encoder).value();
+  }
+
+  /// Simulates one step and encodes it.
+  EncodedFramePtr next() {
+    hair_.step();
+    truth_ = hair_.snapshot(kQuantumM);
+    return encoder_->encode(truth_);
+  }
+  std::shared_ptr<const Snapshot> receive(const EncodedFramePtr& frame, int64_t receive_time_ns = 0) {
+    return replay_->receive(frame->message, receive_time_ns, clock_);
+  }
+
+  HairMotion hair_{{.strand_count = kStrands, .vertex_count = kVertices}};
+  Snapshot truth_;
+  std::unique_ptr<StrandEncoder> encoder_;
+  std::unique_ptr<StrandReplay> replay_;
+  ClockOffset clock_;
+  int requests_ = 0;
+};
+
+TEST_F(StrandReplayTest, DecodesTheServersStateBitForBit) {
+  uint64_t bytes = 0;
+  for (int i = 0; i < 30; ++i) {
+    const auto frame = next();
+    bytes += frame->message.size();
+    const auto snapshot = receive(frame, i * kStepNs);
+    ASSERT_TRUE(snapshot);
+    EXPECT_EQ(state_hash(*snapshot), state_hash(truth_));
+  }
+  const ReplayStats& stats = replay_->stats();
+  EXPECT_EQ(stats.decoded_frames, 30u);
+  EXPECT_EQ(stats.keyframes, 1u);
+  EXPECT_EQ(stats.received_bytes, bytes);
+  EXPECT_EQ(stats.gaps, 0u);
+  EXPECT_EQ(stats.rejected_frames, 0u);
+  EXPECT_EQ(requests_, 0);
+  EXPECT_EQ(replay_->decode_timer().count(), 30u);
+}
+
+TEST_F(StrandReplayTest, LowLatencyShowsTheNewestStateExactly) {
+  EXPECT_FALSE(replay_->picture_at(0));
+  EXPECT_EQ(replay_->newest(), nullptr);
+  for (int i = 0; i < 5; ++i) receive(next(), i * kStepNs);
+  const auto picture = replay_->picture_at(4 * kStepNs + 3 * kMs);
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->position_m, positions_in_head(truth_));
+  EXPECT_EQ(picture->world_from_head, truth_.world_from_head);
+}
+
+TEST_F(StrandReplayTest, ALostFrameIsAGapAndAsksOnceASecond) {
+  receive(next());
+  (void)next();  // lost
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(receive(next(), i * 150 * kMs), nullptr);
+  EXPECT_EQ(replay_->stats().gaps, 1u);
+  EXPECT_EQ(replay_->stats().missed_frames, 1u);
+  EXPECT_EQ(replay_->stats().rejected_frames, 10u);
+  EXPECT_EQ(requests_, 2) << "at 0 and at 1.05 s of 1.35 s";
+  ASSERT_TRUE(receive(encoder_->encode_keyframe()));
+  EXPECT_EQ(replay_->stats().gaps, 1u) << "a keyframe of the present state repeats a number and skips none";
+  ASSERT_TRUE(receive(next()));
+  EXPECT_EQ(state_hash(*replay_->newest()), state_hash(truth_));
+}
+
+TEST_F(StrandReplayTest, AMalformedFrameChangesNothing) {
+  receive(next());
+  const auto good = next();
+  auto bad = good->message;
+  bad.resize(bad.size() / 2);
+  EXPECT_EQ(replay_->receive(bad, 0, clock_), nullptr);
+  EXPECT_EQ(replay_->receive({}, 0, clock_), nullptr);
+  EXPECT_EQ(replay_->stats().rejected_frames, 2u);
+  EXPECT_EQ(requests_, 1);
+  ASSERT_TRUE(receive(good)) << "the chain goes on where it was";
+  EXPECT_EQ(state_hash(*replay_->newest()), state_hash(truth_));
+}
+
+TEST_F(StrandReplayTest, RefusesAnUnknownCodec) {
+  Welcome welcome = make_welcome();
+  welcome.codec = "magic";
+  const auto replay = StrandReplay::make(welcome, {});
+  ASSERT_FALSE(replay);
+  EXPECT_EQ(replay.error().code, ErrorCode::NotFound);
+}
+
+TEST_F(StrandReplayTest, SmoothPlayoutMovesEvenlyBetweenStates) {
+  replay_->set_playout(Playout::Smooth);
+  std::vector<Snapshot> truths;
+  for (int i = 0; i < 40; ++i) {
+    const auto frame = next();
+    truths.push_back(truth_);
+    // Received unevenly: every other frame 4 ms late.
+    ASSERT_TRUE(receive(frame, i * kStepNs + (i % 2) * 4 * kMs));
+  }
+  const Snapshot& before = truths[truths.size() - 2];
+  const Snapshot& newest = truths.back();
+  double last = -1.0;
+  int between = 0;
+  for (int64_t t_ns = 39 * kStepNs; t_ns < 42 * kStepNs; t_ns += kMs) {
+    const auto picture = replay_->picture_at(t_ns);
+    ASSERT_TRUE(picture);
+    // Where the head is on its way from the last state but one to the newest, as a fraction.
+    const auto way = newest.world_from_head.position_m - before.world_from_head.position_m;
+    const double fraction =
+        glm::dot(picture->world_from_head.position_m - before.world_from_head.position_m, way) /
+        glm::dot(way, way);
+    EXPECT_GE(fraction, last - 1e-9) << "never backwards";
+    EXPECT_LE(fraction, 1.0 + 1e-9) << "never beyond what was received";
+    last = fraction;
+    if (fraction > 0.02 && fraction < 0.98) ++between;
+  }
+  EXPECT_GE(between, 10) << "a step lasts 16.7 ms, sampled every millisecond";
+  EXPECT_NEAR(last, 1.0, 1e-9) << "without news it rests on the newest state";
+  EXPECT_GE(replay_->playout_delay_ms(), 16.0);
+}
+
+TEST_F(StrandReplayTest, AResetServerIsNotBlendedInto) {
+  replay_->set_playout(Playout::Smooth);
+  for (int i = 0; i < 10; ++i) receive(next(), i * kStepNs);
+  hair_ = HairMotion({.strand_count = kStrands, .vertex_count = kVertices});
+  receive(next(), 10 * kStepNs);
+  const auto picture = replay_->picture_at(10 * kStepNs);
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->position_m, positions_in_head(truth_));
+}
+
+TEST_F(StrandReplayTest, MeasuresMotionLatencyOncePerSampleAndStateAge) {
+  // The server's clock is one second ahead; the probe took no time.
+  constexpr int64_t kAheadNs = 1'000'000'000;
+  clock_.add(0, kAheadNs, kAheadNs, 0);
+  for (int i = 0; i < 6; ++i) {
+    hair_.step();
+    truth_ = hair_.snapshot(kQuantumM);
+    // Two states for each motion sample, which arrived 20 ms ago.
+    truth_.motion_time_ns = i % 2 == 0 ? now_ns() + kAheadNs - 20 * kMs : truth_.motion_time_ns;
+    static int64_t held_ns = 0;
+    if (i % 2 == 0) held_ns = truth_.motion_time_ns;
+    truth_.motion_time_ns = held_ns;
+    ASSERT_TRUE(receive(encoder_->encode(truth_)));
+  }
+  EXPECT_EQ(replay_->motion_latency_timer().count(), 2u)
+      << "three samples; the first may have waited for a viewer";
+  EXPECT_GE(replay_->motion_latency_timer().median_ms(), 20.0);
+}
+
+TEST(Blend, MeetsBothEndsExactlyAndIsLinearBetween) {
+  HairMotion hair({.strand_count = kStrands, .vertex_count = kVertices});
+  hair.step();
+  const Snapshot from = hair.snapshot(kQuantumM);
+  hair.step();
+  const Snapshot to = hair.snapshot(kQuantumM);
+  EXPECT_EQ(blend(from, to, 0.0).position_m, positions_in_head(from));
+  EXPECT_EQ(blend(from, to, 1.0).position_m, positions_in_head(to));
+  EXPECT_EQ(blend(from, to, 1.0).world_from_head, to.world_from_head);
+  const auto half = blend(from, to, 0.5);
+  const auto a = positions_in_head(from);
+  const auto b = positions_in_head(to);
+  for (size_t i = 0; i < a.size(); ++i)
+    EXPECT_LT(glm::length(half.position_m[i] - 0.5f * (a[i] + b[i])), 1e-6f) << i;
+  EXPECT_NEAR(angle_between_rad(from.world_from_head.rotation, half.world_from_head.rotation),
+              angle_between_rad(half.world_from_head.rotation, to.world_from_head.rotation), 1e-6);
+}
+
+}  // namespace
+}  // namespace strandcast
