@@ -27,10 +27,6 @@ const uint kBindingKeyPosition = 0u;
 const uint kBindingRootTriangle = 1u;
 const uint kBindingExpanded = 2u;
 
-// Uniform blocks of the renderer.
-const uint kBindingView = 0u;
-const uint kBindingLook = 1u;
-
 #ifdef __cplusplus
 }  // namespace strandcast::shader
 #endif
