@@ -61,6 +61,18 @@ class Quarantine : public GlTest {
     }
   }
 
+  void expect_poisoned_at_rest(Solver& solver, const glm::dquat& world_from_head,
+                               const std::string& name) const {
+    SolverState state;
+    solver.read(state);
+    for (uint32_t vertex = 0; vertex < groom_.uniform_vertex_count(); ++vertex) {
+      const size_t i = static_cast<size_t>(vertex) * groom_.strand_count() + kPoisoned;
+      const glm::dvec3 rest(groom_.rest_position_m[groom_.offset[kPoisoned] + vertex]);
+      EXPECT_LT(glm::distance(glm::dvec3(state.position_m[i]), world_from_head * rest), 1e-6) << name;
+      EXPECT_EQ(state.velocity_mps[i], glm::vec3(0.0f)) << name;
+    }
+  }
+
   gl::ShaderLibrary shaders_;
   Groom groom_;
 };
@@ -84,6 +96,7 @@ TEST_F(Quarantine, APoisonedStrandReturnsAndItsNeighboursKeepTheirBits) {
             is_struck ? std::vector<uint32_t>{kPoisoned} : std::vector<uint32_t>{};
         ASSERT_THAT(publisher.quarantined(), ElementsAreArray(expected)) << row.name << ", step " << k;
         expect_equal_but_poisoned(*snapshot, *clean, row.name);
+        if (is_struck) expect_poisoned_at_rest(*solver, moving_input(k, kStepS).world_from_head, row.name);
       }
       EXPECT_EQ(clean_publisher.quarantine_count(), 0u);
     }
