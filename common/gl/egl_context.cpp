@@ -178,9 +178,9 @@ Result<std::unique_ptr<EglContext>> EglContext::make(const std::string& device) 
     context->info_ = opened->info;
     return context;
   }
-  return make_error(
-      ErrorCode::Unavailable, "no OpenGL 4.5 context for GL device '{}' (tried: {})", device,
-      tried.empty() ? "nothing, EGL lists no such device" : fmt::format("{}", fmt::join(tried, "; ")));
+  return make_error(ErrorCode::Unavailable, "no OpenGL 4.5 context for GL device '{}' (tried: {})", device,
+                    tried.empty() ? "nothing, EGL lists no such device; libgl1-mesa-dri draws without a GPU"
+                                  : fmt::format("{}", fmt::join(tried, "; ")));
 }
 
 EglContext::~EglContext() {

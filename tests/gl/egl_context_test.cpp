@@ -2,6 +2,10 @@
 
 #include <epoxy/gl.h>
 
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
 #include <thread>
 
 #include "common/gl/objects.h"
@@ -67,6 +71,19 @@ TEST(EglContext, MovesToAnotherThread) {
     (*context)->release();
   }).join();
   EXPECT_EQ(seen, (std::vector<int>{5, 6}));
+}
+
+TEST(EglContext, AMachineWithoutDriversGetsOneSentence) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // a fresh process: EGL looks for drivers once
+  EXPECT_EXIT(
+      {
+        setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent", 1);
+        const auto context = EglContext::make("auto");
+        const bool is_expected = !context && context.error().code == ErrorCode::Unavailable;
+        fprintf(stderr, "%s\n", context ? "a context" : context.error().to_string().c_str());
+        _exit(is_expected ? 0 : 1);
+      },
+      testing::ExitedWithCode(0), "no OpenGL 4.5 context for GL device 'auto'");
 }
 
 TEST(DeviceInfo, ADebugMessageIsNoError) {
