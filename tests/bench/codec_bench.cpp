@@ -1,12 +1,20 @@
 // Prints bits per vertex and milliseconds of the strand codecs, and of raw lattices under zstd in the same
-// run. Usage: codec_bench [frames]
+// run, for test motions and for the built-in scene under its reference solver. Usage: codec_bench [frames]
 #include <fmt/format.h>
 #include <zstd.h>
 
 #include <cstdlib>
+#include <functional>
 
+#include "common/base/check.h"
 #include "common/base/profile.h"
 #include "common/codec/strand_codec.h"
+#include "common/motion/motion_clip.h"
+#include "common/scene/features.h"
+#include "server/publish/publisher.h"
+#include "server/scene/scene_content.h"
+#include "server/scene/step_builder.h"
+#include "server/sim/solver_registry.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {
@@ -16,6 +24,55 @@ constexpr float kBoundM = 1e-4f;
 constexpr int kWarmUpFrames = 60;
 constexpr double kRateHz = 60.0;
 
+/// Gives the next snapshot of a motion that starts anew with every source.
+using SnapshotSource = std::function<Snapshot()>;
+
+SnapshotSource test_motion(const HairMotionDesc& desc) {
+  auto hair = std::make_shared<HairMotion>(desc);
+  return [hair] {
+    hair->step();
+    return hair->snapshot(quantum_for_bound(kBoundM));
+  };
+}
+
+/// The built-in scene as the server runs it, on the CPU: head motion, gusts, DFTL, publishing.
+class BuiltInScene {
+ public:
+  BuiltInScene()
+      : scene_(built_in_scene()),
+        content_(std::move(load_scene_content(scene_)).value()),
+        builder_(scene_, content_.colliders),
+        publisher_(content_.groom, kBoundM) {
+    const auto row = find_solver(scene_.solver.name);
+    CHECK(row.ok());
+    solver_ = (*row)->make_reference(complete_parameters(**row, scene_.solver.parameters).value());
+    CHECK(solver_->load(content_.groom, built_in_motion(0.0).rotation).ok());
+  }
+  Snapshot next() {
+    ++tick_;
+    const double time_s = static_cast<double>(tick_) / scene_.step_rate_hz;
+    InputFrame input;
+    input.has_motion = true;
+    input.is_motion_stale = false;
+    input.world_from_head = built_in_motion(time_s);
+    const SceneStep& step = builder_.build(input, analyse(scene_, {}), time_s);
+    for (const StepInput& substep : step.substeps) solver_->substep(substep);
+    PublishInput publish;
+    publish.tick = tick_;
+    publish.sim_time_ns = std::llround(time_s * 1e9);
+    publish.world_from_head = step.world_from_head;
+    return *publisher_.publish(*solver_, publish);
+  }
+
+ private:
+  SceneDesc scene_;
+  SceneContent content_;
+  StepBuilder builder_;
+  Publisher publisher_;
+  std::unique_ptr<Solver> solver_;
+  uint64_t tick_ = 0;
+};
+
 struct Row {
   StageTimer encode;
   StageTimer decode;
@@ -23,25 +80,24 @@ struct Row {
   double keyframe_bytes = 0.0;
 };
 
-void print(const char* scene, const char* codec, const Row& row, const HairMotion& hair, int frames) {
-  const double vertices = static_cast<double>(hair.plane_size());
+void print(const char* scene, const char* codec, const Row& row, size_t vertex_count, int frames) {
+  const double vertices = static_cast<double>(vertex_count);
   const double bits_per_vertex = 8.0 * row.bytes / frames / vertices;
-  fmt::print("{},{},{},{:.2f},{:.2f},{:.2f},{:.3f},{:.3f}\n", scene, codec, hair.plane_size(),
-             bits_per_vertex, bits_per_vertex * vertices * kRateHz * 1e-6,
-             8.0 * row.keyframe_bytes / vertices, row.encode.median_ms(), row.decode.median_ms());
+  fmt::print("{},{},{},{:.2f},{:.2f},{:.2f},{:.3f},{:.3f}\n", scene, codec, vertex_count, bits_per_vertex,
+             bits_per_vertex * vertices * kRateHz * 1e-6, 8.0 * row.keyframe_bytes / vertices,
+             row.encode.median_ms(), row.decode.median_ms());
 }
 
-bool run_codec(const char* scene, const std::string& codec, const HairMotionDesc& desc, int frames) {
-  HairMotion hair(desc);
-  for (int i = 0; i < kWarmUpFrames; ++i) hair.step();
+bool run_codec(const char* scene, const std::string& codec, const SnapshotSource& next, int frames) {
+  Snapshot snapshot;
+  for (int i = 0; i < kWarmUpFrames; ++i) snapshot = next();
   auto encoder = make_strand_encoder(codec);
-  auto decoder = make_strand_decoder(codec, {desc.strand_count, desc.vertex_count});
+  auto decoder = make_strand_decoder(codec, {snapshot.strand_count, snapshot.vertex_count});
   if (!encoder || !decoder) return false;
   Row row;
   constexpr int kStartFrames = 9;  // the first differences are not yet typical
   for (int i = -kStartFrames; i < frames; ++i) {
-    hair.step();
-    const Snapshot snapshot = hair.snapshot(quantum_for_bound(kBoundM));
+    snapshot = next();
     const int64_t begin_ns = now_ns();
     const EncodedFramePtr frame = (*encoder)->encode(snapshot);
     const int64_t middle_ns = now_ns();
@@ -57,17 +113,16 @@ bool run_codec(const char* scene, const std::string& codec, const HairMotionDesc
     row.bytes += static_cast<double>(frame->message.size());
   }
   row.keyframe_bytes = static_cast<double>((*encoder)->encode_keyframe()->message.size());
-  print(scene, codec.c_str(), row, hair, frames);
+  print(scene, codec.c_str(), row, snapshot.plane_size(), frames);
   return true;
 }
 
-void run_raw_zstd(const char* scene, const HairMotionDesc& desc, int frames) {
-  HairMotion hair(desc);
-  for (int i = 0; i < kWarmUpFrames; ++i) hair.step();
+void run_raw_zstd(const char* scene, const SnapshotSource& next, int frames) {
+  Snapshot snapshot;
+  for (int i = 0; i < kWarmUpFrames; ++i) snapshot = next();
   Row row;
   for (int i = 0; i < frames; ++i) {
-    hair.step();
-    const Snapshot snapshot = hair.snapshot(quantum_for_bound(kBoundM));
+    snapshot = next();
     const size_t source_bytes = snapshot.lattice.size() * sizeof(int32_t);
     std::vector<std::byte> packed(ZSTD_compressBound(source_bytes));
     std::vector<std::byte> unpacked(source_bytes);
@@ -80,28 +135,35 @@ void run_raw_zstd(const char* scene, const HairMotionDesc& desc, int frames) {
     row.bytes += static_cast<double>(size);
   }
   row.keyframe_bytes = row.bytes / frames;
-  print(scene, "raw+zstd3", row, hair, frames);
+  print(scene, "raw+zstd3", row, snapshot.plane_size(), frames);
 }
 
 int run(int frames) {
   struct Scene {
     const char* name;
-    HairMotionDesc desc;
+    std::function<SnapshotSource()> start;
+  };
+  const auto motion = [](uint32_t strands, uint32_t vertices, MotionKind kind) {
+    return [=] { return test_motion({strands, vertices, kind}); };
+  };
+  const auto built_in = [] {
+    return SnapshotSource([scene = std::make_shared<BuiltInScene>()] { return scene->next(); });
   };
   const std::vector<Scene> scenes = {
-      {"242x8_active", {242, 8, MotionKind::Active}},
-      {"2000x16_idle", {2000, 16, MotionKind::Idle}},
-      {"2000x16_active", {2000, 16, MotionKind::Active}},
-      {"2000x16_extreme", {2000, 16, MotionKind::Extreme}},
-      {"10000x16_active", {10000, 16, MotionKind::Active}},
+      {"built_in_2000x16", built_in},
+      {"242x8_active", motion(242, 8, MotionKind::Active)},
+      {"2000x16_idle", motion(2000, 16, MotionKind::Idle)},
+      {"2000x16_active", motion(2000, 16, MotionKind::Active)},
+      {"2000x16_extreme", motion(2000, 16, MotionKind::Extreme)},
+      {"10000x16_active", motion(10000, 16, MotionKind::Active)},
   };
   fmt::print(
       "scene,codec,vertices,bits_per_vertex,mbit_per_s_at_60hz,keyframe_bits_per_vertex,encode_ms,decode_"
       "ms\n");
   for (const Scene& scene : scenes) {
     for (const char* codec : {"raw", "delta"})
-      if (!run_codec(scene.name, codec, scene.desc, frames)) return 1;
-    run_raw_zstd(scene.name, scene.desc, frames);
+      if (!run_codec(scene.name, codec, scene.start(), frames)) return 1;
+    run_raw_zstd(scene.name, scene.start(), frames);
   }
   return 0;
 }
