@@ -9,11 +9,12 @@ namespace strandcast {
 namespace {
 
 constexpr float kPartingWidth = 0.05f;  // over which the side changes
-constexpr float kPartingAt = 0.10f;     // x of the parting: a little to one side looks natural
-constexpr float kPartingWave = 0.03f;   // it is not a straight line
-constexpr float kSwayNoise = 0.22f;     // slow change over the scalp
-constexpr float kSwayStrand = 0.05f;    // from strand to strand
-constexpr float kNoiseCells = 2.5f;     // per skull radius
+constexpr float kMinSide = 0.6f;
+constexpr float kPartingAt = 0.10f;    // x of the parting: a little to one side looks natural
+constexpr float kPartingWave = 0.03f;  // it is not a straight line
+constexpr float kSwayNoise = 0.22f;    // slow change over the scalp
+constexpr float kSwayStrand = 0.05f;   // from strand to strand
+constexpr float kNoiseCells = 2.5f;    // per skull radius
 constexpr float kMinClearance = 0.015f;
 constexpr float kTopClearance = 0.11f;  // more at the top of the head
 constexpr float kClearanceNoise = 0.035f;
@@ -87,7 +88,9 @@ StrandCharacter make_character(const glm::vec3& root, uint32_t strand_hash, uint
   character.root = root;
   const glm::vec3 place = root * kNoiseCells;
   const float parting = kPartingAt + kPartingWave * noise(place * 2.0f, mix_u32(seed + 11));
-  character.side = std::tanh((root.x - parting) / kPartingWidth);
+  // Nobody stays undecided on the parting: such a strand would fall over the face.
+  const float side = std::tanh((root.x - parting) / kPartingWidth);
+  character.side = std::copysign(std::max(std::abs(side), kMinSide), side);
   const float height = smooth(kHeight, root.y / std::max(glm::length(root), 1e-6f));
   const float lift = noise(place * 1.7f, mix_u32(seed + 23)) + (unit_float(mix_u32(strand_hash + 5)) - 0.5f);
   character.clearance =

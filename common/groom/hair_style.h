@@ -11,7 +11,7 @@ namespace strandcast {
 /// What one strand (or one clump) does differently from its neighbours.
 struct StrandCharacter {
   glm::vec3 root{0.0f};     // in skull radii
-  float side = 1.0f;        // -1 .. 1: which side of the parting it is combed to
+  float side = 1.0f;        // -1 .. 1, never near 0: which side of the parting it is combed to
   float clearance = 0.05f;  // height above the skull at which it settles; upper hair lies over lower hair
   glm::vec3 sway{0.0f};     // added to the direction it is combed in
 };

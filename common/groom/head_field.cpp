@@ -47,9 +47,9 @@ const std::array kParts = {
             0.10f),                                                                // bridge of the nose
     ellipsoid(Blend::Add, 0.08f, {0.00f, -0.53f, 1.11f}, {0.12f, 0.10f, 0.11f}),   // its tip
     ellipsoid(Blend::Add, 0.07f, {0.13f, -0.56f, 1.00f}, {0.08f, 0.075f, 0.11f}),  // its wing
-    capsule(Blend::Add, 0.09f, {0.04f, -0.805f, 0.93f}, 0.055f, {0.20f, -0.85f, 0.83f}, 0.03f),  // upper lip
-    capsule(Blend::Add, 0.09f, {0.00f, -0.925f, 0.92f}, 0.065f, {0.18f, -0.87f, 0.82f}, 0.03f),  // lower lip
-    capsule(Blend::Cut, 0.07f, {0.00f, -0.865f, 1.03f}, 0.025f, {0.25f, -0.865f, 0.895f}, 0.025f),  // mouth
+    capsule(Blend::Add, 0.10f, {0.05f, -0.805f, 0.925f}, 0.055f, {0.25f, -0.87f, 0.79f}, 0.01f),  // upper lip
+    capsule(Blend::Add, 0.10f, {0.00f, -0.93f, 0.925f}, 0.06f, {0.24f, -0.87f, 0.78f}, 0.01f),    // lower lip
+    capsule(Blend::Cut, 0.08f, {0.00f, -0.868f, 1.025f}, 0.02f, {0.25f, -0.87f, 0.885f}, 0.005f),  // mouth
     ellipsoid(Blend::Cut, 0.12f, {0.00f, -1.05f, 0.99f}, {0.16f, 0.05f, 0.10f}),   // below the lips
     ellipsoid(Blend::Add, 0.06f, {0.965f, -0.28f, 0.02f}, {0.09f, 0.28f, 0.16f}),  // ear
     ellipsoid(Blend::Cut, 0.06f, {1.07f, -0.26f, 0.05f}, {0.05f, 0.17f, 0.08f}),   // its shell

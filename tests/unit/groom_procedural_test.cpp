@@ -112,20 +112,28 @@ TEST(Procedural, LeavesTheScalpOutwards) {
 }
 
 TEST(Procedural, HangsDownAndLeavesTheFaceFree) {
-  const auto groom = grow_groom(scalp(), ProceduralGroomOptions{});
-  ASSERT_TRUE(groom) << groom.error().to_string();
-  uint32_t on_face = 0, below_head = 0;
-  for (uint32_t strand = 0; strand < groom->strand_count(); ++strand) {
-    for (uint32_t vertex = groom->offset[strand]; vertex < groom->offset[strand + 1]; ++vertex) {
-      const glm::vec3 point = groom->rest_position_m[vertex] / kRadiusM;
-      // Before the eyes, nose and mouth: between the temples and in front of the ears.
-      on_face += point.z > 0.4f && std::abs(point.x) < 0.6f && point.y < 0.3f ? 1 : 0;
+  for (const uint32_t seed : {1u, 2u, 3u, 4u}) {
+    for (const float curl_radius_m : {0.0f, 0.008f}) {
+      ProceduralGroomOptions options;
+      options.strand_count = 5000;
+      options.seed = seed;
+      options.curl_radius_m = curl_radius_m;
+      const auto groom = grow_groom(scalp(), options);
+      ASSERT_TRUE(groom) << groom.error().to_string();
+      uint32_t on_face = 0, below_head = 0;
+      for (uint32_t strand = 0; strand < groom->strand_count(); ++strand) {
+        for (uint32_t vertex = groom->offset[strand]; vertex < groom->offset[strand + 1]; ++vertex) {
+          const glm::vec3 point = groom->rest_position_m[vertex] / kRadiusM;
+          // Before the eyes, nose and mouth: between the temples and in front of the ears.
+          on_face += point.z > 0.4f && std::abs(point.x) < 0.6f && point.y < 0.3f ? 1 : 0;
+        }
+        below_head += groom->rest_position_m[groom->offset[strand + 1] - 1].y < -0.5f * kRadiusM ? 1 : 0;
+      }
+      EXPECT_EQ(on_face, 0u) << "seed " << seed;
+      // Hair of 28 cm from anywhere on the scalp reaches below the ears when it hangs.
+      EXPECT_GT(below_head, groom->strand_count() * 95 / 100);
     }
-    below_head += groom->rest_position_m[groom->offset[strand + 1] - 1].y < -0.5f * kRadiusM ? 1 : 0;
   }
-  EXPECT_EQ(on_face, 0u);
-  // Hair of 28 cm from anywhere on the scalp reaches below the ears when it hangs.
-  EXPECT_GT(below_head, groom->strand_count() * 95 / 100);
 }
 
 TEST(Procedural, SameSeedSameGroomOtherSeedOtherGroom) {
@@ -201,6 +209,33 @@ TEST(ScalpRoots, RefusesBrokenMeshes) {
   broken = good;
   for (auto& point : broken.position_m) point = glm::vec3(1.0f);
   EXPECT_THAT(spread_roots(broken, 10, 1).error().message, ::testing::HasSubstr("the area 0"));
+}
+
+/// Two squares of the same kind of skin, one cut into far more triangles than the other.
+TEST(ScalpRoots, FollowTheAreaNotTheTriangles) {
+  Mesh mesh;
+  const auto add_square = [&](float x, float side, uint32_t cells) {
+    const auto first = static_cast<uint32_t>(mesh.position_m.size());
+    for (uint32_t i = 0; i <= cells; ++i) {
+      for (uint32_t k = 0; k <= cells; ++k) {
+        const glm::vec2 at = side / static_cast<float>(cells) * glm::vec2(i, k);
+        mesh.position_m.emplace_back(x + at.x, 0.0f, at.y);
+        mesh.normal.emplace_back(0.0f, 1.0f, 0.0f);
+        const uint32_t corner = first + i * (cells + 1) + k;
+        if (i == cells || k == cells) continue;
+        mesh.triangle.emplace_back(corner, corner + 1, corner + cells + 1);
+        mesh.triangle.emplace_back(corner + 1, corner + cells + 2, corner + cells + 1);
+      }
+    }
+  };
+  add_square(0.0f, 0.2f, 1);
+  add_square(1.0f, 0.1f, 20);
+  const auto roots = spread_roots(mesh, 1000, 1);
+  ASSERT_TRUE(roots) << roots.error().to_string();
+  const auto on_large =
+      std::count_if(roots->begin(), roots->end(), [](const auto& r) { return r.position_m.x < 0.5f; });
+  // Areas 4 to 1; rims make the smaller square hold a few more points that keep their distance.
+  EXPECT_NEAR(static_cast<double>(on_large), 800.0, 25.0);
 }
 
 /// As many roots on one half of the scalp as on the other, and none crowded: the smallest distance between
