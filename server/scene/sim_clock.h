@@ -28,6 +28,8 @@ class SimClock {
   bool is_paused() const { return is_paused_; }
   /// One more step while paused; false when running.
   bool step_once();
+  /// Steps asked for by step_once() are waiting.
+  bool has_single_steps() const { return single_steps_ > 0; }
 
   /// Steps taken over steps that real time asked for, within the last second; 0 while paused.
   double realtime_factor(int64_t time_ns) const;

@@ -1,0 +1,98 @@
+#include "server/app/options.h"
+
+#include <CLI/CLI.hpp>
+
+#include "common/base/file.h"
+#include "common/scene/scene_file.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint64_t kMaxTokenFileBytes = 4'096;
+constexpr const char* kVersionText = "strandcast-server 0.1.0";
+
+void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom, std::string& explained) {
+  app.add_option("--scene", options.scene_path, "scene file (protobuf text); default: the built-in scene");
+  app.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--groom", groom, "hair from this .tfx or .hair file: short for --set groom.file.path=FILE");
+  app.add_flag("--list-solvers", options.is_listing_solvers,
+               "print the solvers and their parameters, and leave");
+  app.add_option("--explain", explained, "print what runs for the scene and why, and leave")->expected(0, 1);
+  app.add_option("--frame-viewers", options.explained_frame_viewers,
+                 "with --explain: assume so many frame viewers");
+  app.add_flag("--print-scene", options.is_printing_scene, "print the scene with its overrides, and leave");
+}
+
+void add_run_options(CLI::App& app, ServerOptions& options, std::string& shader_folder) {
+  NetConfig& net = options.config.net;
+  app.add_option("--listen", net.address, "address to listen on; beyond loopback a token is needed")
+      ->capture_default_str();
+  app.add_option("--port", net.port, "TCP port, 0 = any free one")->capture_default_str();
+  app.add_option("--port-file", options.port_path, "write the port to this file once the server is ready");
+  app.add_option("--token-file", options.token_path, "file with the token that clients must give");
+  app.add_option("--allow-host", net.allowed_hosts, "further name accepted in the Host header; repeatable")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--gl-device", options.config.gl_device, "auto, software, hardware or a device number")
+      ->capture_default_str();
+  app.add_option("--shader-dir", shader_folder, "read shaders from this folder instead of the program");
+  app.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+  app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(CLI::NonNegativeNumber);
+}
+
+}  // namespace
+
+Result<ServerOptions> parse_options(int argc, const char* const* argv) {
+  ServerOptions options;
+  std::string groom;
+  std::string explained;
+  std::string shader_folder;
+  CLI::App app("Simulates hair and streams it to viewers.", "strandcast-server");
+  app.set_version_flag("--version", kVersionText);
+  add_scene_options(app, options, groom, explained);
+  add_run_options(app, options, shader_folder);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    options.help = app.help();
+  } catch (const CLI::CallForVersion&) {
+    options.help = std::string(kVersionText) + "\n";
+  } catch (const CLI::ParseError& error) {
+    return make_error(ErrorCode::BadInput, "{} (--help lists the options)", error.what());
+  }
+  options.is_explaining = app.count("--explain") > 0;
+  if (!explained.empty()) {
+    if (!options.scene_path.empty())
+      return make_error(ErrorCode::BadInput, "give the scene once: --explain {} or --scene {}", explained,
+                        options.scene_path.string());
+    options.scene_path = explained;
+  }
+  // First, so that --set can still change what belongs to the file (its unit, its axes).
+  if (!groom.empty()) options.overrides.insert(options.overrides.begin(), "groom.file.path=" + groom);
+  if (!shader_folder.empty()) options.config.shader_folder = shader_folder;
+  return options;
+}
+
+Result<ServerConfig> load_config(const ServerOptions& options) {
+  ServerConfig config = options.config;
+  if (options.scene_path.empty()) {
+    ASSIGN_OR_RETURN(config.scene, built_in_scene_with(options.overrides));
+  } else {
+    ASSIGN_OR_RETURN(config.scene, load_scene(options.scene_path, options.overrides));
+  }
+  if (!options.token_path.empty()) {
+    ASSIGN_OR_RETURN(std::string token, load_text(options.token_path, kMaxTokenFileBytes));
+    const size_t end = token.find_last_not_of(" \t\r\n");
+    token.resize(end == std::string::npos ? 0 : end + 1);
+    if (token.empty())
+      return at(options.token_path.string(), make_error(ErrorCode::BadInput, "the token file is empty"));
+    config.net.token = token;
+  }
+  return config;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,43 @@
+#include "server/app/scene_change.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "common/scene/scene_file.h"
+#include "server/sim/solver_registry.h"
+
+namespace strandcast {
+
+const std::vector<std::string>& live_fields() {
+  static const std::vector<std::string> kFields = {"solver",    "substeps",          "gravity_mps2",
+                                                   "colliders", "has_auto_collider", "wind"};
+  return kFields;
+}
+
+Status check_solver(const SceneDesc& scene) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
+  const Result<SolverParameters> parameters = complete_parameters(*row, scene.solver.parameters);
+  if (!parameters) return parameters.error();
+  return {};
+}
+
+Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment) {
+  const std::string root = assignment.substr(0, assignment.find_first_of(".= "));
+  const std::vector<std::string>& fields = live_fields();
+  if (std::find(fields.begin(), fields.end(), root) == fields.end())
+    return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", root,
+                      fmt::join(fields, ", "));
+  ASSIGN_OR_RETURN(SceneDesc changed, with_overrides(scene, {assignment}));
+  if (changed.solver.name != scene.solver.name) {
+    ASSIGN_OR_RETURN(const SolverRow* row, find_solver(changed.solver.name));
+    std::erase_if(changed.solver.parameters, [&](const auto& given) {
+      return std::none_of(row->parameters.begin(), row->parameters.end(),
+                          [&](const SolverParameterInfo& info) { return info.name == given.first; });
+    });
+  }
+  RETURN_IF_ERROR(check_solver(changed));
+  return changed;
+}
+
+}  // namespace strandcast

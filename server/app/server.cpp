@@ -1,0 +1,317 @@
+#include "server/app/server.h"
+
+#include <condition_variable>
+#include <mutex>
+#include <random>
+#include <thread>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/codec/scene_asset.h"
+#include "server/app/scene_change.h"
+#include "server/app/viewers.h"
+#include "server/net/metrics.h"
+
+namespace strandcast {
+namespace {
+
+constexpr const char* kServerVersion = "0.1.0";
+constexpr auto kStatusInterval = std::chrono::milliseconds(500);
+
+std::string make_session_id() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
+Result<EncodedFramePtr> encode_asset(const SceneAsset& asset) {
+  FrameHeader header;
+  header.opcode = Opcode::Asset;
+  header.sequence = 1;
+  EncodedFramePtr frame = make_encoded_frame(header, encode_scene_asset(asset));
+  if (frame == nullptr)
+    return make_error(ErrorCode::LimitExceeded, "the scene does not fit into one message of {} bytes",
+                      kMaxMediaPayloadBytes);
+  return frame;
+}
+
+}  // namespace
+
+class Server::State : public NetHandler {
+ public:
+  explicit State(const ServerConfig& config) : config_(config), viewers_(config.scene) {}
+  ~State() override { stop(); }
+
+  Status start();
+  void stop();
+  void wait();
+  ServerCounters counters() const;
+  uint16_t port() const { return net_->port(); }
+  std::optional<Error> failure() const { return sim_->failure(); }
+
+  Result<Admission> on_hello(SessionId session, const Hello& hello) override;
+  void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override {
+    hub_.push(session, samples, arrival_ns);
+  }
+  void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) override {
+    hub_.push(session, samples, arrival_ns);
+  }
+  void on_command(SessionId session, const ControlCommand& command) override {
+    sim_->post(command, reply_to(session));
+  }
+  void on_parameter(SessionId session, const SetParameter& parameter) override {
+    sim_->post(parameter, reply_to(session));
+  }
+  void on_camera(SessionId session, const CameraChange& camera) override;
+  void on_ack(SessionId, const FrameAck&) override {}
+  void on_keyframe_request(SessionId) override { encoder_->request_keyframe(); }
+  void on_left(SessionId session) override;
+  std::string metrics() override;
+
+ private:
+  void start_workers(std::unique_ptr<StrandEncoder> encoder, std::unique_ptr<StrandDecoder> decoder);
+  SimLoop::Reply reply_to(SessionId session) {
+    return [this, session](Notice notice) { net_->send(session, std::move(notice)); };
+  }
+  Welcome make_welcome(const Viewers::Place& place) const;
+  void follow_viewers();
+  void run_status();
+
+  const ServerConfig config_;
+  const std::string session_id_ = make_session_id();
+  InputHub hub_;
+  SnapshotSlot slot_;
+  Viewers viewers_;
+  std::shared_ptr<const SceneContent> content_;
+  std::shared_ptr<const SceneAsset> asset_;
+  EncodedFramePtr asset_frame_;
+
+  std::unique_ptr<NetServer> net_;
+  mutable std::mutex
+      workers_mutex_;  // guards that the two still exist, for threads that stop() does not wait for first
+  std::unique_ptr<FrameWorker> frames_;
+  std::unique_ptr<StrandEncodeWorker> encoder_;
+  std::unique_ptr<SimLoop> sim_;
+
+  std::mutex mutex_;  // guards has_stopped_
+  std::condition_variable changed_;
+  bool has_stopped_ = false;
+  std::thread status_thread_;
+};
+
+Status Server::State::start() {
+  const SceneDesc& scene = config_.scene;
+  RETURN_IF_ERROR(check_solver(scene));
+  ASSIGN_OR_RETURN(auto strand_encoder, make_strand_encoder(scene.stream.codec));
+  ASSIGN_OR_RETURN(SceneContent content, load_scene_content(scene));
+  content_ = std::make_shared<const SceneContent>(std::move(content));
+  asset_ = std::make_shared<const SceneAsset>(make_scene_asset(content_->groom, content_->head));
+  ASSIGN_OR_RETURN(asset_frame_, encode_asset(*asset_));
+  ASSIGN_OR_RETURN(auto strand_decoder,
+                   make_strand_decoder(scene.stream.codec, {asset_->strand_count, asset_->vertex_count}));
+  // The port first: a port in use is told at once, not after compiling shaders.
+  ASSIGN_OR_RETURN(net_, NetServer::listen(config_.net, *this));
+  SimLoopConfig sim{scene, content_, config_.gl_device, config_.shader_folder};
+  ASSIGN_OR_RETURN(sim_, SimLoop::start(std::move(sim), hub_, slot_));
+  start_workers(std::move(strand_encoder), std::move(strand_decoder));
+  net_->start();
+  status_thread_ = std::thread([this] { run_status(); });
+  log_info("app", "serving scene '{}' on {} port {}", scene.name, config_.net.address, net_->port());
+  return {};
+}
+
+void Server::State::start_workers(std::unique_ptr<StrandEncoder> encoder,
+                                  std::unique_ptr<StrandDecoder> decoder) {
+  FrameWorker::Hooks hooks;
+  hooks.sink = [this](uint32_t picture_class, EncodedFramePtr frame) {
+    net_->publish_picture(picture_class, std::move(frame));
+  };
+  hooks.request_keyframe = [this] {
+    const std::lock_guard lock(workers_mutex_);
+    if (encoder_ != nullptr) encoder_->request_keyframe();
+  };
+  hooks.on_failure = [this](const Error& error) {
+    log_error("render", "{}", error.to_string());
+    net_->broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});
+  };
+  const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset_, config_.scene.look};
+  frames_ = std::make_unique<FrameWorker>(std::move(decoder), gl_picture_painter(painter),
+                                          config_.scene.stream.frame_rate_hz, std::move(hooks));
+  const auto sink = [this](EncodedFramePtr frame) {
+    {
+      const std::lock_guard lock(workers_mutex_);
+      if (frames_ != nullptr && frames_->has_views()) frames_->offer(frame);
+    }
+    net_->publish_strands(std::move(frame));
+  };
+  encoder_ = std::make_unique<StrandEncodeWorker>(slot_, std::move(encoder), sink);
+}
+
+void Server::State::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(has_stopped_, true)) return;
+  }
+  changed_.notify_all();
+  if (status_thread_.joinable()) status_thread_.join();
+  // Viewers first, so that they hear of it; then whoever feeds the next in line.
+  if (net_ != nullptr) net_->stop();
+  slot_.stop();
+  if (sim_ != nullptr) sim_->stop();
+  // Each worker calls the other: both are taken out of reach before their threads are joined.
+  std::unique_ptr<StrandEncodeWorker> encoder;
+  std::unique_ptr<FrameWorker> frames;
+  const auto take = [this](auto& from, auto& to) {
+    const std::lock_guard lock(workers_mutex_);
+    to = std::move(from);
+  };
+  take(encoder_, encoder);
+  take(frames_, frames);
+}
+
+void Server::State::wait() {
+  std::unique_lock lock(mutex_);
+  while (!has_stopped_ && !sim_->failure()) changed_.wait_for(lock, kStatusInterval);
+}
+
+Welcome Server::State::make_welcome(const Viewers::Place& place) const {
+  const SceneDesc& scene = config_.scene;
+  Welcome welcome;
+  welcome.session_id = session_id_;
+  welcome.server_version = kServerVersion;
+  welcome.scene_name = scene.name;
+  welcome.mode = place.mode;
+  welcome.mode_reason = place.reason;
+  welcome.codec = scene.stream.codec;
+  welcome.strand_count = asset_->strand_count;
+  welcome.vertex_count = asset_->vertex_count;
+  welcome.bound_m = scene.stream.bound_m;
+  welcome.step_rate_hz = scene.step_rate_hz;
+  welcome.look = scene.look;
+  welcome.camera = scene.camera;
+  welcome.frame_width = place.size.width;
+  welcome.frame_height = place.size.height;
+  return welcome;
+}
+
+Result<Admission> Server::State::on_hello(SessionId session, const Hello& hello) {
+  if (hello.mode == StreamMode::Frames && hello.role != Role::Source)
+    if (const std::optional<Error> error = frames_->failure())
+      return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
+  ASSIGN_OR_RETURN(const Viewers::Place place, viewers_.add(session, hello));
+  Admission admission;
+  admission.welcome = make_welcome(place);
+  if (hello.role != Role::Source && place.mode == StreamMode::Strands) admission.asset = asset_frame_;
+  admission.picture_class = place.picture_class;
+  follow_viewers();
+  return admission;
+}
+
+void Server::State::on_camera(SessionId session, const CameraChange& camera) {
+  const Result<PictureClass> picture_class = viewers_.set_camera(session, camera.camera);
+  if (!picture_class) return net_->send(session, Notice{true, picture_class.error().to_string()});
+  net_->set_picture_class(session, *picture_class);
+  frames_->set_views(viewers_.picture_views());
+}
+
+void Server::State::on_left(SessionId session) {
+  hub_.remove_source(session);
+  viewers_.remove(session);
+  follow_viewers();
+}
+
+/// What runs follows who watches.
+void Server::State::follow_viewers() {
+  const RuntimeFacts facts = viewers_.facts();
+  frames_->set_views(viewers_.picture_views());
+  encoder_->set_has_listeners(facts.strand_viewers + facts.frame_viewers > 0);
+  sim_->set_facts(facts);
+}
+
+void Server::State::run_status() {
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, kStatusInterval, [this] { return has_stopped_; })) {
+    lock.unlock();
+    const ServerCounters now = counters();
+    ServerStatus status;
+    status.tick = now.sim.tick;
+    status.sim_ms = now.sim.step_median_ms;
+    status.encode_ms = now.encode.encode_median_ms;
+    status.render_ms = now.frame_viewers > 0 ? now.frames.paint_median_ms + now.frames.jpeg_median_ms : 0.0;
+    status.realtime_factor = now.sim.realtime_factor;
+    status.is_paused = now.sim.is_paused;
+    status.is_motion_stale = now.sim.is_motion_stale;
+    status.viewer_count = now.strand_viewers + now.frame_viewers;
+    status.rejected_samples = now.input.rejected();
+    net_->broadcast(status);
+    lock.lock();
+  }
+}
+
+ServerCounters Server::State::counters() const {
+  ServerCounters counters;
+  counters.net = net_->counters();
+  const RuntimeFacts facts = viewers_.facts();
+  counters.strand_viewers = facts.strand_viewers;
+  counters.frame_viewers = facts.frame_viewers;
+  counters.input = hub_.counters();
+  counters.sim = sim_->stats();
+  const std::lock_guard lock(workers_mutex_);
+  if (encoder_ != nullptr) counters.encode = encoder_->counters();
+  if (frames_ != nullptr) counters.frames = frames_->counters();
+  return counters;
+}
+
+std::string Server::State::metrics() {
+  const ServerCounters now = counters();
+  std::string text;
+  const auto gauge = [&](const char* name, double value) { text += format_metric(name, "gauge", value); };
+  const auto total = [&](const char* name, uint64_t value) {
+    text += format_metric(name, "counter", static_cast<double>(value));
+  };
+  total("sim_steps_total", now.sim.tick);
+  gauge("sim_step_median_ms", now.sim.step_median_ms);
+  gauge("sim_realtime_factor", now.sim.realtime_factor);
+  total("sim_dropped_steps_total", now.sim.dropped_steps);
+  gauge("publish_read_median_ms", now.sim.read_median_ms);
+  gauge("publish_quantise_median_ms", now.sim.quantise_median_ms);
+  total("publish_snapshots_total", now.sim.published);
+  total("publish_quarantined_total", now.sim.quarantined);
+  total("encode_frames_total", now.encode.encodes);
+  total("encode_keyframes_total", now.encode.keyframes);
+  total("encode_delta_bytes_total", now.encode.delta_bytes);
+  gauge("encode_median_ms", now.encode.encode_median_ms);
+  total("render_frames_total", now.frames.frames);
+  gauge("render_median_ms", now.frames.paint_median_ms);
+  total("input_accepted_total", now.input.accepted);
+  total("input_rejected_total", now.input.rejected());
+  gauge("viewers_strands", now.strand_viewers);
+  gauge("viewers_frames", now.frame_viewers);
+  return text;
+}
+
+Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Server::~Server() = default;
+
+Result<std::unique_ptr<Server>> Server::start(const ServerConfig& config) {
+  auto state = std::make_unique<State>(config);
+  RETURN_IF_ERROR(state->start());
+  return std::unique_ptr<Server>(new Server(std::move(state)));
+}
+
+uint16_t Server::port() const {
+  return state_->port();
+}
+ServerCounters Server::counters() const {
+  return state_->counters();
+}
+std::optional<Error> Server::failure() const {
+  return state_->failure();
+}
+void Server::stop() {
+  state_->stop();
+}
+void Server::wait() {
+  state_->wait();
+}
+
+}  // namespace strandcast

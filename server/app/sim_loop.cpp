@@ -1,0 +1,297 @@
+#include "server/app/sim_loop.h"
+
+#include <cmath>
+#include <exception>
+#include <future>
+#include <utility>
+
+#include "common/base/log.h"
+#include "server/app/scene_change.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kNsPerS = 1e9;
+/// Medians cost a sort of the window; viewers are told twice a second.
+constexpr uint64_t kStatsInterval = 8;
+
+/// Whether a solver built for one set of facts serves another: only what it compiles for counts.
+bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
+  return a.has_wind == b.has_wind && a.has_turbulence == b.has_turbulence &&
+         a.has_colliders == b.has_colliders;
+}
+
+uint32_t viewers(const RuntimeFacts& facts) {
+  return facts.strand_viewers + facts.frame_viewers;
+}
+
+std::vector<SphereCollider> colliders_of(const SceneDesc& scene, const SceneContent& content) {
+  if (!scene.colliders.empty()) return scene.colliders;
+  if (!scene.has_auto_collider) return {};
+  return {fit_head_collider(content.groom)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot) {
+  std::unique_ptr<SimLoop> loop(new SimLoop(std::move(config), hub, slot));
+  auto ready = std::make_shared<std::promise<Status>>();
+  loop->thread_ = std::thread([self = loop.get(), ready] {
+    self->run([ready](Status status) { ready->set_value(std::move(status)); });
+  });
+  const Status status = ready->get_future().get();
+  if (!status) return status.error();
+  return loop;
+}
+
+SimLoop::SimLoop(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot)
+    : config_(std::move(config)), hub_(hub), slot_(slot) {}
+
+SimLoop::~SimLoop() {
+  stop();
+}
+
+void SimLoop::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void SimLoop::run(std::function<void(Status)> on_ready) {
+  bool is_ready = false;
+  try {
+    const Status status = begin();
+    is_ready = true;
+    on_ready(status);
+    if (status) loop();
+  } catch (const std::exception& exception) {
+    const Error error = make_error(ErrorCode::Internal, "the simulation failed: {}", exception.what());
+    log_error("sim", "{}", error.message);
+    if (!is_ready) on_ready(error);
+    const std::lock_guard lock(mutex_);
+    failure_ = error;
+  }
+  // GL objects go before their context, on this thread.
+  timer_.reset();
+  solver_.reset();
+  context_.reset();
+}
+
+Status SimLoop::begin() {
+  ASSIGN_OR_RETURN(context_, gl::EglContext::make(config_.gl_device));
+  log_info("sim", "simulating on {}", context_->info().renderer);
+  if (config_.shader_folder) shaders_ = gl::ShaderLibrary(*config_.shader_folder);
+  timer_.emplace(context_->info());
+  builder_.emplace(config_.scene, config_.content->colliders);
+  publisher_.emplace(config_.content->groom, config_.scene.stream.bound_m);
+  RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
+  publish();
+  clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
+  update_stats();
+  return {};
+}
+
+void SimLoop::loop() {
+  while (true) {
+    const std::deque<Job> jobs = wait_for_jobs();
+    {
+      const std::lock_guard lock(mutex_);
+      if (is_stopping_) return;
+    }
+    for (const Job& job : jobs) carry_out(job);
+    const auto time_ns = clock_->take_step(now_ns());
+    if (time_ns) step(*time_ns);
+    const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0);
+    if (!jobs.empty() || has_news) update_stats();
+  }
+}
+
+std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
+  // A job may have asked for a single step: it is taken by the turn of the loop that carries the job out, or,
+  // when there are several, by the next ones, which then must not sleep.
+  const std::optional<int64_t> due_ns = clock_->next_due_ns();
+  const auto is_awake = [this] { return is_stopping_ || !jobs_.empty() || clock_->has_single_steps(); };
+  std::unique_lock lock(mutex_);
+  if (due_ns) {
+    const std::chrono::steady_clock::time_point due{std::chrono::nanoseconds(*due_ns)};
+    changed_.wait_until(lock, due, is_awake);
+  } else {
+    changed_.wait(lock, is_awake);
+  }
+  return std::exchange(jobs_, {});
+}
+
+void SimLoop::push(Job job) {
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(std::move(job));
+  }
+  changed_.notify_all();
+}
+
+void SimLoop::post(const ControlCommand& command, Reply reply) {
+  push({command, std::move(reply)});
+}
+void SimLoop::post(const SetParameter& parameter, Reply reply) {
+  push({parameter, std::move(reply)});
+}
+void SimLoop::set_facts(const RuntimeFacts& facts) {
+  push({facts, {}});
+}
+
+void SimLoop::carry_out(const Job& job) {
+  if (const auto* facts = std::get_if<RuntimeFacts>(&job.what)) {
+    RuntimeFacts changed = *facts;
+    changed.has_wind_stream = facts_.has_wind_stream;
+    return apply_facts(changed);
+  }
+  const auto* control = std::get_if<ControlCommand>(&job.what);
+  const Notice notice =
+      control != nullptr ? command(control->command) : change(std::get<SetParameter>(job.what).assignment);
+  if (job.reply) job.reply(notice);
+}
+
+Notice SimLoop::command(Command command) {
+  switch (command) {
+    case Command::Pause:
+      clock_->pause();
+      return {false, fmt::format("Paused at step {}.", tick_)};
+    case Command::Resume:
+      clock_->resume(now_ns());
+      return {false, fmt::format("Running from step {}.", tick_)};
+    case Command::StepOnce:
+      if (!clock_->step_once()) return {true, "StepOnce needs a paused simulation: send Pause first."};
+      return {false, fmt::format("Step {} follows.", tick_ + 1)};
+    case Command::Reset:
+      if (const Status status = solver_->load(config_.content->groom, builder_->world_from_head().rotation);
+          !status)
+        return {true, status.error().to_string()};
+      publish();
+      return {false, fmt::format("All strands are at rest at step {}.", tick_)};
+  }
+  return {true, "Unknown command."};
+}
+
+Notice SimLoop::change(const std::string& assignment) {
+  const Result<SceneDesc> scene = change_scene(config_.scene, assignment);
+  if (!scene) return {true, scene.error().to_string()};
+  const SceneFeatures features = analyse(*scene, facts_);
+  const bool is_other_solver = scene->solver.name != config_.scene.solver.name ||
+                               scene->solver.parameters != config_.scene.solver.parameters;
+  if (is_other_solver || !needs_same_solver(features, solver_features_))
+    if (const Status status = rebuild_solver(*scene, features); !status)
+      return {true, status.error().to_string()};
+  config_.scene = *scene;
+  builder_->change(*scene, colliders_of(*scene, *config_.content));
+  return {false, fmt::format("{} from step {} on.", assignment, tick_ + 1)};
+}
+
+/// Builds the scene's solver; strands keep their state.
+Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& features) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
+  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
+  ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, {&shaders_, features}));
+  RETURN_IF_ERROR(solver->load(config_.content->groom, builder_->world_from_head().rotation));
+  if (solver_ != nullptr) {
+    solver_->read(scratch_);
+    solver->write(scratch_);
+  }
+  solver_ = std::move(solver);
+  solver_features_ = features;
+  step_timer_ = StageTimer();
+  ++solver_builds_;
+  log_info("sim", "solver {}: {} strands x {} vertices, {} kB", row->name,
+           config_.content->groom.strand_count(), config_.content->groom.uniform_vertex_count(),
+           solver_->memory_bytes() / 1000);
+  return {};
+}
+
+void SimLoop::apply_facts(const RuntimeFacts& facts) {
+  const bool was_watched = viewers(facts_) > 0;
+  facts_ = facts;
+  // The first viewer sees the present state at once, also while paused.
+  if (!was_watched && viewers(facts_) > 0 && published_tick_ != tick_) publish();
+  const SceneFeatures features = analyse(config_.scene, facts_);
+  if (needs_same_solver(features, solver_features_)) return;
+  if (const Status status = rebuild_solver(config_.scene, features); !status)
+    log_error("sim", "the solver in use stays: {}", status.error().to_string());
+}
+
+void SimLoop::step(int64_t time_ns) {
+  input_ = hub_.sample(time_ns);
+  if (input_.has_wind_stream != facts_.has_wind_stream) {
+    RuntimeFacts facts = facts_;
+    facts.has_wind_stream = input_.has_wind_stream;
+    apply_facts(facts);
+  }
+  ++tick_;
+  const double end_time_s = static_cast<double>(tick_) / config_.scene.step_rate_hz;
+  const SceneStep& scene_step = builder_->build(input_, solver_features_, end_time_s);
+  if (scene_step.rigid_turn) turn_rigidly(*scene_step.rigid_turn);
+  timer_->begin();
+  for (const StepInput& substep : scene_step.substeps) solver_->substep(substep);
+  step_timer_.add_ms(timer_->end_ms());
+  if (viewers(facts_) > 0 || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
+}
+
+/// Loading is how a solver is told that the old rotation is no movement.
+void SimLoop::turn_rigidly(const glm::dquat& turn) {
+  solver_->read(scratch_);
+  for (auto* values : {&scratch_.position_m, &scratch_.velocity_mps})
+    for (glm::vec3& value : *values) value = glm::vec3(turn * glm::dvec3(value));
+  if (const Status status = solver_->load(config_.content->groom, builder_->world_from_head().rotation);
+      !status)
+    return log_error("sim", "{}", status.error().to_string());
+  solver_->write(scratch_);
+}
+
+void SimLoop::publish() {
+  PublishInput input;
+  input.tick = tick_;
+  input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
+  input.motion_time_ns = input_.motion_time_ns;
+  input.world_from_head = builder_->world_from_head();
+  slot_.put(publisher_->publish(*solver_, input));
+  published_tick_ = tick_;
+  ++published_count_;
+  if (publisher_->quarantined().empty()) return;
+  publisher_->repair(*solver_);
+  if (published_count_ % kIdlePublishSteps == 1)
+    log_warn("publish", "{} strands had left the simulation and are back at rest",
+             publisher_->quarantined().size());
+}
+
+void SimLoop::update_stats() {
+  SimStats stats;
+  stats.tick = tick_;
+  stats.step_median_ms = step_timer_.median_ms();
+  stats.read_median_ms = publisher_->read_timer().median_ms();
+  stats.quantise_median_ms = publisher_->quantise_timer().median_ms();
+  stats.realtime_factor = clock_->realtime_factor(now_ns());
+  stats.is_paused = clock_->is_paused();
+  stats.is_motion_stale = input_.is_motion_stale;
+  stats.rejected_samples = input_.rejected_samples;
+  stats.dropped_steps = clock_->dropped_steps();
+  stats.published = published_count_;
+  stats.quarantined = publisher_->quarantine_count();
+  stats.solver_builds = solver_builds_;
+  stats.solver_bytes = solver_->memory_bytes();
+  stats.solver_name = config_.scene.solver.name;
+  const std::lock_guard lock(mutex_);
+  stats_ = std::move(stats);
+}
+
+SimStats SimLoop::stats() const {
+  const std::lock_guard lock(mutex_);
+  return stats_;
+}
+
+std::optional<Error> SimLoop::failure() const {
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,140 @@
+// SimLoop: the simulation thread with its GL context: takes input, steps the solver, publishes. Commands and
+// facts reach it through a queue and are carried out between two steps. It never waits for a viewer.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "common/base/profile.h"
+#include "common/base/result.h"
+#include "common/gl/egl_context.h"
+#include "common/gl/program.h"
+#include "common/gl/timer.h"
+#include "common/scene/features.h"
+#include "common/wire/messages.h"
+#include "server/input/input_hub.h"
+#include "server/publish/publisher.h"
+#include "server/publish/snapshot_slot.h"
+#include "server/scene/scene_content.h"
+#include "server/scene/sim_clock.h"
+#include "server/scene/step_builder.h"
+#include "server/sim/solver_registry.h"
+
+namespace strandcast {
+
+/// While nobody watches, states are read back only this often, to find broken strands.
+inline constexpr uint64_t kIdlePublishSteps = 30;
+
+struct SimLoopConfig {
+  SceneDesc scene;
+  std::shared_ptr<const SceneContent> content;
+  std::string gl_device = "auto";                      // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+};
+
+/// Totals since start, and the present state.
+struct SimStats {
+  uint64_t tick = 0;
+  double step_median_ms = 0.0;  // solver, all substeps
+  double read_median_ms = 0.0;
+  double quantise_median_ms = 0.0;
+  double realtime_factor = 0.0;
+  bool is_paused = false;
+  bool is_motion_stale = true;
+  uint64_t rejected_samples = 0;
+  uint64_t dropped_steps = 0;
+  uint64_t published = 0;
+  uint64_t quarantined = 0;  // strands put back to rest
+  uint64_t solver_builds = 0;
+  uint64_t solver_bytes = 0;
+  std::string solver_name;
+};
+
+class SimLoop {
+ public:
+  /// Answer to a command, on the simulation thread.
+  using Reply = std::function<void(Notice)>;
+
+  /// Starts the thread and waits until the solver is loaded and the rest state published, or for the error.
+  /// `hub` and `slot` outlive the loop.
+  static Result<std::unique_ptr<SimLoop>> start(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot);
+  /// stop(), if it was not called.
+  ~SimLoop();
+  SimLoop(const SimLoop&) = delete;
+  SimLoop& operator=(const SimLoop&) = delete;
+
+  // From any thread; return at once.
+  void post(const ControlCommand& command, Reply reply);
+  void post(const SetParameter& parameter, Reply reply);
+  /// How many watch; has_wind_stream is found by the loop itself.
+  void set_facts(const RuntimeFacts& facts);
+  SimStats stats() const;
+  /// Ends the thread after the step that is under way. From one thread.
+  void stop();
+  /// Why the simulation ended; nothing while it runs.
+  std::optional<Error> failure() const;
+
+ private:
+  struct Job {
+    std::variant<ControlCommand, SetParameter, RuntimeFacts> what;
+    Reply reply;
+  };
+
+  SimLoop(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot);
+  void run(std::function<void(Status)> on_ready);
+  Status begin();
+  void loop();
+  void push(Job job);
+  std::deque<Job> wait_for_jobs();
+  void carry_out(const Job& job);
+  Notice command(Command command);
+  Notice change(const std::string& assignment);
+  Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
+  void apply_facts(const RuntimeFacts& facts);
+  void step(int64_t time_ns);
+  void turn_rigidly(const glm::dquat& turn);
+  void publish();
+  void update_stats();
+
+  SimLoopConfig config_;
+  InputHub& hub_;
+  SnapshotSlot& slot_;
+
+  // Of the simulation thread.
+  std::unique_ptr<gl::EglContext> context_;
+  gl::ShaderLibrary shaders_;
+  std::unique_ptr<Solver> solver_;
+  SceneFeatures solver_features_;  // what the solver was built for
+  std::optional<StepBuilder> builder_;
+  std::optional<Publisher> publisher_;
+  std::optional<SimClock> clock_;
+  std::optional<gl::GpuTimer> timer_;
+  RuntimeFacts facts_;
+  SolverState scratch_;
+  StageTimer step_timer_;
+  InputFrame input_;
+  uint64_t tick_ = 0;
+  uint64_t published_tick_ = 0;
+  uint64_t published_count_ = 0;
+  uint64_t solver_builds_ = 0;
+
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  bool is_stopping_ = false;
+  SimStats stats_;
+  std::optional<Error> failure_;
+
+  std::thread thread_;  // last: starts when everything else is there
+};
+
+}  // namespace strandcast

@@ -1,0 +1,116 @@
+// strandcast-server: reads the command line, serves until a signal. Exit code 0 after a clean stop, 2 for bad
+// input.
+#include <pthread.h>
+
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+
+#include "common/base/file.h"
+#include "common/base/log.h"
+#include "common/base/profile.h"
+#include "common/scene/scene_file.h"
+#include "server/app/explain.h"
+#include "server/app/options.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int kExitBadInput = 2;
+constexpr int kExitFailure = 1;
+constexpr long kPollNs = 100'000'000;
+constexpr double kNsPerS = 1e9;
+
+int fail(const Error& error) {
+  fmt::print(stderr, "strandcast-server: {}\n", error.to_string());
+  return kExitBadInput;
+}
+
+sigset_t stop_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  return signals;
+}
+
+int explain_command(const ServerOptions& options, const ServerConfig& config) {
+  const Result<SceneContent> content = load_scene_content(config.scene);
+  if (!content) return fail(content.error());
+  RuntimeFacts facts;
+  facts.strand_viewers = 1;
+  facts.frame_viewers = options.explained_frame_viewers;
+  PassTimes times;
+  auto measured = measure_passes(config.scene, *content, facts, config.gl_device, config.shader_folder);
+  if (measured) {
+    times = *measured;
+  } else if (measured.error().code != ErrorCode::Unavailable) {
+    return fail(measured.error());
+  }
+  const auto text =
+      explain_scene(config.scene, make_scene_asset(content->groom, content->head), facts, times);
+  if (!text) return fail(text.error());
+  fmt::print("{}", *text);
+  if (!measured) fmt::print("Times were not measured: {}\n", measured.error().to_string());
+  return 0;
+}
+
+Status write_port(const std::filesystem::path& path, uint16_t port) {
+  if (path.empty()) return {};
+  const std::string text = fmt::format("{}\n", port);
+  return save_file(path, std::as_bytes(std::span(text)));
+}
+
+/// Serves until a signal, the end of the time or a failure. The signals are blocked in every thread.
+int serve(const ServerOptions& options, const ServerConfig& config) {
+  const sigset_t signals = stop_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  auto server = Server::start(config);
+  if (!server) return fail(server.error());
+  if (const Status status = write_port(options.port_path, (*server)->port()); !status)
+    return fail(status.error());
+  fmt::print("Serving '{}' on {} port {}\n", config.scene.name, config.net.address, (*server)->port());
+  std::fflush(stdout);
+  const int64_t begin_ns = now_ns();
+  const timespec poll{0, kPollNs};
+  while (!(*server)->failure()) {
+    if (sigtimedwait(&signals, nullptr, &poll) > 0) break;
+    if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
+  }
+  // A second signal ends the process at once.
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+  const std::optional<Error> failure = (*server)->failure();
+  (*server)->stop();
+  if (failure) {
+    fmt::print(stderr, "strandcast-server: {}\n", failure->to_string());
+    return kExitFailure;
+  }
+  return 0;
+}
+
+int run(int argc, const char* const* argv) {
+  const Result<ServerOptions> options = parse_options(argc, argv);
+  if (!options) return fail(options.error());
+  if (!options->help.empty()) return fmt::print("{}", options->help), 0;
+  if (options->is_listing_solvers) return fmt::print("{}", list_solvers()), 0;
+  init_log(options->log_level);
+  const Result<ServerConfig> config = load_config(*options);
+  if (!config) return fail(config.error());
+  if (options->is_printing_scene) return fmt::print("{}", to_text(config->scene)), 0;
+  if (options->is_explaining) return explain_command(*options, *config);
+  return serve(*options, *config);
+}
+
+}  // namespace
+}  // namespace strandcast
+
+int main(int argc, char** argv) {
+  try {
+    return strandcast::run(argc, argv);
+  } catch (const std::exception& exception) {
+    std::fprintf(stderr, "strandcast-server: %s\n", exception.what());
+    return strandcast::kExitFailure;
+  }
+}

@@ -1,0 +1,178 @@
+// Changing a scene while it runs, who watches what, the pass plan of the server, and its command line.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/scene/scene_file.h"
+#include "server/app/explain.h"
+#include "server/app/options.h"
+#include "server/app/pass_table.h"
+#include "server/app/scene_change.h"
+#include "server/app/viewers.h"
+#include "server/sim/solver_registry.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+
+std::string error_of(const Result<SceneDesc>& result) {
+  return result.ok() ? "no error" : result.error().to_string();
+}
+
+TEST(SceneChange, ChangesLiveFieldsOnly) {
+  const SceneDesc scene = built_in_scene();
+  const auto windy = change_scene(scene, "wind.mean_mps.x=4");
+  ASSERT_TRUE(windy.ok()) << windy.error().to_string();
+  EXPECT_EQ(windy->wind.mean_mps.x, 4.0f);
+  EXPECT_THAT(error_of(change_scene(scene, "groom.procedural.strand_count=3")), HasSubstr("known: solver"));
+  EXPECT_THAT(error_of(change_scene(scene, "stream.bound_m=0.0002")), HasSubstr("'stream'"));
+  EXPECT_THAT(error_of(change_scene(scene, "")), HasSubstr("known: solver"));
+}
+
+TEST(SceneChange, NamesKnownSolversAndRanges) {
+  const SceneDesc scene = built_in_scene();
+  EXPECT_THAT(error_of(change_scene(scene, "solver.name=spaghetti")), HasSubstr("known: dftl"));
+  EXPECT_THAT(error_of(change_scene(scene, "solver.parameters.nonsense=1")), HasSubstr("known: "));
+  EXPECT_THAT(error_of(change_scene(scene, "solver.parameters.s_damping=17")), HasSubstr("17"));
+  EXPECT_THAT(error_of(change_scene(scene, "wind.nonsense=1")), HasSubstr("nonsense"));
+}
+
+TEST(SceneChange, EverySolverCanBeChosenFromEveryOtherWithItsParametersSet) {
+  for (const SolverRow& from : solver_table()) {
+    SceneDesc scene = built_in_scene();
+    scene.solver.name = from.name;
+    for (const SolverParameterInfo& info : from.parameters)
+      scene.solver.parameters[info.name] = info.default_value;
+    for (const SolverRow& to : solver_table()) {
+      const auto changed = change_scene(scene, "solver.name=" + to.name);
+      ASSERT_TRUE(changed.ok()) << changed.error().to_string();
+      EXPECT_EQ(changed->solver.name, to.name);
+    }
+  }
+}
+
+Hello hello(Role role, StreamMode mode, uint32_t width = 0, uint32_t height = 0) {
+  Hello message;
+  message.role = role;
+  message.mode = mode;
+  message.frame_width = width;
+  message.frame_height = height;
+  return message;
+}
+
+TEST(Viewers, CountsByModeAndSharesEqualPictures) {
+  Viewers viewers(built_in_scene());
+  const auto automatic = viewers.add(1, hello(Role::Viewer, StreamMode::Auto));
+  ASSERT_TRUE(automatic.ok());
+  EXPECT_EQ(automatic->mode, StreamMode::Strands);
+  EXPECT_FALSE(automatic->reason.empty());
+  ASSERT_TRUE(viewers.add(2, hello(Role::Source, StreamMode::Frames)).ok());
+  const auto first = viewers.add(3, hello(Role::Viewer, StreamMode::Frames));
+  const auto second = viewers.add(4, hello(Role::Controller, StreamMode::Frames));
+  ASSERT_TRUE(first.ok() && second.ok());
+  EXPECT_EQ(first->picture_class, second->picture_class);
+  EXPECT_EQ(viewers.facts().strand_viewers, 1u);
+  EXPECT_EQ(viewers.facts().frame_viewers, 2u);
+  EXPECT_EQ(viewers.picture_views().size(), 1u);
+
+  CameraDesc camera;
+  camera.offset_m = {0.0f, 0.0f, 2.0f};
+  const auto moved = viewers.set_camera(4, camera);
+  ASSERT_TRUE(moved.ok());
+  EXPECT_NE(*moved, first->picture_class);
+  EXPECT_FALSE(viewers.set_camera(1, camera).ok()) << "a viewer of strands has its camera at home";
+  for (SessionId session = 1; session <= 4; ++session) viewers.remove(session);
+  EXPECT_EQ(viewers.facts().strand_viewers + viewers.facts().frame_viewers, 0u);
+  EXPECT_TRUE(viewers.picture_views().empty());
+}
+
+TEST(Viewers, RefusesPicturesBeyondTheLimit) {
+  Viewers viewers(built_in_scene());
+  for (uint32_t i = 0; i < kMaxPictureViews; ++i)
+    ASSERT_TRUE(viewers.add(i, hello(Role::Viewer, StreamMode::Frames, 64 + i, 64)).ok());
+  const auto refused = viewers.add(100, hello(Role::Viewer, StreamMode::Frames, 512, 512));
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_FALSE(viewers.add(101, hello(Role::Viewer, StreamMode::Frames, 1'000'000, 2)).ok());
+  EXPECT_EQ(viewers.facts().frame_viewers, kMaxPictureViews);
+}
+
+TEST(ServerPlan, RunsOnlyWhatTheSceneAndItsViewersNeed) {
+  SceneDesc scene = built_in_scene();
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  const SceneAsset asset = make_scene_asset(content->groom, content->head);
+  RuntimeFacts watched;
+  watched.strand_viewers = 1;
+  watched.frame_viewers = 1;
+  const auto full = make_server_plan(scene, asset, watched);
+  ASSERT_TRUE(full.ok()) << full.error().to_string();
+  for (const auto& pass : full->passes) EXPECT_TRUE(full->plan.runs(pass.name)) << pass.name;
+  EXPECT_EQ(full->plan.saved_bytes, 0u);
+
+  scene.wind.mean_mps = glm::vec3(0.0f);
+  scene.has_auto_collider = false;
+  const auto bare = make_server_plan(scene, asset, {});
+  ASSERT_TRUE(bare.ok()) << bare.error().to_string();
+  for (const auto& pass : bare->passes)
+    EXPECT_EQ(bare->plan.runs(pass.name), pass.name == "sim/step") << pass.name;
+  EXPECT_GT(bare->plan.saved_bytes, 0u);
+
+  RuntimeFacts strands_only;
+  strands_only.strand_viewers = 1;
+  const auto strands = make_server_plan(scene, asset, strands_only);
+  ASSERT_TRUE(strands.ok());
+  EXPECT_TRUE(strands->plan.runs("encode/strands"));
+  EXPECT_FALSE(strands->plan.runs("render/strands"));
+}
+
+TEST(Explain, NamesEverySolverAndEveryPass) {
+  for (const SolverRow& row : solver_table()) EXPECT_THAT(list_solvers(), HasSubstr(row.name));
+  const SceneDesc scene = built_in_scene();
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  const auto text =
+      explain_scene(scene, make_scene_asset(content->groom, content->head), {}, {{"sim/step", 1.25}});
+  ASSERT_TRUE(text.ok());
+  for (const char* part : {"has_wind", "sim/step", "1.25 ms", "unread", "not requested", "saved"})
+    EXPECT_THAT(*text, HasSubstr(part));
+}
+
+Result<ServerOptions> parse(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "strandcast-server");
+  return parse_options(static_cast<int>(arguments.size()), arguments.data());
+}
+
+TEST(ServerOptions, ReadsWhatTheCommandLineSays) {
+  const auto options = parse({"--port", "0", "--set", "substeps=2", "--set", "wind.seed=7", "--groom",
+                              "a.tfx", "--listen", "::1", "--seconds", "2.5"});
+  ASSERT_TRUE(options.ok()) << options.error().to_string();
+  EXPECT_EQ(options->config.net.port, 0);
+  EXPECT_EQ(options->config.net.address, "::1");
+  EXPECT_THAT(options->overrides, testing::ElementsAre("groom.file.path=a.tfx", "substeps=2", "wind.seed=7"));
+  EXPECT_EQ(options->run_s, 2.5);
+  EXPECT_TRUE(parse({"--explain"})->is_explaining);
+  EXPECT_EQ(parse({"--explain", "x.textproto"})->scene_path, "x.textproto");
+  EXPECT_FALSE(parse({"--help"})->help.empty());
+}
+
+TEST(ServerOptions, NamesWhatIsWrong) {
+  for (const std::vector<const char*>& arguments : {std::vector<const char*>{"--nonsense"},
+                                                    {"--port", "70000"},
+                                                    {"--port", "x"},
+                                                    {"--log-level", "loud"},
+                                                    {"--seconds", "-1"},
+                                                    {"--explain", "a", "--scene", "b"}}) {
+    const auto options = parse(arguments);
+    ASSERT_FALSE(options.ok()) << arguments[0];
+    EXPECT_FALSE(options.error().message.empty());
+  }
+  const auto options = parse({"--token-file", "/no/such/token"});
+  ASSERT_TRUE(options.ok());
+  const auto config = load_config(*options);
+  ASSERT_FALSE(config.ok());
+  EXPECT_THAT(config.error().to_string(), HasSubstr("/no/such/token"));
+}
+
+}  // namespace
+}  // namespace strandcast
