@@ -36,6 +36,7 @@ struct FileGroomDesc {
   float unit_m = 1.0f;         // metres per file unit
   UpAxis up_axis = UpAxis::Y;
   glm::vec3 origin{0.0f};  // point of the file (in file units, after the up axis) that becomes the head joint
+  bool has_origin = false;    // false: the centre of the sphere fitted to the roots
   uint32_t vertex_count = 0;  // resample to this many; 0 = keep (rounded into the limits)
   Pinning pinning = Pinning::RootPair;
   bool has_pinning = false;  // false: as the file says
@@ -72,6 +73,8 @@ struct HeadDesc {
   std::filesystem::path mesh_path;  // OBJ in the groom's units and axes; empty = built-in head
   float radius_m = 0.095f;          // of the built-in cranium; 0 = fitted to the roots
   bool is_visible = true;
+  glm::vec3 center_m{0.0f};  // of the built-in cranium, head space
+  bool has_center = false;   // false: at the head joint, or fitted to the roots of a groom file
 
   bool operator==(const HeadDesc&) const = default;
 };

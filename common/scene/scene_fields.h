@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "common/groom/procedural.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast::scene_fields {
@@ -24,10 +25,10 @@ inline constexpr double kMinDirectionLength = 1e-3;
 inline constexpr Range kStrandCount{1, kMaxStrandCount, ""};
 inline constexpr Range kVertexCount{kMinVertexCount, kMaxVertexCount, ""};
 inline constexpr Range kResampledVertexCount{0, kMaxVertexCount, ""};
-inline constexpr Range kStrandLength{0.005, 3.0, "m"};
+inline constexpr Range kStrandLength{0.005, kMaxGrownLengthM, "m"};
 inline constexpr Range kLengthVariation{0.0, 0.95, ""};
-inline constexpr Range kCurlRadius{0.0, 0.1, "m"};
-inline constexpr Range kCurlTurns{0.0, 100.0, "turns"};
+inline constexpr Range kCurlRadius{0.0, kMaxCurlRadiusM, "m"};
+inline constexpr Range kCurlTurns{0.0, kMaxCurlTurns, "turns"};
 inline constexpr Range kSeed{0, std::numeric_limits<uint32_t>::max(), ""};
 inline constexpr Range kUnit{1e-6, 1e3, "m"};
 inline constexpr Range kFileOrigin{-1e6, 1e6, "file units"};
@@ -79,7 +80,8 @@ void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& g
               "is empty: name the groom file, for example --set groom.file.path=FILE.tfx");
     v.number("unit_m", file->unit_m, kUnit);
     v.choice("up_axis", file->up_axis, UpAxis::Z);
-    v.vector("origin", file->origin, kFileOrigin);
+    file->has_origin = v.chooses("origin", file->has_origin);
+    if (file->has_origin) v.vector("origin", file->origin, kFileOrigin);
     v.number("vertex_count", file->vertex_count, kResampledVertexCount);
     v.require("vertex_count", file->vertex_count == 0 || file->vertex_count >= kMinVertexCount,
               "is 1, it must be 0 (keep) or within 2 .. 64");
@@ -125,6 +127,8 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.path("mesh_path", scene.head.mesh_path);
     v.number("radius_m", scene.head.radius_m, kHeadRadius);
     v.flag("is_visible", scene.head.is_visible);
+    scene.head.has_center = v.chooses("center_m", scene.head.has_center);
+    if (scene.head.has_center) v.vector("center_m", scene.head.center_m, kColliderCenter);
   });
   v.group("solver", [&] {
     v.text("name", scene.solver.name, kMaxNameBytes);

@@ -4,6 +4,7 @@
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/text_format.h>
 
+#include <charconv>
 #include <cmath>
 
 #include "common/base/check.h"
@@ -219,6 +220,17 @@ class Reader {
   std::optional<Error> error_;
 };
 
+/// The double with the fewest digits that rounds to the same float: 0.1f is written as 0.1.
+template <class T>
+double shortest(T value) {
+  double result = static_cast<double>(value);
+  if constexpr (std::is_same_v<T, float>) {
+    const std::string digits = fmt::format("{}", value);
+    std::from_chars(digits.data(), digits.data() + digits.size(), result);
+  }
+  return result;
+}
+
 /// Copies a SceneDesc into a message, every field.
 class Writer {
  public:
@@ -232,7 +244,7 @@ class Writer {
     const auto* reflection = message_->GetReflection();
     switch (field.cpp_type()) {
       case pb::FieldDescriptor::CPPTYPE_DOUBLE:
-        return reflection->SetDouble(message_, &field, static_cast<double>(value));
+        return reflection->SetDouble(message_, &field, shortest(value));
       case pb::FieldDescriptor::CPPTYPE_FLOAT:
         return reflection->SetFloat(message_, &field, static_cast<float>(value));
       default:

@@ -17,13 +17,17 @@ constexpr double kInsideQuantile = 0.05;
 /// Collider radius over the radius at that quantile.
 constexpr float kColliderScale = 0.98f;
 
+glm::vec3 head_center(const HeadDesc& head) {
+  return head.has_center ? head.center_m : glm::vec3(0.0f);
+}
+
 Result<Groom> make_groom(const SceneDesc& scene) {
   if (const auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
     GroomFileOptions options;
     options.path = file->path;
     options.unit_m = file->unit_m;
     options.is_z_up = file->up_axis == UpAxis::Z;
-    options.origin = file->origin;
+    if (file->has_origin) options.origin = file->origin;
     options.vertex_count = file->vertex_count;
     if (file->has_pinning) options.pinning = file->pinning;
     ASSIGN_OR_RETURN(Groom groom, load_groom(options));
@@ -40,7 +44,7 @@ Result<Groom> make_groom(const SceneDesc& scene) {
   options.curl_turns = procedural.curl_turns;
   options.seed = procedural.seed;
   // Grown strands come in prefix order already.
-  return grow_groom(make_scalp_cap(glm::vec3(0.0f), radius_m, kScalpVertices), options);
+  return grow_groom(make_scalp_cap(head_center(scene.head), radius_m, kScalpVertices), options);
 }
 
 std::vector<glm::vec3> roots_of(const Groom& groom) {
@@ -50,27 +54,36 @@ std::vector<glm::vec3> roots_of(const Groom& groom) {
   return roots;
 }
 
-/// A mesh of the groom's file: the same unit, axes and origin.
-Result<Mesh> load_head_mesh(const SceneDesc& scene) {
+/// A mesh of the groom's file: the same unit, axes and origin. `shift_m` is what the groom was moved by.
+Result<Mesh> load_head_mesh(const SceneDesc& scene, const glm::vec3& shift_m) {
   const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
   ASSIGN_OR_RETURN(Mesh mesh, load_obj(scene.head.mesh_path, 1.0f));
   if (file == nullptr) return mesh;
   const bool is_z_up = file->up_axis == UpAxis::Z;
   const auto turn = [&](const glm::vec3& v) { return is_z_up ? glm::vec3(v.x, v.z, -v.y) : v; };
-  for (glm::vec3& position : mesh.position_m) position = (turn(position) - file->origin) * file->unit_m;
+  const glm::vec3 origin = file->has_origin ? file->origin : glm::vec3(0.0f);
+  for (glm::vec3& position : mesh.position_m) position = (turn(position) - origin) * file->unit_m + shift_m;
   for (glm::vec3& normal : mesh.normal) normal = turn(normal);
   return mesh;
 }
 
-Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom) {
+/// Moves a groom whose file and scene do not say where the head joint is: the middle of the head, which a
+/// head turns about much more nearly than about a file's origin between the feet. Returns the shift, m.
+glm::vec3 centre_on_roots(Groom& groom) {
+  const glm::vec3 shift_m = -fit_sphere(roots_of(groom)).center_m;
+  for (glm::vec3& position : groom.rest_position_m) position += shift_m;
+  return shift_m;
+}
+
+Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom, const glm::vec3& shift_m) {
   if (!scene.head.is_visible) return Mesh{};
-  if (!scene.head.mesh_path.empty()) return load_head_mesh(scene);
-  if (std::holds_alternative<ProceduralGroomDesc>(scene.groom))
-    return make_head(scene.head.radius_m > 0.0f ? scene.head.radius_m : kDefaultHeadRadiusM);
-  // Under a groom from a file the built-in head is put where its roots are.
-  const FittedSphere fitted = fit_sphere(roots_of(groom));
+  if (!scene.head.mesh_path.empty()) return load_head_mesh(scene, shift_m);
+  // Under a groom from a file the built-in head is put where its roots are, unless the scene says where.
+  const bool is_fitted = std::holds_alternative<FileGroomDesc>(scene.groom);
+  const FittedSphere fitted = is_fitted ? fit_sphere(roots_of(groom)) : FittedSphere{{}, kDefaultHeadRadiusM};
+  const glm::vec3 center_m = scene.head.has_center ? scene.head.center_m : fitted.center_m;
   Mesh mesh = make_head(scene.head.radius_m > 0.0f ? scene.head.radius_m : fitted.radius_m);
-  for (glm::vec3& position : mesh.position_m) position += fitted.center_m;
+  for (glm::vec3& position : mesh.position_m) position += center_m;
   return mesh;
 }
 
@@ -90,7 +103,10 @@ SphereCollider fit_head_collider(const Groom& groom) {
 Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   SceneContent content;
   ASSIGN_OR_RETURN(content.groom, make_groom(scene));
-  ASSIGN_OR_RETURN(content.head, make_head_mesh(scene, content.groom));
+  const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
+  const bool is_centred = file != nullptr && !file->has_origin;
+  const glm::vec3 shift_m = is_centred ? centre_on_roots(content.groom) : glm::vec3(0.0f);
+  ASSIGN_OR_RETURN(content.head, make_head_mesh(scene, content.groom, shift_m));
   content.colliders = scene.colliders;
   if (content.colliders.empty() && scene.has_auto_collider)
     content.colliders.push_back(fit_head_collider(content.groom));

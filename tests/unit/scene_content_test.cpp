@@ -65,6 +65,41 @@ TEST(SceneContent, RealGroomGetsAHeadWhereItsRootsAre) {
   ASSERT_FALSE(content->head.position_m.empty());
 }
 
+TEST(SceneContent, HeadStandsWhereTheSceneSays) {
+  SceneDesc scene = built_in_scene();
+  const auto here = load_scene_content(scene);
+  scene.head.has_center = true;
+  scene.head.center_m = {0.5f, 0.25f, -1.0f};
+  const auto there = load_scene_content(scene);
+  ASSERT_TRUE(here.ok() && there.ok());
+  for (size_t i = 0; i < here->head.position_m.size(); i += 100)
+    EXPECT_LT(glm::distance(here->head.position_m[i] + scene.head.center_m, there->head.position_m[i]),
+              1e-6f);
+  EXPECT_LT(glm::distance(there->colliders[0].center_m, scene.head.center_m), 0.02f)
+      << "the hair comes along";
+}
+
+TEST(SceneContent, GroomFileWithoutAnOriginIsCentredOnItsRootsWithItsMesh) {
+  const std::filesystem::path data = STRANDCAST_SHARED_DATA;
+  FileGroomDesc file;
+  file.path = data / "grooms/sintel_11400x16.tfx";
+  if (!std::filesystem::exists(file.path)) GTEST_SKIP() << "needs the groom " << file.path;
+  SceneDesc scene = built_in_scene();
+  scene.groom = file;
+  scene.head.mesh_path = data / "meshes/sintel.obj";
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok()) << content.error().to_string();
+  EXPECT_LT(glm::length(content->colliders[0].center_m), 1e-4f);
+  // With the origin that is written into the file's own scene, everything lies in the same place.
+  file.has_origin = true;
+  file.origin = {0.0f, 1.5646f, -0.0041f};
+  scene.groom = file;
+  const auto placed = load_scene_content(scene);
+  ASSERT_TRUE(placed.ok());
+  EXPECT_LT(glm::distance(placed->groom.rest_position_m[0], content->groom.rest_position_m[0]), 1e-3f);
+  EXPECT_LT(glm::distance(placed->head.position_m[0], content->head.position_m[0]), 1e-3f);
+}
+
 TEST(SceneContent, MissingFilesAreNamed) {
   SceneDesc scene = built_in_scene();
   FileGroomDesc file;

@@ -26,13 +26,20 @@ std::string error_of(const std::string& text, const std::vector<std::string>& ov
 SceneDesc unusual_scene() {
   SceneDesc s;
   s.name = "Zöpfe 2";
-  FileGroomDesc file{
-      .path = "../a folder/x.tfx", .unit_m = 0.1f, .up_axis = UpAxis::Z, .origin = {1.5f, -2, 1e-3f}};
+  FileGroomDesc file{.path = "../a folder/x.tfx",
+                     .unit_m = 0.1f,
+                     .up_axis = UpAxis::Z,
+                     .origin = {1.5f, -2, 1e-3f},
+                     .has_origin = true};
   file.vertex_count = 24;
   file.pinning = Pinning::BothEnds;
   file.has_pinning = true;
   s.groom = file;
-  s.head = {.mesh_path = "head.obj", .radius_m = 0.11f, .is_visible = false};
+  s.head = {.mesh_path = "head.obj",
+            .radius_m = 0.11f,
+            .is_visible = false,
+            .center_m = {0.1f, 0, -0.1f},
+            .has_center = true};
   s.solver = {.name = "other", .parameters = {{"damping", 0.1}, {"k", 1e-300}}};
   s.step_rate_hz = 59.94005994005994;
   s.substeps = 3;
