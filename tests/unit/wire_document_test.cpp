@@ -1,0 +1,96 @@
+// proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
+#include "common/base/file.h"
+#include "common/codec/image_codec.h"
+#include "common/codec/scene_asset.h"
+#include "common/codec/strand_payload.h"
+#include "common/codec/strand_predictor.h"
+#include "common/wire/clock_offset.h"
+#include "common/wire/close_code.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+
+std::string document() {
+  auto text = load_text(std::string(STRANDCAST_SOURCE_DIR) + "/proto/WIRE.md", 1 << 20);
+  EXPECT_TRUE(text) << text.error().to_string();
+  return text ? *text : std::string();
+}
+
+std::string with_commas(uint64_t value) {
+  std::string digits = std::to_string(value);
+  for (auto i = static_cast<std::ptrdiff_t>(digits.size()) - 3; i > 0; i -= 3)
+    digits.insert(static_cast<size_t>(i), 1, ',');
+  return digits;
+}
+
+TEST(WireDocument, NamesEveryLimitWithItsValue) {
+  const std::vector<std::pair<std::string, std::string>> limits = {
+      {"kDefaultPort", std::to_string(kDefaultPort)},
+      {"kWebSocketProtocol", kWebSocketProtocol},
+      {"kMaxControlBytes", with_commas(kMaxControlBytes)},
+      {"kClockWindow", with_commas(kClockWindow)},
+      {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
+      {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},
+      {"kMaxStrandCount", with_commas(kMaxStrandCount)},
+      {"kMaxVertexCount", fmt::format("{}..{}", kMinVertexCount, kMaxVertexCount)},
+      {"kMaxTrianglesPerStrand", fmt::format("{} S", kMaxTrianglesPerStrand)},
+      {"kMaxMeshVertices", with_commas(kMaxMeshVertices)},
+      {"kMaxMeshTriangles", with_commas(kMaxMeshTriangles)},
+      {"kMaxGroomExtentM", fmt::format("+-{} m", kMaxGroomExtentM)},
+      {"kMaxLattice", with_commas(kMaxLattice)},
+      {"kBoundReachM", fmt::format("{} m", kBoundReachM)},
+      {"kStrandFixedBytes", with_commas(kStrandFixedBytes)},
+      {"kMaxImageSide", with_commas(kMaxImageSide)},
+  };
+  const std::string text = document();
+  for (const auto& [name, value] : limits) {
+    bool is_named = false;
+    for (size_t begin = 0; begin < text.size();) {
+      const size_t end = std::min(text.find('\n', begin), text.size());
+      const std::string line = text.substr(begin, end - begin);
+      is_named |= line.find("`" + name + "`") != std::string::npos && line.find(value) != std::string::npos;
+      begin = end + 1;
+    }
+    EXPECT_TRUE(is_named) << "no line of WIRE.md names " << name << " with " << value;
+  }
+  EXPECT_THAT(text, HasSubstr(fmt::format("at most {} samples of time (source", kMaxSamplesPerMessage)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("name <= {} printable", kMaxNameChars)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("token <= {} bytes", kMaxTokenBytes)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
+  EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
+  EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("({} + sum of weight x feature) >> {}", 1 << (kWeightShift - 1),
+                                          kWeightShift)));
+}
+
+TEST(WireDocument, ListsEveryOpcodeAndCloseCode) {
+  const std::string text = document();
+  for (const Opcode opcode :
+       {Opcode::Control, Opcode::Asset, Opcode::StrandKeyframe, Opcode::StrandDelta, Opcode::JpegFrame})
+    EXPECT_THAT(text, HasSubstr(fmt::format("| `0x{:02x}` |", static_cast<int>(opcode))));
+  for (const CloseCode code :
+       {CloseCode::Normal, CloseCode::GoingAway, CloseCode::BadData, CloseCode::Policy, CloseCode::TooBig,
+        CloseCode::Internal, CloseCode::TryLater, CloseCode::Unauthorized, CloseCode::Full})
+    EXPECT_THAT(text, HasSubstr(fmt::format("{} |", static_cast<int>(code))));
+}
+
+TEST(WireDocument, ExampleHeaderHasItsBytes) {
+  FrameHeader header;
+  header.opcode = Opcode::StrandDelta;
+  header.stream_id = 0x0201;
+  header.sequence = 0x06050403;
+  header.base_sequence = 0x0a090807;
+  header.payload_bytes = 3;
+  header.sim_time_ns = 0x1716151413121110;
+  header.send_time_ns = -2;
+  std::string bytes;
+  for (const std::byte byte : pack(header)) bytes += fmt::format("{:02x} ", static_cast<int>(byte));
+  bytes.pop_back();
+  EXPECT_THAT(document(), HasSubstr("`" + bytes + "`"));
+}
+
+}  // namespace
+}  // namespace strandcast
