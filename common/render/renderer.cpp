@@ -14,6 +14,7 @@
 #include "common/render/passes/light_texture.h"
 #include "common/render/passes/picture_target.h"
 #include "common/render/passes/strand_pass.h"
+#include "common/render/scalp_cover.h"
 #include "common/render/view.h"
 
 namespace strandcast {
@@ -25,7 +26,9 @@ constexpr float kFollowerVariation = 0.012f;
 constexpr float kFollowerShorten = 0.18f;
 constexpr uint32_t kMaxFollowers = 64;  // per triangle
 // A segment shorter than this on the screen shows no bend: fewer are drawn per gap.
-constexpr float kTargetSegmentPx = 5.0f;
+constexpr float kTargetSegmentPx = 7.0f;
+// Strands thinner than this on the screen are replaced by fewer that together are as wide.
+constexpr float kTargetWidthPx = 0.4f;
 // Cells of the light volume along the largest extent of the rest shape.
 constexpr float kLightCells = 32.0f;
 constexpr float kMinLightCellM = 1e-4f;
@@ -35,6 +38,8 @@ constexpr uint32_t kMinSkullRoots = 32;
 // them.
 constexpr float kSkullShrink = 0.93f;
 constexpr float kShadowLiftCells = 1.0f;
+// A root tints the skin this far around it, of the hair's extent.
+constexpr float kCoverReach = 0.025f;
 
 struct RestFacts {
   float mean_length_m = 0.0f;
@@ -110,7 +115,7 @@ class GlRenderer final : public Renderer {
  private:
   void update_light(const StrandPicture& picture, const View& view);
   void draw_strands(const View& view);
-  uint32_t segments_per_gap(const View& view) const;
+  ExpandLevel choose_level(const View& view) const;
   template <class Work>
   double timed_ms(Work&& work) {
     timer_.begin();
@@ -171,7 +176,9 @@ Status GlRenderer::load(const gl::ShaderLibrary& shaders, const SceneAsset& asse
     ASSIGN_OR_RETURN(strands_, StrandPass::make(shaders));
   }
   if (plan_.runs("head")) {
-    ASSIGN_OR_RETURN(head_, HeadPass::make(shaders, asset.head, kShadowLiftCells * light.cell_m));
+    ASSIGN_OR_RETURN(head_,
+                     HeadPass::make(shaders, asset.head, scalp_cover(asset, rest_.extent_m * kCoverReach),
+                                    kShadowLiftCells * light.cell_m));
   }
   return {};
 }
@@ -187,24 +194,35 @@ void GlRenderer::update_light(const StrandPicture& picture, const View& view) {
   light_.set_light(look_, view, to_light);
 }
 
-// Fewer segments where the strands are small on the screen.
-uint32_t GlRenderer::segments_per_gap(const View& view) const {
-  const float gap_m = rest_.mean_length_m / static_cast<float>(gap_count_);
-  const float focal_px = view.focal_px / static_cast<float>(kSamplesPerSide);
-  const float gap_px = gap_m * focal_px / view.target_distance_m;
-  const float wanted =
-      std::clamp(std::ceil(gap_px / kTargetSegmentPx), 1.0f, static_cast<float>(look_.segments));
-  return static_cast<uint32_t>(wanted);
+// What is too small to be seen on the screen is not drawn: bends within a few pixels, and strands far thinner
+// than a pixel, for which fewer and wider ones stand.
+ExpandLevel GlRenderer::choose_level(const View& view) const {
+  const float px_per_m = view.focal_px / static_cast<float>(kSamplesPerSide) / view.target_distance_m;
+  const float gap_px = rest_.mean_length_m / static_cast<float>(gap_count_) * px_per_m;
+  const float width_px = 2.0f * look_.strand_radius_m * px_per_m;
+  const auto at_most = [](float wanted, uint32_t limit) {
+    return std::min(static_cast<uint32_t>(std::clamp(std::ceil(wanted), 1.0f, 1e6f)), limit);
+  };
+  ExpandLevel level;
+  level.segments_per_gap = at_most(gap_px / kTargetSegmentPx, look_.segments);
+  level.followers = at_most(static_cast<float>(expand_.max_followers()) * width_px / kTargetWidthPx,
+                            expand_.max_followers());
+  return level;
 }
 
 void GlRenderer::draw_strands(const View& view) {
-  const uint32_t segments = segments_per_gap(view);
-  const uint32_t batch = expand_.batch_strands(segments);
-  for (uint32_t first = 0; first < expand_.strand_count(); first += batch) {
-    const uint32_t count = std::min(batch, expand_.strand_count() - first);
+  const ExpandLevel level = choose_level(view);
+  const uint32_t strand_count = expand_.strand_count(level.followers);
+  const float width_m = 2.0f * look_.strand_radius_m *
+                        static_cast<float>(expand_.strand_count(expand_.max_followers())) /
+                        static_cast<float>(strand_count);
+  const uint32_t batch = expand_.batch_strands(level.segments_per_gap);
+  for (uint32_t first = 0; first < strand_count; first += batch) {
+    const uint32_t count = std::min(batch, strand_count - first);
     uint32_t written = 0;
-    profile_.expand_ms += timed_ms([&] { written = expand_.run(first, count, segments); });
-    profile_.strands_ms += timed_ms([&] { strands_.run(expand_.expanded(), written, view, look_, light_); });
+    profile_.expand_ms += timed_ms([&] { written = expand_.run(first, count, level); });
+    profile_.strands_ms +=
+        timed_ms([&] { strands_.run(expand_.expanded(), written, width_m, view, look_, light_); });
     profile_.drawn_strands += count;
     profile_.drawn_segments += written;
   }

@@ -49,7 +49,9 @@ class Renderer {
                                                 const LookDesc& look);
   virtual ~Renderer() = default;
 
-  /// Draws into an internal target of the given size (4x multisampled), resolved to sRGB.
+  /// Draws into an internal target of the given size with 2 x 2 samples per pixel, resolved to sRGB. Strands
+  /// far thinner than a pixel are replaced by fewer and wider ones. BadInput or LimitExceeded for impossible
+  /// input.
   virtual Status draw(const StrandPicture& picture, const CameraDesc& camera, RenderSize size) = 0;
   /// Pixels of the last draw, top row first.
   virtual Image read_image() = 0;

@@ -80,8 +80,8 @@ struct HeadDesc {
 };
 
 struct LookDesc {
-  glm::vec3 root_color{0.11f, 0.055f, 0.025f};  // linear RGB, 0..1
-  glm::vec3 tip_color{0.36f, 0.19f, 0.085f};
+  glm::vec3 root_color{0.075f, 0.036f, 0.017f};  // linear RGB, 0..1
+  glm::vec3 tip_color{0.26f, 0.125f, 0.05f};
   float strand_radius_m = 0.00012f;  // as drawn: a drawn strand stands for several real ones
   float tip_scale = 0.25f;           // radius at the tip over radius at the root
   uint32_t followers = 3;            // drawn strands per root triangle, beside the key strands
@@ -89,7 +89,7 @@ struct LookDesc {
   glm::vec3 light_direction{-0.45f, -0.75f, -0.5f};  // travels this way, world
   glm::vec3 light_color{1.0f, 0.97f, 0.92f};
   float ambient = 0.22f;
-  glm::vec3 background{0.16f, 0.17f, 0.19f};
+  glm::vec3 background{0.11f, 0.12f, 0.135f};
   glm::vec3 skin_color{0.55f, 0.38f, 0.29f};
 
   bool operator==(const LookDesc&) const = default;
@@ -97,8 +97,8 @@ struct LookDesc {
 
 /// Camera about the head: it follows the head's position, not its rotation.
 struct CameraDesc {
-  glm::vec3 offset_m{0.25f, 0.08f, 0.75f};  // from the point looked at, world axes
-  glm::vec3 target_m{0.0f, -0.02f, 0.0f};   // from the head joint, world axes
+  glm::vec3 offset_m{0.22f, 0.1f, 0.72f};  // from the point looked at, world axes
+  glm::vec3 target_m{0.0f, -0.08f, 0.0f};   // from the head joint, world axes
   float fov_y_rad = 0.61f;
 
   bool operator==(const CameraDesc&) const = default;

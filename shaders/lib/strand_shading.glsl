@@ -10,9 +10,8 @@ const float kDegree = kPi / 180.0;
 const float kShiftR = -7.0 * kDegree;
 const float kShiftTT = -0.5 * kShiftR;
 const float kShiftTRT = -1.5 * kShiftR;
-// Longitudinal widths: beta_R within 5..10 degrees, beta_TT = beta_R / 2, beta_TRT = 2 beta_R. One drawn strand stands
-// for several real ones that are not parallel, so the widest of the range is taken.
-const float kWidthR = 10.0 * kDegree;
+// Longitudinal widths: beta_R within 5..10 degrees, beta_TT = beta_R / 2, beta_TRT = 2 beta_R.
+const float kWidthR = 7.5 * kDegree;
 const float kWidthTT = 0.5 * kWidthR;
 const float kWidthTRT = 2.0 * kWidthR;
 // Azimuthal widths (Sadeghi: gamma_TT, gamma_g) and the strength of the glints, at most 0.5.

@@ -16,7 +16,8 @@ layout(std430, binding = kBindingKeyPosition) restrict readonly buffer KeyPositi
 layout(std430, binding = kBindingRootTriangle) restrict readonly buffer RootTriangle {
   uint corner[];  // (triangle_count x 3)
 } triangles;
-uniform uint u_followers;      // per triangle
+uniform uint u_followers;      // per triangle, numbered
+uniform uint u_drawn;          // of them, drawn
 uniform float u_clump;         // 0..1, pull towards the nearest key strand at the tip
 uniform float u_variation_m;   // how far a follower's tip strays
 uniform float u_shorten;       // 0..1, largest part cut off a follower
@@ -75,14 +76,17 @@ vec3 follower_deviation(uint follower, float along) {
   return along * (direction + 0.35 * wave * direction.yzx);
 }
 
-CurvePoint follower_point(uint follower, uint gap, float t) {
+// `drawn_index` counts only what is drawn; a follower keeps its number, and so its place, when fewer are drawn.
+CurvePoint follower_point(uint drawn_index, uint gap, float t) {
+  uint drawn_triangle = drawn_index / u_drawn;
+  uint follower = drawn_triangle * u_followers + drawn_index - drawn_triangle * u_drawn;
   float last = float(u_vertex_count - 1u);
   float along = (float(gap) + t) / last;
   float end = 1.0 - u_shorten * follower_random(follower, kSaltLength);
   float x = along * end * last;
   uint cut_gap = min(uint(x), u_vertex_count - 2u);
   float cut_t = x - float(cut_gap);
-  uint triangle = 3u * (follower / u_followers);
+  uint triangle = 3u * drawn_triangle;
   CurvePoint a = key_point(triangles.corner[triangle], cut_gap, cut_t);
   CurvePoint b = key_point(triangles.corner[triangle + 1u], cut_gap, cut_t);
   CurvePoint c = key_point(triangles.corner[triangle + 2u], cut_gap, cut_t);

@@ -30,21 +30,24 @@ flat out float v_threshold;            // of this strand
 out vec3 v_color;
 
 // Artist's weights of the terms, chosen by eye on the built-in scene.
-const float kDiffuse = 0.75;
+const float kDiffuse = 0.70;
 const float kScatter = 0.30;           // light that arrives through other strands
 const float kScatterReach = 0.35;      // power of the direct part: how deep that light goes
-const float kLobeR = 0.10;
-const float kLobeTT = 0.30;
-const float kLobeTRT = 0.22;
+const float kLobeR = 0.07;
+const float kLobeTT = 0.25;
+const float kLobeTRT = 1.10;
 const float kGroundLight = 0.45;       // light from below over light from above
 // Variation between strands.
-const float kBrightnessSpread = 0.22;
+const float kBrightnessSpread = 0.28;
 const float kWarmthSpread = 0.08;
+// Strands do not lie perfectly in their direction: the cuticle's tilt seems to vary.
+const float kTiltSpread = 5.0 * kDegree;
 const float kGlintFrom = 30.0 * kDegree;
 const float kGlintTo = 45.0 * kDegree;
 const uint kSaltBrightness = 0x68bc21ebu;
 const uint kSaltWarmth = 0x02e5be93u;
 const uint kSaltGlint = 0x967a889bu;
+const uint kSaltTilt = 0x3c6ef372u;
 const uint kSaltThreshold = 0x7f4a7c15u;
 
 float strand_random(uint strand, uint salt) { return unit_float(mix_u32(strand ^ salt)); }
@@ -61,6 +64,7 @@ vec3 shade(vec3 position_m, vec3 tangent, uint strand, float along) {
   vec3 color = strand_color(strand, along);
   vec2 light = light_at(position_m);
   ScatterAngles angles = scatter_angles(tangent, u_to_light, to_eye);
+  angles.theta_half += kTiltSpread * (2.0 * strand_random(strand, kSaltTilt) - 1.0);
   vec3 lobes = sadeghi_lobes(angles, mix(kGlintFrom, kGlintTo, strand_random(strand, kSaltGlint)));
 
   // R leaves the surface and keeps the light's colour; TT and TRT went through the strand once and twice.

@@ -2,6 +2,7 @@
 
 #include <epoxy/gl.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -65,7 +66,7 @@ class ExpandPassTest : public GlTest {
   // All points of the strands first .. first + count - 1, strand-major, in order along the strand.
   static std::vector<ExpandedVertex> expand(const ExpandPass& pass, uint32_t first, uint32_t count,
                                             uint32_t segments) {
-    const uint32_t written = pass.run(first, count, segments);
+    const uint32_t written = pass.run(first, count, {segments, pass.max_followers()});
     const uint32_t per_strand = pass.segments_per_strand(segments);
     EXPECT_EQ(written, count * per_strand);
     std::vector<ExpandedVertex> raw(2 * static_cast<size_t>(written));
@@ -149,7 +150,7 @@ TEST_F(ExpandPassTest, FollowersMatchTheReference) {
   const Keys keys = make_keys(60, 12);
   const std::vector<RootTriangle> triangles{{0, 1, 50}, {1, 50, 51}, {7, 8, 57}};
   const ExpandPass pass = make_pass(keys, triangles, kStyledFollowers, 3);
-  ASSERT_EQ(pass.strand_count(), 60u + 15u);
+  ASSERT_EQ(pass.strand_count(pass.max_followers()), 60u + 15u);
   const auto points = expand(pass, 60, 15, 3);
   ASSERT_EQ(points.size(), 15u * 34u);
   const reference::FollowerStyle style{kStyledFollowers.clump, kStyledFollowers.variation_m,
@@ -230,10 +231,26 @@ TEST_F(ExpandPassTest, StrandsLongerThanATessellationLevelComeInRuns) {
 TEST_F(ExpandPassTest, ABatchEqualsTheSameStrandsOfTheWhole) {
   const Keys keys = make_keys(200, 6);
   const ExpandPass pass = make_pass(keys, {{0, 1, 50}, {10, 11, 60}}, kStyledFollowers, 2);
-  const auto whole = expand(pass, 0, pass.strand_count(), 2);
+  const auto whole = expand(pass, 0, pass.strand_count(pass.max_followers()), 2);
   const auto batch = expand(pass, 150, 57, 2);
   ASSERT_EQ(batch.size(), 57u * 11u);
   for (size_t i = 0; i < batch.size(); ++i) EXPECT_EQ(batch[i].position_m, whole[150 * 11 + i].position_m);
+}
+
+TEST_F(ExpandPassTest, FewerFollowersAreSomeOfTheSameOnes) {
+  const Keys keys = make_keys(60, 5);
+  const ExpandPass pass = make_pass(keys, {{0, 1, 50}, {3, 4, 53}}, kStyledFollowers, 1);
+  const auto points_of = [&](uint32_t followers) {
+    std::vector<ExpandedVertex> raw(2 * static_cast<size_t>(pass.run(60, 2 * followers, {1, followers})));
+    pass.expanded().read(0, std::as_writable_bytes(std::span(raw)));
+    return raw;
+  };
+  const auto all = points_of(5), some = points_of(2);
+  ASSERT_EQ(some.size(), 4u * 4u * 2u);
+  for (const ExpandedVertex& point : some)
+    EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const ExpandedVertex& other) {
+      return other.position_m == point.position_m && other.tangent == point.tangent;
+    }));
 }
 
 TEST_F(ExpandPassTest, CoincidentVerticesGiveFiniteUnitTangents) {
@@ -246,7 +263,7 @@ TEST_F(ExpandPassTest, CoincidentVerticesGiveFiniteUnitTangents) {
     keys.position_m.emplace_back(1e-20f * v, 0.0f, 0.0f);  // shorter than a float can square
   }
   const ExpandPass pass = make_pass(keys, {{0, 1, 2}, {0, 0, 0}}, kStyledFollowers, 4);
-  for (const ExpandedVertex& point : expand(pass, 0, pass.strand_count(), 4)) {
+  for (const ExpandedVertex& point : expand(pass, 0, pass.strand_count(pass.max_followers()), 4)) {
     for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(std::isfinite(point.position_m[axis]));
     EXPECT_NEAR(glm::length(point.tangent), 1.0f, 1e-3f);
   }
@@ -257,7 +274,7 @@ TEST_F(ExpandPassTest, WithoutFollowersNothingIsAllocatedForThem) {
   const std::vector<RootTriangle> triangles{{0, 1, 2}, {3, 4, 5}};
   const ExpandPass none = make_pass(keys, triangles, FollowerDesc{}, 2);
   const ExpandPass some = make_pass(keys, triangles, kPlainFollowers, 2);
-  EXPECT_EQ(none.strand_count(), 10u);
+  EXPECT_EQ(none.strand_count(none.max_followers()), 10u);
   EXPECT_EQ(none.size_bytes(), 10 * 6 * sizeof(glm::vec3) + 10 * 10 * 2 * sizeof(ExpandedVertex));
   EXPECT_EQ(some.size_bytes(),
             none.size_bytes() + 2 * sizeof(RootTriangle) + 8 * 10 * 2 * sizeof(ExpandedVertex));

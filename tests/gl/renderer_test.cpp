@@ -226,6 +226,7 @@ TEST_F(RendererTest, TheProfileCountsWhatWasDrawn) {
   LookDesc look;
   look.followers = 2;
   look.segments = 1;
+  look.strand_radius_m = 0.005f;
   const auto renderer = make_renderer(asset, look);
   ASSERT_TRUE(renderer);
   draw(*renderer, {{}, asset.rest_position_m}, front_camera());
@@ -233,6 +234,35 @@ TEST_F(RendererTest, TheProfileCountsWhatWasDrawn) {
   EXPECT_EQ(renderer->profile().drawn_segments, 26u * 5u);
   EXPECT_GT(renderer->profile().strands_ms, 0.0);
   EXPECT_EQ(renderer->profile().head_ms, 0.0);
+}
+
+TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {
+  // Far away fewer are drawn; the mean of the picture stays.
+  SceneAsset asset = curtain(300, 8);
+  LookDesc look;
+  look.followers = 6;
+  look.strand_radius_m = 0.0002f;
+  look.tip_scale = 1.0f;
+  look.ambient = 0.0f;
+  look.light_color = glm::vec3(0.0f);
+  look.background = glm::vec3(0.3f);
+  const auto renderer = make_renderer(asset, look);
+  ASSERT_TRUE(renderer);
+  const auto mean_luminance = [&](RenderSize size) {
+    const Image image = draw(*renderer, {{}, asset.rest_position_m}, front_camera(), size);
+    double sum = 0.0;
+    for (uint32_t y = 0; y < size.height; ++y)
+      for (uint32_t x = 0; x < size.width; ++x)
+        sum += std::pow((luminance(image, x, y) + 0.055) / 1.055, 2.4);
+    return sum / (size.width * size.height);
+  };
+  const double small = mean_luminance({160, 90});
+  const uint64_t small_strands = renderer->profile().drawn_strands;
+  const double large = mean_luminance({1280, 720});
+  EXPECT_LT(small_strands, renderer->profile().drawn_strands);
+  EXPECT_EQ(renderer->profile().drawn_strands, 300u + 298u * 6u);
+  const double empty = 0.3;
+  EXPECT_NEAR((empty - small) / (empty - large), 1.0, 0.06);
 }
 
 TEST_F(RendererTest, WrongSizesAreErrorsInWords) {

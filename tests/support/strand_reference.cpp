@@ -94,7 +94,7 @@ double kajiya_kay_specular(const glm::dvec3& tangent, const glm::dvec3& to_light
 
 std::array<LobeShape, 3> lobe_shapes() {
   return {
-      {{-7.0 * kDegree, 10.0 * kDegree}, {3.5 * kDegree, 5.0 * kDegree}, {10.5 * kDegree, 20.0 * kDegree}}};
+      {{-7.0 * kDegree, 7.5 * kDegree}, {3.5 * kDegree, 3.75 * kDegree}, {10.5 * kDegree, 15.0 * kDegree}}};
 }
 
 glm::dvec3 sadeghi_lobes(const glm::dvec3& tangent, const glm::dvec3& to_light, const glm::dvec3& to_eye,

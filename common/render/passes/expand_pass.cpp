@@ -49,14 +49,13 @@ Result<ExpandPass> ExpandPass::make(const gl::ShaderLibrary& shaders, const Scen
                                                     {{"HAS_FOLLOWERS", has_followers ? 1 : 0}}, kCaptured));
   pass.key_count_ = asset.strand_count;
   pass.vertex_count_ = asset.vertex_count;
-  pass.strand_count_ =
-      asset.strand_count + static_cast<uint32_t>(asset.triangle.size()) * pass.followers_.per_triangle;
+  pass.triangle_count_ = static_cast<uint32_t>(asset.triangle.size());
   pass.no_attributes_ = gl::VertexArray("expand");
   pass.key_position_ = gl::Buffer(
       "key position", sizeof(glm::vec3) * static_cast<size_t>(asset.strand_count) * asset.vertex_count);
   if (has_followers) pass.root_triangle_ = gl::Buffer::of("root triangle", asset.triangle);
   const uint64_t strand_bytes = kSegmentBytes * pass.segments_per_strand(max_segments_per_gap);
-  pass.expanded_ = gl::Buffer("expanded", std::min(strand_bytes * pass.strand_count_,
+  pass.expanded_ = gl::Buffer("expanded", std::min(strand_bytes * pass.strand_count(pass.max_followers()),
                                                    kMaxExpandedBytes / strand_bytes * strand_bytes));
   return pass;
 }
@@ -70,18 +69,20 @@ uint32_t ExpandPass::batch_strands(uint32_t segments_per_gap) const {
                                (kSegmentBytes * segments_per_strand(segments_per_gap)));
 }
 
-uint32_t ExpandPass::run(uint32_t first, uint32_t count, uint32_t segments_per_gap) const {
-  CHECK(count <= batch_strands(segments_per_gap) && first + count <= strand_count_);
-  const uint32_t segments = segments_per_strand(segments_per_gap);
+uint32_t ExpandPass::run(uint32_t first, uint32_t count, const ExpandLevel& level) const {
+  CHECK(level.followers <= followers_.per_triangle && first + count <= strand_count(level.followers));
+  CHECK(count <= batch_strands(level.segments_per_gap));
+  const uint32_t segments = segments_per_strand(level.segments_per_gap);
   program_.use();
   no_attributes_.bind();
   key_position_.bind_storage(shader::kBindingKeyPosition);
   program_.set("u_key_count", key_count_);
   program_.set("u_vertex_count", vertex_count_);
-  program_.set("u_segments", segments_per_gap);
+  program_.set("u_segments", level.segments_per_gap);
   if (followers_.per_triangle > 0) {
     root_triangle_.bind_storage(shader::kBindingRootTriangle);
     program_.set("u_followers", followers_.per_triangle);
+    program_.set("u_drawn", std::max(level.followers, 1u));
     program_.set("u_clump", followers_.clump);
     program_.set("u_variation_m", followers_.variation_m);
     program_.set("u_shorten", followers_.shorten);

@@ -35,6 +35,12 @@ inline constexpr uint32_t kMaxSegmentsPerGap = 8;
 /// Largest expanded buffer; more strands are expanded and drawn in several batches.
 inline constexpr uint64_t kMaxExpandedBytes = 96ull << 20;
 
+/// How finely one draw expands.
+struct ExpandLevel {
+  uint32_t segments_per_gap = 1;  // 1 .. the maximum given to make()
+  uint32_t followers = 0;         // per triangle, at most FollowerDesc::per_triangle
+};
+
 class ExpandPass {
  public:
   ExpandPass() = default;
@@ -47,14 +53,18 @@ class ExpandPass {
   void upload(const std::vector<glm::vec3>& position_m);
 
   /// Key strands and followers together.
-  uint32_t strand_count() const { return strand_count_; }
+  uint32_t strand_count(uint32_t followers_per_triangle) const {
+    return key_count_ + triangle_count_ * followers_per_triangle;
+  }
+  /// Followers per triangle at most; 0 without triangles.
+  uint32_t max_followers() const { return followers_.per_triangle; }
   /// Strands that fit in the buffer at once.
   uint32_t batch_strands(uint32_t segments_per_gap) const;
   uint32_t segments_per_strand(uint32_t segments_per_gap) const {
     return segments_per_gap * (vertex_count_ - 1);
   }
   /// Expands strands first .. first + count - 1; count at most batch_strands(). Returns the segments written.
-  uint32_t run(uint32_t first, uint32_t count, uint32_t segments_per_gap) const;
+  uint32_t run(uint32_t first, uint32_t count, const ExpandLevel& level) const;
 
   /// (segments x 2) ExpandedVertex of the last run. Segments of one strand may come in any order.
   const gl::Buffer& expanded() const { return expanded_; }
@@ -69,7 +79,7 @@ class ExpandPass {
   FollowerDesc followers_;
   uint32_t key_count_ = 0;
   uint32_t vertex_count_ = 0;
-  uint32_t strand_count_ = 0;
+  uint32_t triangle_count_ = 0;
 };
 
 }  // namespace strandcast

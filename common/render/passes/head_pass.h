@@ -2,6 +2,8 @@
 // the context's thread.
 #pragma once
 
+#include <vector>
+
 #include "common/base/result.h"
 #include "common/gl/objects.h"
 #include "common/gl/program.h"
@@ -15,8 +17,10 @@ namespace strandcast {
 class HeadPass {
  public:
   HeadPass() = default;
-  /// The mesh must have triangles; `shadow_lift_m` is how far above the skin the hair's shadow is looked up.
-  static Result<HeadPass> make(const gl::ShaderLibrary& shaders, const Mesh& mesh, float shadow_lift_m);
+  /// The mesh must have triangles. `cover`: per vertex, 0 bare skin .. 1 under hair; `shadow_lift_m` is how
+  /// far above the skin the hair's shadow is looked up.
+  static Result<HeadPass> make(const gl::ShaderLibrary& shaders, const Mesh& mesh,
+                               const std::vector<float>& cover, float shadow_lift_m);
   /// Draws into the bound framebuffer with depth test.
   void run(const View& view, const LookDesc& look, const LightTexture& light) const;
 
@@ -25,6 +29,7 @@ class HeadPass {
   gl::VertexArray vertex_array_;
   gl::Buffer position_;
   gl::Buffer normal_;
+  gl::Buffer cover_;
   gl::Buffer index_;
   int index_count_ = 0;
   float shadow_lift_m_ = 0.0f;

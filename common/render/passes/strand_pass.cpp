@@ -36,8 +36,8 @@ Result<StrandPass> StrandPass::make(const gl::ShaderLibrary& shaders) {
   return pass;
 }
 
-void StrandPass::run(const gl::Buffer& expanded, uint32_t segments, const View& view, const LookDesc& look,
-                     const LightTexture& light) const {
+void StrandPass::run(const gl::Buffer& expanded, uint32_t segments, float width_m, const View& view,
+                     const LookDesc& look, const LightTexture& light) const {
   program_.use();
   vertex_array_.bind();
   expanded.bind_storage(shader::kBindingExpanded);
@@ -47,7 +47,7 @@ void StrandPass::run(const gl::Buffer& expanded, uint32_t segments, const View& 
   program_.set("u_target_px", view.target_px);
   program_.set("u_focal_px", view.focal_px);
   program_.set("u_near_m", view.near_m);
-  program_.set("u_strand_width_m", 2.0f * look.strand_radius_m);
+  program_.set("u_strand_width_m", width_m);
   program_.set("u_tip_scale", look.tip_scale);
   program_.set("u_root_color", look.root_color);
   program_.set("u_tip_color", look.tip_color);

@@ -17,9 +17,10 @@ class StrandPass {
  public:
   StrandPass() = default;
   static Result<StrandPass> make(const gl::ShaderLibrary& shaders);
-  /// Draws the first `segments` segments of an expanded buffer into the bound framebuffer with depth test.
-  void run(const gl::Buffer& expanded, uint32_t segments, const View& view, const LookDesc& look,
-           const LightTexture& light) const;
+  /// Draws the first `segments` segments of an expanded buffer into the bound framebuffer with depth test,
+  /// strands `width_m` wide at the root.
+  void run(const gl::Buffer& expanded, uint32_t segments, float width_m, const View& view,
+           const LookDesc& look, const LightTexture& light) const;
 
  private:
   gl::Program program_;

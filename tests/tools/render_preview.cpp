@@ -1,0 +1,114 @@
+// render_preview: draws a scene's hair at rest into a PNG, without server or simulation. For looking at the
+// renderer.
+//   render_preview OUT.png [--scene FILE] [--set path=value]... [--size WxH] [--repeat N] [--turn DEGREES]
+//   [--shaders DIR]
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <glm/gtc/constants.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/codec/image_codec.h"
+#include "common/codec/scene_asset.h"
+#include "common/gl/egl_context.h"
+#include "common/render/renderer.h"
+#include "common/scene/scene_file.h"
+#include "server/scene/scene_content.h"
+
+namespace strandcast {
+namespace {
+
+struct Options {
+  std::string out;
+  std::string scene;
+  std::string shaders;  // folder to read shaders from instead of the binary
+  std::vector<std::string> overrides;
+  RenderSize size;
+  int repeat = 1;
+  double turn_degrees = 0.0;  // of the head about the vertical
+};
+
+Result<Options> parse(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word.rfind("--", 0) != 0) {
+      options.out = word;
+      continue;
+    }
+    if (++i >= argc) return make_error(ErrorCode::BadInput, "option {} needs a value", word);
+    const std::string value = argv[i];
+    if (word == "--scene") {
+      options.scene = value;
+    } else if (word == "--shaders") {
+      options.shaders = value;
+    } else if (word == "--set") {
+      options.overrides.push_back(value);
+    } else if (word == "--repeat") {
+      options.repeat = std::max(1, std::atoi(value.c_str()));
+    } else if (word == "--turn") {
+      options.turn_degrees = std::atof(value.c_str());
+    } else if (word == "--size") {
+      if (std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2)
+        return make_error(ErrorCode::BadInput, "--size is {} but must look like 640x360", value);
+    } else {
+      return make_error(ErrorCode::BadInput,
+                        "unknown option {} (known: --scene --set --shaders --size --repeat --turn)", word);
+    }
+  }
+  if (options.out.empty()) return make_error(ErrorCode::BadInput, "name the PNG file to write");
+  return options;
+}
+
+Status run(int argc, char** argv) {
+  ASSIGN_OR_RETURN(const Options options, parse(argc, argv));
+  auto loaded = options.scene.empty() ? built_in_scene_with(options.overrides)
+                                      : load_scene(options.scene, options.overrides);
+  ASSIGN_OR_RETURN(const SceneDesc scene, std::move(loaded));
+  ASSIGN_OR_RETURN(SceneContent content, load_scene_content(scene));
+  const SceneAsset asset = make_scene_asset(content.groom, std::move(content.head));
+  const gl::ShaderLibrary shaders =
+      options.shaders.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shaders);
+  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
+  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, scene.look));
+
+  StrandPicture picture;
+  picture.position_m = asset.rest_position_m;
+  picture.world_from_head.rotation =
+      glm::angleAxis(glm::radians(options.turn_degrees), glm::dvec3(0.0, 1.0, 0.0));
+  std::vector<double> frame_ms;
+  std::clock_t cpu_begin = 0;
+  for (int i = 0; i < options.repeat; ++i) {
+    if (i <= 1) cpu_begin = std::clock();  // the first frame compiles
+    const int64_t begin_ns = now_ns();
+    RETURN_IF_ERROR(renderer->draw(picture, scene.camera, options.size));
+    const Image image = renderer->read_image();
+    frame_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    if (i == 0) RETURN_IF_ERROR(save_png(options.out, image));
+  }
+  const double cpu_ms =
+      1e3 * static_cast<double>(std::clock() - cpu_begin) / CLOCKS_PER_SEC / std::max(1, options.repeat - 1);
+  std::sort(frame_ms.begin(), frame_ms.end());
+  const RenderProfile& profile = renderer->profile();
+  std::printf(
+      "%s: %ux%u, %llu strands, %llu segments; frame %.1f ms (best %.1f), %.1f ms of CPU; expand %.1f, "
+      "strands %.1f, "
+      "head %.1f, resolve %.1f\n",
+      context->info().renderer.c_str(), options.size.width, options.size.height,
+      static_cast<unsigned long long>(profile.drawn_strands),
+      static_cast<unsigned long long>(profile.drawn_segments), frame_ms[frame_ms.size() / 2],
+      frame_ms.front(), cpu_ms, profile.expand_ms, profile.strands_ms, profile.head_ms, profile.resolve_ms);
+  return {};
+}
+
+}  // namespace
+}  // namespace strandcast
+
+int main(int argc, char** argv) {
+  const strandcast::Status status = strandcast::run(argc, argv);
+  if (!status) std::fprintf(stderr, "%s\n", status.error().to_string().c_str());
+  return status ? 0 : 2;
+}
