@@ -25,10 +25,15 @@ constexpr float kFollowerClump = 0.75f;
 constexpr float kFollowerVariation = 0.012f;
 constexpr float kFollowerShorten = 0.18f;
 constexpr uint32_t kMaxFollowers = 64;  // per triangle
-// A segment shorter than this on the screen shows no bend: fewer are drawn per gap.
-constexpr float kTargetSegmentPx = 7.0f;
-// Strands thinner than this on the screen are replaced by fewer that together are as wide.
-constexpr float kTargetWidthPx = 0.4f;
+// What is drawn follows from its size on the screen. A segment shorter than `segment_px` shows no bend, so
+// fewer are drawn per gap; strands thinner than `width_px` are replaced by fewer that together are as wide.
+// Every triangle costs a CPU about half a microsecond, so software renderers get coarser targets.
+struct DetailTarget {
+  float segment_px;
+  float width_px;
+};
+constexpr DetailTarget kHardwareDetail{5.0f, 0.25f};
+constexpr DetailTarget kSoftwareDetail{9.0f, 0.6f};
 // Cells of the light volume along the largest extent of the rest shape.
 constexpr float kLightCells = 32.0f;
 constexpr float kMinLightCellM = 1e-4f;
@@ -102,7 +107,8 @@ Result<gl::PassPlan> plan_passes(const SceneAsset& asset) {
 
 class GlRenderer final : public Renderer {
  public:
-  GlRenderer(const gl::DeviceInfo& device, const LookDesc& look) : timer_(device), look_(look) {}
+  GlRenderer(const gl::DeviceInfo& device, const LookDesc& look)
+      : timer_(device), detail_(device.is_software ? kSoftwareDetail : kHardwareDetail), look_(look) {}
 
   Status load(const gl::ShaderLibrary& shaders, const SceneAsset& asset);
   Status draw(const StrandPicture& picture, const CameraDesc& camera, RenderSize size) override;
@@ -124,6 +130,7 @@ class GlRenderer final : public Renderer {
   }
 
   gl::GpuTimer timer_;
+  DetailTarget detail_;
   LookDesc look_;
   gl::PassPlan plan_;
   size_t position_count_ = 0;
@@ -204,8 +211,8 @@ ExpandLevel GlRenderer::choose_level(const View& view) const {
     return std::min(static_cast<uint32_t>(std::clamp(std::ceil(wanted), 1.0f, 1e6f)), limit);
   };
   ExpandLevel level;
-  level.segments_per_gap = at_most(gap_px / kTargetSegmentPx, look_.segments);
-  level.followers = at_most(static_cast<float>(expand_.max_followers()) * width_px / kTargetWidthPx,
+  level.segments_per_gap = at_most(gap_px / detail_.segment_px, look_.segments);
+  level.followers = at_most(static_cast<float>(expand_.max_followers()) * width_px / detail_.width_px,
                             expand_.max_followers());
   return level;
 }

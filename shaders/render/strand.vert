@@ -37,6 +37,7 @@ const float kLobeR = 0.07;
 const float kLobeTT = 0.25;
 const float kLobeTRT = 1.10;
 const float kGroundLight = 0.45;       // light from below over light from above
+const float kDeepLight = 0.08;         // what is left of it in the middle of the hair, scattered many times
 // Variation between strands.
 const float kBrightnessSpread = 0.28;
 const float kWarmthSpread = 0.08;
@@ -73,7 +74,7 @@ vec3 shade(vec3 position_m, vec3 tangent, uint strand, float along) {
                 kLobeTT * lobes.y * through + kLobeTRT * lobes.z * color;
   vec3 scattered = kScatter * pow(max(light.x, 1e-6), kScatterReach) * color;
   float facing = 0.5 + 0.5 * dot(u_up, normalize(position_m));
-  vec3 surrounding = u_ambient * mix(kGroundLight, 1.0, facing) * light.y * through * color;
+  vec3 surrounding = u_ambient * mix(kGroundLight, 1.0, facing) * (kDeepLight + (1.0 - kDeepLight) * light.y) * color;
   return u_light_color * (light.x * direct + scattered) + surrounding;
 }
 
