@@ -105,7 +105,7 @@ void SimLoop::loop() {
     const auto time_ns = clock_->take_step(now_ns());
     if (time_ns) step(*time_ns);
     const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0);
-    if (!jobs.empty() || has_news) update_stats();
+    if (has_news) update_stats();
   }
 }
 
@@ -151,6 +151,7 @@ void SimLoop::carry_out(const Job& job) {
   const auto* control = std::get_if<ControlCommand>(&job.what);
   const Notice notice =
       control != nullptr ? command(control->command) : change(std::get<SetParameter>(job.what).assignment);
+  update_stats();  // whoever reads the answer may count on it
   if (job.reply) job.reply(notice);
 }
 

@@ -1,0 +1,383 @@
+// A whole server in this process against raw clients: late join, lost and stalled clients, commands, live
+// changes, sources and frame viewers.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <map>
+#include <thread>
+
+#include "common/codec/image_codec.h"
+#include "common/codec/scene_asset.h"
+#include "common/codec/strand_codec.h"
+#include "server/app/server.h"
+#include "tests/support/raw_client.h"
+
+namespace strandcast {
+namespace {
+
+using test::eventually;
+using test::RawClient;
+using testing::HasSubstr;
+
+constexpr uint32_t kStrands = 150;
+constexpr uint32_t kVertices = 8;
+
+/// A client that decodes strands like a viewer.
+class StrandClient {
+ public:
+  StrandClient(uint16_t port, Role role, int receive_buffer_bytes = 0) : raw(port, receive_buffer_bytes) {
+    EXPECT_TRUE(raw.handshake());
+    Hello hello;
+    hello.role = role;
+    hello.name = "test";
+    raw.send(hello);
+    const auto answer = raw.read_control<Welcome>();
+    EXPECT_TRUE(answer.has_value());
+    if (answer) welcome = *answer;
+    auto made = make_strand_decoder(welcome.codec, {welcome.strand_count, welcome.vertex_count});
+    EXPECT_TRUE(made.ok());
+    if (made.ok()) decoder_ = std::move(*made);
+  }
+
+  /// The next state; null at the end of the connection.
+  std::shared_ptr<const Snapshot> next() {
+    while (states_.empty())
+      if (!receive()) return nullptr;
+    auto state = states_.front();
+    states_.pop_front();
+    return state;
+  }
+
+  /// The state of exactly this step.
+  std::shared_ptr<const Snapshot> state_at(uint64_t tick) {
+    auto snapshot = next();
+    while (snapshot != nullptr && snapshot->tick < tick) snapshot = next();
+    return snapshot;
+  }
+
+  /// Sends a command or a change and returns its answer; states on the way are kept for next().
+  Notice ask(const ClientMessage& message) {
+    raw.send(message);
+    while (notices_.empty())
+      if (!receive()) return {true, "no answer"};
+    Notice notice = notices_.front();
+    notices_.pop_front();
+    return notice;
+  }
+
+  RawClient raw;
+  Welcome welcome;
+
+ private:
+  bool receive() {
+    const test::Received received = raw.read();
+    if (received.is_end) return false;
+    if (received.opcode() == Opcode::Control) {
+      const auto message = decode_server_message(received.bytes);
+      EXPECT_TRUE(message.ok()) << message.error().to_string();
+      if (message.ok() && std::holds_alternative<Notice>(*message))
+        notices_.push_back(std::get<Notice>(*message));
+    }
+    if (received.opcode() != Opcode::StrandKeyframe && received.opcode() != Opcode::StrandDelta) return true;
+    auto snapshot = decoder_->decode(received.bytes);
+    EXPECT_TRUE(snapshot.ok()) << snapshot.error().to_string();
+    if (snapshot.ok()) states_.push_back(*snapshot);
+    return snapshot.ok();
+  }
+
+  std::unique_ptr<StrandDecoder> decoder_;
+  std::deque<std::shared_ptr<const Snapshot>> states_;
+  std::deque<Notice> notices_;
+};
+
+SceneDesc small_scene() {
+  SceneDesc scene = built_in_scene();
+  ProceduralGroomDesc groom;
+  groom.strand_count = kStrands;
+  groom.vertex_count = kVertices;
+  scene.groom = groom;
+  scene.stream.frame_width = 64;
+  scene.stream.frame_height = 48;
+  return scene;
+}
+
+class LiveServer : public testing::Test {
+ protected:
+  void start(const SceneDesc& scene = small_scene()) {
+    ServerConfig config;
+    config.scene = scene;
+    config.net.port = 0;
+    auto server = Server::start(config);
+    if (!server.ok() && server.error().code == ErrorCode::Unavailable)
+      GTEST_SKIP() << "needs OpenGL 4.5: " << server.error().to_string();
+    ASSERT_TRUE(server.ok()) << server.error().to_string();
+    server_ = std::move(*server);
+  }
+  StrandClient join(Role role = Role::Viewer) { return StrandClient(server_->port(), role); }
+
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient early = join();
+  EXPECT_EQ(early.welcome.strand_count, kStrands);
+  EXPECT_EQ(early.welcome.vertex_count, kVertices);
+  std::map<uint64_t, uint64_t> hash_at_tick;
+  for (int i = 0; i < 20; ++i) {
+    const auto snapshot = early.next();
+    ASSERT_NE(snapshot, nullptr);
+    hash_at_tick[snapshot->tick] = state_hash(*snapshot);
+  }
+  StrandClient late = join();
+  uint32_t shared_count = 0;
+  for (int i = 0; i < 400 && shared_count < 20; ++i) {
+    const auto of_early = early.next();
+    const auto of_late = late.next();
+    ASSERT_TRUE(of_early != nullptr && of_late != nullptr);
+    hash_at_tick[of_early->tick] = state_hash(*of_early);
+    if (of_late->tick > of_early->tick) continue;
+    const auto same = hash_at_tick.find(of_late->tick);
+    if (same == hash_at_tick.end()) continue;
+    EXPECT_EQ(same->second, state_hash(*of_late)) << "step " << of_late->tick;
+    ++shared_count;
+  }
+  EXPECT_EQ(shared_count, 20u);
+}
+
+TEST_F(LiveServer, AssetMatchesTheWelcome) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient viewer = join();
+  const auto message = viewer.raw.read_media(Opcode::Asset);
+  ASSERT_TRUE(message.has_value());
+  const auto asset = decode_scene_asset(std::span(*message).subspan(kFrameHeaderBytes));
+  ASSERT_TRUE(asset.ok()) << asset.error().to_string();
+  EXPECT_EQ(asset->strand_count, kStrands);
+  EXPECT_EQ(asset->vertex_count, kVertices);
+  EXPECT_FALSE(asset->head.triangle.empty());
+}
+
+TEST_F(LiveServer, KilledAndStalledClientsDisturbNobody) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient healthy = join();
+  {
+    StrandClient killed = join();
+    ASSERT_NE(killed.next(), nullptr);
+    killed.raw.reset();
+  }
+  StrandClient stalled(server_->port(), Role::Viewer, 4'096);  // never reads again
+  ASSERT_NE(stalled.next(), nullptr);
+  const auto first = healthy.next();
+  ASSERT_NE(first, nullptr);
+  uint64_t last_tick = first->tick;
+  for (int i = 0; i < 120; ++i) {
+    const auto snapshot = healthy.next();
+    ASSERT_NE(snapshot, nullptr);
+    EXPECT_GT(snapshot->tick, last_tick);
+    last_tick = snapshot->tick;
+  }
+  EXPECT_TRUE(eventually([&] { return server_->counters().strand_viewers == 2; })) << "the killed one left";
+  // Every step was published, whoever was watching (the first ones only on occasion: nobody watched yet).
+  EXPECT_TRUE(eventually([&] { return server_->counters().sim.published >= last_tick - first->tick; }));
+}
+
+TEST_F(LiveServer, PauseAndStepAreExact) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient controller = join(Role::Controller);
+  ASSERT_NE(controller.next(), nullptr);
+  EXPECT_TRUE(controller.ask(ControlCommand{Command::StepOnce}).is_error) << "not paused yet";
+  EXPECT_FALSE(controller.ask(ControlCommand{Command::Pause}).is_error);
+  const uint64_t paused_tick = server_->counters().sim.tick;
+  EXPECT_TRUE(server_->counters().sim.is_paused);
+  for (uint64_t step = 1; step <= 3; ++step) {
+    EXPECT_FALSE(controller.ask(ControlCommand{Command::StepOnce}).is_error);
+    ASSERT_TRUE(eventually([&] { return server_->counters().sim.tick == paused_tick + step; }));
+  }
+  test::sleep_ms(100);
+  EXPECT_EQ(server_->counters().sim.tick, paused_tick + 3) << "no step that was not asked for";
+
+  // Somebody who joins now sees exactly this state.
+  StrandClient late = join();
+  const auto snapshot = late.next();
+  ASSERT_NE(snapshot, nullptr);
+  EXPECT_EQ(snapshot->tick, paused_tick + 3);
+
+  EXPECT_FALSE(controller.ask(ControlCommand{Command::Resume}).is_error);
+  EXPECT_TRUE(eventually([&] { return server_->counters().sim.tick > paused_tick + 10; }));
+}
+
+TEST_F(LiveServer, ResetPutsEveryStrandToRest) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient controller = join(Role::Controller);
+  ASSERT_NE(controller.state_at(30), nullptr);
+  EXPECT_FALSE(controller.ask(ControlCommand{Command::Pause}).is_error);
+  EXPECT_FALSE(controller.ask(ControlCommand{Command::Reset}).is_error);
+  StrandClient late(server_->port(), Role::Viewer);
+  const auto message = late.raw.read_media(Opcode::Asset);
+  ASSERT_TRUE(message.has_value());
+  const auto asset = decode_scene_asset(std::span(*message).subspan(kFrameHeaderBytes));
+  ASSERT_TRUE(asset.ok());
+  const auto snapshot = late.next();
+  ASSERT_NE(snapshot, nullptr);
+  const std::vector<glm::vec3> position_m = positions_in_head(*snapshot);
+  ASSERT_EQ(position_m.size(), asset->rest_position_m.size());
+  float largest_m = 0.0f;
+  for (size_t i = 0; i < position_m.size(); ++i)
+    largest_m = std::max(largest_m, glm::length(position_m[i] - asset->rest_position_m[i]));
+  EXPECT_LE(largest_m, late.welcome.bound_m * 1.01f) << "within the announced bound";
+}
+
+TEST_F(LiveServer, SolverAndWindChangeWhileRunning) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient controller = join(Role::Controller);
+  ASSERT_NE(controller.next(), nullptr);
+  for (const SolverRow& row : solver_table()) {
+    const Notice notice = controller.ask(SetParameter{"solver.name=" + row.name});
+    EXPECT_FALSE(notice.is_error) << notice.text;
+    EXPECT_TRUE(eventually([&] { return server_->counters().sim.solver_name == row.name; }));
+    const uint64_t tick = server_->counters().sim.tick;
+    const auto snapshot = controller.state_at(tick + 5);
+    ASSERT_NE(snapshot, nullptr) << "states keep coming with " << row.name;
+  }
+  EXPECT_FALSE(controller.ask(SetParameter{"wind.mean_mps.x=3"}).is_error);
+  EXPECT_FALSE(controller.ask(SetParameter{"substeps=2"}).is_error);
+  EXPECT_EQ(server_->counters().sim.quarantined, 0u);
+}
+
+TEST_F(LiveServer, BadChangesAreRefusedInOneSentenceAndChangeNothing) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient controller = join(Role::Controller);
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"solver.name=spaghetti", "known: dftl"},
+      {"solver.parameters.nonsense=1", "nonsense"},
+      {"solver.parameters.s_damping=1e9", "s_damping"},
+      {"groom.procedural.strand_count=5", "known: solver"},
+      {"substeps=100000", "substeps"},
+      {"wind.mean_mps.x=nan", "wind"},
+      {"no assignment", "known: solver"}};
+  for (const auto& [assignment, part] : cases) {
+    const Notice notice = controller.ask(SetParameter{assignment});
+    EXPECT_TRUE(notice.is_error) << assignment;
+    EXPECT_THAT(notice.text, HasSubstr(part)) << assignment;
+  }
+  EXPECT_EQ(server_->counters().sim.solver_builds, 1u);
+  EXPECT_NE(controller.next(), nullptr);
+}
+
+TEST_F(LiveServer, HeadFollowsTheSourceAndJumpsRigidly) {
+  SceneDesc scene = small_scene();
+  scene.wind.mean_mps = glm::vec3(0.0f);
+  ASSERT_NO_FATAL_FAILURE(start(scene));
+  if (server_ == nullptr) return;
+  StrandClient viewer = join();
+  RawClient source(server_->port());
+  ASSERT_TRUE(source.handshake());
+  Hello hello;
+  hello.role = Role::Source;
+  source.send(hello);
+  ASSERT_TRUE(source.read_control<Welcome>().has_value());
+  Pose pose;
+  pose.position_m = {100.0, 1.5, -20.0};
+  pose.rotation = glm::angleAxis(1.0, glm::dvec3(0.0, 1.0, 0.0));
+  source.send(MotionSamples{{MotionSamples::Sample{1'000, pose}}});
+  bool has_arrived = false;
+  for (int i = 0; i < 600 && !has_arrived; ++i) {
+    const auto snapshot = viewer.next();
+    ASSERT_NE(snapshot, nullptr);
+    has_arrived = snapshot->motion_time_ns != 0;
+    if (has_arrived) {
+      EXPECT_LT(glm::length(snapshot->world_from_head.position_m - pose.position_m), 1e-6);
+      EXPECT_LT(angle_between_rad(snapshot->world_from_head.rotation, pose.rotation), 1e-6);
+    }
+  }
+  EXPECT_TRUE(has_arrived);
+  EXPECT_EQ(server_->counters().strand_viewers, 1u) << "a source is no viewer";
+  EXPECT_EQ(server_->counters().sim.quarantined, 0u);
+}
+
+TEST_F(LiveServer, FramesAreDrawnOnlyWhileSomebodyWatchesThem) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient strands = join();
+  ASSERT_NE(strands.state_at(10), nullptr);
+  EXPECT_EQ(server_->counters().frames.frames, 0u);
+  {
+    RawClient viewer(server_->port());
+    ASSERT_TRUE(viewer.handshake());
+    Hello hello;
+    hello.mode = StreamMode::Frames;
+    viewer.send(hello);
+    const auto welcome = viewer.read_control<Welcome>();
+    ASSERT_TRUE(welcome.has_value());
+    EXPECT_EQ(welcome->mode, StreamMode::Frames);
+    const auto message = viewer.read_media(Opcode::JpegFrame);
+    ASSERT_TRUE(message.has_value());
+    const auto image = decode_jpeg(std::span(*message).subspan(kFrameHeaderBytes));
+    ASSERT_TRUE(image.ok()) << image.error().to_string();
+    EXPECT_EQ(image->width, welcome->frame_width);
+    EXPECT_EQ(image->height, welcome->frame_height);
+    viewer.reset();
+  }
+  EXPECT_TRUE(eventually([&] { return server_->counters().frame_viewers == 0; }));
+  EXPECT_NE(strands.next(), nullptr);
+}
+
+TEST_F(LiveServer, NobodyWatchingMeansNothingIsEncodedOrDrawn) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  EXPECT_TRUE(eventually([&] { return server_->counters().sim.tick >= 60; }));
+  const ServerCounters counters = server_->counters();
+  EXPECT_EQ(counters.encode.encodes, 0u);
+  EXPECT_EQ(counters.frames.frames, 0u);
+  EXPECT_LE(counters.sim.published, counters.sim.tick / kIdlePublishSteps + 1);
+}
+
+TEST_F(LiveServer, SeveralServersLiveInOneProcessAndStopCleanly) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  ServerConfig config;
+  config.scene = small_scene();
+  config.net.port = 0;
+  auto other = Server::start(config);
+  ASSERT_TRUE(other.ok()) << other.error().to_string();
+  StrandClient first = join();
+  StrandClient second((*other)->port(), Role::Viewer);
+  EXPECT_NE(first.welcome.session_id, second.welcome.session_id);
+  ASSERT_NE(second.next(), nullptr);
+  RawClient::End end;
+  std::thread reader([&] { end = second.raw.read_end(); });
+  (*other)->stop();
+  (*other)->wait();
+  reader.join();
+  EXPECT_EQ(end.close_code, static_cast<uint16_t>(CloseCode::GoingAway));
+  EXPECT_FALSE(end.reason.empty());
+  EXPECT_NE(first.next(), nullptr);
+
+  config.net.port = server_->port();
+  const auto taken = Server::start(config);
+  ASSERT_FALSE(taken.ok());
+  EXPECT_EQ(taken.error().code, ErrorCode::Unavailable);
+  EXPECT_THAT(taken.error().message, HasSubstr(std::to_string(config.net.port)));
+}
+
+TEST_F(LiveServer, MetricsTellWhatRuns) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient viewer = join();
+  ASSERT_NE(viewer.next(), nullptr);
+  const std::string text = test::http_get(server_->port(), "/metrics");
+  for (const char* name :
+       {"strandcast_sim_steps_total", "strandcast_viewers_strands 1", "strandcast_encode_frames"})
+    EXPECT_THAT(text, HasSubstr(name));
+}
+
+}  // namespace
+}  // namespace strandcast
