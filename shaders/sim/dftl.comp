@@ -1,4 +1,5 @@
-// Serial Dynamic Follow-The-Leader: one invocation walks one strand from root to tip and keeps it in registers.
+// Serial Dynamic Follow-The-Leader: one invocation walks one strand from root to tip and keeps it in
+// registers.
 #include "sim/follow.glsl"
 
 layout(local_size_x = kStrandLocalSize) in;

@@ -1,14 +1,19 @@
-// Odd-even Dynamic Follow-The-Leader: one invocation per vertex, whole strands per group, positions in shared memory.
-// It starts from the predicted directions laid end to end; every placement starts again from the prediction, so two
-// more vertices are final after each iteration, and half as many iterations as vertices give the serial result.
+// Odd-even Dynamic Follow-The-Leader: one invocation per vertex, whole strands per group, positions in shared
+// memory. It starts from the predicted directions laid end to end; every placement starts again from the
+// prediction, so two more vertices are final after each iteration, and half as many iterations as vertices
+// give the serial result.
 #include "sim/follow.glsl"
 
 layout(local_size_x = kVertexLocalSize) in;
 
-// (vertices x strands of the group), strand fastest; later reused for sums and for corrections.
+// (vertices x strands of the group), strand fastest; later reused for corrections.
 shared vec3 s_point[kVertexLocalSize];
 shared vec3 s_target[kVertexLocalSize];
+#if HAS_PINNED_TAIL
 shared float s_segment[kVertexLocalSize];
+#else
+shared vec3 s_sum[2u * kVertexLocalSize];
+#endif
 
 struct Lane {
   uint local;    // element of the shared arrays
@@ -18,7 +23,8 @@ struct Lane {
 };
 
 void place_in_turn(Lane lane, Vertex vertex, uint parity, vec3 anchor, float reach, inout vec3 pushed) {
-  if (lane.is_free && (lane.index & 1u) == parity) {
+  // A loop of one round rather than an if: llvmpipe skips it when no lane needs it.
+  for (bool is_turn = lane.is_free && (lane.index & 1u) == parity; is_turn; is_turn = false) {
     const uint leader = lane.local - lane.stride;
     s_point[lane.local] = placed(s_point[leader], s_target[leader], vertex, anchor, reach,
                                  lane.index + 1u == u_step.shape.w, pushed);
@@ -26,27 +32,34 @@ void place_in_turn(Lane lane, Vertex vertex, uint parity, vec3 anchor, float rea
   barrier();
 }
 
-// Keeps every segment's direction and lays the segments end to end: an inclusive sum along the strand in log2 steps.
+#if !HAS_PINNED_TAIL
+// Keeps every segment's direction and lays the segments end to end: an inclusive sum along the strand in log2
+// steps.
 void restore_lengths(Lane lane, Vertex vertex) {
   vec3 sum = s_point[lane.local];
   if (lane.is_free) {
     const uint leader = lane.local - lane.stride;
     const vec3 along = sum - s_point[leader];
     const float squared = dot(along, along);
-    sum = squared > kTinySquared ? along * (vertex.segment * inversesqrt(squared)) : vertex.target - s_target[leader];
+    const vec3 groomed = vertex.target - s_target[leader];
+    sum = squared > kTinySquared ? along * (vertex.segment * inversesqrt(squared)) : groomed;
   } else if (lane.index + 1u != u_step.shape.z) {
     sum = vec3(0.0);  // the last pinned vertex is where the sum starts
   }
-  barrier();
-  s_point[lane.local] = sum;
+  // Sums alternate between two arrays, so that one barrier per doubling is enough.
+  uint from = 0u;
+  s_sum[lane.local] = sum;
   barrier();
   for (uint reach = 1u; reach < u_step.shape.y; reach *= 2u) {
-    const vec3 below = lane.is_free && lane.index >= reach ? s_point[lane.local - reach * lane.stride] : vec3(0.0);
-    barrier();
-    if (lane.is_free) s_point[lane.local] += below;
+    if (lane.is_free && lane.index >= reach) sum += s_sum[from + lane.local - reach * lane.stride];
+    from = kVertexLocalSize - from;
+    s_sum[from + lane.local] = sum;
     barrier();
   }
+  if (lane.is_free) s_point[lane.local] = sum;
+  barrier();
 }
+#endif
 
 void main() {
   const uint strands = u_step.shape.x;
@@ -66,7 +79,9 @@ void main() {
   if (!lane.is_free) vertex.predicted = vertex.target;
   s_point[lane.local] = vertex.predicted;
   s_target[lane.local] = vertex.target;
+#if HAS_PINNED_TAIL
   s_segment[lane.local] = vertex.segment;
+#endif
   barrier();
 
   vec3 anchor = vec3(0.0);

@@ -1,5 +1,5 @@
-// Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Document 003, sections
-// 2.1.4 and 4.2.3.
+// Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Document 003,
+// sections 2.1.4 and 4.2.3.
 #pragma variant HAS_TURBULENCE 0 1
 #pragma variant COLLIDERS 0 1 4 16
 #pragma variant HAS_PINNED_TAIL 0 1
@@ -52,15 +52,16 @@ Vertex predict(uint at) {
   return vertex;
 }
 
-// The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at once,
-// by the law of cosines; the nearest end that can be had when there is none. `direction` is the segment's now.
+// The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at
+// once, by the law of cosines; the nearest end that can be had when there is none. `direction` is the
+// segment's now.
 vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, float radius) {
   const vec3 to_center = center - start;
   const float squared = dot(to_center, to_center);
   const float inverse = inversesqrt(max(squared, kTinySquared));
   const vec3 axis = to_center * inverse;
-  const float cosine = clamp(
-      (segment * segment + squared - radius * radius) * inverse / max(2.0 * segment, kTinySquared), -1.0, 1.0);
+  const float along = (segment * segment + squared - radius * radius) * inverse;
+  const float cosine = clamp(along / max(2.0 * segment, kTinySquared), -1.0, 1.0);
   vec3 side = direction - axis * dot(direction, axis);
   // Straight at the centre: any side will do.
   const vec3 other = abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
@@ -70,8 +71,8 @@ vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, 
   return squared > kTinySquared ? end : start + segment * direction;
 }
 
-// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone up to the
-// friction coefficient times the depth that the collider has to push back.
+// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
+// up to the friction coefficient times the depth that the collider has to push back.
 vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
   const vec3 outward = end - sphere.xyz;
   const float squared = max(dot(outward, outward), kTinySquared);
@@ -83,10 +84,11 @@ vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
   return end - sliding * min(1.0, most * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
 }
 
-// The end of a vertex's segment: as near to its prediction as the segment's length from `start`, the colliders and,
-// with a pinned tail, the distance `reach` to `anchor` allow (exactly there for the last free vertex). `pushed` is what
-// colliders moved it by.
-vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float reach, bool is_last, out vec3 pushed) {
+// The end of a vertex's segment: as near to its prediction as the segment's length from `start`, the
+// colliders and, with a pinned tail, the distance `reach` to `anchor` allow (exactly there for the last free
+// vertex). `pushed` is what colliders moved it by.
+vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float reach, bool is_last,
+            out vec3 pushed) {
   pushed = vec3(0.0);
   vec3 along = vertex.predicted - start;
   float squared = dot(along, along);
@@ -111,11 +113,12 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float rea
       most = max(inside, most);
     }
     if (!(most > 0.0)) break;
-    const vec3 held = (held_by_friction(vertex.old, end, deepest) - start) / max(vertex.segment, kTinySquared);
+    const float per_segment = 1.0 / max(vertex.segment, kTinySquared);
+    const vec3 held = (held_by_friction(vertex.old, end, deepest) - start) * per_segment;
     const vec3 turned = turned_onto_sphere(start, held, vertex.segment, deepest.xyz, deepest.w);
     pushed += turned - end;
     end = turned;
-    direction = (end - start) / max(vertex.segment, kTinySquared);
+    direction = (end - start) * per_segment;
   }
 #endif
 

@@ -1,5 +1,6 @@
-// What a strand kernel reads: the step's uniform block (server/sim/step_block.h) and the state of the strands.
-// Element of vertex i of strand s: i * strand_count + s, so that neighbouring lanes are neighbouring strands.
+// What a strand kernel reads: the step's uniform block (server/sim/step_block.h) and the state of the
+// strands. Element of vertex i of strand s: i * strand_count + s, so that neighbouring lanes are neighbouring
+// strands.
 #include "shared/limits.h"
 #include "shared/bindings.h"
 
@@ -10,28 +11,32 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 push;                // velocity gained from gravity and mean wind, m/s; w = 1 / substep
   vec4 style;               // stiffness at the root 1/s^2, share at the tip, s_damping, speed limit m/s
   vec4 contact;             // friction, air drag 1/s; rest unused
-  uvec4 shape;              // strands, vertices per strand, pinned at the root, first vertex of the pinned tail
+  uvec4 shape;              // strands, vertices of each, pinned at the root, first vertex of the pinned tail
   uvec4 odd_even;           // iterations, 1 = restore exact lengths
   vec4 gust_amplitude[kMaxGustWaves];  // m/s; w = phase, rad
   vec4 gust_wave[kMaxGustWaves];       // rad/m
   vec4 collider[kMaxSphereColliders];    // centre, m; w = radius (0 = none)
 } u_step;
 
-// Buffer textures: on llvmpipe a texel fetch costs half of a storage-block load or less. They show the buffers that
-// the storage blocks write. Every vertex is fetched by one invocation only, before it stores a value computed from
-// what it fetched, so the order cannot change.
+// Buffer textures: on llvmpipe a texel fetch costs half of a storage-block load or less. They show the
+// buffers that the storage blocks write. Every vertex is fetched by one invocation only, before it stores a
+// value computed from what it fetched, so the order cannot change.
 layout(binding = kUnitRest) uniform samplerBuffer u_rest;           // head space, m; w = segment before it, m
 layout(binding = kUnitPosition) uniform samplerBuffer u_position;   // head-relative world, m; w = arc, 0..1
 layout(binding = kUnitVelocity) uniform samplerBuffer u_velocity;   // world, m/s; w unused
 
-layout(std430, binding = kBindingPosition) writeonly restrict buffer PositionBlock { vec4 position[]; } b_position;
-layout(std430, binding = kBindingVelocity) writeonly restrict buffer VelocityBlock { vec4 velocity[]; } b_velocity;
+layout(std430, binding = kBindingPosition) writeonly restrict buffer PositionBlock {
+  vec4 position[];
+} b_position;
+layout(std430, binding = kBindingVelocity) writeonly restrict buffer VelocityBlock {
+  vec4 velocity[];
+} b_velocity;
 
 // A squared length below this has no direction.
 const float kTinySquared = 1e-20;
 
-// True for NaN, infinity and absurdly large numbers (2^40 and up). By bits: compilers may turn comparisons around,
-// which changes what they say about NaN.
+// True for NaN, infinity and absurdly large numbers (2^40 and up). By bits: compilers may turn comparisons
+// around, which changes what they say about NaN.
 bool is_broken(vec3 value) {
   const uvec3 magnitude = floatBitsToUint(value) & 0x7fffffffu;
   return max(max(magnitude.x, magnitude.y), magnitude.z) >= 0x53800000u;
