@@ -70,30 +70,41 @@ std::vector<Candidate> list_devices() {
   return candidates;
 }
 
+/// Mesa's own platform; beside another vendor's GPU it picks software rendering.
+std::vector<Candidate> list_surfaceless(bool may_be_hardware, bool may_be_software) {
+  if (!has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_MESA_platform_surfaceless")) return {};
+  return {{"surfaceless Mesa", EGL_PLATFORM_SURFACELESS_MESA, reinterpret_cast<void*>(EGL_DEFAULT_DISPLAY),
+           may_be_hardware, may_be_software}};
+}
+
 /// The order in which `device` is tried.
-Result<std::vector<Candidate>> choose_candidates(const std::string& device) {
+Result<std::vector<Candidate>> choose_candidates(const std::string& device, DriverThreads threads) {
   const std::vector<Candidate> devices = list_devices();
-  const Error unknown =
-      make_error(ErrorCode::NotFound, "unknown GL device '{}' (known: auto, software, hardware{})", device,
-                 devices.empty() ? "" : fmt::format(", 0 to {}", devices.size() - 1));
-  const bool wants_hardware = device == "auto" || device == "hardware";
-  const bool wants_software = device == "auto" || device == "software";
-  if (!wants_hardware && !wants_software) {
+  std::vector<Candidate> hardware, software;
+  if (device == "auto" || device == "hardware" || device == "software") {
+    for (const Candidate& candidate : devices)
+      (candidate.may_be_hardware ? hardware : software).push_back(candidate);
+    if (device == "software") hardware.clear();
+    if (device == "hardware") software.clear();
+  } else {
     size_t number = 0;
     const char* end = device.data() + device.size();
     const auto parsed = std::from_chars(device.data(), end, number);
-    if (parsed.ec != std::errc() || parsed.ptr != end || number >= devices.size()) return unknown;
-    return std::vector<Candidate>{devices[number]};
+    if (parsed.ec != std::errc() || parsed.ptr != end || number >= devices.size())
+      return make_error(ErrorCode::NotFound, "unknown GL device '{}' (known: auto, software, hardware{})",
+                        device, devices.empty() ? "" : fmt::format(", 0 to {}", devices.size() - 1));
+    (devices[number].may_be_hardware ? hardware : software).push_back(devices[number]);
   }
-  std::vector<Candidate> chosen;
-  for (const Candidate& candidate : devices)
-    if (wants_hardware && candidate.may_be_hardware) chosen.push_back(candidate);
-  for (const Candidate& candidate : devices)
-    if (wants_software && candidate.may_be_software) chosen.push_back(candidate);
-  // Last, because this platform is Mesa's own: beside another vendor's GPU it would pick software rendering.
-  if (has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), "EGL_MESA_platform_surfaceless"))
-    chosen.push_back({"surfaceless Mesa", EGL_PLATFORM_SURFACELESS_MESA,
-                      reinterpret_cast<void*>(EGL_DEFAULT_DISPLAY), wants_hardware, wants_software});
+  std::vector<Candidate> chosen = hardware;
+  const auto append = [&](const std::vector<Candidate>& more) {
+    chosen.insert(chosen.end(), more.begin(), more.end());
+  };
+  // A display of its own brings threads of its own; the surfaceless one is the second way to the same
+  // renderer.
+  if (threads == DriverThreads::Own && !software.empty()) append(list_surfaceless(false, true));
+  append(software);
+  if (device == "auto" || device == "hardware" || device == "software")
+    append(list_surfaceless(device != "software", device != "hardware"));
   return chosen;
 }
 
@@ -161,10 +172,10 @@ void GLAPIENTRY log_debug_message(GLenum, GLenum type, GLuint, GLenum severity, 
 
 }  // namespace
 
-Result<std::unique_ptr<EglContext>> EglContext::make(const std::string& device) {
+Result<std::unique_ptr<EglContext>> EglContext::make(const std::string& device, DriverThreads threads) {
   if (!has_egl_library())
     return make_error(ErrorCode::Unavailable, "no OpenGL: libEGL.so.1 is not installed (package libegl1)");
-  ASSIGN_OR_RETURN(const auto candidates, choose_candidates(device));
+  ASSIGN_OR_RETURN(const auto candidates, choose_candidates(device, threads));
   std::vector<std::string> tried;
   for (const Candidate& candidate : candidates) {
     auto opened = open(candidate);

@@ -19,11 +19,17 @@ struct DeviceInfo {
   int max_samples = 1;
 };
 
+/// Software renderers draw with threads that all contexts of a display share; they run at the priority of the
+/// thread that came first. Own keeps apart from the contexts made with Shared, so that neither waits in the
+/// other's queue; contexts made with Own share one such set. No difference on hardware.
+enum class DriverThreads { Shared, Own };
+
 class EglContext {
  public:
   /// `device`: "auto", "software", "hardware" or a device number. Makes the context current on the calling
   /// thread. Unavailable lists what was tried.
-  static Result<std::unique_ptr<EglContext>> make(const std::string& device);
+  static Result<std::unique_ptr<EglContext>> make(const std::string& device,
+                                                  DriverThreads threads = DriverThreads::Shared);
   ~EglContext();
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;

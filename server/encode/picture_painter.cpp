@@ -40,7 +40,9 @@ class GlPicturePainter : public PicturePainter {
 
 MakePicturePainter gl_picture_painter(GlPainterConfig config) {
   return [config = std::move(config)]() -> Result<std::unique_ptr<PicturePainter>> {
-    ASSIGN_OR_RETURN(auto context, gl::EglContext::make(config.gl_device));
+    // Else a picture in the shared queue of a software renderer would hold up the simulation until it is
+    // drawn.
+    ASSIGN_OR_RETURN(auto context, gl::EglContext::make(config.gl_device, gl::DriverThreads::Own));
     const gl::ShaderLibrary shaders =
         config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
     ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), *config.asset, config.look));

@@ -1,11 +1,12 @@
 #include "common/gl/egl_context.h"
 
 #include <epoxy/gl.h>
-
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <thread>
 
 #include "common/gl/objects.h"
@@ -58,6 +59,35 @@ TEST(EglContext, TwoContextsOfOneDeviceLiveSideBySide) {
   second->reset();  // must not take the display away from the first
   ASSERT_TRUE((*first)->make_current());
   EXPECT_EQ(Buffer::of("four", std::vector<int>{1, 2, 3, 4}).read_all<int>(), (std::vector<int>{1, 2, 3, 4}));
+}
+
+/// Threads of this process that run at the given nice value.
+int count_threads_at_nice(int nice) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task"))
+    count += getpriority(PRIO_PROCESS, static_cast<id_t>(std::stoi(entry.path().filename()))) == nice ? 1 : 0;
+  return count;
+}
+
+/// Makes a shared and then two niced contexts; true when only the one with threads of its own brings any.
+bool own_threads_are_new() {
+  constexpr int kNice = 7;
+  const auto shared = EglContext::make("software");
+  bool is_right = static_cast<bool>(shared);
+  std::thread([&] {
+    setpriority(PRIO_PROCESS, 0, kNice);
+    const auto also_shared = EglContext::make("software", DriverThreads::Shared);
+    is_right = is_right && also_shared && count_threads_at_nice(kNice) == 1;  // this thread
+    const auto own = EglContext::make("software", DriverThreads::Own);
+    is_right = is_right && own && count_threads_at_nice(kNice) > 1;
+    is_right = is_right && (*own)->info().renderer == (*shared)->info().renderer;
+  }).join();
+  return is_right;
+}
+
+TEST(EglContext, OwnDriverThreadsAreANewSetAtThePriorityOfTheirMaker) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // a fresh process: displays live as long as it does
+  EXPECT_EXIT(_exit(own_threads_are_new() ? 0 : 1), testing::ExitedWithCode(0), "");
 }
 
 TEST(EglContext, MovesToAnotherThread) {
