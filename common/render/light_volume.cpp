@@ -17,6 +17,8 @@ constexpr float kSurroundingShare = 0.45f;
 constexpr float kSkullPerM = 400.0f;
 // More vertices than this are sampled strand by strand in even steps: the sum keeps its mean.
 constexpr size_t kMaxSplats = 60'000;
+// Coordinates further out, in cells, or not a number say nothing about where the hair is.
+constexpr float kFarCells = 1e6f;
 constexpr int kSizeStep = 4;  // cells; the texture is not made anew for every small movement
 
 struct Sweep {
@@ -73,7 +75,8 @@ void LightVolume::fit_lattice(const std::vector<glm::vec3>& position_m) {
     high = glm::max(high, point);
   }
   const auto cell_of = [&](float value) {
-    return static_cast<int>(std::floor(std::clamp(value / desc_.cell_m, -1e6f, 1e6f)));
+    const float cell = value / desc_.cell_m;
+    return std::abs(cell) < kFarCells ? static_cast<int>(std::floor(cell)) : 0;
   };
   for (int axis = 0; axis < 3; ++axis) {
     const int first = cell_of(low[axis]) - 1;

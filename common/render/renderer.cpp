@@ -207,8 +207,10 @@ ExpandLevel GlRenderer::choose_level(const View& view) const {
   const float px_per_m = view.focal_px / static_cast<float>(kSamplesPerSide) / view.target_distance_m;
   const float gap_px = rest_.mean_length_m / static_cast<float>(gap_count_) * px_per_m;
   const float width_px = 2.0f * look_.strand_radius_m * px_per_m;
+  // A size that is not a number takes the least detail.
   const auto at_most = [](float wanted, uint32_t limit) {
-    return std::min(static_cast<uint32_t>(std::clamp(std::ceil(wanted), 1.0f, 1e6f)), limit);
+    return wanted > 1.0f ? static_cast<uint32_t>(std::min(std::ceil(wanted), static_cast<float>(limit)))
+                         : std::min(1u, limit);
   };
   ExpandLevel level;
   level.segments_per_gap = at_most(gap_px / detail_.segment_px, look_.segments);

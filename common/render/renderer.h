@@ -33,7 +33,7 @@ struct RenderSize {
 
 /// Milliseconds of the last draw, by pass.
 struct RenderProfile {
-  double expand_ms = 0.0;
+  double expand_ms = 0.0;  // light volume, upload and tessellation
   double strands_ms = 0.0;
   double head_ms = 0.0;
   double resolve_ms = 0.0;

@@ -117,5 +117,15 @@ TEST(LightVolume, FarAwayVerticesKeepItBounded) {
   for (int axis = 0; axis < 3; ++axis) EXPECT_LE(volume.size()[axis], kMaxLightCells);
 }
 
+TEST(LightVolume, CoordinatesThatAreNoNumbersAreIgnored) {
+  LightVolumeDesc desc;
+  desc.strand_count = 2;
+  desc.vertex_count = 2;
+  LightVolume volume(desc);
+  volume.build({{NAN, 0, 0}, {0, INFINITY, 0}, {0, 0, NAN}, {NAN, NAN, NAN}}, {0, 1, 0});
+  for (int axis = 0; axis < 3; ++axis) EXPECT_LE(volume.size()[axis], kMaxLightCells);
+  for (const uint16_t texel : volume.texels()) EXPECT_EQ(texel, 65535);
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -84,6 +84,7 @@ Image PictureTarget::read_image() const {
 void PictureTarget::blit_to(uint32_t framebuffer, glm::uvec2 size) const {
   const auto width = static_cast<GLint>(size_.x);
   const auto height = static_cast<GLint>(size_.y);
+  glDisable(GL_SCISSOR_TEST);
   // The picture's first row is its top, the framebuffer's its bottom.
   glBlitNamedFramebuffer(picture_.name(), framebuffer, 0, height, width, 0, 0, 0, static_cast<GLint>(size.x),
                          static_cast<GLint>(size.y), GL_COLOR_BUFFER_BIT,
