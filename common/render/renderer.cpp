@@ -39,6 +39,9 @@ constexpr float kLightCells = 32.0f;
 constexpr float kMinLightCellM = 1e-4f;
 // With fewer roots a sphere fitted to them is no skull.
 constexpr uint32_t kMinSkullRoots = 32;
+// Nor is it one when more than this share of the head's vertices lies deep inside of it, in radii.
+constexpr float kDeepInside = 0.75f;
+constexpr float kMaxDeepShare = 0.15f;
 // The skull that shadows is a little smaller than the sphere through the roots, so that it does not darken
 // them.
 constexpr float kSkullShrink = 0.93f;
@@ -145,6 +148,16 @@ class GlRenderer final : public Renderer {
   RenderProfile profile_;
 };
 
+// Whether a ball lies under the skin of a head instead of swallowing it, as a sphere through a mane that goes
+// on down the neck would.
+bool is_skull_of(const FittedSphere& ball, const Mesh& head) {
+  const auto deep =
+      std::count_if(head.position_m.begin(), head.position_m.end(), [&](const glm::vec3& point) {
+        return glm::length(point - ball.center_m) < kDeepInside * ball.radius_m;
+      });
+  return static_cast<float>(deep) < kMaxDeepShare * static_cast<float>(head.position_m.size());
+}
+
 LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, const RestFacts& rest) {
   LightVolumeDesc desc;
   desc.strand_count = asset.strand_count;
@@ -155,10 +168,11 @@ LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, co
     desc.strands_per_key = 1.0f + static_cast<float>(asset.triangle.size() * look.followers) /
                                       static_cast<float>(asset.strand_count);
   if (asset.strand_count >= kMinSkullRoots && !asset.head.triangle.empty()) {
-    desc.skull = fit_sphere(std::vector<glm::vec3>(asset.rest_position_m.begin(),
-                                                   asset.rest_position_m.begin() + asset.strand_count));
+    const std::vector<glm::vec3> roots_m(asset.rest_position_m.begin(),
+                                         asset.rest_position_m.begin() + asset.strand_count);
+    desc.skull = fit_sphere(roots_m);
+    desc.has_skull = is_skull_of(desc.skull, asset.head);
     desc.skull.radius_m *= kSkullShrink;
-    desc.has_skull = true;
   }
   return desc;
 }

@@ -115,6 +115,29 @@ TEST_F(RenderLook, HairShadowsTheHeadUnderIt) {
   EXPECT_LT(mean(luminance(with_hair, low, high)), mean(luminance(without, low, high)));
 }
 
+TEST_F(RenderLook, ASphereThroughAManeIsNoSkull) {
+  // Roots along a long arc behind the head: the sphere through them holds the whole head, which must stay
+  // lit.
+  SceneAsset asset;
+  asset.head = make_head(kHeadRadiusM);
+  asset.strand_count = 200;
+  asset.vertex_count = 2;
+  for (const float radius_m : {0.3f, 0.35f})
+    for (uint32_t i = 0; i < asset.strand_count; ++i) {
+      const float angle = 2.0f * static_cast<float>(i) / static_cast<float>(asset.strand_count);
+      const float side = 0.02f * static_cast<float>(i % 5) - 0.04f;
+      asset.rest_position_m.emplace_back(side, radius_m * std::cos(angle) - 0.2f,
+                                         -radius_m * std::sin(angle));
+    }
+  CameraDesc front = behind();
+  front.offset_m.z = 0.7f;
+  LookDesc look;
+  look.light_direction = {0.0f, -0.1f, -1.0f};
+  const Image image = draw(asset, look, front);
+  ASSERT_FALSE(image.rgba.empty());
+  EXPECT_GT(mean(luminance(image, {0.45f, 0.5f}, {0.55f, 0.55f})), 0.35);
+}
+
 TEST_F(RenderLook, FairHairGlowsAgainstTheLight) {
   // Transmitted light: blond hair in front of the light is brighter than dark hair by more than its colour
   // says.
