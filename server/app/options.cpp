@@ -72,7 +72,12 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     options.scene_path = explained;
   }
   // First, so that --set can still change what belongs to the file (its unit, its axes).
-  if (!groom.empty()) options.overrides.insert(options.overrides.begin(), "groom.file.path=" + groom);
+  if (!groom.empty()) {
+    std::vector<std::string> first = {"groom.file.path=" + groom};
+    // A groom without a scene of its own brings no head: the built-in one is made to fit under it.
+    if (options.scene_path.empty()) first.push_back("head.radius_m=0");
+    options.overrides.insert(options.overrides.begin(), first.begin(), first.end());
+  }
   if (!shader_folder.empty()) options.config.shader_folder = shader_folder;
   return options;
 }

@@ -1,6 +1,7 @@
 #include "server/scene/scene_content.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "common/groom/groom_file.h"
@@ -16,6 +17,10 @@ constexpr uint32_t kScalpVertices = 2'000;
 constexpr double kInsideQuantile = 0.05;
 /// Collider radius over the radius at that quantile.
 constexpr float kColliderScale = 0.98f;
+/// Parts of the roots, from the top, that are tried as those of the head; fewer than kMinFittedRoots say
+/// nothing.
+constexpr std::array kUpperParts = {1.0, 0.75, 0.5, 0.35, 0.25};
+constexpr size_t kMinFittedRoots = 16;
 
 glm::vec3 head_center(const HeadDesc& head) {
   return head.has_center ? head.center_m : glm::vec3(0.0f);
@@ -67,10 +72,35 @@ Result<Mesh> load_head_mesh(const SceneDesc& scene, const glm::vec3& shift_m) {
   return mesh;
 }
 
+float extent_m(const std::vector<glm::vec3>& points_m) {
+  glm::vec3 low = points_m.front(), high = points_m.front();
+  for (const glm::vec3& point : points_m) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  return glm::length(high - low);
+}
+
+/// The sphere under the hair of the head. A mane that goes on down the neck and the back does not wrap its
+/// fitted sphere; then only its upper roots count. Falls back to all roots.
+FittedSphere fit_head_sphere(const Groom& groom) {
+  std::vector<glm::vec3> roots = roots_of(groom);
+  const FittedSphere of_all = fit_sphere(roots);
+  std::sort(roots.begin(), roots.end(), [](const glm::vec3& a, const glm::vec3& b) { return a.y > b.y; });
+  for (const double part : kUpperParts) {
+    const auto count = static_cast<size_t>(part * static_cast<double>(groom.strand_count()));
+    if (count < kMinFittedRoots) break;
+    roots.resize(count);
+    const FittedSphere fitted = fit_sphere(roots);
+    if (extent_m(roots) >= 2.0f * fitted.radius_m) return fitted;
+  }
+  return of_all;
+}
+
 /// Moves a groom whose file and scene do not say where the head joint is: the middle of the head, which a
 /// head turns about much more nearly than about a file's origin between the feet. Returns the shift, m.
 glm::vec3 centre_on_roots(Groom& groom) {
-  const glm::vec3 shift_m = -fit_sphere(roots_of(groom)).center_m;
+  const glm::vec3 shift_m = -fit_head_sphere(groom).center_m;
   for (glm::vec3& position : groom.rest_position_m) position += shift_m;
   return shift_m;
 }
@@ -80,7 +110,7 @@ Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom, const gl
   if (!scene.head.mesh_path.empty()) return load_head_mesh(scene, shift_m);
   // Under a groom from a file the built-in head is put where its roots are, unless the scene says where.
   const bool is_fitted = std::holds_alternative<FileGroomDesc>(scene.groom);
-  const FittedSphere fitted = is_fitted ? fit_sphere(roots_of(groom)) : FittedSphere{{}, kDefaultHeadRadiusM};
+  const FittedSphere fitted = is_fitted ? fit_head_sphere(groom) : FittedSphere{{}, kDefaultHeadRadiusM};
   const glm::vec3 center_m = scene.head.has_center ? scene.head.center_m : fitted.center_m;
   Mesh mesh = make_head(scene.head.radius_m > 0.0f ? scene.head.radius_m : fitted.radius_m);
   for (glm::vec3& position : mesh.position_m) position += center_m;
@@ -91,7 +121,7 @@ Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom, const gl
 
 SphereCollider fit_head_collider(const Groom& groom) {
   const std::vector<glm::vec3> roots = roots_of(groom);
-  const FittedSphere fitted = fit_sphere(roots);
+  const FittedSphere fitted = fit_head_sphere(groom);
   std::vector<float> distance_m(roots.size());
   std::transform(roots.begin(), roots.end(), distance_m.begin(),
                  [&](const glm::vec3& root) { return glm::length(root - fitted.center_m); });

@@ -149,7 +149,8 @@ TEST(ServerOptions, ReadsWhatTheCommandLineSays) {
   ASSERT_TRUE(options.ok()) << options.error().to_string();
   EXPECT_EQ(options->config.net.port, 0);
   EXPECT_EQ(options->config.net.address, "::1");
-  EXPECT_THAT(options->overrides, testing::ElementsAre("groom.file.path=a.tfx", "substeps=2", "wind.seed=7"));
+  EXPECT_THAT(options->overrides,
+              testing::ElementsAre("groom.file.path=a.tfx", "head.radius_m=0", "substeps=2", "wind.seed=7"));
   EXPECT_EQ(options->run_s, 2.5);
   EXPECT_TRUE(parse({"--explain"})->is_explaining);
   EXPECT_EQ(parse({"--explain", "x.textproto"})->scene_path, "x.textproto");
