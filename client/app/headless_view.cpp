@@ -119,21 +119,21 @@ Status render_snapshots(const ViewOptions& options, const SceneAsset& asset, con
       options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir);
   ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, welcome.look));
 
-  const auto draw = [&](const Snapshot& snapshot) -> Result<Image> {
+  const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot), welcome.camera, options.size));
+    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot), welcome.camera, size));
     Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
     render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     return image;
   };
   if (!options.screenshot.empty() && collected.screenshot_snapshot) {
-    ASSIGN_OR_RETURN(const Image image, draw(*collected.screenshot_snapshot));
+    ASSIGN_OR_RETURN(const Image image, draw(*collected.screenshot_snapshot, options.size));
     RETURN_IF_ERROR(save_png(options.screenshot, image));
   }
   if (options.clip.empty()) return {};
   ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
   for (const auto& snapshot : collected.clip_snapshots) {
-    ASSIGN_OR_RETURN(const Image image, draw(*snapshot));
+    ASSIGN_OR_RETURN(const Image image, draw(*snapshot, options.clip_size));
     RETURN_IF_ERROR(clip.add(image));
   }
   return clip.finish();

@@ -58,6 +58,7 @@ struct RawOptions {
   std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
   std::string mode = "strands";
   std::string size = "960x540";
+  std::string clip_size;  // empty = as size
   std::string token_file;
   double seconds = 0.0;
   bool is_smooth = false;
@@ -82,6 +83,7 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--clip-fps", options.clip_fps, "Pictures per second of the clip")
       ->check(CLI::Range(1.0, kMaxClipFps))
       ->capture_default_str();
+  app.add_option("--clip-size", raw.clip_size, "Size of the clip (default: as --size)");
   app.add_option("--seconds", raw.seconds, "Stop after this long")->check(CLI::Range(0.1, 1e6));
   app.add_option("--report", options.report, "Write what was measured: .json, else key=value lines");
   app.add_option("--shader-dir", options.shader_dir, "Read shaders from this folder");
@@ -94,6 +96,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   ASSIGN_OR_RETURN(options.address, parse_address(raw.connect));
   ASSIGN_OR_RETURN(options.mode, parse_mode(raw.mode));
   ASSIGN_OR_RETURN(options.size, parse_size(raw.size));
+  ASSIGN_OR_RETURN(options.clip_size, parse_size(raw.clip_size.empty() ? raw.size : raw.clip_size));
   if (!raw.token_file.empty()) {
     ASSIGN_OR_RETURN(options.token, load_token(raw.token_file));
   }

@@ -24,6 +24,7 @@ struct ViewOptions {
   std::filesystem::path clip;        // empty = none
   double clip_s = 3.0;
   double clip_fps = 15.0;
+  RenderSize clip_size{960, 540};
   std::optional<double> seconds;     // stop after this long
   std::filesystem::path report;      // empty = none
   std::filesystem::path shader_dir;  // empty = the shaders in the program

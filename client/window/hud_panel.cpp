@@ -42,11 +42,10 @@ void draw_hud_panel(const HudState& hud) {
     row("server step", fmt::format("{:.2f} ms, x{:.2f} real time", hud.sim_ms, hud.realtime_factor));
     row("stream", fmt::format("{:.1f} kB/s, {:.0f} frames/s", hud.kilobytes_per_s, hud.frames_per_s));
     row("state age", fmt::format("{:.1f} ms", hud.state_age_ms));
-    // To the screen: the way to the decoded state, then decoding is in it, then waiting and drawing.
-    row("motion to photon",
-        fmt::format(
-            "{:.1f} ms decoded + {:.1f} ms draw{}", hud.motion_to_decoded_ms, hud.render_ms,
-            hud.playout_delay_ms > 0.0 ? fmt::format(" + {:.1f} ms smooth", hud.playout_delay_ms) : ""));
+    if (hud.motion_to_decoded_ms > 0.0)
+      row("motion to photon",
+          fmt::format("{:.1f} ms decoded + {:.1f} ms draw{}", hud.motion_to_decoded_ms, hud.render_ms,
+                      hud.playout_delay_ms > 0.0 ? fmt::format(" + {:.1f} ms smooth", hud.playout_delay_ms) : ""));
     row("encode, decode", fmt::format("{:.2f} ms, {:.2f} ms", hud.encode_ms, hud.decode_ms));
     row("round trip", fmt::format("{:.2f} ms", hud.round_trip_ms));
     row("dropped", fmt::format("{} server, {} missed, {} here", hud.dropped_by_server, hud.missed_frames,
@@ -76,8 +75,8 @@ void draw_help_panel() {
       {"Esc, Q", "quit"},
   }};
   constexpr float kKeyColumn = 160.0f;
-  ImGui::SetNextWindowPos(ImVec2(kMargin, ImGui::GetIO().DisplaySize.y - kMargin), ImGuiCond_Always,
-                          ImVec2(0.0f, 1.0f));
+  const ImVec2 area = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos(ImVec2(area.x - kMargin, area.y - kMargin), ImGuiCond_Always, ImVec2(1.0f, 1.0f));
   ImGui::SetNextWindowBgAlpha(kPanelAlpha);
   if (ImGui::Begin("help", nullptr, kPanelFlags)) {
     for (const auto& [key, meaning] : kHelp) {

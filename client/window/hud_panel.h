@@ -7,7 +7,7 @@ namespace strandcast {
 
 /// Measurements, top left.
 void draw_hud_panel(const HudState& hud);
-/// Mouse and keys, bottom left.
+/// Mouse and keys, bottom right.
 void draw_help_panel();
 /// What is wrong with the connection, in the middle.
 void draw_connection_banner(const HudState& hud);

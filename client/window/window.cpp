@@ -186,6 +186,10 @@ void Window::show_image(const Image& image, uint64_t image_number) {
 }
 
 void Window::end_frame(const HudState& hud) {
+  // The renderer leaves its own target bound; the panel's backend draws into whatever it finds.
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glDisable(GL_FRAMEBUFFER_SRGB);
+  glDisable(GL_RASTERIZER_DISCARD);
   if (state_->is_hud_visible) draw_hud_panel(hud);
   if (state_->is_help_visible) draw_help_panel();
   if (!hud.is_connected) draw_connection_banner(hud);
