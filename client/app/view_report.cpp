@@ -50,7 +50,7 @@ ViewReport make_report(ViewerSession& session) {
   const Welcome& welcome = session.welcome();
   const ReplayStats& strands = session.replay().stats();
   const PictureStats& pictures = session.picture_stats();
-  const NetCounters net = session.client().counters();
+  const ConnectionCounters net = session.client().counters();
   const ClockOffset clock = session.client().clock();
   const ServerStatus& server = session.status();
   const bool is_frames = welcome.mode == StreamMode::Frames;

@@ -181,7 +181,7 @@ class WindowedView {
   HudState hud() {
     const int64_t time_ns = now_ns();
     const ClockOffset clock = session().client().clock();
-    const NetCounters net = session().client().counters();
+    const ConnectionCounters net = session().client().counters();
     const Welcome& welcome = session().welcome();
     const ServerStatus& status = session().status();
     StrandReplay& replay = session().replay();

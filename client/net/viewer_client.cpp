@@ -136,9 +136,9 @@ class ViewerClient::Connection {
     return clock_;
   }
 
-  NetCounters counters() const {
+  ConnectionCounters counters() const {
     const std::lock_guard lock(mutex_);
-    NetCounters counters = counters_;
+    ConnectionCounters counters = counters_;
     counters.dropped_strand_frames = mailbox_.dropped_strand_frames();
     return counters;
   }
@@ -442,7 +442,7 @@ class ViewerClient::Connection {
   std::deque<std::vector<std::byte>> outbound_;
   size_t outbound_bytes_ = 0;
   ClockOffset clock_;
-  NetCounters counters_;
+  ConnectionCounters counters_;
   std::optional<std::chrono::steady_clock::time_point> last_keyframe_request_;
   std::thread thread_;
 };
@@ -477,7 +477,7 @@ size_t ViewerClient::queued_messages() const {
 ClockOffset ViewerClient::clock() const {
   return connection_->clock();
 }
-NetCounters ViewerClient::counters() const {
+ConnectionCounters ViewerClient::counters() const {
   return connection_->counters();
 }
 

@@ -36,7 +36,7 @@ inline constexpr std::chrono::milliseconds kPingInterval{1000};
 inline constexpr std::chrono::milliseconds kKeyframeRequestInterval{
     1000};  // at most one request in this time
 
-struct NetCounters {
+struct ConnectionCounters {
   uint64_t received_bytes = 0;  // payload of WebSocket messages
   uint64_t received_messages = 0;
   uint64_t sent_messages = 0;
@@ -71,7 +71,7 @@ class ViewerClient {
 
   /// Copy of the clock estimate; has no value until the first probe returned. Any thread.
   ClockOffset clock() const;
-  NetCounters counters() const;
+  ConnectionCounters counters() const;
 
  private:
   class Connection;

@@ -110,7 +110,7 @@ Status Server::State::start() {
                    make_strand_decoder(scene.stream.codec, {asset_->strand_count, asset_->vertex_count}));
   // The port first: a port in use is told at once, not after compiling shaders.
   ASSIGN_OR_RETURN(net_, NetServer::listen(config_.net, *this));
-  SimLoopConfig sim{scene, content_, config_.gl_device, config_.shader_folder};
+  SimLoopConfig sim{scene, content_, config_.gl_device, config_.shader_folder, config_.on_publish};
   ASSIGN_OR_RETURN(sim_, SimLoop::start(std::move(sim), hub_, slot_));
   start_workers(std::move(strand_encoder), std::move(strand_decoder));
   net_->start();
@@ -134,7 +134,7 @@ void Server::State::start_workers(std::unique_ptr<StrandEncoder> encoder,
     net_->broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});
   };
   const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset_, config_.scene.look};
-  frames_ = std::make_unique<FrameWorker>(std::move(decoder), gl_picture_painter(painter),
+  frames_ = std::make_unique<FrameWorker>(std::move(decoder), config_.make_painter(painter),
                                           config_.scene.stream.frame_rate_hz, std::move(hooks));
   const auto sink = [this](EncodedFramePtr frame) {
     {

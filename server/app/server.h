@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "common/scene/scene_desc.h"
 #include "server/app/sim_loop.h"
 #include "server/encode/frame_worker.h"
+#include "server/encode/picture_painter.h"
 #include "server/encode/strand_encode_worker.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
@@ -23,6 +25,9 @@ struct ServerConfig {
   NetConfig net;
   std::string gl_device = "auto";                      // as EglContext::make
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+  SnapshotObserver on_publish;                         // may be empty
+  std::function<MakePicturePainter(GlPainterConfig)> make_painter =
+      gl_picture_painter;  // of the frame thread
 };
 
 struct ServerCounters {

@@ -255,7 +255,9 @@ void SimLoop::publish() {
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
   input.motion_time_ns = input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
-  slot_.put(publisher_->publish(*solver_, input));
+  std::shared_ptr<const Snapshot> snapshot = publisher_->publish(*solver_, input);
+  if (config_.on_publish) config_.on_publish(snapshot);
+  slot_.put(std::move(snapshot));
   published_tick_ = tick_;
   ++published_count_;
   if (publisher_->quarantined().empty()) return;

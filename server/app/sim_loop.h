@@ -34,11 +34,15 @@ namespace strandcast {
 /// While nobody watches, states are read back only this often, to find broken strands.
 inline constexpr uint64_t kIdlePublishSteps = 30;
 
+/// Sees every published state; for tests and recordings. Must return quickly.
+using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot>&)>;
+
 struct SimLoopConfig {
   SceneDesc scene;
   std::shared_ptr<const SceneContent> content;
   std::string gl_device = "auto";                      // as EglContext::make
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+  SnapshotObserver on_publish;                         // may be empty; on the simulation thread
 };
 
 /// Totals since start, and the present state.

@@ -1,0 +1,361 @@
+// The whole product in one process: server with simulation, encode, frame and network threads, a source that
+// feeds it over the network, and viewers that decode and draw what it streams.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "client/app/ctl_commands.h"
+#include "client/app/feed.h"
+#include "client/app/headless_view.h"
+#include "client/app/stream_check.h"
+#include "client/app/viewer_session.h"
+#include "common/base/file.h"
+#include "common/gl/egl_context.h"
+#include "common/motion/motion_clip.h"
+#include "common/render/renderer.h"
+#include "server/app/server.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+
+constexpr uint32_t kStrands = 150;
+constexpr uint32_t kVertices = 8;
+constexpr milliseconds kWait{50};
+constexpr double kDeadlineS = 60.0;  // never reached by code that works
+
+/// What the server's frame thread painted, before JPEG.
+struct Painted {
+  uint64_t tick = 0;
+  PictureView view;
+  Image image;
+};
+
+/// Everything seen from inside the server.
+class Observer {
+ public:
+  void saw(const Snapshot& snapshot) {
+    const std::lock_guard lock(mutex_);
+    hash_by_tick_[snapshot.tick] = state_hash(snapshot);
+  }
+  void saw(Painted painted) {
+    constexpr size_t kKept = 400;
+    const std::lock_guard lock(mutex_);
+    if (painted_.size() < kKept) painted_.push_back(std::move(painted));
+  }
+  std::map<uint64_t, uint64_t> hash_by_tick() const {
+    const std::lock_guard lock(mutex_);
+    return hash_by_tick_;
+  }
+  std::vector<Painted> painted() const {
+    const std::lock_guard lock(mutex_);
+    return painted_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<uint64_t, uint64_t> hash_by_tick_;
+  std::vector<Painted> painted_;
+};
+
+class ObservedPainter : public PicturePainter {
+ public:
+  ObservedPainter(std::unique_ptr<PicturePainter> painter, Observer& observer)
+      : painter_(std::move(painter)), observer_(observer) {}
+  Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
+    auto image = painter_->paint(snapshot, view);
+    if (image) observer_.saw({snapshot.tick, view, *image});
+    return image;
+  }
+
+ private:
+  std::unique_ptr<PicturePainter> painter_;
+  Observer& observer_;
+};
+
+class EndToEnd : public testing::Test {
+ protected:
+  void SetUp() override {
+    ServerConfig config;
+    config.scene = built_in_scene();
+    auto& groom = std::get<ProceduralGroomDesc>(config.scene.groom);
+    groom.strand_count = kStrands;
+    groom.vertex_count = kVertices;
+    config.scene.stream.frame_width = 96;
+    config.scene.stream.frame_height = 64;
+    config.net.port = 0;
+    config.on_publish = [this](const auto& snapshot) { observer_.saw(*snapshot); };
+    config.make_painter = [this](GlPainterConfig painter) -> MakePicturePainter {
+      return [this,
+              make = gl_picture_painter(std::move(painter))]() -> Result<std::unique_ptr<PicturePainter>> {
+        ASSIGN_OR_RETURN(auto made, make());
+        return std::unique_ptr<PicturePainter>(std::make_unique<ObservedPainter>(std::move(made), observer_));
+      };
+    };
+    auto server = Server::start(config);
+    ASSERT_TRUE(server) << server.error().to_string();
+    server_ = std::move(server).value();
+  }
+
+  void TearDown() override {
+    stop_feeding_ = true;
+    if (feeder_.joinable()) feeder_.join();
+    if (server_ == nullptr) return;
+    EXPECT_FALSE(server_->failure());
+    server_->stop();
+  }
+
+  ClientConfig client_config(StreamMode mode = StreamMode::Strands, Role role = Role::Viewer) const {
+    ClientConfig config;
+    config.address = {"127.0.0.1", server_->port()};
+    config.hello.role = role;
+    config.hello.mode = mode;
+    config.hello.name = "test";
+    return config;
+  }
+
+  std::unique_ptr<ViewerSession> join(StreamMode mode = StreamMode::Strands, Role role = Role::Viewer) {
+    auto session = ViewerSession::open(client_config(mode, role));
+    EXPECT_TRUE(session) << session.error().to_string();
+    return session ? std::move(session).value() : nullptr;
+  }
+
+  /// The built-in head motion, over the network, until the test ends.
+  void start_feeding() {
+    feeder_ = std::thread([this] {
+      auto client = ViewerClient::connect(client_config(StreamMode::Strands, Role::Source));
+      ASSERT_TRUE(client) << client.error().to_string();
+      FeedPlan plan;
+      plan.motion = built_in_motion;
+      const auto fed = feed(**client, plan, stop_feeding_, {});
+      EXPECT_TRUE(fed) << fed.error().to_string();
+    });
+  }
+
+  /// Pumps the sessions in turn until the condition holds.
+  template <class Condition>
+  [[nodiscard]] bool pump_until(const std::vector<ViewerSession*>& sessions, Condition condition) {
+    const int64_t begin_ns = now_ns();
+    while (!condition()) {
+      for (ViewerSession* session : sessions)
+        if (const auto pumped = session->pump(milliseconds(5)); !pumped) {
+          ADD_FAILURE() << pumped.error().to_string();
+          return false;
+        }
+      if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kDeadlineS) return false;
+    }
+    return true;
+  }
+
+  Observer observer_;
+  std::unique_ptr<Server> server_;
+  std::atomic<bool> stop_feeding_{false};
+  std::thread feeder_;
+};
+
+/// Hashes of what a session decodes, by tick.
+std::map<uint64_t, uint64_t>& record(ViewerSession& session, std::map<uint64_t, uint64_t>& hashes) {
+  session.set_snapshot_listener(
+      [&hashes](const auto& snapshot) { hashes[snapshot->tick] = state_hash(*snapshot); });
+  return hashes;
+}
+
+TEST_F(EndToEnd, TwoViewersDecodeTheServersStatesBitForBitEvenWhenOneJoinsLate) {
+  start_feeding();
+  std::map<uint64_t, uint64_t> first_hashes;
+  std::map<uint64_t, uint64_t> late_hashes;
+  auto first = join();
+  ASSERT_TRUE(first);
+  record(*first, first_hashes);
+  ASSERT_TRUE(pump_until({first.get()}, [&] { return first_hashes.size() >= 40; }));
+  auto late = join();
+  ASSERT_TRUE(late);
+  record(*late, late_hashes);
+  ASSERT_TRUE(pump_until({first.get(), late.get()}, [&] {
+    const auto newest = late->replay().newest();
+    return late_hashes.size() >= 40 && newest && newest->motion_time_ns != 0;
+  }));
+  EXPECT_NE(late->replay().newest()->world_from_head, Pose{}) << "the fed head motion reached the viewers";
+
+  const auto published = observer_.hash_by_tick();
+  for (const auto* hashes : {&first_hashes, &late_hashes})
+    for (const auto& [tick, hash] : *hashes) {
+      ASSERT_TRUE(published.contains(tick)) << tick;
+      EXPECT_EQ(published.at(tick), hash) << "tick " << tick;
+    }
+  for (const ViewerSession* session : {first.get(), late.get()}) {
+    EXPECT_EQ(session->replay().stats().rejected_frames, 0u) << session->replay().stats().last_error;
+    EXPECT_GE(session->replay().stats().keyframes, 1u);
+    ASSERT_NE(session->asset(), nullptr);
+    EXPECT_EQ(session->asset()->strand_count, kStrands);
+  }
+  EXPECT_GT(late_hashes.begin()->first, first_hashes.begin()->first);
+}
+
+TEST_F(EndToEnd, AKilledViewerDisturbsNobody) {
+  std::map<uint64_t, uint64_t> hashes;
+  auto survivor = join();
+  ASSERT_TRUE(survivor);
+  record(*survivor, hashes);
+  {
+    test::RawClient victim(server_->port());
+    ASSERT_TRUE(victim.handshake());
+    victim.send(Hello{});
+    ASSERT_TRUE(victim.read_media(Opcode::StrandKeyframe));
+    victim.reset();
+  }
+  ASSERT_TRUE(pump_until({survivor.get()}, [&] {
+    return hashes.size() >= 60 && survivor->has_status() && survivor->status().viewer_count == 1;
+  }));
+  EXPECT_EQ(survivor->replay().stats().rejected_frames, 0u);
+  const auto published = observer_.hash_by_tick();
+  for (const auto& [tick, hash] : hashes) EXPECT_EQ(published.at(tick), hash) << tick;
+}
+
+TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {
+  start_feeding();
+  std::map<uint64_t, std::shared_ptr<const Snapshot>> decoded;
+  auto strands = join();
+  auto frames = join(StreamMode::Frames);
+  ASSERT_TRUE(strands && frames);
+  strands->set_snapshot_listener([&](const auto& snapshot) { decoded[snapshot->tick] = snapshot; });
+  const auto common_pictures = [&] {
+    std::vector<Painted> common;
+    for (Painted& painted : observer_.painted())
+      if (decoded.contains(painted.tick)) common.push_back(std::move(painted));
+    return common;
+  };
+  ASSERT_TRUE(pump_until({strands.get(), frames.get()},
+                         [&] { return frames->image_count() >= 3 && common_pictures().size() >= 3; }));
+
+  auto context = gl::EglContext::make("auto");
+  ASSERT_TRUE(context) << context.error().to_string();
+  const Welcome& welcome = frames->welcome();
+  auto renderer = Renderer::make(gl::ShaderLibrary(), (*context)->info(), *strands->asset(), welcome.look);
+  ASSERT_TRUE(renderer) << renderer.error().to_string();
+  std::vector<Image> drawn;
+  for (const Painted& server : common_pictures()) {
+    const RenderSize size{welcome.frame_width, welcome.frame_height};
+    ASSERT_TRUE((*renderer)->draw(picture_of(*decoded.at(server.tick)), welcome.camera, size));
+    const Image client = (*renderer)->read_image();
+    ASSERT_EQ(client.width, server.image.width);
+    ASSERT_EQ(client.height, server.image.height);
+    EXPECT_TRUE(client.rgba == server.image.rgba) << "tick " << server.tick;
+    drawn.push_back(client);
+  }
+  // The head moves, so that equal pictures are not equal because nothing changes; and they show something.
+  EXPECT_FALSE(drawn.front().rgba == drawn.back().rgba);
+  const auto [darkest, brightest] = std::minmax_element(drawn[0].rgba.begin(), drawn[0].rgba.end());
+  EXPECT_GT(*brightest - *darkest, 60);
+}
+
+TEST_F(EndToEnd, AControllerPausesStepsAndIsToldWhatIsWrong) {
+  auto viewer = join(StreamMode::Strands, Role::Controller);
+  ASSERT_TRUE(viewer);
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->decoded_frames() >= 3; }));
+  ASSERT_TRUE(viewer->client().send(ControlCommand{Command::Pause}));
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->status().is_paused; }));
+  // The status may overtake frames that are on their way: wait until none has come for a while.
+  uint64_t tick = 0;
+  for (int quiet = 0; quiet < 10; ++quiet) {
+    ASSERT_TRUE(viewer->pump(kWait));
+    if (std::exchange(tick, viewer->replay().newest()->tick) != tick) quiet = 0;
+  }
+  ASSERT_TRUE(viewer->client().send(ControlCommand{Command::StepOnce}));
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().newest()->tick != tick; }));
+  EXPECT_EQ(viewer->replay().newest()->tick, tick + 1);
+
+  const CtlTarget target{fmt::format("127.0.0.1:{}", server_->port()), {}, {}};
+  EXPECT_EQ(run_command(target, ControlCommand{Command::Resume}), kDoneExit);
+  EXPECT_EQ(run_command(target, SetParameter{"solver.name=spaghetti"}), kRefusedExit);
+  EXPECT_EQ(run_health(target), kDoneExit);
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().newest()->tick > tick + 5; }));
+}
+
+TEST_F(EndToEnd, TheCheckCommandComparesTwoViewers) {
+  const auto check = check_stream(client_config(), 40, kDeadlineS);
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_TRUE(check->is_good()) << check->to_string();
+  EXPECT_GE(check->decoded_frames, 40u);
+}
+
+TEST_F(EndToEnd, TheHeadlessViewerLeavesPictureClipAndReport) {
+  start_feeding();
+  const TemporaryFolder folder;
+  ViewOptions options;
+  options.address = {"127.0.0.1", server_->port()};
+  options.mode = StreamMode::Strands;
+  options.is_headless = true;
+  options.size = {120, 80};
+  options.clip_size = {64, 48};
+  options.screenshot = folder.path() / "hair.png";
+  options.after_frames = 20;
+  options.clip = folder.path() / "hair.webp";
+  options.clip_s = 0.5;
+  options.clip_fps = 10.0;
+  const std::atomic<bool> stop{false};
+  const auto report = run_headless(options, stop);
+  ASSERT_TRUE(report) << report.error().to_string();
+  const auto png = load_png(options.screenshot);
+  ASSERT_TRUE(png) << png.error().to_string();
+  EXPECT_EQ(png->width, 120u);
+  EXPECT_GT(std::filesystem::file_size(options.clip), 100u);
+  const std::string lines = to_lines(*report);
+  EXPECT_THAT(lines, HasSubstr("rendered_frames=6\n")) << "five of the clip and the picture";
+  EXPECT_THAT(lines, HasSubstr("strands=150\n"));
+  EXPECT_THAT(to_json(*report), HasSubstr("\"mode\": \"strands\""));
+}
+
+TEST_F(EndToEnd, AStoppedServerTellsItsViewers) {
+  auto viewer = join();
+  ASSERT_TRUE(viewer);
+  server_->stop();
+  Status pumped;
+  while (pumped) pumped = viewer->pump(kWait);
+  EXPECT_EQ(pumped.error().code, ErrorCode::Unavailable) << "a viewer may come back when the server does";
+  EXPECT_THAT(pumped.error().message, HasSubstr("stopping"));
+}
+
+/// The window under a virtual display, as a person starts it.
+TEST_F(EndToEnd, TheWindowOpensDrawsAndLeaves) {
+  if (std::system("command -v xvfb-run >/dev/null") != 0)
+    GTEST_SKIP() << "xvfb-run (package xvfb) is not installed: no display to open a window on";
+  const TemporaryFolder folder;
+  const auto report = folder.path() / "report.txt";
+  const std::string command = fmt::format(
+      "xvfb-run -a -s '-screen 0 320x240x24' {} --connect 127.0.0.1:{} --size 160x120 --seconds 4 "
+      "--smooth --report {} >{} 2>&1",
+      STRANDCAST_VIEW_PROGRAM, server_->port(), report.string(), (folder.path() / "log").string());
+  const int status = std::system(command.c_str());
+  const auto log = load_text(folder.path() / "log", 1u << 20);
+  ASSERT_EQ(status, 0) << (log ? *log : "no output");
+  const auto lines = load_text(report, 1u << 20);
+  ASSERT_TRUE(lines) << lines.error().to_string();
+  EXPECT_EQ(lines->find("rendered_frames=0\n"), std::string::npos) << *lines;
+}
+
+TEST_F(EndToEnd, WithoutADisplayTheErrorNamesTheWayOut) {
+  const TemporaryFolder folder;
+  const std::string command =
+      fmt::format("env -u DISPLAY -u WAYLAND_DISPLAY {} --connect 127.0.0.1:{} >{} 2>&1",
+                  STRANDCAST_VIEW_PROGRAM, server_->port(), (folder.path() / "log").string());
+  const int status = std::system(command.c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  const auto log = load_text(folder.path() / "log", 1u << 20);
+  ASSERT_TRUE(log);
+  EXPECT_THAT(*log, HasSubstr("--headless"));
+}
+
+}  // namespace
+}  // namespace strandcast
