@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# One command from a clone to moving hair: installs what is missing, builds, starts the server, feeds it head motion
+# and wind as network streams, and opens the viewer. Without a display it leaves a picture, a clip and a report.
+set -euo pipefail
+
+usage() {
+  cat <<'TEXT'
+usage: bash deploy/run.sh [options]
+
+  --groom FILE         hair to simulate: TressFX .tfx (v2, v3, v4) or .hair     (default: grown on the spot)
+  --motion FILE        head motion to feed: BVH                                 (default: built in)
+  --motion-unit M      metres per unit of the BVH                               (default: 0.0564, CMU files)
+  --motion-up y|z      up axis of the BVH                                       (default: y)
+  --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
+  --scene FILE         scene as protobuf text, see deploy/scenes
+  --set PATH=VALUE     overrides one field of the scene; may be repeated
+  --seconds N          stop after N seconds                                     (default: 6 headless, else never)
+  --out DIR            where picture, clip, report and logs go                  (default: out)
+  --headless           no window, even where there is a display
+  --help
+TEXT
+}
+
+fail() { echo "run.sh: $1" >&2; exit 2; }
+
+motion=builtin; wind=gusts; motion_options=(); server_options=(); seconds=; out=out; headless=
+need_file() { [ -f "$2" ] || fail "$1: no such file: $2"; }
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --help|-h) usage; exit 0 ;;
+    --headless) headless=1; shift; continue ;;
+    --groom|--motion|--motion-unit|--motion-up|--wind|--scene|--set|--seconds|--out) ;;
+    *) usage >&2; fail "unknown option: $1" ;;
+  esac
+  [ $# -ge 2 ] || fail "$1 needs a value"
+  case "$1" in
+    --groom) need_file "$1" "$2"; server_options+=(--groom "$(realpath "$2")") ;;
+    --scene) need_file "$1" "$2"; server_options+=(--scene "$(realpath "$2")") ;;
+    --set) server_options+=(--set "$2") ;;
+    --motion) need_file "$1" "$2"; motion=$(realpath "$2") ;;
+    --motion-unit) motion_options+=(--unit "$2") ;;
+    --motion-up) motion_options+=(--up "$2") ;;
+    --wind) need_file "$1" "$2"; wind=$(realpath "$2") ;;
+    --seconds) [[ "$2" =~ ^[0-9]+(\.[0-9]+)?$ ]] || fail "--seconds: not a number: $2"; seconds=$2 ;;
+    --out) out=$2 ;;
+  esac
+  shift 2
+done
+if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then headless=1; fi
+mkdir -p "$out"
+out=$(realpath "$out")
+
+root=$(realpath "$(dirname "$0")/..")
+cd "$root"
+bash deploy/install_deps.sh
+echo "Building (the first time takes a few minutes) ..."
+cmake --preset release -DBUILD_TESTING=OFF >/dev/null
+cmake --build --preset release --target strandcast-server strandcast-view strandcast-ctl >"$out/build.log" 2>&1 \
+  || { tail -30 "$out/build.log" >&2; fail "the build failed; its whole output is in $out/build.log"; }
+bin=$root/build/release/bin
+
+pids=()
+stop_all() {
+  trap - EXIT INT TERM
+  for pid in "${pids[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
+  for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null || true; done
+}
+trap stop_all EXIT
+trap 'stop_all; exit 0' INT TERM
+
+port_file=$(mktemp)
+: >"$port_file"
+"$bin/strandcast-server" --port 0 --port-file "$port_file" "${server_options[@]}" 2>"$out/server.log" &
+server=$!
+pids+=("$server")
+for _ in $(seq 600); do
+  [ -s "$port_file" ] && break
+  kill -0 "$server" 2>/dev/null || { cat "$out/server.log" >&2; exit 2; }
+  sleep 0.1
+done
+[ -s "$port_file" ] || fail "the server did not start within 60 s; see $out/server.log"
+port=$(cat "$port_file")
+rm -f "$port_file"
+echo "Server on 127.0.0.1:$port (log: $out/server.log)"
+
+"$bin/strandcast-ctl" feed --connect "127.0.0.1:$port" --motion "$motion" --wind "$wind" --loop "${motion_options[@]}" \
+  >"$out/feed.log" 2>&1 &
+feed=$!
+pids+=("$feed")
+sleep 0.5
+kill -0 "$feed" 2>/dev/null || { cat "$out/feed.log" >&2; exit 2; }
+
+if [ -n "$headless" ]; then
+  "$bin/strandcast-view" --connect "127.0.0.1:$port" --headless --size 1280x720 --seconds "${seconds:-6}" \
+    --screenshot "$out/hair.png" --clip "$out/hair.webp" --clip-size 640x360 --report "$out/report.txt"
+  echo
+  echo "Picture: $out/hair.png"
+  echo "Clip:    $out/hair.webp (any browser plays it)"
+  echo "Report:  $out/report.txt"
+else
+  echo "Opening the viewer: drag to orbit, wheel to zoom, H for help, Esc to leave."
+  "$bin/strandcast-view" --connect "127.0.0.1:$port" ${seconds:+--seconds "$seconds"}
+fi
