@@ -9,7 +9,7 @@ usage: bash deploy/run.sh [options]
 
   --groom FILE         hair to simulate: TressFX .tfx (v2, v3, v4) or .hair     (default: grown on the spot)
   --motion FILE        head motion to feed: BVH                                 (default: built in)
-  --motion-unit M      metres per unit of the BVH                               (default: 0.0564, CMU files)
+  --motion-unit M      metres per unit of the BVH                               (default: from the body's height)
   --motion-up y|z      up axis of the BVH                                       (default: y)
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
   --scene FILE         scene as protobuf text, see deploy/scenes

@@ -68,6 +68,10 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
   ASSIGN_OR_RETURN(MotionClip loaded, load_bvh(options.motion, bvh));
   auto clip = std::make_shared<const MotionClip>(std::move(loaded));
   length_s = clip->duration_s();
+  if (options.unit_m == 0.0)
+    std::cerr << fmt::format(
+        "{}: one unit is taken as {:.4g} m, so that the body is {} m tall (change it with --unit)\n",
+        options.motion, clip->file_unit_m, kAssumedBodyHeightM);
   plan.motion = [clip, is_looped = options.is_looped](double t_s) {
     return clip->sample(wrapped(t_s, clip->duration_s(), is_looped));
   };

@@ -26,7 +26,7 @@ struct CtlTarget {
 struct FeedOptions {
   std::string motion = "builtin";  // "builtin", "none" or a BVH file
   std::string wind = "gusts";      // "gusts", "none" or a CSV file
-  double unit_m = 0.01;            // metres per unit of the BVH file
+  double unit_m = 0.0;             // metres per unit of the BVH file; 0 = guessed
   std::string up = "y";            // up axis of the BVH file
   std::string joint;               // head joint; empty = found by name
   bool is_looped = false;

@@ -28,8 +28,8 @@ void declare_feed(CLI::App& app, CommandLine& line) {
   FeedOptions& feed = line.feed;
   app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
-  app.add_option("--unit", feed.unit_m, "Metres per unit of the BVH file")
-      ->check(CLI::Range(1e-6, 1e3))
+  app.add_option("--unit", feed.unit_m, "Metres per unit of the BVH file, 0 = guessed from the body's height")
+      ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
   app.add_option("--up", feed.up, "Up axis of the BVH file")
       ->check(CLI::IsMember({"y", "z"}))

@@ -102,6 +102,7 @@ Groom reorder(const Groom& groom, const std::vector<uint32_t>& order) {
   CHECK(order.size() == groom.strand_count());
   Groom sorted;
   sorted.name = groom.name;
+  sorted.file_unit_m = groom.file_unit_m;
   sorted.offset.reserve(groom.offset.size());
   sorted.offset.push_back(0);
   sorted.rest_position_m.reserve(groom.rest_position_m.size());

@@ -25,6 +25,7 @@ enum class Pinning { Root, RootPair, BothEnds };  // vertex 0 | vertices 0 and 1
 
 struct Groom {
   std::string name;
+  float file_unit_m = 1.0f;                // metres per unit of the file it came from
   std::vector<uint32_t> offset;            // (strand_count + 1) first vertex of each strand
   std::vector<glm::vec3> rest_position_m;  // (vertex total) head space, root first
   std::vector<uint8_t> pinned;             // (vertex total) 1 = follows the head

@@ -5,15 +5,21 @@
 #include <string>
 
 #include "common/groom/hair_loader.h"
+#include "common/groom/mesh.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
 
 namespace strandcast {
 namespace {
 
+/// Radii of the sphere through the roots of a human head, child to large adult with a wide hairline.
+constexpr float kSmallestHeadRadiusM = 0.07f, kTypicalHeadRadiusM = 0.1f, kLargestHeadRadiusM = 0.14f;
+constexpr float kCommonUnitsM[] = {1.0f, 0.01f, 0.001f, 0.0254f};  // metre, centimetre, millimetre, inch
+
 Status check_options(const GroomFileOptions& options) {
-  if (!std::isfinite(options.unit_m) || options.unit_m <= 0.0f) {
-    return make_error(ErrorCode::BadInput, "unit_m is {}, it has to be above 0", options.unit_m);
+  if (!std::isfinite(options.unit_m) || options.unit_m < 0.0f) {
+    return make_error(ErrorCode::BadInput, "unit_m is {}, it has to be above 0, or 0 to be guessed",
+                      options.unit_m);
   }
   if (!std::isfinite(options.origin.x) || !std::isfinite(options.origin.y) ||
       !std::isfinite(options.origin.z)) {
@@ -49,13 +55,27 @@ uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
 
 }  // namespace
 
+float guess_unit_m(const Groom& groom) {
+  std::vector<glm::vec3> roots;
+  roots.reserve(groom.strand_count());
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
+    roots.push_back(groom.rest_position_m[groom.offset[strand]]);
+  const float radius = fit_sphere(roots).radius_m;
+  if (!std::isfinite(radius) || radius <= 0.0f) return 1.0f;
+  for (const float unit_m : kCommonUnitsM) {
+    if (radius * unit_m >= kSmallestHeadRadiusM && radius * unit_m <= kLargestHeadRadiusM) return unit_m;
+  }
+  return kTypicalHeadRadiusM / radius;
+}
+
 Result<Groom> load_groom(const GroomFileOptions& options) {
   if (const Status checked = check_options(options); !checked)
     return at(options.path.string(), checked.error());
   ASSIGN_OR_RETURN(Groom groom, load_by_extension(options.path));
+  groom.file_unit_m = options.unit_m > 0.0f ? options.unit_m : guess_unit_m(groom);
   for (glm::vec3& point : groom.rest_position_m) {
     const glm::vec3 upright = options.is_z_up ? glm::vec3(point.x, point.z, -point.y) : point;
-    point = (upright - options.origin) * options.unit_m;
+    point = (upright - options.origin) * groom.file_unit_m;
   }
   // Before resampling, so that overflown coordinates never enter its sums.
   if (const Status checked = validate(groom); !checked) return at(options.path.string(), checked.error());

@@ -14,13 +14,17 @@ namespace strandcast {
 
 struct GroomFileOptions {
   std::filesystem::path path;  // .tfx or .hair
-  float unit_m = 1.0f;         // metres per file unit, > 0
+  float unit_m = 0.0f;         // metres per file unit; 0 = guessed from the size of the head
   bool is_z_up = false;        // +Z up and -Y forward in the file; turned to +Y up and +Z forward
   glm::vec3 origin{0.0f};      // point that becomes the head joint: file units, after the axes are turned
   uint32_t vertex_count =
       0;  // resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can
   std::optional<Pinning> pinning;  // empty: as the file says
 };
+
+/// The first of metre, centimetre, millimetre and inch in which the sphere through the roots has the size of
+/// a human head, else whatever makes it one. `groom` is in file units.
+float guess_unit_m(const Groom& groom);
 
 /// Loads, turns, moves, scales and checks a groom; the result is uniform. With vertex_count 0 a ragged groom,
 /// or one outside of 2..kMaxVertexCount, is resampled to its largest vertex count clamped into these limits.

@@ -49,6 +49,7 @@ Groom resample(const Groom& groom, uint32_t vertex_count) {
   CHECK(vertex_count >= kMinVertexCount && vertex_count <= kMaxVertexCount);
   Groom result;
   result.name = groom.name;
+  result.file_unit_m = groom.file_unit_m;
   result.root_uv = groom.root_uv;
   const size_t vertex_total = size_t{groom.strand_count()} * vertex_count;
   result.offset.reserve(groom.offset.size());

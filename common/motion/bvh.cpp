@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "common/base/check.h"
 #include "common/base/file.h"
 #include "common/motion/text_cursor.h"
 
@@ -37,8 +38,14 @@ struct Joint {
   uint32_t first_channel = 0;
 };
 
+struct EndSite {
+  uint32_t parent = kNoJoint;
+  glm::dvec3 offset{0.0};
+};
+
 struct Skeleton {
-  std::vector<Joint> joints;
+  std::vector<Joint> joints;  // parents before children
+  std::vector<EndSite> end_sites;
   uint32_t channel_count = 0;
 };
 
@@ -98,7 +105,10 @@ class HierarchyParser {
         open.pop_back();
       } else if (equals_ignoring_case(word, "OFFSET")) {
         ASSIGN_OR_RETURN(const glm::dvec3 offset, parse_offset());
-        if (!is_end_site) skeleton_.joints[open.back()].offset = offset;
+        if (is_end_site)
+          skeleton_.end_sites.push_back({open[open.size() - 2], offset});
+        else
+          skeleton_.joints[open.back()].offset = offset;
       } else if (equals_ignoring_case(word, "CHANNELS") && !is_end_site) {
         RETURN_IF_ERROR(parse_channels(open.back()));
       } else if (equals_ignoring_case(word, "JOINT") && !is_end_site) {
@@ -185,6 +195,30 @@ std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index
     path.push_back(&skeleton.joints[joint_index]);
   std::reverse(path.begin(), path.end());
   return path;
+}
+
+/// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
+/// long as they are; rest poses often spread the legs. 0 for a skeleton without extent.
+double body_height(const Skeleton& skeleton, bool is_z_up) {
+  struct Reach {
+    double height = 0.0;  // above the root with all rotations zero
+    double bones = 0.0;   // length of the bones from the root
+  };
+  const int up = is_z_up ? 2 : 1;
+  const auto grown = [&](const Reach& parent, const glm::dvec3& offset) {
+    return Reach{parent.height + offset[up], parent.bones + glm::length(offset)};
+  };
+  std::vector<Reach> reach;
+  for (const Joint& joint : skeleton.joints)
+    reach.push_back(joint.parent == kNoJoint ? Reach{} : grown(reach[joint.parent], joint.offset));
+  const size_t joint_count = reach.size();
+  for (const EndSite& site : skeleton.end_sites) {
+    CHECK(site.parent < joint_count);
+    reach.push_back(grown(reach[site.parent], site.offset));
+  }
+  const auto [lowest, highest] = std::minmax_element(
+      reach.begin(), reach.end(), [](const Reach& a, const Reach& b) { return a.height < b.height; });
+  return lowest->bones + highest->bones;
 }
 
 /// Pose of the last joint of the path in the file's axes and units.
@@ -284,12 +318,12 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
 }
 
 /// From the file's axes and units to world axes and metres.
-void to_world(std::vector<Pose>& poses, const BvhOptions& options) {
+void to_world(std::vector<Pose>& poses, double unit_m, const BvhOptions& options) {
   const double quarter_turn_rad = glm::radians(90.0);
   const glm::dquat world_from_file =
       options.is_z_up ? glm::angleAxis(-quarter_turn_rad, kAxis[0]) : glm::dquat(1, 0, 0, 0);
   for (Pose& pose : poses) {
-    pose.position_m = world_from_file * (pose.position_m * options.unit_m);
+    pose.position_m = world_from_file * (pose.position_m * unit_m);
     // On both sides: the file's rest pose is turned upright too, so that it becomes the identity.
     pose.rotation = glm::normalize(world_from_file * pose.rotation * glm::conjugate(world_from_file));
   }
@@ -301,8 +335,9 @@ void to_world(std::vector<Pose>& poses, const BvhOptions& options) {
 }  // namespace
 
 Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, const BvhOptions& options) {
-  if (!(options.unit_m > 0.0) || !std::isfinite(options.unit_m))
-    return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0", options.unit_m);
+  if (!(options.unit_m >= 0.0) || !std::isfinite(options.unit_m))
+    return make_error(ErrorCode::BadInput, "the length unit is {} m, it must be above 0, or 0 to be guessed",
+                      options.unit_m);
   TextCursor cursor(text, place);
   ASSIGN_OR_RETURN(const Skeleton skeleton, HierarchyParser(cursor).parse());
   const auto head = find_head(skeleton, options.head_joint);
@@ -329,7 +364,13 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   if (options.skip_first_frame_if_t_pose &&
       begins_with_t_pose(clip.world_from_head, rest_share[0], rest_share[1]))
     clip.world_from_head.erase(clip.world_from_head.begin());
-  to_world(clip.world_from_head, options);
+  const double height = body_height(skeleton, options.is_z_up);
+  const bool is_guessed = options.unit_m == 0.0;
+  if (is_guessed && !(height > 0.0))
+    return at(place, make_error(ErrorCode::BadInput,
+                                "the skeleton has no height to guess the unit from: give the unit"));
+  clip.file_unit_m = is_guessed ? kAssumedBodyHeightM / height : options.unit_m;
+  to_world(clip.world_from_head, clip.file_unit_m, options);
   return clip;
 }
 

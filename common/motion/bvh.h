@@ -17,8 +17,11 @@ inline constexpr uint32_t kMaxBvhDepth = 128;
 inline constexpr uint32_t kMaxBvhFrames = 1'000'000;
 inline constexpr double kMinFrameTimeS = 1e-4, kMaxFrameTimeS = 10.0;
 
+/// Bones from the lowest to the highest point of a grown-up: the body, and the foot's length.
+inline constexpr double kAssumedBodyHeightM = 1.7;
+
 struct BvhOptions {
-  double unit_m = 0.01;      // metres per file unit
+  double unit_m = 0.0;       // metres per file unit; 0 = guessed from kAssumedBodyHeightM
   bool is_z_up = false;      // else +Y is up
   std::string head_joint{};  // empty: "Head" or "head", with or without a prefix ending in ':' or '_'
   bool skip_first_frame_if_t_pose = true;

@@ -14,6 +14,7 @@ namespace strandcast {
 struct MotionClip {
   double frame_s = 1.0 / 60.0;
   std::vector<Pose> world_from_head;  // one per frame
+  double file_unit_m = 1.0;           // metres per unit of the file it came from
 
   /// Time of the last pose, s; 0 for an empty clip.
   double duration_s() const;

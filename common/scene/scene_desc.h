@@ -33,7 +33,7 @@ struct ProceduralGroomDesc {
 
 struct FileGroomDesc {
   std::filesystem::path path;  // .tfx or .hair
-  float unit_m = 1.0f;         // metres per file unit
+  float unit_m = 0.0f;         // metres per file unit; 0 = guessed from the size of the head
   UpAxis up_axis = UpAxis::Y;
   glm::vec3 origin{0.0f};  // point of the file (in file units, after the up axis) that becomes the head joint
   bool has_origin = false;    // false: the centre of the sphere fitted to the roots

@@ -30,7 +30,7 @@ inline constexpr Range kLengthVariation{0.0, 0.95, ""};
 inline constexpr Range kCurlRadius{0.0, kMaxCurlRadiusM, "m"};
 inline constexpr Range kCurlTurns{0.0, kMaxCurlTurns, "turns"};
 inline constexpr Range kSeed{0, std::numeric_limits<uint32_t>::max(), ""};
-inline constexpr Range kUnit{1e-6, 1e3, "m"};
+inline constexpr Range kUnit{0.0, 1e3, "m"};
 inline constexpr Range kFileOrigin{-1e6, 1e6, "file units"};
 inline constexpr Range kHeadRadius{0.0, 1.0, "m"};
 inline constexpr Range kSolverParameter{-std::numeric_limits<double>::max(),

@@ -60,14 +60,14 @@ std::vector<glm::vec3> roots_of(const Groom& groom) {
 }
 
 /// A mesh of the groom's file: the same unit, axes and origin. `shift_m` is what the groom was moved by.
-Result<Mesh> load_head_mesh(const SceneDesc& scene, const glm::vec3& shift_m) {
+Result<Mesh> load_head_mesh(const SceneDesc& scene, float unit_m, const glm::vec3& shift_m) {
   const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
   ASSIGN_OR_RETURN(Mesh mesh, load_obj(scene.head.mesh_path, 1.0f));
   if (file == nullptr) return mesh;
   const bool is_z_up = file->up_axis == UpAxis::Z;
   const auto turn = [&](const glm::vec3& v) { return is_z_up ? glm::vec3(v.x, v.z, -v.y) : v; };
   const glm::vec3 origin = file->has_origin ? file->origin : glm::vec3(0.0f);
-  for (glm::vec3& position : mesh.position_m) position = (turn(position) - origin) * file->unit_m + shift_m;
+  for (glm::vec3& position : mesh.position_m) position = (turn(position) - origin) * unit_m + shift_m;
   for (glm::vec3& normal : mesh.normal) normal = turn(normal);
   return mesh;
 }
@@ -107,7 +107,7 @@ glm::vec3 centre_on_roots(Groom& groom) {
 
 Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom, const glm::vec3& shift_m) {
   if (!scene.head.is_visible) return Mesh{};
-  if (!scene.head.mesh_path.empty()) return load_head_mesh(scene, shift_m);
+  if (!scene.head.mesh_path.empty()) return load_head_mesh(scene, groom.file_unit_m, shift_m);
   // Under a groom from a file the built-in head is put where its roots are, unless the scene says where.
   const bool is_fitted = std::holds_alternative<FileGroomDesc>(scene.groom);
   const FittedSphere fitted = is_fitted ? fit_head_sphere(groom) : FittedSphere{{}, kDefaultHeadRadiusM};

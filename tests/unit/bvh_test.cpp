@@ -149,8 +149,23 @@ TEST(Bvh, ErrorsNameFileAndLine) {
   EXPECT_THAT(with("OFFSET 0 1 0", "OFFSET 0 1 inf"), HasSubstr("found \"inf\""));
   EXPECT_THAT(with("End Site", "End Sight"), HasSubstr("found \"Sight\""));
   BvhOptions options = kPlain;
+  options.unit_m = -1.0;
+  EXPECT_THAT(error_of(text, options), HasSubstr("unit is -1 m"));
   options.unit_m = 0.0;
-  EXPECT_THAT(error_of(text, options), HasSubstr("unit"));
+  std::string flat = text;
+  for (size_t at = flat.find("OFFSET 0 1"); at != std::string::npos; at = flat.find("OFFSET 0 1"))
+    flat.replace(at, 10, "OFFSET 0 0");
+  flat.replace(flat.find(" .5"), 3, " 0");
+  EXPECT_THAT(error_of(flat, options), HasSubstr("no height to guess the unit from"));
+}
+
+TEST(Bvh, UnitIsGuessedFromTheHeightOfTheSkeleton) {
+  BvhOptions options = kPlain;
+  options.unit_m = 0.0;
+  // Hips, neck 1 up, head 1 up and 0.5 forward, end site 1 up: the bones are as long as the body is tall.
+  const MotionClip clip = parsed(small_with("0 3 0 0 0 0 0 0 0 0 0 0\n0 3 0 0 0 0 0 0 0 0 0 0"), options);
+  EXPECT_DOUBLE_EQ(clip.file_unit_m, kAssumedBodyHeightM / (2.0 + std::sqrt(1.25)));
+  EXPECT_NEAR(clip.world_from_head[0].position_m.y, 5.0 * clip.file_unit_m, 1e-12);
 }
 
 TEST(Bvh, LimitsHoldBeforeAnythingGrows) {
@@ -228,6 +243,17 @@ Peaks peaks_of(const MotionClip& clip) {
         peaks.rotation_deg_per_s, glm::degrees(angle_between_rad(a.rotation, b.rotation)) / clip.frame_s);
   }
   return peaks;
+}
+
+TEST(BvhRealFiles, GuessedUnitsAgreeWithTheKnownOnes) {
+  if (!std::filesystem::exists(mocap_path(kRealFiles[0].name)))
+    GTEST_SKIP() << "no motion capture data beside the project";
+  for (const char* name : {"cmu_01_01_playground_jumps.bvh", "cmu_05_20_mb.bvh", "cmu_131_01.bvh"}) {
+    const auto clip = load_bvh(mocap_path(name), {});
+    ASSERT_TRUE(clip) << clip.error().to_string();
+    // People are not all 1.7 m tall: within an eighth of the published unit.
+    EXPECT_NEAR(clip->file_unit_m / 0.0564, 1.0, 0.125) << name;
+  }
 }
 
 TEST(BvhRealFiles, PeaksAndPosesAreThoseOfPeople) {

@@ -86,6 +86,26 @@ TEST(RealGroom, PonytailPartsHaveTheirCounts) {
   EXPECT_EQ(pins_per_root(*side), 2);
 }
 
+TEST(RealGroom, GuessedUnitMakesHumanHeads) {
+  REQUIRE_SHARED_DATA();
+  struct Known {
+    const char* name;
+    float smallest_m, largest_m;  // bounds of a believable unit
+  };
+  // Sintel is in metres; the ponytail's unit is about 0.4 cm, the mohawk's by its skull 0.63, and its mane
+  // down the back looks like a larger head.
+  for (const Known& known :
+       {Known{"sintel_11400x16.tfx", 1.0f, 1.0f}, Known{"ponytail_side.tfx", 0.002f, 0.006f},
+        Known{"Ratboy_mohawk.tfx", 0.15f, 1.0f}}) {
+    GroomFileOptions options;
+    options.path = shared_data() / "grooms" / known.name;
+    const auto groom = load_groom(options);
+    ASSERT_TRUE(groom) << groom.error().to_string();
+    EXPECT_GE(groom->file_unit_m, known.smallest_m) << known.name;
+    EXPECT_LE(groom->file_unit_m, known.largest_m) << known.name;
+  }
+}
+
 TEST(RealGroom, LoadsIntoHeadSpaceAtAnyVertexCount) {
   REQUIRE_SHARED_DATA();
   GroomFileOptions options;
