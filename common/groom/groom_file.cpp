@@ -5,7 +5,7 @@
 #include <string>
 
 #include "common/groom/hair_loader.h"
-#include "common/groom/mesh.h"
+#include "common/groom/head_fit.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
 
@@ -13,7 +13,7 @@ namespace strandcast {
 namespace {
 
 /// Radii of the sphere through the roots of a human head, child to large adult with a wide hairline.
-constexpr float kSmallestHeadRadiusM = 0.07f, kTypicalHeadRadiusM = 0.1f, kLargestHeadRadiusM = 0.14f;
+constexpr float kSmallestHeadRadiusM = 0.07f, kTypicalHeadRadiusM = 0.1f, kLargestHeadRadiusM = 0.12f;
 constexpr float kCommonUnitsM[] = {1.0f, 0.01f, 0.001f, 0.0254f};  // metre, centimetre, millimetre, inch
 
 Status check_options(const GroomFileOptions& options) {
@@ -56,11 +56,7 @@ uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
 }  // namespace
 
 float guess_unit_m(const Groom& groom) {
-  std::vector<glm::vec3> roots;
-  roots.reserve(groom.strand_count());
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
-    roots.push_back(groom.rest_position_m[groom.offset[strand]]);
-  const float radius = fit_sphere(roots).radius_m;
+  const float radius = fit_head_sphere(groom).radius_m;
   if (!std::isfinite(radius) || radius <= 0.0f) return 1.0f;
   for (const float unit_m : kCommonUnitsM) {
     if (radius * unit_m >= kSmallestHeadRadiusM && radius * unit_m <= kLargestHeadRadiusM) return unit_m;
@@ -72,11 +68,11 @@ Result<Groom> load_groom(const GroomFileOptions& options) {
   if (const Status checked = check_options(options); !checked)
     return at(options.path.string(), checked.error());
   ASSIGN_OR_RETURN(Groom groom, load_by_extension(options.path));
-  groom.file_unit_m = options.unit_m > 0.0f ? options.unit_m : guess_unit_m(groom);
   for (glm::vec3& point : groom.rest_position_m) {
-    const glm::vec3 upright = options.is_z_up ? glm::vec3(point.x, point.z, -point.y) : point;
-    point = (upright - options.origin) * groom.file_unit_m;
+    if (options.is_z_up) point = glm::vec3(point.x, point.z, -point.y);
   }
+  groom.file_unit_m = options.unit_m > 0.0f ? options.unit_m : guess_unit_m(groom);
+  for (glm::vec3& point : groom.rest_position_m) point = (point - options.origin) * groom.file_unit_m;
   // Before resampling, so that overflown coordinates never enter its sums.
   if (const Status checked = validate(groom); !checked) return at(options.path.string(), checked.error());
   const uint32_t vertex_count = target_vertex_count(groom, options.vertex_count);

@@ -23,7 +23,7 @@ struct GroomFileOptions {
 };
 
 /// The first of metre, centimetre, millimetre and inch in which the sphere through the roots has the size of
-/// a human head, else whatever makes it one. `groom` is in file units.
+/// a human head, else whatever makes it one. `groom` is in file units, +Y up.
 float guess_unit_m(const Groom& groom);
 
 /// Loads, turns, moves, scales and checks a groom; the result is uniform. With vertex_count 0 a ragged groom,

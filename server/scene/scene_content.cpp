@@ -1,10 +1,10 @@
 #include "server/scene/scene_content.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "common/groom/groom_file.h"
+#include "common/groom/head_fit.h"
 #include "common/groom/procedural.h"
 
 namespace strandcast {
@@ -17,10 +17,6 @@ constexpr uint32_t kScalpVertices = 2'000;
 constexpr double kInsideQuantile = 0.05;
 /// Collider radius over the radius at that quantile.
 constexpr float kColliderScale = 0.98f;
-/// Parts of the roots, from the top, that are tried as those of the head; fewer than kMinFittedRoots say
-/// nothing.
-constexpr std::array kUpperParts = {1.0, 0.75, 0.5, 0.35, 0.25};
-constexpr size_t kMinFittedRoots = 16;
 
 glm::vec3 head_center(const HeadDesc& head) {
   return head.has_center ? head.center_m : glm::vec3(0.0f);
@@ -52,13 +48,6 @@ Result<Groom> make_groom(const SceneDesc& scene) {
   return grow_groom(make_scalp_cap(head_center(scene.head), radius_m, kScalpVertices), options);
 }
 
-std::vector<glm::vec3> roots_of(const Groom& groom) {
-  std::vector<glm::vec3> roots(groom.strand_count());
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
-    roots[strand] = groom.rest_position_m[groom.offset[strand]];
-  return roots;
-}
-
 /// A mesh of the groom's file: the same unit, axes and origin. `shift_m` is what the groom was moved by.
 Result<Mesh> load_head_mesh(const SceneDesc& scene, float unit_m, const glm::vec3& shift_m) {
   const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
@@ -70,31 +59,6 @@ Result<Mesh> load_head_mesh(const SceneDesc& scene, float unit_m, const glm::vec
   for (glm::vec3& position : mesh.position_m) position = (turn(position) - origin) * unit_m + shift_m;
   for (glm::vec3& normal : mesh.normal) normal = turn(normal);
   return mesh;
-}
-
-float extent_m(const std::vector<glm::vec3>& points_m) {
-  glm::vec3 low = points_m.front(), high = points_m.front();
-  for (const glm::vec3& point : points_m) {
-    low = glm::min(low, point);
-    high = glm::max(high, point);
-  }
-  return glm::length(high - low);
-}
-
-/// The sphere under the hair of the head. A mane that goes on down the neck and the back does not wrap its
-/// fitted sphere; then only its upper roots count. Falls back to all roots.
-FittedSphere fit_head_sphere(const Groom& groom) {
-  std::vector<glm::vec3> roots = roots_of(groom);
-  const FittedSphere of_all = fit_sphere(roots);
-  std::sort(roots.begin(), roots.end(), [](const glm::vec3& a, const glm::vec3& b) { return a.y > b.y; });
-  for (const double part : kUpperParts) {
-    const auto count = static_cast<size_t>(part * static_cast<double>(groom.strand_count()));
-    if (count < kMinFittedRoots) break;
-    roots.resize(count);
-    const FittedSphere fitted = fit_sphere(roots);
-    if (extent_m(roots) >= 2.0f * fitted.radius_m) return fitted;
-  }
-  return of_all;
 }
 
 /// Moves a groom whose file and scene do not say where the head joint is: the middle of the head, which a

@@ -107,6 +107,7 @@ TEST(SceneContent, ManeDownTheBackDoesNotInflateTheHead) {
   SceneDesc scene = built_in_scene();
   FileGroomDesc file;
   file.path = path;
+  file.unit_m = 1.0f;
   scene.groom = file;
   scene.head.radius_m = 0.0f;
   const auto content = load_scene_content(scene);
