@@ -45,10 +45,6 @@ class ReferenceStrands : public Solver {
  private:
   void begin(ReferenceStrand& strand, uint32_t strand_index) const;
   glm::dvec3 predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const;
-  glm::dvec3 air_velocity(const glm::dvec3& point_m) const;
-  void push_out(ReferenceStrand& strand, uint32_t i, const glm::dvec3& start, glm::dvec3& end) const;
-  glm::dvec3 held_by_friction(const glm::dvec3& old, const glm::dvec3& end, const glm::dvec3& center,
-                              double radius) const;
   glm::dvec3 finish_velocity(const ReferenceStrand& strand, uint32_t i) const;
 
   StrandParameters parameters_;

@@ -4,11 +4,12 @@
 
 #include "server/sim/solvers/dftl/dftl.h"
 #include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
+#include "server/sim/solvers/direct_rod/direct_rod.h"
 
 namespace strandcast {
 
 const std::vector<SolverRow>& solver_table() {
-  static const std::vector<SolverRow> table = {dftl_row(), dftl_parallel_row()};
+  static const std::vector<SolverRow> table = {dftl_row(), dftl_parallel_row(), direct_rod_row()};
   return table;
 }
 

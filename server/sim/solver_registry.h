@@ -39,7 +39,7 @@ struct SolverRow {
 
 const std::vector<SolverRow>& solver_table();
 
-/// NotFound: "unknown solver 'x' (known: dftl, dftl_parallel)".
+/// NotFound: "unknown solver 'x' (known: dftl, dftl_parallel, direct_rod)".
 Result<const SolverRow*> find_solver(const std::string& name);
 
 /// Defaults filled in; BadInput for unknown names and values out of range.

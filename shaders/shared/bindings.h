@@ -13,6 +13,9 @@ using uint = uint32_t;
 // Storage blocks of the simulation.
 const uint kBindingPosition = 0u;
 const uint kBindingVelocity = 1u;
+const uint kBindingDisplacement = 2u;
+const uint kBindingVelocityChange = 3u;
+const uint kBindingRodScratch = 4u;
 
 // Uniform block of the simulation.
 const uint kBindingStep = 0u;
@@ -21,6 +24,10 @@ const uint kBindingStep = 0u;
 const uint kUnitRest = 0u;
 const uint kUnitPosition = 1u;
 const uint kUnitVelocity = 2u;
+const uint kUnitDisplacement = 3u;
+const uint kUnitVelocityChange = 4u;
+const uint kUnitRodEdge = 5u;
+const uint kUnitRodStrand = 6u;
 
 // Storage blocks of the renderer.
 const uint kBindingKeyPosition = 0u;

@@ -199,8 +199,10 @@ TEST_F(SolverLaws, FrictionHoldsAStrandOnACollider) {
     SCOPED_TRACE(kind.name());
     double slid_m[2] = {0.0, 0.0};
     for (const int is_rough : {0, 1}) {
-      auto solver =
-          make(kind, groom, {{"style_stiffness_per_s2", 0.0}, {"collider_friction", is_rough ? 2.0 : 0.0}});
+      auto solver = make(kind, groom,
+                         {{"style_stiffness_per_s2", 0.0},
+                          {"young_modulus_pa", 0.0},
+                          {"collider_friction", is_rough ? 2.0 : 0.0}});
       StepInput input;
       input.gravity_mps2 = {0.0, -9.81, 4.0};  // pulls sideways, across the strand
       input.colliders = {{glm::vec3(0.0f), 0.2f}};

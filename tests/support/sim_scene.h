@@ -8,7 +8,7 @@
 
 #include "common/base/hash.h"
 #include "common/groom/groom.h"
-#include "server/sim/solver.h"
+#include "server/sim/solver_registry.h"
 
 namespace strandcast {
 
@@ -98,6 +98,15 @@ inline double largest_distance_m(const std::vector<glm::vec3>& a, const std::vec
     largest = std::fmax(largest, distance);
   }
   return largest;
+}
+
+/// Of the given parameters, those that the row has: models differ in what can be set.
+inline SolverParameters known_parameters(const SolverRow& row, const SolverParameters& given) {
+  SolverParameters known;
+  for (const SolverParameterInfo& info : row.parameters) {
+    if (const auto found = given.find(info.name); found != given.end()) known.insert(*found);
+  }
+  return known;
 }
 
 /// All facts a solver may ask for.

@@ -30,11 +30,11 @@ class SolverTest : public GlTest {
     return kinds;
   }
 
-  /// A loaded solver; `given` holds only what differs from the defaults and is known to the row.
+  /// A loaded solver; `given` holds what differs from the defaults, as far as the row knows it.
   std::unique_ptr<Solver> make(const SolverKind& kind, const Groom& groom, const SolverParameters& given = {},
                                const glm::dquat& world_from_head = {1.0, 0.0, 0.0, 0.0},
                                const SceneFeatures& features = all_features()) {
-    const auto parameters = complete_parameters(*kind.row, given);
+    const auto parameters = complete_parameters(*kind.row, known_parameters(*kind.row, given));
     EXPECT_TRUE(parameters) << parameters.error().to_string();
     std::unique_ptr<Solver> solver;
     if (kind.is_gpu) {

@@ -33,7 +33,7 @@ TEST(SolverRegistry, UnknownSolversListTheKnownOnes) {
   const auto found = find_solver("dftl2");
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().code, ErrorCode::NotFound);
-  EXPECT_EQ(found.error().message, "unknown solver 'dftl2' (known: dftl, dftl_parallel)");
+  EXPECT_EQ(found.error().message, "unknown solver 'dftl2' (known: dftl, dftl_parallel, direct_rod)");
 }
 
 TEST(SolverRegistry, ParametersAreFilledInAndChecked) {

@@ -1,0 +1,96 @@
+#include "server/sim/reference_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/sim/strand_layout.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kTinyLength = 1e-12;
+
+/// Any unit vector at right angles to a unit vector.
+glm::dvec3 any_perpendicular(const glm::dvec3& axis) {
+  const glm::dvec3 other = std::abs(axis.x) < 0.6 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
+  return glm::normalize(glm::cross(axis, other));
+}
+
+// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
+// up to the friction coefficient times the depth that the collider has to push back.
+glm::dvec3 held_by_friction(const ReferenceSegment& segment, const glm::dquat& carry, double friction,
+                            const glm::dvec3& center, double radius) {
+  const glm::dvec3& end = segment.end_m;
+  const double distance = glm::distance(end, center);
+  if (distance < kTinyLength) return end;
+  const glm::dvec3 normal = (end - center) / distance;
+  const glm::dvec3 slip = end - carry * segment.old_m;
+  const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
+  const double way = glm::length(sliding);
+  if (way < kTinyLength) return end;
+  return end - sliding * std::min(1.0, friction * (radius - distance) / way);
+}
+
+}  // namespace
+
+glm::dvec3 shortened(const glm::dvec3& value, double longest) {
+  const double length = glm::length(value);
+  return length > longest ? value * (longest / length) : value;
+}
+
+glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3& center, double radius) {
+  const double length = segment.length_m;
+  const glm::dvec3 to_center = center - segment.start_m;
+  const double distance = glm::length(to_center);
+  if (distance < kTinyLength || length < kTinyLength) return segment.end_m;
+  const glm::dvec3 axis = to_center / distance;
+  // Law of cosines in the triangle start, end, center.
+  const double cosine = std::clamp(
+      (length * length + distance * distance - radius * radius) / (2.0 * length * distance), -1.0, 1.0);
+  const glm::dvec3 along = segment.end_m - segment.start_m;
+  glm::dvec3 side = along - axis * glm::dot(along, axis);
+  const double side_length = glm::length(side);
+  side = side_length > kTinyLength ? side / side_length : any_perpendicular(axis);
+  return segment.start_m + length * (cosine * axis + std::sqrt(1.0 - cosine * cosine) * side);
+}
+
+// 003 solves collider and length constraints in turn and leaves the exact solution of both (figure 4.1) out
+// for its cost; turning the segment onto the sphere is that exact solution. Several colliders: out of the one
+// with the largest r^2 - |p - c|^2 first, then once more.
+glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
+                      ReferenceSegment segment) {
+  const size_t collider_count = std::min<size_t>(input.colliders.size(), kMaxSphereColliders);
+  const int rounds = collider_count > 1 ? 2 : 1;
+  for (int round = 0; round < rounds; ++round) {
+    double most = 0.0;
+    glm::dvec3 center(0.0);
+    double radius = 0.0;
+    for (size_t c = 0; c < collider_count; ++c) {
+      const glm::dvec3 candidate = limited(glm::dvec3(input.colliders[c].center_m), kMaxColliderM);
+      const double r = std::max(0.0, limited(input.colliders[c].radius_m, kMaxColliderM));
+      const double inside = r * r - glm::dot(segment.end_m - candidate, segment.end_m - candidate);
+      if (inside <= most) continue;
+      most = inside;
+      center = candidate;
+      radius = r;
+    }
+    if (most <= 0.0) break;
+    segment.end_m = held_by_friction(segment, carry, friction, center, radius);
+    segment.end_m = turned_onto_sphere(segment, center, radius);
+  }
+  return segment.end_m;
+}
+
+glm::dvec3 air_velocity_mps(const StepInput& input, const glm::dvec3& point_m) {
+  glm::dvec3 result = limited(input.wind_mps, kMaxWindMps);
+  const size_t count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);
+  for (size_t i = 0; i < count; ++i) {
+    const GustWave& wave = input.gusts[i];
+    const glm::dvec3 wave_vector = limited(glm::dvec3(wave.wave_vector_rad_per_m), kMaxPhaseRad);
+    const double angle = glm::dot(wave_vector, point_m) - limited(wave.phase_rad, kMaxPhaseRad);
+    result += limited(glm::dvec3(wave.amplitude_mps), kMaxWindMps) * std::sin(angle);
+  }
+  return result;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,57 @@
+// RodRest: the rest shape of one strand in the terms of the rod, computed once in double when a groom is
+// loaded; the numbers that both versions of the solver share. Plain data, any thread.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "server/sim/solvers/direct_rod/direct_rod.h"
+#include "server/sim/strand_layout.h"
+
+namespace strandcast {
+
+/// Head space. Entry i of a vector belongs to the edge that ends at vertex i.
+struct RodRest {
+  glm::dvec3 clamp_direction{0.0};  // of the strand where it leaves the head
+  glm::dvec3 frame_axis{0.0};       // at right angles to it; carried along the strand without twist
+  double mean_segment_m = 0.0;      // of the free edges
+  std::vector<glm::dvec3>
+      rest_direction;  // in the frame (axis, direction x axis, direction) of the edge before
+  std::vector<double> segment_m;
+  std::vector<double> tension_m2ps2;  // to start with: of a sag-free shape, else 0
+};
+
+/// `gravity_in_head_mps2` counts for a sag-free shape only. A strand pinned at both ends is never sag-free.
+RodRest make_rod_rest(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
+                      const glm::dvec3& gravity_in_head_mps2);
+
+/// The axis of an edge's frame on the next edge: turned by the smallest rotation from one direction to the
+/// other. All unit vectors, `axis` at right angles to `from`.
+glm::dvec3 carried_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to);
+
+/// Length that stiffness and mass of an edge are computed from: no shorter than a share of the mean, so that
+/// zero-length edges divide nothing by zero.
+double soft_length_m(double segment_m, double mean_segment_m);
+
+/// Stiffness of the joint at the clamp, moment per angle over mass per length. With tension T the angle
+/// decays from the clamp over sqrt(b / T); the factor 1 + kappa / 2 + sqrt(1 + kappa^2 / 4), kappa^2 =
+/// T l^2 / b, over b / l is the one with which edges of length l reach the continuous rod's displacement
+/// behind that layer (difference equation c (2 t_i - t_(i-1) - t_(i+1)) = -T l t_i summed up); 2 b / l, the
+/// clamp at the vertex, without tension.
+double clamp_stiffness(double stiffness_m4ps2, double tension_m2ps2, double segment_m);
+
+// Penalty of the multiplier's update, over (length / step)^2: the square of how often a wave of stretch
+// crosses the strand in one step. Any value has the same equilibrium. With less the strand gives way within a
+// step and loses energy when its lengths are restored; with much more float loses the inertia beside it.
+inline constexpr double kTensionPerCrossing = 3.0;
+// A step starts from the motion going on as it changed before, by at most this share of a segment. One solve
+// from a start that is wrong by more keeps a strand thrashing for ever.
+inline constexpr double kMaxTrendPerSegment = 0.1;
+inline constexpr double kStandardGravityMps2 = 9.80665;
+// theta / sin(theta) is held where sin^2(theta / 2) passes this (a right angle in one joint).
+inline constexpr double kMaxHalfSineSquared = 0.5;
+// A step of more than this times the one before starts with backward Euler: order 2 is stable up to 1 +
+// sqrt(2).
+inline constexpr double kMaxStepRatio = 2.0;
+
+}  // namespace strandcast
