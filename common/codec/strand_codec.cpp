@@ -14,6 +14,9 @@ struct Row {
 
 const std::vector<Row>& rows() {
   static const std::vector<Row> table = {
+      {{"adaptive", "as delta, coded value by value with probabilities that follow the errors near by"},
+       make_adaptive_encoder,
+       make_adaptive_decoder},
       {{"delta", "lattice steps predicted from the last frame and the neighbouring vertices, entropy coded"},
        make_delta_encoder,
        make_delta_decoder},

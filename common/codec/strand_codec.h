@@ -45,7 +45,7 @@ struct StrandStreamLimits {
 };
 
 struct StrandCodecInfo {
-  std::string name;     // "raw", "delta"
+  std::string name;     // "adaptive", "delta", "raw"
   std::string summary;  // one line
 };
 

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "common/base/check.h"
+#include "common/codec/strand_rows.h"
 
 // Integer results are the same on every path, so wider instructions may be chosen at run time. Sanitizers
 // start too late for the resolver that does so.
@@ -16,30 +17,6 @@
 #endif
 
 namespace strandcast {
-namespace {
-
-// Features, all of them lattice velocities or residuals. "now" is the frame being coded, "then" the one
-// before.
-//   0 own then          1 own residual then
-//   2 parent now        3 parent then          4 parent residual then      (parent = vertex nearer to the
-//   root) 5 grandparent now   6 grandparent then 7 child then        8 child residual then 9 neighbour now 10
-//   neighbour then      11 neighbour residual then   (same vertex of a strand near by)
-//  12 second now       13 second then         14 second residual then
-constexpr uint32_t kRowFeatureCount = 9;
-constexpr uint32_t kOwnThen = 0;
-constexpr int32_t kRound = 1 << (kWeightShift - 1);
-
-struct RowFeatures {
-  std::array<const int32_t*, kRowFeatureCount> row;  // each (strand_count)
-  const int32_t* now;                                // this row, for the neighbours
-  const int32_t* then;
-  const int32_t* residual_then;
-};
-
-uint32_t row_class(uint32_t vertex_index, uint32_t vertex_count) {
-  if (vertex_index < 3) return 0;
-  return vertex_index + 1 == vertex_count ? 2 : 1;
-}
 
 RowFeatures row_features(const StrandChain& chain, const int32_t* now, const int32_t* zeros, size_t axis,
                          uint32_t vertex_index) {
@@ -66,22 +43,22 @@ RowFeatures row_features(const StrandChain& chain, const int32_t* now, const int
   return features;
 }
 
-/// sum[s] = weighted sum of the features that lie in whole rows.
 STRANDCAST_WIDE
-void sum_rows(const RowFeatures& features, const RowWeights& weights, uint32_t* sum, size_t count) {
-  const int32_t* const f0 = features.row[0];
-  const int32_t* const f1 = features.row[1];
-  const int32_t* const f2 = features.row[2];
-  const int32_t* const f3 = features.row[3];
-  const int32_t* const f4 = features.row[4];
-  const int32_t* const f5 = features.row[5];
-  const int32_t* const f6 = features.row[6];
-  const int32_t* const f7 = features.row[7];
-  const int32_t* const f8 = features.row[8];
+void sum_rows(const RowFeatures& features, const RowWeights& weights, size_t begin, uint32_t* sum,
+              size_t count) {
+  const int32_t* const f0 = features.row[0] + begin;
+  const int32_t* const f1 = features.row[1] + begin;
+  const int32_t* const f2 = features.row[2] + begin;
+  const int32_t* const f3 = features.row[3] + begin;
+  const int32_t* const f4 = features.row[4] + begin;
+  const int32_t* const f5 = features.row[5] + begin;
+  const int32_t* const f6 = features.row[6] + begin;
+  const int32_t* const f7 = features.row[7] + begin;
+  const int32_t* const f8 = features.row[8] + begin;
   std::array<uint32_t, kRowFeatureCount> w;
   for (uint32_t k = 0; k < kRowFeatureCount; ++k) w[k] = static_cast<uint32_t>(int32_t{weights[k]});
   for (size_t s = 0; s < count; ++s) {
-    sum[s] = kRound + w[0] * static_cast<uint32_t>(f0[s]) + w[1] * static_cast<uint32_t>(f1[s]) +
+    sum[s] = kPredictionRound + w[0] * static_cast<uint32_t>(f0[s]) + w[1] * static_cast<uint32_t>(f1[s]) +
              w[2] * static_cast<uint32_t>(f2[s]) + w[3] * static_cast<uint32_t>(f3[s]) +
              w[4] * static_cast<uint32_t>(f4[s]) + w[5] * static_cast<uint32_t>(f5[s]) +
              w[6] * static_cast<uint32_t>(f6[s]) + w[7] * static_cast<uint32_t>(f7[s]) +
@@ -89,28 +66,9 @@ void sum_rows(const RowFeatures& features, const RowWeights& weights, uint32_t* 
   }
 }
 
-/// Adds the neighbours' share for strand s and gives the predicted velocity.
-struct NeighbourTerms {
-  std::array<uint32_t, 6> w;
+namespace {
 
-  explicit NeighbourTerms(const RowWeights& weights) {
-    for (uint32_t k = 0; k < w.size(); ++k)
-      w[k] = static_cast<uint32_t>(int32_t{weights[kRowFeatureCount + k]});
-  }
-  int32_t predict(const StrandChain& chain, const RowFeatures& features, uint32_t sum, size_t s) const {
-    const uint32_t n = chain.neighbour[s];
-    const uint32_t m = chain.second_neighbour[s];
-    if (n != s) {
-      sum += w[0] * static_cast<uint32_t>(features.now[n]) + w[1] * static_cast<uint32_t>(features.then[n]) +
-             w[2] * static_cast<uint32_t>(features.residual_then[n]);
-    }
-    if (m != s) {
-      sum += w[3] * static_cast<uint32_t>(features.now[m]) + w[4] * static_cast<uint32_t>(features.then[m]) +
-             w[5] * static_cast<uint32_t>(features.residual_then[m]);
-    }
-    return static_cast<int32_t>(sum) >> kWeightShift;
-  }
-};
+constexpr uint32_t kOwnThen = 0;  // feature
 
 /// Calls visit(row begin, features, weights) for each row, root rows first.
 template <class Visit>
@@ -136,30 +94,6 @@ uint32_t spread_bits(uint32_t x) {  // 10 bits, two zeros between each
   return (x | (x << 2)) & 0x09249249;
 }
 
-std::vector<uint32_t> morton_order(const StrandChain& chain) {
-  const size_t plane = chain.plane_size();
-  std::array<int64_t, 3> low;
-  int64_t extent = 1;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const auto [min, max] = std::minmax_element(
-        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane),
-        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane) + chain.strand_count);
-    low[axis] = *min;
-    extent = std::max(extent, int64_t{*max} - *min + 1);
-  }
-  std::vector<uint32_t> code(chain.strand_count);
-  for (size_t s = 0; s < code.size(); ++s) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const auto cell = static_cast<uint32_t>((chain.lattice[axis * plane + s] - low[axis]) * 1024 / extent);
-      code[s] |= spread_bits(cell) << axis;
-    }
-  }
-  std::vector<uint32_t> order(chain.strand_count);
-  std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
-  return order;
-}
-
 double root_distance(const StrandChain& chain, uint32_t a, uint32_t b) {
   double sum = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -168,6 +102,34 @@ double root_distance(const StrandChain& chain, uint32_t a, uint32_t b) {
     sum += difference * difference;
   }
   return sum;
+}
+
+/// For each strand of `order`, in which neighbours lie close together, the two nearest of smaller index.
+void find_neighbours(StrandChain& chain, const std::vector<uint32_t>& order) {
+  constexpr size_t kWindow = 24;  // places on the curve searched to each side
+  chain.neighbour.resize(chain.strand_count);
+  chain.second_neighbour.resize(chain.strand_count);
+  for (size_t place = 0; place < order.size(); ++place) {
+    const uint32_t s = order[place];
+    std::array<double, 2> best = {INFINITY, INFINITY};
+    std::array<uint32_t, 2> found = {s, s};
+    const size_t begin = place > kWindow ? place - kWindow : 0;
+    const size_t end = std::min(order.size(), place + kWindow + 1);
+    for (size_t i = begin; i < end; ++i) {
+      const uint32_t candidate = order[i];
+      if (candidate >= s) continue;
+      const double distance = root_distance(chain, s, candidate);
+      if (distance < best[0]) {
+        best = {distance, best[0]};
+        found = {candidate, found[0]};
+      } else if (distance < best[1]) {
+        best[1] = distance;
+        found[1] = candidate;
+      }
+    }
+    chain.neighbour[s] = found[0];
+    chain.second_neighbour[s] = found[1];
+  }
 }
 
 // ---- least squares ----
@@ -260,32 +222,38 @@ RowWeights solve(const Gram& gram) {
 
 }  // namespace
 
-void find_neighbours(StrandChain& chain) {
-  constexpr size_t kWindow = 24;  // places on the curve searched to each side
-  chain.neighbour.resize(chain.strand_count);
-  chain.second_neighbour.resize(chain.strand_count);
-  const std::vector<uint32_t> order = morton_order(chain);
-  for (size_t place = 0; place < order.size(); ++place) {
-    const uint32_t s = order[place];
-    std::array<double, 2> best = {INFINITY, INFINITY};
-    std::array<uint32_t, 2> found = {s, s};
-    const size_t begin = place > kWindow ? place - kWindow : 0;
-    const size_t end = std::min(order.size(), place + kWindow + 1);
-    for (size_t i = begin; i < end; ++i) {
-      const uint32_t candidate = order[i];
-      if (candidate >= s) continue;
-      const double distance = root_distance(chain, s, candidate);
-      if (distance < best[0]) {
-        best = {distance, best[0]};
-        found = {candidate, found[0]};
-      } else if (distance < best[1]) {
-        best[1] = distance;
-        found[1] = candidate;
-      }
-    }
-    chain.neighbour[s] = found[0];
-    chain.second_neighbour[s] = found[1];
+std::vector<uint32_t> root_curve_order(const StrandChain& chain) {
+  const size_t plane = chain.plane_size();
+  std::array<int64_t, 3> low;
+  int64_t extent = 1;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto [min, max] = std::minmax_element(
+        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane),
+        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane) + chain.strand_count);
+    low[axis] = *min;
+    extent = std::max(extent, int64_t{*max} - *min + 1);
   }
+  std::vector<uint32_t> code(chain.strand_count);
+  for (size_t s = 0; s < code.size(); ++s) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto cell = static_cast<uint32_t>((chain.lattice[axis * plane + s] - low[axis]) * 1024 / extent);
+      code[s] |= spread_bits(cell) << axis;
+    }
+  }
+  std::vector<uint32_t> order(chain.strand_count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
+  return order;
+}
+
+void find_neighbours(StrandChain& chain) {
+  find_neighbours(chain, root_curve_order(chain));
+}
+
+void find_neighbours(StrandChain& chain, size_t begin, size_t end) {
+  std::vector<uint32_t> order(end - begin);
+  std::iota(order.begin(), order.end(), static_cast<uint32_t>(begin));
+  find_neighbours(chain, order);
 }
 
 PredictorWeights fit_weights(const StrandChain& chain, const std::vector<int32_t>& velocity) {
@@ -331,7 +299,7 @@ std::vector<int32_t> find_residual(const StrandChain& chain, const PredictorWeig
   std::vector<uint32_t> sum(chain.strand_count);
   for_each_row(chain, weights, velocity.data(),
                [&](size_t begin, const RowFeatures& features, const RowWeights& row_weights) {
-                 sum_rows(features, row_weights, sum.data(), sum.size());
+                 sum_rows(features, row_weights, 0, sum.data(), sum.size());
                  const NeighbourTerms neighbours(row_weights);
                  for (size_t s = 0; s < sum.size(); ++s)
                    residual[begin + s] = wrapping_difference(velocity[begin + s],
@@ -347,7 +315,7 @@ std::vector<int32_t> find_velocity(const StrandChain& chain, const PredictorWeig
   std::vector<uint32_t> sum(chain.strand_count);
   for_each_row(chain, weights, velocity.data(),
                [&](size_t begin, const RowFeatures& features, const RowWeights& row_weights) {
-                 sum_rows(features, row_weights, sum.data(), sum.size());
+                 sum_rows(features, row_weights, 0, sum.data(), sum.size());
                  const NeighbourTerms neighbours(row_weights);
                  for (size_t s = 0; s < sum.size(); ++s)
                    velocity[begin + s] =

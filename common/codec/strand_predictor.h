@@ -37,6 +37,12 @@ struct StrandChain {
 /// Finds for each strand the two nearest roots among strands of smaller index (approximately: among those
 /// near it on a Morton curve).
 void find_neighbours(StrandChain& chain);
+/// The same within strands [begin, end) of a chain that lies in curve order: neighbours are among them. Sets
+/// these strands' entries only.
+void find_neighbours(StrandChain& chain, size_t begin, size_t end);
+
+/// The strands in the order of a Morton curve through their roots.
+std::vector<uint32_t> root_curve_order(const StrandChain& chain);
 
 /// Weights for the step from `chain` to `velocity` by least squares over a sample of strands; falls back to
 /// plain extrapolation or to no motion where one of these does better.

@@ -1,10 +1,12 @@
 // Prints bits per vertex and milliseconds of the strand codecs, and of raw lattices under zstd in the same
-// run, for test motions and for the built-in scene under its reference solver. Usage: codec_bench [frames]
+// run, for test motions and for the built-in scene under its reference solver. Usage: codec_bench [frames
+// [part of a scene's name]]
 #include <fmt/format.h>
 #include <zstd.h>
 
 #include <cstdlib>
 #include <functional>
+#include <string_view>
 
 #include "common/base/check.h"
 #include "common/base/profile.h"
@@ -138,7 +140,7 @@ void run_raw_zstd(const char* scene, const SnapshotSource& next, int frames) {
   print(scene, "raw+zstd3", row, snapshot.plane_size(), frames);
 }
 
-int run(int frames) {
+int run(int frames, std::string_view wanted) {
   struct Scene {
     const char* name;
     std::function<SnapshotSource()> start;
@@ -155,14 +157,17 @@ int run(int frames) {
       {"2000x16_idle", motion(2000, 16, MotionKind::Idle)},
       {"2000x16_active", motion(2000, 16, MotionKind::Active)},
       {"2000x16_extreme", motion(2000, 16, MotionKind::Extreme)},
+      {"10000x16_idle", motion(10000, 16, MotionKind::Idle)},
       {"10000x16_active", motion(10000, 16, MotionKind::Active)},
+      {"10000x16_extreme", motion(10000, 16, MotionKind::Extreme)},
   };
   fmt::print(
       "scene,codec,vertices,bits_per_vertex,mbit_per_s_at_60hz,keyframe_bits_per_vertex,encode_ms,decode_"
       "ms\n");
   for (const Scene& scene : scenes) {
-    for (const char* codec : {"raw", "delta"})
-      if (!run_codec(scene.name, codec, scene.start(), frames)) return 1;
+    if (std::string_view(scene.name).find(wanted) == std::string_view::npos) continue;
+    for (const StrandCodecInfo& codec : strand_codecs())
+      if (!run_codec(scene.name, codec.name, scene.start(), frames)) return 1;
     run_raw_zstd(scene.name, scene.start(), frames);
   }
   return 0;
@@ -174,5 +179,5 @@ int run(int frames) {
 int main(int argc, char** argv) {
   constexpr int kDefaultFrames = 120;
   const int frames = argc > 1 ? std::atoi(argv[1]) : kDefaultFrames;
-  return strandcast::run(frames > 0 ? frames : kDefaultFrames);
+  return strandcast::run(frames > 0 ? frames : kDefaultFrames, argc > 2 ? argv[2] : "");
 }

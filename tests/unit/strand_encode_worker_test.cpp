@@ -240,7 +240,7 @@ TEST_F(StrandEncoding, CountsBytesAndStampsTheSendTime) {
 
 /// Whoever starts at any keyframe of a busy stream decodes everything after it to the published states.
 TEST(StrandEncodingWithCodec, EveryKeyframeIsAWayIntoTheChain) {
-  for (const char* codec : {"delta", "raw"}) {
+  for (const char* codec : {"adaptive", "delta", "raw"}) {
     auto encoder = make_strand_encoder(codec);
     ASSERT_TRUE(encoder);
     SnapshotSlot slot;

@@ -1,5 +1,6 @@
 // proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
 #include "common/base/file.h"
+#include "common/codec/adaptive_slice.h"
 #include "common/codec/image_codec.h"
 #include "common/codec/scene_asset.h"
 #include "common/codec/strand_payload.h"
@@ -44,6 +45,13 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kBoundReachM", fmt::format("{} m", kBoundReachM)},
       {"kStrandFixedBytes", with_commas(kStrandFixedBytes)},
       {"kMaxImageSide", with_commas(kMaxImageSide)},
+      {"kMaxSliceCount", fmt::format("1..{}", kMaxSliceCount)},
+      {"kResidualBits", fmt::format("1/{} (`kResidualBits` {})", 1 << kResidualBits, kResidualBits)},
+      {"kMaxMagnitude", with_commas(kMaxMagnitude)},
+      {"kTableCount", with_commas(kTableCount)},
+      {"kLearnShift", fmt::format(">> {} (", kLearnShift)},
+      {"kLeastShare", fmt::format("`kLeastShare` {}", kLeastShare)},
+      {"kRansLow", with_commas(kRansLow)},
   };
   const std::string text = document();
   for (const auto& [name, value] : limits) {
@@ -62,6 +70,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
   EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
   EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
   EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("Table ({} axis + c) {}", kSizeCount, kFractionCount)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("symbols 0 to {} themselves", kFirstTail - 1)));
   EXPECT_THAT(text, HasSubstr(fmt::format("({} + sum of weight x feature) >> {}", 1 << (kWeightShift - 1),
                                           kWeightShift)));
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <random>
 
+#include "common/codec/adaptive_slice.h"
 #include "common/codec/byte_io.h"
 #include "common/codec/image_codec.h"
 #include "common/codec/strand_payload.h"
@@ -309,6 +310,33 @@ TEST(StrandBytes, BombsInsideAValidMessageAreRefused) {
     }
   }
   EXPECT_TRUE(stream.decoder->decode(delta->message));
+}
+
+TEST(StrandBytes, BombsInPlaceOfSymbolTablesAreRefused) {
+  Stream stream("adaptive");
+  const auto key = stream.next();
+  for (const ContentSize mode : {ContentSize::Declared, ContentSize::Absent}) {
+    const Bytes bomb = compressed(Bytes(size_t{16} << 20), mode);
+    constexpr size_t kTablesAt = kFrameHeaderBytes + kStrandFixedBytes + sizeof(uint32_t);
+    Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
+    ByteWriter writer(message);
+    writer.put(static_cast<uint32_t>(bomb.size()));
+    writer.put_bytes(bomb);
+    const auto decoded = stream.decoder->decode(with_length(message));
+    ASSERT_FALSE(decoded);
+    EXPECT_EQ(decoded.error().place, "symbol tables");
+  }
+  // Tables that do not rise would make a share of nothing or less.
+  const Bytes flat = compressed(Bytes(kTableCount * sizeof(SymbolTable)), ContentSize::Declared);
+  constexpr size_t kTablesAt = kFrameHeaderBytes + kStrandFixedBytes + sizeof(uint32_t);
+  Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
+  ByteWriter writer(message);
+  writer.put(static_cast<uint32_t>(flat.size()));
+  writer.put_bytes(flat);
+  const auto decoded = stream.decoder->decode(with_length(message));
+  ASSERT_FALSE(decoded);
+  EXPECT_THAT(decoded.error().message, testing::HasSubstr("does not rise"));
+  EXPECT_TRUE(stream.decoder->decode(key->message));
 }
 
 // ---- assets and pictures ----
