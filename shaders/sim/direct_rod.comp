@@ -35,7 +35,7 @@ const float kMinSoftLength = 1e-5;
 const float kTensionPerCrossing = 3.0;
 const float kMaxTrendPerSegment = 0.1;
 const float kMaxHalfSineSquared = 0.5;
-const float kMaxStepRatio = 2.0;
+const float kMaxStepRatio = 8.0;
 const float kFoldedBack = 1e-6;
 // Stiffness so many times the inertia is beyond hair and beyond float: a few roundings of it are added to the
 // pivots, which keeps them positive.

@@ -7,7 +7,7 @@
 //   k); bending     b / (2 l_v) theta^2 per joint, theta between t_(i+1) and its rest direction u_i, which
 //   turns
 //               with the edge before it in a frame carried from the clamp without twist;
-//   time        second-order backward differences (order 2, any step ratio up to 2) or backward Euler.
+//   time        second-order backward differences (order 2, with steps of any length) or backward Euler.
 // After each solve every edge gets its exact length back. No twist: a curl is kept by bending alone.
 #pragma once
 

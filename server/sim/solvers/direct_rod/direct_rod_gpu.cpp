@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <string_view>
 
 #include "common/base/check.h"
 #include "common/gl/objects.h"
@@ -16,9 +17,18 @@ namespace {
 // Values of the variant COLLIDERS in shaders/sim/follow.glsl besides 0.
 constexpr uint32_t kColliderCapacities[] = {1, 4, kMaxSphereColliders};
 // Planes of the scratch buffer in shaders/sim/direct_rod.comp, and how much of it is worth having: strands
-// that do not fit wait for the next dispatch.
+// that do not fit wait for the next dispatch. A software device finds on the way back what still fits its
+// caches; hardware wants all strands at once.
 constexpr size_t kScratchPlanes = 7;
+constexpr size_t kCachedScratchBytes = size_t{2} << 20;
 constexpr size_t kMaxScratchBytes = size_t{64} << 20;
+
+size_t worthwhile_scratch_bytes() {
+  const auto* renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const bool is_software =
+      renderer != nullptr && std::string_view(renderer).find("llvmpipe") != std::string_view::npos;
+  return is_software ? kCachedScratchBytes : kMaxScratchBytes;
+}
 
 /// A buffer of vec4 with a buffer texture over all of it: what a kernel writes and fetches.
 struct Plane {
@@ -185,7 +195,9 @@ class DirectRodGpu final : public Solver {
     displacement_ = make_plane("direct_rod displacement", velocity);
     velocity_change_ = make_plane("direct_rod velocity change", velocity);
     const size_t bytes_per_strand = kScratchPlanes * sizeof(glm::vec4) * layout.vertex_count;
-    const size_t fitting = std::max<size_t>(kMaxScratchBytes / bytes_per_strand, 1);
+    const size_t fitting = std::max<size_t>(
+        worthwhile_scratch_bytes() / bytes_per_strand / shader::kStrandLocalSize * shader::kStrandLocalSize,
+        shader::kStrandLocalSize);
     batch_ = static_cast<uint32_t>(std::min<size_t>(fitting, strand_count));
     scratch_ = gl::Buffer("direct_rod scratch", bytes_per_strand * batch_);
     step_ = gl::Buffer("direct_rod step", sizeof(StepBlock));

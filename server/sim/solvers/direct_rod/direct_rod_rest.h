@@ -50,8 +50,9 @@ inline constexpr double kMaxTrendPerSegment = 0.1;
 inline constexpr double kStandardGravityMps2 = 9.80665;
 // theta / sin(theta) is held where sin^2(theta / 2) passes this (a right angle in one joint).
 inline constexpr double kMaxHalfSineSquared = 0.5;
-// A step of more than this times the one before starts with backward Euler: order 2 is stable up to 1 +
-// sqrt(2).
-inline constexpr double kMaxStepRatio = 2.0;
+// A step of more than this times the one before starts with backward Euler. With ratio r order 2 multiplies
+// what a step got wrong by r^2 / (1 + 2 r): above 1 after a jump up, but less than 1 over steps that come
+// back to where they were, since the logarithm of that is concave in log r.
+inline constexpr double kMaxStepRatio = 8.0;
 
 }  // namespace strandcast
