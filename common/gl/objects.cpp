@@ -108,6 +108,23 @@ void Texture::bind(uint32_t unit) const {
 
 Framebuffer::Framebuffer(const std::string& label, std::span<const Texture* const> colors,
                          const Texture* depth) {
+  attach(label, colors, depth);
+  CHECK(is_complete());
+}
+
+Result<Framebuffer> Framebuffer::make(const std::string& label, std::span<const Texture* const> colors,
+                                      const Texture* depth) {
+  Framebuffer framebuffer;
+  framebuffer.attach(label, colors, depth);
+  if (framebuffer.is_complete()) return framebuffer;
+  const Texture* first = colors.empty() ? depth : colors.front();
+  return make_error(ErrorCode::LimitExceeded,
+                    "OpenGL cannot draw into the {} of {} x {} pixels, which may be too many for this driver",
+                    label, first ? first->width() : 0, first ? first->height() : 0);
+}
+
+void Framebuffer::attach(const std::string& label, std::span<const Texture* const> colors,
+                         const Texture* depth) {
   GLuint name = 0;
   glCreateFramebuffers(1, &name);
   label_object(GL_FRAMEBUFFER, name, label);
@@ -125,7 +142,10 @@ Framebuffer::Framebuffer(const std::string& label, std::span<const Texture* cons
     glNamedFramebufferParameteri(name, GL_FRAMEBUFFER_DEFAULT_WIDTH, 1);
     glNamedFramebufferParameteri(name, GL_FRAMEBUFFER_DEFAULT_HEIGHT, 1);
   }
-  CHECK(glCheckNamedFramebufferStatus(name, GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE);
+}
+
+bool Framebuffer::is_complete() const {
+  return glCheckNamedFramebufferStatus(name(), GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
 Framebuffer Framebuffer::without_attachments(const std::string& label) {

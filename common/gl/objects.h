@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/result.h"
+
 namespace strandcast::gl {
 
 /// Owns one GL name and deletes it with Delete.
@@ -98,7 +100,11 @@ class Texture {
 class Framebuffer {
  public:
   Framebuffer() = default;
+  /// For textures that are known to be there; make() for sizes that somebody else chose.
   Framebuffer(const std::string& label, std::span<const Texture* const> colors, const Texture* depth);
+  /// LimitExceeded when the driver cannot draw into the textures, which may be too large for it.
+  static Result<Framebuffer> make(const std::string& label, std::span<const Texture* const> colors,
+                                  const Texture* depth);
   /// 1 x 1 without storage: what to bind for transform feedback with the rasteriser off, since a context
   /// without a surface has no framebuffer of its own and refuses every draw.
   static Framebuffer without_attachments(const std::string& label);
@@ -106,6 +112,8 @@ class Framebuffer {
   uint32_t name() const { return handle_.name(); }
 
  private:
+  void attach(const std::string& label, std::span<const Texture* const> colors, const Texture* depth);
+  bool is_complete() const;
   Handle<delete_framebuffer> handle_;
 };
 

@@ -262,7 +262,7 @@ Status GlRenderer::draw(const StrandPicture& picture, const CameraDesc& camera, 
   ASSIGN_OR_RETURN(const View view,
                    make_view(camera, picture.world_from_head.rotation, pixels * kSamplesPerSide));
   profile_ = RenderProfile{};
-  target_.resize(pixels);
+  RETURN_IF_ERROR(target_.resize(pixels));
   profile_.expand_ms += timed_ms([&] {
     update_light(picture, view);
     if (plan_.runs("expand")) expand_.upload(picture.position_m);

@@ -129,6 +129,9 @@ void Server::State::start_workers(std::unique_ptr<StrandEncoder> encoder,
     const std::lock_guard lock(workers_mutex_);
     if (encoder_ != nullptr) encoder_->request_keyframe();
   };
+  hooks.on_refused = [this](uint32_t picture_class, const Error& error) {
+    net_->send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()});
+  };
   hooks.on_failure = [this](const Error& error) {
     log_error("render", "{}", error.to_string());
     net_->broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});

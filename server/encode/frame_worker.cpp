@@ -18,6 +18,11 @@ constexpr double kMsPerNs = 1e-6;
 constexpr double kNsPerS = 1e9;
 constexpr int kFrameThreadNice = 10;
 
+/// Whether other views can still be drawn: this one is too large, say, or its camera impossible.
+bool concerns_view_only(const Error& error) {
+  return error.code == ErrorCode::BadInput || error.code == ErrorCode::LimitExceeded;
+}
+
 double ms_since(int64_t begin_ns) {
   return static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
 }
@@ -106,7 +111,12 @@ void FrameWorker::run() {
     decode(job.strand_frames);
     const auto due = next_due();
     if (!due || due->time_ns > now_ns()) continue;
-    if (const Status drawn = draw(due->picture_class); !drawn) fail(drawn.error());
+    if (const Status drawn = draw(due->picture_class); !drawn) {
+      if (concerns_view_only(drawn.error()))
+        refuse(due->picture_class, drawn.error());
+      else
+        fail(drawn.error());
+    }
   }
   painter_.reset();  // on the thread that owns its context
 }
@@ -147,7 +157,10 @@ void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
   std::erase_if(drawn_, [&](const auto& entry) { return !views.contains(entry.first); });
   for (const auto& [picture_class, view] : views) {
     Drawn& drawn = drawn_[picture_class];
-    if (!(drawn.view == view)) drawn.decode_count = 0;  // another camera: draw the same state again
+    if (!(drawn.view == view)) {  // another camera: draw the same state again
+      drawn.decode_count = 0;
+      drawn.is_refused = false;
+    }
     drawn.view = view;
   }
 }
@@ -179,7 +192,7 @@ std::optional<FrameWorker::Due> FrameWorker::next_due() const {
   std::optional<Due> first;
   if (snapshot_ == nullptr) return first;
   for (const auto& [picture_class, drawn] : drawn_) {
-    if (drawn.decode_count == decode_count_) continue;
+    if (drawn.is_refused || drawn.decode_count == decode_count_) continue;
     const int64_t due_ns = drawn.sequence == 0 ? 0 : drawn.begin_ns + frame_interval_ns_;
     if (!first || due_ns < first->time_ns) first = Due{picture_class, due_ns};
   }
@@ -195,7 +208,7 @@ Status FrameWorker::draw(uint32_t picture_class) {
     ASSIGN_OR_RETURN(painter_, make_painter_());
   }
   int64_t begin_ns = now_ns();
-  ASSIGN_OR_RETURN(const Image image, painter_->paint(*snapshot_, drawn.view));
+  ASSIGN_OR_RETURN(const Image image, painter_->paint(snapshot_, drawn.view));
   const double paint_ms = ms_since(begin_ns);
   begin_ns = now_ns();
   ASSIGN_OR_RETURN(const auto jpeg, encode_jpeg(image, drawn.view.jpeg_quality));
@@ -219,6 +232,14 @@ Status FrameWorker::draw(uint32_t picture_class) {
   }
   hooks_.sink(picture_class, std::move(frame));
   return {};
+}
+
+void FrameWorker::refuse(uint32_t picture_class, const Error& error) {
+  Drawn& drawn = drawn_[picture_class];
+  drawn.is_refused = true;
+  log_warn("render", "a view of {} x {} pixels cannot be drawn: {}", drawn.view.size.width,
+           drawn.view.size.height, error.to_string());
+  if (hooks_.on_refused) hooks_.on_refused(picture_class, error);
 }
 
 void FrameWorker::fail(const Error& error) {

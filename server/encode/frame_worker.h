@@ -39,6 +39,9 @@ class FrameWorker {
     std::function<void(uint32_t picture_class, EncodedFramePtr frame)> sink;
     /// Asks whoever encodes strands for a keyframe, on any thread.
     std::function<void()> request_keyframe;
+    /// Called on the worker's thread when one class cannot be drawn; it is left out until its view changes.
+    /// May be empty.
+    std::function<void(uint32_t picture_class, const Error& error)> on_refused;
     /// Called once, on the worker's thread, when no frames can be drawn any more (no GL, say). May be empty.
     std::function<void(const Error& error)> on_failure;
   };
@@ -70,6 +73,7 @@ class FrameWorker {
     uint64_t decode_count = 0;  // when last drawn, 0 = never with this view
     int64_t begin_ns = 0;       // when that drawing began
     uint32_t sequence = 0;
+    bool is_refused = false;  // this view cannot be drawn
   };
   /// What other threads left for the worker.
   struct Job {
@@ -91,6 +95,7 @@ class FrameWorker {
   void decode(const std::deque<EncodedFramePtr>& strand_frames);
   std::optional<Due> next_due() const;
   Status draw(uint32_t picture_class);
+  void refuse(uint32_t picture_class, const Error& error);
   void fail(const Error& error);
 
   std::unique_ptr<StrandDecoder> decoder_;

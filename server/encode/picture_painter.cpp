@@ -19,11 +19,11 @@ class GlPicturePainter : public PicturePainter {
       renderer_.reset();  // GL objects are deleted from the context that made them
   }
 
-  Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
+  Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     // Several views of one snapshot share its positions.
-    if (painted_tick_ != snapshot.tick || picture_.position_m.empty()) {
-      picture_ = {snapshot.world_from_head, positions_in_head(snapshot)};
-      painted_tick_ = snapshot.tick;
+    if (painted_ != snapshot) {
+      picture_ = {snapshot->world_from_head, positions_in_head(*snapshot)};
+      painted_ = snapshot;
     }
     RETURN_IF_ERROR(renderer_->draw(picture_, view.camera, view.size));
     return renderer_->read_image();
@@ -33,7 +33,7 @@ class GlPicturePainter : public PicturePainter {
   std::unique_ptr<gl::EglContext> context_;  // outlives the renderer's GL objects
   std::unique_ptr<Renderer> renderer_;
   StrandPicture picture_;
-  uint64_t painted_tick_ = 0;
+  std::shared_ptr<const Snapshot> painted_;  // what picture_ shows
 };
 
 }  // namespace

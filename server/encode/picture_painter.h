@@ -19,7 +19,10 @@ namespace strandcast {
 class PicturePainter {
  public:
   virtual ~PicturePainter() = default;
-  virtual Result<Image> paint(const Snapshot& snapshot, const PictureView& view) = 0;
+  /// Shared, so that what a painter keeps of the last snapshot cannot be mistaken for another's: ticks come
+  /// again after a reset. BadInput and LimitExceeded concern this view alone; after any other error nothing
+  /// can be painted any more.
+  virtual Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) = 0;
 };
 
 using MakePicturePainter = std::function<Result<std::unique_ptr<PicturePainter>>()>;

@@ -240,6 +240,12 @@ void NetServer::broadcast(ServerMessage message) {
   state_->post_to_all([message = std::move(message)](net::Session& session) { session.send(message); });
 }
 
+void NetServer::send_to_class(PictureClass picture_class, ServerMessage message) {
+  state_->post_to_all([picture_class, message = std::move(message)](net::Session& session) {
+    if (session.watches(picture_class)) session.send(message);
+  });
+}
+
 void NetServer::send(SessionId session, ServerMessage message) {
   net::asio::post(state_->context.io, [state = state_.get(), session, message = std::move(message)] {
     const auto found = state->context.sessions.find(session);

@@ -115,6 +115,8 @@ class NetServer {
   void set_picture_class(SessionId session, PictureClass picture_class);
   /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
   void broadcast(ServerMessage message);
+  /// To those who watch the pictures of one class.
+  void send_to_class(PictureClass picture_class, ServerMessage message);
   /// Ignored when the session is gone.
   void send(SessionId session, ServerMessage message);
 

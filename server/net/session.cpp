@@ -237,9 +237,13 @@ void Session::deliver_strands(const EncodedFramePtr& frame) {
   });
 }
 
+bool Session::watches(PictureClass picture_class) const {
+  return state_ == State::Joined && mode_ == StreamMode::Frames && hello_.role != Role::Source &&
+         picture_class == picture_class_;
+}
+
 void Session::deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame) {
-  if (state_ != State::Joined || mode_ != StreamMode::Frames || picture_class != picture_class_) return;
-  if (hello_.role == Role::Source) return;
+  if (!watches(picture_class)) return;
   guarded([&] {
     queue_.offer_picture(frame);
     account_drops();

@@ -24,6 +24,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void start(http::request<http::empty_body> request, bool has_room);
 
   void deliver_strands(const EncodedFramePtr& frame);
+  /// Whether pictures of this class are for this session.
+  bool watches(PictureClass picture_class) const;
   void deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame);
   void set_picture_class(PictureClass picture_class) { picture_class_ = picture_class; }
   /// Queues a control message; ignored before Welcome and while closing.

@@ -78,6 +78,23 @@ TEST_F(GlObjects, AFramebufferClearsItsTexturesAndResolves) {
   }
 }
 
+TEST_F(GlObjects, ATextureTooLargeForTheDriverGivesAnErrorNotAFramebuffer) {
+  GLint limit = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
+  const Texture wide("wide", GL_RGBA8, static_cast<uint32_t>(limit) + 1, 1, 1);
+  const Texture narrow("narrow", GL_RGBA8, 4, 2, 1);
+  while (glGetError() != GL_NO_ERROR) {
+  }
+  const std::array<const Texture*, 1> too_wide{&wide};
+  const auto refused = Framebuffer::make("scene", too_wide, nullptr);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+  EXPECT_NE(refused.error().message.find("scene of " + std::to_string(limit + 1) + " x 1"), std::string::npos)
+      << refused.error().message;
+  const std::array<const Texture*, 1> fitting{&narrow};
+  EXPECT_TRUE(Framebuffer::make("scene", fitting, nullptr));
+}
+
 TEST_F(GlObjects, TransformFeedbackNeedsNoWindow) {
   TemporaryFolder folder;
   folder.write("squares.vert",

@@ -72,7 +72,7 @@ TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
   std::vector<EncodedFramePtr> frames;
   for (uint64_t tick = 1; tick <= 3; ++tick) {
     frames.push_back(encoder->encode(make_state(*asset_, tick)));
-    auto image = (*painter)->paint(**server_decoder->decode(frames.back()->message), small_view());
+    auto image = (*painter)->paint(*server_decoder->decode(frames.back()->message), small_view());
     ASSERT_TRUE(image) << image.error().to_string();
     painted.push_back(std::move(image).value());
   }
@@ -86,6 +86,47 @@ TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
   for (size_t i = 0; i < painted.size(); ++i) EXPECT_TRUE(painted[i] == drawn[i]) << "frame " << i;
   EXPECT_FALSE(painted[0] == painted[2]) << "the hair moved";
   renderer->reset();  // while its context is current
+}
+
+TEST_F(GlPainting, ATickThatComesAgainIsPaintedAgain) {
+  auto painter = gl_picture_painter(config_)();
+  ASSERT_TRUE(painter) << painter.error().to_string();
+  const auto paint = [&](const std::shared_ptr<const Snapshot>& snapshot) {
+    auto image = (*painter)->paint(snapshot, small_view());
+    EXPECT_TRUE(image) << image.error().to_string();
+    return image ? std::move(image).value() : Image{};
+  };
+  const auto blown = std::make_shared<Snapshot>(make_state(*asset_, 30));
+  auto after_reset = std::make_shared<Snapshot>(make_state(*asset_, 0));
+  after_reset->tick = blown->tick;
+  const Image first = paint(blown);
+  const Image second = paint(after_reset);
+  EXPECT_FALSE(first == second) << "the picture before the reset is shown after it";
+  EXPECT_TRUE(paint(blown) == first);
+}
+
+TEST_F(GlPainting, EveryViewThatIsAcceptedCanBePainted) {
+  auto painter = gl_picture_painter(config_)();
+  ASSERT_TRUE(painter) << painter.error().to_string();
+  const auto snapshot = std::make_shared<const Snapshot>(make_state(*asset_, 1));
+  std::vector<PictureView> views;
+  const auto add = [&](glm::vec3 offset_m, glm::vec3 target_m, float fov_y_rad, RenderSize size) {
+    views.push_back({{offset_m, target_m, fov_y_rad}, size, 80});
+  };
+  constexpr RenderSize kSize{160, 90};
+  add({0.0f, 0.0f, 1e-3f}, {0.0f, 0.0f, 0.0f}, 3.0f, kSize);   // inside the head
+  add({0.0f, 0.0f, 1e4f}, {0.0f, 0.0f, 0.0f}, 0.01f, kSize);   // as far as it goes
+  add({0.0f, 1e4f, 0.0f}, {0.0f, 0.0f, 0.0f}, 3.0f, kSize);    // straight down
+  add({0.0f, -0.5f, 0.0f}, {0.0f, 1e4f, 0.0f}, 1.0f, kSize);   // straight up, past everything
+  add({1e-3f, 0.0f, 0.0f}, {5e3f, 5e3f, 5e3f}, 0.01f, kSize);  // nothing to see
+  add({0.0f, 0.0f, 0.5f}, {0.0f, 0.0f, 0.0f}, 1.0f, {kMaxPictureWidth, kMinPictureSide});
+  add({0.0f, 0.0f, 0.5f}, {0.0f, 0.0f, 0.0f}, 1.0f, {kMinPictureSide, kMaxPictureHeight});
+  for (const PictureView& view : views) {
+    ASSERT_TRUE(validate(view)) << validate(view).error().to_string();
+    const auto image = (*painter)->paint(snapshot, view);
+    ASSERT_TRUE(image) << image.error().to_string();
+    EXPECT_EQ(image->rgba.size(), size_t{4} * view.size.width * view.size.height);
+  }
 }
 
 TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {

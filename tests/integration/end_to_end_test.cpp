@@ -73,9 +73,9 @@ class ObservedPainter : public PicturePainter {
  public:
   ObservedPainter(std::unique_ptr<PicturePainter> painter, Observer& observer)
       : painter_(std::move(painter)), observer_(observer) {}
-  Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
+  Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     auto image = painter_->paint(snapshot, view);
-    if (image) observer_.saw({snapshot.tick, view, *image});
+    if (image) observer_.saw({snapshot->tick, view, *image});
     return image;
   }
 

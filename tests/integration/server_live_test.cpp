@@ -330,6 +330,48 @@ TEST_F(LiveServer, FramesAreDrawnOnlyWhileSomebodyWatchesThem) {
   EXPECT_NE(strands.next(), nullptr);
 }
 
+TEST_F(LiveServer, HostileCamerasEndTheirOwnSessionOnly) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  const auto watch = [&](RenderSize size) {
+    auto viewer = std::make_unique<RawClient>(server_->port());
+    EXPECT_TRUE(viewer->handshake());
+    Hello hello;
+    hello.mode = StreamMode::Frames;
+    hello.frame_width = size.width;
+    hello.frame_height = size.height;
+    viewer->send(hello);
+    return viewer;
+  };
+  auto witness = watch({});
+  ASSERT_TRUE(witness->read_media(Opcode::JpegFrame).has_value());
+  const float nan = std::nanf("");
+  const std::vector<std::pair<CameraDesc, std::string>> cameras = {
+      {{{nan, 0.0f, 1.0f}, {}, 1.0f}, "camera.offset_m"},
+      {{{0.0f, 0.0f, 0.0f}, {}, 1.0f}, "camera.offset_m"},
+      {{{0.0f, 0.0f, 3e38f}, {}, 1.0f}, "camera.offset_m"},
+      {{{0.0f, 0.0f, 1.0f}, {0.0f, INFINITY, 0.0f}, 1.0f}, "camera.target_m"},
+      {{{0.0f, 0.0f, 1.0f}, {}, nan}, "camera.fov_y_rad"},
+      {{{0.0f, 0.0f, 1.0f}, {}, 3.2f}, "camera.fov_y_rad"},
+      {{{0.0f, 0.0f, 1.0f}, {}, -0.0f}, "camera.fov_y_rad"}};
+  for (const auto& [camera, field] : cameras) {
+    auto viewer = watch({});
+    ASSERT_TRUE(viewer->read_control<Welcome>().has_value());
+    viewer->send(CameraChange{camera});
+    const RawClient::End end = viewer->read_end();
+    EXPECT_EQ(end.close_code, static_cast<uint16_t>(CloseCode::BadData));
+    EXPECT_THAT(end.reason, HasSubstr(field));
+  }
+  for (const RenderSize size : {RenderSize{1, 1}, {4'000'000'000u, 16}, {4096, 4096}, {16, 4096}})
+    EXPECT_NE(watch(size)->read_end().close_code, 0) << size.width << " x " << size.height;
+  // What is allowed is drawn, from right inside the head and from far away.
+  for (const float distance_m : {1e-3f, 100.0f}) {
+    witness->send(CameraChange{{{0.0f, 0.0f, distance_m}, {}, 2.8f}});
+    ASSERT_TRUE(witness->read_media(Opcode::JpegFrame).has_value());
+  }
+  EXPECT_EQ(server_->counters().sim.quarantined, 0u);
+}
+
 TEST_F(LiveServer, NobodyWatchingMeansNothingIsEncodedOrDrawn) {
   ASSERT_NO_FATAL_FAILURE(start());
   if (server_ == nullptr) return;

@@ -469,9 +469,14 @@ TEST_F(ServerNet, PicturesReachTheirClassOnly) {
   auto strands = join();
   server_->publish_picture(1, media(Opcode::JpegFrame, 1, 0));
   server_->publish_picture(0, media(Opcode::JpegFrame, 2, 0));
+  server_->send_to_class(1, Notice{true, "of another class"});
+  server_->send_to_class(0, Notice{true, "of this class"});
   const auto picture = viewer->read_media(Opcode::JpegFrame);
   ASSERT_TRUE(picture.has_value());
   EXPECT_EQ(unpack_frame_header(*picture)->sequence, 2u);
+  const auto notice = viewer->read_control<Notice>();
+  ASSERT_TRUE(notice.has_value());
+  EXPECT_EQ(notice->text, "of this class");
   server_->broadcast(Notice{false, "end"});
   test::Received received;
   do {

@@ -35,6 +35,7 @@ struct Studio {
   bool is_held = false;
   bool is_inside = false;
   bool is_failing = false;
+  uint32_t largest_width = 1000;  // of what can be painted
   int painters_made = 0;
   int painters_alive = 0;
   std::set<std::thread::id> threads;
@@ -65,15 +66,17 @@ class FakePainter : public PicturePainter {
     --studio_.painters_alive;
     studio_.threads.insert(std::this_thread::get_id());
   }
-  Result<Image> paint(const Snapshot& snapshot, const PictureView& view) override {
+  Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     std::unique_lock lock(studio_.mutex);
     studio_.threads.insert(std::this_thread::get_id());
-    studio_.hashes.push_back(state_hash(snapshot));
+    studio_.hashes.push_back(state_hash(*snapshot));
     studio_.is_inside = true;
     studio_.changed.wait(lock, [&] { return !studio_.is_held; });
     studio_.is_inside = false;
     if (studio_.is_failing) return make_error(ErrorCode::Unavailable, "out of paint");
     const auto [width, height] = view.size;
+    if (width > studio_.largest_width)
+      return make_error(ErrorCode::LimitExceeded, "the canvas has {} columns", studio_.largest_width);
     return Image{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height * 4, 255)};
   }
 
@@ -93,6 +96,10 @@ class FrameWork : public testing::Test {
       frames_.emplace_back(picture_class, std::move(frame));
     };
     hooks.request_keyframe = [this] { ++requests_; };
+    hooks.on_refused = [this](uint32_t picture_class, const Error&) {
+      const std::lock_guard lock(mutex_);
+      refused_.push_back(picture_class);
+    };
     hooks.on_failure = [this](const Error&) { ++failures_; };
     return std::make_unique<FrameWorker>(
         std::move(*make_strand_decoder("delta", {kStrands, kVertices})),
@@ -129,6 +136,7 @@ class FrameWork : public testing::Test {
   std::atomic<int> failures_{0};
   std::mutex mutex_;
   std::vector<std::pair<uint32_t, EncodedFramePtr>> frames_;
+  std::vector<uint32_t> refused_;  // classes
 };
 
 TEST_F(FrameWork, NothingIsDecodedOrMadeWithoutViews) {
@@ -283,6 +291,31 @@ TEST_F(FrameWork, NoGlIsReportedOnceAndTheRestLivesOn) {
   give_time_to_misbehave();
   EXPECT_EQ(failures_, 1);
   EXPECT_EQ(frame_count(), 0u);
+}
+
+TEST_F(FrameWork, AViewThatCannotBeDrawnCostsTheOthersNothing) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  views[2] = views[1];
+  views[2].size.width = 1016;
+  worker->set_views(views);
+  join_chain(*worker);
+  const auto refused = [&] {
+    const std::lock_guard lock(mutex_);
+    return refused_;
+  };
+  ASSERT_TRUE(eventually([&] { return refused().size() == 1 && frame_count() == 1; }));
+  EXPECT_EQ(refused()[0], 2u);
+  worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  EXPECT_EQ(refused().size(), 1u) << "it is not tried at every state";
+  EXPECT_FALSE(worker->failure());
+  views[2].size.width = 1000;
+  worker->set_views(views);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 3; })) << "another view of that class may do";
+  EXPECT_EQ(frames().back().first, 2u);
+  EXPECT_EQ(failures_, 0);
 }
 
 TEST_F(FrameWork, AFailedDrawingEndsFramesToo) {

@@ -29,17 +29,25 @@ Result<PictureTarget> PictureTarget::make(const gl::ShaderLibrary& shaders) {
   return target;
 }
 
-void PictureTarget::resize(glm::uvec2 size) {
-  if (size == size_) return;
-  size_ = size;
-  const glm::uvec2 scene = scene_size();
+Status PictureTarget::resize(glm::uvec2 size) {
+  if (size == size_) return {};
+  // The old ones first: two sizes side by side may not fit.
+  size_ = glm::uvec2(0);
+  scene_ = {};
+  picture_ = {};
+  scene_color_ = {};
+  scene_depth_ = {};
+  picture_color_ = {};
+  const glm::uvec2 scene = size * kSamplesPerSide;
   scene_color_ = gl::Texture("scene color", GL_RGBA16F, scene.x, scene.y, 1);
   scene_depth_ = gl::Texture("scene depth", GL_DEPTH_COMPONENT32F, scene.x, scene.y, 1);
   const std::array<const gl::Texture*, 1> scene_colors{&scene_color_};
-  scene_ = gl::Framebuffer("scene", scene_colors, &scene_depth_);
+  ASSIGN_OR_RETURN(scene_, gl::Framebuffer::make("scene", scene_colors, &scene_depth_));
   picture_color_ = gl::Texture("picture", GL_RGBA8, size.x, size.y, 1);
   const std::array<const gl::Texture*, 1> picture_colors{&picture_color_};
-  picture_ = gl::Framebuffer("picture", picture_colors, nullptr);
+  ASSIGN_OR_RETURN(picture_, gl::Framebuffer::make("picture", picture_colors, nullptr));
+  size_ = size;
+  return {};
 }
 
 void PictureTarget::begin_scene() const {

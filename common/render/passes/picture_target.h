@@ -21,8 +21,9 @@ class PictureTarget {
   PictureTarget() = default;
   static Result<PictureTarget> make(const gl::ShaderLibrary& shaders);
 
-  /// Allocates for a picture of this size, unless it has that size already.
-  void resize(glm::uvec2 size);
+  /// Allocates for a picture of this size, unless it has that size already. LimitExceeded when OpenGL cannot;
+  /// the target then has no size.
+  Status resize(glm::uvec2 size);
   /// Binds and clears the scene target; viewport and depth state are set.
   void begin_scene() const;
   /// Scene over the background (linear RGB) into the picture.
