@@ -8,8 +8,9 @@
 #include "common/codec/strand_rows.h"
 
 // Integer results are the same on every path, so wider instructions may be chosen at run time. Sanitizers
-// start too late for the resolver that does so.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__) && \
+// start too late for the resolver that does so; of the thread sanitizer only libstdc++'s macro is left
+// (cmake/strandcast.cmake).
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(_GLIBCXX_TSAN) && \
     !defined(__SANITIZE_ADDRESS__)
 #define STRANDCAST_WIDE __attribute__((target_clones("avx2", "default")))
 #else
