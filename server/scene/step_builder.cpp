@@ -64,7 +64,8 @@ std::vector<GustWave> make_gust_waves(const WindDesc& wind) {
   return waves;
 }
 
-StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders) {
+StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders)
+    : groom_gravity_in_head_mps2_(scene.gravity_mps2) {
   change(scene, std::move(colliders));
 }
 
@@ -121,6 +122,7 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
     substep.world_from_head = pose.rotation;
     substep.head_shift_m = pose.position_m - previous.position_m;
     substep.gravity_mps2 = scene_.gravity_mps2;
+    substep.groom_gravity_in_head_mps2 = groom_gravity_in_head_mps2_;
     set_wind(substep, input, features, end_time_s - step_s * (1.0 - blend), pose.position_m);
     substep.colliders.clear();
     for (const SphereCollider& collider : colliders_)

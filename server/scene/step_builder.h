@@ -39,6 +39,9 @@ class StepBuilder {
                 const glm::dvec3& head_position_m) const;
 
   SceneDesc scene_;
+  // The groom is made for an upright head under the gravity that the scene begins with; later changes act on
+  // it.
+  glm::dvec3 groom_gravity_in_head_mps2_;
   std::vector<SphereCollider> colliders_;
   std::optional<GustGenerator> gust_generator_;
   std::vector<GustWave> waves_;  // at time 0 with the head at the origin

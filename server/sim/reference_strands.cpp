@@ -69,7 +69,11 @@ void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) con
 
 // Backward Euler for the linear drag toward the air and the linear pull to the groomed shape, forward for the
 // rest, written for the velocity u relative to the head joint, which moves at V during the substep:
-//   (1 + h k + h^2 s_i) u = v - V + h (g + k (w - V)) + h s_i (target - x),   x_predicted = x + h u.
+//   (1 + h k + h^2 s_i) u = v - V + h (g - f_i R g_0 + k (w - V)) + h s_i (target - x),   x_predicted = x + h
+//   u.
+// R turns the head; g_0 is the gravity that the groom was made under, in head space. The share f_i of it that
+// the pull carries is a pre-stress: it moves the target up by f_i R g_0 / s_i, just as far as g = R g_0 lets
+// it sag.
 glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const {
   const size_t at = layout_.index(i, strand_index);
   const glm::dvec3 old_velocity =
@@ -79,7 +83,10 @@ glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t str
       parameters_.style_tip_share + (1.0 - parameters_.style_tip_share) * from_tip * from_tip;
   const double stiffness = parameters_.style_stiffness_per_s2 * share;
   const double drag = parameters_.air_drag_per_s;
-  const glm::dvec3 gravity = limited(input_->gravity_mps2, kMaxGravityMps2);
+  const double carried_share = parameters_.sag_free * std::min(1.0, stiffness / kSupportStiffnessPerS2);
+  const glm::dvec3 groom_gravity = limited(input_->groom_gravity_in_head_mps2, kMaxGravityMps2);
+  const glm::dvec3 gravity =
+      limited(input_->gravity_mps2, kMaxGravityMps2) - carried_share * (rotation_ * groom_gravity);
   const glm::dvec3 relative_air = air_velocity_mps(*input_, strand.old_m[i]) - head_velocity_mps_;
   const glm::dvec3 impulse = (old_velocity - head_velocity_mps_) + h_s_ * (gravity + drag * relative_air) +
                              h_s_ * stiffness * (strand.target_m[i] - strand.old_m[i]);

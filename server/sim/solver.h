@@ -35,6 +35,9 @@ struct StepInput {
   glm::dquat world_from_head{1.0, 0.0, 0.0, 0.0};  // rotation of the head at the end of the substep
   glm::dvec3 head_shift_m{0.0};                    // movement of the head joint during the substep, world
   glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
+  /// Gravity under which the groom has its shape, in head space: what a solver with a sag-free groom lets the
+  /// pull to the groomed shape carry. Zero: the groom is the shape without gravity.
+  glm::dvec3 groom_gravity_in_head_mps2{0.0};
   glm::dvec3 wind_mps{0.0};               // mean wind at the head, world
   std::vector<GustWave> gusts;            // at most kMaxGustWaves; x is relative to the head joint
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep

@@ -30,6 +30,8 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
   block.carry = columns(glm::mat3_cast(rotation * glm::conjugate(previous_world_from_head)));
   block.head_velocity = pack(head_velocity, h_s);
   block.push = pack(h_s * acceleration, 1.0 / h_s);
+  const glm::dvec3 groom_gravity = limited(input.groom_gravity_in_head_mps2, kMaxGravityMps2);
+  block.support = pack(-h_s * parameters.sag_free * (rotation * groom_gravity), 1.0 / kSupportStiffnessPerS2);
   block.style = glm::vec4(glm::dvec4(parameters.style_stiffness_per_s2, parameters.style_tip_share,
                                      parameters.s_damping, parameters.max_speed_mps));
   block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s, 0.0, 0.0));

@@ -16,6 +16,7 @@ struct StepBlock {
   std::array<glm::vec4, 3> carry;
   glm::vec4 head_velocity;
   glm::vec4 push;
+  glm::vec4 support;
   glm::vec4 style;
   glm::vec4 contact;
   glm::uvec4 shape;
@@ -25,7 +26,7 @@ struct StepBlock {
   std::array<glm::vec4, shader::kMaxSphereColliders> collider;
 };
 static_assert(sizeof(StepBlock) ==
-              16 * (3 + 3 + 6 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
+              16 * (3 + 3 + 7 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
 static_assert(shader::kMaxGustWaves == kMaxGustWaves && shader::kMaxSphereColliders == kMaxSphereColliders);
 
 /// The block for one substep; the odd-even fields stay zero. Inputs are held to the limits of

@@ -11,6 +11,8 @@ std::vector<SolverParameterInfo> shared_parameter_infos() {
       {"air_drag_per_s", 1.0, 0.0, 1000.0, "1/s", "rate at which strands take on the velocity of the air"},
       {"style_stiffness_per_s2", 250.0, 0.0, 1e6, "1/s^2", "pull to the groomed shape at the root; 0 = limp"},
       {"style_tip_share", 0.2, 0.0, 1.0, "", "part of the pull to the groomed shape that is left at the tip"},
+      {"sag_free", 1.0, 0.0, 1.0, "",
+       "share of the weight that the groomed shape carries: 1 = the groom as loaded is the shape at rest"},
       {"collider_friction", 0.3, 0.0, 10.0, "", "Coulomb friction of strands on colliders"},
       {"max_speed_mps", 30.0, 0.1, 1000.0, "m/s", "largest speed of a vertex relative to the head"},
   };
@@ -22,6 +24,7 @@ StrandParameters read_strand_parameters(const SolverParameters& parameters) {
   result.air_drag_per_s = parameters.at("air_drag_per_s");
   result.style_stiffness_per_s2 = parameters.at("style_stiffness_per_s2");
   result.style_tip_share = parameters.at("style_tip_share");
+  result.sag_free = parameters.at("sag_free");
   result.collider_friction = parameters.at("collider_friction");
   result.max_speed_mps = parameters.at("max_speed_mps");
   return result;

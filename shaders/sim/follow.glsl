@@ -45,8 +45,10 @@ Vertex predict(uint at) {
   const float h = u_step.head_velocity.w;
   const float drag = u_step.contact.y;
   const float from_tip = 1.0 - vertex.arc;
-  const float pull = h * u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
-  const vec3 push = u_step.push.xyz + (h * drag) * gust_velocity(vertex.old);
+  const float stiffness = u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
+  const float pull = h * stiffness;
+  const vec3 support = min(1.0, stiffness * u_step.support.w) * u_step.support.xyz;
+  const vec3 push = u_step.push.xyz + support + (h * drag) * gust_velocity(vertex.old);
   const vec3 moved = (velocity + push + pull * (vertex.target - vertex.old)) / (1.0 + h * (drag + pull));
   vertex.predicted = vertex.old + h * within_speed_limit(moved);
   return vertex;

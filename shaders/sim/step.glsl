@@ -9,6 +9,7 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 carry[3];            // columns: turn of the head during the substep
   vec4 head_velocity;       // m/s; w = substep, s
   vec4 push;                // velocity gained from gravity and mean wind, m/s; w = 1 / substep
+  vec4 support;             // velocity gained from what carries the groom's weight, m/s; w = 1 / stiffness, s^2
   vec4 style;               // stiffness at the root 1/s^2, share at the tip, s_damping, speed limit m/s
   vec4 contact;             // friction, air drag 1/s; rest unused
   uvec4 shape;              // strands, vertices of each, pinned at the root, first vertex of the pinned tail

@@ -9,7 +9,10 @@ namespace {
 constexpr double kSubstepS = 1.0 / 60.0;
 constexpr double kLengthTolerance = 1e-5;  // relative
 
-class SolverLaws : public SolverTest {};
+class SolverLaws : public SolverTest {
+ protected:
+  static std::vector<SolverKind> sag_free_kinds();
+};
 
 /// Everything of an input turned by one rotation.
 StepInput turned(StepInput input, const glm::dquat& turn) {
@@ -44,8 +47,99 @@ TEST_F(SolverLaws, RestStaysAtRestWithoutForces) {
   }
 }
 
+/// Solvers with a pull to the groomed shape, which carries its weight.
+std::vector<SolverKind> SolverLaws::sag_free_kinds() {
+  std::vector<SolverKind> kinds;
+  for (const SolverKind& kind : all_kinds()) {
+    const auto& infos = kind.row->parameters;
+    const bool is_known = std::any_of(infos.begin(), infos.end(), [](const SolverParameterInfo& info) {
+      return info.name == "style_stiffness_per_s2";
+    });
+    if (is_known) kinds.push_back(kind);
+  }
+  EXPECT_GE(kinds.size(), 4u);
+  return kinds;
+}
+
+/// Gravity that acts on an upright head as on the groom when it was made.
+StepInput standing_input() {
+  StepInput input;
+  input.groom_gravity_in_head_mps2 = input.gravity_mps2;
+  return input;
+}
+
+// At rest in the groomed shape nothing pulls and the weight is carried: the prediction is where the vertex
+// is. What is left is rounding, as without gravity.
+TEST_F(SolverLaws, TheGroomIsTheShapeAtRestUnderGravity) {
+  const Groom groom = make_test_groom({});
+  for (const SolverKind& kind : sag_free_kinds()) {
+    SCOPED_TRACE(kind.name());
+    auto solver = make(kind, groom);
+    const SolverState groomed = read(*solver);
+    for (int step = 0; step < 240; ++step) solver->substep(standing_input());
+    EXPECT_LE(largest_distance_m(read(*solver).position_m, groomed.position_m), 1e-5);
+    auto sagging = make(kind, groom, {{"sag_free", 0.0}});
+    for (int step = 0; step < 240; ++step) sagging->substep(standing_input());
+    EXPECT_GT(largest_distance_m(read(*sagging).position_m, groomed.position_m), 0.01);
+  }
+}
+
+TEST_F(SolverLaws, ATurnedHeadWithItsOwnGravityIsAnUprightHead) {
+  const Groom groom = make_test_groom({});
+  const glm::dquat tilted = glm::angleAxis(2.0, glm::normalize(glm::dvec3(1.0, 2.0, -1.0)));
+  StepInput input = standing_input();
+  input.world_from_head = tilted;
+  input.gravity_mps2 = tilted * input.gravity_mps2;
+  for (const SolverKind& kind : sag_free_kinds()) {
+    SCOPED_TRACE(kind.name());
+    auto solver = make(kind, groom, {}, tilted);
+    const SolverState groomed = read(*solver);
+    for (int step = 0; step < 240; ++step) solver->substep(input);
+    EXPECT_LE(largest_distance_m(read(*solver).position_m, groomed.position_m), 2e-5);
+  }
+}
+
+// A head on its side: what carried the weight now pushes up along the head's axis, and hair falls to the
+// side.
+TEST_F(SolverLaws, HairFallsToTheSideOfATiltedHead) {
+  const Groom groom = make_test_groom({});
+  const glm::dquat on_its_side = glm::angleAxis(1.57, glm::dvec3(0.0, 0.0, 1.0));
+  StepInput input = standing_input();
+  input.world_from_head = on_its_side;
+  for (const SolverKind& kind : sag_free_kinds()) {
+    SCOPED_TRACE(kind.name());
+    auto solver = make(kind, groom, {}, on_its_side);
+    const SolverState groomed = read(*solver);
+    for (int step = 0; step < 240; ++step) solver->substep(input);
+    const SolverState state = read(*solver);
+    double fallen_m = 0.0;
+    const uint32_t strand_count = groom.strand_count();
+    for (size_t tip = state.position_m.size() - strand_count; tip < state.position_m.size(); ++tip)
+      fallen_m += (groomed.position_m[tip].y - state.position_m[tip].y) / strand_count;
+    EXPECT_GT(fallen_m, 0.02) << "mean fall of the tips of strands of 0.17 to 0.25 m";
+  }
+}
+
+TEST_F(SolverLaws, NothingCarriesALimpStrand) {
+  const Groom groom = make_test_groom({});
+  for (const SolverKind& kind : sag_free_kinds()) {
+    SCOPED_TRACE(kind.name());
+    auto solver = make(kind, groom, {{"style_stiffness_per_s2", 0.0}, {"sag_free", 1.0}});
+    auto sagging = make(kind, groom, {{"style_stiffness_per_s2", 0.0}, {"sag_free", 0.0}});
+    for (int step = 0; step < 30; ++step) {
+      solver->substep(standing_input());
+      sagging->substep(standing_input());
+    }
+    EXPECT_EQ(read(*solver).position_m, read(*sagging).position_m);
+  }
+}
+
 TEST_F(SolverLaws, LengthsAreExactAfterEveryStep) {
+  // A taut strand that is held at both ends takes up the rounding of what is left of its reach, which 15
+  // segments of 0.25 m in all are taken from.
+  constexpr double kReachRoundingM = 15 * 1.5e-8;
   for (const Pinning pinning : {Pinning::Root, Pinning::RootPair, Pinning::BothEnds}) {
+    const double allowed_m = pinning == Pinning::BothEnds ? kReachRoundingM : 0.0;
     TestGroomDesc desc;
     desc.pinning = pinning;
     const Groom groom = make_test_groom(desc);
@@ -57,7 +151,7 @@ TEST_F(SolverLaws, LengthsAreExactAfterEveryStep) {
       auto solver = make(kind, groom);
       for (int step = 1; step <= 60; ++step) {
         solver->substep(moving_input(step, kSubstepS));
-        ASSERT_LE(length_excess_m(groom, read(*solver), kLengthTolerance), 0.0) << "step " << step;
+        ASSERT_LE(length_excess_m(groom, read(*solver), kLengthTolerance), allowed_m) << "step " << step;
       }
     }
   }

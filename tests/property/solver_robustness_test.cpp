@@ -103,6 +103,9 @@ TEST_F(SolverRobustness, ExtremeInputsStayFiniteAndExact) {
   };
   for (const double value : {1e3, 1e9, 1e300, -1e300, kInfinity, kNan}) {
     add("gravity", [value](StepInput& input) { input.gravity_mps2 = {value, -value, 1.0}; });
+    add("groom's gravity", [value](StepInput& input) {
+      input.groom_gravity_in_head_mps2 = {value, 0.0, -value};
+    });
     add("wind", [value](StepInput& input) { input.wind_mps = {value, 0.0, -value}; });
     add("shift", [value](StepInput& input) { input.head_shift_m = {0.0, value, value}; });
     add("substep", [value](StepInput& input) { input.h_s = value; });

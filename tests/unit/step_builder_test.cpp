@@ -66,6 +66,20 @@ TEST(StepBuilder, WithoutMotionTheHeadStaysWhereItWas) {
   for (const StepInput& substep : step.substeps) EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
 }
 
+TEST(StepBuilder, TheGroomIsMadeUnderTheGravityThatTheSceneBeginsWith) {
+  SceneDesc scene = still_scene();
+  StepBuilder builder(scene, {});
+  const SceneStep& tilted = builder.build(moved({0.0, 0.0, 0.0}, 1.5), {}, 0.0);
+  for (const StepInput& substep : tilted.substeps)
+    EXPECT_EQ(substep.groom_gravity_in_head_mps2, glm::dvec3(scene.gravity_mps2));
+  const glm::dvec3 at_first = scene.gravity_mps2;
+  scene.gravity_mps2 = {1.0, -3.0, 2.0};
+  builder.change(scene, {});
+  const SceneStep& step = builder.build(InputFrame{}, {}, 0.0);
+  EXPECT_EQ(step.substeps[0].gravity_mps2, glm::dvec3(scene.gravity_mps2));
+  EXPECT_EQ(step.substeps[0].groom_gravity_in_head_mps2, at_first);
+}
+
 TEST(StepBuilder, CollidersTurnWithTheHead) {
   StepBuilder builder(still_scene(), {{glm::vec3(0.0f, 0.0f, 0.1f), 0.09f}});
   const SceneStep& step = builder.build(moved({7.0, 0.0, 0.0}, std::numbers::pi / 2), {}, 0.0);
