@@ -24,8 +24,8 @@ struct ProceduralGroomDesc {
   uint32_t vertex_count = 16;
   float length_m = 0.28f;
   float length_variation = 0.12f;  // relative, uniform +-
-  float curl_radius_m = 0.004f;    // 0 = straight
-  float curl_turns = 3.0f;         // along the strand
+  float curl_radius_m = 0.006f;    // 0 = straight
+  float curl_turns = 2.2f;         // along the strand
   uint32_t seed = 1;
 
   bool operator==(const ProceduralGroomDesc&) const = default;
@@ -97,8 +97,8 @@ struct LookDesc {
 
 /// Camera about the head: it follows the head's position, not its rotation.
 struct CameraDesc {
-  glm::vec3 offset_m{0.22f, 0.1f, 0.72f};  // from the point looked at, world axes
-  glm::vec3 target_m{0.0f, -0.08f, 0.0f};   // from the head joint, world axes
+  glm::vec3 offset_m{0.22f, 0.07f, 0.62f};  // from the point looked at, world axes
+  glm::vec3 target_m{0.0f, -0.055f, 0.0f};  // from the head joint, world axes
   float fov_y_rad = 0.61f;
 
   bool operator==(const CameraDesc&) const = default;

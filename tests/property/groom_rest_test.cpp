@@ -1,0 +1,79 @@
+// Scenes as they ship, on an upright head in still air: hair stays as it was groomed.
+#include <filesystem>
+
+#include "common/scene/scene_file.h"
+#include "server/scene/scene_content.h"
+#include "server/scene/step_builder.h"
+#include "tests/support/solver_fixture.h"
+
+namespace strandcast {
+namespace {
+
+/// A hundredth of the strand, 1 mm in 10 cm: no eye tells the two shapes apart. Colliders that reach into the
+/// groom are what it is for; without them only rounding is left.
+constexpr double kShareOfLength = 0.01;
+constexpr int kSteps = 60;
+
+class GroomAtRest : public SolverTest {
+ protected:
+  /// Largest way of a vertex from the groomed shape over the length of its strand, after one second.
+  static double largest_share(const SceneDesc& scene, const SceneContent& content, Solver& solver) {
+    StepBuilder builder(scene, content.colliders);
+    SceneFeatures still;
+    still.has_colliders = true;
+    for (int step = 1; step <= kSteps; ++step) {
+      for (const StepInput& substep : builder.build(InputFrame{}, still, step / scene.step_rate_hz).substeps)
+        solver.substep(substep);
+    }
+    const SolverState state = read(solver);
+    const uint32_t strand_count = content.groom.strand_count();
+    double largest = 0.0;
+    for (uint32_t s = 0; s < strand_count; ++s) {
+      const glm::vec3* rest = content.groom.rest_position_m.data() + content.groom.offset[s];
+      double length_m = 0.0;
+      double way_m = 0.0;
+      for (uint32_t i = 1; i < content.groom.vertex_count(s); ++i) {
+        length_m += glm::distance(rest[i], rest[i - 1]);
+        way_m = std::fmax(way_m, glm::distance(state.position_m[i * strand_count + s], rest[i]));
+      }
+      if (length_m > 1e-3) largest = std::fmax(largest, way_m / length_m);
+    }
+    return largest;
+  }
+
+  void expect_rest(const SceneDesc& scene) {
+    const auto content = load_scene_content(scene);
+    ASSERT_TRUE(content) << content.error().to_string();
+    for (const SolverKind& kind : all_kinds()) {
+      if (!kind.is_gpu || kind.row->name.rfind("dftl", 0) != 0) continue;  // parity covers the references
+      SCOPED_TRACE(kind.name());
+      auto solver = make(kind, content->groom, scene.solver.parameters);
+      EXPECT_LE(largest_share(scene, *content, *solver), kShareOfLength);
+    }
+  }
+
+  void expect_rest_of(const std::string& scene_name, const std::string& groom_file) {
+    const std::filesystem::path groom = std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms" / groom_file;
+    if (!std::filesystem::exists(groom)) GTEST_SKIP() << groom << " is not here";
+    const auto path =
+        std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy/scenes" / (scene_name + ".textproto");
+    const auto scene = load_scene(path, {"groom.file.path=" + groom.string()});
+    ASSERT_TRUE(scene) << scene.error().to_string();
+    expect_rest(*scene);
+  }
+};
+
+TEST_F(GroomAtRest, BuiltInHair) {
+  expect_rest(built_in_scene());
+}
+
+TEST_F(GroomAtRest, SintelsHair) {
+  expect_rest_of("sintel", "sintel_11400x16.tfx");
+}
+
+TEST_F(GroomAtRest, TheMohawk) {
+  expect_rest_of("mohawk", "Ratboy_mohawk.tfx");
+}
+
+}  // namespace
+}  // namespace strandcast
