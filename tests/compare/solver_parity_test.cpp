@@ -88,7 +88,7 @@ std::vector<ParityCase> parity_cases() {
        false,
        false,
        true,
-       {{"style_stiffness_per_s2", 30.0}, {"style_tip_share", 0.1}, {"sag_free", 0.7}}},
+       {{"style_stiffness_per_s2", 30.0}, {"style_tip_share", 0.1}, {"sag_free", 0.4}}},
       {"limp, rough",
        Pinning::RootPair,
        16,
