@@ -19,14 +19,22 @@ namespace strandcast {
 
 const char* to_string(ErrorCode code) {
   switch (code) {
-    case ErrorCode::BadInput: return "bad input";
-    case ErrorCode::NotFound: return "not found";
-    case ErrorCode::LimitExceeded: return "limit exceeded";
-    case ErrorCode::Unsupported: return "unsupported";
-    case ErrorCode::Unavailable: return "unavailable";
-    case ErrorCode::Unauthorized: return "unauthorized";
-    case ErrorCode::Timeout: return "timeout";
-    case ErrorCode::Internal: return "internal error";
+    case ErrorCode::BadInput:
+      return "bad input";
+    case ErrorCode::NotFound:
+      return "not found";
+    case ErrorCode::LimitExceeded:
+      return "limit exceeded";
+    case ErrorCode::Unsupported:
+      return "unsupported";
+    case ErrorCode::Unavailable:
+      return "unavailable";
+    case ErrorCode::Unauthorized:
+      return "unauthorized";
+    case ErrorCode::Timeout:
+      return "timeout";
+    case ErrorCode::Internal:
+      return "internal error";
   }
   return "unknown";
 }
@@ -68,8 +76,8 @@ Result<std::vector<std::byte>> load_file(const std::filesystem::path& path, uint
   if (!S_ISREG(info.st_mode)) return at(path.string(), make_error(ErrorCode::BadInput, "not a regular file"));
   const auto size_bytes = static_cast<uint64_t>(info.st_size);
   if (size_bytes > limit_bytes)
-    return at(path.string(), make_error(ErrorCode::LimitExceeded, "file has {} bytes, the limit is {}", size_bytes,
-                                        limit_bytes));
+    return at(path.string(), make_error(ErrorCode::LimitExceeded, "file has {} bytes, the limit is {}",
+                                        size_bytes, limit_bytes));
   std::ifstream stream(path, std::ios::binary);
   std::vector<std::byte> bytes(size_bytes);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size_bytes));
@@ -93,7 +101,8 @@ Status save_file(const std::filesystem::path& path, std::span<const std::byte> b
   std::error_code failure;
   std::filesystem::rename(temporary, path, failure);
   if (failure)
-    return at(path.string(), make_error(ErrorCode::Unavailable, "cannot write the file ({})", failure.message()));
+    return at(path.string(),
+              make_error(ErrorCode::Unavailable, "cannot write the file ({})", failure.message()));
   return {};
 }
 

@@ -1,5 +1,5 @@
-// Integer hashes: hash_bytes for state hashes on the wire, mix_u32 for per-strand randomness. The same mix_u32
-// is written in shaders/lib/hash.glsl; a test compares the two.
+// Integer hashes: hash_bytes for state hashes on the wire, mix_u32 for per-strand randomness. The same
+// mix_u32 is written in shaders/lib/hash.glsl; a test compares the two.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,8 @@
 
 namespace strandcast {
 
-/// 64-bit FNV-1a over 8-byte words (then the tail byte by byte); `seed` chains several buffers. Not for security.
+/// 64-bit FNV-1a over 8-byte words (then the tail byte by byte); `seed` chains several buffers. Not for
+/// security.
 uint64_t hash_bytes(std::span<const std::byte> bytes, uint64_t seed = 0xcbf29ce484222325ull);
 
 /// Well-mixed 32-bit hash of one integer (the lowbias32 finaliser by Chris Wellons, public domain).
@@ -22,6 +23,8 @@ constexpr uint32_t mix_u32(uint32_t x) {
 }
 
 /// Uniform number in [0, 1) from a hash, exact in float (24 bits).
-constexpr float unit_float(uint32_t hash) { return static_cast<float>(hash >> 8) * (1.0f / 16777216.0f); }
+constexpr float unit_float(uint32_t hash) {
+  return static_cast<float>(hash >> 8) * (1.0f / 16777216.0f);
+}
 
 }  // namespace strandcast

@@ -1,6 +1,6 @@
-// Logging through spdlog: one logger per process, tags are the stage names (input, scene, sim, publish, encode,
-// net, replay, render). Any thread. Levels: error = a person must act, warn = degraded, info = state changes,
-// debug = for developers. Never logs tokens.
+// Logging through spdlog: one logger per process, tags are the stage names (input, scene, sim, publish,
+// encode, net, replay, render). Any thread. Levels: error = a person must act, warn = degraded, info = state
+// changes, debug = for developers. Never logs tokens.
 #pragma once
 
 #include <spdlog/spdlog.h>

@@ -12,7 +12,8 @@ inline constexpr int kStageWindow = 512;
 
 /// Monotonic clock in nanoseconds (CLOCK_MONOTONIC), comparable between processes of one machine.
 inline int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
       .count();
 }
 

@@ -1,4 +1,5 @@
-// Pictures: JPEG by libjpeg-turbo (frame stream), PNG by libpng (screenshots), animated WebP by libwebp (clips).
+// Pictures: JPEG by libjpeg-turbo (frame stream), PNG by libpng (screenshots), animated WebP by libwebp
+// (clips).
 #pragma once
 
 #include <cstddef>
@@ -23,11 +24,11 @@ struct Image {
   bool operator==(const Image&) const = default;
 };
 
-/// quality 1..100, 4:2:0; alpha is dropped. BadInput for an empty image or one whose sizes disagree, LimitExceeded
-/// above kMaxImageSide.
+/// quality 1..100, 4:2:0; alpha is dropped. BadInput for an empty image or one whose sizes disagree,
+/// LimitExceeded above kMaxImageSide.
 Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality);
-/// Untrusted input: size is read from the header and checked against kMaxImageSide before allocation; damaged or
-/// cut-off pictures are BadInput.
+/// Untrusted input: size is read from the header and checked against kMaxImageSide before allocation; damaged
+/// or cut-off pictures are BadInput.
 Result<Image> decode_jpeg(std::span<const std::byte> bytes);
 
 inline constexpr uint64_t kMaxPngFileBytes = 256ull << 20;

@@ -19,10 +19,11 @@ inline constexpr uint32_t kMaxMeshVertices = 3 * kMaxMeshTriangles;
 
 struct SceneAsset {
   uint32_t strand_count = 0;
-  uint32_t vertex_count = 0;               // per strand
-  std::vector<glm::vec3> rest_position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
-  std::vector<RootTriangle> triangle;      // key strands between which followers are drawn
-  Mesh head;                               // may be empty
+  uint32_t vertex_count = 0;  // per strand
+  std::vector<glm::vec3>
+      rest_position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
+  std::vector<RootTriangle> triangle;  // key strands between which followers are drawn
+  Mesh head;                           // may be empty
 };
 
 /// From a uniform groom and a head mesh with one normal per vertex.
@@ -31,7 +32,8 @@ SceneAsset make_scene_asset(const Groom& groom, Mesh head);
 /// Payload of an Asset message.
 std::vector<std::byte> encode_scene_asset(const SceneAsset& asset);
 
-/// Untrusted input. BadInput or LimitExceeded: every number is checked to be finite, every index against its array.
+/// Untrusted input. BadInput or LimitExceeded: every number is checked to be finite, every index against its
+/// array.
 Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload);
 
 }  // namespace strandcast

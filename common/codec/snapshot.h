@@ -1,6 +1,6 @@
 // Snapshot: one published state of all strands, quantised in head space. Immutable once published
-// (shared_ptr<const Snapshot>), so any thread may read it. Server frames and clients draw from this, never from the
-// solver's floats.
+// (shared_ptr<const Snapshot>), so any thread may read it. Server frames and clients draw from this, never
+// from the solver's floats.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@
 namespace strandcast {
 
 struct Snapshot {
-  uint64_t tick = 0;               // simulation step number
-  int64_t sim_time_ns = 0;         // tick x step, from 0
-  int64_t motion_time_ns = 0;      // server clock at arrival of the newest motion sample in this state, 0 = none
+  uint64_t tick = 0;           // simulation step number
+  int64_t sim_time_ns = 0;     // tick x step, from 0
+  int64_t motion_time_ns = 0;  // server clock at arrival of the newest motion sample in this state, 0 = none
   Pose world_from_head;
   uint32_t strand_count = 0;
-  uint32_t vertex_count = 0;       // per strand
-  float quantum_m = 0.0f;          // lattice step; error of a vertex <= quantum * sqrt(3) / 2
-  std::vector<int32_t> lattice;    // (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest
+  uint32_t vertex_count = 0;     // per strand
+  float quantum_m = 0.0f;        // lattice step; error of a vertex <= quantum * sqrt(3) / 2
+  std::vector<int32_t> lattice;  // (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest
 
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };
@@ -29,12 +29,12 @@ struct Snapshot {
 /// |lattice| stays below this, so that sums of three of them fit in 32 bits; positions outside are clamped.
 inline constexpr int32_t kMaxLattice = 1 << 28;
 
-/// The announced bound holds for vertices within this distance of the head joint along every axis; farther out the
-/// float positions themselves become coarser.
+/// The announced bound holds for vertices within this distance of the head joint along every axis; farther
+/// out the float positions themselves become coarser.
 inline constexpr float kBoundReachM = 2.0f;
 
-/// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less the
-/// rounding of float positions within kBoundReachM. `bound_m` is at least 1e-6.
+/// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less
+/// the rounding of float positions within kBoundReachM. `bound_m` is at least 1e-6.
 float quantum_for_bound(float bound_m);
 
 struct QuantiseInput {
@@ -45,8 +45,9 @@ struct QuantiseInput {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   float quantum_m = 0.0f;
-  std::span<const glm::vec3> position_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
-  std::span<const glm::vec3> fallback_m;          // same shape, or empty: zero; used where a position is not finite
+  std::span<const glm::vec3>
+      position_in_head_m;                 // (vertex_count x strand_count) vertex-major, strand fastest
+  std::span<const glm::vec3> fallback_m;  // same shape, or empty: zero; used where a position is not finite
 };
 
 struct Quantised {

@@ -8,8 +8,8 @@ namespace strandcast {
 bool is_finite(const Pose& pose) {
   const glm::dvec3& p = pose.position_m;
   const glm::dquat& q = pose.rotation;
-  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(q.w) && std::isfinite(q.x) &&
-         std::isfinite(q.y) && std::isfinite(q.z);
+  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(q.w) &&
+         std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z);
 }
 
 Pose interpolate(const Pose& a, const Pose& b, double blend) {

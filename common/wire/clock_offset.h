@@ -10,9 +10,10 @@ namespace strandcast {
 /// Keeps the probe with the smallest round trip among the last kClockWindow; its midpoint gives the offset.
 class ClockOffset {
  public:
-  /// Client send, server receive, server send, client receive; all ns, each in its own clock. Probes with a negative
-  /// round trip, one above 10 s or times that run backwards are ignored.
-  void add(int64_t client_send_ns, int64_t server_receive_ns, int64_t server_send_ns, int64_t client_receive_ns);
+  /// Client send, server receive, server send, client receive; all ns, each in its own clock. Probes with a
+  /// negative round trip, one above 10 s or times that run backwards are ignored.
+  void add(int64_t client_send_ns, int64_t server_receive_ns, int64_t server_send_ns,
+           int64_t client_receive_ns);
   bool has_value() const { return !probes_.empty(); }
   /// server clock minus client clock, ns; 0 without a probe.
   int64_t offset_ns() const;

@@ -1,6 +1,7 @@
-// Control messages as domain types; protobuf never leaves common/wire. Decoding checks every field: finite numbers,
-// ranges, counts, text. The one exception are the values of motion and wind samples: they pass as they are, NaN
-// included, because the server's input hub judges and counts them. No I/O. Sizes and versions: proto/WIRE.md.
+// Control messages as domain types; protobuf never leaves common/wire. Decoding checks every field: finite
+// numbers, ranges, counts, text. The one exception are the values of motion and wind samples: they pass as
+// they are, NaN included, because the server's input hub judges and counts them. No I/O. Sizes and versions:
+// proto/WIRE.md.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +22,8 @@ inline constexpr const char* kWebSocketProtocol = "strandcast.v1";
 inline constexpr size_t kMaxControlBytes = 64u << 10;
 inline constexpr uint32_t kMaxSamplesPerMessage = 256;
 inline constexpr uint16_t kDefaultPort = 7878;
-inline constexpr size_t kMaxNameChars = 64;         // names of clients, scenes, codecs, versions
-inline constexpr size_t kMaxTextChars = 1024;       // reasons and notices
+inline constexpr size_t kMaxNameChars = 64;    // names of clients, scenes, codecs, versions
+inline constexpr size_t kMaxTextChars = 1024;  // reasons and notices
 inline constexpr size_t kMaxTokenBytes = 256;
 inline constexpr size_t kMaxAssignmentBytes = 4096;  // SetParameter
 inline constexpr size_t kSessionIdChars = 16;
@@ -31,52 +32,52 @@ enum class Role { Viewer, Controller, Source };
 enum class StreamMode { Strands, Frames, Auto };
 
 // ---- client to server ----
-struct Hello {                    // first message; answered by Welcome or Goodbye
-  Role role = Role::Viewer;       // a Controller views and may steer; a Source sends motion and wind
+struct Hello {               // first message; answered by Welcome or Goodbye
+  Role role = Role::Viewer;  // a Controller views and may steer; a Source sends motion and wind
   StreamMode mode = StreamMode::Strands;
-  std::string name;               // shown in logs, at most 64 characters
-  std::string token;              // empty on loopback
+  std::string name;                            // shown in logs, at most 64 characters
+  std::string token;                           // empty on loopback
   uint32_t frame_width = 0, frame_height = 0;  // frames mode; 0 = server's choice
 };
-struct MotionSamples {            // from a Source
+struct MotionSamples {  // from a Source
   struct Sample {
-    int64_t time_ns = 0;          // source clock, monotonic
+    int64_t time_ns = 0;  // source clock, monotonic
     Pose world_from_head;
   };
-  std::vector<Sample> samples;    // oldest first, at most kMaxSamplesPerMessage
+  std::vector<Sample> samples;  // oldest first, at most kMaxSamplesPerMessage
 };
-struct WindSamples {              // from a Source
+struct WindSamples {  // from a Source
   struct Sample {
-    int64_t time_ns = 0;          // source clock
-    glm::vec3 velocity_mps{0.0f}; // world
+    int64_t time_ns = 0;           // source clock
+    glm::vec3 velocity_mps{0.0f};  // world
   };
   std::vector<Sample> samples;
 };
-struct CameraChange {             // frames mode: the viewer's camera
+struct CameraChange {  // frames mode: the viewer's camera
   CameraDesc camera;
 };
 struct KeyframeRequest {};
-struct FrameAck {                 // strands and frames
+struct FrameAck {  // strands and frames
   uint32_t sequence = 0;
-  int64_t receive_time_ns = 0;    // client clock
+  int64_t receive_time_ns = 0;  // client clock
   uint32_t decode_us = 0;
 };
-struct Ping {                     // clock probe
+struct Ping {  // clock probe
   int64_t client_time_ns = 0;
 };
 enum class Command { Pause, Resume, StepOnce, Reset };
-struct ControlCommand {           // from a Controller
+struct ControlCommand {  // from a Controller
   Command command = Command::Pause;
 };
-struct SetParameter {             // from a Controller: scene field path, value as text ("solver.name=dftl")
+struct SetParameter {  // from a Controller: scene field path, value as text ("solver.name=dftl")
   std::string assignment;
 };
-using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
-                                   ControlCommand, SetParameter>;
+using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck,
+                                   Ping, ControlCommand, SetParameter>;
 
 // ---- server to client ----
 struct Welcome {
-  std::string session_id;         // 16 hex digits, new for every server start
+  std::string session_id;  // 16 hex digits, new for every server start
   std::string server_version;
   std::string scene_name;
   StreamMode mode = StreamMode::Strands;  // what was chosen for `Auto`
@@ -84,40 +85,41 @@ struct Welcome {
   std::string codec;
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
-  float bound_m = 0.0f;           // announced Euclidean error
+  float bound_m = 0.0f;  // announced Euclidean error
   double step_rate_hz = 60.0;
   LookDesc look;
   CameraDesc camera;
   uint32_t frame_width = 0, frame_height = 0;
 };
 struct Pong {
-  int64_t client_time_ns = 0;     // echoed
+  int64_t client_time_ns = 0;  // echoed
   int64_t server_receive_ns = 0;
   int64_t server_send_ns = 0;
 };
-struct ServerStatus {             // about twice a second to every viewer
+struct ServerStatus {  // about twice a second to every viewer
   uint64_t tick = 0;
-  double sim_ms = 0.0;            // median per step
+  double sim_ms = 0.0;  // median per step
   double encode_ms = 0.0;
-  double render_ms = 0.0;         // 0 when nothing is rendered
-  double realtime_factor = 0.0;   // simulated over wall time, last second
+  double render_ms = 0.0;        // 0 when nothing is rendered
+  double realtime_factor = 0.0;  // simulated over wall time, last second
   bool is_paused = false;
-  bool is_motion_stale = true;    // no motion sample for kMotionStaleS
+  bool is_motion_stale = true;  // no motion sample for kMotionStaleS
   uint32_t viewer_count = 0;
   uint64_t dropped_frames = 0;    // for this client
   uint64_t rejected_samples = 0;  // motion and wind samples refused so far
 };
-struct Goodbye {                  // the server closes right after it
-  std::string reason;             // one sentence
+struct Goodbye {       // the server closes right after it
+  std::string reason;  // one sentence
 };
-struct Notice {                   // answer to SetParameter and ControlCommand, or a warning
+struct Notice {  // answer to SetParameter and ControlCommand, or a warning
   bool is_error = false;
   std::string text;
 };
 using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice>;
 
-/// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their limits.
-/// Names, reasons and notices are shortened to theirs, and characters that cannot be printed become spaces or '?'.
+/// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
+/// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become
+/// spaces or '?'.
 std::vector<std::byte> encode(const ClientMessage& message);
 std::vector<std::byte> encode(const ServerMessage& message);
 

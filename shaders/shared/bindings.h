@@ -1,6 +1,6 @@
-// Binding numbers of buffers, shared by C++ and GLSL. Storage and uniform blocks count separately; simulation and
-// rendering never share a context, so both start at 0. Every block has an instance name: equal member names in two
-// stages of one program do not link otherwise.
+// Binding numbers of buffers, shared by C++ and GLSL. Storage and uniform blocks count separately; simulation
+// and rendering never share a context, so both start at 0. Every block has an instance name: equal member
+// names in two stages of one program do not link otherwise.
 #ifndef STRANDCAST_SHADERS_SHARED_BINDINGS_H
 #define STRANDCAST_SHADERS_SHARED_BINDINGS_H
 

@@ -1,5 +1,5 @@
-// Limits that C++ and GLSL must agree on. Included by both: only "const uint" and "const int" lines here, with
-// names that no other header uses.
+// Limits that C++ and GLSL must agree on. Included by both: only "const uint" and "const int" lines here,
+// with names that no other header uses.
 #ifndef STRANDCAST_SHADERS_SHARED_LIMITS_H
 #define STRANDCAST_SHADERS_SHARED_LIMITS_H
 
@@ -9,22 +9,22 @@ namespace strandcast::shader {
 using uint = uint32_t;
 #endif
 
-// Invocations per group of one-dimensional kernels with one strand per invocation: several times the 8 lanes of
-// llvmpipe and one or two warps elsewhere.
+// Invocations per group of one-dimensional kernels with one strand per invocation: several times the 8 lanes
+// of llvmpipe and one or two warps elsewhere.
 const uint kStrandLocalSize = 64u;
 
 // Invocations per group of kernels with one vertex per invocation: as many whole strands as fit.
 const uint kVertexLocalSize = 128u;
 
-// llvmpipe indexes tessellated vertices of one draw with 16 bits and draws wrongly past that, without an error:
-// patches x lines x (segments + 1) of a draw stays at or below this.
+// llvmpipe indexes tessellated vertices of one draw with 16 bits and draws wrongly past that, without an
+// error: patches x lines x (segments + 1) of a draw stays at or below this.
 const uint kMaxTessellatedVerticesPerDraw = 65535u;
 
 // Largest tessellation level that every GL 4.5 device offers.
 const uint kMaxTessellationLevel = 64u;
 
 // The same limits as in common/ and server/sim under the same names; a test compares them.
-const uint kMaxVertexCount = 64u;      // per strand
+const uint kMaxVertexCount = 64u;  // per strand
 const uint kMaxSphereColliders = 16u;
 const uint kMaxGustWaves = 8u;
 

@@ -143,8 +143,9 @@ TEST_F(StrandShader, LobesMatchTheEquationsEverywhere) {
 }
 
 TEST_F(StrandShader, ThePrimaryHighlightIsShiftedTowardsTheRoot) {
-  // Light straight across. At half angle h the lobe is exp(-(h - shift)^2 / 2 width^2) / cos^2 h, with its peak at
-  // h - shift = 2 width^2 tan h: -7.25 degrees for R (towards the root), 12.2 degrees for TRT. Twice that is the view.
+  // Light straight across. At half angle h the lobe is exp(-(h - shift)^2 / 2 width^2) / cos^2 h, with its
+  // peak at h - shift = 2 width^2 tan h: -7.25 degrees for R (towards the root), 12.2 degrees for TRT. Twice
+  // that is the view.
   std::vector<std::vector<glm::vec4>> rows;
   for (int degrees = -60; degrees <= 60; ++degrees)
     rows.push_back({glm::vec4(1, 0, 0, 35.0 * kDegree), glm::vec4(0, 1, 0, 0),
