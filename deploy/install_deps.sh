@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what Strandcast builds and runs with, from Debian 12's own packages; does nothing when all is there.
-# Run as root or as a user who may use sudo.
+# Run as root or as a user who may use sudo. Arguments are further packages to install.
 set -euo pipefail
 
 packages=(
@@ -8,6 +8,7 @@ packages=(
   libboost1.81-dev libprotobuf-dev libzstd-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev libglm-dev
   libegl-dev libepoxy-dev libegl1 libgl1-mesa-dri libglfw3-dev libimgui-dev
   libturbojpeg0-dev libpng-dev libwebp-dev libgtest-dev libgmock-dev libbenchmark-dev
+  "$@"
 )
 
 missing=()

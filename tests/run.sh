@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-bash deploy/install_deps.sh
+bash deploy/install_deps.sh xvfb xauth  # a display for the window test
 cmake --preset ci >/dev/null
 cmake --build --preset ci
 ctest --preset ci -j2 "$@"
