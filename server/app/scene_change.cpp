@@ -19,7 +19,7 @@ Status check_solver(const SceneDesc& scene) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   const Result<SolverParameters> parameters = complete_parameters(*row, scene.solver.parameters);
   if (!parameters) return parameters.error();
-  return {};
+  return check_step(*row, *parameters, 1.0 / (scene.step_rate_hz * scene.substeps));
 }
 
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment) {

@@ -5,11 +5,12 @@
 #include "server/sim/solvers/dftl/dftl.h"
 #include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
 #include "server/sim/solvers/direct_rod/direct_rod.h"
+#include "server/sim/solvers/ftl/ftl.h"
 
 namespace strandcast {
 
 const std::vector<SolverRow>& solver_table() {
-  static const std::vector<SolverRow> table = {dftl_row(), dftl_parallel_row(), direct_rod_row()};
+  static const std::vector<SolverRow> table = {dftl_row(), dftl_parallel_row(), ftl_row(), direct_rod_row()};
   return table;
 }
 
@@ -20,6 +21,10 @@ Result<const SolverRow*> find_solver(const std::string& name) {
     known += (known.empty() ? "" : ", ") + row.name;
   }
   return make_error(ErrorCode::NotFound, "unknown solver '{}' (known: {})", name, known);
+}
+
+Status check_step(const SolverRow& row, const SolverParameters& complete, double substep_s) {
+  return row.check_step ? row.check_step(complete, substep_s) : Status();
 }
 
 Result<SolverParameters> complete_parameters(const SolverRow& row, const SolverParameters& given) {

@@ -32,6 +32,19 @@ struct SolverRow {
   std::string summary;
   std::string source;  // paper, section and equation
   std::vector<SolverParameterInfo> parameters;
+  /// Largest relative change of a segment's length with default parameters, whatever the head does within the
+  /// motion that the laws test; 0 = lengths are exact to rounding under any motion.
+  double stretch_bound = 0.0;
+  /// Lengths are exact too when both ends of a strand are held; only for rows with exact lengths.
+  bool has_exact_held_length = true;
+  /// Under constant forces strands come to rest within ten seconds, in a shape that the substep does not
+  /// change.
+  bool comes_to_rest = true;
+  /// How deep a vertex may end a step inside a collider.
+  double collider_depth_m = 1e-6;
+  /// BadInput when a step of `substep_s` with complete parameters is outside the model's stable range, with
+  /// the limit, the value and the ways out; empty = every step is stable.
+  std::function<Status(const SolverParameters&, double substep_s)> check_step;
   std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const GpuSolverContext&)> make_gpu;
   std::function<std::unique_ptr<Solver>(const SolverParameters&)>
       make_reference;  // double precision, one thread
@@ -41,6 +54,9 @@ const std::vector<SolverRow>& solver_table();
 
 /// NotFound: "unknown solver 'x' (known: dftl, dftl_parallel, direct_rod)".
 Result<const SolverRow*> find_solver(const std::string& name);
+
+/// The row's check_step, if it has one.
+Status check_step(const SolverRow& row, const SolverParameters& complete, double substep_s);
 
 /// Defaults filled in; BadInput for unknown names and values out of range.
 Result<SolverParameters> complete_parameters(const SolverRow& row, const SolverParameters& given);

@@ -22,7 +22,7 @@ class SolverRobustness : public SolverTest {
       solver->substep(moving_input(step, kSubstepS));
       const SolverState state = read(*solver);
       ASSERT_TRUE(is_finite(state)) << "step " << step;
-      if (checks_lengths) {
+      if (checks_lengths && kind.row->stretch_bound == 0.0) {
         ASSERT_LE(length_excess_m(groom, state, kLengthTolerance), 0.0) << "step " << step;
       }
     }
@@ -130,7 +130,9 @@ TEST_F(SolverRobustness, ExtremeInputsStayFiniteAndExact) {
         solver->substep(input);
         const SolverState state = read(*solver);
         ASSERT_TRUE(is_finite(state));
-        ASSERT_LE(length_excess_m(groom, state, kLengthTolerance), 0.0);
+        if (kind.row->stretch_bound == 0.0) {
+          ASSERT_LE(length_excess_m(groom, state, kLengthTolerance), 0.0);
+        }
       }
     }
   }
@@ -171,7 +173,9 @@ TEST_F(SolverRobustness, ABrokenStrandRecoversAndTouchesNoOther) {
       }
       state = read(*solver);
       EXPECT_TRUE(is_finite(state));
-      EXPECT_LE(length_excess_m(groom, state, kLengthTolerance), 0.0);
+      if (kind.row->stretch_bound == 0.0) {
+        EXPECT_LE(length_excess_m(groom, state, kLengthTolerance), 0.0);
+      }
       const SolverState expected = read(*sound);
       for (size_t i = 0; i < state.position_m.size(); ++i) {
         if (i % strand_count == kBroken) continue;
@@ -207,7 +211,9 @@ TEST_F(SolverRobustness, AKilometreInOneStepSettlesToTheSameShape) {
     input.head_shift_m = {800.0, 0.0, -600.0};
     solver->substep(input);
     ASSERT_TRUE(is_finite(read(*solver)));
-    ASSERT_LE(length_excess_m(groom, read(*solver), kLengthTolerance), 0.0);
+    if (kind.row->stretch_bound == 0.0) {
+      ASSERT_LE(length_excess_m(groom, read(*solver), kLengthTolerance), 0.0);
+    }
     input.head_shift_m = glm::dvec3(0.0);
     for (int step = 0; step < 1200; ++step) {
       solver->substep(input);

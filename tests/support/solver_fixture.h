@@ -94,4 +94,22 @@ inline double length_excess_m(const Groom& groom, const SolverState& state, doub
   return worst;
 }
 
+/// Largest relative change of a segment's length; segments below a micrometre are left out.
+inline double largest_stretch(const Groom& groom, const SolverState& state) {
+  constexpr double kShortestM = 1e-6;
+  const uint32_t strand_count = groom.strand_count();
+  double largest = 0.0;
+  for (uint32_t s = 0; s < strand_count; ++s) {
+    const glm::vec3* rest = groom.rest_position_m.data() + groom.offset[s];
+    for (uint32_t i = 1; i < groom.vertex_count(s); ++i) {
+      const double rest_m = glm::distance(glm::dvec3(rest[i]), glm::dvec3(rest[i - 1]));
+      if (rest_m < kShortestM) continue;
+      const double now_m = glm::distance(glm::dvec3(state.position_m[(i - 1) * strand_count + s]),
+                                         glm::dvec3(state.position_m[i * strand_count + s]));
+      largest = std::fmax(largest, std::abs(now_m / rest_m - 1.0));
+    }
+  }
+  return largest;
+}
+
 }  // namespace strandcast
