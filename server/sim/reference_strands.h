@@ -40,6 +40,10 @@ class ReferenceStrands : public Solver {
   /// reach of a pinned tail allow. pinned tail.
   void place(ReferenceStrand& strand, uint32_t i) const;
   const StrandLayout& layout() const { return layout_; }
+  // Of the substep in progress.
+  const StepInput& input() const { return *input_; }
+  double h_s() const { return h_s_; }
+  glm::dquat carry() const { return rotation_ * glm::conjugate(previous_rotation_); }  // turn of the head
   bool is_pinned(uint32_t i) const { return i < layout_.pinned_root_count || i >= layout_.tail_begin(); }
 
  private:

@@ -64,6 +64,7 @@ Status StrandKernel::compile(bool has_pinned_tail) {
                                  {"HAS_TURBULENCE", features_.has_turbulence ? 1 : 0},
                                  {"HAS_PINNED_TAIL", has_pinned_tail ? 1 : 0}};
     ASSIGN_OR_RETURN(programs_[capacity], gl::Program::make(shaders_, {desc_.shader_path}, variant));
+    for (const auto& [name, value] : desc_.uniforms) programs_[capacity].set(name, value);
   }
   is_compiled_for_tail_ = has_pinned_tail;
   return {};

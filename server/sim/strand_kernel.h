@@ -24,6 +24,7 @@ struct StrandKernelDesc {
   uint32_t local_size = 0;
   uint32_t iterations = 0;  // odd-even only
   bool has_exact_length = false;
+  std::map<std::string, glm::vec4> uniforms;  // of the model, the same in every step
 };
 
 class StrandKernel final : public Solver {

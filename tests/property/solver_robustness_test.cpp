@@ -195,7 +195,9 @@ TEST_F(SolverRobustness, AVertexOnItsLeaderTakesTheGroomedDirection) {
     folded.position_m[1] = folded.position_m[0];
     solver->write(folded);
     solver->substep(calm_input());
-    EXPECT_LE(largest_distance_m(read(*solver).position_m, groomed.position_m), 1e-7);
+    // A compliant segment gives way by a few millionths.
+    const double allowed_m = kind.row->stretch_bound > 0.0 ? 1e-6 : 1e-7;
+    EXPECT_LE(largest_distance_m(read(*solver).position_m, groomed.position_m), allowed_m);
   }
 }
 

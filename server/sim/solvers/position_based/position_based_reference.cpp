@@ -1,0 +1,143 @@
+#include <algorithm>
+#include <cmath>
+
+#include "server/sim/reference_strands.h"
+#include "server/sim/solvers/position_based/position_based.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kTinyLengthM = 1e-10;
+constexpr double kTinyMassKg = 1e-15;
+
+StrandParameters read_shared(SolverParameters parameters) {
+  parameters["s_damping"] = 0.0;
+  return read_strand_parameters(parameters);
+}
+
+/// A distance that two vertices should have.
+struct DistanceConstraint {
+  uint32_t a = 0;
+  uint32_t b = 0;
+  double rest_m = 0.0;
+  double compliance_mpn = 0.0;
+  double share = 1.0;
+  double multiplier = 0.0;  // N s^2
+  bool is_stretch = true;
+};
+
+class PositionBasedReference final : public ReferenceStrands {
+ public:
+  PositionBasedReference(const SolverParameters& parameters, bool is_compliant)
+      : ReferenceStrands(read_shared(parameters)),
+        model_(read_position_based(parameters, is_compliant)),
+        friction_(parameters.at("collider_friction")) {}
+
+ private:
+  void solve(ReferenceStrand& strand) const override {
+    std::vector<DistanceConstraint> constraints = make_constraints(strand);
+    std::vector<double> inverse_mass(layout().vertex_count);
+    for (uint32_t i = 0; i < layout().vertex_count; ++i) inverse_mass[i] = inverse_mass_perkg(strand, i);
+    leave_colliders(strand);
+    for (uint32_t iteration = 0; iteration < model_.iterations; ++iteration) {
+      for (DistanceConstraint& constraint : constraints) project(strand, inverse_mass, constraint);
+      leave_colliders(strand);
+    }
+  }
+
+  std::vector<DistanceConstraint> make_constraints(const ReferenceStrand& strand) const {
+    std::vector<DistanceConstraint> constraints;
+    for (uint32_t i = 1; i < layout().vertex_count; ++i) {
+      if (i >= 2) {
+        const double span_m = glm::distance(strand.target_m[i], strand.target_m[i - 2]);
+        constraints.push_back({i - 2, i, span_m, model_.bend_compliance_mpn, model_.bend_share, 0.0, false});
+      }
+      constraints.push_back(
+          {i - 1, i, strand.segment_m[i], model_.stretch_compliance_mpn, model_.stretch_share, 0.0, true});
+    }
+    return constraints;
+  }
+
+  /// 1/kg; pbd has masses only up to a factor.
+  double inverse_mass_perkg(const ReferenceStrand& strand, uint32_t i) const {
+    if (is_pinned(i)) return 0.0;
+    double length_m = 0.0;
+    for (const double segment_m : strand.segment_m) length_m += segment_m;
+    const double density = model_.is_compliant ? model_.linear_density_kgpm : 1.0;
+    const double mass_kg = std::max(kTinyMassKg, density * length_m / (layout().vertex_count - 1));
+    return i + 1 == layout().vertex_count ? 2.0 / mass_kg : 1.0 / mass_kg;
+  }
+
+  void project(ReferenceStrand& strand, const std::vector<double>& inverse_mass,
+               DistanceConstraint& constraint) const {
+    const double w_a = inverse_mass[constraint.a];
+    const double w_b = inverse_mass[constraint.b];
+    if (w_a + w_b == 0.0) return;
+    const glm::dvec3 along = strand.placed_m[constraint.b] - strand.placed_m[constraint.a];
+    const double length_m = glm::length(along);
+    glm::dvec3 gradient = length_m > kTinyLengthM ? along / length_m : glm::dvec3(0.0);
+    if (length_m <= kTinyLengthM && constraint.is_stretch) {
+      const glm::dvec3 groomed = strand.target_m[constraint.b] - strand.target_m[constraint.a];
+      if (glm::length(groomed) > kTinyLengthM) gradient = glm::normalize(groomed);
+    }
+    const double error_m = length_m - constraint.rest_m;
+    double push = -constraint.share * error_m / (w_a + w_b);
+    if (model_.is_compliant) {
+      const double scaled = constraint.compliance_mpn / (h_s() * h_s());
+      push = (-error_m - scaled * constraint.multiplier) / (w_a + w_b + scaled);
+      constraint.multiplier += push;
+    }
+    strand.placed_m[constraint.a] -= w_a * push * gradient;
+    strand.placed_m[constraint.b] += w_b * push * gradient;
+  }
+
+  void leave_colliders(ReferenceStrand& strand) const {
+    for (uint32_t i = 0; i < layout().vertex_count; ++i) {
+      if (!is_pinned(i)) strand.placed_m[i] = outside(strand.old_m[i], strand.placed_m[i]);
+    }
+  }
+
+  /// Out of the deepest collider along its normal, twice when there are several, after Coulomb friction in
+  /// displacements: sliding over the collider, which turns with the head, is undone up to the friction
+  /// coefficient times the depth.
+  glm::dvec3 outside(const glm::dvec3& old, glm::dvec3 point) const {
+    const size_t count = std::min<size_t>(input().colliders.size(), kMaxSphereColliders);
+    for (int round = 0; round < (count > 1 ? 2 : 1); ++round) {
+      double deepest = 0.0;
+      glm::dvec3 center(0.0);
+      double radius = 0.0;
+      for (size_t c = 0; c < count; ++c) {
+        const glm::dvec3 place = limited(glm::dvec3(input().colliders[c].center_m), kMaxColliderM);
+        const double r = std::max(0.0, limited(input().colliders[c].radius_m, kMaxColliderM));
+        const double inside = r * r - glm::dot(point - place, point - place);
+        if (inside <= deepest) continue;
+        deepest = inside;
+        center = place;
+        radius = r;
+      }
+      if (deepest <= 0.0) return point;
+      const glm::dvec3 outward = point - center;
+      const double distance = glm::length(outward);
+      if (distance < kTinyLengthM) return point;  // no way out is shorter than another
+      const glm::dvec3 normal = outward / distance;
+      const glm::dvec3 slip = point - carry() * old;
+      const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
+      const double way = glm::length(sliding);
+      const double undone = way > kTinyLengthM ? std::min(1.0, friction_ * (radius - distance) / way) : 0.0;
+      const glm::dvec3 held = point - undone * sliding - center;
+      point = center + held * (radius / std::max(glm::length(held), kTinyLengthM));
+    }
+    return point;
+  }
+
+  PositionBasedParameters model_;
+  double friction_;
+};
+
+}  // namespace
+
+std::unique_ptr<Solver> make_position_based_reference(const SolverParameters& parameters, bool is_compliant) {
+  return std::make_unique<PositionBasedReference>(parameters, is_compliant);
+}
+
+}  // namespace strandcast

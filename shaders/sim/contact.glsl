@@ -1,0 +1,34 @@
+// Pushes single vertices out of colliders, along the normal, with friction. For models that move vertices
+// rather than turn segments.
+#include "sim/follow.glsl"
+
+// Position before the substep as predict() sees it.
+vec3 position_before(uint at) {
+  const vec3 stored = texelFetch(u_position, int(at)).xyz;
+  const vec3 velocity = texelFetch(u_velocity, int(at)).xyz;
+  const bool is_sane = !is_broken(stored) && !is_broken(velocity);
+  return is_sane ? stored : turned_with_head(texelFetch(u_rest, int(at)).xyz);
+}
+
+// `at`: the vertex's element in the state.
+vec3 outside_colliders(vec3 point, uint at) {
+#if COLLIDERS >= 1
+  for (int round = 0; round < kPushRounds; ++round) {
+    vec4 deepest = vec4(0.0);
+    float most = 0.0;
+    for (uint i = 0u; i < uint(COLLIDERS); ++i) {
+      const vec4 sphere = u_step.collider[i];
+      const vec3 outward = point - sphere.xyz;
+      const float inside = sphere.w * sphere.w - dot(outward, outward);
+      deepest = inside > most ? sphere : deepest;
+      most = max(inside, most);
+    }
+    if (!(most > 0.0)) break;
+    const vec3 held = held_by_friction(position_before(at), point, deepest) - deepest.xyz;
+    const float squared = dot(held, held);
+    // No way out of the very centre is shorter than another.
+    point = squared > kTinySquared ? deepest.xyz + held * (deepest.w * inversesqrt(squared)) : point;
+  }
+#endif
+  return point;
+}

@@ -1,0 +1,3 @@
+// Position-based dynamics: 003 equation 2.1.
+#define IS_COMPLIANT 0
+#include "sim/position_based.glsl"

@@ -1,0 +1,3 @@
+// Compliant position-based dynamics: Macklin, Mueller, Chentanez 2016, equation 18.
+#define IS_COMPLIANT 1
+#include "sim/position_based.glsl"
