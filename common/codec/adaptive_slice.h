@@ -9,7 +9,7 @@
 namespace strandcast {
 
 inline constexpr uint32_t kMaxSliceCount = 8;
-inline constexpr int kResidualBits = 2;  // residuals are kept in 1/4 lattice steps
+inline constexpr int kResidualBits = 2;          // residuals are kept in 1/4 lattice steps
 inline constexpr uint32_t kMaxMagnitude = 1000;  // of a residual; the sums of six fit in 16 bits
 
 // One table for each axis position, expected size and distance of the prediction from a lattice point.

@@ -13,8 +13,8 @@
 namespace strandcast {
 
 enum class Opcode : uint8_t {
-  Control = 0x01,         // protobuf follows at once, no header
-  Asset = 0x10,           // SceneAsset: groom topology and head mesh
+  Control = 0x01,  // protobuf follows at once, no header
+  Asset = 0x10,    // SceneAsset: groom topology and head mesh
   StrandKeyframe = 0x20,
   StrandDelta = 0x21,
   JpegFrame = 0x30,
@@ -25,13 +25,13 @@ inline constexpr uint32_t kMaxMediaPayloadBytes = 64u << 20;
 
 struct FrameHeader {
   Opcode opcode = Opcode::StrandDelta;
-  uint8_t flags = 0;           // reserved, 0
+  uint8_t flags = 0;  // reserved, 0
   uint16_t stream_id = 0;
   uint32_t sequence = 0;       // counts per stream, from 1
   uint32_t base_sequence = 0;  // a delta decodes only right after this one; 0 = none needed
   uint32_t payload_bytes = 0;
   int64_t sim_time_ns = 0;
-  int64_t send_time_ns = 0;    // server clock
+  int64_t send_time_ns = 0;  // server clock
 
   bool operator==(const FrameHeader&) const = default;
 };
