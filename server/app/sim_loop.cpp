@@ -125,11 +125,20 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
 }
 
 void SimLoop::push(Job job) {
+  const bool is_facts = std::holds_alternative<RuntimeFacts>(job.what);
+  bool is_full = false;
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    // Of the facts only the newest count.
+    if (is_facts)
+      std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<RuntimeFacts>(old.what); });
+    is_full = !is_facts && jobs_.size() >= kMaxPendingJobs;
+    if (!is_full) jobs_.push_back(std::move(job));
   }
-  changed_.notify_all();
+  if (!is_full)
+    changed_.notify_all();
+  else if (job.reply)
+    job.reply({true, fmt::format("{} commands are waiting already: try again later.", kMaxPendingJobs)});
 }
 
 void SimLoop::post(const ControlCommand& command, Reply reply) {

@@ -63,9 +63,12 @@ struct SimStats {
   std::string solver_name;
 };
 
+/// Commands that may wait for the simulation thread; each can cost a new solver.
+inline constexpr size_t kMaxPendingJobs = 32;
+
 class SimLoop {
  public:
-  /// Answer to a command, on the simulation thread.
+  /// Answer to a command, on the simulation thread; on the caller's when kMaxPendingJobs wait already.
   using Reply = std::function<void(Notice)>;
 
   /// Starts the thread and waits until the solver is loaded and the rest state published, or for the error.
