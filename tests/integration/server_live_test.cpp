@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <deque>
+#include <future>
 #include <map>
 #include <thread>
 
@@ -11,6 +13,7 @@
 #include "common/codec/scene_asset.h"
 #include "common/codec/strand_codec.h"
 #include "server/app/server.h"
+#include "server/app/sim_loop.h"
 #include "tests/support/raw_client.h"
 
 namespace strandcast {
@@ -118,6 +121,40 @@ class LiveServer : public testing::Test {
 
   std::unique_ptr<Server> server_;
 };
+
+TEST(SimLoopJobs, CommandsBeyondTheLimitAreRefusedAtOnce) {
+  // The first state published after the start holds the simulation thread until the test lets it go.
+  std::promise<void> held, go;
+  auto let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimLoopConfig config;
+  config.scene = small_scene();
+  auto content = load_scene_content(config.scene);
+  ASSERT_TRUE(content.ok());
+  config.content = std::make_shared<const SceneContent>(std::move(*content));
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  InputHub hub;
+  SnapshotSlot slot;
+  auto loop = SimLoop::start(std::move(config), hub, slot);
+  if (!loop.ok() && loop.error().code == ErrorCode::Unavailable)
+    GTEST_SKIP() << "needs OpenGL 4.5: " << loop.error().to_string();
+  ASSERT_TRUE(loop.ok()) << loop.error().to_string();
+  held.get_future().wait();
+  std::atomic<size_t> refused = 0, answered = 0;
+  for (size_t i = 0; i < kMaxPendingJobs + 3; ++i)
+    (*loop)->post(ControlCommand{Command::Pause},
+                  [&](const Notice& notice) { notice.is_error ? ++refused : ++answered; });
+  EXPECT_EQ(refused, 3u);
+  go.set_value();
+  for (int i = 0; i < 1000 && answered < kMaxPendingJobs; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(answered, kMaxPendingJobs) << "what was accepted is carried out";
+  (*loop)->stop();
+}
 
 TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {
   ASSERT_NO_FATAL_FAILURE(start());
