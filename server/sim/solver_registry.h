@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/gl/program.h"
+#include "server/sim/hair_constants.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
@@ -49,6 +50,12 @@ struct SolverRow {
   /// BadInput when a step of `substep_s` with complete parameters is outside the model's stable range, with
   /// the limit, the value and the ways out; empty = every step is stable.
   std::function<Status(const SolverParameters&, double substep_s)> check_step;
+  /// The parameters that come nearest to a hair of these constants, cut into segments of `segment_m` and
+  /// stepped by `substep_s`, without a pull to the groomed shape and without drag: for tests against the
+  /// theory of rods. Empty = nothing in the model stands for such constants.
+  std::function<SolverParameters(const HairConstants&, double segment_m, double substep_s)> as_hair;
+  /// The parameter that buys accuracy with time ("iterations", "solves"); "" = none.
+  std::string effort_parameter;
   std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const GpuSolverContext&)> make_gpu;
   std::function<std::unique_ptr<Solver>(const SolverParameters&)>
       make_reference;  // double precision, one thread

@@ -29,6 +29,32 @@ TEST(SolverRegistry, RowsAreComplete) {
   }
 }
 
+TEST(SolverRegistry, EffortAndHairParametersAreTheRowsOwnAndInRange) {
+  int hair_count = 0;
+  for (const SolverRow& row : solver_table()) {
+    if (!row.effort_parameter.empty()) {
+      const auto effort = complete_parameters(row, {{row.effort_parameter, 2.0}});
+      EXPECT_TRUE(effort) << effort.error().to_string();
+    }
+    if (!row.as_hair) continue;
+    ++hair_count;
+    for (const double segment_m : {0.3 / 63, 0.3 / 7}) {
+      const auto complete = complete_parameters(row, row.as_hair(HairConstants(), segment_m, 1.0 / 60.0));
+      EXPECT_TRUE(complete) << complete.error().to_string();
+    }
+  }
+  EXPECT_GE(hair_count, 2);
+}
+
+// E I and mass per length of the reference hair as the analytic tests state them.
+TEST(SolverRegistry, HairHasTheStatedStiffnesses) {
+  const HairConstants hair;
+  EXPECT_NEAR(hair.bending_stiffness_nm2(), 1.4726e-8, 1e-12);
+  EXPECT_NEAR(hair.linear_density_kgpm(), 1.0210e-5, 1e-9);
+  EXPECT_NEAR(hair.twist_stiffness_nm2() / hair.bending_stiffness_nm2(), 1.0 / 1.45, 1e-12);
+  EXPECT_NEAR(hair.stretch_stiffness_n() * 0.09 / hair.bending_stiffness_nm2(), 1.44e8, 1.0);
+}
+
 TEST(SolverRegistry, UnknownSolversListTheKnownOnes) {
   const auto found = find_solver("dftl2");
   ASSERT_FALSE(found);

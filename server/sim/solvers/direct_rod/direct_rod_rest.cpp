@@ -162,6 +162,14 @@ SolverRow direct_rod_row() {
       {"max_speed_mps", 30.0, 0.1, 1000.0, "m/s",
        "largest speed relative to the head that a step starts from"},
   };
+  row.effort_parameter = "solves";
+  row.as_hair = [](const HairConstants& hair, double, double) {
+    return SolverParameters{{"radius_m", hair.radius_m},
+                            {"density_kgpm3", hair.density_kgpm3},
+                            {"young_modulus_pa", hair.young_modulus_pa},
+                            {"bending_damping_s", 0.0},
+                            {"air_drag_per_s", 0.0}};
+  };
   row.make_gpu = make_direct_rod_gpu;
   row.make_reference = make_direct_rod_reference;
   return row;

@@ -38,6 +38,7 @@ SolverRow common_row(bool is_compliant) {
   row.parameters.push_back({"iterations", is_compliant ? kDefaultCompliantIterations : kDefaultIterations,
                             1.0, kMaxIterations, "",
                             "times all constraints are solved per substep (rounded)"});
+  row.effort_parameter = "iterations";
   row.make_gpu = [is_compliant](const SolverParameters& parameters, const GpuSolverContext& context) {
     return make_gpu(parameters, context, is_compliant);
   };
@@ -101,6 +102,14 @@ SolverRow xpbd_row() {
                             "change of a vertex's distance to the second next one per force"});
   row.parameters.push_back(
       {"linear_density_kg_per_m", 1.02e-5, 1e-7, 1.0, "kg/m", "mass per length of a strand"});
+  row.as_hair = [](const HairConstants& hair, double segment_m, double) {
+    return SolverParameters{
+        {"stretch_compliance_m_per_n", segment_m / hair.stretch_stiffness_n()},
+        {"bend_compliance_m_per_n", segment_m * segment_m * segment_m / hair.bending_stiffness_nm2()},
+        {"linear_density_kg_per_m", hair.linear_density_kgpm()},
+        {"style_stiffness_per_s2", 0.0},
+        {"air_drag_per_s", 0.0}};
+  };
   row.stretch_bound = 0.15;
   row.rounding_growth = 2.2;
   row.settled_spread_m = 0.01;  // what the iterations leave of the stretch differs
