@@ -1,0 +1,56 @@
+// HtmlPage: one self-contained page of a report: text, tables and inline SVG, readable in a light and a dark
+// browser, without scripts and without anything from elsewhere. Any thread.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace strandcast {
+
+/// The text with the five characters that mean something in HTML and SVG replaced.
+std::string html_escaped(std::string_view text);
+
+enum class HtmlMark { None, Good, Bad };
+
+struct HtmlCell {
+  HtmlCell(std::string cell_text, HtmlMark cell_mark = HtmlMark::None)
+      : text(std::move(cell_text)), mark(cell_mark) {}
+  HtmlCell(const char* cell_text) : text(cell_text) {}
+
+  std::string text;
+  HtmlMark mark;
+};
+
+struct HtmlTable {
+  std::string caption;
+  std::vector<std::string> columns;
+  std::vector<std::vector<HtmlCell>> rows;  // as long as `columns`; cells that begin like numbers align right
+};
+
+class HtmlPage {
+ public:
+  explicit HtmlPage(std::string title);
+
+  /// A section; further calls add to it. Text is escaped.
+  void heading(std::string_view text);
+  void paragraph(std::string_view text);
+  /// A paragraph that stands out: the answer to a reader's question.
+  void answer(std::string_view text);
+  /// Lines to copy, in a fixed-width font.
+  void code(std::string_view text);
+  void table(const HtmlTable& table);
+  /// `svg` as made by make_svg_plot(), not escaped.
+  void figure(std::string_view svg, std::string_view caption);
+
+  /// The whole page.
+  std::string text() const;
+
+ private:
+  void element(std::string_view tag, std::string_view text);
+
+  std::string title_;
+  std::string body_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,24 @@
+// The subcommands of strandcast-report. Each lives in files of its own name and adds itself, with its
+// options, to the program's command line; report_main.cpp lists them.
+#pragma once
+
+#include <functional>
+
+#include "common/base/result.h"
+
+namespace CLI {
+class App;
+}
+
+namespace strandcast {
+
+/// What the chosen subcommand does once the command line is read; the error ends the program with one
+/// sentence.
+using ReportAction = std::function<Status()>;
+
+/// Adds a subcommand; when the command line names it, `action` becomes its work.
+using AddReportCommand = void (*)(CLI::App& app, ReportAction& action);
+
+void add_work_precision_command(CLI::App& app, ReportAction& action);
+
+}  // namespace strandcast
