@@ -107,6 +107,9 @@ struct ServerStatus {  // about twice a second to every viewer
   uint32_t viewer_count = 0;
   uint64_t dropped_frames = 0;    // for this client
   uint64_t rejected_samples = 0;  // motion and wind samples refused so far
+  // Strands put back to rest so far; one may count many times.
+  uint64_t quarantined_strands = 0;    // without usable numbers
+  uint64_t overstretched_strands = 0;  // stretched too far
 };
 struct Goodbye {       // the server closes right after it
   std::string reason;  // one sentence

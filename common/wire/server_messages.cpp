@@ -46,6 +46,8 @@ void put(const ServerStatus& status, v1::ServerMessage& message) {
   out.set_viewer_count(status.viewer_count);
   out.set_dropped_frames(status.dropped_frames);
   out.set_rejected_samples(status.rejected_samples);
+  out.set_quarantined_strands(status.quarantined_strands);
+  out.set_overstretched_strands(status.overstretched_strands);
 }
 
 void put(const Goodbye& goodbye, v1::ServerMessage& message) {
@@ -114,6 +116,8 @@ ServerStatus take(const v1::ServerStatus& message, FieldCheck& check) {
   status.viewer_count = message.viewer_count();
   status.dropped_frames = message.dropped_frames();
   status.rejected_samples = message.rejected_samples();
+  status.quarantined_strands = message.quarantined_strands();
+  status.overstretched_strands = message.overstretched_strands();
   check.measure("status.sim_ms", status.sim_ms);
   check.measure("status.encode_ms", status.encode_ms);
   check.measure("status.render_ms", status.render_ms);

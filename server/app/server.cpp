@@ -245,6 +245,8 @@ void Server::State::run_status() {
     status.is_motion_stale = now.sim.is_motion_stale;
     status.viewer_count = now.strand_viewers + now.frame_viewers;
     status.rejected_samples = now.input.rejected();
+    status.quarantined_strands = now.sim.quarantined;
+    status.overstretched_strands = now.sim.overstretched;
     net_->broadcast(status);
     lock.lock();
   }
@@ -279,6 +281,7 @@ std::string Server::State::metrics() {
   gauge("publish_quantise_median_ms", now.sim.quantise_median_ms);
   total("publish_snapshots_total", now.sim.published);
   total("publish_quarantined_total", now.sim.quarantined);
+  total("publish_overstretched_total", now.sim.overstretched);
   total("encode_frames_total", now.encode.encodes);
   total("encode_keyframes_total", now.encode.keyframes);
   total("encode_delta_bytes_total", now.encode.delta_bytes);

@@ -210,6 +210,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
     solver->write(scratch_);
   }
   solver_ = std::move(solver);
+  publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
   step_timer_ = StageTimer();
   ++solver_builds_;
@@ -242,7 +243,10 @@ void SimLoop::step(int64_t time_ns) {
   const SceneStep& scene_step = builder_->build(input_, solver_features_, end_time_s);
   if (scene_step.rigid_turn) turn_rigidly(*scene_step.rigid_turn);
   timer_->begin();
-  for (const StepInput& substep : scene_step.substeps) solver_->substep(substep);
+  for (const StepInput& substep : scene_step.substeps) {
+    solver_->substep(substep);
+    head_velocity_mps_ = substep.head_shift_m / substep.h_s;
+  }
   step_timer_.add_ms(timer_->end_ms());
   if (viewers(facts_) > 0 || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
@@ -264,6 +268,7 @@ void SimLoop::publish() {
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
   input.motion_time_ns = input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
+  input.head_velocity_mps = head_velocity_mps_;
   std::shared_ptr<const Snapshot> snapshot = publisher_->publish(*solver_, input);
   if (config_.on_publish) config_.on_publish(snapshot);
   slot_.put(std::move(snapshot));
@@ -271,9 +276,24 @@ void SimLoop::publish() {
   ++published_count_;
   if (publisher_->quarantined().empty()) return;
   publisher_->repair(*solver_);
-  if (published_count_ % kIdlePublishSteps == 1)
-    log_warn("publish", "{} strands had left the simulation and are back at rest",
-             publisher_->quarantined().size());
+  report_quarantine();
+}
+
+/// Once per kind, and again each time its total has doubled: a scene that breaks in every step fills no log.
+void SimLoop::report_quarantine() {
+  const uint64_t broken = publisher_->quarantine_count();
+  if (broken >= next_quarantine_report_) {
+    next_quarantine_report_ = 2 * broken;
+    log_warn("publish", "step {}: strands without usable numbers are back at rest; {} so far", tick_, broken);
+  }
+  const uint64_t overstretched = publisher_->overstretch_count();
+  if (overstretched >= next_overstretch_report_) {
+    next_overstretch_report_ = 2 * overstretched;
+    log_warn("publish",
+             "step {}: strands of solver {} that had stretched too far are back at rest; {} so far. Stiffer "
+             "parameters, more iterations or substeps stretch less",
+             tick_, config_.scene.solver.name, overstretched);
+  }
 }
 
 void SimLoop::update_stats() {
@@ -289,6 +309,7 @@ void SimLoop::update_stats() {
   stats.dropped_steps = clock_->dropped_steps();
   stats.published = published_count_;
   stats.quarantined = publisher_->quarantine_count();
+  stats.overstretched = publisher_->overstretch_count();
   stats.solver_builds = solver_builds_;
   stats.solver_bytes = solver_->memory_bytes();
   stats.solver_name = config_.scene.solver.name;

@@ -57,7 +57,8 @@ struct SimStats {
   uint64_t rejected_samples = 0;
   uint64_t dropped_steps = 0;
   uint64_t published = 0;
-  uint64_t quarantined = 0;  // strands put back to rest
+  uint64_t quarantined = 0;    // strands put back to rest because they had no usable numbers
+  uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
   uint64_t solver_builds = 0;
   uint64_t solver_bytes = 0;
   std::string solver_name;
@@ -110,6 +111,7 @@ class SimLoop {
   void step(int64_t time_ns);
   void turn_rigidly(const glm::dquat& turn);
   void publish();
+  void report_quarantine();
   void update_stats();
 
   SimLoopConfig config_;
@@ -129,6 +131,9 @@ class SimLoop {
   SolverState scratch_;
   StageTimer step_timer_;
   InputFrame input_;
+  glm::dvec3 head_velocity_mps_{0.0};     // during the last substep
+  uint64_t next_quarantine_report_ = 1;   // at so many broken strands since start
+  uint64_t next_overstretch_report_ = 1;  // at so many over-stretched ones
   uint64_t tick_ = 0;
   uint64_t published_tick_ = 0;
   uint64_t published_count_ = 0;

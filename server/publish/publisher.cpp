@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/base/check.h"
 
@@ -18,7 +19,19 @@ bool is_usable_velocity(const glm::vec3& velocity) {
   return std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z);
 }
 
+constexpr int64_t kNotOverstretched = std::numeric_limits<int64_t>::min();
+// What float positions a metre from the head leave of a segment without length.
+constexpr double kSegmentRoundingM = 1e-5;
+
+float squared(double value) {
+  return static_cast<float>(value * value);
+}
+
 }  // namespace
+
+double overstretch_limit(double stretch_bound) {
+  return std::max(kLeastOverstretch, kOverstretchPerBound * stretch_bound);
+}
 
 Publisher::Publisher(const Groom& groom, float bound_m)
     : strand_count_(groom.strand_count()),
@@ -36,6 +49,25 @@ Publisher::Publisher(const Groom& groom, float bound_m)
           groom.rest_position_m[groom.offset[strand] + vertex];
 }
 
+void Publisher::watch_stretch(double stretch_bound) {
+  const double limit = overstretch_limit(stretch_bound);
+  const double runaway = std::max(kRunawayStretch, limit);
+  longest_squared_m2_.assign(rest_position_m_.size(), 0.0f);
+  runaway_squared_m2_.assign(rest_position_m_.size(), 0.0f);
+  stretch_grade_.assign(strand_count_, 0);
+  overstretched_since_ns_.assign(strand_count_, kNotOverstretched);
+  std::vector<double> total_m(strand_count_, 0.0);
+  const auto segment_m = [this](size_t i) {
+    return glm::distance(glm::dvec3(rest_position_m_[i]), glm::dvec3(rest_position_m_[i - strand_count_]));
+  };
+  for (size_t i = strand_count_; i < rest_position_m_.size(); ++i) total_m[i % strand_count_] += segment_m(i);
+  for (size_t i = strand_count_; i < rest_position_m_.size(); ++i) {
+    const double unit_m = std::max(segment_m(i), total_m[i % strand_count_] / (vertex_count_ - 1));
+    longest_squared_m2_[i] = squared(segment_m(i) + limit * unit_m + kSegmentRoundingM);
+    runaway_squared_m2_[i] = squared(segment_m(i) + runaway * unit_m + kSegmentRoundingM);
+  }
+}
+
 std::shared_ptr<const Snapshot> Publisher::publish(Solver& solver, const PublishInput& input) {
   {
     const ScopedStage stage(read_timer_);
@@ -45,11 +77,11 @@ std::shared_ptr<const Snapshot> Publisher::publish(Solver& solver, const Publish
   CHECK(state_.velocity_mps.size() == rest_position_m_.size());
   const ScopedStage stage(quantise_timer_);
   find_broken_strands();
-  const glm::dmat3 world_from_head = glm::mat3_cast(input.world_from_head.rotation);
-  for (const uint32_t strand : quarantined_) put_to_rest(strand, world_from_head);
+  if (!longest_squared_m2_.empty()) find_overstretched_strands(input.sim_time_ns);
+  for (const uint32_t strand : quarantined_) put_to_rest(strand, input);
 
   // In double, so that the one rounding to float is all that is added to the announced bound.
-  const glm::dmat3 head_from_world = glm::transpose(world_from_head);
+  const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(input.world_from_head.rotation));
   for (size_t i = 0; i < position_in_head_m_.size(); ++i)
     position_in_head_m_[i] = glm::vec3(head_from_world * glm::dvec3(state_.position_m[i]));
 
@@ -85,11 +117,48 @@ void Publisher::find_broken_strands() {
   quarantine_count_ += quarantined_.size();
 }
 
-void Publisher::put_to_rest(uint32_t strand_index, const glm::dmat3& world_from_head) {
+void Publisher::find_overstretched_strands(int64_t sim_time_ns) {
+  // 0 = within the limit, 1 = beyond it, 2 = run away. A broken strand's comparisons are false or say run
+  // away; it is on the list already.
+  std::fill(stretch_grade_.begin(), stretch_grade_.end(), uint8_t{0});
+  for (uint32_t vertex = 1; vertex < vertex_count_; ++vertex) {
+    const size_t row = static_cast<size_t>(vertex) * strand_count_;
+    for (uint32_t strand = 0; strand < strand_count_; ++strand) {
+      const glm::vec3 edge =
+          state_.position_m[row + strand] - state_.position_m[row + strand - strand_count_];
+      const float length_squared = glm::dot(edge, edge);
+      const int grade = (length_squared > longest_squared_m2_[row + strand] ? 1 : 0) +
+                        (length_squared > runaway_squared_m2_[row + strand] ? 1 : 0);
+      stretch_grade_[strand] = std::max(stretch_grade_[strand], static_cast<uint8_t>(grade));
+    }
+  }
+  const size_t broken_count = quarantined_.size();
+  for (uint32_t strand = 0; strand < strand_count_; ++strand) {
+    int64_t& since_ns = overstretched_since_ns_[strand];
+    if (stretch_grade_[strand] == 0) {
+      since_ns = kNotOverstretched;
+      continue;
+    }
+    // A clock that was set back starts the wait again.
+    if (since_ns == kNotOverstretched || since_ns > sim_time_ns) since_ns = sim_time_ns;
+    const bool is_lasting = sim_time_ns - since_ns >= kOverstretchPatienceNs;
+    if (!is_lasting && stretch_grade_[strand] < 2) continue;
+    since_ns = kNotOverstretched;
+    if (!std::binary_search(quarantined_.begin(), quarantined_.begin() + static_cast<ptrdiff_t>(broken_count),
+                            strand))
+      quarantined_.push_back(strand);
+  }
+  overstretch_count_ += quarantined_.size() - broken_count;
+  std::sort(quarantined_.begin(), quarantined_.end());
+}
+
+void Publisher::put_to_rest(uint32_t strand_index, const PublishInput& input) {
+  const glm::dmat3 world_from_head = glm::mat3_cast(input.world_from_head.rotation);
+  const glm::vec3 head_velocity_mps(input.head_velocity_mps);
   for (uint32_t vertex = 0; vertex < vertex_count_; ++vertex) {
     const size_t i = static_cast<size_t>(vertex) * strand_count_ + strand_index;
     state_.position_m[i] = glm::vec3(world_from_head * glm::dvec3(rest_position_m_[i]));
-    state_.velocity_mps[i] = glm::vec3(0.0f);
+    state_.velocity_mps[i] = is_usable_velocity(head_velocity_mps) ? head_velocity_mps : glm::vec3(0.0f);
   }
 }
 

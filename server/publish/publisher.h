@@ -1,6 +1,7 @@
 // Publisher: reads the solver's state back and makes a Snapshot of it (head space, quantised). A strand with
-// a vertex that is no usable number is quarantined: it is published at rest, and repair() puts the solver's
-// copy back to rest. Used on the simulation thread; holds no GL objects of its own.
+// a vertex that is no usable number, or that stays stretched beyond what its model does, is quarantined: it
+// is published at rest, and repair() puts the solver's copy back to rest relative to the head. Its neighbours
+// keep every bit. Used on the simulation thread; holds no GL objects of its own.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +19,26 @@ namespace strandcast {
 /// No hair reaches farther from the head joint along any axis: a vertex beyond it has left the simulation.
 inline constexpr float kMaxStrandReachM = 10.0f * kMaxGroomExtentM;
 
+// A strand is over-stretched when one segment is longer than at rest by more than this times the row's
+// stretch_bound (the largest in the motions that the laws test), and by at least kLeastOverstretch: room for
+// motion more violent than those, and for parameters off their defaults. In rest lengths of the segment, or
+// of a mean one where that is longer, so that segments of nearly no length do not count.
+inline constexpr double kOverstretchPerBound = 4.0;
+inline constexpr double kLeastOverstretch = 0.5;
+/// Simulated time for which a strand may stay over-stretched; a jolt is over by then.
+inline constexpr int64_t kOverstretchPatienceNs = 250'000'000;
+/// Beyond this no shape is left to come back to: quarantined at once.
+inline constexpr double kRunawayStretch = 20.0;
+
+/// Relative stretch that a strand may keep up; at least kLeastOverstretch.
+double overstretch_limit(double stretch_bound);
+
 struct PublishInput {
   uint64_t tick = 0;
   int64_t sim_time_ns = 0;
-  int64_t motion_time_ns = 0;  // server clock at arrival of the newest motion sample, 0 = none
-  Pose world_from_head;        // pose at the end of the step
+  int64_t motion_time_ns = 0;         // server clock at arrival of the newest motion sample, 0 = none
+  Pose world_from_head;               // pose at the end of the step
+  glm::dvec3 head_velocity_mps{0.0};  // of the head joint, world: what a strand at rest moves with
 };
 
 class Publisher {
@@ -33,7 +49,12 @@ class Publisher {
   /// Allocates nothing but the snapshot (after the first call).
   std::shared_ptr<const Snapshot> publish(Solver& solver, const PublishInput& input);
 
-  /// Strands that the last publish() found broken, ascending. Valid until the next publish().
+  /// From now on strands that stretch beyond overstretch_limit() are quarantined as well. `stretch_bound` as
+  /// in SolverRow. Without this call stretch is not looked at.
+  void watch_stretch(double stretch_bound);
+
+  /// Strands that the last publish() found broken or over-stretched, ascending. Valid until the next
+  /// publish().
   std::span<const uint32_t> quarantined() const { return quarantined_; }
   /// Gives the solver the state of the last publish() with the quarantined strands at rest under that head
   /// pose and the others untouched. Call before the next substep when quarantined() is not empty.
@@ -41,15 +62,18 @@ class Publisher {
 
   /// Vertices without a usable position or velocity, since start.
   uint64_t bad_vertex_count() const { return bad_vertex_count_; }
-  /// Strands put back to rest, since start; one strand may count many times.
+  /// Strands put back to rest because they had no usable numbers, since start; one may count many times.
   uint64_t quarantine_count() const { return quarantine_count_; }
+  /// Strands put back to rest because they had stretched too far, since start.
+  uint64_t overstretch_count() const { return overstretch_count_; }
   float quantum_m() const { return quantum_m_; }
   const StageTimer& read_timer() const { return read_timer_; }
   const StageTimer& quantise_timer() const { return quantise_timer_; }
 
  private:
   void find_broken_strands();
-  void put_to_rest(uint32_t strand_index, const glm::dmat3& world_from_head);
+  void find_overstretched_strands(int64_t sim_time_ns);
+  void put_to_rest(uint32_t strand_index, const PublishInput& input);
 
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
@@ -58,9 +82,16 @@ class Publisher {
   std::vector<glm::vec3> position_in_head_m_;  // same shape
   SolverState state_;
   std::vector<uint8_t> is_broken_;  // (strand_count)
+  // (vertex_count x strand_count) squares of the longest that the segment before a vertex may be; empty =
+  // stretch is not watched.
+  std::vector<float> longest_squared_m2_;
+  std::vector<float> runaway_squared_m2_;
+  std::vector<uint8_t> stretch_grade_;           // (strand_count) of the last publish()
+  std::vector<int64_t> overstretched_since_ns_;  // (strand_count) kNotOverstretched = not
   std::vector<uint32_t> quarantined_;
   uint64_t bad_vertex_count_ = 0;
   uint64_t quarantine_count_ = 0;
+  uint64_t overstretch_count_ = 0;
   StageTimer read_timer_;
   StageTimer quantise_timer_;
 };

@@ -39,6 +39,7 @@ class Quarantine : public GlTest {
     strike(solver);
     PublishInput publish_input;
     publish_input.tick = static_cast<uint64_t>(k);
+    publish_input.sim_time_ns = std::llround(k * kStepS * 1e9);
     publish_input.world_from_head.rotation = input.world_from_head;
     auto snapshot = publisher.publish(solver, publish_input);
     if (!publisher.quarantined().empty()) publisher.repair(solver);
@@ -50,6 +51,18 @@ class Quarantine : public GlTest {
     solver.read(state);
     state.velocity_mps[8 * groom_.strand_count() + kPoisoned] = glm::vec3(value);
     state.position_m[9 * groom_.strand_count() + kPoisoned] = glm::vec3(value);
+    solver.write(state);
+  }
+
+  /// The outer half of one strand, relative to where its rest shape would be.
+  void pull_apart(Solver& solver, float away_m) const {
+    SolverState state;
+    solver.read(state);
+    for (uint32_t vertex = 8; vertex < groom_.uniform_vertex_count(); ++vertex) {
+      glm::vec3& point = state.position_m[vertex * groom_.strand_count() + kPoisoned];
+      const glm::vec3 inner = state.position_m[7 * groom_.strand_count() + kPoisoned];
+      point = inner + glm::vec3(0.0f, away_m + 0.01f * static_cast<float>(vertex), 0.0f);
+    }
     solver.write(state);
   }
 
@@ -100,6 +113,31 @@ TEST_F(Quarantine, APoisonedStrandReturnsAndItsNeighboursKeepTheirBits) {
       }
       EXPECT_EQ(clean_publisher.quarantine_count(), 0u);
     }
+  }
+}
+
+/// One strand's outer half is pulled away after every step, until the publisher has had enough of it.
+TEST_F(Quarantine, AnOverStretchedStrandReturnsAndItsNeighboursKeepTheirBits) {
+  constexpr float kAwayM = 0.25f;  // a segment has at most 0.017 m
+  for (const SolverRow& row : solver_table()) {
+    if (!row.make_gpu) continue;
+    const auto clean_solver = make(row);
+    const auto solver = make(row);
+    ASSERT_TRUE(clean_solver && solver) << row.name;
+    Publisher clean_publisher(groom_, kBoundM);
+    Publisher publisher(groom_, kBoundM);
+    for (Publisher* each : {&clean_publisher, &publisher}) each->watch_stretch(row.stretch_bound);
+    for (int k = 1; k <= 40; ++k) {
+      const auto clean = step(*clean_solver, clean_publisher, k, [](Solver&) {});
+      const auto snapshot = step(*solver, publisher, k, [&](Solver& target) {
+        if (k < 10 || publisher.overstretch_count() > 0) return;
+        pull_apart(target, kAwayM);
+      });
+      expect_equal_but_poisoned(*snapshot, *clean, row.name);
+    }
+    EXPECT_EQ(publisher.overstretch_count(), 1u) << row.name;
+    EXPECT_EQ(publisher.quarantine_count(), 0u) << row.name;
+    EXPECT_EQ(clean_publisher.overstretch_count(), 0u) << row.name;
   }
 }
 

@@ -57,6 +57,8 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.viewer_count = 3;
   status.dropped_frames = 17;
   status.rejected_samples = 19;
+  status.quarantined_strands = 23;
+  status.overstretched_strands = 29;
   return {welcome, Pong{1, -2, INT64_MAX}, status, Goodbye{"the server is shutting down"},
           Notice{true, "unknown field 'x'"}};
 }

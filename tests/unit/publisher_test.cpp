@@ -156,6 +156,110 @@ TEST_F(Publishing, RepairPutsBrokenStrandsToRestAndLeavesTheOthers) {
   EXPECT_THAT(publisher_.quarantined(), IsEmpty()) << "one repair is enough";
 }
 
+/// Strands at rest under some_rotation(), of which single segments are pulled longer.
+class OverStretch : public Publishing {
+ protected:
+  OverStretch() {
+    for (uint32_t strand = 0; strand < kStrands; ++strand) stretch(strand, 0, 0.0);
+    publisher_.watch_stretch(kBound);
+  }
+  /// Moves the vertices from `vertex` on along the strand, so that the segment before it is `by` longer than
+  /// at rest, relative.
+  void stretch(uint32_t strand, uint32_t vertex, double by) {
+    for (uint32_t i = 0; i < kVertices; ++i) {
+      const glm::dvec3 moved(0.0, 0.0, i >= vertex && vertex > 0 ? kSegmentM * by : 0.0);
+      const glm::dvec3 point = glm::dvec3(rest_of(groom_, strand, i)) + moved;
+      solver_.state.position_m[index(strand, i)] = glm::vec3(some_rotation() * point);
+    }
+  }
+  /// Publishes as a simulation at `time_s` would, and repairs.
+  void publish_at(double time_s) {
+    input_.sim_time_ns = std::llround(time_s * 1e9);
+    publisher_.publish(solver_, input_);
+    if (!publisher_.quarantined().empty()) publisher_.repair(solver_);
+  }
+
+  static constexpr double kBound = 0.25;     // limit 1.0: twice the length
+  static constexpr double kSegmentM = 0.05;  // of straight_groom()
+};
+
+TEST_F(OverStretch, TheLimitIsRelativeToTheRowsBoundWithAFloor) {
+  EXPECT_EQ(overstretch_limit(0.0), kLeastOverstretch);
+  EXPECT_EQ(overstretch_limit(kBound), kOverstretchPerBound * kBound);
+}
+
+TEST_F(OverStretch, LastingOverStretchIsPutBackToRestAndCountedApart) {
+  const double limit = overstretch_limit(kBound);
+  stretch(1, 2, 0.98 * limit);
+  stretch(3, 2, 1.02 * limit);
+  const SolverState before = solver_.state;
+  const double patience_s = static_cast<double>(kOverstretchPatienceNs) * 1e-9;
+  for (const double time_s : {0.0, 0.5 * patience_s, 0.99 * patience_s}) {
+    publish_at(time_s);
+    EXPECT_THAT(publisher_.quarantined(), IsEmpty()) << time_s;
+  }
+  publish_at(patience_s);
+  EXPECT_THAT(publisher_.quarantined(), ElementsAre(3u));
+  EXPECT_EQ(publisher_.overstretch_count(), 1u);
+  EXPECT_EQ(publisher_.quarantine_count(), 0u);
+  for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
+    const size_t repaired = index(3, vertex);
+    const glm::vec3 rest(some_rotation() * glm::dvec3(rest_of(groom_, 3, vertex)));
+    EXPECT_LE(glm::length(solver_.state.position_m[repaired] - rest), 1e-6f);
+    for (const uint32_t neighbour : {0u, 1u, 2u, 4u}) {
+      const size_t i = index(neighbour, vertex);
+      EXPECT_EQ(solver_.state.position_m[i], before.position_m[i]) << neighbour;
+      EXPECT_EQ(solver_.state.velocity_mps[i], before.velocity_mps[i]) << neighbour;
+    }
+  }
+  publish_at(2.0 * patience_s);
+  EXPECT_THAT(publisher_.quarantined(), IsEmpty()) << "one repair is enough";
+}
+
+TEST_F(OverStretch, AJoltThatSnapsBackIsLeftAlone) {
+  for (int step = 0; step < 60; ++step) {
+    stretch(2, 1, step % 10 == 9 ? 0.0 : 5.0);  // back within the limit every sixth of a second
+    publish_at(step / 60.0);
+    ASSERT_THAT(publisher_.quarantined(), IsEmpty()) << step;
+  }
+  EXPECT_EQ(publisher_.overstretch_count(), 0u);
+}
+
+TEST_F(OverStretch, ARunawayStrandIsPutBackAtOnceToMoveWithTheHead) {
+  stretch(2, 3, 1.1 * kRunawayStretch);
+  input_.head_velocity_mps = {3.0, -1.0, 2.0};
+  publish_at(0.0);
+  EXPECT_THAT(publisher_.quarantined(), ElementsAre(2u));
+  EXPECT_EQ(publisher_.overstretch_count(), 1u);
+  EXPECT_EQ(solver_.state.velocity_mps[index(2, 1)], glm::vec3(3.0f, -1.0f, 2.0f));
+}
+
+TEST_F(OverStretch, ABrokenStrandCountsAsBrokenOnly) {
+  solver_.state.position_m[index(4, 1)].x = kNan;
+  solver_.state.position_m[index(0, 2)].x = 3.0f * kMaxStrandReachM;
+  publish_at(0.0);
+  EXPECT_THAT(publisher_.quarantined(), ElementsAre(0u, 4u));
+  EXPECT_EQ(publisher_.quarantine_count(), 2u);
+  EXPECT_EQ(publisher_.overstretch_count(), 0u);
+}
+
+TEST_F(Publishing, SegmentsOfNearlyNoLengthDoNotCountAsStretched) {
+  Groom groom = straight_groom();
+  for (uint32_t strand = 0; strand < kStrands; ++strand)  // the third vertex on the second
+    groom.rest_position_m[groom.offset[strand] + 2] = groom.rest_position_m[groom.offset[strand] + 1];
+  Publisher publisher(groom, kBoundM);
+  publisher.watch_stretch(0.0);
+  for (uint32_t strand = 0; strand < kStrands; ++strand)
+    for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
+      solver_.state.position_m[index(strand, vertex)] =
+          rest_of(groom, strand, vertex) + glm::vec3(0.0f, 0.0f, vertex == 2 ? 1e-4f : 0.0f);
+  for (int second = 0; second < 5; ++second) {
+    input_.sim_time_ns = second * 1'000'000'000LL;
+    publisher.publish(solver_, input_);
+    EXPECT_THAT(publisher.quarantined(), IsEmpty());
+  }
+}
+
 TEST_F(Publishing, TheReadBackBufferIsReused) {
   publisher_.publish(solver_, input_);
   const void* first = solver_.read_target;

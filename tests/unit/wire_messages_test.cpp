@@ -133,6 +133,8 @@ TEST(WireMessages, EveryServerFieldComesBack) {
   EXPECT_EQ(back.viewer_count, status.viewer_count);
   EXPECT_EQ(back.dropped_frames, status.dropped_frames);
   EXPECT_EQ(back.rejected_samples, status.rejected_samples);
+  EXPECT_EQ(back.quarantined_strands, status.quarantined_strands);
+  EXPECT_EQ(back.overstretched_strands, status.overstretched_strands);
   EXPECT_EQ(round_trip(Goodbye{"bye"}).reason, "bye");
   EXPECT_TRUE(round_trip(Notice{true, "no"}).is_error);
   EXPECT_EQ(round_trip(Notice{true, "no"}).text, "no");
