@@ -1,0 +1,67 @@
+// ChaosPipe: one direction of one relayed connection: bytes in, the same bytes out later. Plain logic on
+// given times, no sockets and no clock, so that tests can check it exactly.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "tests/tools/chaos_relay.h"
+
+namespace strandcast::chaos {
+
+/// Bytes that cross a link of limited rate together; about one Ethernet frame.
+inline constexpr size_t kSegmentBytes = 1'448;
+
+class ChaosPipe {
+ public:
+  ChaosPipe(const LinkPlan& plan, uint64_t seed)
+      : plan_(plan), corrupt_random_(seed), cut_random_(~seed), jitter_random_(seed + 1) {}
+
+  void set_plan(const LinkPlan& plan) { plan_ = plan; }
+  const LinkPlan& plan() const { return plan_; }
+
+  /// How many bytes may be put in now, 0 while the queue is full.
+  size_t room(int64_t time_us) const;
+  /// Takes bytes read at `time_us`. No more than room() is expected.
+  void push(std::span<const std::byte> bytes, int64_t time_us);
+  /// The piece to write next, empty when none is due. Stays until pop().
+  std::span<const std::byte> front(int64_t time_us) const;
+  /// The first `byte_count` bytes of front() are written.
+  void pop(size_t byte_count);
+  /// When to look again: the next piece or the end of a freeze; -1 = nothing waits.
+  int64_t next_due_us(int64_t time_us) const;
+  bool is_frozen(int64_t time_us) const;
+  bool is_empty() const { return pieces_.empty(); }
+  size_t held_bytes() const { return held_bytes_; }
+  uint64_t pushed_bytes() const { return pushed_bytes_; }
+  uint64_t corrupted_bytes() const { return corrupted_bytes_; }
+
+ private:
+  struct Piece {
+    int64_t crossed_us = 0;  // off the queue, into the delay line
+    int64_t due_us = 0;
+    std::vector<std::byte> bytes;
+    size_t written = 0;
+  };
+  void corrupt(std::span<std::byte> bytes);
+  void push_segment(std::span<const std::byte> bytes, int64_t time_us);
+  size_t cut_bytes() const;
+
+  LinkPlan plan_;
+  std::mt19937_64 corrupt_random_;
+  std::mt19937_64 cut_random_;
+  std::mt19937_64 jitter_random_;
+  std::deque<Piece> pieces_;
+  size_t held_bytes_ = 0;
+  uint64_t pushed_bytes_ = 0;
+  uint64_t corrupted_bytes_ = 0;
+  double link_free_us_ = 0.0;  // when the rate allows the next byte
+  int64_t last_due_us_ = 0;
+  uint64_t next_cut_ = 0;
+  uint64_t corrupt_in_ = 0;  // bytes until the next corrupted one, plus one; 0 = not drawn yet
+};
+
+}  // namespace strandcast::chaos

@@ -1,0 +1,96 @@
+// ChaosRelay: a TCP relay in user space that makes a link bad on purpose: delay, jitter, a rate with a
+// bounded queue, freezes, resets, half-open connections, corruption, and writes cut or glued together. Needs
+// no rights and no kernel module. One own thread; the functions may be called from any thread. It knows
+// nothing of what it carries.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace strandcast::chaos {
+
+/// How bytes leave the relay.
+enum class Writes {
+  AsRead,   // as they came
+  OneByte,  // every byte in a write of its own
+  Split,    // in writes of 1 to kMaxSplitBytes bytes
+  Merged,   // what came within kMergeWindowUs, at once
+};
+inline constexpr size_t kMaxSplitBytes = 61;
+inline constexpr int64_t kMergeWindowUs = 20'000;
+
+/// What happens to one direction of every connection.
+struct LinkPlan {
+  int64_t delay_us = 0;
+  int64_t jitter_us = 0;            // added to the delay, uniform in 0..jitter; order is kept, as in TCP
+  uint64_t bytes_per_s = 0;         // 0 = as fast as it goes
+  size_t queue_bytes = 128u << 10;  // may wait for the rate; beyond it the relay stops reading
+  int64_t freeze_every_us = 0;      // 0 = never; else nothing passes for freeze_us at the end of each period
+  int64_t freeze_us = 0;
+  uint64_t reset_after_bytes = 0;   // 0 = never; else both ends get a TCP reset after this many bytes
+  uint64_t silent_after_bytes = 0;  // 0 = never; else everything is swallowed: the peer looks half-open
+  double corrupt_per_byte = 0.0;    // chance that one bit of a byte is turned
+  Writes writes = Writes::AsRead;
+};
+
+enum class Direction { Up, Down };  // to the server, to the client
+
+struct RelayConfig {
+  std::string listen_host = "127.0.0.1";
+  uint16_t listen_port = 0;  // 0 = any free port
+  std::string to_host = "127.0.0.1";
+  uint16_t to_port = 0;
+  LinkPlan up, down;
+  uint64_t seed =
+      1;  // corruption and cuts depend on it, on the connection's number and on the byte's place only
+};
+
+struct RelayCounters {
+  uint64_t connections = 0;                   // accepted so far
+  uint64_t open_connections = 0;              // now
+  uint64_t refused = 0;                       // the other side could not be reached
+  uint64_t resets = 0;                        // made by the relay
+  std::array<uint64_t, 2> bytes{};            // passed on, by Direction
+  std::array<uint64_t, 2> corrupted_bytes{};  // by Direction
+  std::array<uint64_t, 2> swallowed_bytes{};  // by Direction
+  uint64_t most_queued_bytes = 0;             // of one direction of one connection
+};
+
+/// Address space of what one direction of one connection may hold, delay line included.
+inline constexpr size_t kMaxHeldBytes = 8u << 20;
+
+class ChaosRelay {
+ public:
+  /// Unavailable when the port is taken, BadInput for a host that is none.
+  static Result<std::unique_ptr<ChaosRelay>> start(const RelayConfig& config);
+  /// Closes everything and ends the thread.
+  ~ChaosRelay();
+  ChaosRelay(const ChaosRelay&) = delete;
+  ChaosRelay& operator=(const ChaosRelay&) = delete;
+
+  uint16_t port() const;
+  /// From now on, for connections that exist and for new ones; what is queued keeps its time.
+  void set_plan(Direction direction, const LinkPlan& plan);
+  /// While frozen nothing passes in either direction and nothing is read.
+  void set_frozen(bool is_frozen);
+  /// While silent everything is swallowed and no end is passed on; new connections are accepted and led
+  /// nowhere.
+  void set_silent(bool is_silent);
+  /// Connections that exist now get a TCP reset at both ends.
+  void reset_all();
+  /// New connections go to this port from now on.
+  void set_to_port(uint16_t port);
+  RelayCounters counters() const;
+
+ private:
+  class State;
+  explicit ChaosRelay(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace strandcast::chaos
