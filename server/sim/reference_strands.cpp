@@ -30,7 +30,11 @@ Status ReferenceStrands::load(const Groom& groom, const glm::dquat& world_from_h
   scratch_.predicted_m.resize(n);
   scratch_.placed_m.resize(n);
   scratch_.pushed_m.resize(n);
+  scratch_.velocity_mps.resize(n);
+  scratch_.inertia.resize(n);
   scratch_.segment_m.resize(n);
+  memory_.assign(layout_.strand_count * memory_size(), 0.0);
+  on_load();
   return {};
 }
 
@@ -55,16 +59,34 @@ void ReferenceStrands::substep(const StepInput& input) {
   input_ = nullptr;
 }
 
-void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) const {
+std::span<double> ReferenceStrands::memory_of(uint32_t strand_index) {
+  return std::span(memory_).subspan(strand_index * memory_size(), memory_size());
+}
+
+void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) {
+  strand.index = strand_index;
+  strand.memory = memory_of(strand_index);
   for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
     const size_t at = layout_.index(i, strand_index);
     const glm::dvec3 rest(layout_.rest[at]);
+    const bool is_sound = is_sane(velocity_mps_[at]) && is_sane(position_m_[at]);
+    if (!is_sound) std::fill(strand.memory.begin(), strand.memory.end(), 0.0);
+    strand.velocity_mps[i] = is_sound ? velocity_mps_[at] - head_velocity_mps_ : glm::dvec3(0.0);
+    const double rate = parameters_.air_drag_per_s + h_s_ * style_stiffness_per_s2(at);
+    strand.inertia[i] = 1.0 + h_s_ * rate;
     strand.target_m[i] = rotation_ * rest;
     strand.old_m[i] = is_sane(position_m_[at]) ? position_m_[at] : strand.target_m[i];
     strand.segment_m[i] =
         i == 0 ? 0.0 : glm::distance(rest, glm::dvec3(layout_.rest[layout_.index(i - 1, strand_index)]));
     strand.pushed_m[i] = glm::dvec3(0.0);
   }
+}
+
+double ReferenceStrands::style_stiffness_per_s2(size_t at) const {
+  const double from_tip = 1.0 - static_cast<double>(layout_.arc[at]);
+  const double share =
+      parameters_.style_tip_share + (1.0 - parameters_.style_tip_share) * from_tip * from_tip;
+  return parameters_.style_stiffness_per_s2 * share;
 }
 
 // Backward Euler for the linear drag toward the air and the linear pull to the groomed shape, forward for the
@@ -78,10 +100,7 @@ glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t str
   const size_t at = layout_.index(i, strand_index);
   const glm::dvec3 old_velocity =
       is_sane(velocity_mps_[at]) && is_sane(position_m_[at]) ? velocity_mps_[at] : head_velocity_mps_;
-  const double from_tip = 1.0 - static_cast<double>(layout_.arc[at]);
-  const double share =
-      parameters_.style_tip_share + (1.0 - parameters_.style_tip_share) * from_tip * from_tip;
-  const double stiffness = parameters_.style_stiffness_per_s2 * share;
+  const double stiffness = style_stiffness_per_s2(at);
   const double drag = parameters_.air_drag_per_s;
   const double carried_share = parameters_.sag_free * std::min(1.0, stiffness / kSupportStiffnessPerS2);
   const glm::dvec3 groom_gravity = limited(input_->groom_gravity_in_head_mps2, kMaxGravityMps2);
@@ -144,6 +163,12 @@ void ReferenceStrands::read(SolverState& state) {
 void ReferenceStrands::write(const SolverState& state) {
   CHECK(state.position_m.size() == layout_.size() && state.velocity_mps.size() == layout_.size());
   for (size_t i = 0; i < layout_.size(); ++i) {
+    const bool is_changed = state.position_m[i] != glm::vec3(position_m_[i]) ||
+                            state.velocity_mps[i] != glm::vec3(velocity_mps_[i]);
+    if (is_changed) {
+      const std::span<double> memory = memory_of(static_cast<uint32_t>(i % layout_.strand_count));
+      std::fill(memory.begin(), memory.end(), 0.0);
+    }
     position_m_[i] = glm::dvec3(state.position_m[i]);
     velocity_mps_[i] = glm::dvec3(state.velocity_mps[i]);
   }

@@ -4,6 +4,7 @@
 
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <span>
 #include <vector>
 
 #include "server/sim/solver.h"
@@ -14,12 +15,16 @@ namespace strandcast {
 
 /// One strand during one substep, in head-relative world axes, seen from the moving head joint.
 struct ReferenceStrand {
-  std::vector<glm::dvec3> target_m;     // groomed shape, turned with the head
-  std::vector<glm::dvec3> old_m;        // position before the substep, as stored then
-  std::vector<glm::dvec3> predicted_m;  // where forces alone would take it
-  std::vector<glm::dvec3> placed_m;     // after the constraints
-  std::vector<glm::dvec3> pushed_m;     // of that way, what colliders and their friction did
-  std::vector<double> segment_m;        // before vertex i
+  uint32_t index = 0;
+  std::vector<glm::dvec3> target_m;      // groomed shape, turned with the head
+  std::vector<glm::dvec3> old_m;         // position before the substep, as stored then
+  std::vector<glm::dvec3> predicted_m;   // where forces alone would take it
+  std::vector<glm::dvec3> placed_m;      // after the constraints
+  std::vector<glm::dvec3> pushed_m;      // of that way, what colliders and their friction did
+  std::vector<glm::dvec3> velocity_mps;  // before the substep, relative to the head joint's during it
+  std::vector<double> inertia;           // 1 + what drag and pull add in an implicit step
+  std::vector<double> segment_m;         // before vertex i
+  std::span<double> memory;              // of the model; kept between substeps, 0 at first
 };
 
 class ReferenceStrands : public Solver {
@@ -36,6 +41,11 @@ class ReferenceStrands : public Solver {
   /// Moves placed_m of all vertices that are not pinned, by place() or rigidly with their segment.
   virtual void solve(ReferenceStrand& strand) const = 0;
 
+  /// Numbers that the model keeps per strand besides positions and velocities; they start from 0.
+  virtual size_t memory_size() const { return 0; }
+  /// A groom was loaded: layout() is known.
+  virtual void on_load() {}
+
   /// Puts vertex i as near to its prediction as its segment's length from vertex i-1, the colliders and the
   /// reach of a pinned tail allow. pinned tail.
   void place(ReferenceStrand& strand, uint32_t i) const;
@@ -43,11 +53,14 @@ class ReferenceStrands : public Solver {
   // Of the substep in progress.
   const StepInput& input() const { return *input_; }
   double h_s() const { return h_s_; }
+  glm::dquat rotation() const { return rotation_; }  // of the head, at the end
   glm::dquat carry() const { return rotation_ * glm::conjugate(previous_rotation_); }  // turn of the head
   bool is_pinned(uint32_t i) const { return i < layout_.pinned_root_count || i >= layout_.tail_begin(); }
 
  private:
-  void begin(ReferenceStrand& strand, uint32_t strand_index) const;
+  void begin(ReferenceStrand& strand, uint32_t strand_index);
+  std::span<double> memory_of(uint32_t strand_index);
+  double style_stiffness_per_s2(size_t at) const;
   glm::dvec3 predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const;
   glm::dvec3 finish_velocity(const ReferenceStrand& strand, uint32_t i) const;
 
@@ -55,6 +68,7 @@ class ReferenceStrands : public Solver {
   StrandLayout layout_;
   std::vector<glm::dvec3> position_m_;
   std::vector<glm::dvec3> velocity_mps_;
+  std::vector<double> memory_;
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
 
   // The substep in progress, within the limits of strand_layout.h.

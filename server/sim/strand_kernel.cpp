@@ -135,12 +135,25 @@ void StrandKernel::read(SolverState& state) {
   copy_out(velocity_, state.velocity_mps);
 }
 
+// A strand that is written as it was read keeps what its model stores beside the velocity; another one starts
+// anew.
 void StrandKernel::write(const SolverState& state) {
   CHECK(state.position_m.size() == staging_.size() && state.velocity_mps.size() == staging_.size());
+  std::vector<bool> is_changed(layout_.strand_count, false);
   position_.read(0, std::as_writable_bytes(std::span(staging_)));  // keeps w
-  for (size_t i = 0; i < staging_.size(); ++i) staging_[i] = glm::vec4(state.position_m[i], staging_[i].w);
+  for (size_t i = 0; i < staging_.size(); ++i) {
+    if (glm::vec3(staging_[i]) != state.position_m[i]) is_changed[i % layout_.strand_count] = true;
+    staging_[i] = glm::vec4(state.position_m[i], staging_[i].w);
+  }
   position_.write(staging_);
-  for (size_t i = 0; i < staging_.size(); ++i) staging_[i] = glm::vec4(state.velocity_mps[i], 0.0f);
+  velocity_.read(0, std::as_writable_bytes(std::span(staging_)));
+  for (size_t i = 0; i < staging_.size(); ++i) {
+    if (glm::vec3(staging_[i]) != state.velocity_mps[i]) is_changed[i % layout_.strand_count] = true;
+  }
+  for (size_t i = 0; i < staging_.size(); ++i) {
+    const float kept = is_changed[i % layout_.strand_count] ? 0.0f : staging_[i].w;
+    staging_[i] = glm::vec4(state.velocity_mps[i], kept);
+  }
   velocity_.write(staging_);
 }
 

@@ -59,7 +59,7 @@ class StrandKernel final : public Solver {
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
   gl::Buffer rest_;      // (vertex_count x strand_count) vec4: head space, m; segment before it, m
   gl::Buffer position_;  // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
-  gl::Buffer velocity_;  // (vertex_count x strand_count) vec4: world, m/s; unused
+  gl::Buffer velocity_;  // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
   gl::Buffer step_;      // StepBlock
   gl::Handle<gl::delete_texture> rest_view_;
   gl::Handle<gl::delete_texture> position_view_;

@@ -14,6 +14,8 @@ struct Vertex {
   vec3 old;        // position before the substep
   float arc;       // 0 at the root, 1 at the tip
   vec3 predicted;  // where forces alone would take it
+  vec3 velocity;   // before the substep, relative to the head joint's during it
+  float inertia;   // how hard it holds to the prediction: 1 + what drag and pull add in an implicit step
 };
 
 // Wind beside the mean wind; waves that are not there have no amplitude.
@@ -51,6 +53,8 @@ Vertex predict(uint at) {
   const vec3 push = u_step.push.xyz + support + (h * drag) * gust_velocity(vertex.old);
   const vec3 moved = (velocity + push + pull * (vertex.target - vertex.old)) / (1.0 + h * (drag + pull));
   vertex.predicted = vertex.old + h * within_speed_limit(moved);
+  vertex.velocity = velocity;
+  vertex.inertia = 1.0 + h * (drag + pull);
   return vertex;
 }
 

@@ -24,7 +24,7 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
 // value computed from what it fetched, so the order cannot change.
 layout(binding = kUnitRest) uniform samplerBuffer u_rest;           // head space, m; w = segment before it, m
 layout(binding = kUnitPosition) uniform samplerBuffer u_position;   // head-relative world, m; w = arc, 0..1
-layout(binding = kUnitVelocity) uniform samplerBuffer u_velocity;   // world, m/s; w unused
+layout(binding = kUnitVelocity) uniform samplerBuffer u_velocity;   // world, m/s; w = of the model
 
 layout(std430, binding = kBindingPosition) writeonly restrict buffer PositionBlock {
   vec4 position[];
