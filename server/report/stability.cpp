@@ -1,0 +1,73 @@
+#include "server/report/stability.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "common/gl/egl_context.h"
+#include "server/report/csv_file.h"
+#include "server/report/progress.h"
+#include "server/report/report_commands.h"
+#include "server/report/report_folder.h"
+
+namespace strandcast {
+namespace {
+
+double steps_of(const StabilityTrial& trial) {
+  return (trial.moving_s + trial.still_s) / trial.substep_s(0);
+}
+
+}  // namespace
+
+Status run_stability(const StabilityOptions& options) {
+  std::vector<const SolverRow*> rows;
+  for (const std::string& name : options.solvers) {
+    ASSIGN_OR_RETURN(const SolverRow* row, find_solver(name));
+    rows.push_back(row);
+  }
+  if (rows.empty())
+    for (const SolverRow& row : solver_table()) rows.push_back(&row);
+  RETURN_IF_ERROR(make_report_folder(options.out));
+  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(options.gl_device));
+  const gl::ShaderLibrary shaders;
+  const StabilityGrid grid = options.is_quick ? StabilityGrid::Quick : StabilityGrid::Full;
+  const std::vector<StabilityTrial> trials = make_stability_trials(grid);
+
+  std::vector<StabilityOutcome> outcomes;
+  {
+    Progress progress({"stability"});
+    for (const StabilityTrial& trial : trials)
+      progress.expect(static_cast<uint32_t>(rows.size()), steps_of(trial) * static_cast<double>(rows.size()));
+    StabilityRunner runner(shaders);
+    for (const SolverRow* row : rows) {
+      for (const StabilityTrial& trial : trials) {
+        progress.begin_run(fmt::format("{}, {}", row->name, trial.setting));
+        ASSIGN_OR_RETURN(StabilityOutcome outcome, runner.run(*row, trial));
+        outcomes.push_back(std::move(outcome));
+        progress.end_run(steps_of(trial));
+      }
+    }
+  }
+  fmt::print("{}", stability_text(outcomes));
+  const std::filesystem::path csv_path = options.out / "stability.csv";
+  const std::filesystem::path page_path = options.out / "stability.html";
+  RETURN_IF_ERROR(save_text(csv_path, stability_csv(outcomes)));
+  RETURN_IF_ERROR(save_text(page_path, stability_page(outcomes, {context->info().renderer, grid})));
+  fmt::print("{}\n{}\n", csv_path.string(), page_path.string());
+  return {};
+}
+
+void add_stability_command(CLI::App& app, ReportAction& action) {
+  const auto options = std::make_shared<StabilityOptions>();
+  CLI::App* command =
+      app.add_subcommand("stability", "every strand model against stiff and extreme cases, with limits");
+  command->add_option("--out", options->out, "folder for the CSV and the page")->required();
+  command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
+  command->add_option("--gl-device", options->gl_device, "auto, software, hardware or a device number")
+      ->capture_default_str();
+  command->add_flag("--quick", options->is_quick, "fewer settings and shorter rests");
+  command->callback([options, &action] { action = [options] { return run_stability(*options); }; });
+}
+
+}  // namespace strandcast

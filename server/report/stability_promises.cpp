@@ -1,0 +1,127 @@
+#include <algorithm>
+
+#include "common/base/check.h"
+#include "server/publish/publisher.h"
+#include "server/report/stability_run.h"
+
+namespace strandcast {
+namespace {
+
+// Float positions half a metre from the head, in segments of 4 mm: 6e-8 m / 4e-3 m, and a margin.
+constexpr double kExactStretch = 1e-4;
+// Mass lumped at vertices and single precision.
+constexpr double kEnergyGrowth = 0.01;
+// Row field comes_to_rest.
+constexpr double kTimeToRestS = 10.0;
+// What a vertex has that is 0.1 mm, the stream's default error bound, to either side in alternate steps of
+// 1/60 s: 4 A / h^2. Less cannot be seen.
+constexpr double kVisibleJitterMps2 = 4.0 * 1e-4 * 60.0 * 60.0;
+// The stream's default error bound; ten times that after a disturbance, within twelve seconds.
+constexpr double kStyleM = 1e-4;
+constexpr double kRecoveredStyleM = 1e-3;
+
+// Of iterated constraints: what is left of the stretch after the iterations of one step.
+constexpr const char* kIterationsLeaveStretch =
+    "the iterations of a step carry a jolt only so many segments along the strand, and what is left "
+    "stretches "
+    "those near the root; it is gone within a fraction of a second. More iterations or substeps, or "
+    "direct_rod";
+
+}  // namespace
+
+StabilityPromise stability_promise(const SolverRow& row, const StabilityTrial& trial,
+                                   StabilityMeasure measure) {
+  switch (measure) {
+    case StabilityMeasure::Finite:
+      return {0.0};
+    case StabilityMeasure::Stretch:
+      return {row.stretch_bound > 0.0 ? overstretch_limit(row.stretch_bound) : kExactStretch};
+    case StabilityMeasure::Speed:
+      return {trial.fair_speed_mps};
+    case StabilityMeasure::Energy:
+      return {kEnergyGrowth};
+    case StabilityMeasure::Rest:
+      return {kTimeToRestS, row.comes_to_rest};
+    case StabilityMeasure::Jitter:
+      return {kVisibleJitterMps2};
+    case StabilityMeasure::Style:
+      return {trial.bad_input == BadInput::None ? kStyleM : kRecoveredStyleM};
+  }
+  CHECK(false);
+  return {};
+}
+
+std::string promise_reason(StabilityMeasure measure) {
+  switch (measure) {
+    case StabilityMeasure::Finite:
+      return "Steps after which a position or velocity was no finite number. None may be, whatever comes in.";
+    case StabilityMeasure::Stretch:
+      return "Largest change of a segment's length, relative to it. Rows with exact lengths: rounding. "
+             "Others: "
+             "the limit at which a running server would put the strand back to rest, four times the row's "
+             "bound and at least 50 %.";
+    case StabilityMeasure::Speed:
+      return "Largest speed of a vertex relative to the head, as seen, m/s. Twice the sum of what a rigid "
+             "strand does "
+             "in the trial and what a strand gains that falls by twice its length; wind counts as motion.";
+    case StabilityMeasure::Energy:
+      return "Largest growth of kinetic energy and height over what the strand began with, relative to its "
+             "weight times its length, or to the kick. Strands are damped and nothing drives them: none. 1 % "
+             "is allowed for mass lumped at vertices.";
+    case StabilityMeasure::Rest:
+      return "Seconds after the head stopped until no vertex moves by more than 0.1 mm in 1/60 s: ten, the "
+             "promise of every row that comes to rest.";
+    case StabilityMeasure::Jitter:
+      return "Acceleration in the upper half of the frequencies that steps can show, root mean square over "
+             "two "
+             "seconds that begin one second after the head has stopped, of the worst vertex, m/s2. The limit "
+             "is "
+             "that of a vibration of 0.1 mm at half the step rate.";
+    case StabilityMeasure::Style:
+      return "Largest distance from the groomed shape at the end, m: 0.1 mm at rest, the default error of "
+             "the "
+             "strand stream; 1 mm within twelve seconds of a bad input.";
+  }
+  CHECK(false);
+  return {};
+}
+
+const std::vector<KnownBreak>& known_breaks() {
+  using Measure = StabilityMeasure;
+  constexpr const char* kCompressed =
+      "the velocity correction of DFTL puts on a vertex what its follower was moved, with no mass behind it; "
+      "in a strand under pressure that does work from nothing";
+  constexpr const char* kUnfinishedSweeps =
+      "odd and even sweeps that do not reach the tip leave a rest that differs from step to step after a "
+      "jolt "
+      "and dies away slowly; dftl does not have it";
+  constexpr const char* kStaticFollow =
+      "static Follow-The-Leader takes velocities from projected positions and gives the leader no share: it "
+      "feeds itself (Mueller et al. 2012, section 3)";
+  constexpr const char* kUnstableStyle =
+      "a hair of real constants and 0.25 m is too limp for this style: the style is an equilibrium, as "
+      "sag_free asks, but not a stable one, and rounding is enough to leave it; the double reference leaves "
+      "it too";
+  static const std::vector<KnownBreak> breaks = {
+      {"dftl", "energy", "buckles from upright", Measure::Energy, kCompressed},
+      {"dftl_parallel", "energy", "buckles from upright", Measure::Energy, kCompressed},
+      {"dftl_parallel", "motion", "", Measure::Jitter, kUnfinishedSweeps},
+      {"ftl", "step", "", Measure::Speed, kStaticFollow},
+      {"ftl", "motion", "", Measure::Jitter, kStaticFollow},
+      {"pbd", "motion", "", Measure::Stretch, kIterationsLeaveStretch},
+      {"pbd", "groom", "64 vertices", Measure::Stretch, kIterationsLeaveStretch},
+      {"pbd", "input", "infinity in everything", Measure::Stretch, kIterationsLeaveStretch},
+      {"xpbd", "motion", "", Measure::Stretch, kIterationsLeaveStretch},
+      {"xpbd", "groom", "64 vertices", Measure::Stretch, kIterationsLeaveStretch},
+      {"xpbd", "input", "infinity in everything", Measure::Stretch, kIterationsLeaveStretch},
+      {"direct_rod", "stiffness", "", Measure::Speed,
+       "from a million times the stiffness of hair on, its bending forces leave single precision no room for "
+       "inertia; the double reference moves as a rigid strand"},
+      {"direct_rod", "input", "", Measure::Style, kUnstableStyle},
+      {"direct_rod", "rest", "", Measure::Style, kUnstableStyle},
+      {"direct_rod", "rest", "", Measure::Jitter, kUnstableStyle},
+  };
+  return breaks;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,69 @@
+// StabilityRunner: puts a row of the solver table through the trials and judges what it measures by the
+// row's promises. Needs a current GL context for rows that run on the GPU; one thread.
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/gl/program.h"
+#include "server/report/stability_trial.h"
+
+namespace strandcast {
+
+/// What a row promises of a measure in a trial. Not promised: shown without a judgement.
+struct StabilityPromise {
+  double limit = 0.0;
+  bool is_promised = true;
+};
+StabilityPromise stability_promise(const SolverRow& row, const StabilityTrial& trial,
+                                   StabilityMeasure measure);
+/// Why the limits of a measure are what they are, in a few sentences.
+std::string promise_reason(StabilityMeasure measure);
+
+/// A promise that a row is known to break, and why. Reports show such cells red like any other; tests expect
+/// exactly these to break.
+struct KnownBreak {
+  const char* row;
+  const char* group;
+  const char* setting;  // "" = any of the group
+  StabilityMeasure measure;
+  const char* reason;
+};
+const std::vector<KnownBreak>& known_breaks();
+
+struct StabilityCell {
+  double value = 0.0;
+  StabilityPromise promise;
+  const KnownBreak* known_break = nullptr;
+  bool is_kept() const { return !promise.is_promised || value <= promise.limit; }
+};
+
+struct StabilityOutcome {
+  std::string row;
+  std::string group;
+  std::string setting;
+  std::string note;     // parameters that were changed
+  std::string refusal;  // not run: why the server refuses such a scene
+  std::array<std::optional<StabilityCell>, kStabilityMeasureCount> cells;
+};
+
+class StabilityRunner {
+ public:
+  explicit StabilityRunner(const gl::ShaderLibrary& shaders) : shaders_(shaders) {}
+
+  /// On the GPU where the row can, else its reference. The error names the row and what it would not do.
+  Result<StabilityOutcome> run(const SolverRow& row, const StabilityTrial& trial);
+
+ private:
+  Result<Solver*> solver_for(const SolverRow& row, const SolverParameters& complete);
+
+  const gl::ShaderLibrary& shaders_;
+  std::string row_name_;  // of the solvers kept
+  std::map<SolverParameters, std::unique_ptr<Solver>> solvers_;
+};
+
+}  // namespace strandcast
