@@ -19,7 +19,7 @@ struct HtmlCell {
   HtmlCell(const char* cell_text) : text(cell_text) {}
 
   std::string text;
-  HtmlMark mark;
+  HtmlMark mark = HtmlMark::None;
 };
 
 struct HtmlTable {

@@ -2,33 +2,296 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <map>
 #include <memory>
+#include <optional>
 
-#include "server/report/report_commands.h"
-#include "server/report/report_folder.h"
-#include "server/sim/solver_registry.h"
+#include "common/gl/egl_context.h"
+#include "server/report/progress.h"
+#include "server/report/run_timer.h"
 
 namespace strandcast {
+namespace {
 
-Status run_work_precision(const WorkPrecisionOptions& options) {
-  for (const std::string& name : options.solvers) {
-    const auto row = find_solver(name);
-    if (!row) return row.error();
-  }
-  return make_report_folder(options.out);
+// A step's own cost beside that of its vertices, for the estimate of the time left.
+constexpr double kVerticesPerStep = 400.0;
+
+double cost_of(const RunSetting& setting, double simulated_s) {
+  const double effort = std::isnan(setting.effort) ? 1.0 : setting.effort;
+  return simulated_s * setting.rate_hz * setting.substeps *
+         (1.0 + setting.vertex_count * effort / kVerticesPerStep);
 }
 
-void add_work_precision_command(CLI::App& app, ReportAction& action) {
-  const auto options = std::make_shared<WorkPrecisionOptions>();
-  CLI::App* command = app.add_subcommand("work-precision", "error against run time of every strand model");
-  command->add_option("--out", options->out, "folder for the CSV, plots and page")->required();
-  command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
-  command->add_option("--motion", options->motion, "head motion from this .bvh file; default: built in");
-  command->add_option("--gl-device", options->gl_device, "auto, software, hardware or a device number")
-      ->capture_default_str();
-  command->add_flag("--quick", options->is_quick, "fewer runs: about two minutes on two cores");
-  command->callback([options, &action] { action = [options] { return run_work_precision(*options); }; });
+/// What the rows without constants of hair are run with on real motion: as chains, and as they ship.
+std::vector<Material> materials_of(const SolverRow& row) {
+  if (row.as_hair) return {Material::Hair};
+  return {Material::Limp, Material::AsShipped};
+}
+
+/// The trajectories that runs are compared with. Double precision, so any thread.
+struct References {
+  Trajectory rod;
+  double time_self_difference = 0.0;
+  double space_self_difference = 0.0;
+  std::map<std::pair<std::string, Material>, Trajectory> refined;  // none where a row cannot be refined
+};
+
+Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver("direct_rod"));
+  RunSetting setting{row, Material::Hair, vertex_count, rate_hz};
+  setting.is_reference = true;
+  return motion.run({}, setting);
+}
+
+Result<References> make_references(const MotionSet& motion, const WorkGrid& grid,
+                                   const std::vector<const SolverRow*>& rows) {
+  References references;
+  auto halved = std::async(std::launch::async, [&] {
+    return run_rod(motion, grid.reference_vertices, 2.0 * grid.reference_rate_hz);
+  });
+  auto rod = run_rod(motion, grid.reference_vertices, grid.reference_rate_hz);
+  auto coarse = run_rod(motion, grid.reference_vertices / 2, grid.reference_rate_hz);
+  auto fine = halved.get();
+  for (const auto* result : {&rod, &coarse, &fine})
+    if (!*result) return result->error();
+  references.time_self_difference = relative_rms(*rod, *fine);
+  references.space_self_difference = relative_rms(*coarse, *rod);
+  references.rod = std::move(rod).value();
+  for (const SolverRow* row : rows) {
+    for (const Material material : materials_of(*row)) {
+      RunSetting setting{row, material, grid.refined_vertices, grid.refined_rate_hz};
+      setting.effort = effort_values(*row, {grid.refined_effort_factor}).front();
+      setting.is_reference = true;
+      if (auto refined = motion.run({}, setting))
+        references.refined[{row->name, material}] = std::move(refined).value();
+    }
+  }
+  return references;
+}
+
+class Measurement {
+ public:
+  Measurement(const WorkGrid& grid, const MotionSet& motion, std::vector<const SolverRow*> rows,
+              gl::EglContext* context)
+      : grid_(grid),
+        motion_(motion),
+        rows_(std::move(rows)),
+        workbench_{context != nullptr ? &shaders_ : nullptr},
+        timer_(workbench_, context != nullptr ? &context->info() : nullptr, motion_),
+        progress_({"work-precision"}) {}
+
+  // Times first, while nothing else runs; then tests here and references on another thread; then the motion.
+  Status run(WorkReport& report) {
+    plan();
+    for (const Planned& planned : motion_runs_) time_run(planned.setting);
+    auto references =
+        std::async(std::launch::async, [this] { return make_references(motion_, grid_, rows_); });
+    for (const Planned& planned : analytic_runs_) report.records.push_back(run_analytic(planned));
+    progress_.begin_run("converged reference");
+    const auto converged = references.get();
+    if (!converged) return converged.error();
+    progress_.end_run(0.0);
+    report.time_self_difference = converged->time_self_difference;
+    report.space_self_difference = converged->space_self_difference;
+    for (const Planned& planned : motion_runs_)
+      report.records.push_back(run_motion(planned.setting, *converged));
+    if (!motion_runs_.empty()) report.timed_strands = timer_.strand_count(motion_runs_.front().setting);
+    return {};
+  }
+
+ private:
+  struct Planned {
+    const AnalyticTest* test = nullptr;  // nullptr: the motion set
+    RunSetting setting;
+  };
+
+  void plan() {
+    for (const SolverRow* row : rows_) {
+      for (const Material material : materials_of(*row)) plan_motion(*row, material);
+      for (const AnalyticTest& test : analytic_tests()) {
+        if (has_physics(*row, test) && (test.is_quick || grid_.has_every_effort)) plan_analytic(*row, test);
+      }
+    }
+    for (const auto* runs : {&motion_runs_, &analytic_runs_}) {
+      for (const Planned& planned : *runs)
+        progress_.expect(1,
+                         cost_of(planned.setting, planned.test ? planned.test->simulated_s : grid_.motion_s));
+    }
+    progress_.expect(1 + static_cast<uint32_t>(motion_runs_.size()), 0.0);
+  }
+
+  void plan_motion(const SolverRow& row, Material material) {
+    for (const double effort : effort_values(row, grid_.effort_factors))
+      for (const uint32_t vertex_count : grid_.vertices)
+        for (const double rate_hz : grid_.rates_hz)
+          for (const uint32_t substeps : grid_.substeps)
+            motion_runs_.push_back({nullptr, {&row, material, vertex_count, rate_hz, substeps, effort}});
+  }
+
+  void plan_analytic(const SolverRow& row, const AnalyticTest& test) {
+    const std::vector<double> factors =
+        grid_.has_every_effort ? grid_.effort_factors : std::vector<double>{1.0};
+    const std::vector<uint32_t> vertices = test.fixed_vertex_count > 0
+                                               ? std::vector<uint32_t>{test.fixed_vertex_count}
+                                               : grid_.analytic_vertices;
+    const std::vector<double> rates =
+        test.fixed_rate_hz > 0.0 ? std::vector<double>{test.fixed_rate_hz} : grid_.analytic_rates_hz;
+    for (const double effort : effort_values(row, factors))
+      for (const uint32_t vertex_count : vertices)
+        for (const double rate_hz : rates)
+          analytic_runs_.push_back({&test, {&row, test.material, vertex_count, rate_hz, 1, effort}});
+  }
+
+  WorkRecord record_for(const std::string& test, const RunSetting& setting) const {
+    return {test, setting, workbench_.runs_on_gpu(setting)};
+  }
+
+  void time_run(const RunSetting& setting) {
+    progress_.begin_run("time of " + to_string(setting));
+    (void)timer_.time(setting);  // asked for again, with its error, when the run is recorded
+    progress_.end_run(0.0);
+  }
+
+  void add_time(WorkRecord& record) {
+    const auto time = timer_.time(record.setting);
+    if (!time) return;
+    record.us = us_per_frame(time->best_us, record.setting);
+    record.median_us = us_per_frame(time->median_us, record.setting);
+  }
+
+  WorkRecord run_analytic(const Planned& planned) {
+    progress_.begin_run(planned.test->name + ", " + to_string(planned.setting));
+    WorkRecord record = record_for(planned.test->name, planned.setting);
+    record.result = planned.test->run(workbench_, planned.setting);
+    const auto& sizes = grid_.vertices;
+    if (std::find(sizes.begin(), sizes.end(), planned.setting.vertex_count) != sizes.end()) add_time(record);
+    progress_.end_run(cost_of(planned.setting, planned.test->simulated_s));
+    return record;
+  }
+
+  WorkRecord run_motion(const RunSetting& setting, const References& references) {
+    progress_.begin_run("motion, " + to_string(setting));
+    WorkRecord record = record_for(kMotionTest, setting);
+    RunSetting in_double = setting;
+    in_double.is_reference = true;
+    std::future<Result<Trajectory>> exact;
+    const bool is_default_effort =
+        std::isnan(setting.effort) || setting.effort == effort_values(*setting.row, {1.0}).front();
+    if (record.is_on_gpu && (is_default_effort || grid_.has_every_effort))
+      exact = std::async(std::launch::async, [&] { return motion_.run({}, in_double); });
+    const auto run = motion_.run(workbench_, setting);
+    if (run) {
+      record.result.error = relative_rms(*run, references.rod);
+      record.result.stretch = run->stretch;
+      if (!run->is_finite) record.result.note = "not finite";
+      const auto refined = references.refined.find({setting.row->name, setting.material});
+      if (refined != references.refined.end()) {
+        record.model_error = relative_rms(refined->second, references.rod);
+        record.discretisation_error = relative_rms(*run, refined->second);
+      }
+      add_time(record);
+    } else {
+      record.result.note = run.error().to_string();
+    }
+    if (exact.valid()) {
+      const auto trajectory = exact.get();
+      if (run && trajectory) record.float_error = relative_rms(*run, *trajectory);
+    }
+    progress_.end_run(cost_of(setting, grid_.motion_s));
+    return record;
+  }
+
+  const WorkGrid& grid_;
+  const MotionSet& motion_;
+  std::vector<const SolverRow*> rows_;
+  gl::ShaderLibrary shaders_;
+  Workbench workbench_;
+  RunTimer timer_;
+  Progress progress_;
+  std::vector<Planned> motion_runs_;
+  std::vector<Planned> analytic_runs_;
+};
+
+Result<std::vector<const SolverRow*>> chosen_rows(const std::vector<std::string>& names) {
+  std::vector<const SolverRow*> rows;
+  for (const std::string& name : names) {
+    ASSIGN_OR_RETURN(const SolverRow* row, find_solver(name));
+    rows.push_back(row);
+  }
+  if (names.empty()) {
+    for (const SolverRow& row : solver_table()) rows.push_back(&row);
+  }
+  return rows;
+}
+
+Status check_grid(const WorkGrid& grid) {
+  // Catenaries need three free segments; a strand of more vertices than a scene may have measures nothing.
+  constexpr uint32_t kFewestVertices = 6;
+  for (const uint32_t count : grid.vertices) {
+    if (count < kFewestVertices || count > kMaxVertexCount)
+      return make_error(ErrorCode::BadInput, "--vertices is {} (allowed: {} to {})", count, kFewestVertices,
+                        kMaxVertexCount);
+  }
+  constexpr double kHighestHz = 960.0;
+  for (const double rate_hz : grid.rates_hz) {
+    const double samples = rate_hz * MotionSet::kSampleS;
+    if (!(samples >= 1.0) || std::abs(samples - std::round(samples)) > 1e-9 || rate_hz > kHighestHz)
+      return make_error(ErrorCode::BadInput, "--rate is {:g} Hz (allowed: multiples of {:g} up to {:g})",
+                        rate_hz, 1.0 / MotionSet::kSampleS, kHighestHz);
+  }
+  constexpr double kLongestS = 60.0;
+  if (!(grid.motion_s >= MotionSet::kSampleS) || grid.motion_s > kLongestS)
+    return make_error(ErrorCode::BadInput, "--seconds is {:g} (allowed: {:.3f} to {:g})", grid.motion_s,
+                      MotionSet::kSampleS, kLongestS);
+  return {};
+}
+
+}  // namespace
+
+WorkGrid make_work_grid(const WorkPrecisionOptions& options) {
+  WorkGrid grid;
+  if (options.is_quick) {
+    grid.effort_factors = {1.0, 4.0};
+    grid.substeps = {1};
+    grid.analytic_vertices = {8, 32};
+    grid.analytic_rates_hz = {60.0, 240.0};
+    grid.motion_s = 2.0;
+    grid.reference_vertices = 64;
+    grid.reference_rate_hz = 1920.0;
+    grid.refined_rate_hz = 480.0;
+  } else {
+    grid.effort_factors = {0.25, 1.0, 2.0, 4.0};
+    grid.substeps = {1, 4};
+    grid.analytic_vertices = grid.vertices;
+    grid.analytic_rates_hz = grid.rates_hz;
+    grid.has_every_effort = true;
+    grid.strand_count = 16;
+  }
+  if (!options.vertices.empty()) grid.vertices = grid.analytic_vertices = options.vertices;
+  if (!options.rates_hz.empty()) grid.rates_hz = grid.analytic_rates_hz = options.rates_hz;
+  if (options.motion_s != 0.0) grid.motion_s = options.motion_s;
+  return grid;
+}
+
+Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options) {
+  WorkReport report;
+  report.is_quick = options.is_quick;
+  report.grid = make_work_grid(options);
+  RETURN_IF_ERROR(check_grid(report.grid));
+  ASSIGN_OR_RETURN(std::vector<const SolverRow*> rows, chosen_rows(options.solvers));
+  ASSIGN_OR_RETURN(const MotionSet motion,
+                   MotionSet::make({options.motion, report.grid.motion_s, report.grid.strand_count}));
+  report.motion_name = options.motion.empty() ? "built-in head motion" : options.motion.filename().string();
+  std::unique_ptr<gl::EglContext> context;
+  if (options.gl_device != "none") {
+    ASSIGN_OR_RETURN(context, gl::EglContext::make(options.gl_device));
+  }
+  report.device = context ? context->info().renderer : "none: every model as its double-precision reference";
+  RETURN_IF_ERROR(Measurement(report.grid, motion, std::move(rows), context.get()).run(report));
+  return report;
 }
 
 }  // namespace strandcast

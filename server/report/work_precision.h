@@ -1,11 +1,14 @@
-// strandcast-report work-precision: error against run time of every strand model of the table.
+// strandcast-report work-precision: error against run time of every strand model of the table. This header is
+// what is measured; work_precision_page.h turns it into files.
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
-#include "common/base/result.h"
+#include "server/report/analytic_tests.h"
+#include "server/report/motion_set.h"
 
 namespace strandcast {
 
@@ -13,9 +16,64 @@ struct WorkPrecisionOptions {
   std::filesystem::path out;         // folder of the CSV, plots and page
   std::vector<std::string> solvers;  // rows of the table; empty = all
   std::filesystem::path motion;      // .bvh; empty: the built-in head motion
-  std::string gl_device = "auto";
+  std::string gl_device = "auto";    // "none": every row as its reference
   bool is_quick = false;
+  // Less than the whole grid; empty = all of it.
+  std::vector<uint32_t> vertices;
+  std::vector<double> rates_hz;  // multiples of 30
+  double motion_s = 0.0;         // of the motion set; 0 = as the grid says
 };
+
+/// What is run.
+struct WorkGrid {
+  std::vector<uint32_t> vertices = {8, 16, 32, 64};
+  std::vector<double> rates_hz = {30.0, 60.0, 120.0, 240.0};
+  std::vector<double> effort_factors;  // times a row's default
+  std::vector<uint32_t> substeps;
+  // The tests with an exact answer; default effort only unless has_every_effort.
+  std::vector<uint32_t> analytic_vertices;
+  std::vector<double> analytic_rates_hz;
+  bool has_every_effort = false;  // also for float against double
+  double motion_s = 3.0;
+  uint32_t strand_count = 8;
+  // The converged rod, and each row's own refined version, all in double.
+  uint32_t reference_vertices = 128;
+  double reference_rate_hz = 7680.0;
+  uint32_t refined_vertices = 64;
+  double refined_rate_hz = 960.0;
+  double refined_effort_factor = 4.0;
+};
+WorkGrid make_work_grid(const WorkPrecisionOptions& options);
+
+/// NaN: not measured.
+struct WorkRecord {
+  std::string test;  // kMotionTest or the name of an analytic one
+  RunSetting setting;
+  bool is_on_gpu = false;
+  double us = std::numeric_limits<double>::quiet_NaN();  // per strand and frame, best of several
+  double median_us = std::numeric_limits<double>::quiet_NaN();
+  // Of the motion set, all relative RMS position errors: the row refined against the rod, the run against the
+  // row refined, the GPU run against double precision at the same setting.
+  double model_error = std::numeric_limits<double>::quiet_NaN();
+  double discretisation_error = std::numeric_limits<double>::quiet_NaN();
+  double float_error = std::numeric_limits<double>::quiet_NaN();
+  AnalyticResult result = {};  // of the motion set: error, stretch and note
+};
+inline constexpr const char* kMotionTest = "motion";
+
+struct WorkReport {
+  WorkGrid grid;
+  bool is_quick = false;
+  std::string device;  // as GL names it, or why there is none
+  std::string motion_name;
+  uint32_t timed_strands = 0;
+  double time_self_difference = 0.0;   // of the converged rod: against steps of half the length
+  double space_self_difference = 0.0;  // and against half as many vertices
+  std::vector<WorkRecord> records;
+};
+
+/// Runs everything; prints progress. BadInput for options that nothing can be run for.
+Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options);
 
 /// Measures and writes; prints progress and where the files are.
 Status run_work_precision(const WorkPrecisionOptions& options);

@@ -35,7 +35,7 @@ Result<PinnedRuns> read_pinned_runs(const Groom& groom, uint32_t strand_index) {
   return runs;
 }
 
-Status check_shape(const Groom& groom) {
+Status check_shape(const Groom& groom, uint32_t most_vertices) {
   if (groom.strand_count() == 0)
     return make_error(ErrorCode::BadInput, "groom '{}' has no strands", groom.name);
   if (groom.strand_count() > kMaxStrandCount) {
@@ -55,10 +55,10 @@ Status check_shape(const Groom& groom) {
                         i, vertex_count);
     }
   }
-  if (vertex_count < kMinVertexCount || vertex_count > kMaxVertexCount) {
+  if (vertex_count < kMinVertexCount || vertex_count > most_vertices) {
     return make_error(ErrorCode::LimitExceeded,
                       "groom '{}' has {} vertices per strand (allowed: {} to {}); resample", groom.name,
-                      vertex_count, kMinVertexCount, kMaxVertexCount);
+                      vertex_count, kMinVertexCount, most_vertices);
   }
   return {};
 }
@@ -83,8 +83,8 @@ void fill_strand(const Groom& groom, uint32_t strand_index, StrandLayout& layout
 
 }  // namespace
 
-Result<StrandLayout> make_strand_layout(const Groom& groom) {
-  RETURN_IF_ERROR(check_shape(groom));
+Result<StrandLayout> make_strand_layout(const Groom& groom, uint32_t most_vertices) {
+  RETURN_IF_ERROR(check_shape(groom, most_vertices));
   ASSIGN_OR_RETURN(const PinnedRuns first, read_pinned_runs(groom, 0));
   for (uint32_t i = 1; i < groom.strand_count(); ++i) {
     ASSIGN_OR_RETURN(const PinnedRuns runs, read_pinned_runs(groom, i));

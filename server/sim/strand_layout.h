@@ -32,9 +32,12 @@ struct StrandLayout {
   uint32_t tail_begin() const { return vertex_count - pinned_tail_count; }
 };
 
-/// BadInput unless all strands have the same vertex count (2..kMaxVertexCount) and the same pinned vertices:
-/// a run at the root, optionally a run at the tip, nothing between.
-Result<StrandLayout> make_strand_layout(const Groom& groom);
+/// Vertices per strand of a reference that no GPU has to follow: converged solutions of reports.
+inline constexpr uint32_t kMaxReferenceVertexCount = 256;
+
+/// BadInput unless all strands have the same vertex count (2..most_vertices) and the same pinned vertices: a
+/// run at the root, optionally a run at the tip, nothing between.
+Result<StrandLayout> make_strand_layout(const Groom& groom, uint32_t most_vertices = kMaxVertexCount);
 
 // Bounds on what a step may ask for. Far outside anything physical; they keep squares of floats finite.
 inline constexpr double kMaxSubstepS = 0.1;

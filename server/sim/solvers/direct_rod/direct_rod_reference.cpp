@@ -377,7 +377,7 @@ class DirectRodReference final : public Solver {
       : parameters_(read_rod_parameters(parameters)) {}
 
   Status load(const Groom& groom, const glm::dquat& world_from_head) override {
-    ASSIGN_OR_RETURN(layout_, make_strand_layout(groom));
+    ASSIGN_OR_RETURN(layout_, make_strand_layout(groom, kMaxReferenceVertexCount));
     previous_rotation_ = limited_rotation(world_from_head);
     const glm::dvec3 gravity_in_head =
         glm::conjugate(previous_rotation_) * glm::dvec3(0.0, -kStandardGravityMps2, 0.0);

@@ -1,0 +1,70 @@
+// MotionSet: strands on a moving head in gusts, the real motion that work-precision measures on. Hair of real
+// constants hangs straight from a ring about the head, so that every model begins in its own equilibrium;
+// head and wind set in smoothly. The inputs of a step are made by the server's own StepBuilder. No colliders:
+// what they add depends on where vertices happen to be. Any thread; immutable.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "common/motion/motion_clip.h"
+#include "server/report/strand_run.h"
+
+namespace strandcast {
+
+struct MotionSetOptions {
+  std::filesystem::path clip;  // .bvh; empty: the built-in head motion
+  double duration_s = 3.0;
+  uint32_t strand_count = 8;
+};
+
+/// Positions of one run at times that all rates share, kSampleS apart. (vertex_count x strand_count) each,
+/// vertex-major, head-relative world axes.
+struct Trajectory {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  std::vector<std::vector<glm::vec3>> position_m;
+  double stretch = 0.0;   // largest at any sample
+  bool is_finite = true;  // at every sample
+};
+
+class MotionSet {
+ public:
+  static constexpr double kSampleS = 1.0 / 30.0;
+  static constexpr double kLengthM = 0.25;
+  static constexpr double kFrameS = 1.0 / 60.0;  // times are given per strand and frame of this length
+
+  static Result<MotionSet> make(const MotionSetOptions& options);
+
+  /// The strands, cut into segments; more of them than measured are for timing.
+  Groom groom(uint32_t vertex_count, uint32_t strand_count) const;
+  Groom groom(uint32_t vertex_count) const { return groom(vertex_count, options_.strand_count); }
+  /// Hair of the reference constants in air, with its material damping.
+  RunPhysics physics() const;
+  /// Smooth in time to the second derivative; at rest and upright at 0.
+  Pose head_at(double t_s) const;
+  double duration_s() const { return options_.duration_s; }
+
+  /// The whole motion at the setting's rate, a multiple of 1 / kSampleS.
+  Result<Trajectory> run(const Workbench& workbench, const RunSetting& setting) const;
+  /// The inputs of the first `step_count` steps, substep by substep.
+  std::vector<StepInput> inputs(const RunSetting& setting, int step_count) const;
+
+ private:
+  MotionSet(MotionSetOptions options, MotionClip clip)
+      : options_(std::move(options)), clip_(std::move(clip)) {}
+
+  Pose clip_pose(double clip_s) const;
+  void for_each_step(const RunSetting& setting, int step_count,
+                     const std::function<void(const std::vector<StepInput>&)>& take) const;
+
+  MotionSetOptions options_;
+  MotionClip clip_;  // empty: built in
+};
+
+/// Root of the mean squared distance of a run's free vertices from the reference's curve at the same share of
+/// the arc, over strands and samples, over the length; infinity when either is not finite.
+double relative_rms(const Trajectory& run, const Trajectory& reference);
+
+}  // namespace strandcast

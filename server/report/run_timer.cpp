@@ -1,0 +1,66 @@
+#include "server/report/run_timer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "common/base/profile.h"
+#include "common/gl/timer.h"
+
+namespace strandcast {
+namespace {
+
+// Enough to fill every lane and thread; hardware needs far more of them at once.
+constexpr uint32_t kSoftwareStrands = 1'024;
+constexpr uint32_t kHardwareStrands = 16'384;
+constexpr uint32_t kReferenceStrands = 16;
+constexpr int kWarmUpSubsteps = 3;
+constexpr int kTimedSubsteps = 8;
+constexpr double kUsPerMs = 1e3;
+
+double elapsed_ms(const int64_t begin_ns) {
+  return static_cast<double>(now_ns() - begin_ns) * 1e-6;
+}
+
+}  // namespace
+
+double us_per_frame(double us_per_substep, const RunSetting& setting) {
+  return us_per_substep * setting.substeps * setting.rate_hz * MotionSet::kFrameS;
+}
+
+uint32_t RunTimer::strand_count(const RunSetting& setting) const {
+  if (device_ == nullptr || !workbench_.runs_on_gpu(setting)) return kReferenceStrands;
+  return device_->is_software ? kSoftwareStrands : kHardwareStrands;
+}
+
+Result<StrandTime> RunTimer::time(const RunSetting& setting) {
+  const double effort = std::isnan(setting.effort) ? 0.0 : setting.effort;
+  const std::tuple key(setting.row->name, setting.vertex_count, effort);
+  if (const auto known = measured_.find(key); known != measured_.end()) return known->second;
+  ASSIGN_OR_RETURN(const StrandTime time, measure(setting));
+  measured_[key] = time;
+  return time;
+}
+
+Result<StrandTime> RunTimer::measure(const RunSetting& setting) const {
+  const uint32_t strands = strand_count(setting);
+  const bool is_on_gpu = device_ != nullptr && workbench_.runs_on_gpu(setting);
+  ASSIGN_OR_RETURN(StrandRun run, StrandRun::make(workbench_, setting, motion_.physics(),
+                                                  motion_.groom(setting.vertex_count, strands)));
+  std::optional<gl::GpuTimer> timer;
+  if (is_on_gpu) timer.emplace(*device_);
+  std::vector<double> sample_us;
+  int count = 0;
+  for (const StepInput& input : motion_.inputs(setting, kWarmUpSubsteps + kTimedSubsteps)) {
+    const int64_t begin_ns = now_ns();
+    if (timer) timer->begin();
+    run.substep(input);
+    const double ms = timer ? timer->end_ms() : elapsed_ms(begin_ns);
+    if (++count > kWarmUpSubsteps) sample_us.push_back(ms * kUsPerMs / strands);
+  }
+  std::sort(sample_us.begin(), sample_us.end());
+  return StrandTime{sample_us.front(), sample_us[sample_us.size() / 2]};
+}
+
+}  // namespace strandcast

@@ -1,0 +1,43 @@
+// RunTimer: how long one substep of a strand model takes, per strand, with many strands at once, so that a
+// dispatch does not measure its own overhead. Needs the thread's GL context for GPU runs.
+#pragma once
+
+#include <map>
+#include <string>
+#include <tuple>
+
+#include "common/gl/egl_context.h"
+#include "server/report/motion_set.h"
+
+namespace strandcast {
+
+struct StrandTime {
+  double best_us = 0.0;  // per strand and substep; the least disturbed of several
+  double median_us = 0.0;
+};
+
+/// Microseconds per strand and frame (MotionSet::kFrameS) at the setting's rate and substeps.
+double us_per_frame(double us_per_substep, const RunSetting& setting);
+
+class RunTimer {
+ public:
+  /// `device` of the current context; nullptr when there is none.
+  RunTimer(const Workbench& workbench, const gl::DeviceInfo* device, const MotionSet& motion)
+      : workbench_(workbench), device_(device), motion_(motion) {}
+
+  /// Measured once for every row, vertex count and effort: rate and substeps change nothing in it.
+  Result<StrandTime> time(const RunSetting& setting);
+
+  /// Strands in one measurement.
+  uint32_t strand_count(const RunSetting& setting) const;
+
+ private:
+  Result<StrandTime> measure(const RunSetting& setting) const;
+
+  const Workbench& workbench_;
+  const gl::DeviceInfo* device_;
+  const MotionSet& motion_;
+  std::map<std::tuple<std::string, uint32_t, double>, StrandTime> measured_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,100 @@
+// StrandRun: one strand model at one setting, loaded with a groom and driven step by step, on the GPU or as
+// its double-precision reference. What every measurement of work-precision is made of. GPU runs need the
+// thread's GL context; reference runs may be on any thread.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/gl/program.h"
+#include "server/sim/solver_registry.h"
+
+namespace strandcast {
+
+/// What the parameters of a row stand for.
+enum class Material {
+  Hair,      // the row's nearest to a real hair
+  Limp,      // a chain: no bending, no pull to the style, no drag
+  AsShipped  // the row's defaults
+};
+const char* to_string(Material material);
+
+struct RunSetting {
+  const SolverRow* row = nullptr;
+  Material material = Material::Hair;
+  uint32_t vertex_count = 32;
+  double rate_hz = 60.0;
+  uint32_t substeps = 1;
+  double effort = std::numeric_limits<double>::quiet_NaN();  // of row->effort_parameter; NaN = its default
+  bool is_reference = false;                                 // the double-precision version
+
+  double substep_s() const { return 1.0 / (rate_hz * substeps); }
+};
+
+/// "direct_rod, 32 vertices, 60 Hz, solves 1".
+std::string to_string(const RunSetting& setting);
+
+/// What the strand is, whatever models it.
+struct RunPhysics {
+  HairConstants hair;
+  double length_m = 0.3;
+  SolverParameters given;  // put over the material's, as far as the row has them
+};
+
+/// The row's parameters for the setting; BadInput when the hair is out of their range or the step outside
+/// what the model is stable for.
+Result<SolverParameters> run_parameters(const RunSetting& setting, const RunPhysics& physics);
+
+/// The values of a row's effort parameter to try around its default, ascending; {NaN} without one.
+std::vector<double> effort_values(const SolverRow& row, const std::vector<double>& factors);
+
+/// Whether and where GPU versions run.
+struct Workbench {
+  const gl::ShaderLibrary* shaders = nullptr;  // nullptr: every row runs as its reference
+
+  bool runs_on_gpu(const RunSetting& setting) const {
+    return shaders != nullptr && !setting.is_reference && setting.row->make_gpu != nullptr;
+  }
+};
+
+class StrandRun {
+ public:
+  static Result<StrandRun> make(const Workbench& workbench, const RunSetting& setting,
+                                const RunPhysics& physics, const Groom& groom);
+
+  /// Advances by one step of the setting's rate: `input` holds what is the same in all its substeps;
+  /// head_shift_m is the whole step's.
+  void step(StepInput input);
+  /// Advances by input.h_s.
+  void substep(const StepInput& input) { solver_->substep(input); }
+  /// The state now. Valid until the next call.
+  const SolverState& state();
+  void write(const SolverState& state) { solver_->write(state); }
+
+  const RunSetting& setting() const { return setting_; }
+
+ private:
+  StrandRun(const RunSetting& setting, std::unique_ptr<Solver> solver)
+      : setting_(setting), solver_(std::move(solver)) {}
+
+  RunSetting setting_;
+  std::unique_ptr<Solver> solver_;
+  SolverState state_;
+};
+
+/// Every position and velocity is finite.
+bool is_state_finite(const SolverState& state);
+
+/// Largest relative change of a segment's length against the groom's; segments below a micrometre are left
+/// out.
+double largest_run_stretch(const Groom& groom, const SolverState& state);
+
+/// A uniform groom of polylines with the same number of points each.
+Groom groom_of(const std::vector<std::vector<glm::dvec3>>& strands, Pinning pinning);
+
+/// `vertex_count` points evenly along a straight line from the head joint.
+std::vector<glm::dvec3> straight_run(uint32_t vertex_count, double length_m, const glm::dvec3& direction);
+
+}  // namespace strandcast

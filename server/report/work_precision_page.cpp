@@ -1,0 +1,386 @@
+#include "server/report/work_precision_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+
+#include "server/report/csv_file.h"
+#include "server/report/html_page.h"
+#include "server/report/report_folder.h"
+#include "server/report/svg_plot.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kFramesPerS = 1.0 / MotionSet::kFrameS;
+// What a budget is for, on the page.
+constexpr double kPickStrands = 10'000.0;
+constexpr double kUsPerMs = 1e3;
+constexpr double kBudgetsMs[] = {2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0};
+// An error above this is no picture of the same motion.
+constexpr double kWorstPlotted = 3.0;
+
+std::string percent(double value) {
+  if (std::isnan(value)) return "";
+  if (std::isinf(value)) return "unbounded";
+  const double shown = 100.0 * value;
+  return shown >= 0.01 || shown == 0.0 ? fmt::format("{:.3g} %", shown) : fmt::format("{:.1e} %", shown);
+}
+
+std::string number(double value) {
+  return std::isnan(value) ? "" : fmt::format("{:.3g}", value);
+}
+
+/// Place of a method among those of the report, so that it looks the same in every plot.
+int style_of(const WorkReport& report, const std::string& method) {
+  std::vector<std::string> seen;
+  for (const WorkRecord& record : report.records) {
+    const std::string& name = record.setting.row->name;
+    if (std::find(seen.begin(), seen.end(), name) == seen.end()) seen.push_back(name);
+  }
+  // The champion first.
+  std::stable_partition(seen.begin(), seen.end(), [](const std::string& name) { return name == kChampion; });
+  return static_cast<int>(std::find(seen.begin(), seen.end(), method) - seen.begin());
+}
+
+std::vector<std::string> methods_of(const WorkReport& report) {
+  std::vector<std::string> methods;
+  for (const WorkRecord& record : report.records) {
+    const std::string& name = record.setting.row->name;
+    if (std::find(methods.begin(), methods.end(), name) == methods.end()) methods.push_back(name);
+  }
+  std::sort(methods.begin(), methods.end(), [&](const std::string& a, const std::string& b) {
+    return style_of(report, a) < style_of(report, b);
+  });
+  return methods;
+}
+
+/// A plot of points with each method's front joined by a line.
+std::string front_plot(const WorkReport& report, const std::vector<WorkPoint>& points, PlotDesc desc) {
+  std::vector<PlotSeries> fronts;
+  for (const std::string& method : methods_of(report)) {
+    std::vector<WorkPoint> own;
+    std::copy_if(points.begin(), points.end(), std::back_inserter(own),
+                 [&](const WorkPoint& point) { return point.method == method; });
+    PlotSeries all{method, {}, PlotMark::Dots, style_of(report, method), true, false};
+    PlotSeries front{method, {}, PlotMark::LineAndDots, style_of(report, method)};
+    const auto plotted = [](const WorkPoint& point) {
+      return PlotPoint{point.us, point.error,
+                       fmt::format("{}: {:.3g} % at {:.3g} us", point.label, 100.0 * point.error, point.us)};
+    };
+    for (const WorkPoint& point : own) {
+      if (point.error < kWorstPlotted) all.points.push_back(plotted(point));
+    }
+    for (const size_t i : pareto_front(own)) {
+      if (own[i].error < kWorstPlotted) front.points.push_back(plotted(own[i]));
+    }
+    if (front.points.empty()) continue;
+    desc.series.push_back(std::move(all));
+    fronts.push_back(std::move(front));
+  }
+  desc.series.insert(desc.series.end(), fronts.begin(), fronts.end());
+  desc.x.title = "microseconds per strand and frame of 1/60 s";
+  return make_svg_plot(desc);
+}
+
+std::vector<WorkPoint> points_of(const WorkReport& report, const std::string& test,
+                                 const std::function<double(const WorkRecord&)>& error) {
+  std::vector<WorkPoint> points;
+  for (const WorkRecord& record : report.records) {
+    if (record.test == test)
+      points.push_back({record.setting.row->name, record.us, error(record), to_string(record.setting)});
+  }
+  return points;
+}
+
+double error_of(const WorkRecord& record) {
+  return record.result.error;
+}
+
+void add_picks(HtmlPage& page, const WorkReport& report) {
+  const std::vector<WorkPoint> points = motion_points(report);
+  HtmlTable table;
+  table.caption = fmt::format(
+      "The most exact setting within a budget for {:.0f} strands at 60 frames per second, simulation only. "
+      "\"strandcast-report recommend\" answers for a scene of yours.",
+      kPickStrands);
+  table.columns = {"budget per frame", "pick", "takes", "error"};
+  std::optional<size_t> before;
+  for (const double budget_ms : kBudgetsMs) {
+    const auto best = best_within(points, budget_ms * kUsPerMs / kPickStrands);
+    if (best && best == before) continue;  // a larger budget buys nothing
+    before = best;
+    if (!best) {
+      table.rows.push_back({fmt::format("{:g} ms", budget_ms), "nothing is that fast", "", ""});
+      continue;
+    }
+    const WorkPoint& point = points[*best];
+    table.rows.push_back({fmt::format("{:g} ms", budget_ms), point.label,
+                          fmt::format("{:.3g} ms", point.us * kPickStrands / kUsPerMs),
+                          percent(point.error)});
+  }
+  page.table(table);
+}
+
+/// The three errors of each row: at one common setting, and of its most exact run.
+void add_error_parts(HtmlPage& page, const WorkReport& report) {
+  HtmlTable table;
+  table.caption =
+      "Every model's most exact run. Model: the model itself, refined, against the rod. Discretisation: this "
+      "run "
+      "against the model refined. Float: this run on the GPU against double precision. All are RMS distances "
+      "of "
+      "vertices over the strand's length.";
+  table.columns = {"model",          "setting", "us per strand and frame", "error", "model",
+                   "discretisation", "float",   "largest stretch"};
+  for (const std::string& method : methods_of(report)) {
+    const WorkRecord* best = nullptr;
+    for (const WorkRecord& record : report.records) {
+      if (record.test != kMotionTest || record.setting.row->name != method) continue;
+      if (!std::isfinite(record.result.error)) continue;
+      if (best == nullptr || record.result.error < best->result.error) best = &record;
+    }
+    if (best == nullptr) {
+      table.rows.push_back({method, "no run at any setting", "", "", "", "", "", ""});
+      continue;
+    }
+    table.rows.push_back({method, to_string(best->setting), number(best->us), percent(best->result.error),
+                          percent(best->model_error), percent(best->discretisation_error),
+                          percent(best->float_error), percent(best->result.stretch)});
+  }
+  page.table(table);
+}
+
+/// The default effort's run of a test at about 32 vertices and 60 Hz, which every grid has near.
+const WorkRecord* common_record(const WorkReport& report, const std::string& test,
+                                const std::string& method) {
+  constexpr double kVertices = 32.0;
+  constexpr double kRateHz = 60.0;
+  const WorkRecord* nearest = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const WorkRecord& record : report.records) {
+    const RunSetting& setting = record.setting;
+    if (record.test != test || setting.row->name != method || setting.substeps != 1) continue;
+    const double default_effort = effort_values(*setting.row, {1.0}).front();
+    const bool is_default = std::isnan(setting.effort) || setting.effort == default_effort;
+    const double off = std::abs(std::log(setting.vertex_count / kVertices)) +
+                       std::abs(std::log(setting.rate_hz / kRateHz)) + (is_default ? 0.0 : 10.0);
+    if (off < least) {
+      least = off;
+      nearest = &record;
+    }
+  }
+  return nearest;
+}
+
+void add_analytic_tables(HtmlPage& page, const WorkReport& report) {
+  HtmlTable table;
+  table.caption =
+      "Errors against exact solutions at 32 vertices, 60 Hz and default effort (or the nearest run).";
+  table.columns = {"model"};
+  std::vector<const AnalyticTest*> tests;
+  for (const AnalyticTest& test : analytic_tests()) {
+    const bool has_runs = std::any_of(report.records.begin(), report.records.end(),
+                                      [&](const WorkRecord& record) { return record.test == test.name; });
+    if (has_runs) tests.push_back(&test);
+  }
+  for (const AnalyticTest* test : tests) table.columns.push_back(test->name);
+  table.columns.insert(table.columns.end(), {"T7 damping", "T5 period", "largest stretch"});
+  for (const std::string& method : methods_of(report)) {
+    std::vector<HtmlCell> row = {method};
+    double damping = kNan;
+    double beam_period = kNan;
+    double stretch = 0.0;
+    for (const AnalyticTest* test : tests) {
+      const WorkRecord* record = common_record(report, test->name, method);
+      row.push_back(record == nullptr              ? HtmlCell("not its physics")
+                    : !record->result.note.empty() ? HtmlCell(record->result.note)
+                                                   : HtmlCell(percent(record->result.error)));
+      if (record == nullptr) continue;
+      stretch = std::max(stretch, record->result.stretch);
+      if (!std::isnan(record->result.damping_ratio)) damping = record->result.damping_ratio;
+      if (test->name == "T5") beam_period = record->result.period_error;
+    }
+    row.insert(row.end(),
+               {HtmlCell(number(damping)), HtmlCell(percent(beam_period)), HtmlCell(percent(stretch))});
+    table.rows.push_back(std::move(row));
+  }
+  page.table(table);
+  HtmlTable key;
+  key.columns = {"test", "what is compared"};
+  for (const AnalyticTest* test : tests) key.rows.push_back({HtmlCell(test->name), HtmlCell(test->summary)});
+  page.table(key);
+}
+
+/// T16: how much the droop of the same hair depends on vertices and rate.
+void add_droop_spread(HtmlPage& page, const WorkReport& report) {
+  HtmlTable table;
+  table.caption =
+      "T16: the droop of the same hair (T1, Gamma 10; exactly 0.7002 of its length) over all vertex counts "
+      "and "
+      "rates, default effort.";
+  table.columns = {"model", "least", "most", "spread"};
+  for (const std::string& method : methods_of(report)) {
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const WorkRecord& record : report.records) {
+      const RunSetting& setting = record.setting;
+      if (record.test != "T1 Gamma 10" || setting.row->name != method || std::isnan(record.result.droop))
+        continue;
+      if (!std::isnan(setting.effort) && setting.effort != effort_values(*setting.row, {1.0}).front())
+        continue;
+      least = std::min(least, record.result.droop);
+      most = std::max(most, record.result.droop);
+    }
+    if (!(least <= most)) continue;
+    table.rows.push_back({method, fmt::format("{:.4f}", least), fmt::format("{:.4f}", most),
+                          least > 0.0 ? percent(most / least - 1.0) : "changes sign"});
+  }
+  if (!table.rows.empty()) page.table(table);
+}
+
+void add_method(HtmlPage& page, const WorkReport& report) {
+  const WorkGrid& grid = report.grid;
+  page.heading("How it was measured");
+  page.paragraph(
+      fmt::format("Motion set: {} straight hairs of {:g} m (radius 0.05 mm, 1300 kg/m^3, 3 GPa; air drag "
+                  "4/s) hang from a ring "
+                  "about a head that follows the {} for {:g} s in gusts; no colliders. Errors are root mean "
+                  "squared distances "
+                  "of the vertices over the length, 30 times a second.",
+                  grid.strand_count, MotionSet::kLengthM, report.motion_name, grid.motion_s));
+  page.paragraph(fmt::format(
+      "Reference: direct_rod in double precision, {} vertices, steps of 1/{:g} s{}. It differs by {} from "
+      "itself "
+      "with steps of half the length, and by {} from itself with half the vertices. It is of the family of "
+      "one of "
+      "the models measured; the tests against exact solutions are what speaks for it.",
+      grid.reference_vertices, grid.reference_rate_hz,
+      report.is_quick ? " (coarser than without --quick, which takes 128 vertices and 1/7680 s)" : "",
+      percent(report.time_self_difference), percent(report.space_self_difference)));
+  page.paragraph(
+      fmt::format("Times: {} strands at once on \"{}\", best of several substeps, the device waited for "
+                  "after each; a frame is "
+                  "1/60 s whatever the rate. Rows without a GPU version are timed in double precision on one "
+                  "thread. Times are "
+                  "of this machine; errors are the same on every one.",
+                  report.timed_strands, report.device));
+  page.paragraph(
+      "Models without constants of hair are measured as limp chains and as they ship, and skip the tests "
+      "that "
+      "need stiffness. Not measured: a load at the tip and twisted rings (T2, T11: a step has no such input) "
+      "and "
+      "coil springs (T12); the largest stable stiffness (T8) is in strandcast-report stability.");
+  page.paragraph(fmt::format("Every run, with all its numbers, is in {}.", kWorkPrecisionCsv));
+}
+
+}  // namespace
+
+std::vector<WorkPoint> motion_points(const WorkReport& report) {
+  return points_of(report, kMotionTest, error_of);
+}
+
+std::string work_precision_summary(const WorkReport& report) {
+  return fmt::format(
+      "Does any other model beat {} on real motion, in error and time, below an error of {:g} %? {}",
+      kChampion, 100.0 * kChampionErrorLimit,
+      beaten_sentence(motion_points(report), kChampion, kChampionErrorLimit));
+}
+
+std::string work_precision_csv(const WorkReport& report) {
+  CsvFile csv({"test",         "solver",
+               "material",     "device",
+               "vertices",     "rate_hz",
+               "substeps",     "effort_parameter",
+               "effort",       "us_per_strand_frame",
+               "us_median",    "error",
+               "model_error",  "discretisation_error",
+               "float_error",  "largest_stretch",
+               "period_error", "damping_over_predicted",
+               "droop",        "value",
+               "exact",        "note"});
+  for (const WorkRecord& record : report.records) {
+    const RunSetting& setting = record.setting;
+    const AnalyticResult& result = record.result;
+    const bool was_run = !std::isnan(result.error) || !std::isnan(result.value);
+    csv.add_row({record.test,
+                 setting.row->name,
+                 to_string(setting.material),
+                 record.is_on_gpu ? "gpu" : "double",
+                 std::to_string(setting.vertex_count),
+                 csv_number(setting.rate_hz),
+                 std::to_string(setting.substeps),
+                 setting.row->effort_parameter,
+                 csv_number(setting.effort),
+                 csv_number(record.us),
+                 csv_number(record.median_us),
+                 csv_number(result.error),
+                 csv_number(record.model_error),
+                 csv_number(record.discretisation_error),
+                 csv_number(record.float_error),
+                 csv_number(was_run ? result.stretch : kNan),
+                 csv_number(result.period_error),
+                 csv_number(result.damping_ratio),
+                 csv_number(result.droop),
+                 csv_number(result.value),
+                 csv_number(result.exact),
+                 result.note});
+  }
+  return csv.text();
+}
+
+std::string motion_plot(const WorkReport& report) {
+  PlotDesc desc;
+  desc.title = "Error against time on real motion: below and left is better";
+  desc.y.title = "RMS position error over the length";
+  desc.guides = {{"1 %", kChampionErrorLimit}};
+  return front_plot(report, motion_points(report), std::move(desc));
+}
+
+std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title) {
+  PlotDesc desc;
+  desc.title = title;
+  desc.y.title = "relative error";
+  desc.height = 400.0;
+  return front_plot(report, points_of(report, test, error_of), std::move(desc));
+}
+
+std::string work_precision_page(const WorkReport& report) {
+  HtmlPage page("Strand models: error against run time");
+  page.paragraph(
+      fmt::format("{} runs on {}.{}", report.records.size(), report.device,
+                  report.is_quick ? " A quick report: fewer settings and a coarser reference." : ""));
+  page.heading("What to pick");
+  page.answer(work_precision_summary(report));
+  add_picks(page, report);
+  page.figure(
+      motion_plot(report),
+      "Lines join the runs of a model that no other run of it beats; faint marks are all other runs. Rest "
+      "the mouse on a mark for its setting.");
+  page.heading("Where the error comes from");
+  add_error_parts(page, report);
+  page.heading("Against exact solutions");
+  add_analytic_tables(page, report);
+  page.figure(analytic_plot(report, "T1 Gamma 10", "T1: where the tip of a horizontal hair comes to rest"),
+              "Hair of Gamma = 10 under its own weight; error: distance of the tip over the length.");
+  page.figure(analytic_plot(report, "T4, T7", "T4: period of a hanging chain"),
+              "First mode, small swings; error of the period.");
+  add_droop_spread(page, report);
+  add_method(page, report);
+  return page.text();
+}
+
+Status save_work_precision(const WorkReport& report, const std::filesystem::path& folder) {
+  RETURN_IF_ERROR(save_text(folder / kWorkPrecisionCsv, work_precision_csv(report)));
+  RETURN_IF_ERROR(save_text(folder / kWorkPrecisionPlot, motion_plot(report)));
+  RETURN_IF_ERROR(save_text(folder / "cantilever.svg", analytic_plot(report, "T1 Gamma 10", "T1, Gamma 10")));
+  RETURN_IF_ERROR(save_text(folder / "pendulum.svg", analytic_plot(report, "T4, T7", "T4: period")));
+  return save_text(folder / kWorkPrecisionPage, work_precision_page(report));
+}
+
+}  // namespace strandcast

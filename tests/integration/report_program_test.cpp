@@ -1,0 +1,140 @@
+// strandcast-report as a person runs it: a very small work-precision, its files, and bad input.
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "common/base/file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;  // standard output and error
+};
+
+Outcome run_report(const TemporaryFolder& folder, const std::string& arguments) {
+  const auto log = folder.path() / "log";
+  const std::string command =
+      fmt::format("'{}' {} >'{}' 2>&1", STRANDCAST_REPORT_PROGRAM, arguments, log.string());
+  const int status = std::system(command.c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, load_text(log, 1u << 20).value()};
+}
+
+/// Rows of a CSV by column name; cells may be quoted.
+std::vector<std::map<std::string, std::string>> parse_csv(const std::string& text) {
+  std::vector<std::vector<std::string>> lines(1, {""});
+  bool is_quoted = false;
+  for (const char c : text) {
+    if (c == '"') {
+      is_quoted = !is_quoted;
+    } else if (c == ',' && !is_quoted) {
+      lines.back().emplace_back();
+    } else if (c == '\n' && !is_quoted) {
+      lines.push_back({""});
+    } else {
+      lines.back().back() += c;
+    }
+  }
+  lines.pop_back();
+  std::vector<std::map<std::string, std::string>> rows;
+  for (size_t i = 1; i < lines.size(); ++i) {
+    EXPECT_EQ(lines[i].size(), lines[0].size()) << "line " << i;
+    std::map<std::string, std::string> row;
+    for (size_t k = 0; k < std::min(lines[i].size(), lines[0].size()); ++k) row[lines[0][k]] = lines[i][k];
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+class ReportProgram : public testing::Test {
+ protected:
+  const std::map<std::string, std::string>& row_of(const std::string& test) const {
+    static const std::map<std::string, std::string> kNone;
+    for (const auto& row : rows_)
+      if (row.at("test") == test) return row;
+    ADD_FAILURE() << "no run of " << test;
+    return kNone;
+  }
+  static double number(const std::map<std::string, std::string>& row, const std::string& column) {
+    const auto cell = row.find(column);
+    return cell == row.end() || cell->second.empty() ? NAN : std::stod(cell->second);
+  }
+
+  TemporaryFolder folder_;
+  std::vector<std::map<std::string, std::string>> rows_;
+};
+
+// One model, one size, half a second of motion: what the numbers must be by the laws of rods and chains.
+TEST_F(ReportProgram, ASmallWorkPrecisionKeepsTheLaws) {
+  const auto out = folder_.path() / "report";
+  const Outcome outcome =
+      run_report(folder_, fmt::format("work-precision --quick --solver direct_rod --vertices 32 --rate 240 "
+                                      "--seconds 0.5 --out '{}'",
+                                      out.string()));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr("run 1 of "));
+  EXPECT_THAT(outcome.output, HasSubstr("Does any other model beat direct_rod"));
+
+  rows_ = parse_csv(load_text(out / "work_precision.csv", 1u << 20).value());
+  for (const auto& row : rows_) {
+    EXPECT_EQ(row.at("solver"), "direct_rod");
+    EXPECT_THAT(row.at("note"), IsEmpty());
+    EXPECT_LE(number(row, "largest_stretch"), 1e-3) << row.at("test");
+  }
+  EXPECT_LE(number(row_of("T4, T7"), "period_error"), 0.01);
+  EXPECT_NEAR(number(row_of("T4, T7"), "exact"), 0.91380, 1e-5) << "period of a heavy chain of 0.3 m, s";
+  EXPECT_LE(number(row_of("T5"), "period_error"), 0.01);
+  EXPECT_NEAR(number(row_of("T1 Gamma 10"), "droop"), 0.7002, 0.0025);
+  EXPECT_LE(number(row_of("T9"), "error"), 0.01);
+  EXPECT_NEAR(number(row_of("T10"), "value"), 7.83735, 0.08);
+
+  const auto& motion = row_of("motion");
+  EXPECT_GT(number(motion, "us_per_strand_frame"), 0.0);
+  EXPECT_LE(number(motion, "error"), 0.01);
+  EXPECT_GT(number(motion, "error"), 0.0);
+  EXPECT_LE(number(motion, "float_error"), 1e-3);
+  // The distances of a triangle: run, model refined, rod.
+  EXPECT_LE(number(motion, "error"),
+            1.01 * (number(motion, "model_error") + number(motion, "discretisation_error")));
+
+  const std::string page = load_text(out / "work_precision.html", 1u << 24).value();
+  EXPECT_THAT(page, HasSubstr("</html>"));
+  for (const char* loader : {"src=", "href=", "@import", "url(", "<script"})
+    EXPECT_THAT(page, Not(HasSubstr(loader)));
+  EXPECT_THAT(load_text(out / "work_precision.svg", 1u << 24).value(), HasSubstr("direct_rod"));
+}
+
+TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
+  const std::string out = (folder_.path() / "report").string();
+  folder_.write("file", "");
+  folder_.write("bad.bvh", "HIERARCHY\nROOT");
+  const std::vector<std::pair<std::string, std::string>> bad = {
+      {"", "subcommand"},
+      {"work-precision", "--out"},
+      {fmt::format("work-precision --out '{}' --solver nonsense", out), "unknown solver 'nonsense' (known: "},
+      {fmt::format("work-precision --out '{}' --rate 50", out), "--rate is 50 Hz"},
+      {fmt::format("work-precision --out '{}' --vertices 65", out), "--vertices is 65"},
+      {fmt::format("work-precision --out '{}' --seconds 1e9", out), "--seconds is 1e+09"},
+      {fmt::format("work-precision --out '{}' --motion '{}'", out, (folder_.path() / "bad.bvh").string()),
+       "bad.bvh"},
+      {fmt::format("work-precision --out '{}' --gl-device nonsense", out), "nonsense"},
+      {fmt::format("work-precision --out '{}'", (folder_.path() / "file").string()), "folder"},
+  };
+  for (const auto& [arguments, part] : bad) {
+    const Outcome outcome = run_report(folder_, arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments;
+    EXPECT_THAT(outcome.output, HasSubstr(part)) << arguments;
+    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
+  }
+}
+
+}  // namespace
+}  // namespace strandcast
