@@ -24,6 +24,7 @@ Status ReferenceStrands::load(const Groom& groom, const glm::dquat& world_from_h
   velocity_mps_.assign(layout_.size(), glm::dvec3(0.0));
   for (size_t i = 0; i < layout_.size(); ++i)
     position_m_[i] = previous_rotation_ * glm::dvec3(layout_.rest[i]);
+  step_index_ = 0;
   const size_t n = layout_.vertex_count;
   scratch_.target_m.resize(n);
   scratch_.old_m.resize(n);
@@ -46,7 +47,7 @@ void ReferenceStrands::substep(const StepInput& input) {
   for (uint32_t strand_index = 0; strand_index < layout_.strand_count; ++strand_index) {
     begin(scratch_, strand_index);
     for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-      scratch_.predicted_m[i] = is_pinned(i) ? scratch_.target_m[i] : predict(scratch_, strand_index, i);
+      scratch_.predicted_m[i] = is_pinned(i) ? scratch_.target_m[i] : predict(scratch_, i);
     }
     scratch_.placed_m = scratch_.predicted_m;
     solve(scratch_);
@@ -56,6 +57,7 @@ void ReferenceStrands::substep(const StepInput& input) {
     }
   }
   previous_rotation_ = rotation_;
+  ++step_index_;
   input_ = nullptr;
 }
 
@@ -96,8 +98,8 @@ double ReferenceStrands::style_stiffness_per_s2(size_t at) const {
 // R turns the head; g_0 is the gravity that the groom was made under, in head space. The share f_i of it that
 // the pull carries is a pre-stress: it moves the target up by f_i R g_0 / s_i, just as far as g = R g_0 lets
 // it sag.
-glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const {
-  const size_t at = layout_.index(i, strand_index);
+glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t i) const {
+  const size_t at = layout_.index(i, strand.index);
   const glm::dvec3 old_velocity =
       is_sane(velocity_mps_[at]) && is_sane(position_m_[at]) ? velocity_mps_[at] : head_velocity_mps_;
   const double stiffness = style_stiffness_per_s2(at);
@@ -142,7 +144,7 @@ void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
 // 003 section 2.1.4: v_i = (p_i(t+h) - p_i(t)) / h - s_damping d_(i+1) / h, where d is what the length
 // constraint moved a vertex by; friction and the speed limit are ours.
 glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint32_t i) const {
-  glm::dvec3 u = (strand.placed_m[i] - strand.old_m[i]) / h_s_;
+  glm::dvec3 u = way_m(strand, i) / h_s_;
   const bool has_next = i + 1 < layout_.vertex_count && !is_pinned(i) && !is_pinned(i + 1);
   if (has_next) {
     const glm::dvec3 correction = strand.placed_m[i + 1] - strand.predicted_m[i + 1] - strand.pushed_m[i + 1];

@@ -49,11 +49,18 @@ class ReferenceStrands : public Solver {
   /// Puts vertex i as near to its prediction as its segment's length from vertex i-1, the colliders and the
   /// reach of a pinned tail allow. pinned tail.
   void place(ReferenceStrand& strand, uint32_t i) const;
+  /// Where forces alone take vertex i from old_m.
+  glm::dvec3 predict(const ReferenceStrand& strand, uint32_t i) const;
+  /// The way that vertex i's velocity is made of.
+  virtual glm::dvec3 way_m(const ReferenceStrand& strand, uint32_t i) const {
+    return strand.placed_m[i] - strand.old_m[i];
+  }
   const StrandLayout& layout() const { return layout_; }
   // Of the substep in progress.
   const StepInput& input() const { return *input_; }
   double h_s() const { return h_s_; }
-  glm::dquat rotation() const { return rotation_; }  // of the head, at the end
+  glm::dquat rotation() const { return rotation_; }    // of the head, at the end
+  uint32_t step_index() const { return step_index_; }  // since load()
   glm::dquat carry() const { return rotation_ * glm::conjugate(previous_rotation_); }  // turn of the head
   bool is_pinned(uint32_t i) const { return i < layout_.pinned_root_count || i >= layout_.tail_begin(); }
 
@@ -61,7 +68,6 @@ class ReferenceStrands : public Solver {
   void begin(ReferenceStrand& strand, uint32_t strand_index);
   std::span<double> memory_of(uint32_t strand_index);
   double style_stiffness_per_s2(size_t at) const;
-  glm::dvec3 predict(const ReferenceStrand& strand, uint32_t strand_index, uint32_t i) const;
   glm::dvec3 finish_velocity(const ReferenceStrand& strand, uint32_t i) const;
 
   StrandParameters parameters_;
@@ -74,6 +80,7 @@ class ReferenceStrands : public Solver {
   // The substep in progress, within the limits of strand_layout.h.
   const StepInput* input_ = nullptr;
   double h_s_ = 0.0;
+  uint32_t step_index_ = 0;
   glm::dquat rotation_{1.0, 0.0, 0.0, 0.0};
   glm::dvec3 head_velocity_mps_{0.0};
   ReferenceStrand scratch_;

@@ -8,12 +8,14 @@
 #include "server/sim/solvers/direct_rod/direct_rod.h"
 #include "server/sim/solvers/ftl/ftl.h"
 #include "server/sim/solvers/position_based/position_based.h"
+#include "server/sim/solvers/tractrix/tractrix.h"
 
 namespace strandcast {
 
 const std::vector<SolverRow>& solver_table() {
-  static const std::vector<SolverRow> table = {dftl_row(), dftl_parallel_row(), ftl_row(),
-                                               pbd_row(),  xpbd_row(),          direct_rod_row(), articulated_row()};
+  static const std::vector<SolverRow> table = {
+      dftl_row(), dftl_parallel_row(), ftl_row(),         pbd_row(),
+      xpbd_row(), direct_rod_row(),    articulated_row(), tractrix_emulation_row()};
   return table;
 }
 

@@ -45,6 +45,10 @@ struct SolverRow {
   /// How many times as large a rounding may become within a step: constraints that are solved in turn pass it
   /// on, and segments under pressure fold to either side.
   double rounding_growth = 1.0;
+  /// How far a rounding may move a strand whose segments are shorter than the way they are pushed along in a
+  /// step: each push by a segment's length lets the angle to it grow e times, and rounding decides how the
+  /// segment turns around. 0 = no more than rounding_growth says.
+  double folding_spread_m = 0.0;
   /// How deep a vertex may end a step inside a collider.
   double collider_depth_m = 1e-6;
   /// BadInput when a step of `substep_s` with complete parameters is outside the model's stable range, with

@@ -76,6 +76,7 @@ Status StrandKernel::load(const Groom& groom, const glm::dquat& world_from_head)
   const bool has_pinned_tail = layout.pinned_tail_count > 0;
   if (has_pinned_tail != is_compiled_for_tail_) RETURN_IF_ERROR(compile(has_pinned_tail));
   previous_rotation_ = limited_rotation(world_from_head);
+  step_index_ = 0;
   upload(layout);
   // The kernels read these back from the buffers.
   layout.rest = {};
@@ -107,7 +108,7 @@ const gl::Program& StrandKernel::program_for(size_t collider_count) const {
 
 void StrandKernel::substep(const StepInput& input) {
   StepBlock block = make_step_block(input, parameters_, layout_, previous_rotation_);
-  block.odd_even = {desc_.iterations, desc_.has_exact_length ? 1u : 0u, 0u, 0u};
+  block.odd_even = {desc_.iterations, desc_.has_exact_length ? 1u : 0u, step_index_++, 0u};
   step_.write(0, std::as_bytes(std::span(&block, 1)));
   previous_rotation_ = limited_rotation(input.world_from_head);
 

@@ -57,6 +57,7 @@ class StrandKernel final : public Solver {
 
   StrandLayout layout_;
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
+  uint32_t step_index_ = 0;  // since load()
   gl::Buffer rest_;      // (vertex_count x strand_count) vec4: head space, m; segment before it, m
   gl::Buffer position_;  // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
   gl::Buffer velocity_;  // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first

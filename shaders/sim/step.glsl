@@ -13,7 +13,7 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 style;               // stiffness at the root 1/s^2, share at the tip, s_damping, speed limit m/s
   vec4 contact;             // friction, air drag 1/s; rest unused
   uvec4 shape;              // strands, vertices of each, pinned at the root, first vertex of the pinned tail
-  uvec4 odd_even;           // iterations, 1 = restore exact lengths
+  uvec4 odd_even;           // iterations, 1 = restore exact lengths, steps since loading
   vec4 gust_amplitude[kMaxGustWaves];  // m/s; w = phase, rad
   vec4 gust_wave[kMaxGustWaves];       // rad/m
   vec4 collider[kMaxSphereColliders];    // centre, m; w = radius (0 = none)

@@ -44,6 +44,7 @@ constexpr double kRodBoundM = 3.0 * 6e-8 * 0.25;  // times n^2
 constexpr double kIteratedVertexCount = 8.0;
 
 double bound_for(const SolverRow& row, const ParityCase& test, int step) {
+  if (test.vertex_count > kBoundVertexCount && row.folding_spread_m > 0.0) return row.folding_spread_m;
   const double held_bound_m = row.comes_to_rest ? kHeldBoundM : kRestlessHeldBoundM;
   if (row.rounding_growth > 1.0) {
     const double bound_m = test.pinning == Pinning::BothEnds ? held_bound_m : kBoundM;
