@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/sim/solvers/angular_projection/angular_projection.h"
 #include "server/sim/solvers/articulated/articulated.h"
 #include "server/sim/solvers/dftl/dftl.h"
 #include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
@@ -13,9 +14,15 @@
 namespace strandcast {
 
 const std::vector<SolverRow>& solver_table() {
-  static const std::vector<SolverRow> table = {
-      dftl_row(), dftl_parallel_row(), ftl_row(),         pbd_row(),
-      xpbd_row(), direct_rod_row(),    articulated_row(), tractrix_emulation_row()};
+  static const std::vector<SolverRow> table = {dftl_row(),
+                                               dftl_parallel_row(),
+                                               ftl_row(),
+                                               pbd_row(),
+                                               xpbd_row(),
+                                               direct_rod_row(),
+                                               articulated_row(),
+                                               tractrix_emulation_row(),
+                                               angular_projection_row()};
   return table;
 }
 

@@ -1,43 +1,17 @@
-// articulated: one invocation per strand; equations in server/sim/solvers/articulated/articulated.h. Walks
-// per step: from the root, where a step without forces would lead; per solve from the tip to the root,
-// inertia as the joints see it (articulated-body method), and back, how far every segment turns; last the
-// positions. Masses are lengths: everything is divided by the mass per length. Moments are multiplied by the
-// step squared.
+// articulated: inertia as every joint feels it, from the tip to the root, then how far every segment turns,
+// from the root to the tip (articulated-body method). Equations in
+// server/sim/solvers/articulated/articulated.h.
 #include "sim/chain.glsl"
 
-layout(local_size_x = kStrandLocalSize) in;
-
-// Bending and twist stiffness over mass per length, m^4/s^2; damping, s; solves.
-uniform vec4 u_chain;
-
-// A pinned tip is a vertex of so many strands' mass at its target.
-const uint kHeldSolves = 2u;  // least number that closes the way to it
-const float kAnchorMass = 100.0;
 // Segments have no inertia about themselves. This much of the one across, which only slows how twist spreads,
 // keeps the matrices regular.
 const float kSpinShare = 1e-4;
 const float kPivotShare = 1e-6;
-// Largest turn of a segment per solve.
-const float kMaxTurn = 1.0;
 // 1 + cos of a joint's angle, or of its twist, counts for at least this much.
 const float kMinOpening = 0.1;
 
-vec4 g_aim[kMaxVertexCount];       // predicted position; inertia
-vec4 g_along[kMaxVertexCount];     // direction of the edge before; its length
-vec4 g_axis[kMaxVertexCount];      // first axis of its frame
-vec4 g_rest[kMaxVertexCount];      // its rest direction, seen from the frame before
-vec4 g_turn[kMaxVertexCount];      // how far it turned during the step
 // turn = w of 0..2 - (0..2) movement of its start + (3..5) turn before
 vec4 g_back[6 * kMaxVertexCount];
-
-struct Strand {
-  uint index;
-  uint first;   // vertices first .. last are solved for
-  uint last;
-  Frame clamp;
-  vec3 clamp_turn;  // during the step
-  vec3 root;
-};
 
 // Energy of a part of the strand as a function of how its first joint moves (v) and its segment turns (w):
 // 1/2 w A w + w B v + 1/2 v C v - w turn - v push.
@@ -48,53 +22,6 @@ struct Body {
   vec3 turn;
   vec3 push;
 };
-
-Frame frame_at(Strand strand, uint i) {
-  return i < strand.first ? strand.clamp : Frame(g_along[i].xyz, g_axis[i].xyz);
-}
-
-// Fills the arrays; returns the position of the last vertex.
-vec3 begin(Strand strand) {
-  const uint stride = u_step.shape.x;
-  uint at = (strand.first - 1u) * stride + strand.index;
-  Vertex before = predict(at);
-  vec3 rest_before = rest_at(at);
-  Frame rest = clamp_in_head(strand.index);
-  Frame old = Frame(before_the_turn(strand.clamp.along), before_the_turn(strand.clamp.axis));
-  Frame now = strand.clamp;
-  vec3 position = strand.root;
-  float total = 0.0;
-  for (uint i = strand.first; i <= strand.last; ++i) {
-    at += stride;
-    const Vertex vertex = predict(at);
-    const vec3 rest_end = rest_at(at);
-    const Frame rest_next = carried_to(rest, direction_or(rest_end - rest_before, rest.along));
-    g_rest[i] = vec4(seen_from(rest, rest_next.along), 0.0);
-    rest = rest_next;
-    rest_before = rest_end;
-
-    const vec3 groomed = turned_with_head(rest.along);
-    old = carried_to(old, direction_or(vertex.old - before.old, before_the_turn(groomed)));
-    now = carried_to(now, direction_or(guessed_edge(before, vertex), groomed));
-    const float stored = texelFetch(u_velocity, int(at)).w;
-    const float spin = is_broken(vec3(stored, 0.0, 0.0)) ? 0.0 : stored;
-    const Frame turned_now = spun(now, spin);
-    g_along[i] = vec4(turned_now.along, vertex.segment);
-    g_axis[i] = vec4(turned_now.axis, 0.0);
-    g_turn[i] = vec4(turn_between(spun(old, spin), turned_now), 0.0);
-
-    const float half_mass = 0.5 * max(vertex.segment, kMinLength);
-    if (i > strand.first) g_aim[i - 1u].w += half_mass * before.inertia;
-    g_aim[i] = vec4(vertex.predicted, half_mass * vertex.inertia);
-    total += half_mass;
-    position += vertex.segment * turned_now.along;
-    before = vertex;
-  }
-#if HAS_PINNED_TAIL
-  g_aim[strand.last] = vec4(turned_with_head(rest_at(at)), 2.0 * kAnchorMass * total);
-#endif
-  return position;
-}
 
 // Adds vertex i at the end of its segment, then moves the reference from that end to its start. The force on
 // everything beyond stretches the segment, which makes it as hard to turn as a pendulum.
@@ -212,94 +139,7 @@ vec3 solve_forward(Strand strand, inout bool is_bad) {
   return position;
 }
 
-void store(uint at, vec3 position, float arc, vec3 velocity, float spin) {
-  store_vertex(at, position, arc);
-  b_velocity.velocity[at] = vec4(within_speed_limit(velocity) + u_step.head_velocity.xyz, spin);
-}
-
-void store_pinned(uint i, uint strand) {
-  const uint at = i * u_step.shape.x + strand;
-  const Vertex vertex = predict(at);
-  store(at, vertex.target, vertex.arc, (vertex.target - vertex.old) * u_step.push.w, 0.0);
-}
-
-// Positions, turned out of colliders and back to a pinned tip where need be. What the solves leave of the
-// way to a pinned tip is spread over the strand: the last segments alone would answer to every rounding.
-void finish(Strand strand, vec3 last_position, bool is_bad) {
-  const uint stride = u_step.shape.x;
-  const uint tail = u_step.shape.w;
-  vec3 anchor = vec3(0.0);
-  float reach = 0.0;
-#if HAS_PINNED_TAIL
-  anchor = turned_with_head(rest_at(tail * stride + strand.index));
-  for (uint i = strand.first; i <= tail; ++i) reach += g_along[i].w;
-  const vec3 missed = (anchor - last_position) / max(reach, kMinLength);
-  float way = 0.0;
-#endif
-  vec3 start = strand.root;
-  vec3 solved = strand.root;
-  vec3 start_target = strand.root;
-  Frame untwisted = strand.clamp;
-  for (uint i = strand.first; i < tail; ++i) {
-    const uint at = i * stride + strand.index;
-    Vertex vertex = predict(at);
-    const vec3 groomed = direction_or(vertex.target - start_target, strand.clamp.along);
-    const vec3 along = is_bad ? groomed : g_along[i].xyz;
-    untwisted = carried_to(untwisted, along);
-    const float spin = is_bad ? 0.0 : spin_between(untwisted, Frame(along, g_axis[i].xyz));
-    const bool is_shifted = start != solved;
-    solved += vertex.segment * along;
-    vec3 end = solved;
-#if COLLIDERS > 0 || HAS_PINNED_TAIL
-    vertex.predicted = solved;
-    vec3 pushed;
-    bool is_last = false;
-#if HAS_PINNED_TAIL
-    reach -= vertex.segment;
-    way += vertex.segment;
-    vertex.predicted += way * missed;
-    is_last = i + 1u == tail;
-    const float reach_left = is_last ? g_along[tail].w : reach;
-    end = placed(start, start_target, vertex, anchor, reach_left, is_last, pushed);
-#else
-    const vec3 placed_end = placed(start, start_target, vertex, anchor, reach, is_last, pushed);
-    // Without contact nothing moves, not by a rounding either.
-    end = is_shifted || dot(pushed, pushed) > 0.0 ? placed_end : solved;
-#endif
-#endif
-    const vec3 velocity = is_bad ? vec3(0.0) : (end - vertex.old) * u_step.push.w;
-    store(at, end, vertex.arc, velocity, spin);
-    start = end;
-    start_target = vertex.target;
-  }
-}
-
-void main() {
-  const uint stride = u_step.shape.x;
-  const uint tail = u_step.shape.w;
-  Strand strand;
-  strand.index = gl_GlobalInvocationID.x;
-  if (strand.index >= stride) return;
-  strand.first = u_step.shape.z;
-  strand.last = min(tail, u_step.shape.y - 1u);
-  if (tail > strand.first) {
-    strand.clamp = turned_with_head(clamp_in_head(strand.index));
-    const Frame old_clamp = Frame(before_the_turn(strand.clamp.along), before_the_turn(strand.clamp.axis));
-    strand.clamp_turn = turn_between(old_clamp, strand.clamp);
-    strand.root = turned_with_head(rest_at((strand.first - 1u) * stride + strand.index));
-    bool is_bad = false;
-    vec3 position = begin(strand);
-#if HAS_PINNED_TAIL
-    const uint solves = max(uint(u_chain.w), kHeldSolves);
-#else
-    const uint solves = uint(u_chain.w);
-#endif
-    for (uint solve = 0u; solve < solves; ++solve) {
-      solve_backward(strand, position);
-      position = solve_forward(strand, is_bad);
-    }
-    finish(strand, position, is_bad);
-  }
-  for (uint i = 0u; i < strand.first; ++i) store_pinned(i, strand.index);
-  for (uint i = max(tail, strand.first); i < u_step.shape.y; ++i) store_pinned(i, strand.index);
+vec3 turned_chain(Strand strand, vec3 position, inout bool is_bad) {
+  solve_backward(strand, position);
+  return solve_forward(strand, is_bad);
 }

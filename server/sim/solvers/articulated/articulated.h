@@ -6,13 +6,12 @@
 //   sum of m_i c_i |x_i - y_i|^2 / 2 + h^2 (bending + twist),   x_i = root + sum of l_j t_j,
 // with y_i where forces alone would take vertex i and c_i = 1 + h (drag + h pull). Every solve is one Newton
 // step for it from the shape so far, which starts from the motion going on:
-//   inertia     of what is beyond a joint, as the joint feels it, from the tip to the root; with the force F
-//   on
-//               it a segment resists turning by l F.t more, like a pendulum (never less: the matrix stays
-//               positive);
-//   bending     EI / l times the angle theta to the rest direction, which turns with the segment before;
-//   twist       GJ / l times 2 tan(tau / 2), tau the spin between the two frames beyond the smallest
-//   rotation; damping     both lead by a time, on the turn of one segment against the other during the step.
+// Inertia of what is beyond a joint, as the joint feels it, is summed from the tip to the root; with the
+// force F on it a segment resists turning by l F.t more, like a pendulum (never less: the matrix stays
+// positive). Bending: EI / l times the angle theta to the rest direction, which turns with the segment
+// before. Twist: GJ / l times 2 tan(tau / 2), tau the spin between the two frames beyond the smallest
+// rotation. Damping: both lead by a time, on the turn of one segment against the other during the step.
+//
 // Segments do not resist spinning by inertia: twist runs along a hair in less than a millisecond, so it is
 // always in balance. Spins are kept against the frame that is carried along from the clamp without twist.
 #pragma once
@@ -20,16 +19,6 @@
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {
-
-/// What both versions of the solver read from the parameters, besides the shared ones.
-struct ChainParameters {
-  double bend_stiffness_m4ps2 = 0.0;   // EI / (rho A)
-  double twist_stiffness_m4ps2 = 0.0;  // GJ / (rho A)
-  double damping_s = 0.0;
-  uint32_t solves = 1;
-};
-
-ChainParameters read_chain_parameters(const SolverParameters& parameters);
 
 SolverRow articulated_row();
 
