@@ -89,6 +89,10 @@ ViewReport make_report(ViewerSession& session) {
   out.count("keyframe_requests", strands.keyframe_requests);
   out.count("dropped_by_client", net.dropped_strand_frames);
   out.count("dropped_by_server", server.dropped_frames);
+  out.count("rate_divisor", session.quality().rate_divisor);
+  out.number("quality_bound_mm", static_cast<double>(session.quality().bound_m) * 1e3, 3);
+  out.count("quality_changes", session.quality_changes());
+  out.number("queue_delay_ms", server.queue_delay_ms, 1);
   out.number("server_sim_ms", server.sim_ms, 3);
   out.number("server_encode_ms", server.encode_ms, 3);
   out.number("server_render_ms", server.render_ms, 3);

@@ -7,13 +7,16 @@
 namespace strandcast {
 
 Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
-  ASSIGN_OR_RETURN(auto client, ViewerClient::connect(config));
+  ClientConfig acknowledging = config;
+  acknowledging.hello.acknowledges = true;
+  ASSIGN_OR_RETURN(auto client, ViewerClient::connect(acknowledging));
   std::unique_ptr<ViewerSession> session(new ViewerSession(std::move(client)));
   ViewerClient* requester = session->client_.get();
   auto replay = StrandReplay::make(session->welcome(), [requester] { requester->request_keyframe(); });
   if (!replay) return at(config.address.to_string(), replay.error());
   session->replay_ = std::move(replay).value();
   session->opened_ns_ = now_ns();
+  session->quality_.bound_m = session->welcome().bound_m;
   return session;
 }
 
@@ -28,11 +31,20 @@ Status ViewerSession::pump(std::chrono::milliseconds timeout) {
       has_status_ = true;
     } else if (auto* notice = std::get_if<Notice>(&event)) {
       notices_.push_back(std::move(*notice));
+    } else if (auto* quality = std::get_if<StreamQuality>(&event)) {
+      take_quality(std::move(*quality));
     } else {
       return std::get<ClosedEvent>(event).error;
     }
   }
   return {};
+}
+
+void ViewerSession::take_quality(StreamQuality quality) {
+  quality_ = std::move(quality);
+  ++quality_changes_;
+  log_info("replay", "strands every {} steps within {:.3g} mm: {}", quality_.rate_divisor,
+           quality_.bound_m * 1e3, quality_.reason);
 }
 
 Status ViewerSession::handle(MediaEvent& event) {
@@ -59,12 +71,14 @@ Status ViewerSession::handle(MediaEvent& event) {
 }
 
 Status ViewerSession::take_asset(const MediaEvent& event) {
+  const int64_t begin_ns = now_ns();
   ASSIGN_OR_RETURN(SceneAsset asset, decode_scene_asset(event.payload()));
   const Welcome& announced = welcome();
   if (asset.strand_count != announced.strand_count || asset.vertex_count != announced.vertex_count)
     return make_error(ErrorCode::BadInput, "the asset has {} x {} vertices, the Welcome announced {} x {}",
                       asset.strand_count, asset.vertex_count, announced.strand_count, announced.vertex_count);
   asset_ = std::move(asset);
+  acknowledge(event, begin_ns);
   return {};
 }
 
@@ -90,7 +104,8 @@ void ViewerSession::take_picture(const MediaEvent& event) {
 void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns) {
   const auto decode_us = static_cast<uint32_t>((now_ns() - decode_begin_ns) / 1000);
   // An acknowledgement that does not fit is not needed: the server drops frames for this client already.
-  const auto sent = client_->send(FrameAck{event.header.sequence, event.receive_time_ns, decode_us});
+  const auto sent = client_->send(
+      FrameAck{event.header.sequence, event.receive_time_ns, decode_us, event.header.stream_id});
   if (!sent) log_debug("net", "acknowledgement not sent: {}", sent.error().to_string());
 }
 

@@ -51,6 +51,10 @@ class ViewerSession {
   const Image* image() const { return image_ ? &*image_ : nullptr; }
   uint64_t image_count() const { return image_count_; }
 
+  /// How the server codes strands for this viewer; changes with the link.
+  const StreamQuality& quality() const { return quality_; }
+  uint64_t quality_changes() const { return quality_changes_; }
+
   const ServerStatus& status() const { return status_; }
   bool has_status() const { return has_status_; }
   /// Notices since the last call.
@@ -68,6 +72,7 @@ class ViewerSession {
   Status handle(MediaEvent& event);
   Status take_asset(const MediaEvent& event);
   void take_picture(const MediaEvent& event);
+  void take_quality(StreamQuality quality);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
 
   std::unique_ptr<ViewerClient> client_;
@@ -76,6 +81,8 @@ class ViewerSession {
   std::optional<Image> image_;
   uint64_t image_count_ = 0;
   uint32_t last_picture_sequence_ = 0;
+  StreamQuality quality_;
+  uint64_t quality_changes_ = 0;
   ServerStatus status_;
   bool has_status_ = false;
   std::vector<Notice> notices_;

@@ -197,6 +197,10 @@ class WindowedView {
     hud.mode = is_frames()
                    ? "server's pictures"
                    : fmt::format("strands, {}", playout_ == Playout::Smooth ? "smooth" : "newest state");
+    const StreamQuality& quality = session().quality();
+    if (!is_frames() && quality.rate_divisor > 1)
+      hud.mode +=
+          fmt::format(", every {} steps within {:.2g} mm", quality.rate_divisor, quality.bound_m * 1e3);
     if (static_cast<double>(time_ns - message_ns_) * 1e-9 < kMessageS) hud.message = message_;
     hud.fps = fps_.per_s();
     hud.render_ms = render_timer_.median_ms();
@@ -210,6 +214,7 @@ class WindowedView {
     hud.motion_to_decoded_ms = replay.motion_latency_timer().median_ms();
     hud.playout_delay_ms = playout_ == Playout::Smooth && !is_frames() ? replay.playout_delay_ms() : 0.0;
     hud.round_trip_ms = clock.has_value() ? 2.0 * static_cast<double>(clock.error_ns()) * kNsToMs : 0.0;
+    hud.queue_delay_ms = status.queue_delay_ms;
     hud.tick = status.tick;
     hud.dropped_by_server = status.dropped_frames;
     hud.missed_frames = is_frames() ? session().picture_stats().missed_frames : replay.stats().missed_frames;

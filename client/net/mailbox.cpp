@@ -60,12 +60,20 @@ Mailbox::Outcome Mailbox::push(MediaEvent event) {
   return Outcome::Kept;
 }
 
-void Mailbox::push(const ServerStatus& status) {
+template <class Event>
+void Mailbox::keep_newest(const Event& event) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return;
-  std::erase_if(events_,
-                [](const ClientEvent& event) { return std::holds_alternative<ServerStatus>(event); });
-  append(status);
+  std::erase_if(events_, [](const ClientEvent& old) { return std::holds_alternative<Event>(old); });
+  append(event);
+}
+
+void Mailbox::push(const ServerStatus& status) {
+  keep_newest(status);
+}
+
+void Mailbox::push(const StreamQuality& quality) {
+  keep_newest(quality);
 }
 
 void Mailbox::push(Notice notice) {

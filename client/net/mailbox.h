@@ -1,6 +1,6 @@
 // Mailbox: hands what the network thread received to the application thread; bounded in every kind. Strand
-// frames keep their order (a delta needs every frame before it); pictures, assets and status keep only the
-// newest. Any thread. Does not decode.
+// frames keep their order (a delta needs every frame before it); pictures, assets, status and stream quality
+// keep only the newest. Any thread. Does not decode.
 #pragma once
 
 #include <chrono>
@@ -32,7 +32,7 @@ struct ClosedEvent {
   Error error;
 };
 
-using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, ClosedEvent>;
+using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, ClosedEvent>;
 
 struct MailboxLimits {
   size_t strand_frames = 240;            // four seconds at 60 Hz
@@ -50,6 +50,7 @@ class Mailbox {
   /// delta until the next keyframe; KeyframeNeeded tells the caller to ask for one.
   Outcome push(MediaEvent event);
   void push(const ServerStatus& status);
+  void push(const StreamQuality& quality);
   /// The oldest notice gives way when there are too many.
   void push(Notice notice);
   /// Adds the final event; later pushes are ignored.
@@ -66,6 +67,8 @@ class Mailbox {
  private:
   template <class Predicate>
   size_t erase_media(Predicate predicate);
+  template <class Event>
+  void keep_newest(const Event& event);
   void append(ClientEvent event);
 
   const MailboxLimits limits_;

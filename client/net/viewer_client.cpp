@@ -329,6 +329,14 @@ class ViewerClient::Connection {
                        : make_error(ErrorCode::BadInput, "the server sent a status before its Welcome");
   }
 
+  Status handle_control(StreamQuality& quality) {
+    quality.reason = printable(quality.reason);
+    if (is_welcome_) mailbox_.push(quality);
+    return is_welcome_
+               ? Status()
+               : make_error(ErrorCode::BadInput, "the server sent a stream quality before its Welcome");
+  }
+
   Status handle_control(Notice& notice) {
     notice.text = printable(notice.text);
     if (is_welcome_) mailbox_.push(std::move(notice));

@@ -1,6 +1,7 @@
 #include "client/replay/playout_clock.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace strandcast {
@@ -54,7 +55,8 @@ void PlayoutClock::fit() {
                    lateness_ns.end());
   const double frame_ns =
       static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0) * client_per_sim;
-  delay_ns_ = std::min(static_cast<int64_t>(frame_ns + lateness_ns[rank]), kMaxPlayoutDelayNs);
+  delay_ns_ =
+      static_cast<int64_t>(frame_ns) + std::min(static_cast<int64_t>(lateness_ns[rank]), kMaxPlayoutDelayNs);
 }
 
 int64_t PlayoutClock::sim_time_at(int64_t client_time_ns) const {
@@ -63,6 +65,27 @@ int64_t PlayoutClock::sim_time_at(int64_t client_time_ns) const {
   const double receive =
       static_cast<double>(client_time_ns - delay_ns_ - first.receive_time_ns) - mean_receive_ns_;
   return first.sim_time_ns + static_cast<int64_t>(mean_sim_ns_ + receive * sim_per_client_);
+}
+
+int64_t PlayoutCursor::advance(int64_t client_time_ns, int64_t wanted_ns) {
+  const auto elapsed_ns = static_cast<double>(std::max<int64_t>(client_time_ns - client_time_ns_, 0));
+  const auto moved_ns = static_cast<double>(wanted_ns - wanted_ns_);
+  const double behind_ns = static_cast<double>(wanted_ns) - shown_ns_;
+  client_time_ns_ = client_time_ns;
+  wanted_ns_ = wanted_ns;
+  if (!is_started_ || std::abs(behind_ns) > static_cast<double>(kCatchUpLimitNs)) {
+    is_started_ = true;
+    shown_ns_ = static_cast<double>(wanted_ns);
+    return wanted_ns;
+  }
+  // What the clock itself moved by in this time is the normal pace; a jump of its fit is a difference to
+  // catch up.
+  const double pace_ns = moved_ns < 0.0 ? elapsed_ns : std::min(moved_ns, 2.0 * elapsed_ns);
+  const double correction_ns =
+      std::clamp((behind_ns - pace_ns) * elapsed_ns / static_cast<double>(kCatchUpTimeNs),
+                 -kCatchUpRate * pace_ns, kCatchUpRate * elapsed_ns);
+  shown_ns_ += pace_ns + correction_ns;
+  return static_cast<int64_t>(shown_ns_);
 }
 
 }  // namespace strandcast

@@ -9,8 +9,8 @@
 
 namespace strandcast {
 
-inline constexpr size_t kPlayoutWindow = 64;  // frames, about a second
-inline constexpr int64_t kMaxPlayoutDelayNs = 100'000'000;
+inline constexpr size_t kPlayoutWindow = 64;                // frames, about a second
+inline constexpr int64_t kMaxPlayoutDelayNs = 100'000'000;  // for lateness, besides one frame
 inline constexpr int64_t kPlayoutGapNs =
     500'000'000;  // a longer silence (pause, stall) starts the fit afresh
 
@@ -21,7 +21,7 @@ class PlayoutClock {
 
   bool has_value() const { return samples_.size() >= 2; }
   /// Simulation time to show at `client_time_ns`: one frame behind the fitted line, and further behind by the
-  /// lateness that all but 5 % of recent frames stay under, at most kMaxPlayoutDelayNs in all.
+  /// lateness that all but 5 % of recent frames stay under, at most kMaxPlayoutDelayNs.
   int64_t sim_time_at(int64_t client_time_ns) const;
   /// The delay behind the newest frame that sim_time_at uses, client ns.
   int64_t delay_ns() const { return delay_ns_; }
@@ -39,5 +39,23 @@ class PlayoutClock {
   double mean_sim_ns_ = 0.0;
   int64_t delay_ns_ = 0;
 };
+
+/// The simulation time that is shown: follows what a PlayoutClock says, but never backwards and never faster
+/// or slower than kCatchUpRate allows, so that a change of the delay or a late burst is caught up without a
+/// jump or a freeze.
+class PlayoutCursor {
+ public:
+  /// The time to show at `client_time_ns`, which does not run backwards, when `wanted_ns` would be right.
+  int64_t advance(int64_t client_time_ns, int64_t wanted_ns);
+
+ private:
+  bool is_started_ = false;
+  int64_t client_time_ns_ = 0;
+  double shown_ns_ = 0.0;
+  int64_t wanted_ns_ = 0;
+};
+inline constexpr double kCatchUpRate = 0.5;             // time may run 1 - this to 1 + this as fast as wanted
+inline constexpr int64_t kCatchUpTimeNs = 100'000'000;  // a difference falls by about two thirds in this time
+inline constexpr int64_t kCatchUpLimitNs = 500'000'000;  // a larger difference is jumped over
 
 }  // namespace strandcast

@@ -40,6 +40,12 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
     reject(header.error(), receive_time_ns);
     return nullptr;
   }
+  if (const Status status = check_stream(*header); !status) {
+    reject(status.error(), receive_time_ns);
+    return nullptr;
+  }
+  const bool is_other_stream = last_sequence_ != 0 && header->stream_id != stream_id_;
+  if (is_other_stream) last_sequence_ = 0;
   note_sequence(*header);
 
   const int64_t begin_ns = now_ns();
@@ -52,6 +58,7 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
   const int64_t decoded_ns = now_ns();
   decode_timer_.add_ms(static_cast<double>(decoded_ns - begin_ns) * 1e-6);
   ++stats_.decoded_frames;
+  stream_id_ = header->stream_id;
   if (header->opcode == Opcode::StrandKeyframe) ++stats_.keyframes;
   newest_send_time_ns_ = header->send_time_ns;
 
@@ -64,8 +71,15 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
     if (last_motion_time_ns_ != 0) motion_latency_timer_.add_ms(static_cast<double>(latency_ns) * 1e-6);
     last_motion_time_ns_ = motion_time_ns;
   }
-  keep(snapshot, receive_time_ns);
+  keep(snapshot, receive_time_ns, is_other_stream);
   return snapshot;
+}
+
+/// Every stream counts its frames by itself: the same number in another one is another state.
+Status StrandReplay::check_stream(const FrameHeader& header) const {
+  if (header.stream_id == stream_id_ || header.opcode == Opcode::StrandKeyframe) return {};
+  return make_error(ErrorCode::Unavailable, "delta {} is of stream {}, the newest keyframe of stream {}",
+                    header.sequence, header.stream_id, stream_id_);
 }
 
 void StrandReplay::note_sequence(const FrameHeader& header) {
@@ -87,16 +101,26 @@ void StrandReplay::reject(const Error& error, int64_t receive_time_ns) {
   if (request_keyframe_) request_keyframe_();
 }
 
-void StrandReplay::keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns) {
+void StrandReplay::keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns,
+                        bool is_other_stream) {
   // A keyframe on request repeats the state that is already here.
   if (!snapshots_.empty() && snapshot->sim_time_ns == snapshots_.back()->sim_time_ns) {
     snapshots_.back() = std::move(snapshot);
     return;
   }
+  // The first keyframe of another stream may be of a state that the old stream has passed: what is shown
+  // stays.
+  if (is_other_stream && !snapshots_.empty()) {
+    const int64_t behind_ns = snapshots_.back()->sim_time_ns - snapshot->sim_time_ns;
+    if (behind_ns > 0 && behind_ns < kStreamOverlapNs) return;
+  }
   playout_clock_.add(receive_time_ns, snapshot->sim_time_ns);
   // A reset server starts at zero again: blending across it would sweep the hair through the head.
   const bool goes_back = !snapshots_.empty() && snapshot->sim_time_ns < snapshots_.back()->sim_time_ns;
-  if (goes_back) snapshots_.clear();
+  if (goes_back) {
+    snapshots_.clear();
+    cursor_ = {};
+  }
   snapshots_.push_back(std::move(snapshot));
   const size_t kept = playout_ == Playout::Smooth ? kKeptSnapshots : 1;
   while (snapshots_.size() > kept) snapshots_.pop_front();
@@ -106,12 +130,15 @@ std::shared_ptr<const Snapshot> StrandReplay::newest() const {
   return snapshots_.empty() ? nullptr : snapshots_.back();
 }
 
-std::optional<StrandPicture> StrandReplay::picture_at(int64_t client_time_ns) const {
+std::optional<StrandPicture> StrandReplay::picture_at(int64_t client_time_ns) {
   if (snapshots_.empty()) return std::nullopt;
   if (playout_ == Playout::LowLatency || snapshots_.size() < 2 || !playout_clock_.has_value())
     return picture_of(*snapshots_.back());
 
-  const int64_t sim_time_ns = playout_clock_.sim_time_at(client_time_ns);
+  // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
+  const int64_t wanted_ns =
+      std::min(playout_clock_.sim_time_at(client_time_ns), snapshots_.back()->sim_time_ns);
+  const int64_t sim_time_ns = cursor_.advance(client_time_ns, wanted_ns);
   const auto later = std::find_if(snapshots_.begin(), snapshots_.end(), [sim_time_ns](const auto& snapshot) {
     return snapshot->sim_time_ns > sim_time_ns;
   });

@@ -59,7 +59,7 @@ class StrandReplay {
   /// Newest snapshot, null before the first keyframe.
   std::shared_ptr<const Snapshot> newest() const;
   /// What to draw at client time `client_time_ns`; nothing before the first keyframe.
-  std::optional<StrandPicture> picture_at(int64_t client_time_ns) const;
+  std::optional<StrandPicture> picture_at(int64_t client_time_ns);
   /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
   double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;
 
@@ -74,7 +74,8 @@ class StrandReplay {
   StrandReplay(std::unique_ptr<StrandDecoder> decoder, KeyframeRequester request_keyframe);
   void reject(const Error& error, int64_t receive_time_ns);
   void note_sequence(const FrameHeader& header);
-  void keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns);
+  Status check_stream(const FrameHeader& header) const;
+  void keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns, bool is_other_stream);
 
   std::unique_ptr<StrandDecoder> decoder_;
   KeyframeRequester request_keyframe_;
@@ -84,6 +85,8 @@ class StrandReplay {
   ReplayStats stats_;
   StageTimer decode_timer_;
   StageTimer motion_latency_timer_;
+  PlayoutCursor cursor_;
+  uint16_t stream_id_ = 0;  // of the newest keyframe
   uint32_t last_sequence_ = 0;
   int64_t last_motion_time_ns_ = 0;
   int64_t newest_send_time_ns_ = 0;
@@ -91,7 +94,10 @@ class StrandReplay {
 };
 
 inline constexpr int64_t kReplayKeyframeRequestNs = 1'000'000'000;
-inline constexpr size_t kKeptSnapshots = 8;  // smooth playout at 60 Hz spans at most 100 ms
+/// Smooth playout at 60 Hz is at most 100 ms behind, and as much again after a burst.
+inline constexpr size_t kKeptSnapshots = 16;
+/// A keyframe of another stream may repeat a state this much older than the newest one.
+inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
 
 /// Strands between two snapshots of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
 /// space, so a turning head carries the hair round instead of cutting through it.

@@ -23,6 +23,7 @@ struct HudState {
   double motion_to_decoded_ms = 0.0;
   double playout_delay_ms = 0.0;  // smooth playout only
   double round_trip_ms = 0.0;
+  double queue_delay_ms = 0.0;  // of data on its way here
   uint64_t tick = 0;
   uint64_t dropped_by_server = 0;
   uint64_t missed_frames = 0;

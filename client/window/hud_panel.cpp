@@ -48,7 +48,7 @@ void draw_hud_panel(const HudState& hud) {
               "{:.1f} ms decoded + {:.1f} ms draw{}", hud.motion_to_decoded_ms, hud.render_ms,
               hud.playout_delay_ms > 0.0 ? fmt::format(" + {:.1f} ms smooth", hud.playout_delay_ms) : ""));
     row("encode, decode", fmt::format("{:.2f} ms, {:.2f} ms", hud.encode_ms, hud.decode_ms));
-    row("round trip", fmt::format("{:.2f} ms", hud.round_trip_ms));
+    row("round trip", fmt::format("{:.2f} ms, {:.0f} ms queued", hud.round_trip_ms, hud.queue_delay_ms));
     row("dropped", fmt::format("{} server, {} missed, {} here", hud.dropped_by_server, hud.missed_frames,
                                hud.dropped_by_client));
     row("tick", fmt::format("{}, {} viewer{}", hud.tick, hud.viewer_count, hud.viewer_count == 1 ? "" : "s"));

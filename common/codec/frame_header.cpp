@@ -81,8 +81,9 @@ EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte
   return frame;
 }
 
-EncodedFramePtr with_send_time(const EncodedFrame& frame, int64_t send_time_ns) {
+EncodedFramePtr with_send_time(const EncodedFrame& frame, uint16_t stream_id, int64_t send_time_ns) {
   auto stamped = std::make_shared<EncodedFrame>(frame);
+  stamped->header.stream_id = stream_id;
   stamped->header.send_time_ns = send_time_ns;
   const auto packed = pack(stamped->header);
   std::copy(packed.begin(), packed.end(), stamped->message.begin());

@@ -25,8 +25,8 @@ inline constexpr uint32_t kMaxMediaPayloadBytes = 64u << 20;
 
 struct FrameHeader {
   Opcode opcode = Opcode::StrandDelta;
-  uint8_t flags = 0;  // reserved, 0
-  uint16_t stream_id = 0;
+  uint8_t flags = 0;           // reserved, 0
+  uint16_t stream_id = 0;      // strands: the class they are coded for
   uint32_t sequence = 0;       // counts per stream, from 1
   uint32_t base_sequence = 0;  // a delta decodes only right after this one; 0 = none needed
   uint32_t payload_bytes = 0;
@@ -52,7 +52,7 @@ using EncodedFramePtr = std::shared_ptr<const EncodedFrame>;
 /// Sets header.payload_bytes. Null when the payload has more than kMaxMediaPayloadBytes.
 EncodedFramePtr make_encoded_frame(FrameHeader header, std::span<const std::byte> payload);
 
-/// A copy of the frame with send_time_ns set, in the header and in the message.
-EncodedFramePtr with_send_time(const EncodedFrame& frame, int64_t send_time_ns);
+/// A copy of the frame for this stream with send_time_ns set, in the header and in the message.
+EncodedFramePtr with_send_time(const EncodedFrame& frame, uint16_t stream_id, int64_t send_time_ns);
 
 }  // namespace strandcast

@@ -15,6 +15,7 @@ void put(const Hello& hello, v1::ClientMessage& message) {
   out.set_token(hello.token);
   out.set_frame_width(hello.frame_width);
   out.set_frame_height(hello.frame_height);
+  out.set_acknowledges(hello.acknowledges);
 }
 
 void put(const MotionSamples& motion, v1::ClientMessage& message) {
@@ -56,6 +57,7 @@ void put(const FrameAck& ack, v1::ClientMessage& message) {
   out.set_sequence(ack.sequence);
   out.set_receive_time_ns(ack.receive_time_ns);
   out.set_decode_us(ack.decode_us);
+  out.set_stream_id(ack.stream_id);
 }
 
 void put(const Ping& ping, v1::ClientMessage& message) {
@@ -81,6 +83,7 @@ Hello take(const v1::Hello& message, FieldCheck& check) {
   hello.token = message.token();
   hello.frame_width = message.frame_width();
   hello.frame_height = message.frame_height();
+  hello.acknowledges = message.acknowledges();
   check.text("hello.name", hello.name, kMaxNameChars);
   check.count("hello.token", hello.token.size(), kMaxTokenBytes);
   check.frame_side("hello.frame_width", hello.frame_width);
@@ -112,8 +115,10 @@ WindSamples take(const v1::WindSamples& message, FieldCheck& check) {
   return wind;
 }
 
-FrameAck take(const v1::FrameAck& message) {
-  return {message.sequence(), message.receive_time_ns(), message.decode_us()};
+FrameAck take(const v1::FrameAck& message, FieldCheck& check) {
+  check.count("frame_ack.stream_id", message.stream_id(), UINT16_MAX);
+  return {message.sequence(), message.receive_time_ns(), message.decode_us(),
+          static_cast<uint16_t>(message.stream_id())};
 }
 
 ControlCommand take(const v1::ControlCommand& message, FieldCheck& check) {
@@ -146,7 +151,7 @@ Result<ClientMessage> take(const v1::ClientMessage& message) {
       result = KeyframeRequest{};
       break;
     case v1::ClientMessage::kFrameAck:
-      result = take(message.frame_ack());
+      result = take(message.frame_ack(), check);
       break;
     case v1::ClientMessage::kPing:
       result = Ping{message.ping().client_time_ns()};

@@ -27,6 +27,7 @@ inline constexpr size_t kMaxTextChars = 1024;  // reasons and notices
 inline constexpr size_t kMaxTokenBytes = 256;
 inline constexpr size_t kMaxAssignmentBytes = 4096;  // SetParameter
 inline constexpr size_t kSessionIdChars = 16;
+inline constexpr uint32_t kMaxRateDivisor = 64;
 
 enum class Role { Viewer, Controller, Source };
 enum class StreamMode { Strands, Frames, Auto };
@@ -38,6 +39,7 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   std::string name;                            // shown in logs, at most 64 characters
   std::string token;                           // empty on loopback
   uint32_t frame_width = 0, frame_height = 0;  // frames mode; 0 = server's choice
+  bool acknowledges = false;                   // will send a FrameAck for every media message it can use
 };
 struct MotionSamples {  // from a Source
   struct Sample {
@@ -57,10 +59,11 @@ struct CameraChange {  // frames mode: the viewer's camera
   CameraDesc camera;
 };
 struct KeyframeRequest {};
-struct FrameAck {  // strands and frames
+struct FrameAck {  // of every media message that was used
   uint32_t sequence = 0;
   int64_t receive_time_ns = 0;  // client clock
   uint32_t decode_us = 0;
+  uint16_t stream_id = 0;  // of its header
 };
 struct Ping {  // clock probe
   int64_t client_time_ns = 0;
@@ -107,9 +110,17 @@ struct ServerStatus {  // about twice a second to every viewer
   uint32_t viewer_count = 0;
   uint64_t dropped_frames = 0;    // for this client
   uint64_t rejected_samples = 0;  // motion and wind samples refused so far
+  double queue_delay_ms = 0.0;    // how long data for this client waits on its way; 0 = unknown
   // Strands put back to rest so far; one may count many times.
   uint64_t quarantined_strands = 0;    // without usable numbers
   uint64_t overstretched_strands = 0;  // stretched too far
+};
+struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on
+  uint16_t stream_id = 0;     // of the frames it is about
+  uint32_t rate_divisor = 1;  // every so many simulation steps
+  float strand_share = 1.0f;  // in (0, 1]
+  float bound_m = 0.0f;       // Euclidean error
+  std::string reason;         // for a person
 };
 struct Goodbye {       // the server closes right after it
   std::string reason;  // one sentence
@@ -118,7 +129,7 @@ struct Notice {  // answer to SetParameter and ControlCommand, or a warning
   bool is_error = false;
   std::string text;
 };
-using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice>;
+using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

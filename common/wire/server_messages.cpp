@@ -46,6 +46,7 @@ void put(const ServerStatus& status, v1::ServerMessage& message) {
   out.set_viewer_count(status.viewer_count);
   out.set_dropped_frames(status.dropped_frames);
   out.set_rejected_samples(status.rejected_samples);
+  out.set_queue_delay_ms(status.queue_delay_ms);
   out.set_quarantined_strands(status.quarantined_strands);
   out.set_overstretched_strands(status.overstretched_strands);
 }
@@ -57,6 +58,15 @@ void put(const Goodbye& goodbye, v1::ServerMessage& message) {
 void put(const Notice& notice, v1::ServerMessage& message) {
   message.mutable_notice()->set_is_error(notice.is_error);
   message.mutable_notice()->set_text(printable(notice.text, kMaxTextChars));
+}
+
+void put(const StreamQuality& quality, v1::ServerMessage& message) {
+  v1::StreamQuality& out = *message.mutable_quality();
+  out.set_stream_id(quality.stream_id);
+  out.set_rate_divisor(quality.rate_divisor);
+  out.set_strand_share(quality.strand_share);
+  out.set_bound_m(quality.bound_m);
+  out.set_reason(printable(quality.reason, kMaxTextChars));
 }
 
 // ---- protobuf to domain ----
@@ -118,6 +128,8 @@ ServerStatus take(const v1::ServerStatus& message, FieldCheck& check) {
   status.rejected_samples = message.rejected_samples();
   status.quarantined_strands = message.quarantined_strands();
   status.overstretched_strands = message.overstretched_strands();
+  status.queue_delay_ms = message.queue_delay_ms();
+  check.measure("status.queue_delay_ms", status.queue_delay_ms);
   check.measure("status.sim_ms", status.sim_ms);
   check.measure("status.encode_ms", status.encode_ms);
   check.measure("status.render_ms", status.render_ms);
@@ -133,6 +145,18 @@ Goodbye take(const v1::Goodbye& message, FieldCheck& check) {
 Notice take(const v1::Notice& message, FieldCheck& check) {
   check.text("notice.text", message.text(), kMaxTextChars);
   return {message.is_error(), message.text()};
+}
+
+StreamQuality take(const v1::StreamQuality& message, FieldCheck& check) {
+  constexpr scene_fields::Range kShare{1e-6, 1.0, ""};
+  constexpr scene_fields::Range kDivisor{1.0, kMaxRateDivisor, "steps"};
+  check.count("quality.stream_id", message.stream_id(), UINT16_MAX);
+  check.number("quality.rate_divisor", message.rate_divisor(), kDivisor);
+  check.number("quality.strand_share", message.strand_share(), kShare);
+  check.number("quality.bound_m", message.bound_m(), scene_fields::kStreamBound);
+  check.text("quality.reason", message.reason(), kMaxTextChars);
+  return {static_cast<uint16_t>(message.stream_id()), message.rate_divisor(), message.strand_share(),
+          message.bound_m(), message.reason()};
 }
 
 Result<ServerMessage> take(const v1::ServerMessage& message) {
@@ -153,6 +177,9 @@ Result<ServerMessage> take(const v1::ServerMessage& message) {
       break;
     case v1::ServerMessage::kNotice:
       result = take(message.notice(), check);
+      break;
+    case v1::ServerMessage::kQuality:
+      result = take(message.quality(), check);
       break;
     case v1::ServerMessage::KIND_NOT_SET:
       return make_error(ErrorCode::BadInput, "server message is of no kind that protocol {} knows",

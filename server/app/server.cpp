@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/codec/scene_asset.h"
 #include "server/app/scene_change.h"
@@ -38,7 +39,10 @@ Result<EncodedFramePtr> encode_asset(const SceneAsset& asset) {
 
 class Server::State : public NetHandler {
  public:
-  explicit State(const ServerConfig& config) : config_(config), viewers_(config.scene) {}
+  explicit State(const ServerConfig& config)
+      : config_(config),
+        classes_(make_strand_classes(config.scene.step_rate_hz, config.scene.stream.bound_m)),
+        viewers_(config.scene) {}
   ~State() override { stop(); }
 
   Status start();
@@ -63,12 +67,17 @@ class Server::State : public NetHandler {
   }
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_ack(SessionId, const FrameAck&) override {}
-  void on_keyframe_request(SessionId) override { encoder_->request_keyframe(); }
+  void on_keyframe_request(SessionId, uint16_t stream_id) override { encoder(stream_id).request_keyframe(); }
+  void on_strand_class(SessionId session, uint16_t stream_id) override {
+    viewers_.set_strand_class(session, stream_id);
+    follow_viewers();
+  }
   void on_left(SessionId session) override;
   std::string metrics() override;
 
  private:
-  void start_workers(std::unique_ptr<StrandEncoder> encoder, std::unique_ptr<StrandDecoder> decoder);
+  void start_workers(std::unique_ptr<StrandDecoder> decoder);
+  StrandEncodeWorker& encoder(uint16_t stream_id);
   SimLoop::Reply reply_to(SessionId session) {
     return [this, session](Notice notice) { net_->send(session, std::move(notice)); };
   }
@@ -77,6 +86,7 @@ class Server::State : public NetHandler {
   void run_status();
 
   const ServerConfig config_;
+  const std::vector<StrandClass> classes_;
   const std::string session_id_ = make_session_id();
   InputHub hub_;
   SnapshotSlot slot_;
@@ -89,7 +99,7 @@ class Server::State : public NetHandler {
   mutable std::mutex
       workers_mutex_;  // guards that the two still exist, for threads that stop() does not wait for first
   std::unique_ptr<FrameWorker> frames_;
-  std::unique_ptr<StrandEncodeWorker> encoder_;
+  std::vector<std::unique_ptr<StrandEncodeWorker>> encoders_;  // by stream_id; null until somebody needs it
   std::unique_ptr<SimLoop> sim_;
 
   std::mutex mutex_;  // guards has_stopped_
@@ -101,7 +111,8 @@ class Server::State : public NetHandler {
 Status Server::State::start() {
   const SceneDesc& scene = config_.scene;
   RETURN_IF_ERROR(check_solver(scene));
-  ASSIGN_OR_RETURN(auto strand_encoder, make_strand_encoder(scene.stream.codec));
+  // A wrong codec is told before anything is loaded.
+  RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(scene));
   content_ = std::make_shared<const SceneContent>(std::move(content));
   asset_ = std::make_shared<const SceneAsset>(make_scene_asset(content_->groom, content_->head));
@@ -109,25 +120,26 @@ Status Server::State::start() {
   ASSIGN_OR_RETURN(auto strand_decoder,
                    make_strand_decoder(scene.stream.codec, {asset_->strand_count, asset_->vertex_count}));
   // The port first: a port in use is told at once, not after compiling shaders.
-  ASSIGN_OR_RETURN(net_, NetServer::listen(config_.net, *this));
+  NetConfig net = config_.net;
+  net.strand_classes = classes_;
+  ASSIGN_OR_RETURN(net_, NetServer::listen(net, *this));
   SimLoopConfig sim{scene, content_, config_.gl_device, config_.shader_folder, config_.on_publish};
   ASSIGN_OR_RETURN(sim_, SimLoop::start(std::move(sim), hub_, slot_));
-  start_workers(std::move(strand_encoder), std::move(strand_decoder));
+  start_workers(std::move(strand_decoder));
   net_->start();
   status_thread_ = std::thread([this] { run_status(); });
   log_info("app", "serving scene '{}' on {} port {}", scene.name, config_.net.address, net_->port());
   return {};
 }
 
-void Server::State::start_workers(std::unique_ptr<StrandEncoder> encoder,
-                                  std::unique_ptr<StrandDecoder> decoder) {
+void Server::State::start_workers(std::unique_ptr<StrandDecoder> decoder) {
   FrameWorker::Hooks hooks;
   hooks.sink = [this](uint32_t picture_class, EncodedFramePtr frame) {
     net_->publish_picture(picture_class, std::move(frame));
   };
   hooks.request_keyframe = [this] {
     const std::lock_guard lock(workers_mutex_);
-    if (encoder_ != nullptr) encoder_->request_keyframe();
+    if (!encoders_.empty() && encoders_[0] != nullptr) encoders_[0]->request_keyframe();
   };
   hooks.on_refused = [this](uint32_t picture_class, const Error& error) {
     net_->send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()});
@@ -139,14 +151,28 @@ void Server::State::start_workers(std::unique_ptr<StrandEncoder> encoder,
   const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset_, config_.scene.look};
   frames_ = std::make_unique<FrameWorker>(std::move(decoder), config_.make_painter(painter),
                                           config_.scene.stream.frame_rate_hz, std::move(hooks));
+  (void)encoder(0);
+}
+
+/// The encoder of a class, made when it is needed first. Network thread, and before that starts.
+StrandEncodeWorker& Server::State::encoder(uint16_t stream_id) {
+  const std::lock_guard lock(workers_mutex_);
+  encoders_.resize(classes_.size());
+  std::unique_ptr<StrandEncodeWorker>& worker = encoders_[stream_id];
+  if (worker != nullptr) return *worker;
   const auto sink = [this](EncodedFramePtr frame) {
-    {
-      const std::lock_guard lock(workers_mutex_);
+    if (frame->header.stream_id == 0) {
+      const std::lock_guard sink_lock(workers_mutex_);
       if (frames_ != nullptr && frames_->has_views()) frames_->offer(frame);
     }
     net_->publish_strands(std::move(frame));
   };
-  encoder_ = std::make_unique<StrandEncodeWorker>(slot_, std::move(encoder), sink);
+  auto made = make_strand_encoder(config_.scene.stream.codec);
+  CHECK(made.ok());  // start() has made one
+  const StrandClass& row = classes_[stream_id];
+  worker = std::make_unique<StrandEncodeWorker>(
+      slot_, std::move(*made), sink, StrandEncodeConfig{stream_id, row.rate_divisor, row.coarsening});
+  return *worker;
 }
 
 void Server::State::stop() {
@@ -161,13 +187,13 @@ void Server::State::stop() {
   slot_.stop();
   if (sim_ != nullptr) sim_->stop();
   // Each worker calls the other: both are taken out of reach before their threads are joined.
-  std::unique_ptr<StrandEncodeWorker> encoder;
+  std::vector<std::unique_ptr<StrandEncodeWorker>> encoders;
   std::unique_ptr<FrameWorker> frames;
   const auto take = [this](auto& from, auto& to) {
     const std::lock_guard lock(workers_mutex_);
     to = std::move(from);
   };
-  take(encoder_, encoder);
+  take(encoders_, encoders);
   take(frames_, frames);
 }
 
@@ -226,7 +252,11 @@ void Server::State::on_left(SessionId session) {
 void Server::State::follow_viewers() {
   const RuntimeFacts facts = viewers_.facts();
   frames_->set_views(viewers_.picture_views());
-  encoder_->set_has_listeners(facts.strand_viewers + facts.frame_viewers > 0);
+  for (uint16_t stream_id = 0; stream_id < classes_.size(); ++stream_id) {
+    const bool draws = stream_id == 0 && facts.frame_viewers > 0;  // pictures are drawn from the first class
+    const bool is_needed = viewers_.strand_viewers(stream_id) > 0 || draws;
+    if (is_needed || encoders_[stream_id] != nullptr) encoder(stream_id).set_has_listeners(is_needed);
+  }
   sim_->set_facts(facts);
 }
 
@@ -261,7 +291,9 @@ ServerCounters Server::State::counters() const {
   counters.input = hub_.counters();
   counters.sim = sim_->stats();
   const std::lock_guard lock(workers_mutex_);
-  if (encoder_ != nullptr) counters.encode = encoder_->counters();
+  for (const auto& worker : encoders_)
+    counters.strand_classes.push_back(worker != nullptr ? worker->counters() : StrandEncodeCounters{});
+  if (!counters.strand_classes.empty()) counters.encode = counters.strand_classes[0];
   if (frames_ != nullptr) counters.frames = frames_->counters();
   return counters;
 }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
@@ -33,7 +34,8 @@ struct ServerConfig {
 struct ServerCounters {
   SimStats sim;
   NetCounters net;
-  StrandEncodeCounters encode;
+  StrandEncodeCounters encode;                       // of the first class
+  std::vector<StrandEncodeCounters> strand_classes;  // all that were ever needed, by stream_id
   FrameCounters frames;
   InputCounters input;
   uint32_t strand_viewers = 0;

@@ -1,5 +1,7 @@
 #include "server/app/viewers.h"
 
+#include <algorithm>
+
 namespace strandcast {
 
 Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
@@ -43,6 +45,19 @@ Result<PictureClass> Viewers::set_camera(SessionId session, const CameraDesc& ca
   ASSIGN_OR_RETURN(const uint32_t picture_class, views_.assign(session, view));
   found->second.view = view;
   return picture_class;
+}
+
+void Viewers::set_strand_class(SessionId session, uint16_t stream_id) {
+  const auto found = viewers_.find(session);
+  if (found != viewers_.end()) found->second.strand_class = stream_id;
+}
+
+uint32_t Viewers::strand_viewers(uint16_t stream_id) const {
+  return static_cast<uint32_t>(std::count_if(viewers_.begin(), viewers_.end(), [&](const auto& item) {
+    const Viewer& viewer = item.second;
+    return viewer.role != Role::Source && viewer.mode == StreamMode::Strands &&
+           viewer.strand_class == stream_id;
+  }));
 }
 
 RuntimeFacts Viewers::facts() const {

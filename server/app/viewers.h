@@ -33,6 +33,11 @@ class Viewers {
   /// The viewer's new picture class; NotFound for a session without pictures.
   Result<PictureClass> set_camera(SessionId session, const CameraDesc& camera);
 
+  /// The class of its strand frames; it joins with class 0. Ignored when the session is gone.
+  void set_strand_class(SessionId session, uint16_t stream_id);
+  /// How many watch strands of this class.
+  uint32_t strand_viewers(uint16_t stream_id) const;
+
   std::map<uint32_t, PictureView> picture_views() const { return views_.views(); }
   RuntimeFacts facts() const;
 
@@ -40,6 +45,7 @@ class Viewers {
   struct Viewer {
     Role role = Role::Viewer;
     StreamMode mode = StreamMode::Strands;
+    uint16_t strand_class = 0;
     PictureView view;
   };
   void count();

@@ -11,8 +11,24 @@ constexpr double kMsPerNs = 1e-6;
 
 }  // namespace
 
-StrandEncodeWorker::StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink)
-    : slot_(slot), encoder_(std::move(encoder)), sink_(std::move(sink)), thread_([this] { run(); }) {}
+Snapshot coarsen(const Snapshot& snapshot, uint32_t factor) {
+  Snapshot coarse = snapshot;
+  if (factor <= 1) return coarse;
+  const auto step = static_cast<int32_t>(factor);
+  coarse.quantum_m = snapshot.quantum_m * static_cast<float>(factor);
+  for (int32_t& value : coarse.lattice) {
+    // To the nearest, rounding down where C++ division rounds to zero.
+    const int32_t shifted = value + step / 2;
+    value = shifted / step - (shifted % step < 0 ? 1 : 0);
+  }
+  return coarse;
+}
+
+StrandEncodeWorker::StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink,
+                                       StrandEncodeConfig config)
+    : slot_(slot), encoder_(std::move(encoder)), sink_(std::move(sink)), config_(config), thread_([this] {
+        run();
+      }) {}
 
 StrandEncodeWorker::~StrandEncodeWorker() {
   is_stopping_ = true;
@@ -42,16 +58,35 @@ StrandEncodeCounters StrandEncodeWorker::counters() const {
 bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
   if (is_stopping_) return true;
   if (!has_listeners_ || view.snapshot == nullptr) return false;
-  return view.version != encoded_version_ || is_keyframe_wanted_ || is_restarting_;
+  return is_due(view) || is_keyframe_wanted_ || is_restarting_;
+}
+
+/// Whether the newest state is for this class.
+bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
+  if (view.version == encoded_version_) return false;
+  const uint64_t tick = view.snapshot->tick;
+  const bool is_first = encoded_version_ == 0 || is_restarting_;
+  return config_.rate_divisor <= 1 || is_first || tick < encoded_tick_ ||
+         tick >= encoded_tick_ + config_.rate_divisor;
 }
 
 void StrandEncodeWorker::run() {
+  const auto is_ready = [this](const SnapshotSlot::View& now) { return has_work(now); };
   while (true) {
-    const SnapshotSlot::View view =
-        slot_.wait([this](const SnapshotSlot::View& now) { return has_work(now); });
+    SnapshotSlot::View view;
+    bool is_overdue = false;  // no further state comes whose turn it would be
+    if (config_.rate_divisor <= 1) {
+      view = slot_.wait(is_ready);
+    } else {
+      view = slot_.wait_for(kLongestStateWait, is_ready);
+      is_overdue =
+          has_listeners_ && view.snapshot != nullptr && !has_work(view) && view.version != encoded_version_;
+    }
     if (view.is_stopped || is_stopping_) return;
-    if (view.version != encoded_version_) {
+    if (!is_overdue && !has_work(view)) continue;
+    if (is_overdue || is_due(view)) {
       encoded_version_ = view.version;
+      encoded_tick_ = view.snapshot->tick;
       encode_newest(*view.snapshot);
     }
     // Requests up to here are served by one keyframe; later ones wake the thread again.
@@ -63,7 +98,8 @@ void StrandEncodeWorker::run() {
 
 void StrandEncodeWorker::encode_newest(const Snapshot& snapshot) {
   const int64_t begin_ns = now_ns();
-  const EncodedFramePtr frame = encoder_->encode(snapshot);
+  const EncodedFramePtr frame =
+      encoder_->encode(config_.coarsening > 1 ? coarsen(snapshot, config_.coarsening) : snapshot);
   const double encode_ms = static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
   const bool is_keyframe = frame != nullptr && frame->header.opcode == Opcode::StrandKeyframe;
   keyframe_ = is_keyframe ? frame : nullptr;
@@ -104,7 +140,7 @@ void StrandEncodeWorker::give_keyframe() {
 }
 
 void StrandEncodeWorker::give(const EncodedFrame& frame) {
-  sink_(with_send_time(frame, now_ns()));
+  sink_(with_send_time(frame, config_.stream_id, now_ns()));
 }
 
 }  // namespace strandcast

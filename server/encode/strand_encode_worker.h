@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -27,6 +28,20 @@ struct StrandEncodeCounters {
   double keyframe_median_ms = 0.0;
 };
 
+/// What one strand class encodes of the published states.
+struct StrandEncodeConfig {
+  uint16_t stream_id = 0;     // of its frames
+  uint32_t rate_divisor = 1;  // at most one state per so many simulation steps
+  uint32_t coarsening = 1;    // lattice steps per step of the published lattice
+};
+
+/// The newest state is encoded after this long even if its turn has not come: the simulation is paused.
+inline constexpr std::chrono::milliseconds kLongestStateWait{250};
+
+/// The snapshot on a lattice that is `factor` times coarser; adds at most `factor` times the error it has
+/// already.
+Snapshot coarsen(const Snapshot& snapshot, uint32_t factor);
+
 class StrandEncodeWorker {
  public:
   /// Called on the worker's thread, frames in the order of the chain: the keyframe of sequence s comes after
@@ -34,7 +49,8 @@ class StrandEncodeWorker {
   using Sink = std::function<void(EncodedFramePtr)>;
 
   /// Starts the thread. `slot` outlives the worker.
-  StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink);
+  StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink,
+                     StrandEncodeConfig config = {});
   /// Ends the thread after the encode that is under way.
   ~StrandEncodeWorker();
   StrandEncodeWorker(const StrandEncodeWorker&) = delete;
@@ -51,6 +67,7 @@ class StrandEncodeWorker {
  private:
   void run();
   bool has_work(const SnapshotSlot::View& view) const;
+  bool is_due(const SnapshotSlot::View& view) const;
   void encode_newest(const Snapshot& snapshot);
   void give_keyframe();
   void give(const EncodedFrame& frame);
@@ -58,6 +75,7 @@ class StrandEncodeWorker {
   SnapshotSlot& slot_;
   std::unique_ptr<StrandEncoder> encoder_;
   Sink sink_;
+  const StrandEncodeConfig config_;
 
   std::atomic<bool> is_stopping_{false};
   std::atomic<bool> has_listeners_{false};
@@ -66,6 +84,7 @@ class StrandEncodeWorker {
 
   // Of the worker's thread.
   uint64_t encoded_version_ = 0;
+  uint64_t encoded_tick_ = 0;
   EncodedFramePtr keyframe_;  // of the chain's present state, once one was made
 
   mutable std::mutex counters_mutex_;

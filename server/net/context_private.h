@@ -7,6 +7,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "server/net/net_server.h"
 
@@ -36,6 +37,11 @@ struct Context {
   bool has_room(const std::string& peer_address) const;
   /// Publishes the number of open and joined sessions.
   void update_session_counts();
+  /// Learns what a class costs from its frames.
+  void note_strand_frame(const FrameHeader& header, size_t bytes, int64_t time_ns);
+  /// Bytes per second of every strand class, as measured, or estimated from the one measured last; empty at
+  /// first.
+  std::vector<double> strand_costs() const;
 
   const NetConfig config;
   NetHandler& handler;
@@ -46,6 +52,11 @@ struct Context {
   bool is_stopping = false;
 
  private:
+  struct ClassLoad {
+    double delta_bytes = 0.0;  // smoothed
+    int64_t time_ns = 0;       // of the newest delta; 0 = none yet
+  };
+  std::vector<ClassLoad> class_loads;
   mutable std::mutex mutex;
   NetCounters counters;
 };

@@ -26,6 +26,7 @@ std::string format_metrics(const NetCounters& counters) {
                              {"net_frames_dropped_total", &NetCounters::frames_dropped},
                              {"net_chain_losses_total", &NetCounters::chain_losses},
                              {"net_keyframe_requests_total", &NetCounters::keyframe_requests},
+                             {"net_class_changes_total", &NetCounters::class_changes},
                              {"net_sent_bytes_total", &NetCounters::bytes_sent}};
   std::string text;
   for (const Row& row : kGauges)

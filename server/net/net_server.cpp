@@ -24,6 +24,10 @@ constexpr auto kSweepInterval = std::chrono::milliseconds(50);
 /// Pause after a failed accept (no file descriptors left): the others are served meanwhile.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 constexpr int kListenBacklog = 128;
+/// Weight of the newest frame in what a strand class costs: a change shows within half a second.
+constexpr double kLoadSmoothing = 0.05;
+/// What a class cost longer ago than this is estimated from another one instead.
+constexpr int64_t kLoadAgeNs = 5'000'000'000;
 
 std::string own_host_name() {
   std::array<char, 256> name{};
@@ -50,6 +54,35 @@ void Context::update_session_counts() {
   const std::lock_guard lock(mutex);
   counters.open_sessions = sessions.size();
   counters.joined_sessions = joined;
+}
+
+void Context::note_strand_frame(const FrameHeader& header, size_t bytes, int64_t time_ns) {
+  if (header.opcode != Opcode::StrandDelta || header.stream_id >= config.strand_classes.size()) return;
+  class_loads.resize(config.strand_classes.size());
+  ClassLoad& load = class_loads[header.stream_id];
+  const auto measured = static_cast<double>(bytes);
+  load.delta_bytes =
+      load.time_ns == 0 ? measured : load.delta_bytes + kLoadSmoothing * (measured - load.delta_bytes);
+  load.time_ns = time_ns;
+}
+
+std::vector<double> Context::strand_costs() const {
+  const auto newest =
+      std::max_element(class_loads.begin(), class_loads.end(),
+                       [](const ClassLoad& a, const ClassLoad& b) { return a.time_ns < b.time_ns; });
+  if (newest == class_loads.end() || newest->time_ns == 0) return {};
+  const auto& classes = config.strand_classes;
+  const auto reference = static_cast<size_t>(newest - class_loads.begin());
+  const double full =
+      newest->delta_bytes * classes[reference].frame_rate_hz / classes[reference].relative_cost;
+  std::vector<double> costs;
+  for (size_t i = 0; i < classes.size(); ++i) {
+    const bool is_fresh =
+        class_loads[i].time_ns > newest->time_ns - kLoadAgeNs && class_loads[i].time_ns != 0;
+    costs.push_back(is_fresh ? class_loads[i].delta_bytes * classes[i].frame_rate_hz
+                             : full * classes[i].relative_cost);
+  }
+  return costs;
 }
 
 }  // namespace net
@@ -220,7 +253,11 @@ uint16_t NetServer::port() const {
 }
 
 void NetServer::publish_strands(EncodedFramePtr frame) {
-  state_->post_to_all([frame = std::move(frame)](net::Session& session) { session.deliver_strands(frame); });
+  net::asio::post(state_->context.io, [state = state_.get(), frame = std::move(frame)] {
+    state->context.note_strand_frame(frame->header, frame->message.size(), now_ns());
+    const auto sessions = state->context.sessions;
+    for (const auto& [id, session] : sessions) session->deliver_strands(frame);
+  });
 }
 
 void NetServer::publish_picture(PictureClass picture_class, EncodedFramePtr frame) {

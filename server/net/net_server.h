@@ -13,6 +13,7 @@
 #include "common/codec/frame_header.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
+#include "server/net/strand_class.h"
 
 namespace strandcast {
 
@@ -27,13 +28,15 @@ using PictureClass = uint32_t;  // viewers of one class get the same rendered fr
 struct NetLimits {
   uint32_t sessions = kMaxSessions;
   uint32_t sessions_per_address = kMaxSessionsPerAddress;
-  int64_t handshake_ms = 5'000;        // TCP accept to a complete HTTP request
-  int64_t hello_ms = 5'000;            // WebSocket open to Hello
-  int64_t idle_ms = 15'000;            // nothing received, pings included
-  int64_t stalled_write_ms = 5'000;    // no progress of one write
+  int64_t handshake_ms = 5'000;  // TCP accept to a complete HTTP request
+  int64_t hello_ms = 5'000;      // WebSocket open to Hello
+  int64_t idle_ms = 15'000;      // nothing received, pings included
+  int64_t stalled_ms = 4'500;    // no progress of one write, or silence while frames wait for acknowledgement
+  int64_t unused_ms = 30'000;    // frames wait for acknowledgement, although the client sends other things
   int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
   double messages_per_s = 1'000.0;     // per session, and as many at once
+  double viewer_bytes_per_s = 0.0;     // cap of what strands may take for one viewer; 0 = none
 };
 
 struct NetConfig {
@@ -43,6 +46,7 @@ struct NetConfig {
   std::vector<std::string>
       allowed_hosts;  // accepted in the Host header, besides the server's own address and name
   NetLimits limits;
+  std::vector<StrandClass> strand_classes = {StrandClass{}};  // best first; the index is the stream_id
 };
 
 /// Answer to a Hello. Without an asset none is sent; strands or pictures follow by welcome.mode.
@@ -65,8 +69,11 @@ class NetHandler {
   virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   virtual void on_ack(SessionId session, const FrameAck& ack) = 0;
-  /// The session waits for a keyframe given to publish_strands(). Repeated until one comes.
-  virtual void on_keyframe_request(SessionId session) = 0;
+  /// The session waits for a keyframe of this strand class given to publish_strands(). Repeated until one
+  /// comes.
+  virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
+  /// The session now gets the frames of this strand class; it starts with the first one.
+  virtual void on_strand_class(SessionId, uint16_t /*stream_id*/) {}
   /// Once for every session whose on_hello succeeded.
   virtual void on_left(SessionId session) = 0;
   /// Lines added to /metrics, in Prometheus text form.
@@ -90,7 +97,8 @@ struct NetCounters {
   uint64_t frames_dropped = 0;  // media a session was too slow for
   uint64_t chain_losses = 0;    // sessions that had to wait for a keyframe
   uint64_t keyframe_requests = 0;
-  uint64_t bytes_sent = 0;  // WebSocket payload
+  uint64_t class_changes = 0;  // of the strand class of a viewer
+  uint64_t bytes_sent = 0;     // WebSocket payload
 };
 
 class NetServer {
@@ -107,8 +115,8 @@ class NetServer {
   void start();
   uint16_t port() const;
 
-  /// Strand frames in the order of their chain. A delta goes to sessions whose last frame it builds on, a
-  /// keyframe to those that wait for one.
+  /// Strand frames of one class (stream_id) in the order of their chain. A delta goes to sessions of the
+  /// class whose last frame it builds on, a keyframe to those that wait for one.
   void publish_strands(EncodedFramePtr frame);
   /// The newest picture for the viewers of one class; replaces one not yet being sent.
   void publish_picture(PictureClass picture_class, EncodedFramePtr frame);

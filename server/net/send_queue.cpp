@@ -62,13 +62,19 @@ bool SendQueue::needs_keyframe() const {
   return chain_ == Chain::Waiting && pending_ == nullptr && !is_writing_media_;
 }
 
-std::optional<SendQueue::Item> SendQueue::take_next() {
+void SendQueue::restart_strands() {
+  if (chain_ != Chain::Following) return;
+  chain_ = Chain::Waiting;
+  if (pending_ != nullptr && !is_pending_asset_) drop_pending();
+}
+
+std::optional<SendQueue::Item> SendQueue::take_next(Media media) {
   if (!control_.empty()) {
     Item item = std::move(control_.front());
     control_.pop_front();
     return item;
   }
-  if (pending_ == nullptr) return std::nullopt;
+  if (pending_ == nullptr || media == Media::Held) return std::nullopt;
   is_writing_media_ = true;
   is_pending_asset_ = false;
   return Item(std::exchange(pending_, nullptr));

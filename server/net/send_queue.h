@@ -35,11 +35,15 @@ class SendQueue {
   void offer_picture(const EncodedFramePtr& frame);
   /// The client lost its state: forget the chain.
   void lose_chain();
+  /// The frames of another class follow, beginning with a keyframe.
+  void restart_strands();
   /// True when a keyframe would be queued at once; false while media is still being written.
   bool needs_keyframe() const;
 
-  /// Removes what is sent next; control first. Call written() when it is done, before the next one.
-  std::optional<Item> take_next();
+  enum class Media { Allowed, Held };
+  /// Removes what is sent next; control first, media only when allowed. Call written() when it is done,
+  /// before the next one.
+  std::optional<Item> take_next(Media media = Media::Allowed);
   void written();
   /// Drops everything not yet taken, for closing.
   void clear();

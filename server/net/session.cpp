@@ -11,10 +11,11 @@
 namespace strandcast::net {
 namespace {
 
-constexpr int64_t kNsPerMs = 1'000'000;
-/// Enough for a keyframe in flight, small enough that a late frame is dropped here and not queued in the
-/// kernel.
-constexpr int kSendBufferBytes = 256 << 10;
+/// Enough to keep a long fast link busy. How much of it waits unsent is bounded apart, so that a late frame
+/// is dropped here and not queued in the kernel.
+constexpr int kSendBufferBytes = 1 << 20;
+constexpr int kUnsentBytes = 128 << 10;
+constexpr int64_t kProbeIntervalNs = 1'000 * kNsPerMs;
 /// Longest sentence of ours put into a Goodbye.
 constexpr size_t kMaxReasonCharacters = 500;
 
@@ -83,6 +84,8 @@ void Session::start(http::request<http::empty_body> request, bool has_room) {
   beast::error_code ignored;
   auto& tcp_socket = beast::get_lowest_layer(socket_).socket();
   tcp_socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+  using UnsentLowWater = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
+  tcp_socket.set_option(UnsentLowWater(kUnsentBytes), ignored);
 
   websocket::stream_base::timeout timeout;
   timeout.handshake_timeout = std::chrono::milliseconds(limits.handshake_ms);
@@ -139,6 +142,7 @@ void Session::on_read(const beast::error_code& error) {
     return reject(CloseCode::Policy, fmt::format("More than {:.0f} messages per second.",
                                                  context_.config.limits.messages_per_s));
   context_.count(&NetCounters::messages_received);
+  received_ns_ = arrival_ns;
   on_message({static_cast<const std::byte*>(data.data()), data.size()}, arrival_ns);
   read_buffer_.consume(read_buffer_.size());
   if (state_ == State::AwaitHello || state_ == State::Joined) read();
@@ -184,6 +188,14 @@ void Session::join(const Hello& hello) {
     queue_.set_asset(admission->asset);
     if (mode_ == StreamMode::Strands) queue_.start_strands();
   }
+  if (hello.acknowledges && hello.role != Role::Source) {
+    flow_.expect_acks();
+    socket_.control_callback([this](websocket::frame_type kind, beast::string_view) {
+      if (kind != websocket::frame_type::pong || !std::exchange(is_probe_under_way_, false)) return;
+      flow_.on_round_trip(now_ns() - probe_sent_ns_, now_ns());
+    });
+    probe(now_ns());
+  }
   queue_control(std::move(admission->welcome));
   ask_for_keyframe(now_ns());
 }
@@ -196,10 +208,14 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                         [&](const CameraChange& camera) { handler.on_camera(id_, camera); },
                         [&](const KeyframeRequest&) {
                           queue_.lose_chain();
+                          flow_.forget_in_flight();
                           account_drops();
                           ask_for_keyframe(arrival_ns);
                         },
-                        [&](const FrameAck& ack) { handler.on_ack(id_, ack); },
+                        [&](const FrameAck& ack) {
+                          on_ack(ack, arrival_ns);
+                          handler.on_ack(id_, ack);
+                        },
                         [&](const Ping& ping) {
                           queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
                         },
@@ -216,7 +232,10 @@ void Session::reject(CloseCode code, const std::string& reason) {
 
 void Session::send(ServerMessage message) {
   if (state_ != State::Joined) return;
-  if (auto* status = std::get_if<ServerStatus>(&message)) status->dropped_frames = queue_.dropped_frames();
+  if (auto* status = std::get_if<ServerStatus>(&message)) {
+    status->dropped_frames = queue_.dropped_frames();
+    status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  }
   guarded([&] { queue_control(std::move(message)); });
 }
 
@@ -229,9 +248,13 @@ void Session::queue_control(ServerMessage message) {
 }
 
 void Session::deliver_strands(const EncodedFramePtr& frame) {
-  if (state_ != State::Joined) return;
+  if (state_ != State::Joined || frame->header.stream_id != strand_class_) return;
   guarded([&] {
-    queue_.offer_strands(frame);
+    const int64_t time_ns = now_ns();
+    if (queue_.offer_strands(frame) == SendQueue::Offer::LostChain) {
+      flow_.on_chain_loss(time_ns);
+      adapt(time_ns);
+    }
     account_drops();
     pump();
   });
@@ -259,17 +282,68 @@ void Session::account_drops() {
 }
 
 void Session::ask_for_keyframe(int64_t time_ns) {
-  if (state_ != State::Joined || !queue_.needs_keyframe()) return;
+  if (state_ != State::Joined || !queue_.needs_keyframe() || !flow_.may_send(time_ns)) return;
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
   if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
-  context_.handler.on_keyframe_request(id_);
+  context_.handler.on_keyframe_request(id_, strand_class_);
+}
+
+void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
+  flow_.on_ack(ack.stream_id, ack.sequence, time_ns);
+  adapt(time_ns);
+  ask_for_keyframe(time_ns);
+  pump();
+}
+
+/// Moves to another strand class when the link says so.
+void Session::adapt(int64_t time_ns) {
+  if (state_ != State::Joined || mode_ != StreamMode::Strands || !flow_.expects_acks()) return;
+  const std::vector<double> costs = context_.strand_costs();
+  if (costs.empty()) return;
+  const double cap = context_.config.limits.viewer_bytes_per_s;
+  const size_t chosen = flow_.choose_class(strand_class_, costs, cap, time_ns);
+  if (chosen == strand_class_) return;
+  const bool is_better = chosen < strand_class_;
+  strand_class_ = static_cast<uint16_t>(chosen);
+  const StrandClass& now = context_.config.strand_classes[chosen];
+  const std::string reason =
+      fmt::format("{}: {:.3g} Hz, {:.3g} mm; link {:.2f} Mbit/s, {:.0f} ms of data on its way",
+                  is_better ? "the link has room" : "the link or this viewer is too slow", now.frame_rate_hz,
+                  now.bound_m * 1e3, flow_.capacity_bytes_per_s(time_ns) * 8e-6,
+                  static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs);
+  log_info("net", "session {}: {}", id_, reason);
+  context_.count(&NetCounters::class_changes);
+  queue_.restart_strands();
+  context_.handler.on_strand_class(id_, strand_class_);
+  queue_control(StreamQuality{strand_class_, now.rate_divisor, now.strand_share, now.bound_m, reason});
+  ask_for_keyframe(time_ns);
+}
+
+/// Measures the bare round trip, and notices a peer that is gone.
+void Session::probe(int64_t time_ns) {
+  if (is_probe_under_way_ || is_close_started_ || time_ns - probe_sent_ns_ < kProbeIntervalNs) return;
+  is_probe_under_way_ = true;
+  probe_sent_ns_ = time_ns;
+  socket_.async_ping({}, [self = shared_from_this()](const beast::error_code&) {});
+}
+
+/// Frames wait for an acknowledgement, and nothing at all comes; or other things come, but never one.
+bool Session::is_stalled(int64_t time_ns) const {
+  if (is_writing_ && (time_ns - write_since_ns_) / kNsPerMs >= context_.config.limits.stalled_ms) return true;
+  const int64_t oldest_ns = flow_.oldest_sent_ns();
+  if (oldest_ns == 0) return false;
+  const NetLimits& limits = context_.config.limits;
+  return (time_ns - std::max(oldest_ns, received_ns_)) / kNsPerMs >= limits.stalled_ms ||
+         (time_ns - oldest_ns) / kNsPerMs >= limits.unused_ms;
 }
 
 void Session::pump() {
   if (is_writing_ || is_close_started_ || state_ == State::Closed || state_ == State::Handshake) return;
-  std::optional<SendQueue::Item> item = queue_.take_next();
+  const bool is_held = !flow_.may_send(now_ns());
+  std::optional<SendQueue::Item> item =
+      queue_.take_next(is_held ? SendQueue::Media::Held : SendQueue::Media::Allowed);
   if (!item) {
     if (state_ == State::Closing) start_close();
     return;
@@ -282,6 +356,7 @@ void Session::pump() {
   } else {
     media_ = std::get<EncodedFramePtr>(std::move(*item));
     unwritten_ = media_->message;
+    flow_.on_sent(media_->header, media_->message.size(), now_ns());
   }
   is_writing_ = true;
   write_chunk();
@@ -343,13 +418,19 @@ void Session::check_deadlines(int64_t time_ns) {
     context_.count(&NetCounters::timeouts);
     return close(CloseCode::Policy, fmt::format("No Hello within {} ms.", limits.hello_ms));
   }
-  if (is_writing_ && (time_ns - write_since_ns_) / kNsPerMs >= limits.stalled_write_ms) {
+  if (is_stalled(time_ns)) {
     context_.count(&NetCounters::stalled);
-    log_warn("net", "session {} from {}: reads nothing for {} ms, dropped", id_, peer_address_,
-             limits.stalled_write_ms);
+    log_warn("net", "session {} from {}: takes nothing for {} ms, dropped", id_, peer_address_,
+             limits.stalled_ms);
     return abort();
   }
-  guarded([&] { ask_for_keyframe(time_ns); });
+  if (state_ != State::Joined) return;
+  guarded([&] {
+    if (flow_.expects_acks()) probe(time_ns);
+    adapt(time_ns);
+    ask_for_keyframe(time_ns);
+    pump();
+  });
 }
 
 void Session::abort() {

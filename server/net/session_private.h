@@ -10,6 +10,7 @@
 #include "server/net/access.h"
 #include "server/net/beast_private.h"
 #include "server/net/context_private.h"
+#include "server/net/flow_control.h"
 #include "server/net/send_queue.h"
 
 namespace strandcast::net {
@@ -56,6 +57,10 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_written(const beast::error_code& error, size_t byte_count);
   void start_close();
   void ask_for_keyframe(int64_t time_ns);
+  void on_ack(const FrameAck& ack, int64_t time_ns);
+  void adapt(int64_t time_ns);
+  void probe(int64_t time_ns);
+  bool is_stalled(int64_t time_ns) const;
   void account_drops();
   void leave();
   void finish();
@@ -74,6 +79,8 @@ class Session : public std::enable_shared_from_this<Session> {
   beast::flat_buffer read_buffer_;
   RateLimit rate_;
   SendQueue queue_;
+  FlowControl flow_;
+  uint16_t strand_class_ = 0;
   uint64_t counted_drops_ = 0;
   uint64_t counted_losses_ = 0;
 
@@ -86,6 +93,9 @@ class Session : public std::enable_shared_from_this<Session> {
   int64_t state_since_ns_ = 0;
   int64_t write_since_ns_ = 0;
   int64_t keyframe_asked_ns_ = 0;
+  int64_t received_ns_ = 0;          // the newest message
+  int64_t probe_sent_ns_ = 0;        // the newest WebSocket ping of ours
+  bool is_probe_under_way_ = false;  // not yet answered
 };
 
 }  // namespace strandcast::net

@@ -2,6 +2,7 @@
 // Latest wins: a slow reader skips states and never holds up the writer. Any thread.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <memory>
@@ -41,6 +42,14 @@ class SnapshotSlot {
   View wait(IsReady is_ready) const {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return view_.is_stopped || is_ready(std::as_const(view_)); });
+    return view_;
+  }
+
+  /// As wait(), but returns after `timeout` at the latest.
+  template <class IsReady>
+  View wait_for(std::chrono::nanoseconds timeout, IsReady is_ready) const {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, timeout, [&] { return view_.is_stopped || is_ready(std::as_const(view_)); });
     return view_;
   }
 

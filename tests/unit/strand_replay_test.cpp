@@ -154,6 +154,30 @@ TEST_F(StrandReplayTest, AResetServerIsNotBlendedInto) {
   EXPECT_EQ(picture->position_m, positions_in_head(truth_));
 }
 
+TEST_F(StrandReplayTest, AnotherStreamStartsWithItsKeyframeAndNeverStepsBack) {
+  auto other = make_strand_encoder("delta");
+  ASSERT_TRUE(other);
+  EncodedFramePtr old_state;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(receive(next(), i * kStepNs));
+    if (i % 4 == 0) old_state = with_send_time(*(*other)->encode(truth_), 2, 1);
+  }
+  const auto newest = replay_->newest();
+  // A delta of the other stream whose number fits by chance must not be taken for one of this stream.
+  EXPECT_FALSE(receive(old_state, 10 * kStepNs));
+  EXPECT_EQ(requests_, 1);
+  EXPECT_TRUE(receive(with_send_time(*(*other)->encode_keyframe(), 2, 1), 10 * kStepNs));
+  EXPECT_EQ(replay_->newest(), newest) << "the keyframe is of an older state";
+  for (int i = 10; i < 20; ++i) {
+    const auto own = next();
+    const auto coarse = with_send_time(*(*other)->encode(truth_), 2, 1);
+    EXPECT_FALSE(receive(own, i * kStepNs)) << "a delta of the stream that was left";
+    ASSERT_TRUE(receive(coarse, i * kStepNs));
+    EXPECT_EQ(state_hash(*replay_->newest()), state_hash(truth_));
+  }
+  EXPECT_EQ(replay_->stats().gaps, 0u) << "streams count by themselves";
+}
+
 TEST_F(StrandReplayTest, MeasuresMotionLatencyOncePerSampleAndStateAge) {
   // The server's clock is one second ahead; the probe took no time.
   constexpr int64_t kAheadNs = 1'000'000'000;

@@ -33,6 +33,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kWebSocketProtocol", kWebSocketProtocol},
       {"kMaxControlBytes", with_commas(kMaxControlBytes)},
       {"kClockWindow", with_commas(kClockWindow)},
+      {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},
       {"kMaxStrandCount", with_commas(kMaxStrandCount)},

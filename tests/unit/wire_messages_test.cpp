@@ -62,6 +62,7 @@ TEST(WireMessages, EveryFieldComesBack) {
   EXPECT_EQ(hello.token, "secret");
   EXPECT_EQ(hello.frame_width, 640u);
   EXPECT_EQ(hello.frame_height, 360u);
+  EXPECT_TRUE(hello.acknowledges);
   const auto motion = round_trip(sample_of<MotionSamples>(messages));
   ASSERT_EQ(motion.samples.size(), 5u);
   EXPECT_EQ(motion.samples[4].time_ns, 1'004);
@@ -78,6 +79,7 @@ TEST(WireMessages, EveryFieldComesBack) {
   EXPECT_EQ(ack.sequence, 4'000'000'000u);
   EXPECT_EQ(ack.receive_time_ns, -5);
   EXPECT_EQ(ack.decode_us, 1234u);
+  EXPECT_EQ(ack.stream_id, 65'535u);
   EXPECT_EQ(round_trip(Ping{INT64_MIN}).client_time_ns, INT64_MIN);
   for (const Command command : {Command::Pause, Command::Resume, Command::StepOnce, Command::Reset})
     EXPECT_EQ(round_trip(ControlCommand{command}).command, command);
@@ -133,6 +135,13 @@ TEST(WireMessages, EveryServerFieldComesBack) {
   EXPECT_EQ(back.viewer_count, status.viewer_count);
   EXPECT_EQ(back.dropped_frames, status.dropped_frames);
   EXPECT_EQ(back.rejected_samples, status.rejected_samples);
+  EXPECT_EQ(back.queue_delay_ms, status.queue_delay_ms);
+  const auto quality = round_trip(StreamQuality{3, 4, 0.5f, 5e-4f, "slow"});
+  EXPECT_EQ(quality.stream_id, 3u);
+  EXPECT_EQ(quality.rate_divisor, 4u);
+  EXPECT_EQ(quality.strand_share, 0.5f);
+  EXPECT_EQ(quality.bound_m, 5e-4f);
+  EXPECT_EQ(quality.reason, "slow");
   EXPECT_EQ(back.quarantined_strands, status.quarantined_strands);
   EXPECT_EQ(back.overstretched_strands, status.overstretched_strands);
   EXPECT_EQ(round_trip(Goodbye{"bye"}).reason, "bye");
@@ -238,6 +247,21 @@ TEST(WireMessages, StatusNumbersMustBeFinite) {
   EXPECT_EQ(decode_server_message(encode(ServerMessage(status))).error().place, "status.realtime_factor");
   status.realtime_factor = -1.0;
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(status))));
+}
+
+TEST(WireMessages, StreamQualityIsCheckedFieldByField) {
+  const StreamQuality good{3, 4, 0.5f, 5e-4f, "slow"};
+  const auto place_after = [&](auto change) {
+    StreamQuality quality = good;
+    change(quality);
+    return decode_server_message(encode(ServerMessage(quality))).error().place;
+  };
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.rate_divisor = 0; }), "quality.rate_divisor");
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.rate_divisor = kMaxRateDivisor + 1; }),
+            "quality.rate_divisor");
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.strand_share = 0.0f; }), "quality.strand_share");
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.strand_share = 1.5f; }), "quality.strand_share");
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.bound_m = std::nanf(""); }), "quality.bound_m");
 }
 
 TEST(WireMessages, ClientLimitsAreExact) {

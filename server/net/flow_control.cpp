@@ -1,0 +1,220 @@
+#include "server/net/flow_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace strandcast {
+namespace {
+
+constexpr double kNsPerS = 1e9;
+/// Round trips shorter than this differ by scheduling, not by the link.
+constexpr int64_t kLeastTransferNs = kNsPerMs;
+constexpr size_t kMaxBusySamples = 16;
+constexpr size_t kMinBusySamples = 3;
+constexpr int64_t kBusyAgeNs = 2'000 * kNsPerMs;
+/// A change needs time to show: nothing is decided before.
+constexpr int64_t kSettleNs = 500 * kNsPerMs;
+constexpr double kDrainingShare = 0.95;
+
+bool is_large(Opcode opcode) {
+  return opcode == Opcode::Asset || opcode == Opcode::StrandKeyframe;
+}
+
+}  // namespace
+
+void FlowControl::on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns) {
+  if (!has_acks_) return;
+  in_flight_.push_back({header.stream_id, header.sequence, is_large(header.opcode),
+                        header.opcode == Opcode::Asset, in_flight_.empty(), bytes, time_ns});
+  in_flight_bytes_ += bytes;
+  if (header.opcode == Opcode::StrandKeyframe) keyframe_ = in_flight_.back();
+}
+
+void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns) {
+  const auto acked = std::find_if(in_flight_.begin(), in_flight_.end(), [&](const Frame& frame) {
+    return frame.stream_id == stream_id && frame.sequence == sequence;
+  });
+  if (acked == in_flight_.end()) return;
+  // Frames before it that were not acknowledged could not be used; they have arrived all the same.
+  const Frame frame = *acked;
+  for (auto skipped = in_flight_.begin(); skipped <= acked; ++skipped) in_flight_bytes_ -= skipped->bytes;
+  in_flight_.erase(in_flight_.begin(), acked + 1);
+  take_sample(frame, time_ns);
+  last_ack_ns_ = time_ns;
+}
+
+void FlowControl::take_sample(const Frame& frame, int64_t time_ns) {
+  const int64_t round_trip_ns = time_ns - frame.sent_ns;
+  note_capacity(frame, round_trip_ns, time_ns);
+  const int64_t own_ns = transfer_ns(frame.bytes, time_ns);
+  // Alone on its way a frame waits for nothing: what is left is the bare link, which may have become longer.
+  const int64_t bare_ns = std::max<int64_t>(round_trip_ns - own_ns, kLeastTransferNs);
+  if (frame.was_alone && !round_trips_.empty() && bare_ns > base_ns() + kHighDelayNs &&
+      time_ns - static_cast<int64_t>(round_trips_.front().time_ns) > kLossWindowNs)
+    round_trips_.clear();
+  note_round_trip(frame.was_alone ? bare_ns : round_trip_ns, time_ns);
+  queue_delay_ns_ = std::max<int64_t>(round_trip_ns - base_ns() - own_ns, 0);
+  delays_.push_back({time_ns, static_cast<double>(queue_delay_ns_)});
+  while (delays_.front().time_ns < time_ns - kDelayWindowNs) delays_.pop_front();
+}
+
+void FlowControl::on_round_trip(int64_t round_trip_ns, int64_t time_ns) {
+  if (round_trip_ns >= 0) note_round_trip(std::max(round_trip_ns, kLeastTransferNs), time_ns);
+}
+
+/// Keeps the candidates for the minimum of the window: each newer one is longer than all before it.
+void FlowControl::note_round_trip(int64_t round_trip_ns, int64_t time_ns) {
+  const auto value = static_cast<double>(round_trip_ns);
+  while (!round_trips_.empty() && round_trips_.back().value >= value) round_trips_.pop_back();
+  round_trips_.push_back({time_ns, value});
+  while (round_trips_.front().time_ns < time_ns - kBaseWindowNs) round_trips_.pop_front();
+}
+
+int64_t FlowControl::base_ns() const {
+  return round_trips_.empty() ? 0 : static_cast<int64_t>(round_trips_.front().value);
+}
+
+void FlowControl::note_capacity(const Frame& frame, int64_t round_trip_ns, int64_t time_ns) {
+  const auto rate = [&](int64_t duration_ns) {
+    return static_cast<double>(frame.bytes) * kNsPerS /
+           static_cast<double>(std::max(duration_ns, kLeastTransferNs));
+  };
+  // A large frame that met nothing on its way shows the rate by how much longer it took than something small.
+  if (frame.is_large && frame.was_alone && !round_trips_.empty())
+    seen_rate_ = {time_ns, rate(round_trip_ns - base_ns())};
+  // This one had reached the bottleneck before the one ahead of it left, so the time between was all its own.
+  const bool was_queued = last_ack_ns_ > 0 && frame.sent_ns + base_ns() <= last_ack_ns_;
+  if (!was_queued) return;
+  busy_rates_.push_back({time_ns, rate(time_ns - last_ack_ns_)});
+  if (busy_rates_.size() > kMaxBusySamples) busy_rates_.pop_front();
+}
+
+void FlowControl::forget_in_flight() {
+  in_flight_.clear();
+  in_flight_bytes_ = 0;
+}
+
+double FlowControl::capacity_bytes_per_s(int64_t time_ns) const {
+  // The median: a freeze makes one long interval and many of nearly nothing, a slow link makes all alike.
+  std::vector<double> rates;
+  for (const Sample& sample : busy_rates_)
+    if (sample.time_ns >= time_ns - kBusyAgeNs) rates.push_back(sample.value);
+  if (rates.size() >= kMinBusySamples) {
+    std::nth_element(rates.begin(), rates.begin() + static_cast<ptrdiff_t>(rates.size() / 2), rates.end());
+    return rates[rates.size() / 2];
+  }
+  const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - kCapacityAgeNs;
+  return is_known ? seen_rate_->value : 0.0;
+}
+
+void FlowControl::on_chain_loss(int64_t time_ns) {
+  losses_ns_.push_back(time_ns);
+  while (losses_ns_.front() < time_ns - kLossWindowNs) losses_ns_.pop_front();
+}
+
+int64_t FlowControl::transfer_ns(size_t bytes, int64_t time_ns) const {
+  const double capacity = capacity_bytes_per_s(time_ns);
+  return capacity > 0.0 ? static_cast<int64_t>(static_cast<double>(bytes) / capacity * kNsPerS) : 0;
+}
+
+/// Without it the frames behind a keyframe would be held for being late, and the next keyframe would be due
+/// already.
+int64_t FlowControl::keyframe_allowance_ns(int64_t time_ns) const {
+  if (!keyframe_) return 0;
+  const int64_t own_ns = transfer_ns(keyframe_->bytes, time_ns);
+  const int64_t draining_ns = std::max<int64_t>(time_ns - keyframe_->sent_ns - own_ns, 0);
+  if (draining_ns >= kDrainNs) return 0;
+  const double left = 1.0 - static_cast<double>(draining_ns) / static_cast<double>(kDrainNs);
+  return static_cast<int64_t>(left * static_cast<double>(std::min(own_ns, kDrainNs)));
+}
+
+bool FlowControl::may_send(int64_t time_ns) const {
+  if (!has_acks_ || in_flight_.empty()) return true;
+  if (in_flight_bytes_ >= kMaxInFlightBytes || in_flight_.size() >= kMaxInFlightFrames) return false;
+  const Frame& oldest = in_flight_.front();
+  // What the link can do shows when the asset has arrived; the first keyframe waits for that.
+  if (oldest.is_asset) return false;
+  // Acknowledgements may get lost with a client's queue: it is asked again, slowly, and never given up here.
+  if (time_ns - in_flight_.back().sent_ns >= kAskAgainNs) return true;
+  // Behind a keyframe may follow what is cheaper than another keyframe would be.
+  if (oldest.is_large && in_flight_bytes_ <= 2 * oldest.bytes) return true;
+  if (in_flight_.size() < kFreeFrames) return true;
+  return time_ns - oldest.sent_ns <=
+         base_ns() + transfer_ns(oldest.bytes, time_ns) + kGateDelayNs + keyframe_allowance_ns(time_ns);
+}
+
+bool FlowControl::is_troubled(double cost, int64_t time_ns) const {
+  const auto recent_losses =
+      static_cast<size_t>(std::count_if(losses_ns_.begin(), losses_ns_.end(), [&](int64_t lost_ns) {
+        return lost_ns > std::max(quiet_since_ns_, time_ns - kLossWindowNs);
+      }));
+  if (recent_losses >= kTroublingLosses) return true;
+  const double capacity = capacity_bytes_per_s(time_ns);
+  if (recent_losses > 0 && capacity > 0.0 && capacity < cost) return true;
+  size_t high = 0, all = 0;
+  for (const Sample& sample : delays_) {
+    if (sample.time_ns <= quiet_since_ns_) continue;
+    ++all;
+    high += sample.value > static_cast<double>(kHighDelayNs) ? 1 : 0;
+  }
+  // A queue that drains is no trouble: a keyframe left it behind.
+  return all >= kMinDelaySamples && high == all &&
+         delays_.back().time_ns - delays_.front().time_ns >= kDelayWindowNs / 2 &&
+         delays_.back().value > kDrainingShare * delays_.front().value;
+}
+
+size_t FlowControl::class_below(size_t present, std::span<const double> costs, double allowed) const {
+  size_t chosen = std::min(present + 1, costs.size() - 1);
+  while (allowed > 0.0 && chosen + 1 < costs.size() && costs[chosen] > allowed) ++chosen;
+  return chosen;
+}
+
+void FlowControl::change(size_t from, size_t to, int64_t time_ns) {
+  const bool has_failed = to > from && improved_ns_ != 0 && time_ns - improved_ns_ < kProbationNs;
+  if (has_failed) probe_ns_ = std::min(2 * probe_ns_, kLongestProbeNs);
+  if (to < from) {
+    if (improved_ns_ != 0 && time_ns - improved_ns_ > 2 * kProbationNs) probe_ns_ = kFirstProbeNs;
+    improved_ns_ = time_ns;
+  }
+  quiet_since_ns_ = time_ns;
+}
+
+size_t FlowControl::choose_class(size_t present, std::span<const double> costs, double cap_bytes_per_s,
+                                 int64_t time_ns) {
+  if (costs.size() < 2 || (has_acks_ && last_ack_ns_ == 0)) return present;
+  const double capacity = capacity_bytes_per_s(time_ns);
+  const double usable = kUsableShare * capacity;
+  const double allowed = cap_bytes_per_s <= 0.0 ? usable
+                         : capacity > 0.0       ? std::min(usable, cap_bytes_per_s)
+                                                : cap_bytes_per_s;
+  if (quiet_since_ns_ == 0) {
+    // The first choice, before any strand frame: by what the asset showed.
+    quiet_since_ns_ = time_ns;
+    size_t first = present;
+    while (allowed > 0.0 && first + 1 < costs.size() && costs[first] > allowed) ++first;
+    return first;
+  }
+  if (!has_acks_ || time_ns - quiet_since_ns_ < kSettleNs) return present;
+  const bool is_over_cap = cap_bytes_per_s > 0.0 && costs[present] > cap_bytes_per_s;
+  if (is_over_cap || is_troubled(costs[present], time_ns)) {
+    if (present + 1 == costs.size()) {
+      quiet_since_ns_ = time_ns;  // nothing cheaper; what is better has to wait
+      return present;
+    }
+    // Remembered, so that what cannot fit is not tried again at once.
+    if (capacity > 0.0) seen_rate_ = {time_ns, capacity};
+    const size_t chosen = class_below(present, costs, allowed);
+    change(present, chosen, time_ns);
+    return chosen;
+  }
+  const bool has_delay = std::any_of(delays_.begin(), delays_.end(), [](const Sample& sample) {
+    return sample.value > static_cast<double>(kLowDelayNs);
+  });
+  if (has_delay) quiet_since_ns_ = std::max(quiet_since_ns_, time_ns - probe_ns_ / 2);
+  if (present == 0 || has_delay || time_ns - quiet_since_ns_ < probe_ns_) return present;
+  if (allowed > 0.0 && costs[present - 1] > allowed) return present;
+  change(present, present - 1, time_ns);
+  return present - 1;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,323 @@
+// Flow control against a link on paper: frames of an encoder per class, a bottleneck with a queue, a delay,
+// freezes. Time is counted, not waited for, so the laws are exact and the tests take no time.
+#include "server/net/flow_control.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <map>
+
+#include "common/base/hash.h"
+#include "server/net/send_queue.h"
+#include "server/net/strand_class.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kS = 1'000 * kMs;
+constexpr int64_t kStepNs = 16'666'667;
+/// Sizes of the built-in scene with the adaptive codec at 0.1 mm.
+constexpr double kFullBytesPerS = 6.6e6 / 8.0;
+constexpr size_t kKeyframeBytes = 124'000;
+constexpr size_t kAssetBytes = 330'000;
+
+struct Link {
+  double bytes_per_s = 1e9;
+  int64_t round_trip_ns = 1 * kMs;
+  int64_t jitter_ns = 0;
+  std::function<bool(int64_t)> is_frozen = [](int64_t) { return false; };
+};
+
+/// One viewer: what Session does with FlowControl and SendQueue, and a link that delivers in order.
+class Viewer {
+ public:
+  explicit Viewer(Link path) : link(std::move(path)), classes_(make_strand_classes(60.0, 1e-4f)) {
+    for (const StrandClass& row : classes_) costs_.push_back(row.relative_cost * kFullBytesPerS);
+    flow.expect_acks();
+    queue.set_asset(frame(Opcode::Asset, 1, 0, kAssetBytes));
+    queue.start_strands();
+    flow.on_round_trip(link.round_trip_ns, time_ns);
+  }
+
+  void run(int64_t duration_ns) {
+    for (const int64_t end_ns = time_ns + duration_ns; time_ns < end_ns; time_ns += kMs) tick();
+  }
+
+  struct Arrival {
+    int64_t made_ns, arrived_ns;
+    size_t stream;
+    bool is_keyframe;
+  };
+  std::vector<Arrival> arrivals_since(int64_t from_ns) const {
+    std::vector<Arrival> since;
+    for (const Arrival& arrival : arrivals)
+      if (arrival.arrived_ns >= from_ns) since.push_back(arrival);
+    return since;
+  }
+  double rate_hz(int64_t from_ns) const {
+    return static_cast<double>(arrivals_since(from_ns).size()) * 1e9 / static_cast<double>(time_ns - from_ns);
+  }
+  /// Longest age of a state at its arrival, less what the bare link takes.
+  int64_t worst_age_ns(int64_t from_ns) const {
+    int64_t worst_ns = 0;
+    for (const Arrival& arrival : arrivals_since(from_ns))
+      worst_ns = std::max(worst_ns, arrival.arrived_ns - arrival.made_ns - link.round_trip_ns / 2);
+    return worst_ns;
+  }
+
+  Link link;
+  FlowControl flow;
+  SendQueue queue;
+  int64_t time_ns = 1 * kS;
+  size_t present = 0;
+  size_t changes = 0;
+  size_t keyframes = 0;
+  bool reads = true;
+  double cap_bytes_per_s = 0.0;
+  size_t most_in_flight_bytes = 0;
+  std::vector<Arrival> arrivals;
+
+ private:
+  struct OnItsWay {
+    EncodedFramePtr frame;
+    int64_t ack_ns;
+  };
+
+  static EncodedFramePtr frame(Opcode opcode, uint32_t sequence, uint16_t stream, size_t bytes) {
+    auto made = std::make_shared<EncodedFrame>();
+    made->header.opcode = opcode;
+    made->header.sequence = sequence;
+    made->header.base_sequence = opcode == Opcode::StrandDelta ? sequence - 1 : 0;
+    made->header.stream_id = stream;
+    made->message.resize(bytes);
+    return made;
+  }
+
+  void tick() {
+    while (reads && !on_its_way_.empty() && on_its_way_.front().ack_ns <= time_ns && !link.is_frozen(time_ns))
+      take_ack();
+    if (time_ns >= next_step_ns_) {
+      next_step_ns_ += kStepNs;
+      ++step_;
+      const uint32_t divisor = classes_[present].rate_divisor;
+      if (step_ % divisor == 0) offer(Opcode::StrandDelta);
+    }
+    if (time_ns % (50 * kMs) == 0) adapt();
+    pump();
+  }
+
+  void offer(Opcode opcode) {
+    const bool is_keyframe = opcode == Opcode::StrandKeyframe;
+    const StrandClass& row = classes_[present];
+    const double coarse = row.coarsening > 1 ? 0.7 : 1.0;
+    const auto bytes = is_keyframe ? static_cast<size_t>(coarse * kKeyframeBytes)
+                                   : static_cast<size_t>(costs_[present] / row.frame_rate_hz);
+    if (!is_keyframe) ++sequence_;
+    const auto made = frame(opcode, sequence_, static_cast<uint16_t>(present), bytes);
+    made_ns_[made.get()] = time_ns;
+    if (queue.offer_strands(made) == SendQueue::Offer::LostChain) {
+      flow.on_chain_loss(time_ns);
+      adapt();
+    }
+    keyframes += is_keyframe ? 1 : 0;
+  }
+
+  void adapt() {
+    const size_t chosen = flow.choose_class(present, costs_, cap_bytes_per_s, time_ns);
+    if (chosen == present) return;
+    present = chosen;
+    ++changes;
+    queue.restart_strands();
+  }
+
+  void pump() {
+    if (queue.needs_keyframe() && flow.may_send(time_ns) && time_ns >= keyframe_asked_ns_ + 250 * kMs) {
+      keyframe_asked_ns_ = time_ns;
+      offer(Opcode::StrandKeyframe);
+    }
+    while (auto item =
+               queue.take_next(flow.may_send(time_ns) ? SendQueue::Media::Allowed : SendQueue::Media::Held)) {
+      const auto sent = std::get<EncodedFramePtr>(*item);
+      flow.on_sent(sent->header, sent->message.size(), time_ns);
+      most_in_flight_bytes = std::max(most_in_flight_bytes, flow.in_flight_bytes());
+      queue.written();
+      free_ns_ = std::max(free_ns_, time_ns) +
+                 static_cast<int64_t>(static_cast<double>(sent->message.size()) / link.bytes_per_s * 1e9);
+      const double late = unit_float(mix_u32(++random_));
+      const int64_t ack_ns =
+          free_ns_ + link.round_trip_ns + static_cast<int64_t>(late * static_cast<double>(link.jitter_ns));
+      on_its_way_.push_back({sent, std::max(ack_ns, on_its_way_.empty() ? 0 : on_its_way_.back().ack_ns)});
+    }
+  }
+
+  void take_ack() {
+    const OnItsWay done = on_its_way_.front();
+    on_its_way_.pop_front();
+    const FrameHeader& header = done.frame->header;
+    flow.on_ack(header.stream_id, header.sequence, time_ns);
+    if (header.opcode != Opcode::Asset)
+      arrivals.push_back({made_ns_[done.frame.get()], time_ns - link.round_trip_ns / 2, header.stream_id,
+                          header.opcode == Opcode::StrandKeyframe});
+    adapt();
+  }
+
+  std::vector<StrandClass> classes_;
+  std::vector<double> costs_;
+  std::deque<OnItsWay> on_its_way_;
+  std::map<const EncodedFrame*, int64_t> made_ns_;
+  int64_t next_step_ns_ = 0, free_ns_ = 0, keyframe_asked_ns_ = -kS;
+  uint64_t step_ = 0;
+  uint32_t sequence_ = 0, random_ = 0;
+};
+
+double share_of_full_rate(const Viewer& viewer, int64_t from_ns) {
+  return viewer.rate_hz(from_ns) / 60.0;
+}
+
+TEST(FlowControl, FastLinkKeepsFullRateAtEveryRoundTrip) {
+  for (const int64_t round_trip_ms : {1, 20, 50, 150, 300}) {
+    Viewer viewer({.round_trip_ns = round_trip_ms * kMs, .jitter_ns = 10 * kMs});
+    viewer.run(3 * kS);
+    const int64_t from_ns = viewer.time_ns;
+    viewer.run(20 * kS);
+    EXPECT_GE(share_of_full_rate(viewer, from_ns), 0.99) << round_trip_ms;
+    EXPECT_EQ(viewer.changes, 0u) << round_trip_ms << " ms of delay say nothing about the rate";
+    EXPECT_EQ(viewer.keyframes, 1u) << round_trip_ms;
+  }
+}
+
+TEST(FlowControl, SlowLinksSettleWithinThreeSecondsAndStay) {
+  for (const double mbit : {2.0, 5.0, 10.0}) {
+    for (const int64_t round_trip_ms : {10, 100, 300}) {
+      SCOPED_TRACE(fmt::format("{} Mbit/s, {} ms", mbit, round_trip_ms));
+      Viewer viewer(
+          {.bytes_per_s = mbit * 125e3, .round_trip_ns = round_trip_ms * kMs, .jitter_ns = 5 * kMs});
+      viewer.run(static_cast<int64_t>(kAssetBytes / (mbit * 125e3) * 1e9) +
+                 3 * kS);  // the asset takes its time
+      const int64_t settled_ns = viewer.time_ns;
+      const size_t changes = viewer.changes;
+      viewer.run(20 * kS);
+      EXPECT_LE(viewer.worst_age_ns(settled_ns), 250 * kMs);
+      EXPECT_GE(viewer.rate_hz(settled_ns), 10.0 * 0.98);
+      EXPECT_LE(viewer.changes, changes + 1) << "what the link showed is remembered";
+    }
+  }
+}
+
+TEST(FlowControl, LinkThatGetsSlowIsFollowedWithinThreeSeconds) {
+  Viewer viewer({.round_trip_ns = 30 * kMs});
+  viewer.run(10 * kS);
+  ASSERT_EQ(viewer.present, 0u);
+  viewer.link.bytes_per_s = 2.0 * 125e3;
+  viewer.run(3 * kS);
+  const int64_t settled_ns = viewer.time_ns;
+  viewer.run(15 * kS);
+  EXPECT_LE(viewer.worst_age_ns(settled_ns), 250 * kMs);
+  EXPECT_GE(viewer.rate_hz(settled_ns), 10.0 * 0.98);
+  // And back: up step by step, since a better class is tried only after quiet time.
+  viewer.link.bytes_per_s = 1e9;
+  viewer.run(180 * kS);
+  EXPECT_EQ(viewer.present, 0u);
+}
+
+TEST(FlowControl, FreezesCostNoClass) {
+  Viewer viewer({.round_trip_ns = 20 * kMs,
+                 .is_frozen = [](int64_t time_ns) { return time_ns % (5 * kS) < 200 * kMs; }});
+  viewer.run(30 * kS);
+  EXPECT_EQ(viewer.present, 0u);
+  EXPECT_EQ(viewer.changes, 0u);
+  // Live again one round trip and one frame after each freeze.
+  for (const auto& arrival : viewer.arrivals_since(6 * kS)) {
+    if (arrival.arrived_ns % (5 * kS) < 300 * kMs) continue;
+    EXPECT_LE(arrival.arrived_ns - arrival.made_ns, 20 * kMs + kStepNs) << "at " << arrival.arrived_ns / kMs;
+  }
+}
+
+TEST(FlowControl, LongerPathIsNoQueue) {
+  Viewer viewer({.round_trip_ns = 20 * kMs});
+  viewer.run(10 * kS);
+  viewer.link.round_trip_ns = 320 * kMs;  // another route
+  viewer.run(60 * kS);
+  const int64_t from_ns = viewer.time_ns;
+  viewer.run(10 * kS);
+  EXPECT_GE(share_of_full_rate(viewer, from_ns), 0.9);
+}
+
+TEST(FlowControl, StalledViewerGetsNothingButAKnockNowAndThen) {
+  Viewer viewer({.round_trip_ns = 5 * kMs});
+  viewer.run(5 * kS);
+  viewer.reads = false;
+  viewer.run(1 * kS);
+  const size_t held = viewer.flow.in_flight_bytes();
+  viewer.run(5 * kS);
+  EXPECT_LE(viewer.flow.in_flight_bytes(), held + 6 * kKeyframeBytes);
+  EXPECT_NE(viewer.flow.oldest_sent_ns(), 0);
+  viewer.reads = true;
+  viewer.run(2 * kS);
+  const int64_t from_ns = viewer.time_ns;
+  viewer.run(2 * kS);
+  EXPECT_GE(viewer.rate_hz(from_ns), 9.0) << "and goes on when it reads again";
+}
+
+TEST(FlowControl, CapIsKept) {
+  Viewer viewer({.round_trip_ns = 5 * kMs});
+  viewer.cap_bytes_per_s = 0.5 * kFullBytesPerS;
+  viewer.run(60 * kS);
+  const auto classes = make_strand_classes(60.0, 1e-4f);
+  EXPECT_LE(classes[viewer.present].relative_cost, 0.5);
+  EXPECT_GT(classes[viewer.present - 1].relative_cost, 0.5) << "no lower than the cap asks for";
+}
+
+TEST(FlowControl, WithoutAcknowledgementsNothingIsHeld) {
+  FlowControl flow;
+  FrameHeader header;
+  for (uint32_t i = 1; i < 1'000; ++i) {
+    header.sequence = i;
+    flow.on_sent(header, 100'000, i);
+    EXPECT_TRUE(flow.may_send(i));
+  }
+  EXPECT_EQ(flow.in_flight_bytes(), 0u);
+  EXPECT_EQ(flow.oldest_sent_ns(), 0);
+}
+
+TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
+  FlowControl flow;
+  flow.expect_acks();
+  FrameHeader header;
+  header.stream_id = 2;
+  for (uint32_t i = 1; i <= 5; ++i) {
+    header.sequence = i;
+    flow.on_sent(header, 1'000, i * kMs);
+  }
+  flow.on_ack(2, 9, 10 * kMs);
+  flow.on_ack(1, 3, 10 * kMs);
+  EXPECT_EQ(flow.in_flight_bytes(), 5'000u);
+  flow.on_ack(2, 3, 10 * kMs);
+  EXPECT_EQ(flow.in_flight_bytes(), 2'000u) << "those before it arrived too";
+  flow.on_ack(2, 3, 11 * kMs);
+  EXPECT_EQ(flow.in_flight_bytes(), 2'000u);
+}
+
+TEST(StrandClasses, GetCheaperAndKeepTheirBounds) {
+  for (const float bound_m : {2e-5f, 5e-5f, 1e-4f, 5e-4f})
+    for (const double step_rate_hz : {10.0, 30.0, 60.0, 240.0}) {
+      const auto classes = make_strand_classes(step_rate_hz, bound_m);
+      ASSERT_FALSE(classes.empty());
+      EXPECT_EQ(classes[0].rate_divisor, 1u);
+      EXPECT_EQ(classes[0].bound_m, bound_m);
+      for (size_t i = 1; i < classes.size(); ++i) {
+        EXPECT_LT(classes[i].relative_cost, classes[i - 1].relative_cost);
+        EXPECT_GE(classes[i].frame_rate_hz, kLeastFrameRateHz);
+        EXPECT_LE(classes[i].bound_m, kCoarsestBoundM * 1.0001f);
+        // The published lattice is within `bound`; a lattice k times coarser adds at most k times as much.
+        EXPECT_GE(classes[i].bound_m,
+                  bound_m * static_cast<float>(classes[i].coarsening > 1 ? 1 + classes[i].coarsening : 1) *
+                      0.9999f);
+      }
+    }
+}
+
+}  // namespace
+}  // namespace strandcast
