@@ -7,6 +7,7 @@
 #include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
 #include "server/app/pass_table.h"
+#include "server/app/scene_change.h"
 #include "server/publish/publisher.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/solver_registry.h"
@@ -83,6 +84,7 @@ Result<PassTimes> measure_passes(const SceneDesc& scene, const SceneContent& con
 
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
                                   const PassTimes& times) {
+  RETURN_IF_ERROR(check_solver(scene));
   ASSIGN_OR_RETURN(const ServerPlan plan, make_server_plan(scene, asset, facts));
   std::string text = fmt::format(
       "Scene '{}': {} strands x {} vertices, solver {}, {:g} steps of {} substeps per s\n", scene.name,

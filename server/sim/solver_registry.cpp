@@ -8,6 +8,7 @@
 #include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
 #include "server/sim/solvers/direct_rod/direct_rod.h"
 #include "server/sim/solvers/ftl/ftl.h"
+#include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "server/sim/solvers/position_based/position_based.h"
 #include "server/sim/solvers/tractrix/tractrix.h"
 
@@ -19,6 +20,7 @@ const std::vector<SolverRow>& solver_table() {
                                                ftl_row(),
                                                pbd_row(),
                                                xpbd_row(),
+                                               mass_spring_row(),
                                                direct_rod_row(),
                                                articulated_row(),
                                                tractrix_emulation_row(),

@@ -66,11 +66,17 @@ TEST_F(ServerProgram, BadInputIsExitCodeTwoAndOneSentence) {
   std::ofstream(folder_.path() / "bad.textproto") << "name: 'x'\nnonsense: 3\n";
   std::ofstream(folder_.path() / "short.tfx") << "not a groom";
   const std::string bad_scene = (folder_.path() / "bad.textproto").string();
+  std::ofstream(folder_.path() / "stiff.textproto")
+      << "name: 'x'\nsolver { name: 'mass_spring' parameters { key: "
+         "'integrator' value: 0 } }\n";
+  const std::string stiff_scene = (folder_.path() / "stiff.textproto").string();
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"--nonsense"}, "nonsense"},
       {{"--scene", "/no/such/scene.textproto"}, "/no/such/scene.textproto"},
       {{"--scene", bad_scene}, "nonsense"},
       {{"--set", "solver.name=spaghetti"}, "known: dftl"},
+      {{"--scene", stiff_scene}, "times as many substeps"},
+      {{"--explain", "--scene", stiff_scene}, "or integrator 2"},
       {{"--set", "substeps=0"}, "substeps"},
       {{"--groom", "/no/such/hair.tfx"}, "/no/such/hair.tfx"},
       {{"--groom", (folder_.path() / "short.tfx").string()}, "short.tfx"},

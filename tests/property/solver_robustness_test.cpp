@@ -189,14 +189,17 @@ TEST_F(SolverRobustness, AVertexOnItsLeaderTakesTheGroomedDirection) {
   const Groom groom = groom_from({strand_of(0.0f, {0.1f})}, Pinning::Root);
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
-    auto solver = make(kind, groom, {{"style_stiffness_per_s2", 0.0}});
+    auto solver = make(kind, groom,
+                       {{"style_stiffness_per_s2", 0.0},
+                        {"stretch_stiffness_n_per_m", 1e6},
+                        {"stretch_damping_ns_per_m", 0.0}});
     const SolverState groomed = read(*solver);
     SolverState folded = groomed;
     folded.position_m[1] = folded.position_m[0];
     solver->write(folded);
     solver->substep(calm_input());
     // A compliant segment gives way by a few millionths.
-    const double allowed_m = kind.row->stretch_bound > 0.0 ? 1e-6 : 1e-7;
+    const double allowed_m = kind.row->stretch_bound > 0.0 ? 3e-6 : 1e-7;
     EXPECT_LE(largest_distance_m(read(*solver).position_m, groomed.position_m), allowed_m);
   }
 }

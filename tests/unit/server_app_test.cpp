@@ -51,6 +51,29 @@ TEST(SceneChange, EverySolverCanBeChosenFromEveryOtherWithItsParametersSet) {
   }
 }
 
+TEST(SceneChange, StepsOutsideTheStableRangeAreRefusedWhateverChangesThem) {
+  SceneDesc scene = built_in_scene();
+  scene.solver.name = "mass_spring";
+  scene.solver.parameters = {{"integrator", 1.0},
+                             {"linear_density_kg_per_m", 0.1},
+                             {"shortest_segment_m", 0.01},
+                             {"stretch_stiffness_n_per_m", 1.0},
+                             {"stretch_damping_ns_per_m", 0.0},
+                             {"altitude_stiffness_n_per_m", 0.0},
+                             {"bend_stiffness_nm_per_rad", 0.0}};
+  scene.step_rate_hz = 60.0;
+  scene.substeps = 1;
+  ASSERT_TRUE(check_solver(scene));  // up to 0.001 kg / (1/60 s)^2 = 3.6 N/m
+  EXPECT_THAT(error_of(change_scene(scene, "solver.parameters.stretch_stiffness_n_per_m=3.7")),
+              HasSubstr("up to 3.6 N/m"));
+  scene.substeps = 4;
+  scene.solver.parameters["stretch_stiffness_n_per_m"] = 50.0;
+  ASSERT_TRUE(check_solver(scene));
+  EXPECT_THAT(error_of(change_scene(scene, "substeps=3")), HasSubstr("too stiff"));
+  scene.solver.parameters["integrator"] = 2.0;
+  EXPECT_TRUE(change_scene(scene, "substeps=1").ok());
+}
+
 Hello hello(Role role, StreamMode mode, uint32_t width = 0, uint32_t height = 0) {
   Hello message;
   message.role = role;

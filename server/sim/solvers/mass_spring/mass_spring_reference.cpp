@@ -1,0 +1,472 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "server/sim/reference_contact.h"
+#include "server/sim/solvers/mass_spring/mass_spring.h"
+#include "server/sim/strand_layout.h"
+#include "server/sim/strand_parameters.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kTinyLengthM = 1e-10;
+constexpr double kBrokenM = 1e12;
+constexpr double kFoldedBack = 1e-6;
+constexpr double kNearlyReversed = 0.02;
+constexpr const char* kCorrectionName = "s_damping";
+
+bool is_sane(const glm::dvec3& value) {
+  return glm::dot(value, value) < kBrokenM * kBrokenM;
+}
+
+glm::dvec3 direction_of(const glm::dvec3& vector, const glm::dvec3& other) {
+  const double length = glm::length(vector);
+  return length > kTinyLengthM ? vector / length : other;
+}
+
+/// The smallest rotation that takes one unit vector to another.
+glm::dquat smallest_turn(const glm::dvec3& from, const glm::dvec3& to) {
+  const double w = 1.0 + glm::dot(from, to);
+  if (w > kFoldedBack) return glm::normalize(glm::dquat(w, glm::cross(from, to)));
+  const glm::dvec3 side =
+      std::abs(from.x) < 0.6 ? glm::dvec3(0.0, from.z, -from.y) : glm::dvec3(-from.z, 0.0, from.x);
+  return glm::normalize(glm::dquat(0.0, side));
+}
+
+/// A linear form in the positions of consecutive vertices: value = constant part, jacobian[k] on vertex first
+/// + k.
+struct Strain {
+  uint32_t first = 0;
+  uint32_t count = 0;
+  glm::dvec3 value{0.0};
+  std::array<glm::dmat3, 4> jacobian{};
+};
+
+/// Symmetric positive matrix of 3 x 3 blocks up to three off the diagonal, solved by scalar Cholesky.
+class SpringSystem {
+ public:
+  explicit SpringSystem(size_t vertex_count)
+      : band_(3 * vertex_count * kWidth, 0.0), right_side_(3 * vertex_count, 0.0) {}
+  void add_block(size_t i, size_t j, const glm::dmat3& block) {
+    for (size_t r = 0; r < 3; ++r) {
+      for (size_t c = 0; c < 3; ++c) {
+        if (3 * j + c <= 3 * i + r)
+          at(3 * i + r, 3 * j + c) += block[static_cast<int>(c)][static_cast<int>(r)];
+      }
+    }
+  }
+  void add_force(size_t i, const glm::dvec3& force) {
+    for (size_t c = 0; c < 3; ++c) right_side_[3 * i + c] += force[static_cast<int>(c)];
+  }
+  /// The solution, or nothing when a pivot is not positive.
+  std::vector<glm::dvec3> solve() {
+    const size_t n = right_side_.size();
+    for (size_t i = 0; i < n; ++i) {
+      const size_t begin = i < kWidth ? 0 : i - kWidth + 1;
+      for (size_t j = begin; j <= i; ++j) {
+        double sum = at(i, j);
+        for (size_t k = std::max(begin, j < kWidth ? 0 : j - kWidth + 1); k < j; ++k)
+          sum -= at(i, k) * at(j, k);
+        if (i == j && !(sum > 0.0)) return {};
+        at(i, j) = i == j ? std::sqrt(sum) : sum / at(j, j);
+      }
+      for (size_t k = begin; k < i; ++k) right_side_[i] -= at(i, k) * right_side_[k];
+      right_side_[i] /= at(i, i);
+    }
+    for (size_t i = n; i-- > 0;) {
+      for (size_t k = i + 1; k < std::min(n, i + kWidth); ++k) right_side_[i] -= at(k, i) * right_side_[k];
+      right_side_[i] /= at(i, i);
+    }
+    std::vector<glm::dvec3> solution(n / 3);
+    for (size_t i = 0; i < n; ++i) solution[i / 3][static_cast<int>(i % 3)] = right_side_[i];
+    return solution;
+  }
+
+ private:
+  static constexpr size_t kWidth = 12;  // scalars of four blocks
+  double& at(size_t row, size_t column) { return band_[row * kWidth + (row - column)]; }
+
+  std::vector<double> band_;  // lower triangle
+  std::vector<double> right_side_;
+};
+
+/// What one substep of all strands works with.
+struct SpringStep {
+  const StepInput* input = nullptr;
+  double h_s = 0.0;
+  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
+  glm::dquat carry{1.0, 0.0, 0.0, 0.0};
+  glm::dvec3 head_velocity_mps{0.0};
+};
+
+/// One substep of one strand; positions relative to the head joint, velocities relative to its movement.
+class SpringMotion {
+ public:
+  SpringMotion(const MassSpringParameters& springs, const StrandParameters& shared,
+               const StrandLayout& layout, uint32_t strand_index, const SpringStep& step)
+      : springs_(springs),
+        shared_(shared),
+        step_(step),
+        n_(layout.vertex_count),
+        first_(layout.pinned_root_count),
+        tail_(layout.tail_begin()) {
+    for (uint32_t i = 0; i < n_; ++i) {
+      const glm::dvec4 rest(layout.rest[layout.index(i, strand_index)]);
+      target_.push_back(step.rotation * glm::dvec3(rest));
+      segment_.push_back(rest.w);
+      soft_.push_back(std::max(rest.w, springs.shortest_segment_m));
+      const double from_tip = 1.0 - static_cast<double>(layout.arc[layout.index(i, strand_index)]);
+      pull_.push_back(shared.style_stiffness_per_s2 *
+                      (shared.style_tip_share + (1.0 - shared.style_tip_share) * from_tip * from_tip));
+    }
+  }
+
+  /// Positions and world velocities before the substep are replaced by those after it.
+  void run(std::vector<glm::dvec3>& position, std::vector<glm::dvec3>& velocity) {
+    begin(position, velocity);
+    const bool is_implicit = springs_.integrator == SpringIntegrator::BackwardEuler;
+    bool is_sound = true;
+    if (is_implicit) {
+      for (uint32_t solve = 0; solve < springs_.solves && is_sound; ++solve) is_sound = newton_step(solve);
+      for (uint32_t i = first_; i < tail_; ++i) end_velocity_[i] = (x_[i] - old_[i]) / step_.h_s;
+    } else {
+      explicit_step();
+    }
+    position = finish(is_sound);
+    for (uint32_t i = 0; i < n_; ++i) {
+      const glm::dvec3 relative = is_free(i) ? end_velocity_[i] + (position[i] - x_[i]) / step_.h_s
+                                             : (target_[i] - old_[i]) / step_.h_s;
+      velocity[i] = step_.head_velocity_mps;
+      if (is_sound && is_sane(relative)) velocity[i] += shortened(relative, shared_.max_speed_mps);
+    }
+  }
+
+ private:
+  bool is_free(uint32_t i) const { return i >= first_ && i < tail_; }
+  bool has_free_tip() const { return tail_ == n_; }
+  /// Last vertex that the springs of the free ones reach.
+  uint32_t last() const { return has_free_tip() ? n_ - 1 : std::min(tail_ + 1, n_ - 1); }
+  double hold(uint32_t i) const { return 1.0 + step_.h_s * (shared_.air_drag_per_s + step_.h_s * pull_[i]); }
+  /// Mass over the mass per length.
+  double mass(uint32_t i) const { return 0.5 * (soft_[i] + (i + 1 < n_ ? soft_[i + 1] : 0.0)); }
+  double capped(double stiffness, double inertia) const {
+    return std::min(stiffness, kMaxImplicitRatio * inertia);
+  }
+
+  void begin(const std::vector<glm::dvec3>& position, const std::vector<glm::dvec3>& velocity) {
+    for (uint32_t i = 0; i < n_; ++i) {
+      const bool is_intact = is_sane(position[i]) && is_sane(velocity[i]);
+      old_.push_back(is_intact ? position[i] : target_[i]);
+      velocity_.push_back(is_intact ? velocity[i] - step_.head_velocity_mps : glm::dvec3(0.0));
+      if (!is_free(i)) velocity_[i] = (target_[i] - old_[i]) / step_.h_s;
+      predicted_.push_back(is_free(i) ? predicted(i) : target_[i]);
+    }
+    end_velocity_ = velocity_;
+    x_ = predicted_;
+  }
+
+  // As predict() of reference_strands.cpp: backward Euler in drag and pull, forward for the rest.
+  glm::dvec3 predicted(uint32_t i) const {
+    const double h = step_.h_s;
+    const double carried = shared_.sag_free * std::min(1.0, pull_[i] / kSupportStiffnessPerS2);
+    const glm::dvec3 groom_gravity = limited(step_.input->groom_gravity_in_head_mps2, kMaxGravityMps2);
+    const glm::dvec3 gravity =
+        limited(step_.input->gravity_mps2, kMaxGravityMps2) - carried * (step_.rotation * groom_gravity);
+    const glm::dvec3 air = air_velocity_mps(*step_.input, old_[i]) - step_.head_velocity_mps;
+    const glm::dvec3 impulse =
+        velocity_[i] + h * (gravity + shared_.air_drag_per_s * air + pull_[i] * (target_[i] - old_[i]));
+    return old_[i] + h * shortened(impulse / hold(i), shared_.max_speed_mps);
+  }
+
+  /// Directions of all edges, and rest directions: each turned with the edge before from its groomed
+  /// direction.
+  void measure(const std::vector<glm::dvec3>& x) {
+    glm::dvec3 groomed = step_.rotation * glm::dvec3(0.0, 1.0, 0.0);
+    if (first_ >= 2) groomed = direction_of(target_[first_ - 1] - target_[first_ - 2], groomed);
+    direction_.assign(n_, groomed);
+    rest_.assign(n_, groomed);
+    groomed_.assign(n_, groomed);
+    glm::dquat turn(1.0, 0.0, 0.0, 0.0);
+    for (uint32_t i = first_; i <= last(); ++i) {
+      groomed = direction_of(target_[i] - target_[i - 1], groomed);
+      groomed_[i] = groomed;
+      rest_[i] = turn * groomed;
+      direction_[i] = direction_of(x[i] - x[i - 1], rest_[i]);
+      turn = smallest_turn(groomed, direction_[i]);
+    }
+  }
+
+  glm::dvec3 relative_edge(const std::vector<glm::dvec3>& x, uint32_t i) const {
+    return (x[i] - x[i - 1]) / soft_[i] + (1.0 - segment_[i] / soft_[i]) * direction_[i];
+  }
+
+  /// The joint before edge i.
+  Strain bend_of(const std::vector<glm::dvec3>& x, uint32_t i) const {
+    const glm::dmat3 after = glm::dmat3(1.0 / soft_[i]);
+    if (i == first_) return {i, 1, relative_edge(x, i) - rest_[i], {after}};
+    // The rest direction u of this edge is R r_i with R the smallest rotation of the edge before from its
+    // groomed direction r to its direction t. When t moves by dt, R turns by t x dt - t (k . dt), k = r x t /
+    // (1 + r . t) being half the tangent's twist; u changes by that turn, and in length with the edge before.
+    const glm::dvec3 t = direction_[i - 1];
+    const glm::dvec3 u = rest_[i];
+    const glm::dvec3 k =
+        glm::cross(groomed_[i - 1], t) / std::max(1.0 + glm::dot(groomed_[i - 1], t), kNearlyReversed);
+    const auto change = [&](const glm::dvec3& strain_change) {
+      const glm::dvec3 dt = strain_change - t * glm::dot(t, strain_change);
+      return u * glm::dot(t, strain_change) + glm::cross(glm::cross(t, dt) - t * glm::dot(k, dt), u);
+    };
+    const glm::dmat3 turn(change({1.0, 0.0, 0.0}), change({0.0, 1.0, 0.0}), change({0.0, 0.0, 1.0}));
+    const glm::dmat3 before = turn / soft_[i - 1];
+    return {i - 2, 3, relative_edge(x, i) - turn * relative_edge(x, i - 1), {before, -after - before, after}};
+  }
+
+  bool has_altitude(uint32_t i) const {
+    return springs_.altitude_mps2 > 0.0 && i >= first_ + (first_ >= 2 ? 1 : 2);
+  }
+
+  /// The tetrahedron that ends at vertex i; only the first component counts.
+  Strain altitude_of(const std::vector<glm::dvec3>& x, uint32_t i) const {
+    // The lengths of edges between pinned vertices count as well.
+    const double longest = std::max({soft_[i], soft_[i - 1], soft_[i - 2]});
+    const double per_base = 1.0 / (longest * longest);
+    const auto volume = [i](const std::vector<glm::dvec3>& p) {
+      return glm::dot(p[i - 2] - p[i - 3], glm::cross(p[i - 1] - p[i - 2], p[i] - p[i - 1]));
+    };
+    const glm::dvec3 a = x[i - 2] - x[i - 3];
+    const glm::dvec3 b = x[i - 1] - x[i - 2];
+    const glm::dvec3 c = x[i] - x[i - 1];
+    const glm::dvec3 by_a = per_base * glm::cross(b, c);
+    const glm::dvec3 by_b = per_base * glm::cross(c, a);
+    const glm::dvec3 by_c = per_base * glm::cross(a, b);
+    Strain strain{i - 3, 4, glm::dvec3(per_base * (volume(x) - volume(target_)), 0.0, 0.0), {}};
+    const std::array<glm::dvec3, 4> gradient = {-by_a, by_a - by_b, by_b - by_c, by_c};
+    for (size_t k = 0; k < 4; ++k)
+      strain.jacobian[k] = glm::outerProduct(glm::dvec3(1.0, 0.0, 0.0), gradient[k]);
+    return strain;
+  }
+
+  void add_strain(SpringSystem& system, const Strain& strain, double weight) const {
+    for (uint32_t a = 0; a < strain.count; ++a) {
+      if (!is_free(strain.first + a)) continue;
+      const size_t row = strain.first + a - first_;
+      const glm::dmat3 transposed = weight * glm::transpose(strain.jacobian[a]);
+      system.add_force(row, -(transposed * strain.value));
+      for (uint32_t b = 0; b < strain.count; ++b) {
+        if (is_free(strain.first + b))
+          system.add_block(row, strain.first + b - first_, transposed * strain.jacobian[b]);
+      }
+    }
+  }
+
+  double length_before(uint32_t i) const { return glm::distance(old_[i], old_[i - 1]); }
+
+  /// The motion going on as it is: its directions, each from the vertex placed before, with the lengths that
+  /// the springs had. At rest that is the solution.
+  void start_iterate() {
+    for (uint32_t i = first_; i < tail_; ++i)
+      x_[i] = old_[i] + step_.h_s * shortened(velocity_[i], shared_.max_speed_mps);
+    if (!has_free_tip()) return;
+    measure(x_);
+    glm::dquat turn(1.0, 0.0, 0.0, 0.0);
+    glm::dvec3 groomed = direction_[0];
+    for (uint32_t i = first_; i < n_; ++i) {
+      groomed = direction_of(target_[i] - target_[i - 1], groomed);
+      const glm::dvec3 rest = turn * groomed;
+      const double slack = springs_.stretch_limit * segment_[i];
+      const double length =
+          std::clamp(length_before(i), std::max(segment_[i] - slack, 0.0), segment_[i] + slack);
+      const glm::dvec3 direction = direction_of(x_[i] - x_[i - 1], rest);
+      x_[i] = x_[i - 1] + length * direction;
+      turn = smallest_turn(groomed, direction);
+    }
+  }
+
+  /// False when the matrix is not positive.
+  bool newton_step(uint32_t solve) {
+    if (tail_ <= first_) return true;
+    if (solve == 0) start_iterate();
+    measure(x_);
+    SpringSystem system(tail_ - first_);
+    for (uint32_t i = first_; i < tail_; ++i) {
+      system.add_force(i - first_, mass(i) * hold(i) * (predicted_[i] - x_[i]));
+      system.add_block(i - first_, i - first_, glm::dmat3(mass(i) * hold(i)));
+    }
+    const double h = step_.h_s;
+    for (uint32_t i = first_; i <= last(); ++i) {
+      add_stretch(system, i);
+      const double shortest = i == first_ ? soft_[i] : std::min(soft_[i], soft_[i - 1]);
+      const double bend = capped(h * h * springs_.bend_m3ps2, std::pow(shortest, 3) / kBendPerStretch);
+      add_strain(system, bend_of(x_, i), i == first_ ? 2.0 * bend : bend);
+      if (!has_altitude(i)) continue;
+      const double shortest_of_three = std::min({soft_[i], soft_[i - 1], soft_[i - 2]});
+      add_strain(system, altitude_of(x_, i),
+                 capped(h * h * springs_.altitude_mps2, shortest_of_three / kAltitudePerStretch));
+    }
+    const std::vector<glm::dvec3> moved = system.solve();
+    if (moved.empty()) return false;
+    for (uint32_t i = first_; i < tail_; ++i) x_[i] += moved[i - first_];
+    return std::all_of(x_.begin(), x_.end(), is_sane);
+  }
+
+  void add_stretch(SpringSystem& system, uint32_t i) const {
+    const double h = step_.h_s;
+    const double spring = capped(h * h * springs_.stretch_mps2, soft_[i]);
+    const double damper = capped(h * springs_.stretch_damping_mps, soft_[i]);
+    const glm::dvec3& t = direction_[i];
+    const double length = glm::dot(x_[i] - x_[i - 1], t);
+    const glm::dvec3 pull = (spring * (length - segment_[i]) + damper * (length - length_before(i))) * t;
+    const double across = spring * std::max(length - segment_[i], 0.0) / std::max(length, kFoldedBack);
+    const glm::dmat3 stiffness =
+        (spring + damper) * glm::outerProduct(t, t) + across * (glm::dmat3(1.0) - glm::outerProduct(t, t));
+    for (const uint32_t a : {i - 1, i}) {
+      if (!is_free(a)) continue;
+      system.add_force(a - first_, a == i ? -pull : pull);
+      for (const uint32_t b : {i - 1, i}) {
+        if (is_free(b)) system.add_block(a - first_, b - first_, a == b ? stiffness : -stiffness);
+      }
+    }
+  }
+
+  void explicit_step() {
+    const double h = step_.h_s;
+    const double share = springs_.integrator == SpringIntegrator::Verlet ? 0.5 : 0.0;
+    std::vector<glm::dvec3> x(n_);
+    for (uint32_t i = 0; i < n_; ++i) x[i] = old_[i] + share * h * velocity_[i];
+    measure(x);
+    std::vector<glm::dvec3> force(n_, glm::dvec3(0.0));
+    const auto push = [&](const Strain& strain, double weight) {
+      for (uint32_t k = 0; k < strain.count; ++k)
+        force[strain.first + k] -= weight * (glm::transpose(strain.jacobian[k]) * strain.value);
+    };
+    for (uint32_t i = first_; i <= last(); ++i) {
+      const glm::dvec3& t = direction_[i];
+      const double stretch_m = glm::dot(x[i] - x[i - 1], t) - segment_[i];
+      const double opening_mps = glm::dot(velocity_[i] - velocity_[i - 1], t);
+      const glm::dvec3 pull =
+          (springs_.stretch_mps2 * stretch_m + springs_.stretch_damping_mps * opening_mps) * t;
+      force[i] -= pull;
+      force[i - 1] += pull;
+      push(bend_of(x, i), i == first_ ? 2.0 * springs_.bend_m3ps2 : springs_.bend_m3ps2);
+      if (has_altitude(i)) push(altitude_of(x, i), springs_.altitude_mps2);
+    }
+    for (uint32_t i = first_; i < tail_; ++i) {
+      const glm::dvec3 velocity = (predicted_[i] - old_[i]) / h + h * force[i] / (mass(i) * hold(i));
+      end_velocity_[i] = shortened(velocity, shared_.max_speed_mps);
+      x_[i] = x[i] + (1.0 - share) * h * end_velocity_[i];
+    }
+  }
+
+  /// Lengths within the limit, outside the colliders.
+  std::vector<glm::dvec3> finish(bool is_sound) const {
+    std::vector<glm::dvec3> end = target_;
+    for (uint32_t i = first_; is_sound && i < tail_; ++i) {
+      if (!is_sane(x_[i])) continue;
+      const glm::dvec3 edge = x_[i] - end[i - 1];
+      double length = glm::length(edge);
+      if (has_free_tip()) {
+        const double slack = springs_.stretch_limit * segment_[i];
+        length = std::clamp(length, std::max(segment_[i] - slack, 0.0), segment_[i] + slack);
+      }
+      const glm::dvec3 groomed = direction_of(target_[i] - target_[i - 1], glm::dvec3(0.0));
+      const glm::dvec3 point = end[i - 1] + length * direction_of(edge, groomed);
+      end[i] = pushed_out(*step_.input, step_.carry, shared_.collider_friction,
+                          {old_[i], end[i - 1], point, length});
+    }
+    return end;
+  }
+
+  const MassSpringParameters& springs_;
+  const StrandParameters& shared_;
+  const SpringStep& step_;
+  uint32_t n_;
+  uint32_t first_;
+  uint32_t tail_;
+  std::vector<glm::dvec3> target_;
+  std::vector<double> segment_;
+  std::vector<double> soft_;
+  std::vector<double> pull_;
+  std::vector<glm::dvec3> old_;
+  std::vector<glm::dvec3> velocity_;
+  std::vector<glm::dvec3> predicted_;
+  std::vector<glm::dvec3> x_;             // the iterate, then the solution
+  std::vector<glm::dvec3> end_velocity_;  // relative, before limit and colliders
+  std::vector<glm::dvec3> direction_;     // of the edge that ends at a vertex
+  std::vector<glm::dvec3> groomed_;       // its direction in the groom, turned with the head
+  std::vector<glm::dvec3> rest_;          // where that edge would be without a moment
+};
+
+class MassSpringReference final : public Solver {
+ public:
+  explicit MassSpringReference(SolverParameters parameters) : springs_(read_mass_spring(parameters)) {
+    parameters[kCorrectionName] = 0.0;
+    shared_ = read_strand_parameters(parameters);
+  }
+
+  Status load(const Groom& groom, const glm::dquat& world_from_head) override {
+    ASSIGN_OR_RETURN(layout_, make_strand_layout(groom));
+    previous_rotation_ = limited_rotation(world_from_head);
+    position_m_.assign(layout_.strand_count, std::vector<glm::dvec3>(layout_.vertex_count));
+    velocity_mps_.assign(layout_.strand_count,
+                         std::vector<glm::dvec3>(layout_.vertex_count, glm::dvec3(0.0)));
+    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+      for (uint32_t i = 0; i < layout_.vertex_count; ++i)
+        position_m_[s][i] = previous_rotation_ * glm::dvec3(layout_.rest[layout_.index(i, s)]);
+    }
+    return {};
+  }
+
+  void substep(const StepInput& input) override {
+    SpringStep step;
+    step.input = &input;
+    step.h_s = limited_substep_s(input);
+    step.rotation = limited_rotation(input.world_from_head);
+    step.carry = step.rotation * glm::conjugate(previous_rotation_);
+    step.head_velocity_mps = limited(input.head_shift_m, kMaxHeadShiftM) / step.h_s;
+    for (uint32_t s = 0; s < layout_.strand_count; ++s)
+      SpringMotion(springs_, shared_, layout_, s, step).run(position_m_[s], velocity_mps_[s]);
+    previous_rotation_ = step.rotation;
+  }
+
+  void read(SolverState& state) override {
+    state.position_m.resize(layout_.size());
+    state.velocity_mps.resize(layout_.size());
+    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
+        state.position_m[layout_.index(i, s)] = glm::vec3(position_m_[s][i]);
+        state.velocity_mps[layout_.index(i, s)] = glm::vec3(velocity_mps_[s][i]);
+      }
+    }
+  }
+
+  void write(const SolverState& state) override {
+    CHECK(state.position_m.size() == layout_.size() && state.velocity_mps.size() == layout_.size());
+    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
+        position_m_[s][i] = glm::dvec3(state.position_m[layout_.index(i, s)]);
+        velocity_mps_[s][i] = glm::dvec3(state.velocity_mps[layout_.index(i, s)]);
+      }
+    }
+  }
+
+  uint64_t memory_bytes() const override {
+    return layout_.size() * (2 * sizeof(glm::dvec3) + sizeof(glm::vec4) + sizeof(float));
+  }
+
+ private:
+  MassSpringParameters springs_;
+  StrandParameters shared_;
+  StrandLayout layout_;
+  std::vector<std::vector<glm::dvec3>> position_m_;  // per strand and vertex, head-relative world
+  std::vector<std::vector<glm::dvec3>> velocity_mps_;
+  glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
+};
+
+}  // namespace
+
+std::unique_ptr<Solver> make_mass_spring_reference(const SolverParameters& parameters) {
+  return std::make_unique<MassSpringReference>(parameters);
+}
+
+}  // namespace strandcast
