@@ -18,7 +18,7 @@ constexpr StabilityMeasure kMeasures[kStabilityMeasureCount] = {
 // Column heads, with the unit of the numbers below.
 const char* head_of(StabilityMeasure measure) {
   constexpr const char* kHeads[kStabilityMeasureCount] = {
-      "broken steps", "stretch", "speed m/s", "energy growth", "rest after s", "jitter m/s2", "off style m"};
+      "broken steps", "stretch", "speed m/s", "energy growth", "rest s", "jitter m/s2", "off style m"};
   return kHeads[static_cast<size_t>(measure)];
 }
 
@@ -89,11 +89,11 @@ HtmlTable overview(const std::vector<StabilityOutcome>& outcomes) {
 
 HtmlTable table_of(const std::vector<StabilityOutcome>& outcomes, const std::string& row) {
   HtmlTable table;
-  table.columns = {"trial", "setting"};
+  table.columns = {"trial"};
   for (const StabilityMeasure measure : kMeasures) table.columns.emplace_back(head_of(measure));
   for (const StabilityOutcome& outcome : outcomes) {
     if (outcome.row != row) continue;
-    std::vector<HtmlCell> cells = {outcome.group, outcome.setting};
+    std::vector<HtmlCell> cells = {outcome.group + ": " + outcome.setting};
     for (const StabilityMeasure measure : kMeasures) {
       const auto& cell = outcome.cells[static_cast<size_t>(measure)];
       if (!outcome.refusal.empty()) {
@@ -210,11 +210,8 @@ std::string stability_page(const std::vector<StabilityOutcome>& outcomes, const 
             "minutes at rest and a million steps."));
   page.table(overview(outcomes));
   page.heading("What is promised");
-  HtmlTable promises;
-  promises.columns = {"measure", "what it is and why its limit"};
   for (const StabilityMeasure measure : kMeasures)
-    promises.rows.push_back({HtmlCell(head_of(measure)), HtmlCell(promise_reason(measure))});
-  page.table(promises);
+    page.paragraph(fmt::format("{}: {}", head_of(measure), promise_reason(measure)));
   for (const std::string& row : names(outcomes, &StabilityOutcome::row)) {
     page.heading(row);
     page.table(table_of(outcomes, row));

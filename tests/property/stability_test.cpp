@@ -223,6 +223,7 @@ TEST(StabilityTables, ABrokenPromiseIsRedWithNumberLimitAndReason) {
   const std::string page = stability_page(outcomes, {"a device", StabilityGrid::Quick});
   EXPECT_THAT(page, HasSubstr("bad\">2.5e-01 &gt; 1.2e-01"));
   EXPECT_THAT(page, HasSubstr("it was told to"));
+  EXPECT_THAT(page, HasSubstr("<td></td>")) << "what was not measured has no colour";
   EXPECT_THAT(page, HasSubstr("1 of 2, 1 refused"));
   EXPECT_THAT(page, HasSubstr("h must stay below 1"));
   EXPECT_THAT(page, HasSubstr("quick"));
