@@ -18,7 +18,7 @@ constexpr StabilityMeasure kMeasures[kStabilityMeasureCount] = {
 // Column heads, with the unit of the numbers below.
 const char* head_of(StabilityMeasure measure) {
   constexpr const char* kHeads[kStabilityMeasureCount] = {
-      "broken steps", "stretch", "speed m/s", "energy growth", "rest s", "jitter m/s2", "off style m"};
+      "broken", "stretch", "speed m/s", "energy", "rest s", "jitter m/s2", "off style m"};
   return kHeads[static_cast<size_t>(measure)];
 }
 

@@ -74,9 +74,9 @@ std::string promise_reason(StabilityMeasure measure) {
     case StabilityMeasure::Jitter:
       return "Acceleration in the upper half of the frequencies that steps can show, root mean square over "
              "two "
-             "seconds that begin one second after the head has stopped, of the worst vertex, m/s2. The limit "
-             "is "
-             "that of a vibration of 0.1 mm at half the step rate.";
+             "seconds from one second after the head has stopped, of the worst vertex, m/s2. The limit is "
+             "what a "
+             "vertex has that is 0.1 mm to either side in alternate steps.";
     case StabilityMeasure::Style:
       return "Largest distance from the groomed shape at the end, m: 0.1 mm at rest, the default error of "
              "the "

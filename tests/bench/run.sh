@@ -1,16 +1,18 @@
 #!/usr/bin/env bash
-# Builds and runs every bench and leaves CSV files: simulation (the seeds' test sets, every solver), strand codecs, and
-# whole streams (server, feeder and headless viewer on loopback). Nothing here passes or fails.
-# usage: bash tests/bench/run.sh [--out DIR] [--groom FILE] [--motion FILE.bvh]
+# Builds and runs every bench and leaves CSV files: simulation (the seeds' test sets, every solver), the models beside
+# Bullet's rope and in the form of the source documents' tables, strand codecs, and whole streams (server, feeder and
+# headless viewer on loopback). Nothing here passes or fails.
+# usage: bash tests/bench/run.sh [--out DIR] [--groom FILE] [--motion FILE.bvh] [--mohawk Ratboy_mohawk.tfx]
 set -euo pipefail
 
-out=out/bench; groom=; motion=builtin
+out=out/bench; groom=; motion=builtin; mohawk=
 while [ $# -gt 0 ]; do
   case "$1" in
     --out) out=$2 ;;
     --groom) groom=$(realpath "$2") ;;
     --motion) motion=$(realpath "$2") ;;
-    *) echo "run.sh: unknown option $1 (known: --out DIR, --groom FILE, --motion FILE.bvh)" >&2; exit 2 ;;
+    --mohawk) mohawk=$(realpath "$2") ;;
+    *) echo "run.sh: unknown option $1 (known: --out DIR, --groom FILE, --motion FILE.bvh, --mohawk FILE.tfx)" >&2; exit 2 ;;
   esac
   shift 2
 done
@@ -19,12 +21,14 @@ out=$(realpath "$out")
 cd "$(dirname "$0")/../.."
 bash deploy/install_deps.sh
 cmake --preset release -DBUILD_TESTING=ON >/dev/null
-cmake --build --preset release --target sim_bench codec_bench strandcast-server strandcast-view strandcast-ctl \
+cmake --build --preset release --target sim_bench peers_bench codec_bench strandcast-server strandcast-view strandcast-ctl \
   >"$out/build.log" 2>&1 || { tail -30 "$out/build.log" >&2; exit 2; }
 bin=build/release/bin
 
 echo "== simulation: $out/sim.csv"
 "$bin/sim_bench" --csv "$out/sim.csv" ${groom:+--groom "$groom"}
+echo "== beside other programs: $out/peers.csv"
+"$bin/peers_bench" --csv "$out/peers.csv" ${mohawk:+--mohawk "$mohawk"} | tee "$out/peers.txt"
 echo "== codecs: $out/codec.csv"
 "$bin/codec_bench" | tee "$out/codec.csv"
 

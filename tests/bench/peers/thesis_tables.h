@@ -1,0 +1,25 @@
+// The performance tables of documents 000 (Zappe, tractrix hair) and 003 (Woodhouse, hair on OpenGL), in
+// their own form: the same sets and components in the same order, their numbers as cited beside ours.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/gl/egl_context.h"
+#include "common/gl/program.h"
+
+namespace strandcast {
+
+struct ThesisOptions {
+  int steps = 60;
+  std::filesystem::path mohawk;         // Ratboy_mohawk.tfx; empty: a groom of the same size
+  std::filesystem::path naive_shaders;  // folder of naive_*.comp
+  std::filesystem::path scene;          // of 242 strands x 8 vertices, for the drawing
+  gl::DeviceInfo device;                // of the current context
+};
+
+/// Prints; lines for a CSV file are appended to `csv` (section, set, model, measure, value).
+Status print_tables_of_000(const ThesisOptions& options, const gl::ShaderLibrary& shaders, std::string& csv);
+Status print_tables_of_003(const ThesisOptions& options, const gl::ShaderLibrary& shaders, std::string& csv);
+
+}  // namespace strandcast
