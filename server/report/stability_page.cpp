@@ -17,8 +17,8 @@ constexpr StabilityMeasure kMeasures[kStabilityMeasureCount] = {
 
 // Column heads, with the unit of the numbers below.
 const char* head_of(StabilityMeasure measure) {
-  constexpr const char* kHeads[kStabilityMeasureCount] = {
-      "broken", "stretch", "speed m/s", "energy", "rest s", "jitter m/s2", "off style m"};
+  constexpr const char* kHeads[kStabilityMeasureCount] = {"broken", "stretch",     "speed m/s",  "energy",
+                                                          "rest s", "jitter m/s2", "off style m"};
   return kHeads[static_cast<size_t>(measure)];
 }
 
@@ -128,8 +128,9 @@ std::vector<std::string> remarks(const std::vector<StabilityOutcome>& outcomes, 
     for (const auto& cell : outcome.cells) {
       if (!cell || cell->is_kept()) continue;
       if (cell->known_break != nullptr)
-        add(fmt::format("Red, {} {}, {}: {}", outcome.group, outcome.setting,
-                        name_of(cell->known_break->measure), cell->known_break->reason));
+        add(fmt::format("Red, {}{}{}, {}: {}.", outcome.group, *cell->known_break->setting != '\0' ? " " : "",
+                        cell->known_break->setting, name_of(cell->known_break->measure),
+                        cell->known_break->reason));
     }
   }
   return lines;

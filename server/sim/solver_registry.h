@@ -22,10 +22,14 @@ struct SolverParameterInfo {
   std::string summary;
 };
 
+/// How a kernel that comes in both forms spreads its work. Auto: as suits the device.
+enum class KernelForm { Auto, PerVertex, PerStrand };
+
 /// What a GPU solver is built from besides the scene's parameters.
 struct GpuSolverContext {
   const gl::ShaderLibrary* shaders = nullptr;
   SceneFeatures features;
+  KernelForm form = KernelForm::Auto;
 };
 
 struct SolverRow {

@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "common/base/check.h"
 #include "shaders/shared/bindings.h"
@@ -43,6 +44,11 @@ uint32_t group_count(const StrandKernelDesc& desc, const StrandLayout& layout) {
 }
 
 }  // namespace
+
+bool is_software_device() {
+  const auto* renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return renderer != nullptr && std::string_view(renderer).find("llvmpipe") != std::string_view::npos;
+}
 
 Result<std::unique_ptr<Solver>> StrandKernel::make(StrandKernelDesc desc, const StrandParameters& parameters,
                                                    const GpuSolverContext& context) {

@@ -15,6 +15,10 @@
 
 namespace strandcast {
 
+/// Whether the current context's device is a processor: shared memory is ordinary memory there, and barriers
+/// cost more than the work between them.
+bool is_software_device();
+
 /// What tells one kernel from another.
 struct StrandKernelDesc {
   std::string name;         // labels
@@ -58,10 +62,10 @@ class StrandKernel final : public Solver {
   StrandLayout layout_;
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
   uint32_t step_index_ = 0;  // since load()
-  gl::Buffer rest_;      // (vertex_count x strand_count) vec4: head space, m; segment before it, m
-  gl::Buffer position_;  // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
-  gl::Buffer velocity_;  // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
-  gl::Buffer step_;      // StepBlock
+  gl::Buffer rest_;          // (vertex_count x strand_count) vec4: head space, m; segment before it, m
+  gl::Buffer position_;      // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
+  gl::Buffer velocity_;      // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
+  gl::Buffer step_;          // StepBlock
   gl::Handle<gl::delete_texture> rest_view_;
   gl::Handle<gl::delete_texture> position_view_;
   gl::Handle<gl::delete_texture> velocity_view_;

@@ -11,9 +11,10 @@ Result<std::unique_ptr<Solver>> make_dftl_parallel_gpu(const SolverParameters& p
                                                        const GpuSolverContext& context) {
   StrandKernelDesc desc;
   desc.name = "dftl_parallel";
-  desc.shader_path = "sim/dftl_parallel.comp";
-  desc.is_per_vertex = true;
-  desc.local_size = shader::kVertexLocalSize;
+  const KernelForm suiting = is_software_device() ? KernelForm::PerStrand : KernelForm::PerVertex;
+  desc.is_per_vertex = (context.form == KernelForm::Auto ? suiting : context.form) == KernelForm::PerVertex;
+  desc.shader_path = desc.is_per_vertex ? "sim/dftl_parallel.comp" : "sim/dftl_odd_even.comp";
+  desc.local_size = desc.is_per_vertex ? shader::kVertexLocalSize : shader::kStrandLocalSize;
   desc.iterations = static_cast<uint32_t>(std::lround(parameters.at("iterations")));
   desc.has_exact_length = parameters.at("exact_length") >= 0.5;
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
