@@ -102,6 +102,10 @@ const std::vector<KnownBreak>& known_breaks() {
       "a hair of real constants and 0.25 m is too limp for this style: the style is an equilibrium, as "
       "sag_free asks, but not a stable one, and rounding is enough to leave it; the double reference leaves "
       "it too";
+  constexpr const char* kDraggedAlong =
+      "a vertex that moves drags the others along by geometry, with no mass behind it: a kick or a push "
+      "along "
+      "the strand does work from nothing, which drag and the velocity correction take out again";
   static const std::vector<KnownBreak> breaks = {
       {"dftl", "energy", "buckles from upright", Measure::Energy, kCompressed},
       {"dftl_parallel", "energy", "buckles from upright", Measure::Energy, kCompressed},
@@ -114,6 +118,7 @@ const std::vector<KnownBreak>& known_breaks() {
       {"xpbd", "motion", "", Measure::Stretch, kIterationsLeaveStretch},
       {"xpbd", "groom", "64 vertices", Measure::Stretch, kIterationsLeaveStretch},
       {"xpbd", "input", "infinity in everything", Measure::Stretch, kIterationsLeaveStretch},
+      {"tractrix_emulation", "energy", "", Measure::Energy, kDraggedAlong},
       {"direct_rod", "stiffness", "", Measure::Speed,
        "from a million times the stiffness of hair on, its bending forces leave single precision no room for "
        "inertia; the double reference moves as a rigid strand"},
