@@ -288,6 +288,22 @@ TEST_F(LiveServer, SolverAndWindChangeWhileRunning) {
   EXPECT_EQ(server_->counters().sim.quarantined, 0u);
 }
 
+// A rope a million times softer than hair hangs down for metres: put back to rest again and again, and
+// reported.
+TEST_F(LiveServer, StrandsThatStretchWithoutEndAreCountedApart) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  StrandClient controller = join(Role::Controller);
+  for (const char* change : {"solver.name=xpbd", "solver.parameters.stretch_compliance_m_per_n=1e6",
+                             "solver.parameters.style_stiffness_per_s2=0"}) {
+    const Notice notice = controller.ask(SetParameter{change});
+    EXPECT_FALSE(notice.is_error) << notice.text;
+  }
+  EXPECT_TRUE(eventually([&] { return server_->counters().sim.overstretched >= kStrands; }));
+  EXPECT_EQ(server_->counters().sim.quarantined, 0u);
+  EXPECT_THAT(test::http_get(server_->port(), "/metrics"), HasSubstr("publish_overstretched_total"));
+}
+
 TEST_F(LiveServer, BadChangesAreRefusedInOneSentenceAndChangeNothing) {
   ASSERT_NO_FATAL_FAILURE(start());
   if (server_ == nullptr) return;
