@@ -16,6 +16,7 @@ const uint kBindingVelocity = 1u;
 const uint kBindingDisplacement = 2u;
 const uint kBindingVelocityChange = 3u;
 const uint kBindingRodScratch = 4u;
+const uint kBindingRodAxis = 5u;
 
 // Uniform block of the simulation.
 const uint kBindingStep = 0u;
@@ -28,6 +29,7 @@ const uint kUnitDisplacement = 3u;
 const uint kUnitVelocityChange = 4u;
 const uint kUnitRodEdge = 5u;
 const uint kUnitRodStrand = 6u;
+const uint kUnitRodAxis = 7u;
 
 // Storage blocks of the renderer.
 const uint kBindingKeyPosition = 0u;

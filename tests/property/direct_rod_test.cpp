@@ -2,40 +2,14 @@
 // solutions to 1e-10, the damping that the integrator's characteristic polynomial predicts, and lengths.
 #include <algorithm>
 #include <complex>
-#include <numbers>
 
-#include "tests/support/solver_fixture.h"
+#include "tests/property/direct_rod_fixture.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kLengthM = 0.3;
-constexpr double kGravityMps2 = 9.81;
-constexpr double kHairModulusPa = 3e9;
-
-/// Young's modulus with which a hair of the default radius and density has EI / (rho A) = b.
-double modulus_for(double b_m4ps2) {
-  constexpr double kRadiusM = 5e-5;
-  constexpr double kDensityKgpm3 = 1300.0;
-  return b_m4ps2 * 4.0 * kDensityKgpm3 / (kRadiusM * kRadiusM);
-}
-
-/// One straight strand from the head joint, clamped at its first vertex.
-Groom straight_strand(uint32_t vertex_count, const glm::dvec3& direction) {
-  std::vector<glm::vec3> strand;
-  for (uint32_t i = 0; i < vertex_count; ++i)
-    strand.emplace_back(direction * (kLengthM * i / (vertex_count - 1)));
-  return groom_from({strand}, Pinning::Root);
-}
-
-class DirectRod : public SolverTest {
+class RodMechanics : public DirectRod {
  protected:
-  static SolverKind kind(bool is_gpu) { return {*find_solver("direct_rod"), is_gpu}; }
-
-  std::unique_ptr<Solver> make_rod(bool is_gpu, const Groom& groom, const SolverParameters& given) {
-    return make(kind(is_gpu), groom, given);
-  }
-
   /// The tip of a horizontal strand, b = g L^3 / gamma, after it came to rest.
   glm::dvec3 settled_tip(bool is_gpu, uint32_t vertex_count, double gamma, double rate_hz) {
     const double b = kGravityMps2 * kLengthM * kLengthM * kLengthM / gamma;
@@ -66,7 +40,7 @@ const std::vector<CantileverShape>& cantilever_shapes() {
   return shapes;
 }
 
-TEST_F(DirectRod, ACantileverHangsAsTheExactCurve) {
+TEST_F(RodMechanics, ACantileverHangsAsTheExactCurve) {
   for (const bool is_gpu : {false, true}) {
     for (const CantileverShape& shape : cantilever_shapes()) {
       SCOPED_TRACE(fmt::format("{}, Gamma {}", is_gpu ? "GPU" : "double", shape.gamma));
@@ -83,7 +57,7 @@ TEST_F(DirectRod, ACantileverHangsAsTheExactCurve) {
   }
 }
 
-TEST_F(DirectRod, DroopDependsOnNeitherVerticesNorRate) {
+TEST_F(RodMechanics, DroopDependsOnNeitherVerticesNorRate) {
   for (const double gamma : {10.0, 184.0}) {
     double least = 1.0;
     double most = 0.0;
@@ -122,7 +96,7 @@ double project(const SolverState& state, const std::function<double(double)>& mo
   return sum;
 }
 
-TEST_F(DirectRod, ACantileverLetGoSwingsAsTheBeam) {
+TEST_F(RodMechanics, ACantileverLetGoSwingsAsTheBeam) {
   // A small load put on at once: the tip's first maximum is 2.0253 times the static one, from the first
   // modes' shares 1.01339, -0.01430, 0.00107 and their frequencies.
   constexpr double kRateHz = 240.0;
@@ -187,7 +161,7 @@ std::complex<double> fitted_root(const std::vector<double>& q) {
 // Damping is what the integrator predicts for x'' = -omega^2 x. Backward Euler multiplies by 1 / (1 - i omega
 // h). Order 2 has 3/2 z^2 - 2 z + 1/2 = i omega h z^2, that is z = (2 + sqrt(1 + 2 i omega h)) / (3 - 2 i
 // omega h).
-TEST_F(DirectRod, DampingIsWhatTheIntegratorPredicts) {
+TEST_F(RodMechanics, DampingIsWhatTheIntegratorPredicts) {
   constexpr double kRateHz = 60.0;
   for (const int order : {1, 2}) {
     for (const double omega_h : {0.15, 0.3, 0.5}) {
@@ -228,7 +202,7 @@ TEST_F(DirectRod, DampingIsWhatTheIntegratorPredicts) {
   }
 }
 
-TEST_F(DirectRod, WithoutStiffnessItIsAHeavyChain) {
+TEST_F(RodMechanics, WithoutStiffnessItIsAHeavyChain) {
   // omega_1 = j / 2 sqrt(g / L), j the first root of the Bessel function J0; the mode is J0(j sqrt(1 - s)).
   constexpr double kRoot = 2.404825557695773;
   constexpr double kRateHz = 240.0;
@@ -259,7 +233,7 @@ TEST_F(DirectRod, WithoutStiffnessItIsAHeavyChain) {
 }
 
 // Undamped hair of 30 cm, let go horizontally, and shaken from side to side with 10 g at 3 Hz.
-TEST_F(DirectRod, StretchStaysBelowATenthOfAPercentAtEveryMoment) {
+TEST_F(RodMechanics, StretchStaysBelowATenthOfAPercentAtEveryMoment) {
   constexpr double kSubstepS = 1.0 / 60.0;
   constexpr double kShakeRadps = 2.0 * std::numbers::pi * 3.0;
   constexpr double kShakeM = 10.0 * kGravityMps2 / (kShakeRadps * kShakeRadps);
@@ -332,7 +306,7 @@ TEST_F(SwayingRod, StepsOfChangingLengthAreAsExactAsEvenOnes) {
   fmt::print("tip error {:.2e} m with even steps, {:.2e} with uneven ones\n", even_m, uneven_m);
 }
 
-TEST_F(DirectRod, ASagFreeGroomStaysAsItWasLoaded) {
+TEST_F(RodMechanics, ASagFreeGroomStaysAsItWasLoaded) {
   // Short enough to be stable: longer ones buckle to the side, whatever their rest shape.
   std::vector<std::vector<glm::vec3>> strands;
   for (int s = 0; s < 5; ++s) {
@@ -354,7 +328,7 @@ TEST_F(DirectRod, ASagFreeGroomStaysAsItWasLoaded) {
         auto rod = make_rod(is_gpu, groom, {{"sag_free", is_sag_free}});
         const SolverState before = read(*rod);
         StepInput input;
-        input.gravity_mps2 = {0.0, -9.80665, 0.0};
+        input.groom_gravity_in_head_mps2 = input.gravity_mps2;
         for (int step = 0; step < 600; ++step) rod->substep(input);
         moved_m[is_sag_free] = largest_distance_m(read(*rod).position_m, before.position_m);
       }
@@ -365,7 +339,7 @@ TEST_F(DirectRod, ASagFreeGroomStaysAsItWasLoaded) {
   }
 }
 
-TEST_F(DirectRod, AMillionTimesStifferStaysFinite) {
+TEST_F(RodMechanics, AMillionTimesStifferStaysFinite) {
   const Groom groom = make_test_groom({});
   for (const bool is_gpu : {true, false}) {
     for (const double factor : {1e2, 1e4, 1e6}) {

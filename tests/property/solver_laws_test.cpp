@@ -333,7 +333,8 @@ TEST_F(SolverLaws, FrictionHoldsAStrandOnACollider) {
   }
 }
 
-// What the kernel is compiled without must not matter when the scene has none of it.
+// What the kernel is compiled without must not matter when the scene has none of it, but for the roundings of
+// another compilation over ten steps: 1e-5 m, as between a kernel and its reference.
 TEST_F(SolverLaws, VariantsWithoutAFeatureMatchTheFeatureAtZero) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {
@@ -348,7 +349,7 @@ TEST_F(SolverLaws, VariantsWithoutAFeatureMatchTheFeatureAtZero) {
       bare->substep(input);
       full->substep(input);
     }
-    EXPECT_LE(largest_distance_m(read(*bare).position_m, read(*full).position_m), 5e-6);
+    EXPECT_LE(largest_distance_m(read(*bare).position_m, read(*full).position_m), 1e-5);
   }
 }
 

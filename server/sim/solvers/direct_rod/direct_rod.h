@@ -1,14 +1,20 @@
-// direct_rod: an inextensible elastic rod with bending and natural curvature, implicit in time, solved by one
-// banded factorisation per strand and solve. Everything is divided by the mass per length, so that the rod
-// has one constant (bending stiffness over mass per length, m^4/s^2) and tensions are in m^2/s^2.
+// direct_rod: an inextensible elastic rod with bending, twist and natural curvature, implicit in time, solved
+// by one banded factorisation per strand and solve. Everything is divided by the mass per length, so that the
+// rod has two constants (bending and twist stiffness over mass per length, m^4/s^2) and tensions are in
+// m^2/s^2.
 //
-// Model, with b = EI / (rho A), e_i = edge before vertex i, t_i its direction, l_i its length:
+// Model, with b = EI / (rho A), c = GJ / (rho A), e_i = edge before vertex i, t_i its direction, l_i its
+// length, F_i its material frame (third axis t_i):
 //   tension     force g_i t_i per edge, g_i a multiplier kept between steps (augmented Lagrangian, penalty
-//   k); bending     b / (2 l_v) theta^2 per joint, theta between t_(i+1) and its rest direction u_i, which
-//   turns
-//               with the edge before it in a frame carried from the clamp without twist;
+//   k); joint       F_(i-1) and F_i each carry half of the rest rotation to the vertex; what is left between
+//   them
+//               is a bend theta and a twist tau about their mean tangent, with the energy
+//               (b theta^2 + c tau^2) / (2 l_v);
+//   twist       has no inertia: one angle per edge is solved for beside the positions (the quasi-static twist
+//               of Bergou et al. 2008, section 5, for rods of any rest shape);
 //   time        second-order backward differences (order 2, with steps of any length) or backward Euler.
-// After each solve every edge gets its exact length back. No twist: a curl is kept by bending alone.
+// After each solve every edge gets its exact length back. The twist of a straight rod with a free tip is
+// zero: the kernel has a variant without.
 #pragma once
 
 #include "server/sim/solver_registry.h"
@@ -17,14 +23,17 @@ namespace strandcast {
 
 /// What both versions of the solver read from the parameters.
 struct RodParameters {
-  double stiffness_m4ps2 = 0.0;    // EI / (rho A)
-  double bending_damping_s = 0.0;  // Kelvin-Voigt: bending moments lead by this time
+  double stiffness_m4ps2 = 0.0;        // EI / (rho A)
+  double twist_stiffness_m4ps2 = 0.0;  // GJ / (rho A)
+  double spin_inertia_m2 = 0.0;        // of the cross section about the tangent, over its area
+  double tip_length_m = 0.0;           // of hair as heavy as the bead at the tip
+  double bending_damping_s = 0.0;      // Kelvin-Voigt: moments lead by this time
   double air_drag_per_s = 0.0;
   double collider_friction = 0.0;
   double max_speed_mps = 0.0;  // relative to the head, of what a step starts from
   uint32_t solves = 1;         // linear solves per step
   uint32_t order = 2;          // of the time integration
-  bool is_sag_free = false;    // the loaded shape is the equilibrium under gravity
+  double sag_free = 0.0;       // share of the groom's weight that its rest shape carries
 };
 
 RodParameters read_rod_parameters(const SolverParameters& parameters);

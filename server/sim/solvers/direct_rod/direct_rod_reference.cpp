@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kTinyLength = 1e-10;
 constexpr double kBrokenM = 1e12;
+constexpr double kFoldedBack = 1e-6;  // 1 + cosine of tangents that face each other
 
 bool is_sane(const glm::dvec3& value) {
   return glm::dot(value, value) < kBrokenM * kBrokenM;
@@ -21,24 +22,30 @@ glm::dmat3 across(const glm::dvec3& direction) {
   return glm::dmat3(1.0) - glm::outerProduct(direction, direction);
 }
 
-/// Symmetric positive matrix of 3 x 3 blocks up to two off the diagonal, solved by scalar Cholesky.
+// Unknowns per vertex: its displacement and the spin of the edge that ends there, times the edge's length.
+constexpr size_t kUnknowns = 4;
+
+/// Symmetric positive matrix of blocks up to two off the diagonal, solved by scalar Cholesky.
 class BandedSystem {
  public:
   explicit BandedSystem(size_t vertex_count)
-      : band_(3 * vertex_count * kWidth, 0.0), right_side_(3 * vertex_count, 0.0) {}
+      : band_(kUnknowns * vertex_count * kWidth, 0.0), right_side_(kUnknowns * vertex_count, 0.0) {}
+  /// Rows and columns are unknowns; of a pair above the diagonal nothing is added.
+  void add(size_t row, size_t column, double value) {
+    if (column <= row) at(row, column) += value;
+  }
   void add_block(size_t i, size_t j, const glm::dmat3& block) {
     for (size_t r = 0; r < 3; ++r) {
-      for (size_t c = 0; c < 3; ++c) {
-        if (3 * j + c <= 3 * i + r)
-          at(3 * i + r, 3 * j + c) += block[static_cast<int>(c)][static_cast<int>(r)];
-      }
+      for (size_t c = 0; c < 3; ++c)
+        add(kUnknowns * i + r, kUnknowns * j + c, block[static_cast<int>(c)][static_cast<int>(r)]);
     }
   }
+  void add_right(size_t row, double value) { right_side_[row] += value; }
   void add_force(size_t i, const glm::dvec3& force) {
-    for (size_t c = 0; c < 3; ++c) right_side_[3 * i + c] += force[static_cast<int>(c)];
+    for (size_t c = 0; c < 3; ++c) add_right(kUnknowns * i + c, force[static_cast<int>(c)]);
   }
   /// The solution, or nothing when a pivot is not positive.
-  std::vector<glm::dvec3> solve() {
+  std::vector<glm::dvec4> solve() {
     const size_t n = right_side_.size();
     for (size_t i = 0; i < n; ++i) {
       const size_t begin = i < kWidth ? 0 : i - kWidth + 1;
@@ -56,16 +63,16 @@ class BandedSystem {
       for (size_t k = i + 1; k < std::min(n, i + kWidth); ++k) right_side_[i] -= at(k, i) * right_side_[k];
       right_side_[i] /= at(i, i);
     }
-    std::vector<glm::dvec3> solution(n / 3);
-    for (size_t i = 0; i < n; ++i) solution[i / 3][static_cast<int>(i % 3)] = right_side_[i];
+    std::vector<glm::dvec4> solution(n / kUnknowns);
+    for (size_t i = 0; i < n; ++i) solution[i / kUnknowns][static_cast<int>(i % kUnknowns)] = right_side_[i];
     return solution;
   }
 
  private:
-  static constexpr size_t kWidth = 9;  // scalars of three blocks
+  static constexpr size_t kWidth = 3 * kUnknowns;
   double& at(size_t row, size_t column) { return band_[row * kWidth + (row - column)]; }
 
-  std::vector<double> band_;  // lower triangle, (3 vertex_count x kWidth)
+  std::vector<double> band_;  // lower triangle, (kUnknowns vertex_count x kWidth)
   std::vector<double> right_side_;
 };
 
@@ -75,8 +82,33 @@ struct RodVertex {
   glm::dvec3 velocity_mps{0.0};         // world
   glm::dvec3 displacement_m{0.0};       // during the step before, world
   glm::dvec3 velocity_change_mps{0.0};  // during the step before
-  double tension_m2ps2 = 0.0;           // of the edge that ends here
+  // Of the edge that ends here.
+  double tension_m2ps2 = 0.0;
+  glm::dvec3 axis{1.0, 0.0, 0.0};  // material, at right angles to the edge, world
+  double spin_rad = 0.0;           // of the axis about the edge during the step before
 };
+
+/// One end of a joint: an edge's direction, and the tangent and axis that its frame carries to the vertex.
+struct JointSide {
+  glm::dvec3 direction{0.0};
+  glm::dvec3 tangent{0.0};
+  glm::dvec3 axis{0.0};
+  double length_m = 0.0;       // of the edge; 0 = a clamp, which does not give way
+  glm::dvec3 turn_radps{0.0};  // of a clamp
+};
+
+/// How a side turns with unit changes of its edge (three directions, and the spin times the length).
+std::array<glm::dvec3, kUnknowns> turns_of(const JointSide& side) {
+  std::array<glm::dvec3, kUnknowns> turns{};
+  if (side.length_m <= 0.0) return turns;
+  for (int k = 0; k < 3; ++k) {
+    glm::dvec3 unit(0.0);
+    unit[k] = 1.0;
+    turns[static_cast<size_t>(k)] = glm::cross(side.direction, unit) / side.length_m;
+  }
+  turns[3] = side.direction / side.length_m;
+  return turns;
+}
 
 struct RodStrand {
   RodRest rest;
@@ -107,6 +139,23 @@ Differences differences_for(double h_s, double history_step_s, uint32_t order) {
   return {(1.0 + 2.0 * ratio) / (1.0 + ratio), ratio * ratio / (1.0 + ratio)};
 }
 
+/// Frames without twist along the strand as it is.
+void set_untwisted(RodStrand& strand, uint32_t first, const glm::dquat& rotation) {
+  const glm::dvec3 clamp = rotation * strand.rest.clamp_direction;
+  glm::dvec3 axis = rotation * strand.rest.clamp_axis;
+  glm::dvec3 before = clamp;
+  for (size_t i = first; i < strand.vertex.size(); ++i) {
+    const glm::dvec3 edge = strand.vertex[i].position_m - strand.vertex[i - 1].position_m;
+    const double length = glm::length(edge);
+    const bool has_direction = strand.rest.segment_m[i] > strand.rest.shortest_m && length > kTinyLength;
+    const glm::dvec3 direction = has_direction && is_sane(edge) ? edge / length : before;
+    const glm::dvec3 straight(0.0, 0.0, 1.0);
+    axis = untwisted_axis(axis, before, direction, i == first ? straight : strand.rest.joint_tangent[i]);
+    strand.vertex[i].axis = axis;
+    before = direction;
+  }
+}
+
 /// One step of one strand.
 class RodMotion {
  public:
@@ -122,7 +171,10 @@ class RodMotion {
     for (uint32_t i = 0; i < n_; ++i)
       target_.push_back(step.rotation * glm::dvec3(layout.rest[layout.index(i, strand_index)]));
     clamp_direction_ = step.rotation * strand.rest.clamp_direction;
-    frame_axis_ = step.rotation * strand.rest.frame_axis;
+    const glm::dmat3 carry = glm::mat3_cast(step.carry);
+    clamp_turn_radps_ =
+        glm::dvec3(carry[1][2] - carry[2][1], carry[2][0] - carry[0][2], carry[0][1] - carry[1][0]) /
+        (2.0 * step.h_s);
   }
 
   void run() {
@@ -164,8 +216,13 @@ class RodMotion {
       if (is_free(i)) x_[i] = predicted(i);
     }
     if (has_free_tip()) restore_lengths();
-    const double rate = strand_.rest.mean_segment_m * (n_ - first_) * differences_.now / step_.h_s;
-    penalty_ = kTensionPerCrossing * rate * rate;
+    spin_rad_.assign(n_, 0.0);
+    for (uint32_t i = 0; i < n_; ++i) axis_.push_back(strand_.vertex[i].axis);
+    for (uint32_t i = first_; i <= last_free_edge(); ++i)
+      axis_[i] = carried_axis(axis_[i], direction_in(old_, i), direction_at(i));
+    const double length = strand_.rest.mean_segment_m * (n_ - first_);
+    const double rate = differences_.now / step_.h_s;
+    penalty_ = kTensionPerCrossing * length * (length + parameters_.tip_length_m) * rate * rate;
   }
 
   /// Where the vertex gets to when its velocity goes on changing as it did, within reason.
@@ -177,19 +234,27 @@ class RodMotion {
     return old_[i] + (step_.h_s * velocity + differences_.before * vertex.displacement_m) / differences_.now;
   }
 
+  /// The last edge with a free end.
+  uint32_t last_free_edge() const { return std::min(tail_, n_ - 1); }
+
+  glm::dvec3 direction_at(uint32_t i) const { return direction_in(x_, i); }
+
   void restore_lengths() {
     const std::vector<glm::dvec3> before = x_;
     for (uint32_t i = first_; i < n_; ++i)
-      x_[i] = x_[i - 1] + strand_.rest.segment_m[i] * direction_of(i, before[i] - before[i - 1]);
+      x_[i] = x_[i - 1] + strand_.rest.segment_m[i] * direction_in(before, i);
   }
 
-  /// Direction of the edge that ends at vertex i; the groomed one where it has none.
-  glm::dvec3 direction_of(uint32_t i, const glm::dvec3& edge) const {
-    const double length = glm::length(edge);
-    if (length > kTinyLength) return edge / length;
-    const glm::dvec3 groomed = target_[i] - target_[i - 1];
-    const double groomed_length = glm::length(groomed);
-    return groomed_length > kTinyLength ? groomed / groomed_length : clamp_direction_;
+  /// Direction of the edge that ends at vertex i: the groomed one where it has none, that of the edge before
+  /// where it has no length to speak of.
+  glm::dvec3 direction_in(const std::vector<glm::dvec3>& points, uint32_t i) const {
+    for (; i >= first_; --i) {
+      if (strand_.rest.segment_m[i] <= strand_.rest.shortest_m) continue;
+      const glm::dvec3 edge = points[i] - points[i - 1];
+      const double length = glm::length(edge);
+      return length > kTinyLength ? edge / length : glm::normalize(target_[i] - target_[i - 1]);
+    }
+    return clamp_direction_;
   }
 
   glm::dvec3 velocity_at(uint32_t i) const {
@@ -197,41 +262,46 @@ class RodMotion {
            step_.h_s;
   }
 
-  /// One Newton step for the multipliers and positions together; false when the matrix is not positive.
+  /// One Newton step for multipliers, positions and spins together; false when the matrix is not positive.
   bool solve() {
     if (tail_ <= first_) return true;
-    BandedSystem system(tail_ - first_);
+    BandedSystem system(last_free_edge() - first_ + 1);
     for (uint32_t i = first_; i < tail_; ++i) add_inertia(system, i);
-    for (uint32_t i = first_; i <= std::min(tail_, n_ - 1); ++i) add_tension(system, i);
-    glm::dvec3 axis = frame_axis_;
-    glm::dvec3 before = clamp_direction_;
-    for (uint32_t i = first_; i <= last(); ++i) {
-      const glm::dvec3 direction = direction_of(i, x_[i] - x_[i - 1]);
-      const glm::dvec3& c = strand_.rest.rest_direction[i];
-      const glm::dvec3 rest = c.x * axis + c.y * glm::cross(before, axis) + c.z * before;
-      add_bending(system, i, before, direction, rest);
-      axis = carried_axis(axis, before, direction);
-      before = direction;
+    for (uint32_t i = first_; i <= last_free_edge(); ++i) {
+      add_tension(system, i);
+      add_spin_inertia(system, i);
     }
+    for (uint32_t i = first_; i <= last(); ++i) add_joint(system, i);
+    // A pinned end does not move; the edge before it may spin.
+    if (!has_free_tip()) system.add_block(tail_ - first_, tail_ - first_, glm::dmat3(1.0));
     std::vector<glm::dvec3> moved(n_, glm::dvec3(0.0));
-    const std::vector<glm::dvec3> solution = system.solve();
+    const std::vector<glm::dvec4> solution = system.solve();
     if (solution.empty()) return false;
-    for (uint32_t i = first_; i < tail_; ++i) moved[i] = solution[i - first_];
-    for (uint32_t i = first_; i <= std::min(tail_, n_ - 1); ++i) {
+    for (uint32_t i = first_; i < tail_; ++i) moved[i] = glm::dvec3(solution[i - first_]);
+    std::vector<glm::dvec3> direction_before(n_);
+    for (uint32_t i = first_; i <= last_free_edge(); ++i) {
       const glm::dvec3 edge = x_[i] - x_[i - 1];
-      const double excess = has_free_tip() ? 0.0 : glm::length(edge) - strand_.rest.segment_m[i];
-      const double opening = excess + glm::dot(direction_of(i, edge), moved[i] - moved[i - 1]);
+      direction_before[i] = direction_at(i);
+      const double excess =
+          has_free_tip() ? 0.0 : glm::dot(edge, direction_before[i]) - strand_.rest.segment_m[i];
+      const double opening = excess + glm::dot(direction_before[i], moved[i] - moved[i - 1]);
       strand_.vertex[i].tension_m2ps2 += penalty_ / soft(i) * opening;
     }
     for (uint32_t i = first_; i < tail_; ++i) x_[i] += moved[i];
     if (has_free_tip()) restore_lengths();
-    return std::all_of(x_.begin(), x_.end(), is_sane);
+    for (uint32_t i = first_; i <= last_free_edge(); ++i) {
+      const double spin_rad = solution[i - first_].w / soft(i);
+      spin_rad_[i] += spin_rad;
+      const glm::dvec3 spun = glm::angleAxis(spin_rad, direction_before[i]) * axis_[i];
+      axis_[i] = carried_axis(spun, direction_before[i], direction_at(i));
+    }
+    return std::all_of(x_.begin(), x_.end(), is_sane) && std::all_of(axis_.begin(), axis_.end(), is_sane);
   }
 
   void add_inertia(BandedSystem& system, uint32_t i) const {
     const double h = step_.h_s;
     const double drag = parameters_.air_drag_per_s;
-    const double mass = 0.5 * (soft(i) + (i + 1 < n_ ? soft(i + 1) : 0.0));
+    const double mass = 0.5 * (soft(i) + (i + 1 < n_ ? soft(i + 1) : 2.0 * parameters_.tip_length_m));
     const RodVertex& vertex = strand_.vertex[i];
     const glm::dvec3 velocity = velocity_at(i);
     const glm::dvec3 acceleration = (differences_.now * (velocity - vertex.velocity_mps) -
@@ -243,10 +313,17 @@ class RodMotion {
     system.add_block(i - first_, i - first_, glm::dmat3(mass * (rate * rate + drag * rate)));
   }
 
+  /// Of the section; it counts only where nothing else holds the spin.
+  void add_spin_inertia(BandedSystem& system, uint32_t i) const {
+    const double rate = differences_.now / step_.h_s;
+    const size_t row = kUnknowns * (i - first_) + 3;
+    system.add(row, row, parameters_.spin_inertia_m2 / soft(i) * rate * rate);
+  }
+
   void add_tension(BandedSystem& system, uint32_t i) const {
     const glm::dvec3 edge = x_[i] - x_[i - 1];
-    const glm::dvec3 t = direction_of(i, edge);
-    const double excess = has_free_tip() ? 0.0 : glm::length(edge) - strand_.rest.segment_m[i];
+    const glm::dvec3 t = direction_at(i);
+    const double excess = has_free_tip() ? 0.0 : glm::dot(edge, t) - strand_.rest.segment_m[i];
     const double tension = strand_.vertex[i].tension_m2ps2;
     const glm::dvec3 force = (tension + penalty_ / soft(i) * excess) * t;
     const glm::dmat3 stiffness =
@@ -260,57 +337,107 @@ class RodMotion {
     }
   }
 
-  /// The joint at vertex i - 1: `before` and `after` are the directions of the edges there, `rest` where
-  /// `after` would be without a moment. Its strain is d = after - rest, with theta / sin(theta) for the
-  /// angle.
-  void add_bending(BandedSystem& system, uint32_t i, const glm::dvec3& before, const glm::dvec3& after,
-                   const glm::dvec3& rest) const {
+  /// What the frame of the edge before vertex i carries to the joint before it (`sign` = -1) or behind it.
+  JointSide side_of(uint32_t i, const glm::dvec3& rest_tangent, double sign) const {
+    JointSide side;
+    side.direction = direction_at(i);
+    side.tangent = sign * rest_tangent.x * axis_[i] +
+                   sign * rest_tangent.y * glm::cross(side.direction, axis_[i]) +
+                   rest_tangent.z * side.direction;
+    side.axis = carried_axis(axis_[i], side.direction, side.tangent);
+    side.length_m = soft(i);
+    return side;
+  }
+
+  JointSide clamp_of(const glm::dvec3& direction_in_head, const glm::dvec3& axis_in_head) const {
+    JointSide side;
+    side.direction = side.tangent = step_.rotation * direction_in_head;
+    side.axis = step_.rotation * axis_in_head;
+    side.turn_radps = clamp_turn_radps_;
+    return side;
+  }
+
+  /// The joint at vertex i - 1. Its strain is the difference d of the two sides' tangents, with theta /
+  /// sin(theta) for the angle, and the angle between their axes.
+  void add_joint(BandedSystem& system, uint32_t i) const {
     const bool is_clamp = i == first_;
     const bool is_tail_clamp = i > tail_;
-    const glm::dvec3 d = after - rest;
+    const RodRest& rest = strand_.rest;
+    const glm::dvec3 straight(0.0, 0.0, 1.0);
+    const JointSide before = is_clamp ? clamp_of(rest.clamp_direction, rest.clamp_axis)
+                                      : side_of(i - 1, is_tail_clamp ? straight : rest.joint_tangent[i], 1.0);
+    const JointSide after = is_tail_clamp ? clamp_of(rest.tail_direction, rest.tail_axis)
+                                          : side_of(i, is_clamp ? straight : rest.joint_tangent[i], -1.0);
+    const glm::dvec3 d = after.tangent - before.tangent;
     const double half_sine_squared = std::min(0.25 * glm::dot(d, d), kMaxHalfSineSquared);
     const double half_sine = std::sqrt(half_sine_squared);
     const double angle = 2.0 * std::asin(half_sine);
     const double per_sine = half_sine > 1e-6 ? angle / std::sin(angle) : 1.0;
-
-    // d changes by -A with the edge before (the rest direction turns with it) and by C with the edge after.
-    glm::dmat3 with_before(0.0);
-    glm::dmat3 with_after(0.0);
-    glm::dvec3 clamp_rate(0.0);
-    if (is_clamp) {
-      clamp_rate = (rest - glm::conjugate(step_.carry) * rest) / step_.h_s;
-    } else {
-      with_before = (glm::dot(before, rest) * glm::dmat3(1.0) - glm::outerProduct(before, rest)) *
-                    across(before) / soft(i - 1);
-    }
-    if (!is_tail_clamp) with_after = across(after) / soft(i);
-    const glm::dmat3 jacobian[3] = {with_before, -with_before - with_after, with_after};
+    const glm::dvec3 carried = carried_axis(before.axis, before.tangent, after.tangent);
+    const double twist =
+        std::atan2(glm::dot(glm::cross(carried, after.axis), after.tangent), glm::dot(carried, after.axis));
 
     const double b = parameters_.stiffness_m4ps2;
-    double weight = per_sine;
-    if (is_clamp) {
-      weight *= clamp_stiffness(b, strand_.vertex[i].tension_m2ps2, soft(i));
-    } else if (is_tail_clamp) {
-      weight *= clamp_stiffness(b, strand_.vertex[i - 1].tension_m2ps2, soft(i - 1));
-    } else {
-      weight *= 2.0 * b / (soft(i - 1) + soft(i));
+    const double per_length = 2.0 / (before.length_m + after.length_m);
+    const double tension = strand_.vertex[is_tail_clamp ? i - 1 : i].tension_m2ps2;
+    const double bending = is_clamp || is_tail_clamp
+                               ? clamp_stiffness(b, tension, before.length_m + after.length_m)
+                               : b * per_length;
+    const glm::dvec4 weight(glm::dvec3(bending * per_sine), parameters_.twist_stiffness_m4ps2 * per_length);
+    add_strain(system, i, {before, after}, glm::dvec4(d, twist), weight);
+  }
+
+  /// Twist turns about the sum of the tangents over 1 + their cosine.
+  static glm::dvec4 strain_of_turn(const JointSide& side, const glm::dvec3& mean, const glm::dvec3& turn) {
+    return {glm::cross(turn, side.tangent), glm::dot(turn, mean)};
+  }
+
+  void add_strain(BandedSystem& system, uint32_t i, const std::array<JointSide, 2>& side,
+                  const glm::dvec4& strain, const glm::dvec4& weight) const {
+    const double cosine = glm::dot(side[0].tangent, side[1].tangent);
+    const glm::dvec3 mean = (side[0].tangent + side[1].tangent) / std::max(1.0 + cosine, kFoldedBack);
+    // Change of the strain with the unknowns of the vertices i - 2, i - 1, i.
+    std::array<glm::dvec4, 3 * kUnknowns> jacobian{};
+    glm::dvec4 rate(0.0);
+    for (size_t k = 0; k < 2; ++k) {
+      const double sign = k == 0 ? -1.0 : 1.0;
+      const std::array<glm::dvec3, kUnknowns> turns = turns_of(side[k]);
+      for (size_t c = 0; c < kUnknowns; ++c) {
+        const glm::dvec4 change = sign * strain_of_turn(side[k], mean, turns[c]);
+        jacobian[kUnknowns * (k + 1) + c] += change;
+        if (c < 3) jacobian[kUnknowns * k + c] -= change;
+      }
+      rate += sign * strain_of_turn(side[k], mean, side[k].turn_radps);
     }
-    glm::dvec3 rate = -clamp_rate;
-    for (uint32_t p = is_clamp ? 1 : 0; p < 3; ++p) rate += jacobian[p] * velocity_at(i - 2 + p);
+    const auto is_unknown = [&](size_t p) {
+      const size_t vertex = i + p / kUnknowns;  // of i - 2, shifted
+      const bool is_spin = p % kUnknowns == 3;
+      return vertex >= first_ + 2 && vertex < (is_spin ? last_free_edge() + 1 : tail_) + 2;
+    };
+    for (size_t p = 0; p < jacobian.size(); ++p) {
+      const size_t shifted = i + p / kUnknowns;
+      if (shifted < 2 || shifted - 2 >= n_) continue;
+      const auto vertex = static_cast<uint32_t>(shifted - 2);
+      const auto c = static_cast<int>(p % kUnknowns);
+      rate += jacobian[p] * (c < 3 ? velocity_at(vertex)[c] : soft(vertex) * spin_rate_at(vertex));
+    }
     const double damping = parameters_.bending_damping_s;
-    const glm::dvec3 stress = weight * (d + damping * rate);
-    const double stiffness = weight * (1.0 + damping * differences_.now / step_.h_s);
-    for (uint32_t p = is_clamp ? 1 : 0; p < 3; ++p) {
-      const uint32_t row = i - 2 + p;
-      if (!is_free(row)) continue;
-      system.add_force(row - first_, -(glm::transpose(jacobian[p]) * stress));
-      for (uint32_t q = is_clamp ? 1 : 0; q < 3; ++q) {
-        const uint32_t column = i - 2 + q;
-        if (!is_free(column)) continue;
-        system.add_block(row - first_, column - first_,
-                         stiffness * (glm::transpose(jacobian[p]) * jacobian[q]));
+    const glm::dvec4 stress = weight * (strain + damping * rate);
+    const glm::dvec4 stiffness = (1.0 + damping * differences_.now / step_.h_s) * weight;
+    for (size_t p = 0; p < jacobian.size(); ++p) {
+      if (!is_unknown(p)) continue;
+      const size_t row = kUnknowns * size_t{i} + p - kUnknowns * size_t{first_ + 2};
+      system.add_right(row, -glm::dot(jacobian[p], stress));
+      for (size_t q = 0; q < jacobian.size(); ++q) {
+        if (is_unknown(q))
+          system.add(row, kUnknowns * size_t{i} + q - kUnknowns * size_t{first_ + 2},
+                     glm::dot(jacobian[p], stiffness * jacobian[q]));
       }
     }
+  }
+
+  double spin_rate_at(uint32_t i) const {
+    return (differences_.now * spin_rad_[i] - differences_.before * strand_.vertex[i].spin_rad) / step_.h_s;
   }
 
   // What colliders, or a pinned tip, move a vertex by after the solve counts as an impulse: once in the
@@ -326,6 +453,11 @@ class RodMotion {
       vertex.velocity_mps = solved_velocity + (x_[i] - solved[i]) / step_.h_s;
       vertex.displacement_m = x_[i] - old_[i];
       vertex.position_m = x_[i];
+      vertex.axis = axis_[i];
+      vertex.spin_rad = spin_rad_[i];
+    }
+    for (uint32_t i = first_; i <= last_free_edge(); ++i) {
+      strand_.vertex[i].axis = carried_axis(axis_[i], direction_in(solved, i), direction_at(i));
     }
     strand_.history_step_s = step_.h_s;
   }
@@ -335,7 +467,7 @@ class RodMotion {
     const double length = strand_.rest.segment_m[i];
     const glm::dvec3 start = x_[i - 1];
     glm::dvec3 end = solved[i];
-    if (start != solved[i - 1] || !has_free_tip()) end = start + length * direction_of(i, solved[i] - start);
+    if (start != solved[i - 1] || !has_free_tip()) end = start + length * aimed_direction(i, start, solved);
     end = pushed_out(*step_.input, step_.carry, parameters_.collider_friction,
                      {strand_.vertex[i].position_m, start, end, length});
     if (!has_free_tip()) {
@@ -347,12 +479,20 @@ class RodMotion {
     x_[i] = end;
   }
 
+  glm::dvec3 aimed_direction(uint32_t i, const glm::dvec3& start,
+                             const std::vector<glm::dvec3>& solved) const {
+    const glm::dvec3 way = solved[i] - start;
+    const double distance = glm::length(way);
+    return distance > kTinyLength ? way / distance : direction_in(solved, i);
+  }
+
   void reset() {
     for (uint32_t i = 0; i < n_; ++i) {
       strand_.vertex[i] = RodVertex{};
       strand_.vertex[i].position_m = target_[i];
       strand_.vertex[i].velocity_mps = step_.head_velocity_mps;
     }
+    set_untwisted(strand_, first_, step_.rotation);
     strand_.history_step_s = 0.0;
   }
 
@@ -364,10 +504,12 @@ class RodMotion {
   uint32_t tail_;
   Differences differences_;
   std::vector<glm::dvec3> target_;
-  std::vector<glm::dvec3> old_;  // position before the step, relative to where the head joint is now
-  std::vector<glm::dvec3> x_;    // of the step in progress
+  std::vector<glm::dvec3> old_;   // position before the step, relative to where the head joint is now
+  std::vector<glm::dvec3> x_;     // of the step in progress
+  std::vector<glm::dvec3> axis_;  // of the edges
+  std::vector<double> spin_rad_;  // in this step
   glm::dvec3 clamp_direction_{0.0};
-  glm::dvec3 frame_axis_{0.0};
+  glm::dvec3 clamp_turn_radps_{0.0};
   double penalty_ = 0.0;
 };
 
@@ -379,22 +521,26 @@ class DirectRodReference final : public Solver {
   Status load(const Groom& groom, const glm::dquat& world_from_head) override {
     ASSIGN_OR_RETURN(layout_, make_strand_layout(groom, kMaxReferenceVertexCount));
     previous_rotation_ = limited_rotation(world_from_head);
-    const glm::dvec3 gravity_in_head =
-        glm::conjugate(previous_rotation_) * glm::dvec3(0.0, -kStandardGravityMps2, 0.0);
     strands_.assign(layout_.strand_count, {});
+    groom_gravity_in_head_mps2_ = glm::dvec3(0.0);
+    is_untouched_ = true;
     for (uint32_t s = 0; s < layout_.strand_count; ++s) {
       RodStrand& strand = strands_[s];
-      strand.rest = make_rod_rest(layout_, s, parameters_, gravity_in_head);
       strand.vertex.assign(layout_.vertex_count, {});
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
+      for (uint32_t i = 0; i < layout_.vertex_count; ++i)
         strand.vertex[i].position_m = previous_rotation_ * glm::dvec3(layout_.rest[layout_.index(i, s)]);
-        strand.vertex[i].tension_m2ps2 = strand.rest.tension_m2ps2[i];
-      }
     }
+    set_rest();
     return {};
   }
 
   void substep(const StepInput& input) override {
+    const glm::dvec3 groom_gravity = limited(input.groom_gravity_in_head_mps2, kMaxGravityMps2);
+    if (parameters_.sag_free > 0.0 && groom_gravity != groom_gravity_in_head_mps2_) {
+      groom_gravity_in_head_mps2_ = groom_gravity;
+      set_rest();
+    }
+    is_untouched_ = false;
     RodStep step;
     step.input = &input;
     step.h_s = limited_substep_s(input);
@@ -431,21 +577,37 @@ class DirectRodReference final : public Solver {
                      state.velocity_mps[layout_.index(i, s)] != glm::vec3(strand.vertex[i].velocity_mps);
       }
       if (!is_changed) continue;
+      is_untouched_ = false;
       strand.history_step_s = 0.0;
       for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
         strand.vertex[i] = RodVertex{};
         strand.vertex[i].position_m = glm::dvec3(state.position_m[layout_.index(i, s)]);
         strand.vertex[i].velocity_mps = glm::dvec3(state.velocity_mps[layout_.index(i, s)]);
       }
+      set_untwisted(strand, layout_.pinned_root_count, previous_rotation_);
     }
   }
 
   uint64_t memory_bytes() const override { return layout_.size() * sizeof(RodVertex); }
 
  private:
+  /// The rest shape; what has not moved yet starts in it, with the tensions and frames it has as loaded.
+  void set_rest() {
+    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+      RodStrand& strand = strands_[s];
+      strand.rest = make_rod_rest(layout_, s, parameters_, groom_gravity_in_head_mps2_);
+      for (uint32_t i = 0; i < layout_.vertex_count && is_untouched_; ++i) {
+        strand.vertex[i].tension_m2ps2 = strand.rest.tension_m2ps2[i];
+        strand.vertex[i].axis = previous_rotation_ * strand.rest.axis[i];
+      }
+    }
+  }
+
   RodParameters parameters_;
   StrandLayout layout_;
   std::vector<RodStrand> strands_;
+  glm::dvec3 groom_gravity_in_head_mps2_{0.0};  // under which the rest shape was found
+  bool is_untouched_ = true;                    // as loaded
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
 };
 

@@ -7,9 +7,11 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLength = 1e-10;
 constexpr double kSoftShare = 0.1;
 constexpr double kMinSoftLengthM = 1e-5;
+// Float positions say nothing about the direction of edges below.
+constexpr double kShortestShare = 1e-3;
+constexpr double kShortestM = 1e-6;
 // 1 + cos below this: the edge folds back, any rotation will do.
 constexpr double kFoldedBack = 1e-6;
 // A joint that would have to turn further than this holds no more load.
@@ -21,8 +23,9 @@ glm::dvec3 any_perpendicular(const glm::dvec3& direction) {
   return glm::normalize(glm::cross(direction, other));
 }
 
-/// Directions of all edges; an edge without length continues the one before it.
-std::vector<glm::dvec3> edge_directions(const StrandLayout& layout, uint32_t strand_index) {
+/// Directions of all edges; an edge too short for one continues the one before it.
+std::vector<glm::dvec3> edge_directions(const StrandLayout& layout, uint32_t strand_index,
+                                        double shortest_m) {
   const uint32_t n = layout.vertex_count;
   std::vector<glm::dvec3> direction(n, glm::dvec3(0.0, 1.0, 0.0));
   bool has_any = false;
@@ -30,35 +33,148 @@ std::vector<glm::dvec3> edge_directions(const StrandLayout& layout, uint32_t str
     const glm::dvec3 edge = glm::dvec3(layout.rest[layout.index(i, strand_index)]) -
                             glm::dvec3(layout.rest[layout.index(i - 1, strand_index)]);
     const double length = glm::length(edge);
-    direction[i] = length > kTinyLength ? edge / length : direction[i - 1];
-    if (length > kTinyLength && !has_any) std::fill(direction.begin(), direction.begin() + i, direction[i]);
-    has_any = has_any || length > kTinyLength;
+    direction[i] = length > shortest_m ? edge / length : direction[i - 1];
+    if (length > shortest_m && !has_any) std::fill(direction.begin(), direction.begin() + i, direction[i]);
+    has_any = has_any || length > shortest_m;
   }
   return direction;
 }
 
-/// Rest directions, in head space, under which the shape carries its own weight: from the tip to the root,
-/// the moment of each joint is what the edge after it and the next joint leave over.
-void make_sag_free(const StrandLayout& layout, const RodParameters& parameters,
-                   const std::vector<glm::dvec3>& direction, const std::vector<glm::dvec3>& load,
-                   RodRest& rest, std::vector<glm::dvec3>& rest_in_head) {
-  const uint32_t first = layout.pinned_root_count;
-  const double b = parameters.stiffness_m4ps2;
-  glm::dvec3 moment_after(0.0);
-  for (uint32_t i = layout.vertex_count - 1; i >= first; --i) {
-    const glm::dvec3& t = direction[i];
+glm::dvec3 rotated(const glm::dvec3& vector, const glm::dvec3& axis, double angle_rad) {
+  return glm::angleAxis(angle_rad, axis) * vector;
+}
+
+/// Strain of a joint that carries a moment: a bend about an axis at right angles to the mean tangent, and a
+/// twist about the mean tangent.
+struct JointStrain {
+  glm::dvec3 bend_axis{1.0, 0.0, 0.0};
+  double bend_rad = 0.0;
+  double twist_rad = 0.0;
+};
+
+/// The stiffnesses are moments per angle over mass per length.
+JointStrain strain_under(const glm::dvec3& moment, const glm::dvec3& tangent, double bend_stiffness,
+                         double twist_stiffness) {
+  JointStrain strain;
+  const double along = glm::dot(moment, tangent);
+  const glm::dvec3 across = moment - along * tangent;
+  const double size = glm::length(across);
+  if (size > 0.0 && bend_stiffness > 0.0) {
+    strain.bend_axis = across / size;
+    strain.bend_rad = std::min(size / bend_stiffness, kMaxRestAngleRad);
+  } else {
+    strain.bend_axis = any_perpendicular(tangent);
+  }
+  // The twist turns about (sum of the tangents) / (1 + cos theta), which is longer than one.
+  if (twist_stiffness > 0.0) {
+    const double twist = along * std::cos(0.5 * strain.bend_rad) / twist_stiffness;
+    strain.twist_rad = std::clamp(twist, -kMaxRestAngleRad, kMaxRestAngleRad);
+  }
+  return strain;
+}
+
+/// A direction turned from the joint's unstrained side to its middle.
+glm::dvec3 half_strained(const JointStrain& strain, const glm::dvec3& tangent, const glm::dvec3& vector,
+                         double sign) {
+  return rotated(rotated(vector, strain.bend_axis, sign * 0.5 * strain.bend_rad), tangent,
+                 sign * 0.5 * strain.twist_rad);
+}
+
+struct RestJoint {
+  JointStrain strain;
+  glm::dvec3 tangent{0.0};  // mean tangent, as loaded
+};
+
+struct JointEdges {
+  glm::dvec3 before{0.0};
+  glm::dvec3 after{0.0};
+  glm::dvec3 side{0.0};
+  bool is_clamp = false;
+};
+
+/// The strain under which a joint between two directions carries a moment. Its axes stand relative to the
+/// mean tangent, which in turn depends on the strain: found by repetition. A clamp (no edge before) has the
+/// edge's direction for the tangent. `side` is the tangent of edges that fold back onto each other.
+RestJoint joint_under(const glm::dvec3& moment, const JointEdges& edges, double bend_stiffness,
+                      double twist_stiffness) {
+  const auto& [before, after, side, is_clamp] = edges;
+  constexpr int kRounds = 60;
+  RestJoint joint;
+  const glm::dvec3 sum = is_clamp ? after : before + after;
+  joint.tangent = glm::dot(sum, sum) > 2.0 * kFoldedBack ? glm::normalize(sum) : side;
+  for (int round = 0; round < kRounds; ++round) {
+    joint.strain = strain_under(moment, joint.tangent, bend_stiffness, twist_stiffness);
+    const glm::dvec3 end = half_strained(joint.strain, joint.tangent, after, -1.0);
+    const glm::dvec3 start = half_strained(joint.strain, joint.tangent, before, 1.0);
+    const glm::dvec3 middle = is_clamp ? end : start + end;
+    if (glm::dot(middle, middle) <= 2.0 * kFoldedBack) break;
+    joint.tangent = glm::normalize(middle);
+  }
+  // The bend axis of the last round, at right angles to the last tangent.
+  joint.strain = strain_under(moment, joint.tangent, bend_stiffness, twist_stiffness);
+  return joint;
+}
+
+/// Moment of every joint of the shape as loaded, from the tip: what the edge after it and the next joint
+/// leave over.
+std::vector<glm::dvec3> moments_of(const StrandLayout& layout, const std::vector<glm::dvec3>& direction,
+                                   const std::vector<glm::dvec3>& load, const RodRest& rest) {
+  std::vector<glm::dvec3> moment(layout.vertex_count + 1, glm::dvec3(0.0));
+  for (uint32_t i = layout.vertex_count - 1; i >= layout.pinned_root_count; --i) {
     const double length = soft_length_m(rest.segment_m[i], rest.mean_segment_m);
-    const glm::dvec3 across = moment_after - t * glm::dot(t, moment_after);
-    const glm::dvec3 moment = length * glm::cross(t, load[i]) + across;
-    const double before = i > first ? soft_length_m(rest.segment_m[i - 1], rest.mean_segment_m) : 0.0;
-    const double stiffness =
-        i > first ? 2.0 * b / (before + length) : clamp_stiffness(b, rest.tension_m2ps2[i], length);
-    const double size = glm::length(moment);
-    if (size > 0.0 && stiffness > 0.0) {
-      const double angle = std::min(size / stiffness, kMaxRestAngleRad);
-      rest_in_head[i] = std::cos(angle) * t - std::sin(angle) * glm::cross(moment / size, t);
+    moment[i] = moment[i + 1] + length * glm::cross(direction[i], load[i]);
+  }
+  return moment;
+}
+
+/// Tangents and frames of all joints behind the clamp's direction, for the given moments.
+void set_joints(const StrandLayout& layout, const RodParameters& parameters,
+                const std::vector<glm::dvec3>& direction, const std::vector<glm::dvec3>& moment,
+                RodRest& rest) {
+  const uint32_t n = layout.vertex_count;
+  const uint32_t first = layout.pinned_root_count;
+  const auto soft = [&rest](uint32_t i) { return soft_length_m(rest.segment_m[i], rest.mean_segment_m); };
+  rest.joint_tangent.assign(n, glm::dvec3(0.0, 0.0, 1.0));
+  rest.axis.assign(n, glm::dvec3(1.0, 0.0, 0.0));
+  if (first >= n) {
+    rest.clamp_direction = direction[n - 1];
+    rest.clamp_axis = any_perpendicular(rest.clamp_direction);
+    return;
+  }
+  const double b = parameters.stiffness_m4ps2;
+  const double c = parameters.twist_stiffness_m4ps2;
+  for (uint32_t i = first; i < n; ++i) {
+    const bool is_clamp = i == first;
+    const double per_length = is_clamp ? 2.0 / soft(i) : 2.0 / (soft(i - 1) + soft(i));
+    const double bend = is_clamp ? clamp_stiffness(b, rest.tension_m2ps2[i], soft(i)) : b * per_length;
+    const JointEdges edges = {direction[i - 1], direction[i], glm::cross(direction[i - 1], rest.axis[i - 1]),
+                              is_clamp};
+    const RestJoint joint = joint_under(moment[i], edges, bend, c * per_length);
+    const JointStrain& strain = joint.strain;
+    // Half a bend, the twist, half a bend: from the frame on one side of the joint to that on the other.
+    const auto strained = [&](const glm::dvec3& vector, double sign) {
+      const glm::dvec3 half = rotated(vector, strain.bend_axis, sign * 0.5 * strain.bend_rad);
+      return rotated(rotated(half, joint.tangent, sign * strain.twist_rad), strain.bend_axis,
+                     sign * 0.5 * strain.bend_rad);
+    };
+    const glm::dvec3 start_tangent = rotated(joint.tangent, strain.bend_axis, -0.5 * strain.bend_rad);
+    if (is_clamp) {
+      rest.clamp_direction = start_tangent;
+      rest.clamp_axis = any_perpendicular(start_tangent);
+      rest.axis[i] = strained(rest.clamp_axis, 1.0);
+    } else {
+      const glm::dvec3& before = direction[i - 1];
+      const glm::dvec3& axis = rest.axis[i - 1];
+      rest.joint_tangent[i] = {glm::dot(start_tangent, axis),
+                               glm::dot(start_tangent, glm::cross(before, axis)),
+                               glm::dot(start_tangent, before)};
+      const glm::dvec3 unstrained = strained(direction[i], -1.0);
+      rest.axis[i] = strained(carried_axis(axis, before, unstrained), 1.0);
+      if (i < layout.tail_begin() + 1)
+        rest.turn_rad += 2.0 * std::acos(std::clamp(rest.joint_tangent[i].z, -1.0, 1.0));
     }
-    moment_after = moment;
+    // Roundings of the rotations above.
+    rest.axis[i] = glm::normalize(rest.axis[i] - direction[i] * glm::dot(rest.axis[i], direction[i]));
   }
 }
 
@@ -70,13 +186,18 @@ RodParameters read_rod_parameters(const SolverParameters& parameters) {
   // EI / (rho A) of a full circle: E pi r^4 / 4 over rho pi r^2.
   result.stiffness_m4ps2 =
       parameters.at("young_modulus_pa") * radius * radius / (4.0 * parameters.at("density_kgpm3"));
+  // J = 2 I for a full circle, G = E / (2 (1 + nu)).
+  result.twist_stiffness_m4ps2 = result.stiffness_m4ps2 / (1.0 + parameters.at("poisson_ratio"));
+  result.spin_inertia_m2 = 0.5 * radius * radius;
+  const double mass_per_length = parameters.at("density_kgpm3") * std::numbers::pi * radius * radius;
+  result.tip_length_m = parameters.at("tip_mass_kg") / mass_per_length;
   result.bending_damping_s = parameters.at("bending_damping_s");
   result.air_drag_per_s = parameters.at("air_drag_per_s");
   result.collider_friction = parameters.at("collider_friction");
   result.max_speed_mps = parameters.at("max_speed_mps");
   result.solves = static_cast<uint32_t>(std::lround(parameters.at("solves")));
   result.order = static_cast<uint32_t>(std::lround(parameters.at("order")));
-  result.is_sag_free = parameters.at("sag_free") >= 0.5;
+  result.sag_free = parameters.at("sag_free");
   return result;
 }
 
@@ -97,11 +218,18 @@ glm::dvec3 carried_axis(const glm::dvec3& axis, const glm::dvec3& from, const gl
   return glm::normalize(result);
 }
 
+glm::dvec3 untwisted_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to,
+                          const glm::dvec3& joint_tangent) {
+  const glm::dvec3& c = joint_tangent;
+  const glm::dvec3 tangent = c.x * axis + c.y * glm::cross(from, axis) + c.z * from;
+  const glm::dvec3 unstrained = 2.0 * glm::dot(tangent, from) * tangent - from;
+  return carried_axis(carried_axis(axis, from, unstrained), unstrained, to);
+}
+
 RodRest make_rod_rest(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
-                      const glm::dvec3& gravity_in_head_mps2) {
+                      const glm::dvec3& groom_gravity_in_head_mps2) {
   const uint32_t n = layout.vertex_count;
   const uint32_t first = layout.pinned_root_count;
-  const std::vector<glm::dvec3> direction = edge_directions(layout, strand_index);
   RodRest rest;
   rest.segment_m.assign(n, 0.0);
   double free_length = 0.0;
@@ -111,51 +239,51 @@ RodRest make_rod_rest(const StrandLayout& layout, uint32_t strand_index, const R
   }
   rest.mean_segment_m = first < n ? std::max(free_length / (n - first), kMinSoftLengthM) : kMinSoftLengthM;
 
-  const bool is_sag_free = parameters.is_sag_free && layout.pinned_tail_count == 0;
+  rest.shortest_m = std::max(kShortestShare * rest.mean_segment_m, kShortestM);
+  const std::vector<glm::dvec3> direction = edge_directions(layout, strand_index, rest.shortest_m);
+
+  const double share = layout.pinned_tail_count == 0 ? parameters.sag_free : 0.0;
   // Weight beyond each edge, per mass per length; half of every edge's mass at either end.
   std::vector<glm::dvec3> load(n, glm::dvec3(0.0));
   rest.tension_m2ps2.assign(n, 0.0);
-  double beyond = 0.0;
+  double beyond = parameters.tip_length_m;
   for (uint32_t i = n - 1; i >= first && i > 0; --i) {
     const double length = soft_length_m(rest.segment_m[i], rest.mean_segment_m);
-    load[i] = gravity_in_head_mps2 * (beyond + 0.5 * length);
+    load[i] = share * (beyond + 0.5 * length) * groom_gravity_in_head_mps2;
     beyond += length;
-    if (is_sag_free) rest.tension_m2ps2[i] = glm::dot(load[i], direction[i]);
+    rest.tension_m2ps2[i] = glm::dot(load[i], direction[i]);
   }
-
-  std::vector<glm::dvec3> rest_in_head = direction;
-  if (is_sag_free) make_sag_free(layout, parameters, direction, load, rest, rest_in_head);
-
-  // One pinned vertex: the strand leaves the head in the direction of its first edge.
-  rest.clamp_direction = direction[first >= 2 || first >= n ? first - 1 : first];
-  rest.frame_axis = any_perpendicular(rest.clamp_direction);
-  rest.rest_direction.assign(n, glm::dvec3(0.0, 0.0, 1.0));
-  glm::dvec3 axis = rest.frame_axis;
-  glm::dvec3 before = rest.clamp_direction;
-  for (uint32_t i = first; i < n; ++i) {
-    const glm::dvec3& u = rest_in_head[i];
-    rest.rest_direction[i] = {glm::dot(u, axis), glm::dot(u, glm::cross(before, axis)), glm::dot(u, before)};
-    axis = carried_axis(axis, before, direction[i]);
-    before = direction[i];
-  }
+  set_joints(layout, parameters, direction, moments_of(layout, direction, load, rest), rest);
+  const uint32_t tail = std::min(layout.tail_begin(), n - 1);
+  rest.tail_direction = direction[tail];
+  rest.tail_axis = rest.axis[tail];
   return rest;
 }
 
 SolverRow direct_rod_row() {
   SolverRow row;
   row.name = "direct_rod";
-  row.summary = "elastic rod with the constants of hair: exact lengths, bending, natural curvature, implicit";
+  row.summary =
+      "elastic rod with the constants of hair: exact lengths, bending, twist, natural curvature, implicit";
   row.source =
       "Kirchhoff rod in vertices: bending as in Bergou et al., Discrete Elastic Rods, SIGGRAPH 2008, section "
-      "4.2, with theta^2 for the curvature; tension as a multiplier, the banded solve and the clamp are ours";
+      "4.2, with theta^2 for the curvature, and its quasi-static twist, section 5; frames carried in time as "
+      "in Discrete Viscous Threads, SIGGRAPH 2010; tension as a multiplier, the banded solve and the clamp "
+      "are "
+      "ours";
   row.parameters = {
       {"radius_m", 5e-5, 1e-6, 1e-2, "m", "radius of the circular cross section"},
       {"density_kgpm3", 1300.0, 1.0, 1e5, "kg/m^3", "density"},
       {"young_modulus_pa", 3e9, 0.0, 1e16, "Pa", "Young's modulus; 0 = a chain"},
-      {"bending_damping_s", 2e-3, 0.0, 1.0, "s", "material damping: time by which bending moments lead"},
+      {"poisson_ratio", 0.45, -0.9, 10.0, "",
+       "twist softens with it: shear modulus = Young's modulus / (2 (1 + ratio)); measured hairs reach 1.2"},
+      {"bending_damping_s", 2e-3, 0.0, 1.0, "s",
+       "material damping: time by which bending and twisting moments lead"},
+      {"tip_mass_kg", 0.0, 0.0, 1.0, "kg", "a bead at the tip"},
       {"air_drag_per_s", 4.0, 0.0, 1000.0, "1/s",
        "rate at which strands take on the velocity of the air; a single hair has about 10"},
-      {"sag_free", 0.0, 0.0, 1.0, "", "1 = the groom as loaded is the equilibrium under gravity"},
+      {"sag_free", 0.0, 0.0, 1.0, "",
+       "share of the groom's weight that its rest shape carries: 1 = the groom as loaded is the equilibrium"},
       {"solves", 1.0, 1.0, 4.0, "", "linear solves per step (rounded)"},
       {"order", 2.0, 1.0, 2.0, "", "order of the time integration: 1 = backward Euler (rounded)"},
       {"collider_friction", 0.3, 0.0, 10.0, "", "Coulomb friction of strands on colliders"},
@@ -167,6 +295,7 @@ SolverRow direct_rod_row() {
     return SolverParameters{{"radius_m", hair.radius_m},
                             {"density_kgpm3", hair.density_kgpm3},
                             {"young_modulus_pa", hair.young_modulus_pa},
+                            {"poisson_ratio", hair.poisson_ratio},
                             {"bending_damping_s", 0.0},
                             {"air_drag_per_s", 0.0}};
   };

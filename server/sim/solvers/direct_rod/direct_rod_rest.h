@@ -10,24 +10,37 @@
 
 namespace strandcast {
 
-/// Head space. Entry i of a vector belongs to the edge that ends at vertex i.
+/// Head space. Entry i of a vector belongs to the edge that ends at vertex i; what a frame is given by: its
+/// tangent and one axis at right angles to it.
 struct RodRest {
-  glm::dvec3 clamp_direction{0.0};  // of the strand where it leaves the head
-  glm::dvec3 frame_axis{0.0};       // at right angles to it; carried along the strand without twist
-  double mean_segment_m = 0.0;      // of the free edges
-  std::vector<glm::dvec3>
-      rest_direction;  // in the frame (axis, direction x axis, direction) of the edge before
+  glm::dvec3 clamp_direction{0.0};  // rest direction of the first free edge, fixed in the head
+  glm::dvec3 clamp_axis{0.0};
+  glm::dvec3 tail_direction{
+      0.0};  // of the last free edge, fixed in the head by a pinned tail of two vertices
+  glm::dvec3 tail_axis{0.0};
+  double mean_segment_m = 0.0;  // of the free edges
+  double shortest_m = 0.0;      // edges shorter at rest continue the one before them
+  double turn_rad = 0.0;        // natural bending angles of the joints between free edges, added up
+  /// Rest tangent at the joint before the edge, in the frame (axis, direction x axis, direction) of the edge
+  /// before; in the frame of the edge after it is (-x, -y, z).
+  std::vector<glm::dvec3> joint_tangent;
+  std::vector<glm::dvec3> axis;  // of the edges as loaded
   std::vector<double> segment_m;
   std::vector<double> tension_m2ps2;  // to start with: of a sag-free shape, else 0
 };
 
-/// `gravity_in_head_mps2` counts for a sag-free shape only. A strand pinned at both ends is never sag-free.
+/// `groom_gravity_in_head_mps2` counts for a sag-free shape only. A strand pinned at both ends is never
+/// sag-free.
 RodRest make_rod_rest(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
-                      const glm::dvec3& gravity_in_head_mps2);
+                      const glm::dvec3& groom_gravity_in_head_mps2);
 
 /// The axis of an edge's frame on the next edge: turned by the smallest rotation from one direction to the
 /// other. All unit vectors, `axis` at right angles to `from`.
 glm::dvec3 carried_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to);
+
+/// The axis behind a joint without twist: turned by the rest rotation, then by the smallest one to `to`.
+glm::dvec3 untwisted_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to,
+                          const glm::dvec3& joint_tangent);
 
 /// Length that stiffness and mass of an edge are computed from: no shorter than a share of the mean, so that
 /// zero-length edges divide nothing by zero.
@@ -47,7 +60,9 @@ inline constexpr double kTensionPerCrossing = 3.0;
 // A step starts from the motion going on as it changed before, by at most this share of a segment. One solve
 // from a start that is wrong by more keeps a strand thrashing for ever.
 inline constexpr double kMaxTrendPerSegment = 0.1;
-inline constexpr double kStandardGravityMps2 = 9.80665;
+// A rod whose joints turn by less than this in all, at rest, bends as a straight one: twist could move its
+// tip by the square of it.
+inline constexpr double kStraightTurnRad = 1e-3;
 // theta / sin(theta) is held where sin^2(theta / 2) passes this (a right angle in one joint).
 inline constexpr double kMaxHalfSineSquared = 0.5;
 // A step of more than this times the one before starts with backward Euler. With ratio r order 2 multiplies
