@@ -69,6 +69,17 @@ TEST_F(GroomAtRest, BuiltInHair) {
   expect_rest(scene);
 }
 
+// Rods find the shape that is the groom under gravity themselves.
+TEST_F(GroomAtRest, ElasticRods) {
+  const auto path = std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy/scenes/elastic_rod.textproto";
+  const auto scene = load_scene(path, {});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  const auto content = load_scene_content(*scene);
+  ASSERT_TRUE(content) << content.error().to_string();
+  auto solver = make({*find_solver("direct_rod"), true}, content->groom, scene->solver.parameters);
+  EXPECT_LE(largest_share(*scene, *content, *solver), kShareOfLength);
+}
+
 TEST_F(GroomAtRest, SintelsHair) {
   expect_rest_of("sintel", "sintel_11400x16.tfx");
 }

@@ -5,16 +5,15 @@
 //
 // Model, with b = EI / (rho A), c = GJ / (rho A), e_i = edge before vertex i, t_i its direction, l_i its
 // length, F_i its material frame (third axis t_i):
-//   tension     force g_i t_i per edge, g_i a multiplier kept between steps (augmented Lagrangian, penalty
-//   k); joint       F_(i-1) and F_i each carry half of the rest rotation to the vertex; what is left between
-//   them
-//               is a bend theta and a twist tau about their mean tangent, with the energy
-//               (b theta^2 + c tau^2) / (2 l_v);
-//   twist       has no inertia: one angle per edge is solved for beside the positions (the quasi-static twist
-//               of Bergou et al. 2008, section 5, for rods of any rest shape);
-//   time        second-order backward differences (order 2, with steps of any length) or backward Euler.
+//   tension: force g_i t_i per edge, g_i a multiplier kept between steps (augmented Lagrangian, penalty k).
+//   joint: F_(i-1) and F_i each carry half of the rest rotation to the vertex; what is left between them is a
+//     bend theta and a twist tau about their mean tangent, with the energy (b theta^2 + c tau^2) / (2 l_v).
+//   twist: without inertia; one angle per edge is solved for beside the positions (the quasi-static twist of
+//     Bergou et al. 2008, section 5, for rods of any rest shape).
+//   time: second-order backward differences (order 2, with steps of any length) or backward Euler.
+//
 // After each solve every edge gets its exact length back. The twist of a straight rod with a free tip is
-// zero: the kernel has a variant without.
+// zero: the kernel has a variant without. Vertices that coincide at rest are a hinge.
 #pragma once
 
 #include "server/sim/solver_registry.h"

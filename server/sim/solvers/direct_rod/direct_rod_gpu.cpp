@@ -16,9 +16,9 @@ namespace {
 
 // Values of the variant COLLIDERS in shaders/sim/follow.glsl besides 0.
 constexpr uint32_t kColliderCapacities[] = {1, 4, kMaxSphereColliders};
-// Planes of the scratch buffer in shaders/sim/direct_rod_band.glsl without and with twist, and how much of it is
-// worth having: strands that do not fit wait for the next dispatch. A software device finds on the way back
-// what still fits its caches; hardware wants all strands at once.
+// Planes of the scratch buffer in shaders/sim/direct_rod_band.glsl without and with twist, and how much of it
+// is worth having: strands that do not fit wait for the next dispatch. A software device finds on the way
+// back what still fits its caches; hardware wants all strands at once.
 constexpr uint32_t kStrandPlanes = 4;  // of u_strand
 constexpr double kLongestM = 1e12;     // an edge beyond has no direction
 constexpr size_t kScratchPlanes[] = {7, 11};
