@@ -124,7 +124,6 @@ const std::vector<KnownBreak>& known_breaks() {
        "inertia; the double reference moves as a rigid strand"},
       {"direct_rod", "input", "", Measure::Style, kUnstableStyle},
       {"direct_rod", "rest", "", Measure::Style, kUnstableStyle},
-      {"direct_rod", "rest", "", Measure::Jitter, kUnstableStyle},
   };
   return breaks;
 }
