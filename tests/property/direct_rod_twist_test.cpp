@@ -144,6 +144,40 @@ TEST_F(RodTwist, ACurlPulledStraightComesBack) {
   }
 }
 
+// A wide, limp curl on a head that shakes with 10 g and turns by 2 rad to either side: no coil stays wound
+// the wrong way.
+TEST_F(RodTwist, AShakenCurlComesBack) {
+  constexpr double kShakeRadps = 2.0 * std::numbers::pi * 3.0;
+  constexpr double kShakenS = 2.0;
+  constexpr double kRateHz = 60.0;
+  Helix helix;
+  helix.radius_m = helix.pitch_m = 1.5e-2;
+  helix.vertices_per_coil = 12;
+  const Groom groom = groom_from({helix_strand(helix)}, Pinning::Root);
+  const auto head_m = [&](double t) {
+    return 10.0 * kGravityMps2 / (kShakeRadps * kShakeRadps) * std::sin(kShakeRadps * std::min(t, kShakenS));
+  };
+  for (const bool is_gpu : {false, true}) {
+    auto rod = make_rod(is_gpu, groom, {});
+    const std::vector<glm::vec3> groomed = read(*rod).position_m;
+    double swing_m = 0.0;
+    for (int step = 1; step <= 25.0 * kRateHz; ++step) {
+      const double t = step / kRateHz;
+      StepInput input = calm_input(1.0 / kRateHz);
+      input.head_shift_m = {head_m(t) - head_m(t - input.h_s), 0.0, 0.0};
+      if (t < kShakenS) {
+        input.world_from_head = glm::angleAxis(2.0 * std::sin(8.0 * t), glm::dvec3(0.0, 1.0, 0.0));
+        swing_m = std::max(swing_m, largest_distance_m(read(*rod).position_m, groomed));
+      }
+      rod->substep(input);
+    }
+    const double away_m = largest_distance_m(read(*rod).position_m, groomed);
+    EXPECT_GE(swing_m, 0.5 * helix.wire_m());
+    EXPECT_LE(away_m, 1e-3 * helix.radius_m);
+    fmt::print("{}: swung by {:.2f} m, {:.1e} m from the groom\n", name(is_gpu), swing_m, away_m);
+  }
+}
+
 TEST_F(RodTwist, TwistDoesNothingToAStraightStrand) {
   const Groom groom = straight_strand(16, {1.0, 0.0, 0.0});
   auto soft = make_rod(false, groom, {{"poisson_ratio", 5.0}});
