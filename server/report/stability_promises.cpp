@@ -106,6 +106,10 @@ const std::vector<KnownBreak>& known_breaks() {
       "a vertex that moves drags the others along by geometry, with no mass behind it: a kick or a push "
       "along "
       "the strand does work from nothing, which drag and the velocity correction take out again";
+  constexpr const char* kOnlyTheTip =
+      "only the tip has mass; the energy here counts that of the vertices which it drags";
+  constexpr const char* kFinishedLengths =
+      "sweeps put lengths right where the constraints have left vertices too low, and lift them for nothing";
   static const std::vector<KnownBreak> breaks = {
       {"dftl", "energy", "buckles from upright", Measure::Energy, kCompressed},
       {"dftl_parallel", "energy", "buckles from upright", Measure::Energy, kCompressed},
@@ -119,6 +123,8 @@ const std::vector<KnownBreak>& known_breaks() {
       {"xpbd", "groom", "64 vertices", Measure::Stretch, kIterationsLeaveStretch},
       {"xpbd", "input", "infinity in everything", Measure::Stretch, kIterationsLeaveStretch},
       {"tractrix_emulation", "energy", "", Measure::Energy, kDraggedAlong},
+      {"tractrix_split", "energy", "buckles from upright", Measure::Energy, kOnlyTheTip},
+      {"tractrix_hybrid", "energy", "buckles from upright", Measure::Energy, kFinishedLengths},
       {"direct_rod", "stiffness", "", Measure::Speed,
        "from a million times the stiffness of hair on, its bending forces leave single precision no room for "
        "inertia; the double reference moves as a rigid strand"},

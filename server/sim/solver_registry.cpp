@@ -24,6 +24,8 @@ const std::vector<SolverRow>& solver_table() {
                                                direct_rod_row(),
                                                articulated_row(),
                                                tractrix_emulation_row(),
+                                               tractrix_split_row(),
+                                               tractrix_hybrid_row(),
                                                angular_projection_row()};
   return table;
 }

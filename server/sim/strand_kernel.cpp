@@ -104,6 +104,9 @@ void StrandKernel::upload(const StrandLayout& layout) {
   rest_view_ = make_view(desc_.name + " rest", rest_);
   position_view_ = make_view(desc_.name + " position", position_);
   velocity_view_ = make_view(desc_.name + " velocity", velocity_);
+  if (!desc_.has_offset) return;
+  offset_ = gl::Buffer::of(desc_.name + " offset", staging_);
+  offset_view_ = make_view(desc_.name + " offset", offset_);
 }
 
 const gl::Program& StrandKernel::program_for(size_t collider_count) const {
@@ -124,6 +127,10 @@ void StrandKernel::substep(const StepInput& input) {
   glBindTextureUnit(shader::kUnitRest, rest_view_.name());
   glBindTextureUnit(shader::kUnitPosition, position_view_.name());
   glBindTextureUnit(shader::kUnitVelocity, velocity_view_.name());
+  if (desc_.has_offset) {
+    offset_.bind_storage(shader::kBindingDisplacement);
+    glBindTextureUnit(shader::kUnitDisplacement, offset_view_.name());
+  }
   program_for(input.colliders.size()).use();
   glDispatchCompute(group_count(desc_, layout_), 1, 1);
   // The next substep fetches what this one stored; read() copies it.
@@ -162,10 +169,20 @@ void StrandKernel::write(const SolverState& state) {
     staging_[i] = glm::vec4(state.velocity_mps[i], kept);
   }
   velocity_.write(staging_);
+  if (desc_.has_offset) clear_offset(is_changed);
+}
+
+void StrandKernel::clear_offset(const std::vector<bool>& is_changed) {
+  offset_.read(0, std::as_writable_bytes(std::span(staging_)));
+  for (size_t i = 0; i < staging_.size(); ++i) {
+    if (is_changed[i % layout_.strand_count]) staging_[i] = glm::vec4(0.0f);
+  }
+  offset_.write(staging_);
 }
 
 uint64_t StrandKernel::memory_bytes() const {
-  return rest_.size_bytes() + position_.size_bytes() + velocity_.size_bytes() + step_.size_bytes();
+  return rest_.size_bytes() + position_.size_bytes() + velocity_.size_bytes() + offset_.size_bytes() +
+         step_.size_bytes();
 }
 
 }  // namespace strandcast

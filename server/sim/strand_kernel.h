@@ -28,6 +28,7 @@ struct StrandKernelDesc {
   uint32_t local_size = 0;
   uint32_t iterations = 0;  // odd-even only
   bool has_exact_length = false;
+  bool has_offset = false;  // a strand beside the state; one that is written starts without any
   std::map<std::string, glm::vec4> uniforms;  // of the model, the same in every step
 };
 
@@ -50,6 +51,7 @@ class StrandKernel final : public Solver {
 
   Status compile(bool has_pinned_tail);
   void upload(const StrandLayout& layout);
+  void clear_offset(const std::vector<bool>& is_changed);
   const gl::Program& program_for(size_t collider_count) const;
 
   StrandKernelDesc desc_;
@@ -65,10 +67,12 @@ class StrandKernel final : public Solver {
   gl::Buffer rest_;          // (vertex_count x strand_count) vec4: head space, m; segment before it, m
   gl::Buffer position_;      // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
   gl::Buffer velocity_;      // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
-  gl::Buffer step_;          // StepBlock
+  gl::Buffer offset_;  // (vertex_count x strand_count) vec4: second strand less the state, m; has_offset only
+  gl::Buffer step_;    // StepBlock
   gl::Handle<gl::delete_texture> rest_view_;
   gl::Handle<gl::delete_texture> position_view_;
   gl::Handle<gl::delete_texture> velocity_view_;
+  gl::Handle<gl::delete_texture> offset_view_;
   std::vector<glm::vec4> staging_;
 };
 

@@ -30,24 +30,28 @@ vec3 gust_velocity(vec3 point) {
   return gust;
 }
 
+// Of the pull to the groomed shape, 1/s^2; `arc` is 0 at the root and 1 at the tip.
+float style_stiffness(float arc) {
+  const float from_tip = 1.0 - arc;
+  return u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
+}
+
 // Backward Euler in the drag and in the pull to the groomed shape, seen from the head joint (see predict() in
-// server/sim/reference_strands.cpp for the equation). A broken state starts again from the groomed shape.
-Vertex predict(uint at) {
+// server/sim/reference_strands.cpp for the equation), from a state of one's own. A broken one starts again
+// from the groomed shape.
+Vertex predict_from(uint at, vec3 stored, vec3 stored_velocity) {
   const vec4 rest = texelFetch(u_rest, int(at));
-  const vec4 state = texelFetch(u_position, int(at));
-  const vec3 state_velocity = texelFetch(u_velocity, int(at)).xyz;
   Vertex vertex;
   vertex.target = turned_with_head(rest.xyz);
   vertex.segment = rest.w;
-  vertex.arc = state.w;
-  const bool is_sane = !is_broken(state.xyz) && !is_broken(state_velocity);
-  vertex.old = is_sane ? state.xyz : vertex.target;
-  const vec3 velocity = is_sane ? state_velocity - u_step.head_velocity.xyz : vec3(0.0);
+  vertex.arc = texelFetch(u_position, int(at)).w;
+  const bool is_sane = !is_broken(stored) && !is_broken(stored_velocity);
+  vertex.old = is_sane ? stored : vertex.target;
+  const vec3 velocity = is_sane ? stored_velocity - u_step.head_velocity.xyz : vec3(0.0);
 
   const float h = u_step.head_velocity.w;
   const float drag = u_step.contact.y;
-  const float from_tip = 1.0 - vertex.arc;
-  const float stiffness = u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
+  const float stiffness = style_stiffness(vertex.arc);
   const float pull = h * stiffness;
   const vec3 support = min(1.0, stiffness * u_step.support.w) * u_step.support.xyz;
   const vec3 push = u_step.push.xyz + support + (h * drag) * gust_velocity(vertex.old);
@@ -56,6 +60,10 @@ Vertex predict(uint at) {
   vertex.velocity = velocity;
   vertex.inertia = 1.0 + h * (drag + pull);
   return vertex;
+}
+
+Vertex predict(uint at) {
+  return predict_from(at, texelFetch(u_position, int(at)).xyz, texelFetch(u_velocity, int(at)).xyz);
 }
 
 // The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at
@@ -72,6 +80,7 @@ vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, 
   // Straight at the centre: any side will do.
   const vec3 other = abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
   side = dot(side, side) > 1e-12 ? side : other;
+  side -= axis * dot(side, axis);  // once more: a short side is made of roundings along the axis
   const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
   const vec3 end = start + segment * (cosine * axis + sine * side);
   return squared > kTinySquared ? end : start + segment * direction;

@@ -6,7 +6,7 @@
 layout(local_size_x = kStrandLocalSize) in;
 
 // x for stretch, y for bending. pbd: share of the error per iteration. xpbd: compliance times mass per
-// length, s^2/m.
+// length, s^2/m. z = tractrix sweeps, w = 1: before the iterations.
 uniform vec4 u_give;
 
 // What the constraints of one vertex remember.
@@ -89,6 +89,71 @@ void sweep(uint strand, uint last, vec2 give) {
   g_point[last].xyz = contact(b, last, strand);
 }
 
+#if HAS_TRACTRIX_SWEEPS
+vec3 g_solved[kMaxVertexCount];  // what the constraints left
+
+void sweep_from_tip(uint first, uint tail) {
+  const uint last = min(tail, u_step.shape.y - 1u);
+  vec4 head_before = g_point[last];
+  vec3 head = head_before.xyz;
+  for (uint i = last; i > first; --i) {
+    const vec4 point = g_point[i - 1u];
+    head = tractrix_fitted(head_before.xyz, head, point.xyz, head_before.w);
+    g_point[i - 1u] = vec4(head, point.w);
+    head_before = point;
+  }
+}
+
+// Tractrix sweeps as a first guess for the constraints.
+void guess(uint first, uint tail) {
+  if (u_give.z > 1.5) sweep_from_tip(first, tail);
+  vec3 head_before = g_point[first - 1u].xyz;
+  vec3 head = head_before;
+  for (uint i = first; i < tail; ++i) {
+    const vec4 point = g_point[i];
+    head = tractrix_fitted(head_before, head, point.xyz, point.w);
+    g_point[i] = vec4(head, point.w);
+    head_before = point.xyz;
+  }
+}
+
+// Tractrix sweeps that give what the constraints left its lengths, with colliders and a pinned tip; stores the
+// free vertices. (With results back in g_point, Mesa 22.3 puts them one element further.)
+void finish(uint strand, uint first, uint tail) {
+  const uint stride = u_step.shape.x;
+  for (uint i = first; i < tail; ++i) g_solved[i] = g_point[i].xyz;
+  if (u_give.z > 1.5) sweep_from_tip(first, tail);
+  uint at = (first - 1u) * stride + strand;
+  vec3 start = g_point[first - 1u].xyz;
+  vec3 start_target = start;
+  vec3 head_before = start;
+  vec3 anchor = vec3(0.0);
+  float reach = 0.0;
+#if HAS_PINNED_TAIL
+  anchor = turned_with_head(texelFetch(u_rest, int(tail * stride + strand)).xyz);
+  for (uint i = first; i <= tail; ++i) reach += texelFetch(u_rest, int(i * stride + strand)).w;
+#endif
+  for (uint i = first; i < tail; ++i) {
+    at += stride;
+    const vec4 point = g_point[i];
+    Vertex vertex = predict(at);
+    vertex.predicted = tractrix_fitted(head_before, start, point.xyz, point.w);
+    const bool is_last = i + 1u == tail;
+#if HAS_PINNED_TAIL
+    reach -= point.w;
+    if (is_last) reach = texelFetch(u_rest, int(at + stride)).w;
+#endif
+    vec3 pushed;
+    const vec3 end = placed(start, start_target, vertex, anchor, reach, is_last, pushed);
+    store_vertex(at, end, vertex.arc);
+    store_velocity(at, (g_solved[i] - vertex.old) * u_step.push.w);
+    head_before = point.xyz;
+    start = end;
+    start_target = vertex.target;
+  }
+}
+#endif
+
 void main() {
   const uint stride = u_step.shape.x;
   const uint vertices = u_step.shape.y;
@@ -114,10 +179,26 @@ void main() {
 #if IS_COMPLIANT
   give *= (total / float(vertices - 1u)) * u_step.push.w * u_step.push.w;
 #endif
+#if HAS_TRACTRIX_SWEEPS
+  const uint first = u_step.shape.z;
+  const uint tail = u_step.shape.w;
+  const bool is_guess = u_give.w > 0.5;
+  if (is_guess) guess(first, tail);
+#endif
   for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) sweep(strand, vertices - 1u, give);
+#if HAS_TRACTRIX_SWEEPS
+  if (!is_guess) finish(strand, first, tail);
+#endif
 
   at = strand;
   for (uint i = 0u; i < vertices; ++i) {
+#if HAS_TRACTRIX_SWEEPS
+    const bool is_stored = !is_guess && i >= first && i < tail;
+    if (is_stored) {
+      at += stride;
+      continue;
+    }
+#endif
     const float arc = texelFetch(u_position, int(at)).w;
     const vec3 before = position_before(at);
     const vec3 point = g_point[i].xyz;

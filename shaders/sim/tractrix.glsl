@@ -47,41 +47,10 @@ vec3 tractrix_followed(vec3 head_before, vec3 head, vec3 tail, float segment) {
   return tail + (squared > kTinySquared ? shift + segment * turn : shift);
 }
 
-// The strand that is dragged about. w = segment before the vertex.
-vec4 g_point[kMaxVertexCount];
-
-// Moves one vertex to a place; those towards the root, down to `first`, follow.
-void drag_towards_root(uint vertex, uint first, vec3 place) {
-  vec4 head_before = g_point[vertex];
-  vec3 head = place;
-  for (uint i = vertex; i-- > first;) {
-    const vec4 tail = g_point[i];
-    const vec3 followed = tractrix_followed(head_before.xyz, head, tail.xyz, head_before.w);
-    g_point[i].xyz = followed;
-    head_before = tail;
-    head = followed;
-  }
-}
-
-// The same towards the tip, up to before `end`.
-void drag_towards_tip(uint vertex, uint end, vec3 place) {
-  vec3 head_before = g_point[vertex].xyz;
-  vec3 head = place;
-  for (uint i = vertex + 1u; i < end; ++i) {
-    const vec4 tail = g_point[i];
-    const vec3 followed = tractrix_followed(head_before, head, tail.xyz, tail.w);
-    g_point[i].xyz = followed;
-    head_before = tail.xyz;
-    head = followed;
-  }
-}
-
-void store_pinned(uint strand, uint begin, uint end) {
-  for (uint i = begin; i < end; ++i) {
-    const uint at = i * u_step.shape.x + strand;
-    const vec3 target = turned_with_head(texelFetch(u_rest, int(at)).xyz);
-    const vec4 state = texelFetch(u_position, int(at));
-    store_vertex(at, target, state.w);
-    store_velocity(at, is_broken(state.xyz) ? vec3(0.0) : (target - state.xyz) * u_step.push.w);
-  }
+// The same for a segment that does not have its length, which it gets.
+vec3 tractrix_fitted(vec3 head_before, vec3 head, vec3 tail, float segment) {
+  const vec3 edge = tail - head_before;
+  const vec3 direction = edge * inversesqrt(max(dot(edge, edge), kTinySquared));
+  const vec3 turned = direction + tractrix_turn(direction, head - head_before, segment);
+  return head + turned * (segment * inversesqrt(max(dot(turned, turned), kTinySquared)));
 }

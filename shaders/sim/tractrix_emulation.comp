@@ -1,6 +1,6 @@
 // 000 section 3.0.1: every vertex in turn goes where its forces take it and drags the others along; then the
 // strand is pulled back to its root. One invocation per strand.
-#include "sim/tractrix.glsl"
+#include "sim/tractrix_drag.glsl"
 #include "lib/hash.glsl"
 
 layout(local_size_x = kStrandLocalSize) in;
@@ -20,13 +20,6 @@ uint shuffled(uint value, uint bits, uint key) {
   return value;
 }
 
-void move_one(uint vertex, uint first, uint tail) {
-  const vec3 place = g_wanted[vertex];
-  drag_towards_root(vertex, first - 1u, place);
-  drag_towards_tip(vertex, tail, place);
-  g_point[vertex].xyz = place;
-}
-
 // The same order in all strands, so that they stay side by side in the lanes.
 void move_all(uint first, uint tail) {
   const uint count = tail - first;
@@ -36,7 +29,7 @@ void move_all(uint first, uint tail) {
   const uint turns = is_random ? 1u << bits : count;
   for (uint k = 0u; k < turns; ++k) {
     const uint pick = is_random ? shuffled(k, bits, key) : count - 1u - k;
-    if (pick < count) move_one(first + pick, first, tail);
+    if (pick < count) drag(first + pick, first - 1u, tail, g_wanted[first + pick]);
   }
 }
 

@@ -9,8 +9,11 @@ namespace strandcast {
 namespace {
 
 constexpr const char* kCorrectionName = "s_damping";  // of the follow solvers only
+constexpr const char* kSweepsName = "tractrix_sweeps";
+constexpr const char* kFirstName = "tractrix_first";
 constexpr double kDefaultIterations = 10.0;
 constexpr double kDefaultCompliantIterations = 20.0;
+constexpr double kDefaultHybridIterations = 4.0;
 constexpr double kMaxIterations = 64.0;
 
 Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const GpuSolverContext& context,
@@ -25,7 +28,12 @@ Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const Gp
   const glm::dvec2 give =
       is_compliant ? density * glm::dvec2(parameters.stretch_compliance_mpn, parameters.bend_compliance_mpn)
                    : glm::dvec2(parameters.stretch_share, parameters.bend_share);
-  desc.uniforms["u_give"] = glm::vec4(glm::dvec4(give, 0.0, 0.0));
+  if (parameters.tractrix_sweeps > 0) {
+    desc.name = "tractrix_hybrid";
+    desc.shader_path = "sim/tractrix_hybrid.comp";
+  }
+  desc.uniforms["u_give"] =
+      glm::vec4(glm::dvec4(give, parameters.tractrix_sweeps, parameters.has_tractrix_first ? 1.0 : 0.0));
   SolverParameters shared = given;
   shared[kCorrectionName] = 0.0;
   return StrandKernel::make(std::move(desc), read_strand_parameters(shared), context);
@@ -54,6 +62,10 @@ PositionBasedParameters read_position_based(const SolverParameters& parameters, 
   PositionBasedParameters result;
   result.iterations = static_cast<uint32_t>(std::lround(parameters.at("iterations")));
   result.is_compliant = is_compliant;
+  if (parameters.contains(kSweepsName)) {
+    result.tractrix_sweeps = static_cast<uint32_t>(std::lround(parameters.at(kSweepsName)));
+    result.has_tractrix_first = parameters.at(kFirstName) >= 0.5;
+  }
   if (is_compliant) {
     result.stretch_compliance_mpn = parameters.at("stretch_compliance_m_per_n");
     result.bend_compliance_mpn = parameters.at("bend_compliance_m_per_n");
@@ -113,6 +125,25 @@ SolverRow xpbd_row() {
   row.stretch_bound = 0.15;
   row.rounding_growth = 2.2;
   row.settled_spread_m = 0.01;  // what the iterations leave of the stretch differs
+  return row;
+}
+
+SolverRow tractrix_hybrid_row() {
+  SolverRow row = xpbd_row();
+  row.name = "tractrix_hybrid";
+  row.summary =
+      "compliant position-based dynamics finished by tractrix sweeps: exact lengths, few iterations";
+  row.source =
+      "Zappe, Simulation of hair with the Tractrix curve, Ravensburg-Weingarten 2020, chapter 6 (proposed "
+      "there); constraints as in xpbd";
+  for (SolverParameterInfo& info : row.parameters) {
+    if (info.name == "iterations") info.default_value = kDefaultHybridIterations;
+  }
+  row.parameters.push_back({kSweepsName, 2.0, 0.0, 2.0, "",
+                            "0 = none, 1 = from the root to the tip, 2 = from the tip first (rounded)"});
+  row.parameters.push_back(
+      {kFirstName, 0.0, 0.0, 1.0, "", "1 = sweeps before the iterations, as a first guess"});
+  row.stretch_bound = 0.0;
   return row;
 }
 

@@ -3,6 +3,7 @@
 
 #include "server/sim/reference_strands.h"
 #include "server/sim/solvers/position_based/position_based.h"
+#include "server/sim/solvers/tractrix/tractrix_step.h"
 
 namespace strandcast {
 namespace {
@@ -39,10 +40,53 @@ class PositionBasedReference final : public ReferenceStrands {
     std::vector<double> inverse_mass(layout().vertex_count);
     for (uint32_t i = 0; i < layout().vertex_count; ++i) inverse_mass[i] = inverse_mass_perkg(strand, i);
     leave_colliders(strand);
+    const bool is_first = model_.has_tractrix_first;
+    if (is_first && model_.tractrix_sweeps > 0) guess(strand);
     for (uint32_t iteration = 0; iteration < model_.iterations; ++iteration) {
       for (DistanceConstraint& constraint : constraints) project(strand, inverse_mass, constraint);
       leave_colliders(strand);
     }
+    solved_m_ = strand.placed_m;
+    if (!is_first && model_.tractrix_sweeps > 0) finish(strand);
+  }
+
+  /// Tractrix sweeps as a first guess for the constraints.
+  void guess(ReferenceStrand& strand) const {
+    if (model_.tractrix_sweeps > 1) sweep_from_tip(strand);
+    const std::vector<glm::dvec3> before = strand.placed_m;
+    for (uint32_t i = layout().pinned_root_count; i < layout().tail_begin(); ++i)
+      strand.placed_m[i] = followed(strand, before, i - 1, i);
+  }
+
+  /// Tractrix sweeps that give what the constraints left its lengths; the velocity does not have them in it.
+  void finish(ReferenceStrand& strand) const {
+    if (model_.tractrix_sweeps > 1) sweep_from_tip(strand);
+    const std::vector<glm::dvec3> before = strand.placed_m;
+    for (uint32_t i = layout().pinned_root_count; i < layout().tail_begin(); ++i) {
+      strand.predicted_m[i] = followed(strand, before, i - 1, i);
+      place(strand, i);
+    }
+  }
+
+  void sweep_from_tip(ReferenceStrand& strand) const {
+    const std::vector<glm::dvec3> before = strand.placed_m;
+    const uint32_t last = std::min(layout().tail_begin(), layout().vertex_count - 1);
+    for (uint32_t i = last; i > layout().pinned_root_count; --i)
+      strand.placed_m[i - 1] = followed(strand, before, i, i - 1);
+  }
+
+  /// Where the tail goes when the head has been moved, once their segment has its length.
+  static glm::dvec3 followed(const ReferenceStrand& strand, const std::vector<glm::dvec3>& before,
+                             uint32_t head, uint32_t tail) {
+    const double segment_m = strand.segment_m[std::max(head, tail)];
+    const glm::dvec3 edge = before[tail] - before[head];
+    if (glm::length(edge) < kTinyLengthM) return strand.placed_m[head];
+    const glm::dvec3 fitting = before[head] + segment_m * glm::normalize(edge);
+    return tractrix_followed(before[head], strand.placed_m[head], fitting, segment_m);
+  }
+
+  glm::dvec3 way_m(const ReferenceStrand& strand, uint32_t i) const override {
+    return solved_m_[i] - strand.old_m[i];
   }
 
   std::vector<DistanceConstraint> make_constraints(const ReferenceStrand& strand) const {
@@ -131,6 +175,7 @@ class PositionBasedReference final : public ReferenceStrands {
   }
 
   PositionBasedParameters model_;
+  mutable std::vector<glm::dvec3> solved_m_;  // of the strand in progress, before its finish
   double friction_;
 };
 

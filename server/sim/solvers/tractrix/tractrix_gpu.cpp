@@ -6,6 +6,9 @@
 namespace strandcast {
 namespace {
 
+constexpr const char* kCorrectionName = "s_damping";
+constexpr double kDefaultStyleMix = 0.3;
+constexpr double kDefaultStyleReturnPerS = 0.5;
 constexpr double kMaxSeed = 65535.0;  // exact in the float that carries it
 
 Result<std::unique_ptr<Solver>> make_emulation_gpu(const SolverParameters& parameters,
@@ -16,6 +19,18 @@ Result<std::unique_ptr<Solver>> make_emulation_gpu(const SolverParameters& param
   desc.local_size = shader::kStrandLocalSize;
   desc.uniforms["u_order"] =
       glm::vec4(glm::dvec4(parameters.at("order_seed"), parameters.at("random_order"), 0.0, 0.0));
+  return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
+}
+
+Result<std::unique_ptr<Solver>> make_split_gpu(SolverParameters parameters, const GpuSolverContext& context) {
+  StrandKernelDesc desc;
+  desc.name = "tractrix_split";
+  desc.shader_path = "sim/tractrix_split.comp";
+  desc.local_size = shader::kStrandLocalSize;
+  desc.has_offset = true;
+  desc.uniforms["u_style"] =
+      glm::vec4(glm::dvec4(parameters.at("style_mix"), parameters.at("style_return_per_s"), 0.0, 0.0));
+  parameters[kCorrectionName] = 0.0;
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
@@ -39,6 +54,30 @@ SolverRow tractrix_emulation_row() {
   row.folding_spread_m = 0.03;
   row.make_gpu = make_emulation_gpu;
   row.make_reference = make_tractrix_emulation_reference;
+  return row;
+}
+
+SolverRow tractrix_split_row() {
+  SolverRow row;
+  row.name = "tractrix_split";
+  row.summary =
+      "only the tip has forces and drags the strand along tractrix curves; what is shown is mixed with the "
+      "style by one number";
+  row.source =
+      "Zappe, Simulation of hair with the Tractrix curve, Ravensburg-Weingarten 2020, section 3.0.2, "
+      "algorithm 4; step: section 2.2.3, after Sreenivasan, Goel and Ghosal 2010";
+  row.parameters = shared_parameter_infos();
+  std::erase_if(row.parameters, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
+  row.parameters.push_back({"style_mix", kDefaultStyleMix, 0.0, 1.0, "",
+                            "share of the turn of every segment towards the groomed one: 0 = all motion, 1 = "
+                            "all style"});
+  row.parameters.push_back({"style_return_per_s", kDefaultStyleReturnPerS, 0.0, 1000.0, "1/s",
+                            "rate at which the dragged strand takes on the style; 0 = never, as published"});
+  // The style takes back slowly what the tip's weight, when the style does not carry it, pulls down; a strand
+  // that stands against it folds over and over.
+  row.comes_to_rest = false;
+  row.make_gpu = make_split_gpu;
+  row.make_reference = make_tractrix_split_reference;
   return row;
 }
 

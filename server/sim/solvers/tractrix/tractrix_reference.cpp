@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "common/base/hash.h"
@@ -65,7 +66,78 @@ class EmulationReference final : public TractrixReference {
   bool is_random_;
 };
 
+// The state is the strand that is shown; the memory is the way from there to the one that is dragged.
+class SplitReference final : public TractrixReference {
+ public:
+  explicit SplitReference(const SolverParameters& parameters)
+      : TractrixReference(without_correction(parameters)),
+        style_mix_(parameters.at("style_mix")),
+        style_return_per_s_(parameters.at("style_return_per_s")) {}
+
+ private:
+  static SolverParameters without_correction(SolverParameters parameters) {
+    parameters["s_damping"] = 0.0;
+    return parameters;
+  }
+
+  size_t memory_size() const override { return size_t{3} * layout().vertex_count; }
+
+  void solve(ReferenceStrand& strand) const override {
+    if (end() <= first()) return;
+    const std::vector<glm::dvec3> shown_before = strand.old_m;
+    const uint32_t leader = end() - 1;
+    for (uint32_t i = first(); i < end(); ++i)
+      strand.old_m[i] += glm::dvec3(strand.memory[3 * i], strand.memory[3 * i + 1], strand.memory[3 * i + 2]);
+    std::vector<glm::dvec3> point = strand.old_m;
+    drag(point, strand.segment_m, leader, predict(strand, leader));
+    pull_back(strand, point);
+    const std::vector<glm::dvec3> dragged = strand.placed_m;
+    leader_way_m_ = dragged[leader] - strand.old_m[leader];
+
+    strand.old_m = shown_before;
+    glm::dvec3 kept = dragged[first() - 1];
+    for (uint32_t i = first(); i < end(); ++i) {
+      const glm::dvec3 segment = dragged[i] - dragged[i - 1];
+      const glm::dvec3 groomed = strand.target_m[i] - strand.target_m[i - 1];
+      strand.predicted_m[i] =
+          strand.placed_m[i - 1] + strand.segment_m[i] * mixed(segment, groomed, style_mix_);
+      place(strand, i);
+      const double stiffness = style_stiffness_per_s2(layout().index(i, strand.index));
+      const double turn = h_s() * style_return_per_s_ * std::min(1.0, stiffness / kSupportStiffnessPerS2);
+      kept += strand.segment_m[i] * mixed(segment, groomed, turn / (1.0 + turn));
+      const glm::dvec3 apart = kept - strand.placed_m[i];
+      for (int axis = 0; axis < 3; ++axis) strand.memory[3 * i + axis] = apart[axis];
+    }
+  }
+
+  /// Direction of a segment turned towards the groomed one by a share of the angle between them, about the
+  /// normal of both.
+  static glm::dvec3 mixed(const glm::dvec3& segment, const glm::dvec3& groomed, double share) {
+    const double product = glm::length(segment) * glm::length(groomed);
+    if (product < kTinySquaredM) return glm::length(segment) > 0.0 ? glm::normalize(segment) : groomed;
+    const double angle = std::acos(std::clamp(glm::dot(segment, groomed) / product, -1.0, 1.0));
+    const glm::dvec3 normal = glm::cross(segment, groomed);
+    if (glm::length(normal) > kNoPlane * product)
+      return glm::angleAxis(share * angle, glm::normalize(normal)) * glm::normalize(segment);
+    return glm::normalize(share < 0.5 ? segment : groomed);
+  }
+
+  glm::dvec3 way_m(const ReferenceStrand& strand, uint32_t i) const override {
+    return i + 1 == end() && i >= first() ? leader_way_m_ : TractrixReference::way_m(strand, i);
+  }
+
+  static constexpr double kTinySquaredM = 1e-20;
+  static constexpr double kNoPlane = 1e-9;
+  double style_mix_;
+  double style_return_per_s_;
+  mutable glm::dvec3 leader_way_m_{0.0};  // of the strand in progress
+};
+
 }  // namespace
+
+std::unique_ptr<Solver> make_tractrix_split_reference(const SolverParameters& parameters) {
+  return std::make_unique<SplitReference>(parameters);
+}
 
 std::unique_ptr<Solver> make_tractrix_emulation_reference(const SolverParameters& parameters) {
   return std::make_unique<EmulationReference>(parameters);

@@ -1,0 +1,5 @@
+// Compliant position-based dynamics with tractrix sweeps: 000 chapter 6.
+#define IS_COMPLIANT 1
+#define HAS_TRACTRIX_SWEEPS 1
+#include "sim/tractrix.glsl"
+#include "sim/position_based.glsl"
