@@ -20,6 +20,8 @@ bool is_sane(const glm::dvec3& value) {
 Status ReferenceStrands::load(const Groom& groom, const glm::dquat& world_from_head) {
   ASSIGN_OR_RETURN(layout_, make_strand_layout(groom));
   previous_rotation_ = limited_rotation(world_from_head);
+  previous_carry_ = {1.0, 0.0, 0.0, 0.0};
+  previous_h_s_ = 1.0;
   position_m_.resize(layout_.size());
   velocity_mps_.assign(layout_.size(), glm::dvec3(0.0));
   for (size_t i = 0; i < layout_.size(); ++i)
@@ -51,11 +53,14 @@ void ReferenceStrands::substep(const StepInput& input) {
     }
     scratch_.placed_m = scratch_.predicted_m;
     solve(scratch_);
-    for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
+    // The root last: models read from it how the head moved before.
+    for (uint32_t i = layout_.vertex_count; i-- > 0;) {
       position_m_[layout_.index(i, strand_index)] = scratch_.placed_m[i];
       velocity_mps_[layout_.index(i, strand_index)] = finish_velocity(scratch_, i);
     }
   }
+  previous_carry_ = carry();
+  previous_h_s_ = h_s_;
   previous_rotation_ = rotation_;
   ++step_index_;
   input_ = nullptr;
@@ -74,7 +79,7 @@ void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) {
     const bool is_sound = is_sane(velocity_mps_[at]) && is_sane(position_m_[at]);
     if (!is_sound) std::fill(strand.memory.begin(), strand.memory.end(), 0.0);
     strand.velocity_mps[i] = is_sound ? velocity_mps_[at] - head_velocity_mps_ : glm::dvec3(0.0);
-    const double rate = parameters_.air_drag_per_s + h_s_ * style_stiffness_per_s2(at);
+    const double rate = parameters_.air_drag_per_s + h_s_ * style_stiffness_per_s2(strand, i);
     strand.inertia[i] = 1.0 + h_s_ * rate;
     strand.target_m[i] = rotation_ * rest;
     strand.old_m[i] = is_sane(position_m_[at]) ? position_m_[at] : strand.target_m[i];
@@ -84,11 +89,26 @@ void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) {
   }
 }
 
-double ReferenceStrands::style_stiffness_per_s2(size_t at) const {
-  const double from_tip = 1.0 - static_cast<double>(layout_.arc[at]);
-  const double share =
-      parameters_.style_tip_share + (1.0 - parameters_.style_tip_share) * from_tip * from_tip;
-  return parameters_.style_stiffness_per_s2 * share;
+bool ReferenceStrands::was_intact(const ReferenceStrand& strand, uint32_t i) const {
+  const size_t at = layout_.index(i, strand.index);
+  return is_sane(velocity_mps_[at]) && is_sane(position_m_[at]);
+}
+
+glm::dvec3 ReferenceStrands::previous_turn_mps(const glm::dvec3& arm_m) const {
+  return (arm_m - glm::conjugate(previous_carry_) * arm_m) / previous_h_s_;
+}
+
+glm::dvec3 ReferenceStrands::uncarried_gravity_mps2(const ReferenceStrand& strand, uint32_t i) const {
+  const double carried_share =
+      parameters_.sag_free * std::min(1.0, style_stiffness_per_s2(strand, i) / kSupportStiffnessPerS2);
+  const glm::dvec3 groom_gravity = limited(input_->groom_gravity_in_head_mps2, kMaxGravityMps2);
+  return limited(input_->gravity_mps2, kMaxGravityMps2) - carried_share * (rotation_ * groom_gravity);
+}
+
+double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const {
+  const double from_tip = 1.0 - static_cast<double>(layout_.arc[layout_.index(i, strand.index)]);
+  const double tip_share = parameters_.style_tip_share;
+  return parameters_.style_stiffness_per_s2 * (tip_share + (1.0 - tip_share) * from_tip * from_tip);
 }
 
 // Backward Euler for the linear drag toward the air and the linear pull to the groomed shape, forward for the
@@ -99,17 +119,11 @@ double ReferenceStrands::style_stiffness_per_s2(size_t at) const {
 // the pull carries is a pre-stress: it moves the target up by f_i R g_0 / s_i, just as far as g = R g_0 lets
 // it sag.
 glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t i) const {
-  const size_t at = layout_.index(i, strand.index);
-  const glm::dvec3 old_velocity =
-      is_sane(velocity_mps_[at]) && is_sane(position_m_[at]) ? velocity_mps_[at] : head_velocity_mps_;
-  const double stiffness = style_stiffness_per_s2(at);
+  const double stiffness = style_stiffness_per_s2(strand, i);
   const double drag = parameters_.air_drag_per_s;
-  const double carried_share = parameters_.sag_free * std::min(1.0, stiffness / kSupportStiffnessPerS2);
-  const glm::dvec3 groom_gravity = limited(input_->groom_gravity_in_head_mps2, kMaxGravityMps2);
-  const glm::dvec3 gravity =
-      limited(input_->gravity_mps2, kMaxGravityMps2) - carried_share * (rotation_ * groom_gravity);
   const glm::dvec3 relative_air = air_velocity_mps(*input_, strand.old_m[i]) - head_velocity_mps_;
-  const glm::dvec3 impulse = (old_velocity - head_velocity_mps_) + h_s_ * (gravity + drag * relative_air) +
+  const glm::dvec3 impulse = strand.velocity_mps[i] +
+                             h_s_ * (uncarried_gravity_mps2(strand, i) + drag * relative_air) +
                              h_s_ * stiffness * (strand.target_m[i] - strand.old_m[i]);
   const glm::dvec3 u = impulse / (1.0 + h_s_ * drag + h_s_ * h_s_ * stiffness);
   return strand.old_m[i] + h_s_ * shortened(u, parameters_.max_speed_mps);

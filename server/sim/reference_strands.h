@@ -50,13 +50,14 @@ class ReferenceStrands : public Solver {
   /// reach of a pinned tail allow. pinned tail.
   void place(ReferenceStrand& strand, uint32_t i) const;
   /// Where forces alone take vertex i from old_m.
-  glm::dvec3 predict(const ReferenceStrand& strand, uint32_t i) const;
+  virtual glm::dvec3 predict(const ReferenceStrand& strand, uint32_t i) const;
   /// Of the pull to the groomed shape; `at`: the vertex's element in the layout.
   double style_stiffness_per_s2(size_t at) const;
   /// The way that vertex i's velocity is made of.
   virtual glm::dvec3 way_m(const ReferenceStrand& strand, uint32_t i) const {
     return strand.placed_m[i] - strand.old_m[i];
   }
+  const StrandParameters& parameters() const { return parameters_; }
   const StrandLayout& layout() const { return layout_; }
   // Of the substep in progress.
   const StepInput& input() const { return *input_; }
@@ -64,6 +65,14 @@ class ReferenceStrands : public Solver {
   glm::dquat rotation() const { return rotation_; }    // of the head, at the end
   uint32_t step_index() const { return step_index_; }  // since load()
   glm::dquat carry() const { return rotation_ * glm::conjugate(previous_rotation_); }  // turn of the head
+  glm::dvec3 head_velocity_mps() const { return head_velocity_mps_; }
+  /// Velocity of a point at `arm_m` from another by the head's turn in the substep before.
+  glm::dvec3 previous_turn_mps(const glm::dvec3& arm_m) const;
+  /// Whether the state of vertex i before the substep was finite and of this world.
+  bool was_intact(const ReferenceStrand& strand, uint32_t i) const;
+  /// Pull to the groomed shape, 1/s^2, and what is left of gravity when it carries its share.
+  double style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const;
+  glm::dvec3 uncarried_gravity_mps2(const ReferenceStrand& strand, uint32_t i) const;
   bool is_pinned(uint32_t i) const { return i < layout_.pinned_root_count || i >= layout_.tail_begin(); }
 
  private:
@@ -77,6 +86,8 @@ class ReferenceStrands : public Solver {
   std::vector<glm::dvec3> velocity_mps_;
   std::vector<double> memory_;
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
+  glm::dquat previous_carry_{1.0, 0.0, 0.0, 0.0};
+  double previous_h_s_ = 1.0;
 
   // The substep in progress, within the limits of strand_layout.h.
   const StepInput* input_ = nullptr;

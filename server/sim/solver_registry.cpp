@@ -10,6 +10,7 @@
 #include "server/sim/solvers/ftl/ftl.h"
 #include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "server/sim/solvers/position_based/position_based.h"
+#include "server/sim/solvers/shape_constraints/shape_constraints.h"
 #include "server/sim/solvers/tractrix/tractrix.h"
 
 namespace strandcast {
@@ -27,6 +28,10 @@ const std::vector<SolverRow>& solver_table() {
                                                tractrix_split_row(),
                                                tractrix_hybrid_row(),
                                                angular_projection_row()};
+  static const std::vector<SolverRow> table = {
+      dftl_row(),       dftl_parallel_row(), ftl_row(),
+      pbd_row(),        xpbd_row(),          shape_constraints_row(),
+      direct_rod_row(), articulated_row(),   tractrix_emulation_row()};
   return table;
 }
 

@@ -5,16 +5,16 @@
 namespace strandcast {
 namespace {
 
-std::array<glm::vec4, 3> columns(const glm::dmat3& matrix) {
-  return {glm::vec4(glm::vec3(matrix[0]), 0.0f), glm::vec4(glm::vec3(matrix[1]), 0.0f),
-          glm::vec4(glm::vec3(matrix[2]), 0.0f)};
-}
-
 glm::vec4 pack(const glm::dvec3& vector, double w) {
   return glm::vec4(glm::dvec4(vector, w));
 }
 
 }  // namespace
+
+std::array<glm::vec4, 3> block_columns(const glm::dmat3& matrix) {
+  return {glm::vec4(glm::vec3(matrix[0]), 0.0f), glm::vec4(glm::vec3(matrix[1]), 0.0f),
+          glm::vec4(glm::vec3(matrix[2]), 0.0f)};
+}
 
 StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
                           const StrandLayout& layout, const glm::dquat& previous_world_from_head) {
@@ -26,8 +26,8 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
       limited(input.gravity_mps2, kMaxGravityMps2) + parameters.air_drag_per_s * relative_wind;
 
   StepBlock block{};
-  block.world_from_head = columns(glm::mat3_cast(rotation));
-  block.carry = columns(glm::mat3_cast(rotation * glm::conjugate(previous_world_from_head)));
+  block.world_from_head = block_columns(glm::mat3_cast(rotation));
+  block.carry = block_columns(glm::mat3_cast(rotation * glm::conjugate(previous_world_from_head)));
   block.head_velocity = pack(head_velocity, h_s);
   block.push = pack(h_s * acceleration, 1.0 / h_s);
   const glm::dvec3 groom_gravity = limited(input.groom_gravity_in_head_mps2, kMaxGravityMps2);
@@ -35,6 +35,7 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
   block.style = glm::vec4(glm::dvec4(parameters.style_stiffness_per_s2, parameters.style_tip_share,
                                      parameters.s_damping, parameters.max_speed_mps));
   block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s, 0.0, 0.0));
+  block.wind = pack(relative_wind, 0.0);
   block.shape = {layout.strand_count, layout.vertex_count, layout.pinned_root_count, layout.tail_begin()};
   const size_t wave_count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);
   for (size_t i = 0; i < wave_count; ++i) {

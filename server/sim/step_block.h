@@ -21,17 +21,22 @@ struct StepBlock {
   glm::vec4 contact;
   glm::uvec4 shape;
   glm::uvec4 odd_even;
+  std::array<glm::vec4, 3> previous_turn;
+  glm::vec4 wind;
   std::array<glm::vec4, shader::kMaxGustWaves> gust_amplitude;
   std::array<glm::vec4, shader::kMaxGustWaves> gust_wave;
   std::array<glm::vec4, shader::kMaxSphereColliders> collider;
 };
 static_assert(sizeof(StepBlock) ==
-              16 * (3 + 3 + 7 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
+              16 * (3 + 3 + 7 + 3 + 1 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
 static_assert(shader::kMaxGustWaves == kMaxGustWaves && shader::kMaxSphereColliders == kMaxSphereColliders);
 
-/// The block for one substep; the odd-even fields stay zero. Inputs are held to the limits of
-/// strand_layout.h.
+/// The block for one substep; the odd-even fields and the turn before stay zero. Inputs are held to the
+/// limits of strand_layout.h.
 StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
                           const StrandLayout& layout, const glm::dquat& previous_world_from_head);
+
+/// Columns of a matrix as a uniform block holds them.
+std::array<glm::vec4, 3> block_columns(const glm::dmat3& matrix);
 
 }  // namespace strandcast

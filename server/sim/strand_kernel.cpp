@@ -83,6 +83,7 @@ Status StrandKernel::load(const Groom& groom, const glm::dquat& world_from_head)
   if (has_pinned_tail != is_compiled_for_tail_) RETURN_IF_ERROR(compile(has_pinned_tail));
   previous_rotation_ = limited_rotation(world_from_head);
   step_index_ = 0;
+  previous_turn_per_s_ = glm::dmat3(0.0);
   upload(layout);
   // The kernels read these back from the buffers.
   layout.rest = {};
@@ -118,8 +119,12 @@ const gl::Program& StrandKernel::program_for(size_t collider_count) const {
 void StrandKernel::substep(const StepInput& input) {
   StepBlock block = make_step_block(input, parameters_, layout_, previous_rotation_);
   block.odd_even = {desc_.iterations, desc_.has_exact_length ? 1u : 0u, step_index_++, 0u};
+  block.previous_turn = block_columns(previous_turn_per_s_);
   step_.write(0, std::as_bytes(std::span(&block, 1)));
-  previous_rotation_ = limited_rotation(input.world_from_head);
+  const glm::dquat rotation = limited_rotation(input.world_from_head);
+  const glm::dmat3 turned_back = glm::mat3_cast(previous_rotation_ * glm::conjugate(rotation));
+  previous_turn_per_s_ = (glm::dmat3(1.0) - turned_back) / limited_substep_s(input);
+  previous_rotation_ = rotation;
 
   step_.bind_uniform(shader::kBindingStep);
   position_.bind_storage(shader::kBindingPosition);

@@ -63,12 +63,13 @@ class StrandKernel final : public Solver {
 
   StrandLayout layout_;
   glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
-  uint32_t step_index_ = 0;  // since load()
-  gl::Buffer rest_;          // (vertex_count x strand_count) vec4: head space, m; segment before it, m
-  gl::Buffer position_;      // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
-  gl::Buffer velocity_;      // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
-  gl::Buffer offset_;  // (vertex_count x strand_count) vec4: second strand less the state, m; has_offset only
-  gl::Buffer step_;    // StepBlock
+  uint32_t step_index_ = 0;              // since load()
+  glm::dmat3 previous_turn_per_s_{0.0};  // velocity of a point by the head's turn in the substep before
+  gl::Buffer rest_;      // (vertex_count x strand_count) vec4: head space, m; segment before it, m
+  gl::Buffer position_;  // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
+  gl::Buffer velocity_;  // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
+  gl::Buffer offset_;    // (vertex_count x strand_count) vec4: second strand less the state, m; has_offset only
+  gl::Buffer step_;      // StepBlock
   gl::Handle<gl::delete_texture> rest_view_;
   gl::Handle<gl::delete_texture> position_view_;
   gl::Handle<gl::delete_texture> velocity_view_;

@@ -30,40 +30,54 @@ vec3 gust_velocity(vec3 point) {
   return gust;
 }
 
+// Groom and a state of a vertex, not yet predicted. A broken state starts again from the groomed shape.
+Vertex vertex_from(uint at, vec3 stored, float arc, vec3 stored_velocity) {
+  const vec4 rest = texelFetch(u_rest, int(at));
+  Vertex vertex;
+  vertex.target = turned_with_head(rest.xyz);
+  vertex.segment = rest.w;
+  vertex.arc = arc;
+  const bool is_sane = !is_broken(stored) && !is_broken(stored_velocity);
+  vertex.old = is_sane ? stored : vertex.target;
+  vertex.predicted = vertex.old;
+  vertex.velocity = is_sane ? stored_velocity - u_step.head_velocity.xyz : vec3(0.0);
+  vertex.inertia = 1.0;
+  return vertex;
+}
+
+Vertex read_vertex(uint at) {
+  const vec4 state = texelFetch(u_position, int(at));
+  return vertex_from(at, state.xyz, state.w, texelFetch(u_velocity, int(at)).xyz);
+}
+
 // Of the pull to the groomed shape, 1/s^2; `arc` is 0 at the root and 1 at the tip.
 float style_stiffness(float arc) {
   const float from_tip = 1.0 - arc;
   return u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
 }
 
-// Backward Euler in the drag and in the pull to the groomed shape, seen from the head joint (see predict() in
-// server/sim/reference_strands.cpp for the equation), from a state of one's own. A broken one starts again
-// from the groomed shape.
-Vertex predict_from(uint at, vec3 stored, vec3 stored_velocity) {
-  const vec4 rest = texelFetch(u_rest, int(at));
-  Vertex vertex;
-  vertex.target = turned_with_head(rest.xyz);
-  vertex.segment = rest.w;
-  vertex.arc = texelFetch(u_position, int(at)).w;
-  const bool is_sane = !is_broken(stored) && !is_broken(stored_velocity);
-  vertex.old = is_sane ? stored : vertex.target;
-  const vec3 velocity = is_sane ? stored_velocity - u_step.head_velocity.xyz : vec3(0.0);
+// Velocity gained from what carries the groom's weight.
+vec3 support_of(float stiffness) { return min(1.0, stiffness * u_step.support.w) * u_step.support.xyz; }
 
+// Backward Euler in the drag and in the pull to the groomed shape, seen from the head joint (see predict() in
+// server/sim/reference_strands.cpp for the equation).
+Vertex predicted_from(Vertex vertex) {
   const float h = u_step.head_velocity.w;
   const float drag = u_step.contact.y;
   const float stiffness = style_stiffness(vertex.arc);
   const float pull = h * stiffness;
-  const vec3 support = min(1.0, stiffness * u_step.support.w) * u_step.support.xyz;
-  const vec3 push = u_step.push.xyz + support + (h * drag) * gust_velocity(vertex.old);
-  const vec3 moved = (velocity + push + pull * (vertex.target - vertex.old)) / (1.0 + h * (drag + pull));
-  vertex.predicted = vertex.old + h * within_speed_limit(moved);
-  vertex.velocity = velocity;
+  const vec3 push = u_step.push.xyz + support_of(stiffness) + (h * drag) * gust_velocity(vertex.old);
   vertex.inertia = 1.0 + h * (drag + pull);
+  const vec3 moved = (vertex.velocity + push + pull * (vertex.target - vertex.old)) / vertex.inertia;
+  vertex.predicted = vertex.old + h * within_speed_limit(moved);
   return vertex;
 }
 
-Vertex predict(uint at) {
-  return predict_from(at, texelFetch(u_position, int(at)).xyz, texelFetch(u_velocity, int(at)).xyz);
+Vertex predict(uint at) { return predicted_from(read_vertex(at)); }
+
+// From a state of one's own.
+Vertex predict_from(uint at, vec3 stored, vec3 stored_velocity) {
+  return predicted_from(vertex_from(at, stored, texelFetch(u_position, int(at)).w, stored_velocity));
 }
 
 // The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at

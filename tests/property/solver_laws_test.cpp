@@ -320,6 +320,7 @@ TEST_F(SolverLaws, FrictionHoldsAStrandOnACollider) {
                          {{"style_stiffness_per_s2", 0.0},
                           {"young_modulus_pa", 0.0},
                           {"bend_stiffness_nm_per_rad", 0.0},
+                          {"bend_stiffness_m4_per_s2", 0.0},
                           {"collider_friction", is_rough ? 2.0 : 0.0}});
       StepInput input;
       input.gravity_mps2 = {0.0, -9.81, 4.0};  // pulls sideways, across the strand
