@@ -51,8 +51,6 @@ class ReferenceStrands : public Solver {
   void place(ReferenceStrand& strand, uint32_t i) const;
   /// Where forces alone take vertex i from old_m.
   virtual glm::dvec3 predict(const ReferenceStrand& strand, uint32_t i) const;
-  /// Of the pull to the groomed shape; `at`: the vertex's element in the layout.
-  double style_stiffness_per_s2(size_t at) const;
   /// The way that vertex i's velocity is made of.
   virtual glm::dvec3 way_m(const ReferenceStrand& strand, uint32_t i) const {
     return strand.placed_m[i] - strand.old_m[i];

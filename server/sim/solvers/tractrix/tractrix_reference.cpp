@@ -102,7 +102,7 @@ class SplitReference final : public TractrixReference {
       strand.predicted_m[i] =
           strand.placed_m[i - 1] + strand.segment_m[i] * mixed(segment, groomed, style_mix_);
       place(strand, i);
-      const double stiffness = style_stiffness_per_s2(layout().index(i, strand.index));
+      const double stiffness = style_stiffness_per_s2(strand, i);
       const double turn = h_s() * style_return_per_s_ * std::min(1.0, stiffness / kSupportStiffnessPerS2);
       kept += strand.segment_m[i] * mixed(segment, groomed, turn / (1.0 + turn));
       const glm::dvec3 apart = kept - strand.placed_m[i];
