@@ -79,7 +79,7 @@ void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) {
     const bool is_sound = is_sane(velocity_mps_[at]) && is_sane(position_m_[at]);
     if (!is_sound) std::fill(strand.memory.begin(), strand.memory.end(), 0.0);
     strand.velocity_mps[i] = is_sound ? velocity_mps_[at] - head_velocity_mps_ : glm::dvec3(0.0);
-    const double rate = parameters_.air_drag_per_s + h_s_ * style_stiffness_per_s2(strand, i);
+    const double rate = air_drag_per_s(strand) + h_s_ * style_stiffness_per_s2(strand, i);
     strand.inertia[i] = 1.0 + h_s_ * rate;
     strand.target_m[i] = rotation_ * rest;
     strand.old_m[i] = is_sane(position_m_[at]) ? position_m_[at] : strand.target_m[i];
@@ -105,10 +105,20 @@ glm::dvec3 ReferenceStrands::uncarried_gravity_mps2(const ReferenceStrand& stran
   return limited(input_->gravity_mps2, kMaxGravityMps2) - carried_share * (rotation_ * groom_gravity);
 }
 
+double ReferenceStrands::thickness(const ReferenceStrand& strand) const {
+  return thickness_factor(glm::vec3(layout_.rest[layout_.index(0, strand.index)]),
+                          parameters_.thickness_spread);
+}
+
+double ReferenceStrands::air_drag_per_s(const ReferenceStrand& strand) const {
+  return parameters_.air_drag_per_s / (thickness(strand) * thickness(strand));
+}
+
 double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const {
   const double from_tip = 1.0 - static_cast<double>(layout_.arc[layout_.index(i, strand.index)]);
   const double tip_share = parameters_.style_tip_share;
-  return parameters_.style_stiffness_per_s2 * (tip_share + (1.0 - tip_share) * from_tip * from_tip);
+  return thickness(strand) * thickness(strand) * parameters_.style_stiffness_per_s2 *
+         (tip_share + (1.0 - tip_share) * from_tip * from_tip);
 }
 
 // Backward Euler for the linear drag toward the air and the linear pull to the groomed shape, forward for the
@@ -120,7 +130,7 @@ double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, u
 // it sag.
 glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t i) const {
   const double stiffness = style_stiffness_per_s2(strand, i);
-  const double drag = parameters_.air_drag_per_s;
+  const double drag = air_drag_per_s(strand);
   const glm::dvec3 relative_air = air_velocity_mps(*input_, strand.old_m[i]) - head_velocity_mps_;
   const glm::dvec3 impulse = strand.velocity_mps[i] +
                              h_s_ * (uncarried_gravity_mps2(strand, i) + drag * relative_air) +
@@ -161,7 +171,14 @@ glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint
   glm::dvec3 u = way_m(strand, i) / h_s_;
   const bool has_next = i + 1 < layout_.vertex_count && !is_pinned(i) && !is_pinned(i + 1);
   if (has_next) {
-    const glm::dvec3 correction = strand.placed_m[i + 1] - strand.predicted_m[i + 1] - strand.pushed_m[i + 1];
+    glm::dvec3 correction = strand.placed_m[i + 1] - strand.predicted_m[i + 1] - strand.pushed_m[i + 1];
+    // A string takes no thrust: of a correction that points away from vertex i only a share counts.
+    const glm::dvec3 segment = strand.placed_m[i + 1] - strand.placed_m[i];
+    if (const double length_m = glm::length(segment); length_m > kTinyLength) {
+      const glm::dvec3 direction = segment / length_m;
+      const double thrust_m = std::max(0.0, glm::dot(correction, direction));
+      correction -= (1.0 - parameters_.thrust_share) * thrust_m * direction;
+    }
     u -= parameters_.s_damping * correction / h_s_;
   }
   return shortened(u, parameters_.max_speed_mps) + head_velocity_mps_;

@@ -68,6 +68,9 @@ class ReferenceStrands : public Solver {
   glm::dvec3 previous_turn_mps(const glm::dvec3& arm_m) const;
   /// Whether the state of vertex i before the substep was finite and of this world.
   bool was_intact(const ReferenceStrand& strand, uint32_t i) const;
+  /// Of this strand, over the mean; and the drag that goes with it.
+  double thickness(const ReferenceStrand& strand) const;
+  double air_drag_per_s(const ReferenceStrand& strand) const;
   /// Pull to the groomed shape, 1/s^2, and what is left of gravity when it carries its share.
   double style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const;
   glm::dvec3 uncarried_gravity_mps2(const ReferenceStrand& strand, uint32_t i) const;

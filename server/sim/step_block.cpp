@@ -34,7 +34,8 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
   block.support = pack(-h_s * parameters.sag_free * (rotation * groom_gravity), 1.0 / kSupportStiffnessPerS2);
   block.style = glm::vec4(glm::dvec4(parameters.style_stiffness_per_s2, parameters.style_tip_share,
                                      parameters.s_damping, parameters.max_speed_mps));
-  block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s, 0.0, 0.0));
+  block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s,
+                                       1.0 - parameters.thrust_share, parameters.thickness_spread));
   block.wind = pack(relative_wind, 0.0);
   block.shape = {layout.strand_count, layout.vertex_count, layout.pinned_root_count, layout.tail_begin()};
   const size_t wave_count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);

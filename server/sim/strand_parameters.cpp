@@ -1,5 +1,9 @@
 #include "server/sim/strand_parameters.h"
 
+#include <bit>
+
+#include "common/base/hash.h"
+
 namespace strandcast {
 
 // Defaults of pull and drag, tried by eye on the built-in hair, whose weight the pull carries: it swings and
@@ -19,6 +23,32 @@ std::vector<SolverParameterInfo> shared_parameter_infos() {
   };
 }
 
+SolverParameterInfo thrust_share_info() {
+  return {
+      "thrust_share",
+      1.0,
+      0.0,
+      1.0,
+      "",
+      "share of that correction kept when it thrusts: 1 = as published, jitters after fast reversals, above "
+      "60 Hz for good; 0 = as hair, which buckles, but standing limp strands then sway on"};
+}
+
+SolverParameterInfo thickness_spread_info() {
+  return {"thickness_spread",
+          0.0,
+          0.0,
+          0.5,
+          "",
+          "strands are up to this share thinner or thicker than the mean, so that they do not move alike"};
+}
+
+double thickness_factor(const glm::vec3& root_in_head_m, double spread) {
+  uint32_t hash = 0;
+  for (int axis = 0; axis < 3; ++axis) hash = mix_u32(hash ^ std::bit_cast<uint32_t>(root_in_head_m[axis]));
+  return 1.0 + spread * (2.0 * static_cast<double>(unit_float(hash)) - 1.0);
+}
+
 StrandParameters read_strand_parameters(const SolverParameters& parameters) {
   StrandParameters result;
   result.s_damping = parameters.at("s_damping");
@@ -28,6 +58,12 @@ StrandParameters read_strand_parameters(const SolverParameters& parameters) {
   result.sag_free = parameters.at("sag_free");
   result.collider_friction = parameters.at("collider_friction");
   result.max_speed_mps = parameters.at("max_speed_mps");
+  const auto optional = [&parameters](const char* name, double otherwise) {
+    const auto found = parameters.find(name);
+    return found == parameters.end() ? otherwise : found->second;
+  };
+  result.thrust_share = optional("thrust_share", 1.0);
+  result.thickness_spread = optional("thickness_spread", 0.0);
   return result;
 }
 

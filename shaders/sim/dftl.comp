@@ -20,6 +20,7 @@ void main() {
   const uint stride = u_step.shape.x;
   const uint strand = gl_GlobalInvocationID.x;
   if (strand >= stride) return;
+  set_thickness(strand);
   const uint first = u_step.shape.z;
   const uint tail = u_step.shape.w;
   uint at = follow_head(strand, 0u, first, stride);
@@ -44,7 +45,7 @@ void main() {
 #endif
     vec3 pushed;
     const vec3 end = placed(start, start_target, vertex, anchor, reach, is_last, pushed);
-    const vec3 correction = end - vertex.predicted - pushed;
+    const vec3 correction = taken_back(end - vertex.predicted - pushed, end - start);
     store_vertex(at, end, vertex.arc);
     if (i > first) store_velocity(at - stride, waiting - (u_step.style.z * u_step.push.w) * correction);
     waiting = (end - vertex.old) * u_step.push.w;

@@ -74,6 +74,7 @@ void main() {
   // Idle lanes shadow the first vertex: barriers need every invocation.
   const uint at = exists ? lane.index * strands + strand : 0u;
 
+  set_thickness(exists ? strand : 0u);
   Vertex vertex = predict(at);
   vec3 pushed = vec3(0.0);
   if (!lane.is_free) vertex.predicted = vertex.target;
@@ -106,8 +107,9 @@ void main() {
 #endif
 
   const vec3 end = lane.is_free ? s_point[lane.local] : vertex.target;
+  const vec3 along = lane.is_free ? end - s_point[lane.local - lane.stride] : vec3(0.0);
   barrier();
-  s_point[lane.local] = lane.is_free ? end - vertex.predicted - pushed : vec3(0.0);
+  s_point[lane.local] = lane.is_free ? taken_back(end - vertex.predicted - pushed, along) : vec3(0.0);
   barrier();
   if (!exists) return;
   vec3 velocity = (end - vertex.old) * u_step.push.w;

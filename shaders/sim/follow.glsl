@@ -3,6 +3,7 @@
 #pragma variant HAS_TURBULENCE 0 1
 #pragma variant COLLIDERS 0 1 4 16
 #pragma variant HAS_PINNED_TAIL 0 1
+#include "lib/hash.glsl"
 #include "sim/step.glsl"
 
 // Times a vertex inside several colliders is pushed, out of the deepest first.
@@ -17,6 +18,24 @@ struct Vertex {
   vec3 velocity;   // before the substep, relative to the head joint's during it
   float inertia;   // how hard it holds to the prediction: 1 + what drag and pull add in an implicit step
 };
+
+// Thickness of this strand over the mean, squared, and the inverse of that: what pull and drag go with (see
+// server/sim/strand_parameters.h). Kernels whose rows have the parameter set it first.
+vec2 g_thickness = vec2(1.0);
+
+void set_thickness(uint strand) {
+  const uvec3 bits = floatBitsToUint(texelFetch(u_rest, int(strand)).xyz);
+  const uint hash = mix_u32(mix_u32(mix_u32(bits.x) ^ bits.y) ^ bits.z);
+  const float thickness = 1.0 + u_step.contact.w * (2.0 * unit_float(hash) - 1.0);
+  g_thickness = vec2(thickness * thickness, 1.0 / (thickness * thickness));
+}
+
+// What of a follower's correction its leader takes back: of a thrust, which points away from the leader, only
+// the share that is kept.
+vec3 taken_back(vec3 correction, vec3 along) {
+  const float thrust = max(dot(correction, along), 0.0) / max(dot(along, along), kTinySquared);
+  return correction - (u_step.contact.z * thrust) * along;
+}
 
 // Wind beside the mean wind; waves that are not there have no amplitude.
 vec3 gust_velocity(vec3 point) {
@@ -53,7 +72,7 @@ Vertex read_vertex(uint at) {
 // Of the pull to the groomed shape, 1/s^2; `arc` is 0 at the root and 1 at the tip.
 float style_stiffness(float arc) {
   const float from_tip = 1.0 - arc;
-  return u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
+  return g_thickness.x * u_step.style.x * mix(u_step.style.y, 1.0, from_tip * from_tip);
 }
 
 // Velocity gained from what carries the groom's weight.
@@ -63,10 +82,12 @@ vec3 support_of(float stiffness) { return min(1.0, stiffness * u_step.support.w)
 // server/sim/reference_strands.cpp for the equation).
 Vertex predicted_from(Vertex vertex) {
   const float h = u_step.head_velocity.w;
-  const float drag = u_step.contact.y;
+  const float drag = g_thickness.y * u_step.contact.y;
   const float stiffness = style_stiffness(vertex.arc);
   const float pull = h * stiffness;
-  const vec3 push = u_step.push.xyz + support_of(stiffness) + (h * drag) * gust_velocity(vertex.old);
+  const vec3 more_wind = (g_thickness.y - 1.0) * (h * u_step.contact.y) * u_step.wind.xyz;
+  const vec3 push =
+      u_step.push.xyz + support_of(stiffness) + (h * drag) * gust_velocity(vertex.old) + more_wind;
   vertex.inertia = 1.0 + h * (drag + pull);
   const vec3 moved = (vertex.velocity + push + pull * (vertex.target - vertex.old)) / vertex.inertia;
   vertex.predicted = vertex.old + h * within_speed_limit(moved);

@@ -11,7 +11,7 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 push;                // velocity gained from gravity and mean wind, m/s; w = 1 / substep
   vec4 support;             // velocity gained from what carries the groom's weight, m/s; w = 1 / stiffness, s^2
   vec4 style;               // stiffness at the root 1/s^2, share at the tip, s_damping, speed limit m/s
-  vec4 contact;             // friction, air drag 1/s; rest unused
+  vec4 contact;             // friction, air drag 1/s, share of thrusts that is not kept, thickness spread
   uvec4 shape;              // strands, vertices of each, pinned at the root, first vertex of the pinned tail
   uvec4 odd_even;           // iterations, 1 = restore exact lengths, steps since loading
   vec4 previous_turn[3];    // columns: velocity of a point by the head's turn in the step before, 1/s; w unused

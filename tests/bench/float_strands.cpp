@@ -92,9 +92,13 @@ void FloatStrands::step_strand(const StepBlock& block, const glm::mat3& rotation
     const float segment = layout_.rest[at].w;
     const glm::vec3 free_end = start + along * (segment / std::max(glm::length(along), kTiny));
     const glm::vec3 end = outside(block, collider_count, start, free_end, segment);
+    const glm::vec3 segment_vector = free_end - start;
+    const float thrust = std::max(glm::dot(free_end - predicted, segment_vector), 0.0f) /
+                         std::max(glm::dot(segment_vector, segment_vector), kTiny);
+    const glm::vec3 correction = free_end - predicted - block.contact.z * thrust * segment_vector;
     if (i > layout_.pinned_root_count) {
       state_.velocity_mps[layout_.index(i - 1, strand)] =
-          shortened(waiting - block.style.z * per_step * (free_end - predicted), limit) + head_velocity;
+          shortened(waiting - block.style.z * per_step * correction, limit) + head_velocity;
     }
     waiting = (end - position) * per_step;
     position = start = end;

@@ -23,6 +23,8 @@ SolverRow dftl_row() {
       "(equations of "
       "d_i and v_i) and 4.2.3 (gpu version)";
   row.parameters = shared_parameter_infos();
+  row.parameters.push_back(thrust_share_info());
+  row.parameters.push_back(thickness_spread_info());
   row.make_gpu = make_dftl_gpu;
   row.make_reference = make_dftl_reference;
   return row;

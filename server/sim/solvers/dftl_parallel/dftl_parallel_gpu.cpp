@@ -29,6 +29,8 @@ SolverRow dftl_parallel_row() {
       "(optimised_gpu "
       "version)";
   row.parameters = shared_parameter_infos();
+  row.parameters.push_back(thrust_share_info());
+  row.parameters.push_back(thickness_spread_info());
   row.parameters.push_back({"iterations", kDefaultOddEvenIterations, 1.0, kMaxOddEvenIterations, "",
                             "times the odd and the even vertices follow their leaders (rounded)"});
   row.parameters.push_back(

@@ -48,6 +48,7 @@ SolverRow ftl_row() {
       "Woodhouse, Real-Time Hair Rendering and Simulation, University of Bristol 2017, section 2.1.4 "
       "(equations of dv, p_i and d_i), after Brown, Latombe and Montgomery 2004";
   row.parameters = shared_parameter_infos();
+  row.parameters.push_back(thickness_spread_info());
   std::erase_if(row.parameters, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
   // The segments are a chain of followers that no reaction holds back: what one does, the next does larger.
   row.comes_to_rest = false;
