@@ -12,12 +12,13 @@ constexpr const char* kCorrectionName = "s_damping";  // of the follow solvers o
 // TressFX takes 2, for hair without gravity. At 60 Hz 2 / 4 / 8 let limp strands of 16 vertices and 30 cm
 // swing with a period of 0.74 / 0.91 / 1.005 of that of many small steps.
 constexpr double kDefaultLengthIterations = 8.0;
-constexpr double kDefaultShapeIterations = 4.0;
+constexpr double kDefaultShapeIterations = 2.0;  // as TressFX
 // Few sweeps from root to tip turn errors around, and the next step repeats what it finds: stiff strands
 // flicker, as TressFX's do (its issue 19). From four on they converge well enough to take all of a
 // correction.
 constexpr uint32_t kConvergingShapeIterations = 4;
 constexpr double kShapeRelaxation = 0.7;
+constexpr double kConvergedShapeIterations = 8.0;
 constexpr double kDefaultStretchLimit = 0.1;
 constexpr double kMaxIterations = 64.0;
 // The local shape holds the style as well, so the pull to it may be weaker; at the tip it still carries all
@@ -55,7 +56,9 @@ std::vector<SolverParameterInfo> parameter_infos() {
       {{"iterations", kDefaultLengthIterations, 0.0, kMaxIterations, "",
         "times the segments are given their lengths per substep (rounded); 0 = they are not"},
        {"shape_iterations", kDefaultShapeIterations, 0.0, kMaxIterations, "",
-        "times the segments are turned to their groomed angles per substep (rounded); 0 = limp"},
+        "times the segments are turned to their groomed angles per substep (rounded); 0 = limp, 2 as "
+        "TressFX, "
+        "softer than bend_stiffness, from 4 on as stiff as that at any rate, but folded strands may flutter"},
        {"bend_stiffness_m4_per_s2", hair.bending_stiffness_nm2() / hair.linear_density_kgpm(), 0.0, 1.0,
         "m^4/s^2", "bending stiffness over mass per length; default: a hair of 0.05 mm radius"},
        {"shock_share", 0.8, 0.0, 1.0, "",
@@ -106,6 +109,7 @@ SolverRow shape_constraints_row() {
   row.as_hair = [](const HairConstants& hair, double, double) {
     return SolverParameters{
         {"bend_stiffness_m4_per_s2", hair.bending_stiffness_nm2() / hair.linear_density_kgpm()},
+        {"shape_iterations", kConvergedShapeIterations},
         {"style_stiffness_per_s2", 0.0},
         {"air_drag_per_s", 0.0},
         {"damping_per_s", 0.0},
