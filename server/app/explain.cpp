@@ -41,6 +41,7 @@ std::string list_solvers() {
   std::string text;
   for (const SolverRow& row : solver_table()) {
     text += fmt::format("{}\n  {}\n  {}\n", row.name, row.summary, row.source);
+    if (!row.has_kernel) text += "  reference only: in double on one thread of the processor, slow\n";
     for (const SolverParameterInfo& info : row.parameters)
       text += fmt::format("    {:<24} {:>10g}  in {:g} .. {:g} {:<8} {}\n", info.name, info.default_value,
                           info.minimum, info.maximum, info.unit, info.summary);

@@ -217,6 +217,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   log_info("sim", "solver {}: {} strands x {} vertices, {} kB", row->name,
            config_.content->groom.strand_count(), config_.content->groom.uniform_vertex_count(),
            solver_->memory_bytes() / 1000);
+  if (!row->has_kernel)
+    log_warn("sim", "solver {} is a reference: it runs in double on one thread of the processor", row->name);
   return {};
 }
 

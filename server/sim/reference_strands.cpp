@@ -193,17 +193,24 @@ void ReferenceStrands::read(SolverState& state) {
   }
 }
 
+// A strand that is written as it was read goes on as if nothing had happened.
 void ReferenceStrands::write(const SolverState& state) {
   CHECK(state.position_m.size() == layout_.size() && state.velocity_mps.size() == layout_.size());
-  for (size_t i = 0; i < layout_.size(); ++i) {
-    const bool is_changed = state.position_m[i] != glm::vec3(position_m_[i]) ||
-                            state.velocity_mps[i] != glm::vec3(velocity_mps_[i]);
-    if (is_changed) {
-      const std::span<double> memory = memory_of(static_cast<uint32_t>(i % layout_.strand_count));
-      std::fill(memory.begin(), memory.end(), 0.0);
+  for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+    bool is_changed = false;
+    for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
+      const size_t at = layout_.index(i, s);
+      is_changed = is_changed || state.position_m[at] != glm::vec3(position_m_[at]) ||
+                   state.velocity_mps[at] != glm::vec3(velocity_mps_[at]);
     }
-    position_m_[i] = glm::dvec3(state.position_m[i]);
-    velocity_mps_[i] = glm::dvec3(state.velocity_mps[i]);
+    if (!is_changed) continue;
+    const std::span<double> memory = memory_of(s);
+    std::fill(memory.begin(), memory.end(), 0.0);
+    for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
+      const size_t at = layout_.index(i, s);
+      position_m_[at] = glm::dvec3(state.position_m[at]);
+      velocity_mps_[at] = glm::dvec3(state.velocity_mps[at]);
+    }
   }
 }
 

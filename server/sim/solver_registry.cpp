@@ -11,6 +11,7 @@
 #include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "server/sim/solvers/position_based/position_based.h"
 #include "server/sim/solvers/shape_constraints/shape_constraints.h"
+#include "server/sim/solvers/super_helix/super_helix.h"
 #include "server/sim/solvers/tractrix/tractrix.h"
 
 namespace strandcast {
@@ -32,6 +33,8 @@ const std::vector<SolverRow>& solver_table() {
       dftl_row(),       dftl_parallel_row(), ftl_row(),
       pbd_row(),        xpbd_row(),          shape_constraints_row(),
       direct_rod_row(), articulated_row(),   tractrix_emulation_row()};
+                                               angular_projection_row(),
+                                               super_helix_row()};
   return table;
 }
 

@@ -64,6 +64,9 @@ struct SolverRow {
   std::function<SolverParameters(const HairConstants&, double segment_m, double substep_s)> as_hair;
   /// The parameter that buys accuracy with time ("iterations", "solves"); "" = none.
   std::string effort_parameter;
+  /// False: there is no kernel. make_gpu then makes the double-precision solver as well, which runs on one
+  /// thread of the processor, slowly, through the same interface.
+  bool has_kernel = true;
   std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const GpuSolverContext&)> make_gpu;
   std::function<std::unique_ptr<Solver>(const SolverParameters&)>
       make_reference;  // double precision, one thread
