@@ -9,6 +9,8 @@ uniform vec4 u_springs;  // stretch, m/s^2; its damper, m/s; bend, m^3/s^2; alti
 uniform vec4 u_limits;   // shortest segment, m; stretch; stiffness over inertia; where in the step forces are
 
 const float kFoldedBack = 1e-6;
+// Closer than 16 degrees to the reverse of its groomed direction, an edge turns less about itself than the
+// smallest rotation would: bending stays within what float and explicit steps bear, not quite of one energy.
 const float kNearlyReversed = 0.02;
 const float kFarAway = 1e30;
 const float kBendPerStretch = 4.0;

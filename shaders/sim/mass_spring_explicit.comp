@@ -17,7 +17,11 @@ void add_forces(uint strand, uint last) {
   vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
   const vec3 clamp_edge = first >= 2u ? target - target_at(at - u_step.shape.x) : vec3(0.0);
   vec3 rest_direction = direction_of(clamp_edge, u_step.world_from_head[1].xyz);
-  vec3 edge1 = clamp_edge;
+  vec3 edge1 = vec3(0.0);
+  if (first >= 2u) {
+    const uint before = at - u_step.shape.x;
+    edge1 = position - position_before(before) - share * velocity_before(before, false);
+  }
   vec3 edge0 = vec3(0.0);
   vec3 target1 = clamp_edge;
   vec3 target0 = vec3(0.0);

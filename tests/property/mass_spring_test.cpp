@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <glm/gtx/quaternion.hpp>
 #include <numbers>
 
 #include "server/sim/solvers/mass_spring/mass_spring.h"
@@ -43,6 +44,10 @@ SolverParameters bare(const SolverParameters& given) {
 class MassSpring : public SolverTest {
  protected:
   static SolverKind kind(bool is_gpu) { return {*find_solver("mass_spring"), is_gpu}; }
+  /// Without gusts and colliders, so that one program is compiled and not four.
+  std::unique_ptr<Solver> make_plain(bool is_gpu, const Groom& groom, const SolverParameters& given) {
+    return make(kind(is_gpu), groom, given, {1.0, 0.0, 0.0, 0.0}, SceneFeatures{});
+  }
   static Status check(const SolverParameters& given, double substep_s) {
     const SolverRow& row = **find_solver("mass_spring");
     return check_step(row, complete_parameters(row, given).value(), substep_s);
@@ -97,11 +102,11 @@ double chain_limit_by_iteration_npm() {
 /// Whether a chain that is pulled a little in the highest mode stays near its rest shape.
 bool MassSpring::is_stable(bool is_gpu, double integrator, double stretch_npm) {
   const Groom groom = straight_strand(kFreeMasses + 1, kSegmentM, {0.0, -1.0, 0.0});
-  auto solver = make(kind(is_gpu), groom,
-                     bare({{"integrator", integrator},
-                           {"stretch_stiffness_n_per_m", stretch_npm},
-                           {"linear_density_kg_per_m", kMassKg / kSegmentM},
-                           {"shortest_segment_m", kSegmentM}}));
+  auto solver = make_plain(is_gpu, groom,
+                           bare({{"integrator", integrator},
+                                 {"stretch_stiffness_n_per_m", stretch_npm},
+                                 {"linear_density_kg_per_m", kMassKg / kSegmentM},
+                                 {"shortest_segment_m", kSegmentM}}));
   constexpr double kSeedM = 2e-6;
   constexpr double kGrowth = 100.0;
   constexpr int kSteps = 600;
@@ -189,7 +194,7 @@ TEST_F(MassSpring, TheLimitCoversAllSpringsTogether) {
               {"altitude_stiffness_n_per_m", load * altitude * unit_npm / kAltitudePerStretch},
               {"stretch_damping_ns_per_m", load * damping}});
     EXPECT_EQ(check(parameters, kStepS).ok(), load < 1.0);
-    auto solver = make(kind(false), groom, parameters);
+    auto solver = make_plain(false, groom, parameters);
     SolverState state = read(*solver);
     const SolverState rest = state;
     for (size_t i = 2; i < state.position_m.size(); ++i) {
@@ -216,24 +221,32 @@ TEST_F(MassSpring, ImplicitStepsSurviveAnyStiffness) {
   const Groom groom = make_test_groom({});
   const SolverRow& row = **find_solver("mass_spring");
   const SolverParameters defaults = complete_parameters(row, {}).value();
-  for (const bool is_gpu : {false, true}) {
-    for (const double factor : {1.0, 1e3, 1e6, 1e9}) {
-      SolverParameters stiff = {{"stretch_limit", kNoLimit}};
-      for (const char* name :
-           {"stretch_stiffness_n_per_m", "bend_stiffness_nm_per_rad", "altitude_stiffness_n_per_m"})
-        stiff[name] = factor * defaults.at(name);
-      auto solver = make(kind(is_gpu), groom, stiff);
-      double largest = 0.0;
-      for (int step = 1; step <= 120; ++step) {
-        solver->substep(moving_input(step, 1.0 / 60.0));
-        const SolverState state = read(*solver);
-        ASSERT_TRUE(is_finite(state));
-        largest = std::fmax(largest, largest_stretch(groom, state));
-      }
-      EXPECT_LE(largest, 0.25) << (is_gpu ? "GPU" : "double") << ", stiffness x " << factor;
-      fmt::print("{}, stiffness x {:g}: stretch {:.4f} without the limit\n", is_gpu ? "GPU" : "double",
-                 factor, largest);
+  for (const double factor : {1.0, 1e3, 1e6, 1e9}) {
+    SolverParameters stiff = {{"stretch_limit", kNoLimit}};
+    for (const char* name :
+         {"stretch_stiffness_n_per_m", "bend_stiffness_nm_per_rad", "altitude_stiffness_n_per_m"})
+      stiff[name] = factor * defaults.at(name);
+    auto gpu = make_plain(true, groom, stiff);
+    auto reference = make_plain(false, groom, stiff);
+    double largest = 0.0;
+    double apart_m = 0.0;
+    for (int step = 1; step <= 120; ++step) {
+      StepInput input = moving_input(step, 1.0 / 60.0);
+      input.gusts.clear();
+      input.colliders.clear();
+      gpu->substep(input);
+      reference->substep(input);
+      const SolverState state = read(*gpu);
+      const SolverState expected = read(*reference);
+      ASSERT_TRUE(is_finite(state) && is_finite(expected));
+      largest = std::max({largest, largest_stretch(groom, state), largest_stretch(groom, expected)});
+      apart_m = std::fmax(apart_m, largest_distance_m(state.position_m, expected.position_m));
     }
+    fmt::print("stiffness x {:g}: stretch {:.4f} without the limit, float and double {:.1e} m apart\n",
+               factor, largest, apart_m);
+    EXPECT_LE(largest, 0.01);
+    // What a float forgets of the inertia beside the stiffest springs moves a strand no further than that.
+    EXPECT_LE(apart_m, 1e-4);
   }
 }
 
@@ -242,7 +255,7 @@ TEST_F(MassSpring, TheSecondSolveTakesTheStretchAway) {
   const Groom groom = make_test_groom({});
   std::vector<double> largest;
   for (const double solves : {1.0, 2.0, 4.0}) {
-    auto solver = make(kind(true), groom, {{"solves", solves}, {"stretch_limit", kNoLimit}});
+    auto solver = make_plain(true, groom, {{"solves", solves}, {"stretch_limit", kNoLimit}});
     largest.push_back(0.0);
     for (int step = 1; step <= 240; ++step) {
       solver->substep(moving_input(step, 1.0 / 60.0));
@@ -287,10 +300,10 @@ TEST_F(MassSpring, TwoMassesSwingAsEachIntegratorSays) {
                                    integrator, sign, omega_h));
           const double omega = omega_h / kStepS;
           const double stretch_npm = omega * omega * mass_kg / (2.0 + sign * std::sqrt(2.0));
-          auto solver = make(kind(is_gpu), groom,
-                             bare({{"integrator", integrator},
-                                   {"stretch_stiffness_n_per_m", stretch_npm},
-                                   {"linear_density_kg_per_m", kDensityKgpm}}));
+          auto solver = make_plain(is_gpu, groom,
+                                   bare({{"integrator", integrator},
+                                         {"stretch_stiffness_n_per_m", stretch_npm},
+                                         {"linear_density_kg_per_m", kDensityKgpm}}));
           SolverState state = read(*solver);
           state.position_m[1].y += static_cast<float>(kAmplitudeM);
           state.position_m[2].y += static_cast<float>(-sign * std::sqrt(2.0) * kAmplitudeM);
@@ -334,30 +347,43 @@ class SwingingStrand {
                  {"bend_stiffness_nm_per_rad", kBendNmprad},
                  {"linear_density_kg_per_m", kDensityKgpm}});
   }
-  /// Kinetic, stretch, bending and, with gravity along -y, potential energy.
-  static double energy_j(const SolverState& state, const glm::dvec3& clamp, double gravity_mps2) {
-    double energy = 0.0;
-    glm::dvec3 before = clamp;
-    for (uint32_t i = 1; i < kVertices; ++i) {
-      const double mass = kDensityKgpm * kSpacingM * (i + 1 < kVertices ? 1.0 : 0.5);
-      const glm::dvec3 velocity(state.velocity_mps[i]);
-      const glm::dvec3 edge = glm::dvec3(state.position_m[i]) - glm::dvec3(state.position_m[i - 1]);
-      const double stretch = glm::length(edge) - kSpacingM;
-      const glm::dvec3 turned = edge / kSpacingM - before;
-      energy += 0.5 * mass * glm::dot(velocity, velocity) + 0.5 * kStretchNpm * stretch * stretch +
-                (i == 1 ? 1.0 : 0.5) * kBendNmprad * glm::dot(turned, turned) +
-                mass * gravity_mps2 * static_cast<double>(state.position_m[i].y);
-      before = edge / kSpacingM;
-    }
-    return energy;
-  }
 };
+
+/// Kinetic, stretch, bending and, with gravity along -y, potential energy of one strand with the numbers of
+/// SwingingStrand, clamped at its first vertex.
+double energy_j(const SolverState& state, const std::vector<glm::vec3>& rest, double gravity_mps2) {
+  double energy = 0.0;
+  glm::dvec3 groomed_before(0.0);
+  glm::dvec3 strain_before(0.0);
+  for (size_t i = 1; i < rest.size(); ++i) {
+    const glm::dvec3 groomed_edge = glm::dvec3(rest[i]) - glm::dvec3(rest[i - 1]);
+    const glm::dvec3 groomed = glm::normalize(groomed_edge);
+    const double length = glm::length(groomed_edge);
+    const double mass = SwingingStrand::kDensityKgpm * length * (i + 1 < rest.size() ? 1.0 : 0.5);
+    const glm::dvec3 velocity(state.velocity_mps[i]);
+    const glm::dvec3 edge = glm::dvec3(state.position_m[i]) - glm::dvec3(state.position_m[i - 1]);
+    const double stretch = glm::length(edge) - length;
+    // Where the edge would rest: turned with the edge before.
+    const glm::dvec3 target =
+        i == 1 ? groomed
+               : glm::length(strain_before) *
+                     (glm::rotation(groomed_before, glm::normalize(strain_before)) * groomed);
+    const glm::dvec3 bend = edge / length - target;
+    energy += 0.5 * mass * glm::dot(velocity, velocity) +
+              0.5 * SwingingStrand::kStretchNpm * stretch * stretch +
+              (i == 1 ? 1.0 : 0.5) * SwingingStrand::kBendNmprad * glm::dot(bend, bend) +
+              mass * gravity_mps2 * static_cast<double>(state.position_m[i].y);
+    groomed_before = groomed;
+    strain_before = edge / length;
+  }
+  return energy;
+}
 
 TEST_F(MassSpring, ErrorsFallWithTheStepAsTheOrderSays) {
   const Groom groom = straight_strand(SwingingStrand::kVertices, SwingingStrand::kSpacingM, {1.0, 0.0, 0.0});
   constexpr double kEndS = 0.32;
   const auto end_of = [&](double integrator, double h_s) {
-    auto solver = make(kind(false), groom, SwingingStrand::parameters(integrator));
+    auto solver = make_plain(false, groom, SwingingStrand::parameters(integrator));
     StepInput input = calm_input(h_s);
     input.gravity_mps2 = {0.0, -9.81, 0.0};
     for (int step = 0; step < std::lround(kEndS / h_s); ++step) solver->substep(input);
@@ -386,15 +412,15 @@ TEST_F(MassSpring, EnergyIsKeptByExplicitStepsAndNeverGrowsInImplicitOnes) {
   for (const bool is_gpu : {false, true}) {
     for (const double integrator : {kSymplecticEuler, kVerlet, kBackwardEuler}) {
       SCOPED_TRACE(fmt::format("{}, integrator {}", is_gpu ? "GPU" : "double", integrator));
-      auto solver = make(kind(is_gpu), groom, SwingingStrand::parameters(integrator));
-      double before = SwingingStrand::energy_j(read(*solver), along, kGravityMps2);
+      auto solver = make_plain(is_gpu, groom, SwingingStrand::parameters(integrator));
+      double before = energy_j(read(*solver), groom.rest_position_m, kGravityMps2);
       double largest_rise_j = 0.0;
       double late_j = 0.0;
       double early_j = 0.0;
       constexpr int kSteps = 8000;
       for (int step = 0; step < kSteps; ++step) {
         solver->substep(input);
-        const double energy = SwingingStrand::energy_j(read(*solver), along, kGravityMps2);
+        const double energy = energy_j(read(*solver), groom.rest_position_m, kGravityMps2);
         largest_rise_j = std::fmax(largest_rise_j, energy - before);
         before = energy;
         if (step < kSteps / 8) early_j += energy / (kSteps / 8);
@@ -413,15 +439,79 @@ TEST_F(MassSpring, EnergyIsKeptByExplicitStepsAndNeverGrowsInImplicitOnes) {
   }
 }
 
+// The forces of bent joints are the gradient of an energy, however far the strand has turned from its groom.
+TEST_F(MassSpring, ASwingingCurlKeepsItsEnergy) {
+  constexpr double kGravityMps2 = 9.81;
+  std::vector<glm::vec3> curl;
+  for (int i = 0; i < 8; ++i) curl.emplace_back(0.08 * i, 0.04 * std::cos(1.2 * i), 0.04 * std::sin(1.2 * i));
+  const Groom groom = groom_from({curl}, Pinning::Root);
+  StepInput input = calm_input(5e-4);
+  input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
+  for (const bool is_gpu : {false, true}) {
+    auto solver = make_plain(is_gpu, groom, SwingingStrand::parameters(kVerlet));
+    const double begin_j = energy_j(read(*solver), curl, kGravityMps2);
+    double least_j = begin_j;
+    double most_j = begin_j;
+    double lowest_m = 0.0;
+    for (int step = 0; step < 2000; ++step) {  // before an edge turns to within 16 degrees of its reverse
+      solver->substep(input);
+      const SolverState state = read(*solver);
+      const double energy = energy_j(state, curl, kGravityMps2);
+      least_j = std::fmin(least_j, energy);
+      most_j = std::fmax(most_j, energy);
+      lowest_m = std::fmin(lowest_m, static_cast<double>(state.position_m.back().y));
+    }
+    // What the swing turns over: the fall of the middle by half of the depth that the tip reached.
+    const double swing_j = SwingingStrand::kDensityKgpm * 0.56 * kGravityMps2 * 0.5 * -lowest_m;
+    fmt::print("{}: energy of a curl that swings by {:.2f} m kept within {:.3f} %\n",
+               is_gpu ? "GPU" : "double", -lowest_m, 100.0 * (most_j - least_j) / swing_j);
+    EXPECT_LT(lowest_m, -0.3) << "it hardly moved";
+    EXPECT_LE(most_j - least_j, 1e-3 * swing_j);
+  }
+}
+
+// Explicit kernels are a second program: the same motion as the reference, over colliders and in gusts.
+TEST_F(MassSpring, EveryIntegratorFollowsItsReferenceOnTheGpu) {
+  for (const Pinning pinning : {Pinning::Root, Pinning::RootPair, Pinning::BothEnds}) {
+    TestGroomDesc desc;
+    desc.pinning = pinning;
+    const Groom groom = make_test_groom(desc);
+    SolverState end[3];
+    for (const double integrator : {kSymplecticEuler, kVerlet, kBackwardEuler}) {
+      const SolverParameters soft = {
+          {"integrator", integrator},          {"style_stiffness_per_s2", 60.0},
+          {"linear_density_kg_per_m", 0.1},    {"shortest_segment_m", 0.01},
+          {"stretch_stiffness_n_per_m", 2.0},  {"stretch_damping_ns_per_m", 1e-3},
+          {"bend_stiffness_nm_per_rad", 1e-5}, {"altitude_stiffness_n_per_m", 0.05}};
+      ASSERT_TRUE(check(soft, 1.0 / 60.0));
+      auto gpu = make(kind(true), groom, soft);
+      auto reference = make(kind(false), groom, soft);
+      for (int step = 1; step <= 10; ++step) {
+        gpu->substep(moving_input(step, 1.0 / 60.0));
+        reference->substep(moving_input(step, 1.0 / 60.0));
+      }
+      SolverState& state = end[std::lround(integrator)];
+      state = read(*gpu);
+      const SolverState expected = read(*reference);
+      EXPECT_LE(largest_distance_m(state.position_m, expected.position_m), 1e-5)
+          << "integrator " << integrator;
+      EXPECT_LE(largest_distance_m(state.velocity_mps, expected.velocity_mps), 1e-4)
+          << "integrator " << integrator;
+    }
+    EXPECT_GT(largest_distance_m(end[0].position_m, end[1].position_m), 1e-4);
+    EXPECT_GT(largest_distance_m(end[1].position_m, end[2].position_m), 1e-4);
+  }
+}
+
 // Forces that are no gradient of an energy would keep a limp curl moving for ever.
 TEST_F(MassSpring, CurlsComeToRest) {
   const Groom groom = groom_from({curl_of(24, 0.5), curl_of(24, 1.1), curl_of(24, 1.6)}, Pinning::RootPair);
   for (const double factor : {1.0, 1000.0}) {
-    auto solver = make(kind(true), groom,
-                       {{"style_stiffness_per_s2", 0.0},
-                        {"air_drag_per_s", 2.0},
-                        {"bend_stiffness_nm_per_rad", factor * 1e-6},
-                        {"altitude_stiffness_n_per_m", factor * 3e-3}});
+    auto solver = make_plain(true, groom,
+                             {{"style_stiffness_per_s2", 0.0},
+                              {"air_drag_per_s", 2.0},
+                              {"bend_stiffness_nm_per_rad", factor * 1e-6},
+                              {"altitude_stiffness_n_per_m", factor * 3e-3}});
     StepInput input = calm_input(1.0 / 240.0);
     input.gravity_mps2 = {3.0, -9.81, 0.0};
     for (int step = 0; step < 6 * 240; ++step) solver->substep(input);
@@ -457,7 +547,7 @@ TEST_F(MassSpring, AngularSpringsBendAsTheBeam) {
       // The hair's own bending in a gravity that gives this Gamma.
       const double weight_npm = shape.gamma * hair.bending_stiffness_nm2() / std::pow(kLengthM, 3);
       parameters["air_drag_per_s"] = 3.0;
-      auto solver = make(kind(is_gpu), straight_strand(kVertices, segment_m, {1.0, 0.0, 0.0}), parameters);
+      auto solver = make_plain(is_gpu, straight_strand(kVertices, segment_m, {1.0, 0.0, 0.0}), parameters);
       StepInput input = calm_input();
       input.gravity_mps2 = {0.0, -weight_npm / hair.linear_density_kgpm(), 0.0};
       constexpr double kSettlingS = 12.0;
@@ -483,11 +573,11 @@ TEST_F(MassSpring, AStrandHangsByHookesLaw) {
   for (const bool is_gpu : {false, true}) {
     for (const auto& [integrator, h_s] : std::vector<std::pair<double, double>>{
              {kBackwardEuler, 1.0 / 60.0}, {kBackwardEuler, 1.0 / 240.0}, {kVerlet, 1.0 / 240.0}}) {
-      auto solver = make(kind(is_gpu), groom,
-                         bare({{"integrator", integrator},
-                               {"stretch_stiffness_n_per_m", kStretchNpm},
-                               {"stretch_damping_ns_per_m", 0.02},
-                               {"linear_density_kg_per_m", kDensityKgpm}}));
+      auto solver = make_plain(is_gpu, groom,
+                               bare({{"integrator", integrator},
+                                     {"stretch_stiffness_n_per_m", kStretchNpm},
+                                     {"stretch_damping_ns_per_m", 0.02},
+                                     {"linear_density_kg_per_m", kDensityKgpm}}));
       StepInput input = calm_input(h_s);
       input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
       for (int step = 0; step < 10.0 / h_s; ++step) solver->substep(input);
@@ -522,12 +612,12 @@ TEST_F(MassSpring, AltitudeSpringsOpenACollapsedCurl) {
   for (const bool is_gpu : {false, true}) {
     for (const bool has_altitude : {false, true}) {
       for (const double integrator : {kSymplecticEuler, kBackwardEuler}) {
-        auto solver = make(kind(is_gpu), groom,
-                           bare({{"integrator", integrator},
-                                 {"air_drag_per_s", 5.0},
-                                 {"linear_density_kg_per_m", 0.1},
-                                 {"stretch_stiffness_n_per_m", 1.0},
-                                 {"altitude_stiffness_n_per_m", has_altitude ? 0.5 : 0.0}}));
+        auto solver = make_plain(is_gpu, groom,
+                                 bare({{"integrator", integrator},
+                                       {"air_drag_per_s", 5.0},
+                                       {"linear_density_kg_per_m", 0.1},
+                                       {"stretch_stiffness_n_per_m", 1.0},
+                                       {"altitude_stiffness_n_per_m", has_altitude ? 0.5 : 0.0}}));
         SolverState state = read(*solver);
         for (size_t i = 2; i < curl.size(); ++i) state.position_m[i].z *= 0.05f;
         solver->write(state);

@@ -14,7 +14,7 @@ namespace {
 constexpr double kTinyLengthM = 1e-10;
 constexpr double kBrokenM = 1e12;
 constexpr double kFoldedBack = 1e-6;
-constexpr double kNearlyReversed = 0.02;
+constexpr double kNearlyReversed = 0.02;  // 1 + cos of 164 degrees
 constexpr const char* kCorrectionName = "s_damping";
 
 bool is_sane(const glm::dvec3& value) {
