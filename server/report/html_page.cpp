@@ -17,19 +17,23 @@ body { color: var(--text); background: var(--back); font: 16px/1.5 system-ui, sa
 h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
 .answer { background: var(--panel); border-left: 4px solid #2a7fb8; padding: .6rem 1rem; }
 figure { margin: 1.2rem 0; } figure svg { max-width: 100%; height: auto; }
-figcaption, caption { color: var(--soft); font-size: .9rem; text-align: left; }
-.wide { overflow-x: auto; margin: 1rem 0; }
+figcaption, .caption { color: var(--soft); font-size: .9rem; }
+.caption { margin-bottom: .3rem; }
+.wide { overflow-x: auto; margin: 0 0 1.2rem; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid var(--line); padding: .25rem .7rem .25rem 0; text-align: left;
   white-space: nowrap; vertical-align: top; }
-th { color: var(--soft); font-weight: 600; } td.number { text-align: right; }
+th { color: var(--soft); font-weight: 600; white-space: normal; vertical-align: bottom; } td.number { text-align: right; }
 td.good { background: var(--good); } td.bad { background: var(--bad); }
 pre { background: var(--panel); padding: .7rem 1rem; overflow-x: auto; font-size: .88rem; }
 )";
 
+/// A number, perhaps with a short unit: "12.5", "-3e-07 %", "1.2 ms".
 bool looks_like_number(std::string_view text) {
+  constexpr size_t kLongest = 14;
   const size_t first = text.find_first_not_of("+-<>= ");
-  return first != std::string_view::npos && text[first] >= '0' && text[first] <= '9';
+  return first != std::string_view::npos && text[first] >= '0' && text[first] <= '9' &&
+         text.size() <= kLongest && text.find(',') == std::string_view::npos;
 }
 
 }  // namespace
@@ -81,8 +85,9 @@ void HtmlPage::answer(std::string_view text) {
 }
 
 void HtmlPage::table(const HtmlTable& table) {
+  if (!table.caption.empty())
+    body_ += fmt::format("<p class=\"caption\">{}</p>\n", html_escaped(table.caption));
   body_ += "<div class=\"wide\"><table>\n";
-  if (!table.caption.empty()) body_ += fmt::format("<caption>{}</caption>\n", html_escaped(table.caption));
   body_ += "<tr>";
   for (const std::string& column : table.columns) body_ += fmt::format("<th>{}</th>", html_escaped(column));
   body_ += "</tr>\n";

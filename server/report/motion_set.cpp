@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/base/check.h"
 #include "common/motion/bvh.h"
 #include "server/scene/step_builder.h"
 
@@ -164,11 +165,12 @@ std::vector<StepInput> MotionSet::inputs(const RunSetting& setting, int step_cou
   return all;
 }
 
-Result<Trajectory> MotionSet::run(const Workbench& workbench, const RunSetting& setting) const {
-  const Groom strands = groom(setting.vertex_count);
+Result<Trajectory> MotionSet::run(const Workbench& workbench, const RunSetting& setting,
+                                  uint32_t strand_count) const {
+  const Groom strands = groom(setting.vertex_count, strand_count);
   ASSIGN_OR_RETURN(StrandRun run, StrandRun::make(workbench, setting, physics(), strands));
   Trajectory trajectory;
-  trajectory.strand_count = options_.strand_count;
+  trajectory.strand_count = strand_count;
   trajectory.vertex_count = setting.vertex_count;
   const auto steps_per_sample = static_cast<int>(std::lround(kSampleS * setting.rate_hz));
   const auto sample_count = static_cast<int>(std::floor(options_.duration_s / kSampleS + 1e-9));
@@ -184,21 +186,32 @@ Result<Trajectory> MotionSet::run(const Workbench& workbench, const RunSetting& 
   return trajectory;
 }
 
+Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver("direct_rod"));
+  RunSetting setting{row, Material::Hair, vertex_count, rate_hz};
+  setting.is_reference = true;
+  return motion.run({}, setting);
+}
+
 double relative_rms(const Trajectory& run, const Trajectory& reference) {
   if (!run.is_finite || !reference.is_finite) return INFINITY;
+  const uint32_t strand_count = std::min(run.strand_count, reference.strand_count);
+  CHECK(run.strand_count % strand_count == 0 && reference.strand_count % strand_count == 0);
   double sum = 0.0;
   for (size_t sample = 0; sample < run.position_m.size(); ++sample) {
-    for (uint32_t s = 0; s < run.strand_count; ++s) {
+    for (uint32_t s = 0; s < strand_count; ++s) {
+      const uint32_t run_strand = s * (run.strand_count / strand_count);
+      const uint32_t reference_strand = s * (reference.strand_count / strand_count);
       for (uint32_t i = 1; i < run.vertex_count; ++i) {
-        const glm::dvec3 point(run.position_m[sample][static_cast<size_t>(i) * run.strand_count + s]);
-        const glm::dvec3 exact =
-            point_at(reference, sample, s, static_cast<double>(i) / (run.vertex_count - 1));
-        const glm::dvec3 off = point - exact;
+        const glm::dvec3 point(
+            run.position_m[sample][static_cast<size_t>(i) * run.strand_count + run_strand]);
+        const double share = static_cast<double>(i) / (run.vertex_count - 1);
+        const glm::dvec3 off = point - point_at(reference, sample, reference_strand, share);
         sum += glm::dot(off, off);
       }
     }
   }
-  const double count = static_cast<double>(run.position_m.size()) * run.strand_count * (run.vertex_count - 1);
+  const double count = static_cast<double>(run.position_m.size()) * strand_count * (run.vertex_count - 1);
   return std::sqrt(sum / count) / MotionSet::kLengthM;
 }
 

@@ -47,7 +47,11 @@ class MotionSet {
   double duration_s() const { return options_.duration_s; }
 
   /// The whole motion at the setting's rate, a multiple of 1 / kSampleS.
-  Result<Trajectory> run(const Workbench& workbench, const RunSetting& setting) const;
+  Result<Trajectory> run(const Workbench& workbench, const RunSetting& setting) const {
+    return run(workbench, setting, options_.strand_count);
+  }
+  /// With fewer strands, a divisor of all: every so many of them.
+  Result<Trajectory> run(const Workbench& workbench, const RunSetting& setting, uint32_t strand_count) const;
   /// The inputs of the first `step_count` steps, substep by substep.
   std::vector<StepInput> inputs(const RunSetting& setting, int step_count) const;
 
@@ -63,8 +67,12 @@ class MotionSet {
   MotionClip clip_;  // empty: built in
 };
 
+/// The rod that others are compared with: direct_rod in double precision.
+Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz);
+
 /// Root of the mean squared distance of a run's free vertices from the reference's curve at the same share of
-/// the arc, over strands and samples, over the length; infinity when either is not finite.
+/// the arc, over strands and samples, over the length; infinity when either is not finite. Of trajectories
+/// with different strand counts, one a divisor of the other, the strands that both have.
 double relative_rms(const Trajectory& run, const Trajectory& reference);
 
 }  // namespace strandcast

@@ -15,7 +15,8 @@ namespace {
 constexpr int kExitBadInput = 2;
 constexpr int kExitFailure = 1;
 
-constexpr AddReportCommand kCommands[] = {add_work_precision_command, add_stability_command};
+constexpr AddReportCommand kCommands[] = {add_work_precision_command, add_recommend_command,
+                                          add_stability_command};
 
 int run(int argc, const char* const* argv) {
   CLI::App app("Measures the strand models: error against run time, and more.", "strandcast-report");

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <string_view>
 
 namespace strandcast {
@@ -12,8 +14,9 @@ namespace {
 
 // Parameters of bending and of the pull to the groomed shape, by the words in their names: a limp strand has
 // the least of each stiffness and the most of each compliance.
-constexpr std::array<std::string_view, 8> kStiffeningWords = {"bend",  "twist", "torsion",       "style",
-                                                              "shape", "angle", "young_modulus", "sag_free"};
+constexpr std::array<std::string_view, 11> kStiffeningWords = {"bend",   "twist",         "torsion",  "style",
+                                                               "shape",  "angle",         "altitude", "local",
+                                                               "global", "young_modulus", "sag_free"};
 constexpr std::string_view kDragName = "air_drag_per_s";
 
 bool has_word(const std::string& name, std::string_view word) {
@@ -38,6 +41,26 @@ void make_limp(const SolverRow& row, SolverParameters& parameters) {
   }
 }
 
+/// A chain let go from horizontal in air hangs straight down in the end.
+bool hangs_straight(const SolverRow& row) {
+  constexpr uint32_t kVertices = 8;
+  constexpr double kDragPerS = 20.0;
+  constexpr double kTimeS = 6.0;
+  constexpr double kNearly = 0.1;  // lengths of the tip from where it would hang
+  RunPhysics physics;
+  physics.given = {{std::string(kDragName), kDragPerS}};
+  RunSetting setting{&row, Material::Limp, kVertices};
+  setting.is_reference = true;
+  auto run =
+      StrandRun::make({}, setting, physics,
+                      groom_of({straight_run(kVertices, physics.length_m, {1.0, 0.0, 0.0})}, Pinning::Root));
+  if (!run) return false;
+  StepInput input;
+  for (int step = 0; step < kTimeS * setting.rate_hz; ++step) run->step(input);
+  const glm::dvec3 tip(run->state().position_m.back());
+  return glm::distance(tip, glm::dvec3(0.0, -physics.length_m, 0.0)) < kNearly * physics.length_m;
+}
+
 bool has_parameter(const SolverRow& row, const std::string& name) {
   return std::any_of(row.parameters.begin(), row.parameters.end(),
                      [&](const SolverParameterInfo& info) { return info.name == name; });
@@ -57,15 +80,17 @@ const char* to_string(Material material) {
   return "?";
 }
 
-std::string to_string(const RunSetting& setting) {
-  std::string text =
-      fmt::format("{}{}, {} vertices, {:g} Hz", setting.row->name,
-                  setting.material == Material::Hair ? "" : fmt::format(" ({})", to_string(setting.material)),
-                  setting.vertex_count, setting.rate_hz);
+std::string setting_words(const RunSetting& setting) {
+  std::string text = fmt::format("{} vertices, {:g} Hz", setting.vertex_count, setting.rate_hz);
   if (setting.substeps > 1) text += fmt::format(", {} substeps", setting.substeps);
   if (!std::isnan(setting.effort))
     text += fmt::format(", {} {:g}", setting.row->effort_parameter, setting.effort);
+  if (setting.material != Material::Hair) text += fmt::format(", {}", to_string(setting.material));
   return text;
+}
+
+std::string to_string(const RunSetting& setting) {
+  return setting.row->name + ", " + setting_words(setting);
 }
 
 Result<SolverParameters> run_parameters(const RunSetting& setting, const RunPhysics& physics) {
@@ -78,6 +103,15 @@ Result<SolverParameters> run_parameters(const RunSetting& setting, const RunPhys
   ASSIGN_OR_RETURN(SolverParameters complete, complete_parameters(*setting.row, given));
   RETURN_IF_ERROR(check_step(*setting.row, complete, setting.substep_s()));
   return complete;
+}
+
+bool can_be_limp(const SolverRow& row) {
+  static std::mutex mutex;
+  static std::map<std::string, bool> known;
+  const std::lock_guard lock(mutex);
+  const auto [found, is_new] = known.try_emplace(row.name, false);
+  if (is_new) found->second = hangs_straight(row);
+  return found->second;
 }
 
 std::vector<double> effort_values(const SolverRow& row, const std::vector<double>& factors) {

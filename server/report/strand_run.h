@@ -33,6 +33,8 @@ struct RunSetting {
   double substep_s() const { return 1.0 / (rate_hz * substeps); }
 };
 
+/// "32 vertices, 60 Hz, solves 1".
+std::string setting_words(const RunSetting& setting);
 /// "direct_rod, 32 vertices, 60 Hz, solves 1".
 std::string to_string(const RunSetting& setting);
 
@@ -46,6 +48,9 @@ struct RunPhysics {
 /// The row's parameters for the setting; BadInput when the hair is out of their range or the step outside
 /// what the model is stable for.
 Result<SolverParameters> run_parameters(const RunSetting& setting, const RunPhysics& physics);
+
+/// The row has parameters for a chain without stiffness: found out by letting one hang, once per row.
+bool can_be_limp(const SolverRow& row);
 
 /// The values of a row's effort parameter to try around its default, ascending; {NaN} without one.
 std::vector<double> effort_values(const SolverRow& row, const std::vector<double>& factors);

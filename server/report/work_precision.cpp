@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/base/profile.h"
 #include "common/gl/egl_context.h"
 #include "server/report/progress.h"
 #include "server/report/run_timer.h"
@@ -31,19 +32,49 @@ std::vector<Material> materials_of(const SolverRow& row) {
   return {Material::Limp, Material::AsShipped};
 }
 
+/// A row with many vertices and small steps; a few of the strands are enough for it.
+struct Refined {
+  Trajectory trajectory;
+  double rate_hz = 0.0;
+};
+constexpr uint32_t kRefinedStrands = 2;
+
 /// The trajectories that runs are compared with. Double precision, so any thread.
 struct References {
   Trajectory rod;
   double time_self_difference = 0.0;
   double space_self_difference = 0.0;
-  std::map<std::pair<std::string, Material>, Trajectory> refined;  // none where a row cannot be refined
+  std::map<std::pair<std::string, Material>, Refined> refined;  // none where a row cannot be refined
 };
 
-Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz) {
-  ASSIGN_OR_RETURN(const SolverRow* row, find_solver("direct_rod"));
-  RunSetting setting{row, Material::Hair, vertex_count, rate_hz};
+/// Seconds that the whole motion takes in double at this setting, from a few steps.
+Result<double> expected_run_s(const MotionSet& motion, const RunSetting& setting) {
+  constexpr int kTriedSteps = 4;
+  ASSIGN_OR_RETURN(StrandRun run, StrandRun::make({}, setting, motion.physics(),
+                                                  motion.groom(setting.vertex_count, kRefinedStrands)));
+  const std::vector<StepInput> inputs = motion.inputs(setting, kTriedSteps);
+  const int64_t begin_ns = now_ns();
+  for (const StepInput& input : inputs) run.substep(input);
+  const double step_s = static_cast<double>(now_ns() - begin_ns) * 1e-9 / kTriedSteps;
+  return step_s * motion.duration_s() * setting.rate_hz;
+}
+
+/// The row on its own with many vertices and small steps; steps twice as long while it would take too long.
+Result<Refined> run_refined(const MotionSet& motion, const WorkGrid& grid, const SolverRow& row,
+                            Material material) {
+  constexpr double kCoarsestHz = 240.0;
+  RunSetting setting{&row, material, grid.refined_vertices, grid.refined_rate_hz};
+  setting.effort = effort_values(row, {grid.refined_effort_factor}).front();
   setting.is_reference = true;
-  return motion.run({}, setting);
+  ASSIGN_OR_RETURN(double expected_s, expected_run_s(motion, setting));
+  while (expected_s > grid.longest_run_s && setting.rate_hz > kCoarsestHz) {
+    setting.rate_hz /= 2.0;
+    expected_s /= 2.0;
+  }
+  if (expected_s > grid.longest_run_s)
+    return make_error(ErrorCode::LimitExceeded, "the refined run would take {:.0f} s", expected_s);
+  ASSIGN_OR_RETURN(Trajectory trajectory, motion.run({}, setting, kRefinedStrands));
+  return Refined{std::move(trajectory), setting.rate_hz};
 }
 
 Result<References> make_references(const MotionSet& motion, const WorkGrid& grid,
@@ -62,10 +93,7 @@ Result<References> make_references(const MotionSet& motion, const WorkGrid& grid
   references.rod = std::move(rod).value();
   for (const SolverRow* row : rows) {
     for (const Material material : materials_of(*row)) {
-      RunSetting setting{row, material, grid.refined_vertices, grid.refined_rate_hz};
-      setting.effort = effort_values(*row, {grid.refined_effort_factor}).front();
-      setting.is_reference = true;
-      if (auto refined = motion.run({}, setting))
+      if (auto refined = run_refined(motion, grid, *row, material))
         references.refined[{row->name, material}] = std::move(refined).value();
     }
   }
@@ -149,6 +177,16 @@ class Measurement {
     return {test, setting, workbench_.runs_on_gpu(setting)};
   }
 
+  /// Not empty when a row that only runs in double would take too long for it.
+  std::string too_slow(const RunSetting& setting, double simulated_s, uint32_t strand_count) {
+    if (workbench_.runs_on_gpu(setting)) return "";
+    const auto time = timer_.time(setting);
+    if (!time) return "";
+    const double expected_s =
+        time->best_us * 1e-6 * strand_count * simulated_s * setting.rate_hz * setting.substeps;
+    return expected_s > grid_.longest_run_s ? fmt::format("left out: {:.0f} s", expected_s) : "";
+  }
+
   void time_run(const RunSetting& setting) {
     progress_.begin_run("time of " + to_string(setting));
     (void)timer_.time(setting);  // asked for again, with its error, when the run is recorded
@@ -165,7 +203,8 @@ class Measurement {
   WorkRecord run_analytic(const Planned& planned) {
     progress_.begin_run(planned.test->name + ", " + to_string(planned.setting));
     WorkRecord record = record_for(planned.test->name, planned.setting);
-    record.result = planned.test->run(workbench_, planned.setting);
+    record.result.note = too_slow(planned.setting, planned.test->simulated_s, 1);
+    if (record.result.note.empty()) record.result = planned.test->run(workbench_, planned.setting);
     const auto& sizes = grid_.vertices;
     if (std::find(sizes.begin(), sizes.end(), planned.setting.vertex_count) != sizes.end()) add_time(record);
     progress_.end_run(cost_of(planned.setting, planned.test->simulated_s));
@@ -182,15 +221,18 @@ class Measurement {
         std::isnan(setting.effort) || setting.effort == effort_values(*setting.row, {1.0}).front();
     if (record.is_on_gpu && (is_default_effort || grid_.has_every_effort))
       exact = std::async(std::launch::async, [&] { return motion_.run({}, in_double); });
-    const auto run = motion_.run(workbench_, setting);
+    const std::string note = too_slow(setting, grid_.motion_s, grid_.strand_count);
+    const auto run = note.empty() ? motion_.run(workbench_, setting)
+                                  : Result<Trajectory>(Error{ErrorCode::LimitExceeded, note, {}});
     if (run) {
       record.result.error = relative_rms(*run, references.rod);
       record.result.stretch = run->stretch;
       if (!run->is_finite) record.result.note = "not finite";
       const auto refined = references.refined.find({setting.row->name, setting.material});
       if (refined != references.refined.end()) {
-        record.model_error = relative_rms(refined->second, references.rod);
-        record.discretisation_error = relative_rms(*run, refined->second);
+        record.refined_rate_hz = refined->second.rate_hz;
+        record.model_error = relative_rms(refined->second.trajectory, references.rod);
+        record.discretisation_error = relative_rms(*run, refined->second.trajectory);
       }
       add_time(record);
     } else {
@@ -261,7 +303,8 @@ WorkGrid make_work_grid(const WorkPrecisionOptions& options) {
     grid.motion_s = 2.0;
     grid.reference_vertices = 64;
     grid.reference_rate_hz = 1920.0;
-    grid.refined_rate_hz = 480.0;
+    grid.refined_rate_hz = 1920.0;
+    grid.longest_run_s = 4.0;
   } else {
     grid.effort_factors = {0.25, 1.0, 2.0, 4.0};
     grid.substeps = {1, 4};

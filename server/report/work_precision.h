@@ -40,8 +40,11 @@ struct WorkGrid {
   uint32_t reference_vertices = 128;
   double reference_rate_hz = 7680.0;
   uint32_t refined_vertices = 64;
-  double refined_rate_hz = 960.0;
-  double refined_effort_factor = 4.0;
+  double refined_rate_hz = 3840.0;
+  double refined_effort_factor = 1.0;
+  // A row without a GPU version may be so slow that its runs take minutes: those beyond this are left out,
+  // and refined versions take longer steps to keep it.
+  double longest_run_s = 120.0;
 };
 WorkGrid make_work_grid(const WorkPrecisionOptions& options);
 
@@ -57,6 +60,7 @@ struct WorkRecord {
   double model_error = std::numeric_limits<double>::quiet_NaN();
   double discretisation_error = std::numeric_limits<double>::quiet_NaN();
   double float_error = std::numeric_limits<double>::quiet_NaN();
+  double refined_rate_hz = std::numeric_limits<double>::quiet_NaN();
   AnalyticResult result = {};  // of the motion set: error, stretch and note
 };
 inline constexpr const char* kMotionTest = "motion";

@@ -130,14 +130,15 @@ void add_picks(HtmlPage& page, const WorkReport& report) {
 /// The three errors of each row: at one common setting, and of its most exact run.
 void add_error_parts(HtmlPage& page, const WorkReport& report) {
   HtmlTable table;
-  table.caption =
-      "Every model's most exact run. Model: the model itself, refined, against the rod. Discretisation: this "
-      "run "
-      "against the model refined. Float: this run on the GPU against double precision. All are RMS distances "
-      "of "
-      "vertices over the strand's length.";
-  table.columns = {"model",          "setting", "us per strand and frame", "error", "model",
-                   "discretisation", "float",   "largest stretch"};
+  table.caption = fmt::format(
+      "Every model's most exact run. Model: the model itself, refined ({} vertices, up to {:g} Hz, in "
+      "double), "
+      "against the rod. Discretisation: this run against the model refined. Float: this run on the GPU "
+      "against "
+      "double precision. All are RMS distances of vertices over the strand's length.",
+      report.grid.refined_vertices, report.grid.refined_rate_hz);
+  table.columns = {"model", "setting",        "microseconds", "error",
+                   "model", "discretisation", "float",        "largest stretch"};
   for (const std::string& method : methods_of(report)) {
     const WorkRecord* best = nullptr;
     for (const WorkRecord& record : report.records) {
@@ -149,7 +150,7 @@ void add_error_parts(HtmlPage& page, const WorkReport& report) {
       table.rows.push_back({method, "no run at any setting", "", "", "", "", "", ""});
       continue;
     }
-    table.rows.push_back({method, to_string(best->setting), number(best->us), percent(best->result.error),
+    table.rows.push_back({method, setting_words(best->setting), number(best->us), percent(best->result.error),
                           percent(best->model_error), percent(best->discretisation_error),
                           percent(best->float_error), percent(best->result.stretch)});
   }
@@ -181,7 +182,8 @@ const WorkRecord* common_record(const WorkReport& report, const std::string& tes
 void add_analytic_tables(HtmlPage& page, const WorkReport& report) {
   HtmlTable table;
   table.caption =
-      "Errors against exact solutions at 32 vertices, 60 Hz and default effort (or the nearest run).";
+      "Errors against exact solutions at 32 vertices, 60 Hz and default effort (or the nearest run); "
+      "- where the model has not the physics.";
   table.columns = {"model"};
   std::vector<const AnalyticTest*> tests;
   for (const AnalyticTest& test : analytic_tests()) {
@@ -198,7 +200,7 @@ void add_analytic_tables(HtmlPage& page, const WorkReport& report) {
     double stretch = 0.0;
     for (const AnalyticTest* test : tests) {
       const WorkRecord* record = common_record(report, test->name, method);
-      row.push_back(record == nullptr              ? HtmlCell("not its physics")
+      row.push_back(record == nullptr              ? HtmlCell("-")
                     : !record->result.note.empty() ? HtmlCell(record->result.note)
                                                    : HtmlCell(percent(record->result.error)));
       if (record == nullptr) continue;
@@ -215,6 +217,14 @@ void add_analytic_tables(HtmlPage& page, const WorkReport& report) {
   key.columns = {"test", "what is compared"};
   for (const AnalyticTest* test : tests) key.rows.push_back({HtmlCell(test->name), HtmlCell(test->summary)});
   page.table(key);
+}
+
+void add_analytic_plot(HtmlPage& page, const WorkReport& report, const std::string& test,
+                       const std::string& title) {
+  const std::vector<WorkPoint> points = points_of(report, test, error_of);
+  page.figure(analytic_plot(report, test, title),
+              fmt::format("Does another model beat {} here? {}", kChampion,
+                          beaten_sentence(points, kChampion, kChampionErrorLimit)));
 }
 
 /// T16: how much the droop of the same hair depends on vertices and rate.
@@ -293,17 +303,29 @@ std::string work_precision_summary(const WorkReport& report) {
 }
 
 std::string work_precision_csv(const WorkReport& report) {
-  CsvFile csv({"test",         "solver",
-               "material",     "device",
-               "vertices",     "rate_hz",
-               "substeps",     "effort_parameter",
-               "effort",       "us_per_strand_frame",
-               "us_median",    "error",
-               "model_error",  "discretisation_error",
-               "float_error",  "largest_stretch",
-               "period_error", "damping_over_predicted",
-               "droop",        "value",
-               "exact",        "note"});
+  CsvFile csv({"test",
+               "solver",
+               "material",
+               "device",
+               "vertices",
+               "rate_hz",
+               "substeps",
+               "effort_parameter",
+               "effort",
+               "us_per_strand_frame",
+               "us_median",
+               "error",
+               "model_error",
+               "discretisation_error",
+               "float_error",
+               "refined_rate_hz",
+               "largest_stretch",
+               "period_error",
+               "damping_over_predicted",
+               "droop",
+               "value",
+               "exact",
+               "note"});
   for (const WorkRecord& record : report.records) {
     const RunSetting& setting = record.setting;
     const AnalyticResult& result = record.result;
@@ -323,6 +345,7 @@ std::string work_precision_csv(const WorkReport& report) {
                  csv_number(record.model_error),
                  csv_number(record.discretisation_error),
                  csv_number(record.float_error),
+                 csv_number(record.refined_rate_hz),
                  csv_number(was_run ? result.stretch : kNan),
                  csv_number(result.period_error),
                  csv_number(result.damping_ratio),
@@ -366,10 +389,8 @@ std::string work_precision_page(const WorkReport& report) {
   add_error_parts(page, report);
   page.heading("Against exact solutions");
   add_analytic_tables(page, report);
-  page.figure(analytic_plot(report, "T1 Gamma 10", "T1: where the tip of a horizontal hair comes to rest"),
-              "Hair of Gamma = 10 under its own weight; error: distance of the tip over the length.");
-  page.figure(analytic_plot(report, "T4, T7", "T4: period of a hanging chain"),
-              "First mode, small swings; error of the period.");
+  add_analytic_plot(page, report, "T1 Gamma 10", "T1: where the tip of a horizontal hair comes to rest");
+  add_analytic_plot(page, report, "T4, T7", "T4: period of a hanging chain");
   add_droop_spread(page, report);
   add_method(page, report);
   return page.text();

@@ -1,0 +1,47 @@
+// strandcast-report recommend: which strand model, at which setting, moves a scene's strands with the least
+// error within a time budget on this machine.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/scene/scene_desc.h"
+#include "server/report/motion_set.h"
+
+namespace strandcast {
+
+struct RecommendOptions {
+  std::filesystem::path scene_path;    // empty: the built-in scene
+  std::vector<std::string> overrides;  // path=value
+  std::vector<std::string> solvers;    // rows to choose from; empty = all
+  double budget_ms = 0.0;              // of simulation per step of the scene
+  std::string gl_device = "auto";
+};
+
+/// One setting of one row, for the scene.
+struct Candidate {
+  RunSetting setting;
+  double ms_per_step = 0.0;  // measured on the scene's own strands
+  double error = 0.0;        // relative RMS on the motion set at the scene's vertices and rate
+};
+
+struct Recommendation {
+  std::string device;
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  std::vector<Candidate> fitting;  // within the budget, the most exact first
+  Candidate next;                  // the least slow beyond the budget; row is nullptr when all fit
+  std::string scene_lines;         // of the first, to paste into a scene file
+};
+
+/// Measures the rows that have a GPU version. LimitExceeded when none fits the budget: names the fastest,
+/// what it takes, and how many strands would fit.
+Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions& options);
+
+/// What a person reads.
+std::string recommendation_text(const Recommendation& recommendation, const SceneDesc& scene,
+                                double budget_ms);
+
+}  // namespace strandcast
