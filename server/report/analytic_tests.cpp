@@ -7,6 +7,7 @@
 #include <functional>
 #include <numbers>
 
+#include "server/report/curl_test.h"
 #include "server/report/exact_solutions.h"
 #include "server/report/paper_chain.h"
 #include "server/report/swing_fit.h"
@@ -368,6 +369,8 @@ const std::vector<AnalyticTest>& analytic_tests() {
        1.0, run_tractrix},
       {"T10", "weight at which an upright hair buckles; error: relative", Material::Hair, 0.0, 0, true, 2.0,
        run_buckling},
+      {"T12", "a curl that hangs under its own weight; error: its extension, all of it twist", Material::Hair,
+       0.0, kCurlVertices, true, 6.0, run_curl},
       {"T18", "30 particles, 10 ms steps, let go from horizontal; error: RMS of positions over the length",
        Material::Limp, kPaperChainRateHz, kPaperChainVertices, true, 0.4, run_paper_chain},
   };
@@ -375,6 +378,7 @@ const std::vector<AnalyticTest>& analytic_tests() {
 }
 
 bool has_physics(const SolverRow& row, const AnalyticTest& test) {
+  if (test.run == run_curl && !has_twist(row)) return false;
   return test.material == Material::Hair ? row.as_hair != nullptr : can_be_limp(row);
 }
 

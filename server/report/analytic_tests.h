@@ -39,7 +39,7 @@ struct AnalyticTest {
 /// All of them, in the order of their numbers.
 const std::vector<AnalyticTest>& analytic_tests();
 
-/// The row has what the test needs: constants of hair, or parameters for a chain.
+/// The row has what the test needs: constants of hair, parameters for a chain, or twist.
 bool has_physics(const SolverRow& row, const AnalyticTest& test);
 
 }  // namespace strandcast

@@ -283,9 +283,8 @@ void add_method(HtmlPage& page, const WorkReport& report) {
   page.paragraph(
       "Models without constants of hair are measured as limp chains and as they ship, and skip the tests "
       "that "
-      "need stiffness. Not measured: a load at the tip and twisted rings (T2, T11: a step has no such input) "
-      "and "
-      "coil springs (T12); the largest stable stiffness (T8) is in strandcast-report stability.");
+      "need stiffness. Not measured: a load at the tip and twisted rings (T2, T11), since a step has no such "
+      "input; the largest stable stiffness (T8) is in strandcast-report stability.");
   page.paragraph(fmt::format("Every run, with all its numbers, is in {}.", kWorkPrecisionCsv));
 }
 
