@@ -31,7 +31,7 @@ struct NetLimits {
   int64_t handshake_ms = 5'000;  // TCP accept to a complete HTTP request
   int64_t hello_ms = 5'000;      // WebSocket open to Hello
   int64_t idle_ms = 15'000;      // nothing received, pings included
-  int64_t stalled_ms = 4'500;    // no progress of one write, or silence while frames wait for acknowledgement
+  int64_t stalled_ms = 4'500;    // no progress of one write, or a viewer's silence while an answer is due
   int64_t unused_ms = 30'000;    // frames wait for acknowledgement, although the client sends other things
   int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake

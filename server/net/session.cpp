@@ -188,12 +188,10 @@ void Session::join(const Hello& hello) {
     queue_.set_asset(admission->asset);
     if (mode_ == StreamMode::Strands) queue_.start_strands();
   }
-  if (hello.acknowledges && hello.role != Role::Source) {
-    flow_.expect_acks();
-    socket_.control_callback([this](websocket::frame_type kind, beast::string_view) {
-      if (kind != websocket::frame_type::pong || !std::exchange(is_probe_under_way_, false)) return;
-      flow_.on_round_trip(now_ns() - probe_sent_ns_, now_ns());
-    });
+  if (hello.role != Role::Source) {
+    if (hello.acknowledges) flow_.expect_acks();
+    socket_.control_callback(
+        [this](websocket::frame_type kind, beast::string_view) { on_control_frame(kind); });
     probe(now_ns());
   }
   queue_control(std::move(admission->welcome));
@@ -321,7 +319,7 @@ void Session::adapt(int64_t time_ns) {
   ask_for_keyframe(time_ns);
 }
 
-/// Measures the bare round trip, and notices a peer that is gone.
+/// Measures the bare round trip, and shows whether a viewer still reads.
 void Session::probe(int64_t time_ns) {
   if (is_probe_under_way_ || is_close_started_ || time_ns - probe_sent_ns_ < kProbeIntervalNs) return;
   is_probe_under_way_ = true;
@@ -329,14 +327,24 @@ void Session::probe(int64_t time_ns) {
   socket_.async_ping({}, [self = shared_from_this()](const beast::error_code&) {});
 }
 
-/// Frames wait for an acknowledgement, and nothing at all comes; or other things come, but never one.
+void Session::on_control_frame(websocket::frame_type kind) {
+  received_ns_ = now_ns();
+  if (kind == websocket::frame_type::pong && std::exchange(is_probe_under_way_, false))
+    flow_.on_round_trip(received_ns_ - probe_sent_ns_, received_ns_);
+}
+
+/// A write does not get on; or something waits for an answer and nothing at all comes; or other things come,
+/// but never an acknowledgement.
 bool Session::is_stalled(int64_t time_ns) const {
-  if (is_writing_ && (time_ns - write_since_ns_) / kNsPerMs >= context_.config.limits.stalled_ms) return true;
-  const int64_t oldest_ns = flow_.oldest_sent_ns();
-  if (oldest_ns == 0) return false;
   const NetLimits& limits = context_.config.limits;
-  return (time_ns - std::max(oldest_ns, received_ns_)) / kNsPerMs >= limits.stalled_ms ||
-         (time_ns - oldest_ns) / kNsPerMs >= limits.unused_ms;
+  const auto is_past = [&](int64_t since_ns, int64_t limit_ms) {
+    return time_ns - since_ns >= limit_ms * kNsPerMs;
+  };
+  if (is_writing_ && is_past(write_since_ns_, limits.stalled_ms)) return true;
+  const int64_t oldest_ns = flow_.oldest_sent_ns();
+  if (oldest_ns != 0 && is_past(std::max(oldest_ns, received_ns_), limits.stalled_ms)) return true;
+  if (oldest_ns != 0 && is_past(oldest_ns, limits.unused_ms)) return true;
+  return is_probe_under_way_ && is_past(std::max(probe_sent_ns_, received_ns_), limits.stalled_ms);
 }
 
 void Session::pump() {
@@ -426,7 +434,7 @@ void Session::check_deadlines(int64_t time_ns) {
   }
   if (state_ != State::Joined) return;
   guarded([&] {
-    if (flow_.expects_acks()) probe(time_ns);
+    if (hello_.role != Role::Source) probe(time_ns);
     adapt(time_ns);
     ask_for_keyframe(time_ns);
     pump();

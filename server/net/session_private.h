@@ -60,6 +60,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_ack(const FrameAck& ack, int64_t time_ns);
   void adapt(int64_t time_ns);
   void probe(int64_t time_ns);
+  void on_control_frame(websocket::frame_type kind);
   bool is_stalled(int64_t time_ns) const;
   void account_drops();
   void leave();
