@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "client/app/live_connection.h"
 #include "common/base/log.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
@@ -27,78 +28,108 @@ struct Collected {
 
 class Collector {
  public:
-  Collector(const ViewOptions& options, ViewerSession& session, const std::atomic<bool>& stop)
-      : options_(options), session_(session), stop_(stop), sampler_(options.clip_fps, options.clip_s) {
-    session_.set_snapshot_listener([this](const auto& snapshot) { take(snapshot); });
+  Collector(const ViewOptions& options, LiveConnection& live, const std::atomic<bool>& stop)
+      : options_(options), live_(live), stop_(stop), sampler_(options.clip_fps, options.clip_s) {
+    begin_session();
   }
-  ~Collector() { session_.set_snapshot_listener({}); }
+  ~Collector() { session().set_snapshot_listener({}); }
 
   Result<Collected> run() {
     RETURN_IF_ERROR(wait_for_first_picture());
-    uint64_t seen_frames = session_.decoded_frames();
+    uint64_t seen_frames = decoded_frames();
     int64_t last_frame_ns = now_ns();
     while (!stop_ && !is_complete()) {
-      RETURN_IF_ERROR(session_.pump(kPumpWait));
-      if (session_.welcome().mode == StreamMode::Frames) take_image();
-      if (session_.decoded_frames() != seen_frames) {
-        seen_frames = session_.decoded_frames();
+      RETURN_IF_ERROR(pump());
+      if (session().welcome().mode == StreamMode::Frames) take_image();
+      if (decoded_frames() != seen_frames) {
+        seen_frames = decoded_frames();
         last_frame_ns = now_ns();
       }
       if (static_cast<double>(now_ns() - last_frame_ns) * 1e-9 > kStallTimeoutS)
-        return make_error(ErrorCode::Timeout, "no new frame for {} s (is the server paused?)",
-                          kStallTimeoutS);
+        return live_.is_connected()
+                   ? make_error(ErrorCode::Timeout, "no new frame for {} s (is the server paused?)",
+                                kStallTimeoutS)
+                   : make_error(ErrorCode::Unavailable, "{}", live_.trouble());
     }
-    if (!collected_.screenshot_snapshot) collected_.screenshot_snapshot = session_.replay().newest();
-    if (!collected_.screenshot_image && session_.image()) collected_.screenshot_image = *session_.image();
+    if (!collected_.screenshot_snapshot) collected_.screenshot_snapshot = session().replay().newest();
+    if (!collected_.screenshot_image && session().image()) collected_.screenshot_image = *session().image();
     return std::move(collected_);
   }
 
  private:
+  ViewerSession& session() { return live_.session(); }
+  uint64_t decoded_frames() { return earlier_frames_ + session().decoded_frames(); }
+
+  void begin_session() {
+    session().set_snapshot_listener([this](const auto& snapshot) { take(snapshot); });
+    session().replay().set_playout(options_.playout);
+    taken_images_ = 0;
+    known_frames_ = 0;
+  }
+
+  /// Waits for the server if it went away; the error is one that waiting does not mend.
+  Status pump() {
+    const uint32_t strands = session().welcome().strand_count, vertices = session().welcome().vertex_count;
+    known_frames_ = session().decoded_frames();
+    if (live_.pump(kPumpWait)) {
+      earlier_frames_ += known_frames_;
+      begin_session();
+      // Pictures of one clip are drawn with one groom.
+      if (strands != session().welcome().strand_count || vertices != session().welcome().vertex_count)
+        return make_error(ErrorCode::Unavailable, "the server came back with another scene");
+    }
+    if (live_.final_error()) return *live_.final_error();
+    return {};
+  }
+
   Status wait_for_first_picture() {
     const int64_t begin_ns = now_ns();
-    while (!stop_ && !session_.has_picture()) {
-      RETURN_IF_ERROR(session_.pump(kPumpWait));
+    while (!stop_ && !session().has_picture()) {
+      RETURN_IF_ERROR(pump());
       if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
         return make_error(ErrorCode::Timeout, "the server sent nothing to show for {} s{}",
                           kFirstPictureTimeoutS,
-                          session_.replay().stats().last_error.empty()
+                          session().replay().stats().last_error.empty()
                               ? std::string()
-                              : "; last problem: " + session_.replay().stats().last_error);
+                              : "; last problem: " + session().replay().stats().last_error);
     }
     return {};
   }
 
-  bool is_complete() const {
+  bool is_complete() {
     const bool wants_clip = !options_.clip.empty();
     if (wants_clip && !sampler_.is_full()) return false;
-    if (options_.seconds) return session_.connected_s() >= *options_.seconds;
+    if (options_.seconds) return static_cast<double>(now_ns() - begin_ns_) * 1e-9 >= *options_.seconds;
     if (wants_clip && options_.screenshot.empty()) return true;
-    return session_.decoded_frames() >= options_.after_frames;
+    return decoded_frames() >= options_.after_frames;
   }
 
   void take(const std::shared_ptr<const Snapshot>& snapshot) {
     if (!options_.clip.empty() && sampler_.wants(snapshot->sim_time_ns))
       collected_.clip_snapshots.push_back(snapshot);
-    if (!collected_.screenshot_snapshot && session_.decoded_frames() >= options_.after_frames)
+    if (!collected_.screenshot_snapshot && decoded_frames() >= options_.after_frames)
       collected_.screenshot_snapshot = snapshot;
   }
 
   /// Pictures carry no simulation time to the listener, so the clip takes them as they come, on the wall
   /// clock.
   void take_image() {
-    if (session_.image_count() == taken_images_ || session_.image() == nullptr) return;
-    taken_images_ = session_.image_count();
+    if (session().image_count() == taken_images_ || session().image() == nullptr) return;
+    taken_images_ = session().image_count();
     if (!options_.clip.empty() && sampler_.wants(now_ns()))
-      collected_.clip_images.push_back(*session_.image());
+      collected_.clip_images.push_back(*session().image());
     if (!collected_.screenshot_image && taken_images_ >= options_.after_frames)
-      collected_.screenshot_image = *session_.image();
+      collected_.screenshot_image = *session().image();
   }
 
   const ViewOptions& options_;
-  ViewerSession& session_;
+  LiveConnection& live_;
   const std::atomic<bool>& stop_;
   ClipSampler sampler_;
   Collected collected_;
+  const int64_t begin_ns_ = now_ns();
+  uint64_t earlier_frames_ = 0;  // of sessions that broke
+  uint64_t known_frames_ = 0;    // of the running one
   uint64_t taken_images_ = 0;
 };
 
@@ -160,9 +191,9 @@ bool ClipSampler::wants(int64_t sim_time_ns) {
 }
 
 Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto session, ViewerSession::open(client_config(options)));
-  session->replay().set_playout(options.playout);
-  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *session, stop).run());
+  ASSIGN_OR_RETURN(auto live, LiveConnection::open(client_config(options)));
+  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, stop).run());
+  ViewerSession* session = &live->session();
 
   StageTimer render_timer;
   ViewReport report = make_report(*session);
@@ -170,7 +201,7 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   const Welcome welcome = session->welcome();
   const std::optional<SceneAsset> asset =
       session->asset() ? std::optional<SceneAsset>(*session->asset()) : std::nullopt;
-  session.reset();  // the server need not serve a viewer that only draws now
+  live.reset();  // the server need not serve a viewer that only draws now
   if (wants_render && welcome.mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
   if (wants_render && welcome.mode == StreamMode::Strands && asset)
     RETURN_IF_ERROR(render_snapshots(options, *asset, welcome, collected, render_timer));
