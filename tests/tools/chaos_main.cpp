@@ -80,7 +80,11 @@ LinkPlan plan_of(const CommandLine& line) {
 }
 
 Status run(const CommandLine& line) {
-  ASSIGN_OR_RETURN(const Address listen, parse_address(line.listen));
+  // Port 0, any free one, is no address for a viewer and so not for parse_address.
+  const bool takes_free_port = line.listen.ends_with(":0");
+  const std::string listen_host = line.listen.substr(0, line.listen.size() - (takes_free_port ? 2 : 0));
+  ASSIGN_OR_RETURN(Address listen, parse_address(takes_free_port ? listen_host : line.listen));
+  if (takes_free_port) listen.port = 0;
   ASSIGN_OR_RETURN(const Address to, parse_address(line.to));
   RelayConfig config{listen.host, listen.port, to.host, to.port, {}, {}, line.seed};
   if (line.direction != "down") config.up = plan_of(line);

@@ -1,0 +1,144 @@
+// Programs that are killed, stopped, starved of descriptors or told to end, with viewers attached.
+#include <csignal>
+#include <fstream>
+#include <sstream>
+
+#include "client/app/live_connection.h"
+#include "tests/support/child_process.h"
+#include "tests/support/eventually.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/tools/load_viewers.h"
+
+namespace strandcast {
+namespace {
+
+using load::LoadViewers;
+using test::ChildProcess;
+
+class ProcessFaults : public testing::Test {
+ protected:
+  /// A server with a small scene; null after a skip.
+  std::unique_ptr<ChildProcess> serve(uint16_t port = 0) {
+    std::filesystem::remove(port_path_);
+    auto server = std::make_unique<ChildProcess>(
+        STRANDCAST_SERVER_PROGRAM,
+        std::vector<std::string>{"--port", std::to_string(port), "--port-file", port_path_.string(), "--set",
+                                 "groom.procedural.strand_count=50", "--log-level", "info"},
+        folder_.path() / "server.txt");
+    EXPECT_TRUE(eventually([&] { return server->has_ended() || std::filesystem::exists(port_path_); }));
+    if (server->has_ended()) return nullptr;
+    std::ifstream(port_path_) >> port_;
+    return server;
+  }
+  std::string output() const {
+    std::ifstream file(folder_.path() / "server.txt");
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+  bool lacks_gl() const { return output().find("EGL") != std::string::npos; }
+  template <class Condition>
+  static bool run_until(LoadViewers& viewers, Condition condition) {
+    return eventually([&] {
+      viewers.run_for(10);
+      return condition();
+    });
+  }
+
+  TemporaryFolder folder_;
+  const std::filesystem::path port_path_ = folder_.path() / "port";
+  uint16_t port_ = 0;
+};
+
+TEST_F(ProcessFaults, TerminationSaysGoodbyeToSixtyFourViewers) {
+  const auto server = serve();
+  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  constexpr size_t kViewers = 64;
+  LoadViewers viewers({"127.0.0.1", port_, {}});
+  for (size_t i = 0; i < kViewers; ++i) ASSERT_TRUE(viewers.join({}).ok());
+  ASSERT_TRUE(run_until(viewers, [&] { return viewers.watching_count() == kViewers; }));
+  server->send_signal(SIGTERM);
+  EXPECT_TRUE(run_until(viewers, [&] { return viewers.open_count() == 0; }));
+  EXPECT_EQ(viewers.measures().close_codes, (std::map<uint16_t, uint64_t>{{1001, kViewers}}));
+  EXPECT_THAT(viewers.measures().last_goodbye, testing::HasSubstr("stopping"));
+  EXPECT_EQ(server->wait(), 0) << output();
+}
+
+TEST_F(ProcessFaults, AKilledServerIsFoundAgain) {
+  auto server = serve();
+  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  ClientConfig config;
+  config.address.port = port_;
+  auto live = LiveConnection::open(config);
+  ASSERT_TRUE(live.ok()) << live.error().to_string();
+  const auto pump_until = [&](auto condition) {
+    return eventually([&] {
+      (*live)->pump(std::chrono::milliseconds(5));
+      return condition();
+    });
+  };
+  ASSERT_TRUE(pump_until([&] { return (*live)->session().has_picture(); }));
+  const std::string first = (*live)->session().welcome().session_id;
+  server->send_signal(SIGKILL);
+  EXPECT_EQ(server->wait(), -1);
+  ASSERT_TRUE(pump_until([&] { return !(*live)->is_connected(); }));
+  EXPECT_FALSE((*live)->trouble().empty());
+  EXPECT_NE((*live)->session().replay().newest(), nullptr) << "the last state stays while the server is away";
+  server = serve(port_);
+  ASSERT_NE(server, nullptr) << output();
+  EXPECT_TRUE(pump_until([&] { return (*live)->is_connected() && (*live)->session().has_picture(); }));
+  EXPECT_NE((*live)->session().welcome().session_id, first) << "another start of the server";
+}
+
+TEST_F(ProcessFaults, WithoutDescriptorsTheServerServesThoseItHas) {
+  const auto server = serve();
+  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  LoadViewers early({"127.0.0.1", port_, {}});
+  ASSERT_TRUE(early.join({}).ok());
+  ASSERT_TRUE(run_until(early, [&] { return early.watching_count() == 1; }));
+  server->limit_descriptors(28);
+  LoadViewers crowd({"127.0.0.1", port_, {}});
+  for (int i = 0; i < 40; ++i) ASSERT_TRUE(crowd.join({}).ok());
+  EXPECT_TRUE(eventually([&] { return output().find("cannot accept") != std::string::npos; })) << output();
+  crowd.run_for(200);
+  EXPECT_LT(crowd.watching_count(), 40u);
+  const uint64_t frames = early.measures().frames;
+  EXPECT_TRUE(run_until(early, [&] { return early.measures().frames > frames + 20; }));
+  EXPECT_EQ(early.measures().ended, 0u);
+  while (crowd.open_count() > 0) crowd.leave(crowd.oldest(), true);
+  LoadViewers late({"127.0.0.1", port_, {}});
+  ASSERT_TRUE(late.join({}).ok());
+  EXPECT_TRUE(run_until(late, [&] { return late.watching_count() == 1; })) << "there is room again";
+  server->send_signal(SIGTERM);
+  EXPECT_EQ(server->wait(), 0);
+}
+
+TEST_F(ProcessFaults, ASuspendedViewerIsDroppedAndComesBack) {
+  const auto server = serve();
+  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  const auto report = folder_.path() / "report.txt";
+  ChildProcess viewer(STRANDCAST_VIEW_PROGRAM,
+                      {"--connect", "127.0.0.1:" + std::to_string(port_), "--headless", "--seconds", "2",
+                       "--report", report.string()},
+                      folder_.path() / "viewer.txt");
+  const auto count_in_log = [&](const char* what) {
+    size_t count = 0;
+    const std::string text = output();
+    for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+    return count;
+  };
+  ASSERT_TRUE(eventually([&] { return count_in_log("joined") == 1; }));
+  viewer.send_signal(SIGSTOP);
+  EXPECT_TRUE(eventually([&] { return count_in_log("dropped") == 1; })) << "a silent viewer is not kept";
+  viewer.send_signal(SIGCONT);
+  EXPECT_TRUE(eventually([&] { return count_in_log("joined") == 2; })) << "and may come back";
+  EXPECT_EQ(viewer.wait(), 0);
+  EXPECT_TRUE(std::filesystem::exists(report));
+}
+
+}  // namespace
+}  // namespace strandcast

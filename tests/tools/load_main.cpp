@@ -1,0 +1,173 @@
+// strandcast-load: many viewers at once against a running server; prints what they saw, as key=value lines.
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "client/app/stop_signal.h"
+#include "client/app/view_options.h"
+#include "client/net/http_get.h"
+#include "common/base/profile.h"
+#include "tests/tools/load_viewers.h"
+
+namespace {
+
+using namespace strandcast;
+using namespace strandcast::load;
+
+struct CommandLine {
+  std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
+  std::string token;
+  std::filesystem::path token_file;
+  uint32_t viewers = 16, frame_viewers = 0, silent_viewers = 0, stalled_viewers = 0;
+  double seconds = 10.0, warm_up_s = 2.0;
+  int64_t churn_ms = 0;
+  int server_pid = 0;
+};
+
+void declare(CLI::App& app, CommandLine& line) {
+  app.add_option("--connect", line.connect, "HOST:PORT of the server, numeric")->capture_default_str();
+  app.add_option("--token", line.token, "Token of the server");
+  app.add_option("--token-file", line.token_file, "File with the token");
+  app.add_option("--viewers", line.viewers, "Viewers of strands that acknowledge")->capture_default_str();
+  app.add_option("--frame-viewers", line.frame_viewers, "Viewers of the server's pictures besides");
+  app.add_option("--silent-viewers", line.silent_viewers,
+                 "Viewers of strands that never acknowledge, besides");
+  app.add_option("--stalled-viewers", line.stalled_viewers,
+                 "Viewers that join and never read again, besides");
+  app.add_option("--seconds", line.seconds, "How long to measure")
+      ->check(CLI::Range(0.1, 1e6))
+      ->capture_default_str();
+  app.add_option("--warm-up", line.warm_up_s, "Seconds before that")
+      ->check(CLI::Range(0.0, 1e3))
+      ->capture_default_str();
+  app.add_option("--churn-ms", line.churn_ms,
+                 "The oldest viewer leaves and a new one joins this often, 0 = never")
+      ->check(CLI::Range(0, 100'000));
+  app.add_option("--server-pid", line.server_pid, "Watch memory and file descriptors of this process");
+}
+
+/// Resident memory, KiB, and open file descriptors of a process; zeros when it cannot be seen.
+struct ProcessState {
+  double rss_kib = 0.0;
+  size_t descriptors = 0;
+};
+ProcessState process_state(int pid) {
+  ProcessState state;
+  if (pid == 0) return state;
+  std::ifstream status(fmt::format("/proc/{}/status", pid));
+  for (std::string text; std::getline(status, text);)
+    if (text.starts_with("VmRSS:")) state.rss_kib = std::stod(text.substr(6));
+  std::error_code error;
+  for (std::filesystem::directory_iterator item(fmt::format("/proc/{}/fd", pid), error), end;
+       !error && item != end; item.increment(error))
+    ++state.descriptors;
+  return state;
+}
+
+void print(const char* key, double value) {
+  std::cout << fmt::format("{}={:.3f}\n", key, value);
+}
+
+/// The server's own counters, prefixed.
+void print_metrics(const Address& address) {
+  const auto answer = http_get(address, "/metrics", std::chrono::seconds(5));
+  if (!answer) return;
+  std::istringstream lines(answer->body);
+  for (std::string text; std::getline(lines, text);)
+    if (!text.starts_with("#"))
+      if (const size_t space = text.find(' '); space != std::string::npos)
+        std::cout << "server_" << text.substr(0, space) << '=' << text.substr(space + 1) << '\n';
+}
+
+void print_measures(const LoadMeasures& measures, size_t viewers, double seconds) {
+  print("frames_per_s_and_viewer",
+        static_cast<double>(measures.frames) / seconds / static_cast<double>(std::max<size_t>(viewers, 1)));
+  print("mbit_per_s", static_cast<double>(measures.bytes) * 8e-6 / seconds);
+  print("keyframes", static_cast<double>(measures.keyframes));
+  print("chain_errors", static_cast<double>(measures.chain_errors));
+  print("quality_changes", static_cast<double>(measures.quality_changes));
+  print("joined", static_cast<double>(measures.joined));
+  print("ended_by_server", static_cast<double>(measures.ended));
+  for (const auto& [code, count] : measures.close_codes)
+    std::cout << fmt::format("close_{}={}\n", code, count);
+  if (!measures.last_goodbye.empty()) std::cout << "last_goodbye=" << measures.last_goodbye << '\n';
+  for (const auto& [name, values] :
+       {std::pair{"interval", &measures.interval_ms}, {"latency", &measures.latency_ms}})
+    for (const auto& [label, share] : {std::pair{"p50", 0.5}, {"p95", 0.95}, {"p99", 0.99}, {"max", 1.0}})
+      std::cout << fmt::format("{}_ms_{}={:.3f}\n", name, label, quantile(*values, share));
+}
+
+Status join_all(LoadViewers& viewers, const CommandLine& line) {
+  const auto join = [&](uint32_t count, ViewerPlan plan) -> Status {
+    for (uint32_t i = 0; i < count; ++i) {
+      ASSIGN_OR_RETURN([[maybe_unused]] const uint64_t number, viewers.join(plan));
+      viewers.run_for(1);
+    }
+    return {};
+  };
+  RETURN_IF_ERROR(join(line.stalled_viewers, {StreamMode::Strands, true, false}));
+  RETURN_IF_ERROR(join(line.silent_viewers, {StreamMode::Strands, false, true}));
+  RETURN_IF_ERROR(join(line.frame_viewers, {StreamMode::Frames, true, true}));
+  return join(line.viewers, {});
+}
+
+Status run(CommandLine line) {
+  ASSIGN_OR_RETURN(const Address address, parse_address(line.connect));
+  if (!line.token_file.empty()) {
+    ASSIGN_OR_RETURN(line.token, load_token(line.token_file));
+  }
+  const std::atomic<bool>& stop = catch_stop_signals();
+  LoadViewers viewers({address.host, address.port, line.token});
+  RETURN_IF_ERROR(join_all(viewers, line));
+  viewers.run_for(static_cast<int64_t>(line.warm_up_s * 1e3));
+  if (viewers.measures().joined == 0)
+    return make_error(
+        ErrorCode::Unavailable, "nobody was let in by {}: {}", address.to_string(),
+        viewers.measures().last_goodbye.empty() ? "no answer" : viewers.measures().last_goodbye);
+  viewers.reset_measures();
+
+  const int64_t begin_ns = now_ns();
+  const auto elapsed_s = [&] { return static_cast<double>(now_ns() - begin_ns) * 1e-9; };
+  const ProcessState first = process_state(line.server_pid);
+  ProcessState most = first;
+  uint64_t turns = 0;
+  constexpr int64_t kWatchMs = 100;
+  while (!stop && elapsed_s() < line.seconds && viewers.open_count() > 0) {
+    viewers.run_for(line.churn_ms > 0 ? line.churn_ms : kWatchMs);
+    const ProcessState now = process_state(line.server_pid);
+    most.rss_kib = std::max(most.rss_kib, now.rss_kib);
+    most.descriptors = std::max(most.descriptors, now.descriptors);
+    if (line.churn_ms == 0) continue;
+    viewers.leave(viewers.oldest(), ++turns % 2 == 0);
+    ASSIGN_OR_RETURN([[maybe_unused]] const uint64_t number, viewers.join({}));
+  }
+  const ProcessState last = process_state(line.server_pid);
+  std::cout << "viewers_open=" << viewers.open_count() << '\n';
+  print_measures(viewers.measures(), viewers.open_count(), elapsed_s());
+  if (line.server_pid != 0) {
+    print("server_rss_mib_first", first.rss_kib / 1024.0);
+    print("server_rss_mib_most", most.rss_kib / 1024.0);
+    print("server_rss_mib_last", last.rss_kib / 1024.0);
+    print("server_descriptors_first", static_cast<double>(first.descriptors));
+    print("server_descriptors_most", static_cast<double>(most.descriptors));
+    print("server_descriptors_last", static_cast<double>(last.descriptors));
+  }
+  print_metrics(address);
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Strandcast load: many viewers against a running server, and what they saw.",
+               "strandcast-load");
+  CommandLine line;
+  declare(app, line);
+  CLI11_PARSE(app, argc, argv);
+  if (const Status status = run(line); !status) {
+    std::cerr << "strandcast-load: " << status.error().to_string() << '\n';
+    return 2;
+  }
+  return 0;
+}
