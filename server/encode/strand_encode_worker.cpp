@@ -66,8 +66,9 @@ bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
   if (view.version == encoded_version_) return false;
   const uint64_t tick = view.snapshot->tick;
   const bool is_first = encoded_version_ == 0 || is_restarting_;
-  return config_.rate_divisor <= 1 || is_first || tick < encoded_tick_ ||
-         tick >= encoded_tick_ + config_.rate_divisor;
+  // By a fixed grid: a state that is taken late does not put off those that follow.
+  return config_.rate_divisor <= 1 || is_first ||
+         tick / config_.rate_divisor != encoded_tick_ / config_.rate_divisor;
 }
 
 void StrandEncodeWorker::run() {

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <sstream>
+#include <string_view>
 
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
@@ -69,15 +71,18 @@ void print(const char* key, double value) {
   std::cout << fmt::format("{}={:.3f}\n", key, value);
 }
 
-/// The server's own counters, prefixed.
+/// The server's own counters, "strandcast_" replaced by "server_".
 void print_metrics(const Address& address) {
   const auto answer = http_get(address, "/metrics", std::chrono::seconds(5));
   if (!answer) return;
+  constexpr std::string_view kPrefix = "strandcast_";
   std::istringstream lines(answer->body);
-  for (std::string text; std::getline(lines, text);)
-    if (!text.starts_with("#"))
-      if (const size_t space = text.find(' '); space != std::string::npos)
-        std::cout << "server_" << text.substr(0, space) << '=' << text.substr(space + 1) << '\n';
+  for (std::string text; std::getline(lines, text);) {
+    const size_t space = text.find(' ');
+    if (text.starts_with("#") || space == std::string::npos) continue;
+    const size_t begin = text.starts_with(kPrefix) ? kPrefix.size() : 0;
+    std::cout << "server_" << text.substr(begin, space - begin) << '=' << text.substr(space + 1) << '\n';
+  }
 }
 
 void print_measures(const LoadMeasures& measures, size_t viewers, double seconds) {
