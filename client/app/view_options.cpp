@@ -61,7 +61,7 @@ struct RawOptions {
   std::string clip_size;  // empty = as size
   std::string token_file;
   double seconds = 0.0;
-  bool is_smooth = false;
+  std::string playout = "low-latency";
 };
 
 void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
@@ -70,7 +70,10 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--token", options.token, "Token of a server that is not on loopback");
   app.add_option("--token-file", raw.token_file, "File with the token in its first line");
   app.add_option("--size", raw.size, "Picture or window size, WIDTHxHEIGHT")->capture_default_str();
-  app.add_flag("--smooth", raw.is_smooth, "Interpolate between states, a little behind them");
+  app.add_option("--playout", raw.playout,
+                 "low-latency: the newest state; smooth: between states, a little behind")
+      ->check(CLI::IsMember({"low-latency", "smooth"}))
+      ->capture_default_str();
   app.add_flag("--headless", options.is_headless, "No window: pictures, clip and report only");
   app.add_option("--screenshot", options.screenshot, "Write a PNG (headless)");
   app.add_option("--after-frames", options.after_frames, "Decoded frames before the screenshot")
@@ -101,7 +104,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     ASSIGN_OR_RETURN(options.token, load_token(raw.token_file));
   }
   if (raw.seconds > 0.0) options.seconds = raw.seconds;
-  if (raw.is_smooth) options.playout = Playout::Smooth;
+  if (raw.playout == "smooth") options.playout = Playout::Smooth;
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,
                       "--screenshot and --clip need --headless (in the window, S takes a picture)");

@@ -25,7 +25,7 @@ void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom
   app.add_flag("--print-scene", options.is_printing_scene, "print the scene with its overrides, and leave");
 }
 
-void add_run_options(CLI::App& app, ServerOptions& options, std::string& shader_folder) {
+void add_run_options(CLI::App& app, ServerOptions& options, std::string& shader_folder, double& viewer_mbit) {
   NetConfig& net = options.config.net;
   app.add_option("--listen", net.address, "address to listen on; beyond loopback a token is needed")
       ->capture_default_str();
@@ -35,6 +35,9 @@ void add_run_options(CLI::App& app, ServerOptions& options, std::string& shader_
   app.add_option("--allow-host", net.allowed_hosts, "further name accepted in the Host header; repeatable")
       ->expected(1)
       ->take_all();
+  app.add_option("--viewer-mbit", viewer_mbit,
+                 "most that the strands for one viewer may take, Mbit/s; 0 = no cap")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--gl-device", options.config.gl_device, "auto, software, hardware or a device number")
       ->capture_default_str();
   app.add_option("--shader-dir", shader_folder, "read shaders from this folder instead of the program");
@@ -51,10 +54,11 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   std::string groom;
   std::string explained;
   std::string shader_folder;
+  double viewer_mbit = 0.0;
   CLI::App app("Simulates hair and streams it to viewers.", "strandcast-server");
   app.set_version_flag("--version", kVersionText);
   add_scene_options(app, options, groom, explained);
-  add_run_options(app, options, shader_folder);
+  add_run_options(app, options, shader_folder, viewer_mbit);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -64,6 +68,8 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     return make_error(ErrorCode::BadInput, "{} (--help lists the options)", error.what());
   }
+  constexpr double kBytesPerMbit = 125e3;
+  options.config.net.limits.viewer_bytes_per_s = viewer_mbit * kBytesPerMbit;
   options.is_explaining = app.count("--explain") > 0;
   if (!explained.empty()) {
     if (!options.scene_path.empty())

@@ -315,6 +315,13 @@ std::string Server::State::metrics() {
   total("publish_quarantined_total", now.sim.quarantined);
   total("publish_overstretched_total", now.sim.overstretched);
   total("encode_frames_total", now.encode.encodes);
+  uint64_t class_encodes = 0;
+  double classes_in_use = 0.0;
+  for (const StrandEncodeCounters& one : now.strand_classes) class_encodes += one.encodes;
+  for (uint16_t stream_id = 0; stream_id < classes_.size(); ++stream_id)
+    classes_in_use += viewers_.strand_viewers(stream_id) > 0 ? 1.0 : 0.0;
+  total("encode_all_classes_frames_total", class_encodes);
+  gauge("strand_classes_in_use", classes_in_use);
   total("encode_keyframes_total", now.encode.keyframes);
   total("encode_delta_bytes_total", now.encode.delta_bytes);
   gauge("encode_median_ms", now.encode.encode_median_ms);

@@ -335,7 +335,7 @@ TEST_F(EndToEnd, TheWindowOpensDrawsAndLeaves) {
   const auto report = folder.path() / "report.txt";
   const std::string command = fmt::format(
       "xvfb-run -a -s '-screen 0 320x240x24' {} --connect 127.0.0.1:{} --size 160x120 --seconds 4 "
-      "--smooth --report {} >{} 2>&1",
+      "--playout smooth --report {} >{} 2>&1",
       STRANDCAST_VIEW_PROGRAM, server_->port(), report.string(), (folder.path() / "log").string());
   const int status = std::system(command.c_str());
   const auto log = load_text(folder.path() / "log", 1u << 20);

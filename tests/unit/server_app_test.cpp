@@ -175,6 +175,8 @@ TEST(ServerOptions, ReadsWhatTheCommandLineSays) {
   EXPECT_THAT(options->overrides,
               testing::ElementsAre("groom.file.path=a.tfx", "head.radius_m=0", "substeps=2", "wind.seed=7"));
   EXPECT_EQ(options->run_s, 2.5);
+  EXPECT_EQ(options->config.net.limits.viewer_bytes_per_s, 0.0) << "no cap unless asked for";
+  EXPECT_EQ(parse({"--viewer-mbit", "8"})->config.net.limits.viewer_bytes_per_s, 1e6);
   EXPECT_TRUE(parse({"--explain"})->is_explaining);
   EXPECT_EQ(parse({"--explain", "x.textproto"})->scene_path, "x.textproto");
   EXPECT_FALSE(parse({"--help"})->help.empty());
