@@ -77,6 +77,7 @@ Status ViewerSession::take_asset(const MediaEvent& event) {
   if (asset.strand_count != announced.strand_count || asset.vertex_count != announced.vertex_count)
     return make_error(ErrorCode::BadInput, "the asset has {} x {} vertices, the Welcome announced {} x {}",
                       asset.strand_count, asset.vertex_count, announced.strand_count, announced.vertex_count);
+  replay_->set_rest_shape(asset.rest_position_m);
   asset_ = std::move(asset);
   acknowledge(event, begin_ns);
   return {};

@@ -53,6 +53,9 @@ class StrandReplay {
   std::shared_ptr<const Snapshot> receive(std::span<const std::byte> message, int64_t receive_time_ns,
                                           const ClockOffset& clock);
 
+  /// The asset's rest shape; comes before the first strand frame.
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) { decoder_->set_rest_shape(rest_in_head_m); }
+
   void set_playout(Playout playout) { playout_ = playout; }
   Playout playout() const { return playout_; }
 

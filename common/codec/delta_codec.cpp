@@ -86,11 +86,10 @@ class DeltaEncoder : public StrandEncoder {
     return frame;
   }
 
-  EncodedFramePtr encode_keyframe() override {
-    if (chain_.lattice.empty()) return nullptr;
-    Snapshot snapshot = last_;
-    snapshot.lattice = chain_.lattice;
-    return encode_chain(snapshot);
+  JoinFrames encode_for_join(const Snapshot& snapshot) override {
+    const EncodedFramePtr frame = encode(snapshot);
+    const bool is_keyframe = frame == nullptr || frame->header.opcode == Opcode::StrandKeyframe;
+    return {frame, is_keyframe ? frame : encode_chain(snapshot)};
   }
 
  private:

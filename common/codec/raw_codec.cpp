@@ -19,14 +19,15 @@ class RawEncoder : public StrandEncoder {
     header.opcode = Opcode::StrandKeyframe;
     header.sequence = ++sequence_;
     header.sim_time_ns = snapshot.sim_time_ns;
-    last_ = make_encoded_frame(header, payload);
-    return last_;
+    return make_encoded_frame(header, payload);
   }
-  EncodedFramePtr encode_keyframe() override { return last_; }
+  JoinFrames encode_for_join(const Snapshot& snapshot) override {
+    const EncodedFramePtr keyframe = encode(snapshot);
+    return {keyframe, keyframe};
+  }
 
  private:
   uint32_t sequence_ = 0;
-  EncodedFramePtr last_;
 };
 
 class RawDecoder : public StrandDecoder {

@@ -10,7 +10,6 @@
 namespace strandcast {
 namespace {
 
-constexpr float kMinBoundM = 1e-6f;
 // Half the gap between neighbouring floats just below kBoundReachM (2 m: 24 bits, so 2^-24 m).
 constexpr double kFloatRoundingM = kBoundReachM * 0x1p-25;
 

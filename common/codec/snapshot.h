@@ -33,8 +33,11 @@ inline constexpr int32_t kMaxLattice = 1 << 28;
 /// out the float positions themselves become coarser.
 inline constexpr float kBoundReachM = 2.0f;
 
+/// Finest bound that a stream can announce; the checks of a scene use it.
+inline constexpr float kMinBoundM = 1e-6f;
+
 /// Coarsest cubic lattice step whose rounding error stays within the Euclidean bound: 2 bound / sqrt(3), less
-/// the rounding of float positions within kBoundReachM. `bound_m` is at least 1e-6.
+/// the rounding of float positions within kBoundReachM. `bound_m` is at least kMinBoundM.
 float quantum_for_bound(float bound_m);
 
 struct QuantiseInput {

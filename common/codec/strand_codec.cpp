@@ -10,19 +10,24 @@ struct Row {
   StrandCodecInfo info;
   std::unique_ptr<StrandEncoder> (*make_encoder)();
   std::unique_ptr<StrandDecoder> (*make_decoder)(const StrandStreamLimits&);
+  float (*lattice_step_m)(float bound_m);
 };
 
 const std::vector<Row>& rows() {
   static const std::vector<Row> table = {
-      {{"adaptive", "as delta, coded value by value with probabilities that follow the errors near by"},
-       make_adaptive_encoder,
-       make_adaptive_decoder},
       {{"delta", "lattice steps predicted from the last frame and the neighbouring vertices, entropy coded"},
        make_delta_encoder,
-       make_delta_decoder},
+       make_delta_decoder,
+       quantum_for_bound},
       {{"raw", "32-bit lattice values as they are, every frame a keyframe: the reference for tests"},
        make_raw_encoder,
-       make_raw_decoder},
+       make_raw_decoder,
+       quantum_for_bound},
+      {{"tangent",
+        "motion predicted along strands of known lengths, corrected as cheaply as the bound allows"},
+       make_tangent_encoder,
+       make_tangent_decoder,
+       tangent_lattice_step_m},
   };
   return table;
 }
@@ -45,6 +50,11 @@ const std::vector<StrandCodecInfo>& strand_codecs() {
     return list;
   }();
   return infos;
+}
+
+Result<float> lattice_step_m(const std::string& codec, float bound_m) {
+  ASSIGN_OR_RETURN(const Row* row, find_row(codec));
+  return row->lattice_step_m(bound_m);
 }
 
 Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec) {

@@ -47,7 +47,8 @@ std::unique_ptr<StrandEncoder> make_raw_encoder();
 std::unique_ptr<StrandDecoder> make_raw_decoder(const StrandStreamLimits& limits);
 std::unique_ptr<StrandEncoder> make_delta_encoder();
 std::unique_ptr<StrandDecoder> make_delta_decoder(const StrandStreamLimits& limits);
-std::unique_ptr<StrandEncoder> make_adaptive_encoder();
-std::unique_ptr<StrandDecoder> make_adaptive_decoder(const StrandStreamLimits& limits);
+std::unique_ptr<StrandEncoder> make_tangent_encoder();
+std::unique_ptr<StrandDecoder> make_tangent_decoder(const StrandStreamLimits& limits);
+float tangent_lattice_step_m(float bound_m);
 
 }  // namespace strandcast

@@ -6,16 +6,7 @@
 
 #include "common/base/check.h"
 #include "common/codec/strand_rows.h"
-
-// Integer results are the same on every path, so wider instructions may be chosen at run time. Sanitizers
-// start too late for the resolver that does so; of the thread sanitizer only libstdc++'s macro is left
-// (cmake/strandcast.cmake).
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(_GLIBCXX_TSAN) && \
-    !defined(__SANITIZE_ADDRESS__)
-#define STRANDCAST_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define STRANDCAST_WIDE
-#endif
+#include "common/codec/wide.h"
 
 namespace strandcast {
 

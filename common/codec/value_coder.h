@@ -173,6 +173,8 @@ class ValueReader {
   uint32_t take_bits(uint32_t count);
   /// True when exactly the bytes of the slice were needed.
   bool is_spent() const;
+  /// True when more was asked for than there is: everything since then is made up.
+  bool is_short() const { return is_short_; }
 
  private:
   uint32_t next_word() {

@@ -105,7 +105,7 @@ struct CameraDesc {
 };
 
 struct StreamDesc {
-  std::string codec = "delta";  // "adaptive" (fewer bits, more time), "delta" or "raw"
+  std::string codec = "delta";  // "tangent" (fewest bits, more time), "delta" or "raw"
   float bound_m = 1e-4f;        // announced Euclidean error bound, 2e-5 .. 5e-4
   uint32_t frame_width = 640, frame_height = 360;
   uint32_t jpeg_quality = 80;

@@ -110,8 +110,8 @@ void visit_look(Visitor& v, LookDesc& look) {
 template <class Visitor>
 void visit_stream(Visitor& v, StreamDesc& stream) {
   v.text("codec", stream.codec, kMaxNameBytes);
-  v.require("codec", stream.codec == "adaptive" || stream.codec == "delta" || stream.codec == "raw",
-            "is unknown (known: adaptive, delta, raw)");
+  v.require("codec", stream.codec == "delta" || stream.codec == "raw" || stream.codec == "tangent",
+            "is unknown (known: delta, raw, tangent)");
   v.number("bound_m", stream.bound_m, kStreamBound);
   v.number("frame_width", stream.frame_width, kFrameSize);
   v.number("frame_height", stream.frame_height, kFrameSize);

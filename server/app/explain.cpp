@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "common/base/profile.h"
+#include "common/codec/scene_asset.h"
 #include "common/codec/strand_codec.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
@@ -60,7 +61,9 @@ Result<PassTimes> measure_passes(const SceneDesc& scene, const SceneContent& con
   ASSIGN_OR_RETURN(auto solver, row->make_gpu(parameters, {&shaders, features}));
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
-  Publisher publisher(content.groom, scene.stream.bound_m);
+  encoder->set_rest_shape(make_scene_asset(content.groom, {}).rest_position_m);
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(scene.stream.codec, scene.stream.bound_m));
+  Publisher publisher(content.groom, quantum_m);
   StepBuilder builder(scene, content.colliders);
   gl::GpuTimer timer(context->info());
   StageTimer step_timer;

@@ -119,6 +119,8 @@ Status Server::State::start() {
   ASSIGN_OR_RETURN(asset_frame_, encode_asset(*asset_));
   ASSIGN_OR_RETURN(auto strand_decoder,
                    make_strand_decoder(scene.stream.codec, {asset_->strand_count, asset_->vertex_count}));
+  strand_encoder->set_rest_shape(asset_->rest_position_m);
+  strand_decoder->set_rest_shape(asset_->rest_position_m);
   // The port first: a port in use is told at once, not after compiling shaders.
   NetConfig net = config_.net;
   net.strand_classes = classes_;

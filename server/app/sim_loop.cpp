@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/log.h"
+#include "common/codec/strand_codec.h"
 #include "server/app/scene_change.h"
 
 namespace strandcast {
@@ -86,7 +87,9 @@ Status SimLoop::begin() {
   if (config_.shader_folder) shaders_ = gl::ShaderLibrary(*config_.shader_folder);
   timer_.emplace(context_->info());
   builder_.emplace(config_.scene, config_.content->colliders);
-  publisher_.emplace(config_.content->groom, config_.scene.stream.bound_m);
+  const StreamDesc& stream = config_.scene.stream;
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
+  publisher_.emplace(config_.content->groom, quantum_m);
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());

@@ -1,5 +1,6 @@
 #include "server/encode/strand_encode_worker.h"
 
+#include <chrono>
 #include <utility>
 
 #include "common/base/log.h"
@@ -8,6 +9,8 @@ namespace strandcast {
 namespace {
 
 constexpr double kMsPerNs = 1e-6;
+constexpr std::chrono::milliseconds kKeyframePatience{
+    50};  // for a new state, before the present one is encoded again
 
 }  // namespace
 
@@ -58,7 +61,7 @@ StrandEncodeCounters StrandEncodeWorker::counters() const {
 bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
   if (is_stopping_) return true;
   if (!has_listeners_ || view.snapshot == nullptr) return false;
-  return is_due(view) || is_keyframe_wanted_ || is_restarting_;
+  return is_due(view) || is_restarting_ || (is_keyframe_wanted_ && keyframe_ != nullptr);
 }
 
 /// Whether the newest state is for this class.
@@ -71,77 +74,84 @@ bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
          tick / config_.rate_divisor != encoded_tick_ / config_.rate_divisor;
 }
 
+/// Returns for a new state, or when somebody has waited long enough for a keyframe of the present one.
+SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
+  const auto has_work_now = [this](const SnapshotSlot::View& now) { return has_work(now); };
+  const auto has_request = [this](const SnapshotSlot::View& now) {
+    return has_work(now) || (has_listeners_ && now.snapshot != nullptr && is_keyframe_wanted_);
+  };
+  const bool takes_all = config_.rate_divisor <= 1;
+  (void)(takes_all ? slot_.wait(has_request) : slot_.wait_for(kLongestStateWait, has_request));
+  return slot_.wait_for(is_keyframe_wanted_ ? kKeyframePatience : std::chrono::milliseconds(0), has_work_now);
+}
+
 void StrandEncodeWorker::run() {
-  const auto is_ready = [this](const SnapshotSlot::View& now) { return has_work(now); };
   while (true) {
-    SnapshotSlot::View view;
-    bool is_overdue = false;  // no further state comes whose turn it would be
-    if (config_.rate_divisor <= 1) {
-      view = slot_.wait(is_ready);
-    } else {
-      view = slot_.wait_for(kLongestStateWait, is_ready);
-      is_overdue =
-          has_listeners_ && view.snapshot != nullptr && !has_work(view) && view.version != encoded_version_;
-    }
+    const SnapshotSlot::View view = wait_for_work();
     if (view.is_stopped || is_stopping_) return;
-    if (!is_overdue && !has_work(view)) continue;
-    if (is_overdue || is_due(view)) {
-      encoded_version_ = view.version;
-      encoded_tick_ = view.snapshot->tick;
-      encode_newest(*view.snapshot);
-    }
-    // Requests up to here are served by one keyframe; later ones wake the thread again.
-    const bool is_wanted = is_keyframe_wanted_.exchange(false);
-    const bool is_restarting = is_restarting_.exchange(false);
-    if (is_wanted || is_restarting) give_keyframe();
+    if (has_listeners_ && view.snapshot != nullptr) serve(view);
   }
 }
 
-void StrandEncodeWorker::encode_newest(const Snapshot& snapshot) {
+void StrandEncodeWorker::serve(const SnapshotSlot::View& view) {
+  // Without work there was a long wait: no further state comes whose turn it would be.
+  const bool is_overdue = !has_work(view) && view.version != encoded_version_;
+  const bool is_new = is_due(view) || is_overdue;
+  // Requests up to here are served by one keyframe; later ones wake the thread again.
+  const bool is_wanted = is_keyframe_wanted_.exchange(false);
+  const bool is_restarting = is_restarting_.exchange(false);
+  if (!is_new && keyframe_ != nullptr) {
+    if (is_wanted || is_restarting) give(keyframe_);
+    return;
+  }
+  if (!is_new && !is_wanted && !is_restarting) return;
+  encoded_version_ = view.version;
+  encoded_tick_ = view.snapshot->tick;
+  const Audience audience = is_wanted || is_restarting ? Audience::Joiners : Audience::Followers;
+  const JoinFrames frames = encode(*view.snapshot, audience);
+  keyframe_ = frames.keyframe;
+  // After a pause nobody has what a delta builds on; the keyframe is all they need.
+  if (frames.frame != frames.keyframe && !is_restarting) give(frames.frame);
+  give(frames.keyframe);
+}
+
+JoinFrames StrandEncodeWorker::encode(const Snapshot& published, Audience audience) {
   const int64_t begin_ns = now_ns();
-  const EncodedFramePtr frame =
-      encoder_->encode(config_.coarsening > 1 ? coarsen(snapshot, config_.coarsening) : snapshot);
-  const double encode_ms = static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
-  const bool is_keyframe = frame != nullptr && frame->header.opcode == Opcode::StrandKeyframe;
-  keyframe_ = is_keyframe ? frame : nullptr;
+  const Snapshot& snapshot = config_.coarsening > 1 ? coarsen(published, config_.coarsening) : published;
+  JoinFrames frames;
+  if (audience == Audience::Joiners) {
+    frames = encoder_->encode_for_join(snapshot);
+  } else {
+    frames.frame = encoder_->encode(snapshot);
+    const bool is_keyframe = frames.frame != nullptr && frames.frame->header.opcode == Opcode::StrandKeyframe;
+    if (is_keyframe) frames.keyframe = frames.frame;
+  }
+  count(frames, static_cast<double>(now_ns() - begin_ns) * kMsPerNs, audience);
+  return frames;
+}
+
+void StrandEncodeWorker::count(const JoinFrames& frames, double encode_ms, Audience audience) {
   bool is_first_too_large = false;
   {
     const std::lock_guard lock(counters_mutex_);
     ++counters_.encodes;
-    encode_timer_.add_ms(encode_ms);
-    if (frame == nullptr) is_first_too_large = counters_.too_large++ == 0;
-    if (frame != nullptr)
-      (is_keyframe ? counters_.keyframe_bytes : counters_.delta_bytes) += frame->message.size();
-    if (is_keyframe) ++counters_.keyframes;
+    (audience == Audience::Joiners ? keyframe_timer_ : encode_timer_).add_ms(encode_ms);
+    if (frames.frame == nullptr) is_first_too_large = counters_.too_large++ == 0;
+    if (frames.frame != nullptr && frames.frame != frames.keyframe)
+      counters_.delta_bytes += frames.frame->message.size();
+    if (frames.keyframe != nullptr) {
+      ++counters_.keyframes;
+      counters_.keyframe_bytes += frames.keyframe->message.size();
+    }
   }
   if (is_first_too_large)
-    log_error("encode", "a snapshot of {} strands x {} vertices does not fit into one message of {} bytes",
-              snapshot.strand_count, snapshot.vertex_count, kMaxMediaPayloadBytes);
-  // After a pause nobody has what a delta builds on; the keyframe that follows is all they need. A keyframe
-  // that is given here serves everyone who waits.
-  if (frame == nullptr || (is_restarting_ && !is_keyframe)) return;
-  if (is_keyframe) {
-    is_keyframe_wanted_ = false;
-    is_restarting_ = false;
-  }
-  give(*frame);
+    log_error("encode",
+              "a state does not fit into one message of {} bytes: fewer strands or vertices are needed",
+              kMaxMediaPayloadBytes);
 }
 
-void StrandEncodeWorker::give_keyframe() {
-  if (keyframe_ == nullptr) {
-    const int64_t begin_ns = now_ns();
-    keyframe_ = encoder_->encode_keyframe();
-    if (keyframe_ == nullptr) return;  // counted as too large by encode_newest
-    const std::lock_guard lock(counters_mutex_);
-    keyframe_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * kMsPerNs);
-    ++counters_.keyframes;
-    counters_.keyframe_bytes += keyframe_->message.size();
-  }
-  give(*keyframe_);
-}
-
-void StrandEncodeWorker::give(const EncodedFrame& frame) {
-  sink_(with_send_time(frame, config_.stream_id, now_ns()));
+void StrandEncodeWorker::give(const EncodedFramePtr& frame) {
+  if (frame != nullptr) sink_(with_send_time(*frame, config_.stream_id, now_ns()));
 }
 
 }  // namespace strandcast

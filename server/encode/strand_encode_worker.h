@@ -19,7 +19,7 @@ namespace strandcast {
 
 /// Totals since start; the median covers the last kStageWindow encodes.
 struct StrandEncodeCounters {
-  uint64_t encodes = 0;      // snapshots appended to the chain
+  uint64_t encodes = 0;      // states appended to the chain
   uint64_t keyframes = 0;    // keyframes made (not: handed out again)
   uint64_t too_large = 0;    // snapshots that did not fit into one message
   uint64_t delta_bytes = 0;  // header and payload
@@ -46,6 +46,7 @@ class StrandEncodeWorker {
  public:
   /// Called on the worker's thread, frames in the order of the chain: the keyframe of sequence s comes after
   /// delta s and before delta s + 1, so whoever starts with it goes on with delta s + 1. send_time_ns is set.
+  /// A state that is encoded again for those who join while nothing moves has a sequence of its own.
   using Sink = std::function<void(EncodedFramePtr)>;
 
   /// Starts the thread. `slot` outlives the worker.
@@ -58,19 +59,24 @@ class StrandEncodeWorker {
 
   /// False: nothing is encoded. From false to true the chain goes on with a keyframe of the newest snapshot.
   void set_has_listeners(bool has_listeners);
-  /// Asks for a keyframe at the chain's present state and returns at once. Requests that come before it is
-  /// made share it; later ones for the same state get the same frame again.
+  /// Asks for a keyframe and returns at once. It comes with the next state, or with the present one when no
+  /// other is published soon. Requests that come before it is made share it; later ones for the same state
+  /// get the same frame again.
   void request_keyframe();
 
   StrandEncodeCounters counters() const;
 
  private:
+  enum class Audience { Followers, Joiners };
+
   void run();
   bool has_work(const SnapshotSlot::View& view) const;
   bool is_due(const SnapshotSlot::View& view) const;
-  void encode_newest(const Snapshot& snapshot);
-  void give_keyframe();
-  void give(const EncodedFrame& frame);
+  SnapshotSlot::View wait_for_work() const;
+  void serve(const SnapshotSlot::View& view);
+  JoinFrames encode(const Snapshot& published, Audience audience);
+  void count(const JoinFrames& frames, double encode_ms, Audience audience);
+  void give(const EncodedFramePtr& frame);
 
   SnapshotSlot& slot_;
   std::unique_ptr<StrandEncoder> encoder_;

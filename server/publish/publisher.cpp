@@ -33,10 +33,10 @@ double overstretch_limit(double stretch_bound) {
   return std::max(kLeastOverstretch, kOverstretchPerBound * stretch_bound);
 }
 
-Publisher::Publisher(const Groom& groom, float bound_m)
+Publisher::Publisher(const Groom& groom, float quantum_m)
     : strand_count_(groom.strand_count()),
       vertex_count_(groom.uniform_vertex_count()),
-      quantum_m_(quantum_for_bound(bound_m)) {
+      quantum_m_(quantum_m) {
   CHECK(strand_count_ > 0 && vertex_count_ > 0);
   const size_t plane_size = static_cast<size_t>(strand_count_) * vertex_count_;
   rest_position_m_.resize(plane_size);

@@ -43,8 +43,9 @@ struct PublishInput {
 
 class Publisher {
  public:
-  /// `groom` is uniform; `bound_m` is the announced Euclidean error bound.
-  Publisher(const Groom& groom, float bound_m);
+  /// `groom` is uniform; `quantum_m` is the step of the lattice to publish on (lattice_step_m() of the
+  /// codec).
+  Publisher(const Groom& groom, float quantum_m);
 
   /// Allocates nothing but the snapshot (after the first call).
   std::shared_ptr<const Snapshot> publish(Solver& solver, const PublishInput& input);

@@ -145,7 +145,7 @@ TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {
                      gl_picture_painter(config_), 1000.0, std::move(hooks));
   worker.set_views({{1, small_view()}});
   ASSERT_TRUE(eventually([&] { return requests > 0; }));
-  worker.offer(encoder->encode_keyframe());
+  worker.offer(encoder->encode_for_join(make_state(*asset_, 1)).keyframe);
   const auto has_picture = [&] {
     const std::lock_guard lock(mutex);
     return !pictures.empty();

@@ -134,7 +134,7 @@ TEST(ClientSession, ALateKeyframeBringsTheStreamBack) {
     (void)next();  // the keyframe is lost
     for (int i = 0; i < 5; ++i) peer.send(*next());
     peer.read_until<KeyframeRequest>();
-    peer.send(*(*encoder)->encode_keyframe());
+    peer.send(*(*encoder)->encode_for_join(hair.snapshot(quantum_for_bound(1e-4f))).keyframe);
     for (int i = 0; i < 5; ++i) peer.send(*next());
     peer.send(Notice{false, "done"});
     peer.read_to_end();

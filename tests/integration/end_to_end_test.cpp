@@ -47,16 +47,16 @@ class Observer {
  public:
   void saw(const Snapshot& snapshot) {
     const std::lock_guard lock(mutex_);
-    hash_by_tick_[snapshot.tick] = state_hash(snapshot);
+    published_[snapshot.tick] = snapshot;
   }
   void saw(Painted painted) {
     constexpr size_t kKept = 400;
     const std::lock_guard lock(mutex_);
     if (painted_.size() < kKept) painted_.push_back(std::move(painted));
   }
-  std::map<uint64_t, uint64_t> hash_by_tick() const {
+  std::map<uint64_t, Snapshot> published() const {
     const std::lock_guard lock(mutex_);
-    return hash_by_tick_;
+    return published_;
   }
   std::vector<Painted> painted() const {
     const std::lock_guard lock(mutex_);
@@ -65,7 +65,7 @@ class Observer {
 
  private:
   mutable std::mutex mutex_;
-  std::map<uint64_t, uint64_t> hash_by_tick_;
+  std::map<uint64_t, Snapshot> published_;
   std::vector<Painted> painted_;
 };
 
@@ -164,50 +164,68 @@ class EndToEnd : public testing::Test {
   std::thread feeder_;
 };
 
-/// Hashes of what a session decodes, by tick.
-std::map<uint64_t, uint64_t>& record(ViewerSession& session, std::map<uint64_t, uint64_t>& hashes) {
-  session.set_snapshot_listener(
-      [&hashes](const auto& snapshot) { hashes[snapshot->tick] = state_hash(*snapshot); });
-  return hashes;
+/// What a session decodes, by tick.
+using States = std::map<uint64_t, std::shared_ptr<const Snapshot>>;
+
+void record(ViewerSession& session, States& states) {
+  session.set_snapshot_listener([&states](const auto& snapshot) { states[snapshot->tick] = snapshot; });
 }
 
-TEST_F(EndToEnd, TwoViewersDecodeTheServersStatesBitForBitEvenWhenOneJoinsLate) {
+/// Every decoded vertex lies within the announced bound of the published one, poses are the same.
+void expect_within_bound(const States& states, const std::map<uint64_t, Snapshot>& published, float bound_m) {
+  for (const auto& [tick, state] : states) {
+    ASSERT_TRUE(published.contains(tick)) << tick;
+    EXPECT_EQ(state->world_from_head, published.at(tick).world_from_head);
+    const auto shown = positions_in_head(*state);
+    const auto truth = positions_in_head(published.at(tick));
+    ASSERT_EQ(shown.size(), truth.size());
+    for (size_t i = 0; i < shown.size(); ++i)
+      ASSERT_LE(glm::distance(glm::dvec3(shown[i]), glm::dvec3(truth[i])), bound_m) << "tick " << tick;
+  }
+}
+
+TEST_F(EndToEnd, TwoViewersDecodeTheSameStatesBitForBitEvenWhenOneJoinsLate) {
   start_feeding();
-  std::map<uint64_t, uint64_t> first_hashes;
-  std::map<uint64_t, uint64_t> late_hashes;
+  States early_states;
+  States late_states;
   auto first = join();
   ASSERT_TRUE(first);
-  record(*first, first_hashes);
-  ASSERT_TRUE(pump_until({first.get()}, [&] { return first_hashes.size() >= 40; }));
+  record(*first, early_states);
+  ASSERT_TRUE(pump_until({first.get()}, [&] { return early_states.size() >= 40; }));
   auto late = join();
   ASSERT_TRUE(late);
-  record(*late, late_hashes);
+  record(*late, late_states);
   ASSERT_TRUE(pump_until({first.get(), late.get()}, [&] {
     const auto newest = late->replay().newest();
-    return late_hashes.size() >= 40 && newest && newest->motion_time_ns != 0;
+    return late_states.size() >= 40 && newest && newest->motion_time_ns != 0;
   }));
   EXPECT_NE(late->replay().newest()->world_from_head, Pose{}) << "the fed head motion reached the viewers";
 
-  const auto published = observer_.hash_by_tick();
-  for (const auto* hashes : {&first_hashes, &late_hashes})
-    for (const auto& [tick, hash] : *hashes) {
-      ASSERT_TRUE(published.contains(tick)) << tick;
-      EXPECT_EQ(published.at(tick), hash) << "tick " << tick;
-    }
+  size_t common_count = 0;
+  for (const auto& [tick, state] : late_states) {
+    const auto same = early_states.find(tick);
+    if (same == early_states.end()) continue;
+    ++common_count;
+    EXPECT_EQ(state_hash(*same->second), state_hash(*state)) << "tick " << tick;
+  }
+  EXPECT_GE(common_count, 20u);
+  const float bound_m = first->welcome().bound_m;
+  for (const auto* states : {&early_states, &late_states})
+    expect_within_bound(*states, observer_.published(), bound_m);
   for (const ViewerSession* session : {first.get(), late.get()}) {
     EXPECT_EQ(session->replay().stats().rejected_frames, 0u) << session->replay().stats().last_error;
     EXPECT_GE(session->replay().stats().keyframes, 1u);
     ASSERT_NE(session->asset(), nullptr);
     EXPECT_EQ(session->asset()->strand_count, kStrands);
   }
-  EXPECT_GT(late_hashes.begin()->first, first_hashes.begin()->first);
+  EXPECT_GT(late_states.begin()->first, early_states.begin()->first);
 }
 
 TEST_F(EndToEnd, AKilledViewerDisturbsNobody) {
-  std::map<uint64_t, uint64_t> hashes;
+  States states;
   auto survivor = join();
   ASSERT_TRUE(survivor);
-  record(*survivor, hashes);
+  record(*survivor, states);
   {
     test::RawClient victim(server_->port());
     ASSERT_TRUE(victim.handshake());
@@ -216,11 +234,10 @@ TEST_F(EndToEnd, AKilledViewerDisturbsNobody) {
     victim.reset();
   }
   ASSERT_TRUE(pump_until({survivor.get()}, [&] {
-    return hashes.size() >= 60 && survivor->has_status() && survivor->status().viewer_count == 1;
+    return states.size() >= 60 && survivor->has_status() && survivor->status().viewer_count == 1;
   }));
   EXPECT_EQ(survivor->replay().stats().rejected_frames, 0u);
-  const auto published = observer_.hash_by_tick();
-  for (const auto& [tick, hash] : hashes) EXPECT_EQ(published.at(tick), hash) << tick;
+  expect_within_bound(states, observer_.published(), survivor->welcome().bound_m);
 }
 
 TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {

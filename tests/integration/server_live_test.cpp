@@ -7,6 +7,7 @@
 #include <deque>
 #include <future>
 #include <map>
+#include <optional>
 #include <thread>
 
 #include "common/codec/image_codec.h"
@@ -71,6 +72,7 @@ class StrandClient {
 
   RawClient raw;
   Welcome welcome;
+  std::optional<SceneAsset> asset;  // once it has come
 
  private:
   bool receive() {
@@ -81,6 +83,13 @@ class StrandClient {
       EXPECT_TRUE(message.ok()) << message.error().to_string();
       if (message.ok() && std::holds_alternative<Notice>(*message))
         notices_.push_back(std::get<Notice>(*message));
+    }
+    if (received.opcode() == Opcode::Asset) {
+      auto decoded = decode_scene_asset(std::span(received.bytes).subspan(kFrameHeaderBytes));
+      EXPECT_TRUE(decoded.ok()) << decoded.error().to_string();
+      if (!decoded.ok()) return false;
+      asset = std::move(decoded).value();
+      decoder_->set_rest_shape(asset->rest_position_m);
     }
     if (received.opcode() != Opcode::StrandKeyframe && received.opcode() != Opcode::StrandDelta) return true;
     auto snapshot = decoder_->decode(received.bytes);
@@ -256,17 +265,14 @@ TEST_F(LiveServer, ResetPutsEveryStrandToRest) {
   EXPECT_FALSE(controller.ask(ControlCommand{Command::Pause}).is_error);
   EXPECT_FALSE(controller.ask(ControlCommand{Command::Reset}).is_error);
   StrandClient late(server_->port(), Role::Viewer);
-  const auto message = late.raw.read_media(Opcode::Asset);
-  ASSERT_TRUE(message.has_value());
-  const auto asset = decode_scene_asset(std::span(*message).subspan(kFrameHeaderBytes));
-  ASSERT_TRUE(asset.ok());
   const auto snapshot = late.next();
   ASSERT_NE(snapshot, nullptr);
+  ASSERT_TRUE(late.asset.has_value());
   const std::vector<glm::vec3> position_m = positions_in_head(*snapshot);
-  ASSERT_EQ(position_m.size(), asset->rest_position_m.size());
+  ASSERT_EQ(position_m.size(), late.asset->rest_position_m.size());
   float largest_m = 0.0f;
   for (size_t i = 0; i < position_m.size(); ++i)
-    largest_m = std::max(largest_m, glm::length(position_m[i] - asset->rest_position_m[i]));
+    largest_m = std::max(largest_m, glm::length(position_m[i] - late.asset->rest_position_m[i]));
   EXPECT_LE(largest_m, late.welcome.bound_m * 1.01f) << "within the announced bound";
 }
 

@@ -56,6 +56,9 @@ class HairMotion {
     for (size_t i = 0; i < plane_size(); ++i) position_m_[i] = pose * glm::dvec3(rest_[i]);
   }
 
+  /// (vertex_count x strand_count)
+  const std::vector<glm::vec3>& rest_in_head() const { return rest_; }
+
   size_t plane_size() const { return static_cast<size_t>(desc_.strand_count) * desc_.vertex_count; }
   double time_s() const { return time_s_; }
 

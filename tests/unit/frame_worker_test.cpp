@@ -115,7 +115,7 @@ class FrameWork : public testing::Test {
   }
   size_t frame_count() { return frames().size(); }
   EncodedFramePtr next_delta() { return encoder_->encode(make_state(++tick_)); }
-  EncodedFramePtr keyframe() { return encoder_->encode_keyframe(); }
+  EncodedFramePtr keyframe() { return encoder_->encode_for_join(make_state(tick_)).keyframe; }
   /// Waits for the request and answers it as the encode worker does.
   void join_chain(FrameWorker& worker) {
     ASSERT_TRUE(eventually([&] { return requests_ > 0; }));

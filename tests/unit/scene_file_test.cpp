@@ -140,7 +140,7 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
   EXPECT_THAT(error_of("gravity_mps2 { y: nan }"), HasSubstr("gravity_mps2.y is nan"));
   EXPECT_THAT(error_of("gravity_mps2 { y: 1e999 }"), HasSubstr("gravity_mps2.y is inf"));
   EXPECT_THAT(error_of("look { root_color { g: 1.5 } }"), HasSubstr("look.root_color.g is 1.5"));
-  EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: adaptive, delta, raw"));
+  EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: delta, raw, tangent"));
   EXPECT_THAT(error_of("camera { offset_m { x: 0 y: 0 z: 0 } }"),
               HasSubstr("camera.offset_m is almost zero"));
   EXPECT_THAT(error_of("groom { file { } }"), HasSubstr("--set groom.file.path=FILE"));

@@ -1,10 +1,10 @@
 // proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
 #include "common/base/file.h"
-#include "common/codec/adaptive_slice.h"
 #include "common/codec/image_codec.h"
 #include "common/codec/scene_asset.h"
 #include "common/codec/strand_payload.h"
 #include "common/codec/strand_predictor.h"
+#include "common/codec/tangent_symbols.h"
 #include "common/wire/clock_offset.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
@@ -46,10 +46,12 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kBoundReachM", fmt::format("{} m", kBoundReachM)},
       {"kStrandFixedBytes", with_commas(kStrandFixedBytes)},
       {"kMaxImageSide", with_commas(kMaxImageSide)},
-      {"kMaxSliceCount", fmt::format("1..{}", kMaxSliceCount)},
-      {"kResidualBits", fmt::format("1/{} (`kResidualBits` {})", 1 << kResidualBits, kResidualBits)},
-      {"kMaxMagnitude", with_commas(kMaxMagnitude)},
-      {"kTableCount", with_commas(kTableCount)},
+      {"kStepsPerBound", with_commas(kStepsPerBound)},
+      {"kBlockSize", with_commas(kBlockSize)},
+      {"kEscapedLength", with_commas(kEscapedLength)},
+      {"kCoarseLatticeShift", with_commas(kCoarseLatticeShift)},
+      {"kCoarseVelocityShift", with_commas(kCoarseVelocityShift)},
+      {"kTangentTableCount", with_commas(kTangentTableCount)},
       {"kLearnShift", fmt::format(">> {} (", kLearnShift)},
       {"kLeastShare", fmt::format("`kLeastShare` {}", kLeastShare)},
       {"kRansLow", with_commas(kRansLow)},
@@ -71,7 +73,10 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
   EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
   EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
   EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("Table ({} axis + c) {}", kSizeCount, kFractionCount)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16, in units", kMotionClassCount,
+                                          kMotionFeatureCount)));
+  EXPECT_THAT(text,
+              HasSubstr(fmt::format("{} x {} weights of i16 for", kMotionClassCount, kShapeFeatureCount)));
   EXPECT_THAT(text, HasSubstr(fmt::format("symbols 0 to {} themselves", kFirstTail - 1)));
   EXPECT_THAT(text, HasSubstr(fmt::format("({} + sum of weight x feature) >> {}", 1 << (kWeightShift - 1),
                                           kWeightShift)));

@@ -6,10 +6,10 @@
 #include <array>
 #include <random>
 
-#include "common/codec/adaptive_slice.h"
 #include "common/codec/byte_io.h"
 #include "common/codec/image_codec.h"
 #include "common/codec/strand_payload.h"
+#include "common/codec/tangent_symbols.h"
 #include "common/codec/zstd_block.h"
 #include "common/wire/messages.h"
 #include "tests/support/hair_motion.h"
@@ -182,7 +182,7 @@ struct Stream {
   }
   EncodedFramePtr next() {
     hair.step();
-    return encoder->encode(hair.snapshot(quantum_for_bound(1e-4f)));
+    return encoder->encode(hair.snapshot(lattice_step_m(codec, 1e-4f).value()));
   }
 };
 
@@ -313,26 +313,28 @@ TEST(StrandBytes, BombsInsideAValidMessageAreRefused) {
 }
 
 TEST(StrandBytes, BombsInPlaceOfSymbolTablesAreRefused) {
-  Stream stream("adaptive");
+  Stream stream("tangent");
   const auto key = stream.next();
+  constexpr size_t kTablesAt = kFrameHeaderBytes + kStrandFixedBytes;
+  const size_t weight_bytes = 2 * sizeof(ShapeWeights);
   for (const ContentSize mode : {ContentSize::Declared, ContentSize::Absent}) {
     const Bytes bomb = compressed(Bytes(size_t{16} << 20), mode);
-    constexpr size_t kTablesAt = kFrameHeaderBytes + kStrandFixedBytes + sizeof(uint32_t);
     Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
     ByteWriter writer(message);
     writer.put(static_cast<uint32_t>(bomb.size()));
     writer.put_bytes(bomb);
+    message.resize(message.size() + weight_bytes);
     const auto decoded = stream.decoder->decode(with_length(message));
     ASSERT_FALSE(decoded);
     EXPECT_EQ(decoded.error().place, "symbol tables");
   }
   // Tables that do not rise would make a share of nothing or less.
-  const Bytes flat = compressed(Bytes(kTableCount * sizeof(SymbolTable)), ContentSize::Declared);
-  constexpr size_t kTablesAt = kFrameHeaderBytes + kStrandFixedBytes + sizeof(uint32_t);
+  const Bytes flat = compressed(Bytes(sizeof(TangentTables)), ContentSize::Declared);
   Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
   ByteWriter writer(message);
   writer.put(static_cast<uint32_t>(flat.size()));
   writer.put_bytes(flat);
+  message.resize(message.size() + weight_bytes);
   const auto decoded = stream.decoder->decode(with_length(message));
   ASSERT_FALSE(decoded);
   EXPECT_THAT(decoded.error().message, testing::HasSubstr("does not rise"));

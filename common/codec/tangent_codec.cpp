@@ -1,0 +1,432 @@
+// The "tangent" codec: made for strands. Positions are predicted from the motion of the strand and of its
+// neighbours and from the known length of each segment; what is coded are two small integers across the
+// segment, chosen as cheap as the announced bound allows. Every decoded vertex lies within that bound.
+// Layout in proto/WIRE.md.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <thread>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/codec/byte_io.h"
+#include "common/codec/strand_payload.h"
+#include "common/codec/tangent_symbols.h"
+#include "common/codec/zstd_block.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint8_t kTangentCodecNumber = 3;
+constexpr int kTableLevel = 3;
+constexpr uint8_t kCoarseHistoryFlag = 1;
+constexpr size_t kThreadedVertices = 40'000;  // fewer are coded on the calling thread
+
+/// In front of the slices, as it is on the wire.
+struct BodyHead {
+  uint8_t flags = 0;
+  uint8_t length_blend = 0;
+  MotionWeights weights{};
+};
+static_assert(sizeof(BodyHead) == 2 + sizeof(int16_t) * kMotionClassCount * kMotionFeatureCount);
+
+/// What a stream remembers on both sides.
+struct TangentChain {
+  TangentHistory history;
+  SymbolSizes sizes;
+  TangentTables tables = make_first_tables();
+
+  void reset(const TangentLayout& layout) {
+    history.reset(layout);
+    sizes.reset(layout);
+    tables = make_first_tables();
+  }
+  void coarsen(const TangentLayout& layout) {
+    history.coarsen();
+    sizes.reset(layout);
+  }
+};
+
+/// work(slice) for all slices, on as many threads as there are processors when that is worth it.
+template <class Work>
+void for_each_slice(const TangentLayout& layout, Work work) {
+  const uint32_t count = layout.slice_count();
+  const bool is_worth_it = layout.plane_size() >= kThreadedVertices;
+  const uint32_t thread_count =
+      is_worth_it ? std::min(count, std::max(1u, std::thread::hardware_concurrency())) : 1;
+  std::atomic<uint32_t> next{0};
+  const auto run = [&] {
+    for (uint32_t slice = next++; slice < count; slice = next++) work(slice);
+  };
+  std::vector<std::jthread> helpers;
+  for (uint32_t i = 1; i < thread_count; ++i) helpers.emplace_back(run);
+  run();
+}
+
+// What decodes to within the bound of this is still a valid lattice value.
+constexpr int32_t kFarthestTarget = kMaxLattice - 2 * kStepsPerBound;
+
+Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot) {
+  Planes<int32_t> planes;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    planes[axis].assign(layout.plane_size(), 0);
+    for (size_t v = 0; v < layout.vertex_count; ++v) {
+      const int32_t* from = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
+      int32_t* to = planes[axis].data() + v * layout.stride;
+      for (size_t place = 0; place < layout.stride; ++place)
+        if (layout.strand_at[place] != kNoStrand)
+          to[place] = std::clamp(from[layout.strand_at[place]], -kFarthestTarget, kFarthestTarget);
+    }
+  }
+  return planes;
+}
+
+void set_lattice(const TangentLayout& layout, const Planes<int32_t>& planes, Snapshot& snapshot) {
+  snapshot.lattice.resize(3 * snapshot.plane_size());
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t v = 0; v < layout.vertex_count; ++v) {
+      const int32_t* from = planes[axis].data() + v * layout.stride;
+      int32_t* to = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
+      for (size_t place = 0; place < layout.stride; ++place)
+        if (layout.strand_at[place] != kNoStrand) to[layout.strand_at[place]] = from[place];
+    }
+  }
+}
+
+/// The rounded history as whole numbers: positions and velocities.
+Planes<int32_t> coarse_positions(const TangentHistory& history) {
+  Planes<int32_t> coarse = history.lattice;
+  for (auto& plane : coarse)
+    for (int32_t& value : plane) value >>= kCoarseLatticeShift;
+  return coarse;
+}
+Planes<int32_t> coarse_velocities(const TangentHistory& history) {
+  Planes<int32_t> coarse;
+  for (size_t axis = 0; axis < 3; ++axis)
+    for (const float value : history.velocity[axis])
+      coarse[axis].push_back(static_cast<int32_t>(value) >> kCoarseVelocityShift);
+  return coarse;
+}
+void set_history(const Planes<int32_t>& position, const Planes<int32_t>& velocity, TangentHistory& history) {
+  const auto raised = [](int32_t value, int shift) {
+    return static_cast<int32_t>(static_cast<uint32_t>(value) << shift);
+  };
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < position[axis].size(); ++i) {
+      history.lattice[axis][i] = raised(position[axis][i], kCoarseLatticeShift);
+      history.velocity[axis][i] = static_cast<float>(raised(velocity[axis][i], kCoarseVelocityShift));
+    }
+  }
+  history.velocity_before = history.velocity;
+}
+float coarse_unit_m(float quantum_m) {
+  return quantum_m * static_cast<float>(1 << kCoarseLatticeShift);
+}
+
+class TangentEncoder final : public StrandEncoder {
+ public:
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
+    rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
+    has_chain_ = false;
+  }
+
+  EncodedFramePtr encode(const Snapshot& snapshot) override {
+    return continues(snapshot) ? checked(encode_delta(snapshot, History::Kept).frame) : start(snapshot);
+  }
+
+  JoinFrames encode_for_join(const Snapshot& snapshot) override {
+    if (!continues(snapshot)) {
+      const EncodedFramePtr keyframe = start(snapshot);
+      return {keyframe, keyframe};
+    }
+    JoinFrames frames = encode_delta(snapshot, History::Coarsened);
+    checked(frames.frame);
+    return frames;
+  }
+
+ private:
+  enum class History { Kept, Coarsened };
+
+  bool continues(const Snapshot& snapshot) const {
+    return has_chain_ && snapshot.strand_count == layout_.strand_count &&
+           snapshot.vertex_count == layout_.vertex_count && snapshot.quantum_m == chain_.history.quantum_m;
+  }
+
+  EncodedFramePtr start(const Snapshot& snapshot) {
+    CHECK(snapshot.strand_count > 0 && snapshot.vertex_count > 0 && snapshot.quantum_m > 0.0f);
+    CHECK(snapshot.lattice.size() == 3 * snapshot.plane_size());
+    const bool has_rest = rest_in_head_m_.size() == snapshot.plane_size();
+    layout_ = make_tangent_layout(
+        snapshot.strand_count, snapshot.vertex_count,
+        has_rest ? std::span<const glm::vec3>(rest_in_head_m_) : std::span<const glm::vec3>());
+    chain_.reset(layout_);
+    chain_.history.quantum_m = snapshot.quantum_m;
+    chain_.history.lattice = planes_of(layout_, snapshot);
+    frame_.resize(layout_);
+    next_sizes_.reset(layout_);
+    has_chain_ = true;
+    return checked(encode_delta(snapshot, History::Coarsened).keyframe);
+  }
+
+  /// Too large a frame ends the chain.
+  EncodedFramePtr checked(EncodedFramePtr frame) {
+    if (frame == nullptr) has_chain_ = false;
+    return frame;
+  }
+
+  JoinFrames encode_delta(const Snapshot& snapshot, History history) {
+    const bool is_coarsened = history == History::Coarsened;
+    std::vector<std::byte> joiners_part;
+    if (is_coarsened) {
+      chain_.coarsen(layout_);
+      append_history(joiners_part);
+    }
+    const Planes<int32_t> target = planes_of(layout_, snapshot);
+    fit_motion(layout_, chain_.history, target, frame_);
+    std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
+    std::vector<ValueWriter> writers(layout_.slice_count());
+    for (auto& escapes : frame_.escapes) escapes.clear();
+    for_each_slice(layout_, [&](uint32_t slice) {
+      quantise_slice(layout_, chain_.history, target, slice, frame_);
+      write_symbols(layout_, slice, frame_, chain_.sizes, next_sizes_, tables[slice], writers[slice]);
+    });
+    chain_.tables = mean_tables(tables);
+
+    const BodyHead head{is_coarsened ? kCoarseHistoryFlag : uint8_t{0}, frame_.length_blend, frame_.weights};
+    std::vector<std::byte> body;
+    body.reserve(sizeof(head) + layout_.plane_size());
+    ByteWriter(body).put_bytes(std::as_bytes(std::span(&head, 1)));
+    for (ValueWriter& slice : writers) slice.finish(body);
+
+    Snapshot decoded = snapshot;
+    set_lattice(layout_, frame_.lattice, decoded);
+    remember(chain_.history, frame_);
+    std::swap(chain_.sizes, next_sizes_);
+
+    FrameHeader header;
+    header.base_sequence = sequence_++;
+    header.sequence = sequence_;
+    header.sim_time_ns = snapshot.sim_time_ns;
+    header.opcode = Opcode::StrandDelta;
+    JoinFrames frames;
+    frames.frame = make_frame(header, decoded, {}, body);
+    if (!is_coarsened) return frames;
+    header.opcode = Opcode::StrandKeyframe;
+    header.base_sequence = 0;
+    frames.keyframe = make_frame(header, decoded, joiners_part, body);
+    return frames;
+  }
+
+  static EncodedFramePtr make_frame(const FrameHeader& header, const Snapshot& decoded,
+                                    std::span<const std::byte> joiners_part,
+                                    std::span<const std::byte> body) {
+    std::vector<std::byte> payload;
+    payload.reserve(kStrandFixedBytes + joiners_part.size() + body.size());
+    append_fixed_part(decoded, kTangentCodecNumber, payload);
+    ByteWriter writer(payload);
+    writer.put_bytes(joiners_part);
+    writer.put_bytes(body);
+    return make_encoded_frame(header, payload);
+  }
+
+  /// What a late joiner needs of the chain, just made coarse.
+  void append_history(std::vector<std::byte>& destination) {
+    const Planes<int32_t> position = coarse_positions(chain_.history);
+    const Planes<int32_t> velocity = coarse_velocities(chain_.history);
+    const float unit_m = coarse_unit_m(chain_.history.quantum_m);
+    const ShapeWeights edges = fit_shape(layout_, Shape::Edges, position, unit_m);
+    const ShapeWeights values = fit_shape(layout_, Shape::Values, velocity, unit_m);
+    std::vector<std::byte> packed;
+    zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, packed);
+    destination.reserve(packed.size() + layout_.plane_size());
+    ByteWriter writer(destination);
+    writer.put(static_cast<uint32_t>(packed.size()));
+    writer.put_bytes(packed);
+    writer.put_bytes(std::as_bytes(std::span(&edges, 1)));
+    writer.put_bytes(std::as_bytes(std::span(&values, 1)));
+    std::vector<ValueWriter> writers(layout_.slice_count());
+    for_each_slice(layout_, [&](uint32_t slice) {
+      write_shape(layout_, Shape::Edges, edges, unit_m, slice, position, writers[slice]);
+      write_shape(layout_, Shape::Values, values, unit_m, slice, velocity, writers[slice]);
+    });
+    for (ValueWriter& slice : writers) slice.finish(destination);
+  }
+
+  std::vector<glm::vec3> rest_in_head_m_;
+  TangentLayout layout_;
+  TangentChain chain_;
+  TangentFrame frame_;
+  SymbolSizes next_sizes_;
+  ZstdCompressor zstd_;
+  uint32_t sequence_ = 0;
+  bool has_chain_ = false;
+};
+
+class TangentDecoder final : public StrandDecoder {
+ public:
+  explicit TangentDecoder(const StrandStreamLimits& limits) : limits_(limits) {}
+
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
+    const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
+    make_layout(fits ? rest_in_head_m : std::span<const glm::vec3>());
+  }
+
+  Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> bytes) override {
+    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, kTangentCodecNumber, limits_));
+    RETURN_IF_ERROR(check_chain(message.header, sequence_));
+    if (layout_.strand_count == 0) make_layout({});
+    auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
+    if (message.header.opcode == Opcode::StrandKeyframe)
+      RETURN_IF_ERROR(read_keyframe(message, *snapshot));
+    else
+      RETURN_IF_ERROR(read_delta(message, *snapshot));
+    sequence_ = message.header.sequence;
+    return std::shared_ptr<const Snapshot>(std::move(snapshot));
+  }
+
+ private:
+  void make_layout(std::span<const glm::vec3> rest_in_head_m) {
+    layout_ = make_tangent_layout(limits_.strand_count, limits_.vertex_count, rest_in_head_m);
+    frame_.resize(layout_);
+    next_sizes_.reset(layout_);
+    sequence_ = 0;
+  }
+
+  Status read_keyframe(const StrandMessage& message, Snapshot& snapshot) {
+    TangentChain chain;
+    chain.reset(layout_);
+    chain.history.quantum_m = message.fixed.quantum_m;
+    ByteReader body(message.body);
+    const auto table_bytes = body.take<uint32_t>();
+    const auto packed = body.take_bytes(table_bytes);
+    ShapeWeights edges;
+    ShapeWeights values;
+    take_into(body, edges);
+    take_into(body, values);
+    if (!body.ok())
+      return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
+                        message.body.size());
+    if (auto filled = zstd_.fill(packed, std::as_writable_bytes(std::span(chain.tables))); !filled)
+      return at("symbol tables", filled.error());
+    RETURN_IF_ERROR(check_tables(chain.tables));
+
+    std::vector<ValueReader> readers(layout_.slice_count());
+    ASSIGN_OR_RETURN(std::span<const std::byte> rest, open_slices(body.rest(), readers));
+    const float unit_m = coarse_unit_m(chain.history.quantum_m);
+    Planes<int32_t> position;
+    Planes<int32_t> velocity;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      position[axis].assign(layout_.plane_size(), 0);
+      velocity[axis].assign(layout_.plane_size(), 0);
+    }
+    for_each_slice(layout_, [&](uint32_t slice) {
+      read_shape(layout_, Shape::Edges, edges, unit_m, slice, position, readers[slice]);
+      read_shape(layout_, Shape::Values, values, unit_m, slice, velocity, readers[slice]);
+    });
+    RETURN_IF_ERROR(check_spent(readers));
+    set_history(position, velocity, chain.history);
+    RETURN_IF_ERROR(read_body(rest, message, chain, snapshot));
+    chain_ = std::move(chain);
+    return {};
+  }
+
+  Status read_delta(const StrandMessage& message, Snapshot& snapshot) {
+    if (message.fixed.quantum_m != chain_.history.quantum_m)
+      return make_error(ErrorCode::BadInput, "lattice step changes from {} to {} m within a chain",
+                        chain_.history.quantum_m, message.fixed.quantum_m);
+    const bool is_coarsened = !message.body.empty() && message.body[0] == std::byte{kCoarseHistoryFlag};
+    if (!is_coarsened) return read_body(message.body, message, chain_, snapshot);
+    TangentChain chain = chain_;
+    chain.coarsen(layout_);
+    RETURN_IF_ERROR(read_body(message.body, message, chain, snapshot));
+    chain_ = std::move(chain);
+    return {};
+  }
+
+  /// Decodes the frame that follows `chain` and, when all of it is right, moves the chain on.
+  Status read_body(std::span<const std::byte> source, const StrandMessage& message, TangentChain& chain,
+                   Snapshot& snapshot) {
+    ByteReader body(source);
+    BodyHead head;
+    take_into(body, head);
+    if (!body.ok())
+      return make_error(ErrorCode::BadInput, "{} bytes have no room for the weights", source.size());
+    if (head.flags > kCoarseHistoryFlag)
+      return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
+                        kCoarseHistoryFlag);
+    frame_.length_blend = head.length_blend;
+    frame_.weights = head.weights;
+    std::vector<ValueReader> readers(layout_.slice_count());
+    ASSIGN_OR_RETURN(const auto rest, open_slices(body.rest(), readers));
+    if (!rest.empty())
+      return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
+                        rest.size());
+    std::vector<TangentTables> tables(layout_.slice_count(), chain.tables);
+    for_each_slice(layout_, [&](uint32_t slice) {
+      read_symbols(layout_, slice, frame_, chain.sizes, next_sizes_, tables[slice], readers[slice]);
+      place_slice(layout_, chain.history, slice, frame_);
+    });
+    RETURN_IF_ERROR(check_spent(readers));
+    set_lattice(layout_, frame_.lattice, snapshot);
+    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    // Only now, with everything checked, the state moves on.
+    chain.tables = mean_tables(tables);
+    remember(chain.history, frame_);
+    std::swap(chain.sizes, next_sizes_);
+    return {};
+  }
+
+  static Result<std::span<const std::byte>> open_slices(std::span<const std::byte> rest,
+                                                        std::vector<ValueReader>& readers) {
+    for (ValueReader& reader : readers) {
+      ASSIGN_OR_RETURN(rest, reader.open(rest));
+    }
+    return rest;
+  }
+
+  static Status check_spent(const std::vector<ValueReader>& readers) {
+    for (size_t slice = 0; slice < readers.size(); ++slice)
+      if (!readers[slice].is_spent())
+        return make_error(ErrorCode::BadInput, "slice {} does not end where its symbols end", slice);
+    return {};
+  }
+
+  static Status check_tables(const TangentTables& tables) {
+    for (size_t i = 0; i < tables.size(); ++i) {
+      bool is_rising = tables[i].start[0] == 0;
+      for (uint32_t k = 0; k < kSymbolCount; ++k) is_rising &= tables[i].share(k) > 0;
+      if (!is_rising) return make_error(ErrorCode::BadInput, "symbol table {} does not rise from 0", i);
+    }
+    return {};
+  }
+
+  template <class T>
+  static void take_into(ByteReader& reader, T& value) {
+    const auto bytes = reader.take_bytes(sizeof(T));
+    if (bytes.size() == sizeof(T)) std::memcpy(&value, bytes.data(), sizeof(T));
+  }
+
+  StrandStreamLimits limits_;
+  TangentLayout layout_;
+  TangentChain chain_;
+  TangentFrame frame_;
+  SymbolSizes next_sizes_;
+  ZstdDecompressor zstd_;
+  uint32_t sequence_ = 0;
+};
+
+}  // namespace
+
+float tangent_lattice_step_m(float bound_m) {
+  CHECK(bound_m >= kMinBoundM);
+  return std::nextafter(bound_m / static_cast<float>(kStepsPerBound), 0.0f);
+}
+
+std::unique_ptr<StrandEncoder> make_tangent_encoder() {
+  return std::make_unique<TangentEncoder>();
+}
+std::unique_ptr<StrandDecoder> make_tangent_decoder(const StrandStreamLimits& limits) {
+  return std::make_unique<TangentDecoder>(limits);
+}
+
+}  // namespace strandcast

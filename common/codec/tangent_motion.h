@@ -1,0 +1,84 @@
+// Geometry of the "tangent" codec: where a vertex is expected, and the integers that tell how far it is from
+// there. Both sides compute the same floats: only + - * / and square roots in a fixed order, without
+// contraction. Private to common/codec. Functions touch only their own slice of the arrays, so slices of one
+// frame may be worked on side by side.
+//
+// Prediction: the last decoded position plus a weighted sum of what both sides know (features listed in
+// tangent_motion.cpp), brought to the known length from the decoded vertex before it. Two integers correct it
+// in the plane across the segment, a third one, rarely needed, its length. All lengths are in lattice steps.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/codec/tangent_layout.h"
+
+namespace strandcast {
+
+inline constexpr int32_t kStepsPerBound = 256;  // lattice steps in the announced bound
+inline constexpr uint32_t kMotionFeatureCount = 20;
+inline constexpr uint32_t kMotionClassCount = 3;     // rows 0 and 1; rows in between; the last row
+inline constexpr float kMotionWeight = 1.0f / 1024;  // unit of the weights on the wire
+inline constexpr float kLengthWeight = 1.0f / 16;    // unit of the length blend
+inline constexpr int32_t kEscapedLength = 1 << 20;   // in place of a length correction
+inline constexpr int kCoarseLatticeShift = 11;       // a joiner's history is rounded to 8 bounds
+inline constexpr int kCoarseVelocityShift = 10;      // and 4 bounds per frame
+
+template <class T>
+using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_count x stride)
+
+using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMotionClassCount>;
+
+/// What both sides remember of the frames so far.
+struct TangentHistory {
+  float quantum_m = 0.0f;
+  Planes<int32_t> lattice;
+  Planes<float> velocity;  // since the frame before
+  Planes<float> velocity_before;
+  Planes<float> residual;  // decoded less predicted position
+  Planes<float> residual_before;
+
+  void reset(const TangentLayout& layout);
+  /// Forgets all but a rounded position and velocity: what a keyframe tells a late joiner.
+  void coarsen();
+};
+
+/// An escaped vertex: position less the last one, in steps of the coarse cubic lattice.
+struct Escape {
+  size_t at = 0;  // place in a plane
+  std::array<int32_t, 3> step{};
+};
+
+/// One frame, coded after a history.
+struct TangentFrame {
+  MotionWeights weights{};
+  uint8_t length_blend = 0;    // of the last decoded length against the rest length, in 1/16
+  std::vector<int32_t> first;  // (vertex_count x stride) first coordinate across the segment
+  std::vector<int32_t> second;
+  std::vector<int32_t> length;               // correction along the segment, or kEscapedLength
+  std::vector<std::vector<Escape>> escapes;  // of each slice, in coding order
+  Planes<int32_t> lattice;
+  Planes<float> velocity;
+  Planes<float> residual;
+
+  void resize(const TangentLayout& layout);
+};
+
+/// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
+/// sample of strands.
+void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
+                TangentFrame& frame);
+
+/// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
+/// decode to.
+void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
+                    uint32_t slice, TangentFrame& frame);
+
+/// Decoder: positions, velocities and residuals of a slice from its integers.
+void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                 TangentFrame& frame);
+
+/// The frame becomes history.
+void remember(TangentHistory& history, TangentFrame& frame);
+
+}  // namespace strandcast

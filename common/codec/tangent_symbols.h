@@ -1,0 +1,59 @@
+// Entropy coding of the "tangent" codec: the integers of a frame and the rounded history of a keyframe, with
+// tables chosen by the integers coded near by. No floats decide about a table, so this pass needs nothing of
+// the geometry. Private to common/codec. Functions touch only their own slice of the arrays.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/codec/tangent_layout.h"
+#include "common/codec/tangent_motion.h"
+#include "common/codec/value_coder.h"
+
+namespace strandcast {
+
+inline constexpr uint32_t kSizeCount = 28;  // classes of expected size
+inline constexpr uint32_t kFirstSizes = 4;  // the second coordinate is also told apart by the first
+inline constexpr uint32_t kLengthTableCount = 15;
+inline constexpr uint32_t kTangentTableCount = kSizeCount * (1 + kFirstSizes) + kLengthTableCount;
+using TangentTables = std::array<SymbolTable, kTangentTableCount>;
+
+TangentTables make_first_tables();
+
+/// The mean of the tables that the slices of a frame ended with: the next frame starts from it.
+TangentTables mean_tables(std::span<const TangentTables> tables);
+
+/// Sizes of the integers of one frame, (vertex_count x stride).
+struct SymbolSizes {
+  std::vector<uint16_t> across;
+  std::vector<uint8_t> length;
+
+  void reset(const TangentLayout& layout);
+};
+
+/// Writes a slice's integers and escapes of `frame`; `then` are the sizes of the frame before, `now` is
+/// filled.
+void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentFrame& frame,
+                   const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer);
+/// The inverse, from untrusted bytes: any give some integers; escapes take bytes, so there are no
+/// more than there is room for.
+void read_symbols(const TangentLayout& layout, uint32_t slice, TangentFrame& frame, const SymbolSizes& then,
+                  SymbolSizes& now, TangentTables& tables, ValueReader& reader);
+
+inline constexpr uint32_t kShapeFeatureCount = 10;
+using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kMotionClassCount>;
+
+/// Whole numbers along strands, as they are in a keyframe: each vertex less the one before it (positions), or
+/// as it is (velocities), predicted from the strand so far, from neighbours and from the rest shape.
+enum class Shape { Edges, Values };
+
+/// `value`: planes of whole numbers; one of them is `unit_m` long.
+ShapeWeights fit_shape(const TangentLayout& layout, Shape shape, const Planes<int32_t>& value, float unit_m);
+void write_shape(const TangentLayout& layout, Shape shape, const ShapeWeights& weights, float unit_m,
+                 uint32_t slice, const Planes<int32_t>& value, ValueWriter& writer);
+/// The inverse; fills the slice's part of `value`.
+void read_shape(const TangentLayout& layout, Shape shape, const ShapeWeights& weights, float unit_m,
+                uint32_t slice, Planes<int32_t>& value, ValueReader& reader);
+
+}  // namespace strandcast

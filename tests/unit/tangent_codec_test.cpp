@@ -1,0 +1,234 @@
+// What the "tangent" codec promises beyond what every codec does: the bound, whatever moves; the bits it is
+// made for; the same bytes and states on every path.
+#include <set>
+
+#include "common/base/hash.h"
+#include "common/codec/strand_codec.h"
+#include "common/codec/tangent_layout.h"
+#include "tests/support/hair_motion.h"
+
+namespace strandcast {
+namespace {
+
+constexpr float kBoundM = 1e-4f;
+
+struct Chain {
+  std::unique_ptr<StrandEncoder> encoder = std::move(*make_strand_encoder("tangent"));
+  std::unique_ptr<StrandDecoder> decoder;
+
+  explicit Chain(const HairMotionDesc& desc, std::span<const glm::vec3> rest = {}) {
+    decoder = std::move(*make_strand_decoder("tangent", {desc.strand_count, desc.vertex_count}));
+    encoder->set_rest_shape(rest);
+    decoder->set_rest_shape(rest);
+  }
+  std::shared_ptr<const Snapshot> pass(const Snapshot& snapshot) {
+    auto decoded = decoder->decode(encoder->encode(snapshot)->message);
+    EXPECT_TRUE(decoded) << decoded.error().to_string();
+    return decoded ? *decoded : nullptr;
+  }
+};
+
+double largest_error_m(const std::vector<glm::vec3>& truth, const Snapshot& decoded) {
+  const auto shown = positions_in_head(decoded);
+  double largest = shown.size() == truth.size() ? 0.0 : INFINITY;
+  for (size_t i = 0; i < std::min(truth.size(), shown.size()); ++i)
+    largest = std::max(largest, glm::distance(glm::dvec3(truth[i]), glm::dvec3(shown[i])));
+  return largest;
+}
+
+TEST(TangentCodec, StaysWithinEveryBoundForManyFramesFarFromTheOrigin) {
+  for (const float bound_m : {2e-5f, 5e-5f, 1e-4f, 5e-4f}) {
+    for (const MotionKind kind : {MotionKind::Idle, MotionKind::Active, MotionKind::Extreme}) {
+      HairMotionDesc desc{3, 6, kind};
+      desc.origin_m = {100.0, -3.0, 70.0};
+      HairMotion hair(desc);
+      Chain chain(desc, hair.rest_in_head());
+      double largest_m = 0.0;
+      for (int i = 0; i < 9'000; ++i) {
+        hair.step();
+        const auto decoded = chain.pass(hair.snapshot(lattice_step_m("tangent", bound_m).value()));
+        ASSERT_TRUE(decoded);
+        largest_m = std::max(largest_m, largest_error_m(hair.positions_in_head(), *decoded));
+      }
+      EXPECT_LE(largest_m, static_cast<double>(bound_m));
+      EXPECT_GE(largest_m, 0.9 * static_cast<double>(bound_m)) << "the bound is there to be used";
+    }
+  }
+}
+
+// Vertices that stretch, jump and collapse, where no prediction helps.
+TEST(TangentCodec, StaysWithinTheBoundWhateverHappens) {
+  HairMotionDesc desc{40, 12, MotionKind::Active};
+  HairMotion hair(desc);
+  Chain chain(desc, hair.rest_in_head());
+  const float quantum_m = lattice_step_m("tangent", kBoundM).value();
+  for (int i = 0; i < 60; ++i) {
+    hair.step();
+    QuantiseInput input;
+    input.tick = static_cast<uint64_t>(i + 1);
+    input.strand_count = desc.strand_count;
+    input.vertex_count = desc.vertex_count;
+    input.quantum_m = quantum_m;
+    std::vector<glm::vec3> points = hair.positions_in_head();
+    for (size_t k = 0; k < points.size(); ++k) {
+      const uint32_t dice = mix_u32(static_cast<uint32_t>(k) * 977u + static_cast<uint32_t>(i)) % 40;
+      if (i % 7 == 0 && dice == 0) points[k] *= 7.0f;            // stretched
+      if (i % 7 == 1 && dice < 10) points[k] = points[k % 5];    // collapsed
+      if (i % 7 == 2 && dice < 3) points[k] = -points[k];        // turned round
+      if (i % 7 == 3) points[k] += glm::vec3(0.0f, 3.0f, 1.0f);  // all jump
+    }
+    input.position_in_head_m = points;
+    const auto decoded = chain.pass(quantise(input).snapshot);
+    ASSERT_TRUE(decoded);
+    double reach_m = 0.0;
+    for (const glm::vec3& point : points) reach_m = std::max<double>(reach_m, glm::length(point));
+    // Beyond two metres from the head floats become coarser than the allowance made for them.
+    const double float_rounding_m = std::max(0.0, reach_m - 2.0) * 6e-8;
+    EXPECT_LE(largest_error_m(points, *decoded), kBoundM + float_rounding_m) << "frame " << i;
+  }
+}
+
+// More than one slice, and enough vertices for several threads.
+TEST(TangentCodec, SlicesOnManyThreadsGiveTheSameStateToAllAndToJoiners) {
+  for (const uint32_t strands : {1023u, 1024u, 3100u}) {
+    HairMotionDesc desc{strands, 16, MotionKind::Extreme};
+    HairMotion hair(desc);
+    Chain chain(desc, hair.rest_in_head());
+    Chain again(desc, hair.rest_in_head());
+    auto late = std::move(*make_strand_decoder("tangent", {strands, 16}));
+    late->set_rest_shape(hair.rest_in_head());
+    for (int i = 0; i < 6; ++i) {
+      hair.step();
+      const Snapshot snapshot = hair.snapshot(lattice_step_m("tangent", kBoundM).value());
+      const JoinFrames frames = chain.encoder->encode_for_join(snapshot);
+      EXPECT_TRUE(again.encoder->encode_for_join(snapshot).frame->message == frames.frame->message);
+      const auto decoded = chain.decoder->decode(frames.frame->message);
+      ASSERT_TRUE(decoded) << decoded.error().to_string();
+      EXPECT_LE(largest_error_m(hair.positions_in_head(), **decoded), kBoundM);
+      const auto joined = late->decode(frames.keyframe->message);
+      ASSERT_TRUE(joined) << joined.error().to_string();
+      EXPECT_EQ(state_hash(**joined), state_hash(**decoded));
+    }
+  }
+}
+
+TEST(TangentCodec, AnotherRestShapeIsNoticed) {
+  HairMotionDesc desc{20, 8, MotionKind::Active};
+  HairMotion hair(desc);
+  Chain chain(desc, hair.rest_in_head());
+  auto other = hair.rest_in_head();
+  for (glm::vec3& point : other) point *= 1.1f;
+  chain.decoder->set_rest_shape(other);
+  hair.step();
+  const auto frame = chain.encoder->encode(hair.snapshot(lattice_step_m("tangent", kBoundM).value()));
+  const auto decoded = chain.decoder->decode(frame->message);
+  ASSERT_FALSE(decoded);
+  EXPECT_EQ(decoded.error().code, ErrorCode::BadInput);
+}
+
+struct Rate {
+  double delta_bits = 0.0;  // per vertex, headers included
+  double keyframe_bits = 0.0;
+};
+
+Rate rate_of(const std::string& codec, MotionKind kind) {
+  HairMotion hair({1200, 16, kind});
+  for (int i = 0; i < 60; ++i) hair.step();  // until it hangs
+  auto encoder = std::move(*make_strand_encoder(codec));
+  encoder->set_rest_shape(hair.rest_in_head());
+  const float quantum_m = lattice_step_m(codec, kBoundM).value();
+  Rate rate;
+  constexpr int kFrames = 20;
+  for (int i = -10; i < kFrames; ++i) {
+    hair.step();
+    const auto frame = encoder->encode(hair.snapshot(quantum_m));
+    if (i >= 0) rate.delta_bits += 8.0 * static_cast<double>(frame->message.size()) / kFrames;
+  }
+  hair.step();
+  rate.keyframe_bits =
+      8.0 * static_cast<double>(encoder->encode_for_join(hair.snapshot(quantum_m)).keyframe->message.size());
+  rate.delta_bits /= static_cast<double>(hair.plane_size());
+  rate.keyframe_bits /= static_cast<double>(hair.plane_size());
+  return rate;
+}
+
+TEST(TangentCodec, NeedsFarFewerBitsThanTheExactLattice) {
+  for (const MotionKind kind : {MotionKind::Idle, MotionKind::Active, MotionKind::Extreme}) {
+    const Rate tangent = rate_of("tangent", kind);
+    const Rate delta = rate_of("delta", kind);
+    EXPECT_LT(tangent.delta_bits, 0.65 * delta.delta_bits);
+    EXPECT_LT(tangent.keyframe_bits, 0.75 * delta.keyframe_bits);
+  }
+  // What the codec is made for, with some room for so few strands: 1.8, 3.5 and 6 for 10,000 of them.
+  EXPECT_LT(rate_of("tangent", MotionKind::Idle).delta_bits, 2.3);
+  EXPECT_LT(rate_of("tangent", MotionKind::Active).delta_bits, 3.5);
+  EXPECT_LT(rate_of("tangent", MotionKind::Extreme).delta_bits, 6.0);
+}
+
+// After somebody joined, the others' next frame costs more, and soon it is as before.
+TEST(TangentCodec, AJoinCostsTheOthersAFewFrames) {
+  HairMotionDesc desc{1200, 16, MotionKind::Active};
+  HairMotion hair(desc);
+  Chain chain(desc, hair.rest_in_head());
+  const float quantum_m = lattice_step_m("tangent", kBoundM).value();
+  const auto next_bytes = [&] {
+    hair.step();
+    return static_cast<double>(chain.encoder->encode(hair.snapshot(quantum_m))->message.size());
+  };
+  for (int i = 0; i < 60; ++i) next_bytes();
+  const double before = next_bytes();
+  hair.step();
+  const JoinFrames frames = chain.encoder->encode_for_join(hair.snapshot(quantum_m));
+  EXPECT_LT(static_cast<double>(frames.frame->message.size()), 3.5 * before);
+  EXPECT_LT(static_cast<double>(frames.frame->message.size()),
+            0.6 * static_cast<double>(frames.keyframe->message.size()));
+  for (int i = 0; i < 4; ++i) next_bytes();
+  EXPECT_LT(next_bytes(), 1.25 * before);
+}
+
+TEST(TangentLayout, EveryStrandHasOnePlaceAndNeighboursComeBefore) {
+  for (const uint32_t strands : {1u, 7u, 1023u, 1024u, 2047u, 5000u}) {
+    HairMotion hair({strands, 3, MotionKind::Still});
+    const TangentLayout layout = make_tangent_layout(strands, 3, hair.rest_in_head());
+    EXPECT_EQ(layout.slice_count(), strands < 1024 ? 1u : 8u);
+    std::set<uint32_t> seen;
+    for (uint32_t slice = 0; slice < layout.slice_count(); ++slice) {
+      EXPECT_EQ(layout.slice_begin[slice] % kBlockSize, 0u);
+      for (uint32_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1]; ++place) {
+        if (layout.strand_at[place] != kNoStrand) {
+          EXPECT_TRUE(seen.insert(layout.strand_at[place]).second);
+        }
+        for (const auto& neighbour : layout.neighbour) {
+          if (neighbour[place] == layout.no_neighbour()) continue;
+          EXPECT_GE(neighbour[place], layout.slice_begin[slice]);
+          EXPECT_LT(neighbour[place] / kBlockSize, place / kBlockSize);
+        }
+      }
+    }
+    EXPECT_EQ(seen.size(), strands);
+    EXPECT_EQ(layout.stride, layout.slice_begin.back() + kBlockSize);
+  }
+}
+
+// The first slices are an even thinning: an eighth, a quarter, a half of every region.
+TEST(TangentLayout, TheFirstSlicesThinTheGroomEvenly) {
+  constexpr uint32_t kStrands = 4096;
+  HairMotion hair({kStrands, 2, MotionKind::Still});
+  const TangentLayout layout = make_tangent_layout(kStrands, 2, hair.rest_in_head());
+  const auto share_left = [&](uint32_t slices) {
+    int left = 0;
+    int all = 0;
+    for (uint32_t place = 0; place < layout.slice_begin[slices]; ++place) {
+      if (layout.strand_at[place] == kNoStrand) continue;
+      ++all;
+      if (hair.rest_in_head()[layout.strand_at[place]].x < 0.0f) ++left;
+    }
+    return static_cast<double>(left) / all;
+  };
+  EXPECT_NEAR(layout.slice_begin[1], kStrands / 8, kBlockSize);
+  EXPECT_NEAR(layout.slice_begin[4], kStrands / 2, 4 * kBlockSize);
+  for (const uint32_t slices : {1u, 2u, 4u}) EXPECT_NEAR(share_left(slices), share_left(8), 0.02);
+}
+
+}  // namespace
+}  // namespace strandcast
