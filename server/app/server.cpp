@@ -119,7 +119,6 @@ Status Server::State::start() {
   ASSIGN_OR_RETURN(asset_frame_, encode_asset(*asset_));
   ASSIGN_OR_RETURN(auto strand_decoder,
                    make_strand_decoder(scene.stream.codec, {asset_->strand_count, asset_->vertex_count}));
-  strand_encoder->set_rest_shape(asset_->rest_position_m);
   strand_decoder->set_rest_shape(asset_->rest_position_m);
   // The port first: a port in use is told at once, not after compiling shaders.
   NetConfig net = config_.net;
@@ -171,6 +170,7 @@ StrandEncodeWorker& Server::State::encoder(uint16_t stream_id) {
   };
   auto made = make_strand_encoder(config_.scene.stream.codec);
   CHECK(made.ok());  // start() has made one
+  (*made)->set_rest_shape(asset_->rest_position_m);
   const StrandClass& row = classes_[stream_id];
   worker = std::make_unique<StrandEncodeWorker>(
       slot_, std::move(*made), sink, StrandEncodeConfig{stream_id, row.rate_divisor, row.coarsening});

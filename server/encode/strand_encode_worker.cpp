@@ -1,6 +1,7 @@
 #include "server/encode/strand_encode_worker.h"
 
 #include <chrono>
+#include <optional>
 #include <utility>
 
 #include "common/base/log.h"
@@ -117,7 +118,9 @@ void StrandEncodeWorker::serve(const SnapshotSlot::View& view) {
 
 JoinFrames StrandEncodeWorker::encode(const Snapshot& published, Audience audience) {
   const int64_t begin_ns = now_ns();
-  const Snapshot& snapshot = config_.coarsening > 1 ? coarsen(published, config_.coarsening) : published;
+  std::optional<Snapshot> coarse;
+  if (config_.coarsening > 1) coarse = coarsen(published, config_.coarsening);
+  const Snapshot& snapshot = coarse ? *coarse : published;
   JoinFrames frames;
   if (audience == Audience::Joiners) {
     frames = encoder_->encode_for_join(snapshot);

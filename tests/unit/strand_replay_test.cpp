@@ -157,15 +157,18 @@ TEST_F(StrandReplayTest, AnotherStreamStartsWithItsKeyframeAndNeverStepsBack) {
   auto other = make_strand_encoder("delta");
   ASSERT_TRUE(other);
   EncodedFramePtr old_state;
+  Snapshot old_truth;
   for (int i = 0; i < 10; ++i) {
     ASSERT_TRUE(receive(next(), i * kStepNs));
-    if (i % 4 == 0) old_state = with_send_time(*(*other)->encode(truth_), 2, 1);
+    if (i % 4 != 0) continue;
+    old_truth = truth_;
+    old_state = with_send_time(*(*other)->encode(truth_), 2, 1);
   }
   const auto newest = replay_->newest();
   // A delta of the other stream whose number fits by chance must not be taken for one of this stream.
   EXPECT_FALSE(receive(old_state, 10 * kStepNs));
   EXPECT_EQ(requests_, 1);
-  EXPECT_TRUE(receive(with_send_time(*(*other)->encode_keyframe(), 2, 1), 10 * kStepNs));
+  EXPECT_TRUE(receive(with_send_time(*(*other)->encode_for_join(old_truth).keyframe, 2, 1), 10 * kStepNs));
   EXPECT_EQ(replay_->newest(), newest) << "the keyframe is of an older state";
   for (int i = 10; i < 20; ++i) {
     const auto own = next();
