@@ -23,18 +23,14 @@ const std::vector<SolverRow>& solver_table() {
                                                pbd_row(),
                                                xpbd_row(),
                                                mass_spring_row(),
-                                               direct_rod_row(),
-                                               articulated_row(),
+                                               shape_constraints_row(),
                                                tractrix_emulation_row(),
                                                tractrix_split_row(),
                                                tractrix_hybrid_row(),
-                                               angular_projection_row()};
-  static const std::vector<SolverRow> table = {
-      dftl_row(),       dftl_parallel_row(), ftl_row(),
-      pbd_row(),        xpbd_row(),          shape_constraints_row(),
-      direct_rod_row(), articulated_row(),   tractrix_emulation_row()};
                                                angular_projection_row(),
-                                               super_helix_row()};
+                                               articulated_row(),
+                                               super_helix_row(),
+                                               direct_rod_row()};
   return table;
 }
 
