@@ -37,11 +37,13 @@ Status run_stability(const StabilityOptions& options) {
   std::vector<StabilityOutcome> outcomes;
   {
     Progress progress({"stability"});
-    for (const StabilityTrial& trial : trials)
-      progress.expect(static_cast<uint32_t>(rows.size()), steps_of(trial) * static_cast<double>(rows.size()));
+    for (const SolverRow* row : rows)
+      for (const StabilityTrial& trial : trials)
+        if (is_for(*row, trial)) progress.expect(1, steps_of(trial));
     StabilityRunner runner(shaders);
     for (const SolverRow* row : rows) {
       for (const StabilityTrial& trial : trials) {
+        if (!is_for(*row, trial)) continue;
         progress.begin_run(fmt::format("{}, {}", row->name, trial.setting));
         ASSIGN_OR_RETURN(StabilityOutcome outcome, runner.run(*row, trial));
         outcomes.push_back(std::move(outcome));

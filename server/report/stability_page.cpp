@@ -60,6 +60,12 @@ std::string in_words(const Count& total) {
   return text;
 }
 
+std::string sentence(const Count& total) {
+  std::string text = fmt::format("{} of {} promises kept", total.kept, total.judged);
+  if (total.refused > 0) text += fmt::format(", {} trials refused as the server would", total.refused);
+  return text + ".";
+}
+
 HtmlTable overview(const std::vector<StabilityOutcome>& outcomes) {
   HtmlTable table;
   table.caption = "Promises kept, by kind of trial. A refused trial is one that the server does not load.";
@@ -185,7 +191,7 @@ std::string stability_text(const std::vector<StabilityOutcome>& outcomes) {
   }
   Count all;
   for (const StabilityOutcome& outcome : outcomes) count(outcome, all);
-  text += fmt::format("\n{} promises kept. '!' marks the others.\n", in_words(all));
+  text += fmt::format("\n{} '!' marks the others.\n", sentence(all));
   return text;
 }
 
@@ -194,9 +200,9 @@ std::string stability_page(const std::vector<StabilityOutcome>& outcomes, const 
   Count all;
   for (const StabilityOutcome& outcome : outcomes) count(outcome, all);
   page.answer(
-      fmt::format("{} promises kept. A red cell is a promise that does not hold, with the number that was "
+      fmt::format("{} A red cell is a promise that does not hold, with the number that was "
                   "measured and the limit; below each table is why, where it is known.",
-                  in_words(all)));
+                  sentence(all)));
   const RestLengths lengths = rest_lengths(setup.grid);
   page.paragraph(fmt::format(
       "Seven strands of 0.25 m and 16 vertices on a head, parameters at their defaults unless a setting says "

@@ -88,6 +88,19 @@ double longest_substep_s(const StabilityTrial& trial) {
   return longest_s;
 }
 
+/// What every stiffness may be multiplied by before the row refuses the step: by bisection, to a thousandth.
+double refused_from(const SolverRow& row, const SolverParameters& complete, double substep_s) {
+  double allowed = 1e-9;
+  double refused = 1e9;
+  while (refused > 1.001 * allowed) {
+    const double middle = std::sqrt(allowed * refused);
+    const bool is_allowed =
+        check_step(row, scale_stiffness(row, complete, middle).parameters, substep_s).ok();
+    (is_allowed ? allowed : refused) = middle;
+  }
+  return refused;
+}
+
 void run_steps(const StabilityTrial& trial, Solver& solver, StabilityObserver& observer) {
   constexpr int kSeldom = 1000;
   SolverState state;
@@ -132,8 +145,11 @@ Result<Solver*> StabilityRunner::solver_for(const SolverRow& row, const SolverPa
 Result<StabilityOutcome> StabilityRunner::run(const SolverRow& row, const StabilityTrial& trial) {
   StabilityOutcome outcome{row.name, trial.group, trial.setting, "", "", {}};
   ASSIGN_OR_RETURN(SolverParameters complete, complete_parameters(row, known_parameters(row, trial.given)));
-  if (trial.stiffness_factor != 1.0) {
-    ScaledStiffness scaled = scale_stiffness(row, complete, trial.stiffness_factor);
+  double factor = trial.stiffness_factor;
+  if (trial.share_of_limit > 0.0)
+    factor = trial.share_of_limit * refused_from(row, complete, longest_substep_s(trial));
+  if (factor != 1.0) {
+    ScaledStiffness scaled = scale_stiffness(row, complete, factor);
     complete = std::move(scaled.parameters);
     outcome.note = scaled.note.empty() ? "no stiffness to raise" : std::move(scaled.note);
   }

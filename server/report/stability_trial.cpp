@@ -307,6 +307,26 @@ void add_bad_inputs(TrialList& list) {
   }
 }
 
+/// Explicit integrators on either side of where theory ends them.
+void add_explicit_limits(TrialList& list) {
+  const std::pair<const char*, double> integrators[] = {{"symplectic Euler", 0.0}, {"Verlet", 1.0}};
+  for (const auto& [name, integrator] : integrators) {
+    for (const double share : {0.95, 1.05}) {
+      StabilityTrial& trial = list.add(
+          "explicit", fmt::format("{}, {:g} of the stiffness limit", name, share), {StabilityMeasure::Speed});
+      trial.needs_parameter = "integrator";
+      // Dampers take from what is stable as well, and short segments from the masses.
+      trial.given = {{"integrator", integrator},
+                     {"stretch_damping_ns_per_m", 0.0},
+                     {"shortest_segment_m", even_segments_m(16)[0]}};
+      trial.share_of_limit = share;
+      trial.head = lively;
+      trial.moving_s = 4.0;
+      trial.still_s = 2.0;
+    }
+  }
+}
+
 void add_energies(TrialList& list) {
   StabilityTrial& fall =
       list.add("energy", "falls from the groomed shape", {StabilityMeasure::Energy, StabilityMeasure::Speed});
@@ -361,6 +381,13 @@ const char* name_of(StabilityMeasure measure) {
   return kNames[static_cast<size_t>(measure)];
 }
 
+bool is_for(const SolverRow& row, const StabilityTrial& trial) {
+  return trial.needs_parameter.empty() ||
+         std::any_of(row.parameters.begin(), row.parameters.end(), [&trial](const SolverParameterInfo& info) {
+           return info.name == trial.needs_parameter;
+         });
+}
+
 RestLengths rest_lengths(StabilityGrid grid) {
   constexpr double kTenMinutesS = 600.0;
   constexpr double kOneMinuteS = 60.0;
@@ -373,6 +400,7 @@ std::vector<StabilityTrial> make_stability_trials(StabilityGrid grid) {
   TrialList list(grid);
   add_stiffness(list);
   add_steps(list);
+  add_explicit_limits(list);
   add_motions(list);
   add_grooms(list);
   add_bad_inputs(list);

@@ -46,6 +46,8 @@ struct StabilityTrial {
   std::shared_ptr<const Groom> groom;
   SolverParameters given;         // as far as the row knows them
   double stiffness_factor = 1.0;  // on every stiffness of the row, see scale_stiffness()
+  std::string needs_parameter;    // rows without it are not asked; "" = all are
+  double share_of_limit = 0.0;    // above 0: stiffnesses at this share of where the row begins to refuse them
   StartState start = StartState::Groomed;
   BadInput bad_input = BadInput::None;        // of the step that ends half of moving_s
   std::function<Pose(double time_s)> head;    // empty: stands still; stops dead at moving_s
@@ -74,7 +76,10 @@ struct RestLengths {
 /// How long the trials at rest last.
 RestLengths rest_lengths(StabilityGrid grid);
 
-/// All trials that every row goes through.
+/// Whether the trial is one for the row.
+bool is_for(const SolverRow& row, const StabilityTrial& trial);
+
+/// All trials, of which every row goes through those that are for it.
 std::vector<StabilityTrial> make_stability_trials(StabilityGrid grid);
 
 /// Complete parameters with every stiffness times `factor` and every compliance over it, each held to its

@@ -20,6 +20,7 @@ TEST_P(Stability, PromisesAreKept) {
   StabilityRunner runner(shaders_);
   std::vector<const KnownBreak*> seen;
   for (const StabilityTrial& trial : make_stability_trials(StabilityGrid::Reduced)) {
+    if (!is_for(row, trial)) continue;
     SCOPED_TRACE(fmt::format("{}, {}", trial.group, trial.setting));
     const auto outcome = runner.run(row, trial);
     ASSERT_TRUE(outcome) << outcome.error().to_string();
@@ -193,6 +194,29 @@ TEST(StabilityMeasures, AStepThatARowRefusesIsNotRun) {
     refused += outcome->refusal == "too long" ? 1 : 0;
   }
   EXPECT_EQ(refused, 3) << "1/15 s, 1/10 s and the varying ones";
+}
+
+// A spring that is allowed up to k = 100 and refused from there on, whatever it starts from.
+TEST(StabilityMeasures, ExplicitTrialsStandOnEitherSideOfTheLimit) {
+  SolverRow row = row_of(stay);
+  row.parameters = {{"integrator", 2.0, 0.0, 2.0, "", ""}, {"stretch_stiffness", 3.0, 0.0, 1e9, "", ""}};
+  row.check_step = [](const SolverParameters& parameters, double) -> Status {
+    if (parameters.at("integrator") == 2.0 || parameters.at("stretch_stiffness") < 100.0) return {};
+    return make_error(ErrorCode::BadInput, "k is {:.0f}, the limit 100", parameters.at("stretch_stiffness"));
+  };
+  gl::ShaderLibrary shaders;
+  StabilityRunner runner(shaders);
+  std::vector<std::string> seen;
+  for (const StabilityTrial& trial : make_stability_trials(StabilityGrid::Reduced)) {
+    if (trial.group != "explicit") continue;
+    EXPECT_FALSE(is_for(row_of(stay), trial));
+    ASSERT_TRUE(is_for(row, trial));
+    const auto outcome = runner.run(row, trial);
+    ASSERT_TRUE(outcome);
+    seen.push_back(outcome->refusal.empty() ? outcome->note : outcome->refusal);
+  }
+  EXPECT_THAT(seen, testing::ElementsAre(HasSubstr("3 -> 95"), "k is 105, the limit 100",
+                                         HasSubstr("3 -> 95"), "k is 105, the limit 100"));
 }
 
 TEST(ScaleStiffness, RaisesStiffnessLowersComplianceAndSaysWhereItEnds) {
