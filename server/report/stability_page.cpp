@@ -55,8 +55,8 @@ std::vector<std::string> names(const std::vector<StabilityOutcome>& outcomes,
 }
 
 std::string in_words(const Count& total) {
-  std::string text = fmt::format("{} of {}", total.kept, total.judged);
-  if (total.refused > 0) text += fmt::format(", {} refused", total.refused);
+  std::string text = total.judged > 0 ? fmt::format("{} of {}", total.kept, total.judged) : "";
+  if (total.refused > 0) text += fmt::format("{}{} refused", text.empty() ? "" : ", ", total.refused);
   return text;
 }
 
@@ -83,6 +83,7 @@ HtmlTable overview(const std::vector<StabilityOutcome>& outcomes) {
       count(outcome, all);
     }
     const auto cell = [](const Count& total) {
+      if (total.judged + total.refused == 0) return HtmlCell("");
       const bool is_kept = total.kept == total.judged;
       return HtmlCell(in_words(total), is_kept ? HtmlMark::Good : HtmlMark::Bad);
     };

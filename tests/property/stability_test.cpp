@@ -251,6 +251,7 @@ TEST(StabilityTables, ABrokenPromiseIsRedWithNumberLimitAndReason) {
   EXPECT_THAT(page, HasSubstr("1 of 2, 1 refused"));
   EXPECT_THAT(page, HasSubstr("h must stay below 1"));
   EXPECT_THAT(page, HasSubstr("quick"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("0 of 0")));
   const std::string csv = stability_csv(outcomes);
   EXPECT_THAT(csv, HasSubstr("fake,rest,hanging,style,0.25,0.125,no,it was told to"));
   EXPECT_THAT(csv, HasSubstr("refused"));
