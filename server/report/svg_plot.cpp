@@ -21,8 +21,8 @@ constexpr double kMarkRadius = 3.6;
 constexpr double kTickLabelGap = 7.0;
 
 // Readable on white and on near-black (contrast of at least 3 to 1 with both).
-constexpr std::array kColors = {"#d5402b", "#2a7fb8", "#2f9457", "#b27a00",
-                                "#8f63c9", "#c9558f", "#4c8f96", "#7d7f85"};
+constexpr std::array kColors = {"#d5402b", "#2a7fb8", "#2f9457", "#b27a00", "#8f63c9", "#c9558f",
+                                "#4c8f96", "#7d7f85", "#a8643c", "#6a78d6", "#86882a", "#b458c4"};
 constexpr size_t kShapeCount = 4;
 
 // Room at both ends of an axis, as a share of its length.
@@ -85,6 +85,12 @@ std::vector<double> ticks_of(const Axis& axis) {
   return plot_ticks(axis.scale, shown(axis, axis.minimum), shown(axis, axis.maximum));
 }
 
+/// Attributes of a series' line; dashed once the colours begin again.
+std::string stroke_of(size_t style) {
+  return fmt::format(" stroke=\"{}\"{}", kColors[style % kColors.size()],
+                     style < kColors.size() ? "" : " stroke-dasharray=\"7 4\"");
+}
+
 std::string mark_svg(size_t style, double x, double y, const std::string& note) {
   const char* color = kColors[style % kColors.size()];
   const std::string title = note.empty() ? "" : fmt::format("<title>{}</title>", html_escaped(note));
@@ -119,8 +125,7 @@ std::string series_svg(const PlotSeries& series, size_t style, const Axis& x, co
   }
   std::string svg = series.is_faint ? "<g class=\"faint\">\n" : "<g>\n";
   if (series.mark != PlotMark::Dots && !line.empty())
-    svg +=
-        fmt::format("<path class=\"line\" d=\"{}\" stroke=\"{}\"/>\n", line, kColors[style % kColors.size()]);
+    svg += fmt::format("<path class=\"line\" d=\"{}\"{}/>\n", line, stroke_of(style));
   if (series.mark != PlotMark::Line) svg += marks;
   return svg + "</g>\n";
 }
@@ -179,10 +184,8 @@ std::string legend_svg(const PlotDesc& desc, double x_px) {
     if (!series.has_legend) continue;
     const size_t style = style_of(series, i);
     if (series.mark != PlotMark::Dots) {
-      svg += fmt::format(
-          "<line x1=\"{:.2f}\" x2=\"{:.2f}\" y1=\"{:.2f}\" y2=\"{:.2f}\" stroke=\"{}\" "
-          "stroke-width=\"1.8\"/>\n",
-          x_px, x_px + 20.0, y_px, y_px, kColors[style % kColors.size()]);
+      svg += fmt::format("<line class=\"line\" x1=\"{:.2f}\" x2=\"{:.2f}\" y1=\"{:.2f}\" y2=\"{:.2f}\"{}/>\n",
+                         x_px, x_px + 20.0, y_px, y_px, stroke_of(style));
     }
     if (series.mark != PlotMark::Line) svg += mark_svg(style, x_px + 10.0, y_px, "");
     svg += fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\">{}</text>\n", x_px + 27.0, y_px + 4.0,
