@@ -76,7 +76,7 @@ vec3 correction_of(uint vertex) {
 #if COLLIDERS >= 1
   correction -= g_pushed[vertex];
 #endif
-  return correction;
+  return taken_back(correction, g_point[vertex].xyz - g_point[vertex - 1u].xyz);
 }
 
 void main() {
@@ -86,6 +86,7 @@ void main() {
   const uint tail = u_step.shape.w;
   const uint strand = gl_GlobalInvocationID.x;
   if (strand >= stride) return;
+  set_thickness(strand);
 
   uint at = strand;
   for (uint i = 0u; i < vertices; ++i) {
