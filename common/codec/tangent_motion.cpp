@@ -42,7 +42,7 @@ int32_t wrapping_difference(int32_t a, int32_t b) {
   return static_cast<int32_t>(static_cast<uint32_t>(a) - static_cast<uint32_t>(b));
 }
 
-/// Nearest whole number, ties to even; 0 for NaN, limited to +-kLargest.
+/// Nearest whole number, ties to even, limited to +-kLargest; -kLargest for NaN.
 inline int32_t nearest(float value) {
   const float low = value > -kLargest ? value : -kLargest;
   const float within = low < kLargest ? low : kLargest;

@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 
+#include "server/report/swing_fit.h"
 #include "tests/support/solver_fixture.h"
 
 namespace strandcast {
@@ -20,22 +21,6 @@ Groom straight_strand(uint32_t vertex_count, const glm::dvec3& direction, double
   for (uint32_t i = 0; i < vertex_count; ++i)
     strand.emplace_back(direction * (length_m * i / (vertex_count - 1)));
   return groom_from({strand}, Pinning::Root);
-}
-
-/// The complex factor per step of a sequence that is one decaying mode: q(k+1) = 2 Re z q(k) - |z|^2 q(k-1).
-std::complex<double> fitted_factor(const std::vector<double>& q) {
-  double s11 = 0.0, s12 = 0.0, s22 = 0.0, r1 = 0.0, r2 = 0.0;
-  for (size_t k = 1; k + 1 < q.size(); ++k) {
-    s11 += q[k] * q[k];
-    s12 += q[k] * q[k - 1];
-    s22 += q[k - 1] * q[k - 1];
-    r1 += q[k] * q[k + 1];
-    r2 += q[k - 1] * q[k + 1];
-  }
-  const double determinant = s11 * s22 - s12 * s12;
-  const double a = (r1 * s22 - r2 * s12) / determinant;
-  const double c = -(r2 * s11 - r1 * s12) / determinant;
-  return {0.5 * a, std::sqrt(std::max(0.0, c - 0.25 * a * a))};
 }
 
 class Articulated : public SolverTest {
@@ -67,7 +52,7 @@ class Articulated : public SolverTest {
       chain->substep(input);
       if (step >= kFadingSteps) q.push_back(static_cast<double>(read(*chain).position_m.back().y));
     }
-    return -std::imag(1.0 / fitted_factor(q)) / kModeSubstepS;
+    return -std::imag(1.0 / swing_root(q)) / kModeSubstepS;
   }
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <complex>
 
+#include "server/report/swing_fit.h"
 #include "tests/property/direct_rod_fixture.h"
 
 namespace strandcast {
@@ -141,23 +142,6 @@ TEST_F(RodMechanics, ACantileverLetGoSwingsAsTheBeam) {
              100.0 * (period_s / kPeriodS - 1.0));
 }
 
-/// Coefficients of q(k+1) = a q(k) - c q(k-1) that fit a sequence best: a = 2 Re z, c = |z|^2 for one mode
-/// z^k.
-std::complex<double> fitted_root(const std::vector<double>& q) {
-  double s11 = 0.0, s12 = 0.0, s22 = 0.0, r1 = 0.0, r2 = 0.0;
-  for (size_t k = 1; k + 1 < q.size(); ++k) {
-    s11 += q[k] * q[k];
-    s12 += q[k] * q[k - 1];
-    s22 += q[k - 1] * q[k - 1];
-    r1 += q[k] * q[k + 1];
-    r2 += q[k - 1] * q[k + 1];
-  }
-  const double determinant = s11 * s22 - s12 * s12;
-  const double a = (r1 * s22 - r2 * s12) / determinant;
-  const double c = -(r2 * s11 - r1 * s12) / determinant;
-  return {0.5 * a, std::sqrt(std::max(0.0, c - 0.25 * a * a))};
-}
-
 // Damping is what the integrator predicts for x'' = -omega^2 x. Backward Euler multiplies by 1 / (1 - i omega
 // h). Order 2 has 3/2 z^2 - 2 z + 1/2 = i omega h z^2, that is z = (2 + sqrt(1 + 2 i omega h)) / (3 - 2 i
 // omega h).
@@ -187,7 +171,7 @@ TEST_F(RodMechanics, DampingIsWhatTheIntegratorPredicts) {
       const std::complex<double> turn(0.0, omega_h);
       const std::complex<double> predicted =
           order == 1 ? 1.0 / (1.0 - turn) : (2.0 + std::sqrt(1.0 + 2.0 * turn)) / (3.0 - 2.0 * turn);
-      const std::complex<double> measured = fitted_root(q);
+      const std::complex<double> measured = swing_root(q);
       const auto per_period = [](const std::complex<double>& z) {
         return std::log(std::abs(z)) / std::arg(z);
       };

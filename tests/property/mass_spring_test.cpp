@@ -6,6 +6,7 @@
 #include <glm/gtx/quaternion.hpp>
 #include <numbers>
 
+#include "server/report/swing_fit.h"
 #include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "tests/support/solver_fixture.h"
 
@@ -267,22 +268,6 @@ TEST_F(MassSpring, TheSecondSolveTakesTheStretchAway) {
   EXPECT_NEAR(largest[2] / largest[1], 1.0, 0.2);
 }
 
-/// Root z of q(k+1) = 2 Re z q(k) - |z|^2 q(k-1), fitted to a sequence.
-Complex fitted_root(const std::vector<double>& q) {
-  double s11 = 0.0, s12 = 0.0, s22 = 0.0, r1 = 0.0, r2 = 0.0;
-  for (size_t k = 1; k + 1 < q.size(); ++k) {
-    s11 += q[k] * q[k];
-    s12 += q[k] * q[k - 1];
-    s22 += q[k - 1] * q[k - 1];
-    r1 += q[k] * q[k + 1];
-    r2 += q[k - 1] * q[k + 1];
-  }
-  const double determinant = s11 * s22 - s12 * s12;
-  const double a = (r1 * s22 - r2 * s12) / determinant;
-  const double c = -(r2 * s11 - r1 * s12) / determinant;
-  return {0.5 * a, std::sqrt(std::max(0.0, c - 0.25 * a * a))};
-}
-
 // Two masses, m and at the tip m / 2, on two springs: w^2 = (2 -+ sqrt(2)) k / m with the shapes (1,
 // +-sqrt(2)). Explicit: |z| = 1 and sin(arg(z) / 2) = w h / 2. Backward Euler: z = 1 / (1 - i w h), which is
 // an amplitude of (1 + (w h)^2)^(-pi / (w h)) per period.
@@ -319,7 +304,7 @@ TEST_F(MassSpring, TwoMassesSwingAsEachIntegratorSays) {
           const Complex expected = integrator == kBackwardEuler
                                        ? 1.0 / Complex(1.0, -omega_h)
                                        : std::polar(1.0, 2.0 * std::asin(0.5 * omega_h));
-          const Complex found = fitted_root(q);
+          const Complex found = swing_root(q);
           EXPECT_NEAR(std::arg(found) / std::arg(expected), 1.0, is_gpu ? 2e-3 : 5e-4);
           EXPECT_NEAR(std::abs(found) / std::abs(expected), 1.0, is_gpu ? 3e-4 : 5e-5);
           if (integrator != kBackwardEuler) continue;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "server/sim/banded_system.h"
 #include "server/sim/reference_contact.h"
 #include "server/sim/solvers/direct_rod/direct_rod_rest.h"
 
@@ -25,56 +26,7 @@ glm::dmat3 across(const glm::dvec3& direction) {
 // Unknowns per vertex: its displacement and the spin of the edge that ends there, times the edge's length.
 constexpr size_t kUnknowns = 4;
 
-/// Symmetric positive matrix of blocks up to two off the diagonal, solved by scalar Cholesky.
-class BandedSystem {
- public:
-  explicit BandedSystem(size_t vertex_count)
-      : band_(kUnknowns * vertex_count * kWidth, 0.0), right_side_(kUnknowns * vertex_count, 0.0) {}
-  /// Rows and columns are unknowns; of a pair above the diagonal nothing is added.
-  void add(size_t row, size_t column, double value) {
-    if (column <= row) at(row, column) += value;
-  }
-  void add_block(size_t i, size_t j, const glm::dmat3& block) {
-    for (size_t r = 0; r < 3; ++r) {
-      for (size_t c = 0; c < 3; ++c)
-        add(kUnknowns * i + r, kUnknowns * j + c, block[static_cast<int>(c)][static_cast<int>(r)]);
-    }
-  }
-  void add_right(size_t row, double value) { right_side_[row] += value; }
-  void add_force(size_t i, const glm::dvec3& force) {
-    for (size_t c = 0; c < 3; ++c) add_right(kUnknowns * i + c, force[static_cast<int>(c)]);
-  }
-  /// The solution, or nothing when a pivot is not positive.
-  std::vector<glm::dvec4> solve() {
-    const size_t n = right_side_.size();
-    for (size_t i = 0; i < n; ++i) {
-      const size_t begin = i < kWidth ? 0 : i - kWidth + 1;
-      for (size_t j = begin; j <= i; ++j) {
-        double sum = at(i, j);
-        for (size_t k = std::max(begin, j < kWidth ? 0 : j - kWidth + 1); k < j; ++k)
-          sum -= at(i, k) * at(j, k);
-        if (i == j && !(sum > 0.0)) return {};
-        at(i, j) = i == j ? std::sqrt(sum) : sum / at(j, j);
-      }
-      for (size_t k = begin; k < i; ++k) right_side_[i] -= at(i, k) * right_side_[k];
-      right_side_[i] /= at(i, i);
-    }
-    for (size_t i = n; i-- > 0;) {
-      for (size_t k = i + 1; k < std::min(n, i + kWidth); ++k) right_side_[i] -= at(k, i) * right_side_[k];
-      right_side_[i] /= at(i, i);
-    }
-    std::vector<glm::dvec4> solution(n / kUnknowns);
-    for (size_t i = 0; i < n; ++i) solution[i / kUnknowns][static_cast<int>(i % kUnknowns)] = right_side_[i];
-    return solution;
-  }
-
- private:
-  static constexpr size_t kWidth = 3 * kUnknowns;
-  double& at(size_t row, size_t column) { return band_[row * kWidth + (row - column)]; }
-
-  std::vector<double> band_;  // lower triangle, (kUnknowns vertex_count x kWidth)
-  std::vector<double> right_side_;
-};
+using RodSystem = BandedSystem<kUnknowns, 3>;
 
 /// State of one vertex between steps. Differences, so that the moving origin does not enter them.
 struct RodVertex {
@@ -265,7 +217,7 @@ class RodMotion {
   /// One Newton step for multipliers, positions and spins together; false when the matrix is not positive.
   bool solve() {
     if (tail_ <= first_) return true;
-    BandedSystem system(last_free_edge() - first_ + 1);
+    RodSystem system(last_free_edge() - first_ + 1);
     for (uint32_t i = first_; i < tail_; ++i) add_inertia(system, i);
     for (uint32_t i = first_; i <= last_free_edge(); ++i) {
       add_tension(system, i);
@@ -298,7 +250,7 @@ class RodMotion {
     return std::all_of(x_.begin(), x_.end(), is_sane) && std::all_of(axis_.begin(), axis_.end(), is_sane);
   }
 
-  void add_inertia(BandedSystem& system, uint32_t i) const {
+  void add_inertia(RodSystem& system, uint32_t i) const {
     const double h = step_.h_s;
     const double drag = parameters_.air_drag_per_s;
     const double mass = 0.5 * (soft(i) + (i + 1 < n_ ? soft(i + 1) : 2.0 * parameters_.tip_length_m));
@@ -314,13 +266,13 @@ class RodMotion {
   }
 
   /// Of the section; it counts only where nothing else holds the spin.
-  void add_spin_inertia(BandedSystem& system, uint32_t i) const {
+  void add_spin_inertia(RodSystem& system, uint32_t i) const {
     const double rate = differences_.now / step_.h_s;
     const size_t row = kUnknowns * (i - first_) + 3;
     system.add(row, row, parameters_.spin_inertia_m2 / soft(i) * rate * rate);
   }
 
-  void add_tension(BandedSystem& system, uint32_t i) const {
+  void add_tension(RodSystem& system, uint32_t i) const {
     const glm::dvec3 edge = x_[i] - x_[i - 1];
     const glm::dvec3 t = direction_at(i);
     const double excess = has_free_tip() ? 0.0 : glm::dot(edge, t) - strand_.rest.segment_m[i];
@@ -359,7 +311,7 @@ class RodMotion {
 
   /// The joint at vertex i - 1. Its strain is the difference d of the two sides' tangents, with theta /
   /// sin(theta) for the angle, and the angle between their axes.
-  void add_joint(BandedSystem& system, uint32_t i) const {
+  void add_joint(RodSystem& system, uint32_t i) const {
     const bool is_clamp = i == first_;
     const bool is_tail_clamp = i > tail_;
     const RodRest& rest = strand_.rest;
@@ -392,7 +344,7 @@ class RodMotion {
     return {glm::cross(turn, side.tangent), glm::dot(turn, mean)};
   }
 
-  void add_strain(BandedSystem& system, uint32_t i, const std::array<JointSide, 2>& side,
+  void add_strain(RodSystem& system, uint32_t i, const std::array<JointSide, 2>& side,
                   const glm::dvec4& strain, const glm::dvec4& weight) const {
     const double cosine = glm::dot(side[0].tangent, side[1].tangent);
     const glm::dvec3 mean = (side[0].tangent + side[1].tangent) / std::max(1.0 + cosine, kFoldedBack);

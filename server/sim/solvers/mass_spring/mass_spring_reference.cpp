@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "server/sim/banded_system.h"
 #include "server/sim/reference_contact.h"
 #include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "server/sim/strand_layout.h"
@@ -44,53 +45,8 @@ struct Strain {
   std::array<glm::dmat3, 4> jacobian{};
 };
 
-/// Symmetric positive matrix of 3 x 3 blocks up to three off the diagonal, solved by scalar Cholesky.
-class SpringSystem {
- public:
-  explicit SpringSystem(size_t vertex_count)
-      : band_(3 * vertex_count * kWidth, 0.0), right_side_(3 * vertex_count, 0.0) {}
-  void add_block(size_t i, size_t j, const glm::dmat3& block) {
-    for (size_t r = 0; r < 3; ++r) {
-      for (size_t c = 0; c < 3; ++c) {
-        if (3 * j + c <= 3 * i + r)
-          at(3 * i + r, 3 * j + c) += block[static_cast<int>(c)][static_cast<int>(r)];
-      }
-    }
-  }
-  void add_force(size_t i, const glm::dvec3& force) {
-    for (size_t c = 0; c < 3; ++c) right_side_[3 * i + c] += force[static_cast<int>(c)];
-  }
-  /// The solution, or nothing when a pivot is not positive.
-  std::vector<glm::dvec3> solve() {
-    const size_t n = right_side_.size();
-    for (size_t i = 0; i < n; ++i) {
-      const size_t begin = i < kWidth ? 0 : i - kWidth + 1;
-      for (size_t j = begin; j <= i; ++j) {
-        double sum = at(i, j);
-        for (size_t k = std::max(begin, j < kWidth ? 0 : j - kWidth + 1); k < j; ++k)
-          sum -= at(i, k) * at(j, k);
-        if (i == j && !(sum > 0.0)) return {};
-        at(i, j) = i == j ? std::sqrt(sum) : sum / at(j, j);
-      }
-      for (size_t k = begin; k < i; ++k) right_side_[i] -= at(i, k) * right_side_[k];
-      right_side_[i] /= at(i, i);
-    }
-    for (size_t i = n; i-- > 0;) {
-      for (size_t k = i + 1; k < std::min(n, i + kWidth); ++k) right_side_[i] -= at(k, i) * right_side_[k];
-      right_side_[i] /= at(i, i);
-    }
-    std::vector<glm::dvec3> solution(n / 3);
-    for (size_t i = 0; i < n; ++i) solution[i / 3][static_cast<int>(i % 3)] = right_side_[i];
-    return solution;
-  }
-
- private:
-  static constexpr size_t kWidth = 12;  // scalars of four blocks
-  double& at(size_t row, size_t column) { return band_[row * kWidth + (row - column)]; }
-
-  std::vector<double> band_;  // lower triangle
-  std::vector<double> right_side_;
-};
+/// Altitude springs reach three vertices.
+using SpringSystem = BandedSystem<3, 4>;
 
 /// What one substep of all strands works with.
 struct SpringStep {
