@@ -22,6 +22,7 @@ constexpr double kGravityMps2 = 9.81;
 constexpr double kSettlingDragPerS = 20.0;
 constexpr double kSettlingS = 6.0;
 constexpr glm::dvec3 kDown(0.0, -1.0, 0.0);
+constexpr const char* kBeadName = "tip_mass_kg";
 constexpr glm::dvec3 kSideways(1.0, 0.0, 0.0);
 
 AnalyticResult failed(const Error& error) {
@@ -93,6 +94,29 @@ AnalyticResult run_cantilever(const Workbench& workbench, const RunSetting& sett
   result.exact = shape->height_over_width();
   result.error = glm::distance(tip, glm::dvec3(shape->x, -shape->y, 0.0));
   result.droop = -tip.y;
+  result.stretch = strand->stretch();
+  return result;
+}
+
+// T2: a horizontal hair with a bead at its tip, so heavy that its own weight does not count.
+AnalyticResult run_end_load(const Workbench& workbench, const RunSetting& setting, double alpha) {
+  constexpr double kBeadPerHair = 1000.0;
+  const auto tips = end_load_tips();
+  const auto exact = std::find_if(tips.begin(), tips.end(),
+                                  [&](const EndLoadTip& candidate) { return candidate.alpha == alpha; });
+  RunPhysics physics;
+  physics.length_m = kLengthM;
+  physics.hair = hair_with(kBeadPerHair * kGravityMps2 * std::pow(kLengthM, 3) / alpha);
+  const double bead_kg = kBeadPerHair * physics.hair.linear_density_kgpm() * kLengthM;
+  physics.given = {{"air_drag_per_s", kSettlingDragPerS}, {kBeadName, bead_kg}};
+  auto strand = make_straight(workbench, setting, physics, kSideways);
+  if (!strand) return failed(strand.error());
+  settle(*strand, kGravityMps2 * kDown, 2.0 * kSettlingS);
+  const glm::dvec3 tip = strand->vertex(strand->vertex_count() - 1) / kLengthM;
+  AnalyticResult result;
+  result.value = -tip.y;
+  result.exact = exact->y;
+  result.error = glm::distance(tip, glm::dvec3(exact->x, -exact->y, 0.0));
   result.stretch = strand->stretch();
   return result;
 }
@@ -342,6 +366,11 @@ AnalyticResult run_buckling(const Workbench& workbench, const RunSetting& settin
   return result;
 }
 
+template <int kAlpha>
+AnalyticResult run_end_load_of(const Workbench& workbench, const RunSetting& setting) {
+  return run_end_load(workbench, setting, kAlpha);
+}
+
 template <int kGamma>
 AnalyticResult run_cantilever_of(const Workbench& workbench, const RunSetting& setting) {
   return run_cantilever(workbench, setting, kGamma);
@@ -352,11 +381,15 @@ AnalyticResult run_cantilever_of(const Workbench& workbench, const RunSetting& s
 const std::vector<AnalyticTest>& analytic_tests() {
   constexpr const char* kCantilever =
       "tip of a horizontal hair at rest under its weight; error: distance of the tip over the length";
+  constexpr const char* kEndLoad =
+      "tip of a horizontal hair at rest under a heavy bead; error: distance of the tip over the length";
   static const std::vector<AnalyticTest> tests = {
       {"T1 Gamma 1", kCantilever, Material::Hair, 0.0, 0, false, kSettlingS, run_cantilever_of<1>},
       {"T1 Gamma 10", kCantilever, Material::Hair, 0.0, 0, true, kSettlingS, run_cantilever_of<10>},
       {"T1 Gamma 100", kCantilever, Material::Hair, 0.0, 0, false, kSettlingS, run_cantilever_of<100>},
       {"T1 Gamma 1000", kCantilever, Material::Hair, 0.0, 0, false, kSettlingS, run_cantilever_of<1000>},
+      {"T2 alpha 2", kEndLoad, Material::Hair, 0.0, 0, true, 2.0 * kSettlingS, run_end_load_of<2>},
+      {"T2 alpha 10", kEndLoad, Material::Hair, 0.0, 0, false, 2.0 * kSettlingS, run_end_load_of<10>},
       {"T3", "straight hair rolled up by its natural curvature; error: tip to root over the length",
        Material::Hair, 0.0, 0, false, kSettlingS, run_roll_up},
       {"T4, T7", "small swings of a hanging chain; error: period; damping against the integrator's",
@@ -379,6 +412,7 @@ const std::vector<AnalyticTest>& analytic_tests() {
 
 bool has_physics(const SolverRow& row, const AnalyticTest& test) {
   if (test.run == run_curl && !has_twist(row)) return false;
+  if (test.name.starts_with("T2 ") && !has_parameter(row, kBeadName)) return false;
   return test.material == Material::Hair ? row.as_hair != nullptr : can_be_limp(row);
 }
 

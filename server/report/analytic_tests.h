@@ -1,8 +1,8 @@
 // The tests of work-precision with an exact answer: a strand model at one setting against theory. Numbers T1
 // to T18 name the tests in tables. Each runs on the GPU where the row does, else as its reference.
 //
-// Not here: a load at the tip and twisted rings (T2, T11: a step has no such input), and the largest stable
-// stiffness (T8: strandcast-report stability).
+// Not here: twisted rings (T11: a step has no such input), and the largest stable stiffness (T8:
+// strandcast-report stability).
 #pragma once
 
 #include <limits>

@@ -17,6 +17,14 @@ double bessel_root(int mode) {
 
 }  // namespace
 
+std::span<const EndLoadTip> end_load_tips() {
+  static constexpr std::array kTips = {
+      EndLoadTip{0.5, 0.984081, 0.162144}, EndLoadTip{1.0, 0.943567, 0.301721},
+      EndLoadTip{2.0, 0.839358, 0.493457}, EndLoadTip{3.0, 0.745580, 0.603253},
+      EndLoadTip{5.0, 0.612372, 0.713792}, EndLoadTip{10.0, 0.445004, 0.810609}};
+  return kTips;
+}
+
 std::span<const CantileverShape> cantilever_shapes() {
   static constexpr std::array kShapes = {
       CantileverShape{0.01, 0.999999, 0.001250},  CantileverShape{0.1, 0.999911, 0.012498},

@@ -21,6 +21,16 @@ struct CantileverShape {
 /// Ascending in gamma, 0.01 to 1000.
 std::span<const CantileverShape> cantilever_shapes();
 
+/// Tip of a horizontal clamped rod without weight under a load P at its end: EI theta'' = -P cos(theta),
+/// theta(0) = 0, theta'(L) = 0, alpha = P L^2 / EI; y downwards, over the length.
+struct EndLoadTip {
+  double alpha = 0.0;
+  double x = 0.0;
+  double y = 0.0;
+};
+/// Ascending in alpha, 0.5 to 10.
+std::span<const EndLoadTip> end_load_tips();
+
 /// Radian per second of a hanging chain's mode 1, 2 or 3: (j / 2) sqrt(g / L), j a root of the Bessel
 /// function J0 (Daniel Bernoulli).
 double chain_frequency_radps(double length_m, double gravity_mps2, int mode);

@@ -61,12 +61,12 @@ bool hangs_straight(const SolverRow& row) {
   return glm::distance(tip, glm::dvec3(0.0, -physics.length_m, 0.0)) < kNearly * physics.length_m;
 }
 
+}  // namespace
+
 bool has_parameter(const SolverRow& row, const std::string& name) {
   return std::any_of(row.parameters.begin(), row.parameters.end(),
                      [&](const SolverParameterInfo& info) { return info.name == name; });
 }
-
-}  // namespace
 
 const char* to_string(Material material) {
   switch (material) {

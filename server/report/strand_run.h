@@ -64,6 +64,8 @@ struct Workbench {
   }
 };
 
+bool has_parameter(const SolverRow& row, const std::string& name);
+
 class StrandRun {
  public:
   static Result<StrandRun> make(const Workbench& workbench, const RunSetting& setting,

@@ -283,8 +283,9 @@ void add_method(HtmlPage& page, const WorkReport& report) {
   page.paragraph(
       "Models without constants of hair are measured as limp chains and as they ship, and skip the tests "
       "that "
-      "need stiffness. Not measured: a load at the tip and twisted rings (T2, T11), since a step has no such "
-      "input; the largest stable stiffness (T8) is in strandcast-report stability.");
+      "need stiffness. A load at the tip (T2) is a bead, where the model has one. Not "
+      "measured: twisted rings (T11), since a step has no such input; the largest stable stiffness (T8) is "
+      "in strandcast-report stability.");
   page.paragraph(fmt::format("Every run, with all its numbers, is in {}.", kWorkPrecisionCsv));
 }
 

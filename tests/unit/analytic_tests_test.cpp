@@ -35,6 +35,13 @@ TEST(AnalyticTests, HeavyHairAndRolledHairComeToRestWhereTheyShould) {
   EXPECT_LE(run_in_double("T3", "direct_rod", 16).error, 0.001);
 }
 
+TEST(AnalyticTests, ABeadBendsHairAsAnEndLoad) {
+  EXPECT_TRUE(has_physics(**find_solver("direct_rod"), test_named("T2 alpha 2")));
+  EXPECT_FALSE(has_physics(**find_solver("articulated"), test_named("T2 alpha 2"))) << "no bead";
+  for (const char* name : {"T2 alpha 2", "T2 alpha 10"})
+    EXPECT_LE(run_in_double(name, "direct_rod", 32).error, 0.0025) << name;
+}
+
 // The formula is that of a spring with its weight on the axis: within a few percent.
 TEST(AnalyticTests, ACurlWithTwistIsASpring) {
   const AnalyticResult curl = run_in_double("T12", "articulated", kCurlVertices);
