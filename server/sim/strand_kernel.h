@@ -68,8 +68,8 @@ class StrandKernel final : public Solver {
   gl::Buffer rest_;      // (vertex_count x strand_count) vec4: head space, m; segment before it, m
   gl::Buffer position_;  // (vertex_count x strand_count) vec4: head-relative world, m; arc 0..1
   gl::Buffer velocity_;  // (vertex_count x strand_count) vec4: world, m/s; of the model, 0 at first
-  gl::Buffer offset_;    // (vertex_count x strand_count) vec4: second strand less the state, m; has_offset only
-  gl::Buffer step_;      // StepBlock
+  gl::Buffer offset_;  // (vertex_count x strand_count) vec4: second strand less the state, m; has_offset only
+  gl::Buffer step_;    // StepBlock
   gl::Handle<gl::delete_texture> rest_view_;
   gl::Handle<gl::delete_texture> position_view_;
   gl::Handle<gl::delete_texture> velocity_view_;

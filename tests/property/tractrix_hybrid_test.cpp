@@ -72,8 +72,8 @@ double plain_iterations(const std::map<int, HybridError>& plain, double rms_m) {
 
 // The answer. Lengths: yes; one iteration and a finish have none of the stretch that plain iterations still
 // have after 32. Where the strand is: only beside a single iteration, where a finish is worth about half of
-// another; from two on it costs accuracy, because it moves vertices without asking what they weigh. As a first
-// guess sweeps are wrong: the constraints are met before the masses have been asked.
+// another; from two on it costs accuracy, because it moves vertices without asking what they weigh. As a
+// first guess sweeps are wrong: the constraints are met before the masses have been asked.
 TEST_F(TractrixHybrid, SweepsSaveIterationsForTheLengthsNotForThePositions) {
   const std::vector<SolverState> exact = run(kConverged, 0.0, 0.0);
   std::map<int, HybridError> plain;

@@ -27,8 +27,8 @@
 //     for any number of vertices. At 1/60 s, 15 segments of 0.25 m in all and b of real hair a lone error
 //     falls by 0.65 per iteration; TressFX has 0.9. Two iterations (TressFX's number) leave long strands
 //     softer than b; from four on stiffness is that of b at any rate. The missing reaction is why strands of
-//     several hairs' stiffness, or folded back under pressure with four iterations, may flutter: direct_rod is
-//     the row for those. The first segment's angle is that to the head.
+//     several hairs' stiffness, or folded back under pressure with four iterations, may flutter: direct_rod
+//     is the row for those. The first segment's angle is that to the head.
 //   length (004 "Edge constraints")  Both ends by w_1 / (w_1 + w_2) of the error, segments after even
 //   vertices,
 //     then after odd ones.
