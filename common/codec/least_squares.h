@@ -9,8 +9,41 @@
 
 namespace strandcast {
 
-/// Collects samples (features, wanted value) and solves the normal equations by Cholesky with a little ridge;
-/// features that hardly move get weights near 0. Sums of a batch are floats, those of all batches doubles.
+/// Sums of products of kCount features and, last, of the wanted value; the upper half counts.
+template <uint32_t kCount>
+using Gram = std::array<std::array<double, kCount + 1>, kCount + 1>;
+
+/// The weights that fit best, in units of `unit`: normal equations by Cholesky with a little ridge and
+/// `floor` on the diagonal.
+template <uint32_t kCount>
+std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor, double unit) {
+  constexpr double kRidge = 1e-4;
+  std::array<std::array<double, kCount>, kCount> factor{};
+  std::array<double, kCount> solution{};
+  for (uint32_t i = 0; i < kCount; ++i) {
+    for (uint32_t j = 0; j <= i; ++j) {
+      double sum = gram[j][i];
+      if (i == j) sum += kRidge * gram[i][i] + floor;
+      for (uint32_t k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
+      factor[i][j] = i == j ? std::sqrt(std::max(sum, floor)) : sum / factor[j][j];
+    }
+    double sum = gram[i][kCount];
+    for (uint32_t k = 0; k < i; ++k) sum -= factor[i][k] * solution[k];
+    solution[i] = sum / factor[i][i];
+  }
+  std::array<int16_t, kCount> weights;
+  for (uint32_t i = kCount; i-- > 0;) {
+    double sum = solution[i];
+    for (uint32_t k = i + 1; k < kCount; ++k) sum -= factor[k][i] * solution[k];
+    solution[i] = sum / factor[i][i];
+    const double scaled = std::isfinite(solution[i]) ? solution[i] / unit : 0.0;
+    weights[i] = static_cast<int16_t>(std::lrint(std::clamp(scaled, -32767.0, 32767.0)));
+  }
+  return weights;
+}
+
+/// Collects samples (features, wanted value); features that hardly move get weights near 0. Sums of a batch
+/// are floats, those of all batches doubles.
 template <uint32_t kCount>
 class LeastSquares {
  public:
@@ -31,38 +64,16 @@ class LeastSquares {
         std::array<float, 8> sum{};
         for (uint32_t i = 0; i < kLanes; i += 8)
           for (uint32_t lane = 0; lane < 8; ++lane) sum[lane] += lanes_[a][i + lane] * lanes_[b][i + lane];
-        for (const float part : sum) gram_[a][b] += static_cast<double>(part);
+        for (const float part : sum) gram_[b][a] += static_cast<double>(part);
       }
     }
   }
 
   /// In units of `unit`. Features are taken to be off by `noise`: what moves less predicts nothing.
   std::array<int16_t, kCount> weights(double unit, double noise) const {
-    constexpr double kRidge = 1e-4;
     constexpr double kLeast = 1e-9;
     const double floor = std::max(noise * noise * static_cast<double>(count_), kLeast);
-    std::array<std::array<double, kCount>, kCount> factor{};
-    std::array<double, kCount> solution{};
-    for (uint32_t i = 0; i < kCount; ++i) {
-      for (uint32_t j = 0; j <= i; ++j) {
-        double sum = gram_[i][j];
-        if (i == j) sum += kRidge * gram_[i][i] + floor;
-        for (uint32_t k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
-        factor[i][j] = i == j ? std::sqrt(std::max(sum, kLeast)) : sum / factor[j][j];
-      }
-      double sum = gram_[kCount][i];
-      for (uint32_t k = 0; k < i; ++k) sum -= factor[i][k] * solution[k];
-      solution[i] = sum / factor[i][i];
-    }
-    std::array<int16_t, kCount> result;
-    for (uint32_t i = kCount; i-- > 0;) {
-      double sum = solution[i];
-      for (uint32_t k = i + 1; k < kCount; ++k) sum -= factor[k][i] * solution[k];
-      solution[i] = sum / factor[i][i];
-      const double scaled = std::isfinite(solution[i]) ? solution[i] / unit : 0.0;
-      result[i] = static_cast<int16_t>(std::lrint(std::clamp(scaled, -32767.0, 32767.0)));
-    }
-    return result;
+    return solve_weights<kCount>(gram_, floor, unit);
   }
 
  private:
@@ -70,7 +81,7 @@ class LeastSquares {
   std::array<std::array<float, kLanes>, kCount + 1> lanes_{};
   uint32_t filled_ = 0;
   uint64_t count_ = 0;
-  std::array<std::array<double, kCount + 1>, kCount + 1> gram_{};  // lower half
+  Gram<kCount> gram_{};
 };
 
 }  // namespace strandcast

@@ -5,6 +5,8 @@
 #include <numeric>
 
 #include "common/base/check.h"
+#include "common/codec/least_squares.h"
+#include "common/codec/morton.h"
 #include "common/codec/strand_rows.h"
 #include "common/codec/wide.h"
 
@@ -78,14 +80,6 @@ void for_each_row(const StrandChain& chain, const PredictorWeights& weights, con
 
 // ---- neighbours ----
 
-uint32_t spread_bits(uint32_t x) {  // 10 bits, two zeros between each
-  x &= 0x3ff;
-  x = (x | (x << 16)) & 0x030000ff;
-  x = (x | (x << 8)) & 0x0300f00f;
-  x = (x | (x << 4)) & 0x030c30c3;
-  return (x | (x << 2)) & 0x09249249;
-}
-
 double root_distance(const StrandChain& chain, uint32_t a, uint32_t b) {
   double sum = 0.0;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -124,12 +118,38 @@ void find_neighbours(StrandChain& chain, const std::vector<uint32_t>& order) {
   }
 }
 
+/// The strands in the order of a Morton curve through their roots.
+std::vector<uint32_t> root_curve_order(const StrandChain& chain) {
+  const size_t plane = chain.plane_size();
+  std::array<int64_t, 3> low;
+  int64_t extent = 1;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto [min, max] = std::minmax_element(
+        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane),
+        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane) + chain.strand_count);
+    low[axis] = *min;
+    extent = std::max(extent, int64_t{*max} - *min + 1);
+  }
+  std::vector<uint32_t> code(chain.strand_count);
+  for (size_t s = 0; s < code.size(); ++s) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto cell = static_cast<uint32_t>((chain.lattice[axis * plane + s] - low[axis]) * 1024 / extent);
+      code[s] |= morton_bits(cell) << axis;
+    }
+  }
+  std::vector<uint32_t> order(chain.strand_count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
+  return order;
+}
+
 // ---- least squares ----
 
 constexpr uint32_t kTerms = kFeatureCount + 1;  // the velocity itself last
 constexpr uint32_t kSampleStrands = 192;
 constexpr uint32_t kLanes = 8;
-using Gram = std::array<std::array<double, kTerms>, kTerms>;
+using VelocityGram = Gram<kFeatureCount>;
+constexpr double kGramFloor = 1e-3;
 
 /// Feature values of the sampled strands of one row, term by term, padded with zeros to whole lanes.
 struct Sample {
@@ -158,7 +178,7 @@ struct Sample {
       at[k * stride] = static_cast<float>(features.now[s]);
     }
   }
-  void add_to(Gram& gram) const {
+  void add_to(VelocityGram& gram) const {
     for (uint32_t a = 0; a < kTerms; ++a) {
       for (uint32_t b = a; b < kTerms; ++b) {
         const float* x = value.data() + a * stride;
@@ -184,72 +204,14 @@ struct Sample {
   }
 };
 
-/// Solves the normal equations by Cholesky with a little ridge; features that never move get weight 0.
-RowWeights solve(const Gram& gram) {
-  constexpr double kRidge = 1e-4;
-  constexpr double kFloor = 1e-3;
-  std::array<std::array<double, kFeatureCount>, kFeatureCount> factor{};
-  std::array<double, kFeatureCount> solution{};
-  for (uint32_t i = 0; i < kFeatureCount; ++i) {
-    for (uint32_t j = 0; j <= i; ++j) {
-      double sum = gram[j][i];
-      if (i == j) sum += kRidge * gram[i][i] + kFloor;
-      for (uint32_t k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
-      factor[i][j] = i == j ? std::sqrt(std::max(sum, kFloor)) : sum / factor[j][j];
-    }
-    double sum = gram[i][kFeatureCount];
-    for (uint32_t k = 0; k < i; ++k) sum -= factor[i][k] * solution[k];
-    solution[i] = sum / factor[i][i];
-  }
-  RowWeights weights;
-  for (uint32_t i = kFeatureCount; i-- > 0;) {
-    double sum = solution[i];
-    for (uint32_t k = i + 1; k < kFeatureCount; ++k) sum -= factor[k][i] * solution[k];
-    solution[i] = sum / factor[i][i];
-    const double scaled = std::isfinite(solution[i]) ? solution[i] * (1 << kWeightShift) : 0.0;
-    weights[i] = static_cast<int16_t>(std::lrint(std::clamp(scaled, -32767.0, 32767.0)));
-  }
-  return weights;
-}
-
 }  // namespace
-
-std::vector<uint32_t> root_curve_order(const StrandChain& chain) {
-  const size_t plane = chain.plane_size();
-  std::array<int64_t, 3> low;
-  int64_t extent = 1;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const auto [min, max] = std::minmax_element(
-        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane),
-        chain.lattice.begin() + static_cast<std::ptrdiff_t>(axis * plane) + chain.strand_count);
-    low[axis] = *min;
-    extent = std::max(extent, int64_t{*max} - *min + 1);
-  }
-  std::vector<uint32_t> code(chain.strand_count);
-  for (size_t s = 0; s < code.size(); ++s) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const auto cell = static_cast<uint32_t>((chain.lattice[axis * plane + s] - low[axis]) * 1024 / extent);
-      code[s] |= spread_bits(cell) << axis;
-    }
-  }
-  std::vector<uint32_t> order(chain.strand_count);
-  std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
-  return order;
-}
 
 void find_neighbours(StrandChain& chain) {
   find_neighbours(chain, root_curve_order(chain));
 }
 
-void find_neighbours(StrandChain& chain, size_t begin, size_t end) {
-  std::vector<uint32_t> order(end - begin);
-  std::iota(order.begin(), order.end(), static_cast<uint32_t>(begin));
-  find_neighbours(chain, order);
-}
-
 PredictorWeights fit_weights(const StrandChain& chain, const std::vector<int32_t>& velocity) {
-  std::array<Gram, kRowClassCount> gram{};
+  std::array<VelocityGram, kRowClassCount> gram{};
   Sample sample(chain.strand_count);
   const PredictorWeights still{};
   for_each_row(
@@ -262,7 +224,7 @@ PredictorWeights fit_weights(const StrandChain& chain, const std::vector<int32_t
   PredictorWeights fitted;
   PredictorWeights steady{};
   for (uint32_t c = 0; c < kRowClassCount; ++c) {
-    fitted[c] = solve(gram[c]);
+    fitted[c] = solve_weights<kFeatureCount>(gram[c], kGramFloor, 1.0 / (1 << kWeightShift));
     steady[c][kOwnThen] = 1 << kWeightShift;
   }
   std::array<std::array<double, kRowClassCount>, 3> bits{};

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/codec/wrapping.h"
+
 namespace strandcast {
 
 inline constexpr uint32_t kFeatureCount = 15;
@@ -37,13 +39,6 @@ struct StrandChain {
 /// Finds for each strand the two nearest roots among strands of smaller index (approximately: among those
 /// near it on a Morton curve).
 void find_neighbours(StrandChain& chain);
-/// The same within strands [begin, end) of a chain that lies in curve order: neighbours are among them. Sets
-/// these strands' entries only.
-void find_neighbours(StrandChain& chain, size_t begin, size_t end);
-
-/// The strands in the order of a Morton curve through their roots.
-std::vector<uint32_t> root_curve_order(const StrandChain& chain);
-
 /// Weights for the step from `chain` to `velocity` by least squares over a sample of strands; falls back to
 /// plain extrapolation or to no motion where one of these does better.
 PredictorWeights fit_weights(const StrandChain& chain, const std::vector<int32_t>& velocity);
@@ -55,13 +50,5 @@ std::vector<int32_t> find_residual(const StrandChain& chain, const PredictorWeig
 /// velocity = prediction + residual: the inverse of find_residual.
 std::vector<int32_t> find_velocity(const StrandChain& chain, const PredictorWeights& weights,
                                    const std::vector<int32_t>& residual);
-
-/// Differences that wrap around instead of overflowing.
-inline int32_t wrapping_sum(int32_t a, int32_t b) {
-  return static_cast<int32_t>(static_cast<uint32_t>(a) + static_cast<uint32_t>(b));
-}
-inline int32_t wrapping_difference(int32_t a, int32_t b) {
-  return static_cast<int32_t>(static_cast<uint32_t>(a) - static_cast<uint32_t>(b));
-}
 
 }  // namespace strandcast

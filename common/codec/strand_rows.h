@@ -43,13 +43,12 @@ void sum_rows(const RowFeatures& features, const RowWeights& weights, size_t beg
 struct NeighbourTerms {
   std::array<uint32_t, kFeatureCount - kRowFeatureCount> w;
 
-  NeighbourTerms() = default;
   explicit NeighbourTerms(const RowWeights& weights) {
     for (uint32_t k = 0; k < w.size(); ++k)
       w[k] = static_cast<uint32_t>(int32_t{weights[kRowFeatureCount + k]});
   }
-  /// `sum` with the neighbours of strand s added: the predicted velocity in 1 / 2^kWeightShift.
-  uint32_t add(const StrandChain& chain, const RowFeatures& features, uint32_t sum, size_t s) const {
+  /// `sum` with the neighbours of strand s added: the predicted velocity.
+  int32_t predict(const StrandChain& chain, const RowFeatures& features, uint32_t sum, size_t s) const {
     const uint32_t n = chain.neighbour[s];
     const uint32_t m = chain.second_neighbour[s];
     if (n != s) {
@@ -60,10 +59,7 @@ struct NeighbourTerms {
       sum += w[3] * static_cast<uint32_t>(features.now[m]) + w[4] * static_cast<uint32_t>(features.then[m]) +
              w[5] * static_cast<uint32_t>(features.residual_then[m]);
     }
-    return sum;
-  }
-  int32_t predict(const StrandChain& chain, const RowFeatures& features, uint32_t sum, size_t s) const {
-    return static_cast<int32_t>(add(chain, features, sum, s)) >> kWeightShift;
+    return static_cast<int32_t>(sum) >> kWeightShift;
   }
 };
 

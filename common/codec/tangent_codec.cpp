@@ -93,6 +93,18 @@ void set_lattice(const TangentLayout& layout, const Planes<int32_t>& planes, Sna
   }
 }
 
+Snapshot without_lattice(const Snapshot& snapshot) {
+  Snapshot copy;
+  copy.tick = snapshot.tick;
+  copy.sim_time_ns = snapshot.sim_time_ns;
+  copy.motion_time_ns = snapshot.motion_time_ns;
+  copy.world_from_head = snapshot.world_from_head;
+  copy.strand_count = snapshot.strand_count;
+  copy.vertex_count = snapshot.vertex_count;
+  copy.quantum_m = snapshot.quantum_m;
+  return copy;
+}
+
 /// The rounded history as whole numbers: positions and velocities.
 Planes<int32_t> coarse_positions(const TangentHistory& history) {
   Planes<int32_t> coarse = history.lattice;
@@ -198,7 +210,7 @@ class TangentEncoder final : public StrandEncoder {
     ByteWriter(body).put_bytes(std::as_bytes(std::span(&head, 1)));
     for (ValueWriter& slice : writers) slice.finish(body);
 
-    Snapshot decoded = snapshot;
+    Snapshot decoded = without_lattice(snapshot);
     set_lattice(layout_, frame_.lattice, decoded);
     remember(chain_.history, frame_);
     std::swap(chain_.sizes, next_sizes_);

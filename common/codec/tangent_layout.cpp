@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "common/base/check.h"
+#include "common/codec/morton.h"
 
 namespace strandcast {
 namespace {
@@ -13,14 +14,6 @@ constexpr uint32_t kThinnings = 8;          // the coarsest level has one strand
 constexpr uint32_t kStrandsPerSlice = 128;  // fewer than kThinnings times that: a single slice
 constexpr uint32_t kWindow = 64;            // places before a block that are searched for neighbours
 constexpr double kCells = 1024.0;           // of the curve, along each axis
-
-uint32_t spread_bits(uint32_t x) {  // 10 bits, two zeros between each
-  x &= 0x3ff;
-  x = (x | (x << 16)) & 0x030000ff;
-  x = (x | (x << 8)) & 0x0300f00f;
-  x = (x | (x << 4)) & 0x030c30c3;
-  return (x | (x << 2)) & 0x09249249;
-}
 
 /// Strands in the order of a Morton curve through their roots.
 std::vector<uint32_t> curve_order(uint32_t strand_count, std::span<const glm::vec3> rest_in_head_m) {
@@ -38,7 +31,7 @@ std::vector<uint32_t> curve_order(uint32_t strand_count, std::span<const glm::ve
   std::vector<uint32_t> code(strand_count);
   for (uint32_t s = 0; s < strand_count; ++s) {
     const glm::dvec3 cell = (glm::dvec3(roots[s]) - low) * ((kCells - 1.0) / extent);
-    for (int axis = 0; axis < 3; ++axis) code[s] |= spread_bits(static_cast<uint32_t>(cell[axis])) << axis;
+    for (int axis = 0; axis < 3; ++axis) code[s] |= morton_bits(static_cast<uint32_t>(cell[axis])) << axis;
   }
   std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
   return order;

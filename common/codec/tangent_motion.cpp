@@ -6,6 +6,7 @@
 
 #include "common/codec/least_squares.h"
 #include "common/codec/wide.h"
+#include "common/codec/wrapping.h"
 
 namespace strandcast {
 namespace {
@@ -34,13 +35,6 @@ constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23: floats there are whole n
 
 using Lanes = std::array<float, kBlockSize>;
 using IntLanes = std::array<int32_t, kBlockSize>;
-
-int32_t wrapping_sum(int32_t a, int32_t b) {
-  return static_cast<int32_t>(static_cast<uint32_t>(a) + static_cast<uint32_t>(b));
-}
-int32_t wrapping_difference(int32_t a, int32_t b) {
-  return static_cast<int32_t>(static_cast<uint32_t>(a) - static_cast<uint32_t>(b));
-}
 
 /// Nearest whole number, ties to even, limited to +-kLargest; -kLargest for NaN.
 inline int32_t nearest(float value) {

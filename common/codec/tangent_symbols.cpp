@@ -5,6 +5,7 @@
 
 #include "common/base/check.h"
 #include "common/codec/least_squares.h"
+#include "common/codec/wrapping.h"
 
 namespace strandcast {
 namespace {
@@ -174,8 +175,7 @@ struct ShapeRows {
   /// What is predicted at `at`: an edge or a value.
   int32_t wanted(const std::vector<int32_t>& plane, size_t at, uint32_t v) const {
     if (shape == Shape::Values || v == 0) return plane[at];
-    return static_cast<int32_t>(static_cast<uint32_t>(plane[at]) -
-                                static_cast<uint32_t>(plane[at - layout.stride]));
+    return wrapping_difference(plane[at], plane[at - layout.stride]);
   }
   float number(const std::vector<int32_t>& plane, size_t place, uint32_t v) const {
     return static_cast<float>(wanted(plane, v * static_cast<size_t>(layout.stride) + place, v));
@@ -313,8 +313,7 @@ void write_shape(const TangentLayout& layout, Shape shape, const ShapeWeights& w
   const ShapeRows rows{layout, shape, unit_m};
   code_shape(rows, weights, slice, value,
              [&](size_t axis, size_t at, uint32_t v, int32_t guess, SymbolTable& table, uint32_t shift) {
-               const auto error = static_cast<int32_t>(
-                   static_cast<uint32_t>(rows.wanted(value[axis], at, v)) - static_cast<uint32_t>(guess));
+               const int32_t error = wrapping_difference(rows.wanted(value[axis], at, v), guess);
                writer.put(fold_sign(error), table, shift);
                return error;
              });
@@ -326,10 +325,9 @@ void read_shape(const TangentLayout& layout, Shape shape, const ShapeWeights& we
   code_shape(rows, weights, slice, value,
              [&](size_t axis, size_t at, uint32_t v, int32_t guess, SymbolTable& table, uint32_t shift) {
                const int32_t error = unfold_sign(reader.take(table, shift));
-               uint32_t sum = static_cast<uint32_t>(guess) + static_cast<uint32_t>(error);
-               if (shape == Shape::Edges && v > 0)
-                 sum += static_cast<uint32_t>(value[axis][at - layout.stride]);
-               value[axis][at] = static_cast<int32_t>(sum);
+               int32_t sum = wrapping_sum(guess, error);
+               if (shape == Shape::Edges && v > 0) sum = wrapping_sum(sum, value[axis][at - layout.stride]);
+               value[axis][at] = sum;
                return error;
              });
 }

@@ -27,7 +27,7 @@ using Bytes = std::vector<std::byte>;
 using Entry = int (*)(const uint8_t*, size_t);
 
 void feed(Entry entry, const Bytes& bytes) {
-  entry(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size());
+  EXPECT_EQ(entry(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()), 0);
 }
 
 /// Calls visit with copies of `good`: some bytes changed, a part repeated, a part missing.
