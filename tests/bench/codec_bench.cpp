@@ -1,84 +1,27 @@
 // Prints bits per vertex and milliseconds of the strand codecs, and of raw lattices under zstd in the same
-// run, for test motions and for the built-in scene under its reference solver. Usage: codec_bench [frames
-// [part of a scene's name]]
+// run, for test motions, the built-in scene, and our models on motion capture where its files are.
+// usage: codec_bench [--mocap DIR] [frames [part of a scene's name]]
 #include <fmt/format.h>
 #include <zstd.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <string_view>
 
-#include "common/base/check.h"
 #include "common/base/profile.h"
-#include "common/codec/scene_asset.h"
 #include "common/codec/strand_codec.h"
-#include "common/motion/motion_clip.h"
-#include "common/scene/features.h"
-#include "server/publish/publisher.h"
-#include "server/scene/scene_content.h"
-#include "server/scene/step_builder.h"
-#include "server/sim/solver_registry.h"
-#include "tests/support/hair_motion.h"
+#include "tests/bench/codec_motions.h"
 
 namespace strandcast {
 namespace {
 
 constexpr float kBoundM = 1e-4f;
 constexpr int kWarmUpFrames = 60;
+constexpr int kStartFrames = 9;  // the first differences are not yet typical
 constexpr double kRateHz = 60.0;
-
-/// A motion that starts anew with every source, published on a lattice of the given step.
-struct Source {
-  std::vector<glm::vec3> rest_in_head_m;
-  std::function<Snapshot()> next;
-};
-
-Source test_motion(const HairMotionDesc& desc, float quantum_m) {
-  auto hair = std::make_shared<HairMotion>(desc);
-  return {hair->rest_in_head(), [hair, quantum_m] {
-            hair->step();
-            return hair->snapshot(quantum_m);
-          }};
-}
-
-/// The built-in scene as the server runs it, on the CPU: head motion, gusts, DFTL, publishing.
-class BuiltInScene {
- public:
-  explicit BuiltInScene(float quantum_m)
-      : scene_(built_in_scene()),
-        content_(std::move(load_scene_content(scene_)).value()),
-        builder_(scene_, content_.colliders),
-        publisher_(content_.groom, quantum_m) {
-    const auto row = find_solver(scene_.solver.name);
-    CHECK(row.ok());
-    solver_ = (*row)->make_reference(complete_parameters(**row, scene_.solver.parameters).value());
-    CHECK(solver_->load(content_.groom, built_in_motion(0.0).rotation).ok());
-  }
-  std::vector<glm::vec3> rest_in_head() const { return make_scene_asset(content_.groom, {}).rest_position_m; }
-  Snapshot next() {
-    ++tick_;
-    const double time_s = static_cast<double>(tick_) / scene_.step_rate_hz;
-    InputFrame input;
-    input.has_motion = true;
-    input.is_motion_stale = false;
-    input.world_from_head = built_in_motion(time_s);
-    const SceneStep& step = builder_.build(input, analyse(scene_, {}), time_s);
-    for (const StepInput& substep : step.substeps) solver_->substep(substep);
-    PublishInput publish;
-    publish.tick = tick_;
-    publish.sim_time_ns = std::llround(time_s * 1e9);
-    publish.world_from_head = step.world_from_head;
-    return *publisher_.publish(*solver_, publish);
-  }
-
- private:
-  SceneDesc scene_;
-  SceneContent content_;
-  StepBuilder builder_;
-  Publisher publisher_;
-  std::unique_ptr<Solver> solver_;
-  uint64_t tick_ = 0;
-};
 
 struct Row {
   StageTimer encode;
@@ -105,18 +48,18 @@ double largest_error_m(const Snapshot& a, const Snapshot& b) {
   return largest;
 }
 
-bool run_codec(const char* scene, const std::string& codec, const Source& source, int frames) {
-  Snapshot snapshot;
-  for (int i = 0; i < kWarmUpFrames; ++i) snapshot = source.next();
+bool run_codec(const char* scene, const std::string& codec, const Recording& recording) {
+  const float quantum_m = lattice_step_m(codec, kBoundM).value();
   auto encoder = make_strand_encoder(codec);
-  auto decoder = make_strand_decoder(codec, {snapshot.strand_count, snapshot.vertex_count});
+  auto decoder =
+      make_strand_decoder(codec, {recording.states[0].strand_count, recording.states[0].vertex_count});
   if (!encoder || !decoder) return false;
-  (*encoder)->set_rest_shape(source.rest_in_head_m);
-  (*decoder)->set_rest_shape(source.rest_in_head_m);
+  (*encoder)->set_rest_shape(recording.rest_in_head_m);
+  (*decoder)->set_rest_shape(recording.rest_in_head_m);
   Row row;
-  constexpr int kStartFrames = 9;  // the first differences are not yet typical
-  for (int i = -kStartFrames; i < frames; ++i) {
-    snapshot = source.next();
+  const int frames = static_cast<int>(recording.states.size()) - kStartFrames - 1;
+  for (int i = 0; i < kStartFrames + frames; ++i) {
+    const Snapshot snapshot = on_lattice(recording.states[static_cast<size_t>(i)], quantum_m);
     const int64_t begin_ns = now_ns();
     const EncodedFramePtr frame = (*encoder)->encode(snapshot);
     const int64_t middle_ns = now_ns();
@@ -127,23 +70,22 @@ bool run_codec(const char* scene, const std::string& codec, const Source& source
                  decoded ? "beyond the bound" : decoded.error().to_string());
       return false;
     }
-    if (i < 0) continue;
+    if (i < kStartFrames) continue;
     row.encode.add_ms(static_cast<double>(middle_ns - begin_ns) * 1e-6);
     row.decode.add_ms(static_cast<double>(end_ns - middle_ns) * 1e-6);
     row.bytes += static_cast<double>(frame->message.size());
   }
-  row.keyframe_bytes =
-      static_cast<double>((*encoder)->encode_for_join(source.next()).keyframe->message.size());
-  print(scene, codec.c_str(), row, snapshot.plane_size(), frames);
+  const EncodedFramePtr keyframe =
+      (*encoder)->encode_for_join(on_lattice(recording.states.back(), quantum_m)).keyframe;
+  row.keyframe_bytes = static_cast<double>(keyframe->message.size());
+  print(scene, codec.c_str(), row, recording.states[0].plane_size(), frames);
   return true;
 }
 
-void run_raw_zstd(const char* scene, const Source& source, int frames) {
-  Snapshot snapshot;
-  for (int i = 0; i < kWarmUpFrames; ++i) snapshot = source.next();
+void run_raw_zstd(const char* scene, const Recording& recording) {
   Row row;
-  for (int i = 0; i < frames; ++i) {
-    snapshot = source.next();
+  for (const Snapshot& state : recording.states) {
+    const Snapshot snapshot = on_lattice(state, quantum_for_bound(kBoundM));
     const size_t source_bytes = snapshot.lattice.size() * sizeof(int32_t);
     std::vector<std::byte> packed(ZSTD_compressBound(source_bytes));
     std::vector<std::byte> unpacked(source_bytes);
@@ -155,42 +97,88 @@ void run_raw_zstd(const char* scene, const Source& source, int frames) {
     row.encode.add_ms(static_cast<double>(middle_ns - begin_ns) * 1e-6);
     row.bytes += static_cast<double>(size);
   }
+  const auto frames = static_cast<int>(recording.states.size());
   row.keyframe_bytes = row.bytes / frames;
-  print(scene, "raw+zstd3", row, snapshot.plane_size(), frames);
+  print(scene, "raw+zstd3", row, recording.states[0].plane_size(), frames);
 }
 
-int run(int frames, std::string_view wanted) {
-  struct Scene {
+struct Scene {
+  std::string name;
+  std::function<Result<Recording>(const RecordedPart&)> record;
+};
+
+std::vector<Scene> test_scenes() {
+  std::vector<Scene> scenes;
+  scenes.push_back({"built_in_2000x16", [](const RecordedPart& part) {
+                      return record_simulation({"dftl", 2000, 16, {}, 0.0}, part);
+                    }});
+  const auto add = [&scenes](std::string name, const HairMotionDesc& desc) {
+    scenes.push_back({std::move(name), [desc](const RecordedPart& part) -> Result<Recording> {
+                        return record_chains(desc, part);
+                      }});
+  };
+  add("242x8_active", {242, 8, MotionKind::Active});
+  for (const uint32_t strands : {2000u, 10000u}) {
+    add(fmt::format("{}x16_idle", strands), {strands, 16, MotionKind::Idle});
+    add(fmt::format("{}x16_active", strands), {strands, 16, MotionKind::Active});
+    add(fmt::format("{}x16_extreme", strands), {strands, 16, MotionKind::Extreme});
+  }
+  return scenes;
+}
+
+/// Our own models on motion capture; clips by their names in the collections they come from.
+std::vector<Scene> mocap_scenes(const std::filesystem::path& folder) {
+  struct Part {
     const char* name;
-    std::function<Source(float quantum_m)> start;
+    const char* file;
+    double begin_s;
   };
-  const auto motion = [](uint32_t strands, uint32_t vertices, MotionKind kind) {
-    return [=](float quantum_m) { return test_motion({strands, vertices, kind}, quantum_m); };
-  };
-  const auto built_in = [](float quantum_m) {
-    auto scene = std::make_shared<BuiltInScene>(quantum_m);
-    return Source{scene->rest_in_head(), [scene] { return scene->next(); }};
-  };
-  const std::vector<Scene> scenes = {
-      {"built_in_2000x16", built_in},
-      {"242x8_active", motion(242, 8, MotionKind::Active)},
-      {"2000x16_idle", motion(2000, 16, MotionKind::Idle)},
-      {"2000x16_active", motion(2000, 16, MotionKind::Active)},
-      {"2000x16_extreme", motion(2000, 16, MotionKind::Extreme)},
-      {"10000x16_idle", motion(10000, 16, MotionKind::Idle)},
-      {"10000x16_active", motion(10000, 16, MotionKind::Active)},
-      {"10000x16_extreme", motion(10000, 16, MotionKind::Extreme)},
-  };
+  constexpr std::array kParts = {
+      Part{"stand", "cmu_05_20_mb.bvh", 0.0},      // 0.15 m/s, up to 70 degrees/s
+      Part{"walk", "cmu_131_01.bvh", 1.0},         // 1.2 m/s with turns of 380 degrees/s
+      Part{"spin", "cmu_61_05_scaled.bvh", 8.0}};  // salsa: 1.9 m/s, 1,900 degrees/s
+  std::vector<Scene> scenes;
+  for (const Part& part : kParts) {
+    const std::filesystem::path file = folder / part.file;
+    if (!std::filesystem::exists(file)) {
+      fmt::print(stderr, "no mocap_{}: {} is not there (--mocap DIR names the folder)\n", part.name,
+                 file.string());
+      continue;
+    }
+    for (const auto& [strands, vertices] : {std::pair(10000u, 16u), std::pair(2228u, 32u)}) {
+      for (const char* solver : {"dftl", "direct_rod"}) {
+        const SimulatedMotion motion{solver, strands, vertices, file, part.begin_s};
+        scenes.push_back({fmt::format("mocap_{}_{}_{}x{}", part.name, solver, strands, vertices),
+                          [motion](const RecordedPart& of) { return record_simulation(motion, of); }});
+      }
+    }
+  }
+  return scenes;
+}
+
+struct Options {
+  int frames = 120;
+  std::string wanted;  // part of a scene's name
+  std::filesystem::path mocap = "../shared/data/mocap";
+};
+
+int run(const Options& options) {
+  std::vector<Scene> scenes = test_scenes();
+  for (Scene& scene : mocap_scenes(options.mocap)) scenes.push_back(std::move(scene));
   fmt::print(
       "scene,codec,vertices,bits_per_vertex,mbit_per_s_at_60hz,keyframe_bits_per_vertex,encode_ms,decode_"
       "ms\n");
   for (const Scene& scene : scenes) {
-    if (std::string_view(scene.name).find(wanted) == std::string_view::npos) continue;
+    if (scene.name.find(options.wanted) == std::string::npos) continue;
+    const auto recording = scene.record({kWarmUpFrames, kStartFrames + options.frames + 1});
+    if (!recording) {
+      fmt::print(stderr, "{}: {}\n", scene.name, recording.error().to_string());
+      return 1;
+    }
     for (const StrandCodecInfo& codec : strand_codecs())
-      if (!run_codec(scene.name, codec.name, scene.start(lattice_step_m(codec.name, kBoundM).value()),
-                     frames))
-        return 1;
-    run_raw_zstd(scene.name, scene.start(quantum_for_bound(kBoundM)), frames);
+      if (!run_codec(scene.name.c_str(), codec.name, *recording)) return 1;
+    run_raw_zstd(scene.name.c_str(), *recording);
+    std::fflush(stdout);
   }
   return 0;
 }
@@ -199,7 +187,16 @@ int run(int frames, std::string_view wanted) {
 }  // namespace strandcast
 
 int main(int argc, char** argv) {
-  constexpr int kDefaultFrames = 120;
-  const int frames = argc > 1 ? std::atoi(argv[1]) : kDefaultFrames;
-  return strandcast::run(frames > 0 ? frames : kDefaultFrames, argc > 2 ? argv[2] : "");
+  strandcast::Options options;
+  int place = 0;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--mocap" && i + 1 < argc)
+      options.mocap = argv[++i];
+    else if (place++ == 0)
+      options.frames = std::clamp(std::atoi(argv[i]), 1, 1000);
+    else
+      options.wanted = word;
+  }
+  return strandcast::run(options);
 }
