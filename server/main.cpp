@@ -12,6 +12,7 @@
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
 #include "server/app/options.h"
+#include "server/app/token_file.h"
 
 namespace strandcast {
 namespace {
@@ -61,8 +62,21 @@ Status write_port(const std::filesystem::path& path, uint16_t port) {
   return save_file(path, std::as_bytes(std::span(text)));
 }
 
+/// The tokens of the file; new ones are shown on the terminal, this once.
+Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
+  if (options.token_path.empty()) return std::vector<AccessToken>{};
+  ASSIGN_OR_RETURN(TokenFile file, open_token_file(options.token_path));
+  if (file.is_new)
+    fmt::print("New tokens, stored in {} and shown this once:\n{}", options.token_path.string(),
+               to_text(file.tokens));
+  return std::move(file.tokens);
+}
+
 /// Serves until a signal, the end of the time or a failure. The signals are blocked in every thread.
-int serve(const ServerOptions& options, const ServerConfig& config) {
+int serve(const ServerOptions& options, ServerConfig config) {
+  auto tokens = load_tokens(options);
+  if (!tokens) return fail(tokens.error());
+  config.net.tokens = std::move(tokens).value();
   const sigset_t signals = stop_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   auto server = Server::start(config);
@@ -73,7 +87,7 @@ int serve(const ServerOptions& options, const ServerConfig& config) {
   std::fflush(stdout);
   const int64_t begin_ns = now_ns();
   const timespec poll{0, kPollNs};
-  while (!(*server)->failure()) {
+  while (!(*server)->failure() && !(*server)->is_shut_down_wanted()) {
     if (sigtimedwait(&signals, nullptr, &poll) > 0) break;
     if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
   }

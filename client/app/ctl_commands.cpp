@@ -36,7 +36,7 @@ Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
   config.hello.name = "strandcast-ctl";
   config.hello.token = target.token;
   if (!target.token_file.empty()) {
-    ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file));
+    ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file, role));
   }
   return config;
 }
@@ -132,6 +132,16 @@ std::string to_line(const ServerStatus& status) {
       some(status.overstretched_strands, "strands over-stretched"));
 }
 
+std::string to_table(const SessionList& list) {
+  std::string text = fmt::format("{:>8}  {:<10}  {:<7}  {:>12}  {:>8}  {:>8}  {:<20}  {}\n", "session",
+                                 "role", "mode", "sent bytes", "delay ms", "since s", "address", "name");
+  for (const SessionInfo& session : list.sessions)
+    text += fmt::format("{:>8}  {:<10}  {:<7}  {:>12}  {:>8.1f}  {:>8.1f}  {:<20}  {}\n", session.id,
+                        to_string(session.role), to_string(session.mode), session.sent_bytes,
+                        session.queue_delay_ms, session.connected_s, session.address, session.name);
+  return text;
+}
+
 }  // namespace
 
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
@@ -156,8 +166,10 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
 }
 
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop) {
-  // A source gets status but no frames.
+  // A source gets status but no frames; whose token is not good for that watches.
   auto client = connect(target, Role::Source);
+  if (!client && (client.error().code == ErrorCode::BadInput || client.error().code == ErrorCode::NotFound))
+    client = connect(target, Role::Viewer);
   if (!client) return fail(client.error());
   const int64_t begin_ns = now_ns();
   while (!stop && (seconds == 0.0 || static_cast<double>(now_ns() - begin_ns) * 1e-9 < seconds)) {
@@ -170,14 +182,21 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
   return kDoneExit;
 }
 
-int run_command(const CtlTarget& target, const ClientMessage& message) {
-  auto client = connect(target, Role::Controller);
+namespace {
+
+/// Sends one message and prints the answer, a notice or a list.
+int ask(const CtlTarget& target, Role role, const ClientMessage& message) {
+  auto client = connect(target, role);
   if (!client) return fail(client.error());
   if (const auto sent = (*client)->send(message); !sent) return fail(sent.error(), kRefusedExit);
   const int64_t begin_ns = now_ns();
   while (now_ns() - begin_ns < std::chrono::nanoseconds(kAnswerTimeout).count()) {
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
+      if (const auto* list = std::get_if<SessionList>(&event)) {
+        std::cout << to_table(*list);
+        return kDoneExit;
+      }
       const auto* notice = std::get_if<Notice>(&event);
       if (notice == nullptr) continue;
       (notice->is_error ? std::cerr : std::cout) << notice->text << '\n';
@@ -187,6 +206,16 @@ int run_command(const CtlTarget& target, const ClientMessage& message) {
   return fail(
       make_error(ErrorCode::Timeout, "the server did not answer within {} ms", kAnswerTimeout.count()),
       kRefusedExit);
+}
+
+}  // namespace
+
+int run_command(const CtlTarget& target, const ClientMessage& message) {
+  return ask(target, Role::Controller, message);
+}
+
+int run_admin(const CtlTarget& target, const AdminCommand& command) {
+  return ask(target, Role::Admin, command);
 }
 
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {

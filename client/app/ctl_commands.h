@@ -43,6 +43,8 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop);
 /// Sends one command or assignment and prints the server's answer.
 int run_command(const CtlTarget& target, const ClientMessage& message);
+/// Needs an admin's token.
+int run_admin(const CtlTarget& target, const AdminCommand& command);
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s);
 int run_health(const CtlTarget& target);
 

@@ -6,6 +6,7 @@
 #include "client/app/ctl_commands.h"
 #include "client/app/feed.h"
 #include "client/app/stop_signal.h"
+#include "client/app/view_options.h"
 #include "common/base/log.h"
 
 namespace {
@@ -21,6 +22,7 @@ struct CommandLine {
   std::string assignment;
   uint64_t check_frames = 120;
   double check_timeout_s = 60.0;
+  uint64_t session = 0;
 };
 
 void declare_feed(CLI::App& app, CommandLine& line) {
@@ -59,8 +61,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();  // --connect may stand behind the sub-command too
   app.add_option("--connect", line.target.connect, "Server as HOST:PORT")->capture_default_str();
-  app.add_option("--token", line.target.token, "Token of a server that is not on loopback");
-  app.add_option("--token-file", line.target.token_file, "File with the token in its first line");
+  app.add_option("--token-file", line.target.token_file,
+                 "File with the token: the token alone, or lines 'role token'");
+  app.add_option("--token", line.target.token, kTokenHelp)->envname(kTokenVariable);
   app.add_option("--log", line.log_level, "error, warn, info, debug or off")->capture_default_str();
 
   CLI::App* feed = app.add_subcommand("feed", "Send head motion and wind in real time");
@@ -80,6 +83,10 @@ int run(int argc, char** argv) {
   check->add_option("--timeout", line.check_timeout_s, "Seconds to wait for them")
       ->check(CLI::Range(0.1, 1e6))
       ->capture_default_str();
+  CLI::App* sessions = app.add_subcommand("sessions", "List who is connected (needs an admin's token)");
+  CLI::App* kick = app.add_subcommand("kick", "End one session (needs an admin's token)");
+  kick->add_option("session", line.session, "Its number, as listed by sessions")->required();
+  CLI::App* shutdown = app.add_subcommand("shutdown", "End the server (needs an admin's token)");
   CLI::App* health = app.add_subcommand("health", "Ask /healthz");
 
   try {
@@ -104,6 +111,9 @@ int run(int argc, char** argv) {
   if (*reset) return run_command(line.target, ControlCommand{Command::Reset});
   if (*set) return run_command(line.target, SetParameter{line.assignment});
   if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);
+  if (*sessions) return run_admin(line.target, {AdminAction::ListSessions, 0});
+  if (*kick) return run_admin(line.target, {AdminAction::Kick, line.session});
+  if (*shutdown) return run_admin(line.target, {AdminAction::ShutDown, 0});
   if (*health) return run_health(line.target);
   return kBadInputExit;
 }

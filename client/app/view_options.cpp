@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <iostream>
+#include <map>
+#include <sstream>
 
 #include "common/base/file.h"
 
@@ -30,19 +32,40 @@ Result<StreamMode> parse_mode(const std::string& text) {
   return make_error(ErrorCode::BadInput, "unknown mode '{}' (known: strands, frames, auto)", text);
 }
 
-Result<std::string> load_token(const std::filesystem::path& path) {
+Result<std::string> load_token(const std::filesystem::path& path, Role role) {
   constexpr uint64_t kMaxTokenFileBytes = 4096;
-  ASSIGN_OR_RETURN(std::string text, load_text(path, kMaxTokenFileBytes));
-  text = text.substr(0, text.find_first_of("\r\n"));
-  if (text.empty())
-    return at(path.string(), make_error(ErrorCode::BadInput, "the first line, the token, is empty"));
-  return text;
+  ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxTokenFileBytes));
+  std::map<std::string, std::string> token_of_role;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string first, second;
+    words >> first >> second;
+    if (first.empty() || first.starts_with('#')) continue;
+    if (second.empty()) return first;
+    token_of_role.emplace(first, second);
+  }
+  if (token_of_role.empty())
+    return at(path.string(), make_error(ErrorCode::BadInput, "there is no token in this file"));
+  // A controller may watch too, an admin may do everything.
+  std::vector<Role> serving = {role, Role::Admin};
+  if (role == Role::Viewer) serving = {Role::Viewer, Role::Controller, Role::Admin};
+  for (const Role one : serving)
+    if (const auto found = token_of_role.find(to_string(one)); found != token_of_role.end())
+      return found->second;
+  return at(path.string(),
+            make_error(ErrorCode::NotFound, "there is no token for a {} in this file{}", to_string(role),
+                       role == Role::Controller ? " (--view-only asks for less)" : ""));
+}
+
+Role role_of(const ViewOptions& options) {
+  return options.is_headless || options.is_view_only ? Role::Viewer : Role::Controller;
 }
 
 ClientConfig client_config(const ViewOptions& options) {
   ClientConfig config;
   config.address = options.address;
-  config.hello.role = Role::Controller;
+  config.hello.role = role_of(options);
   config.hello.mode = options.mode;
   config.hello.name = "strandcast-view";
   config.hello.token = options.token;
@@ -67,8 +90,10 @@ struct RawOptions {
 void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
   app.add_option("--mode", raw.mode, "strands, frames or auto")->capture_default_str();
-  app.add_option("--token", options.token, "Token of a server that is not on loopback");
-  app.add_option("--token-file", raw.token_file, "File with the token in its first line");
+  app.add_option("--token-file", raw.token_file,
+                 "File with the token: the token alone, or lines 'role token'");
+  app.add_option("--token", options.token, kTokenHelp)->envname(kTokenVariable);
+  app.add_flag("--view-only", options.is_view_only, "Ask for a viewer's role: no steering of the server");
   app.add_option("--size", raw.size, "Picture or window size, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--playout", raw.playout,
                  "low-latency: the newest state; smooth: between states, a little behind")
@@ -101,7 +126,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   ASSIGN_OR_RETURN(options.size, parse_size(raw.size));
   ASSIGN_OR_RETURN(options.clip_size, parse_size(raw.clip_size.empty() ? raw.size : raw.clip_size));
   if (!raw.token_file.empty()) {
-    ASSIGN_OR_RETURN(options.token, load_token(raw.token_file));
+    ASSIGN_OR_RETURN(options.token, load_token(raw.token_file, role_of(options)));
   }
   if (raw.seconds > 0.0) options.seconds = raw.seconds;
   if (raw.playout == "smooth") options.playout = Playout::Smooth;

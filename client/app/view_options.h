@@ -19,6 +19,7 @@ struct ViewOptions {
   std::string token;
   RenderSize size{960, 540};
   bool is_headless = false;
+  bool is_view_only = false;         // ask for a viewer's role only; headless never asks for more
   std::filesystem::path screenshot;  // empty = none
   uint64_t after_frames = 60;        // the screenshot shows the state after this many decoded frames
   std::filesystem::path clip;        // empty = none
@@ -31,6 +32,11 @@ struct ViewOptions {
   std::string device = "auto";
   std::string log_level = "warn";
 };
+
+/// Everybody on the machine sees command lines; a file or the environment is private.
+inline constexpr const char* kTokenVariable = "STRANDCAST_TOKEN";
+inline constexpr const char* kTokenHelp =
+    "Token itself; other users of this machine can see it here, so prefer --token-file";
 
 inline constexpr double kMaxClipS = 60.0;
 inline constexpr double kMaxClipFps = 60.0;
@@ -48,8 +54,13 @@ ViewCommandLine read_view_command_line(int argc, const char* const* argv);
 Result<RenderSize> parse_size(const std::string& text);
 /// "strands", "frames" or "auto".
 Result<StreamMode> parse_mode(const std::string& text);
-/// First line of a file of at most 4 KiB.
-Result<std::string> load_token(const std::filesystem::path& path);
+/// The token for this role from a file of at most 4 KiB: a token alone in the first line, or lines
+/// "role token" as the server makes them, of which the least that serves is taken. NotFound when there is
+/// none.
+Result<std::string> load_token(const std::filesystem::path& path, Role role);
+
+/// A viewer when no steering can come from it.
+Role role_of(const ViewOptions& options);
 
 /// Connection settings for these options.
 ClientConfig client_config(const ViewOptions& options);

@@ -76,6 +76,10 @@ void Mailbox::push(const StreamQuality& quality) {
   keep_newest(quality);
 }
 
+void Mailbox::push(const SessionList& list) {
+  keep_newest(list);
+}
+
 void Mailbox::push(Notice notice) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return;

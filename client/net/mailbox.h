@@ -32,7 +32,7 @@ struct ClosedEvent {
   Error error;
 };
 
-using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, ClosedEvent>;
+using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, SessionList, ClosedEvent>;
 
 struct MailboxLimits {
   size_t strand_frames = 240;            // four seconds at 60 Hz
@@ -51,6 +51,7 @@ class Mailbox {
   Outcome push(MediaEvent event);
   void push(const ServerStatus& status);
   void push(const StreamQuality& quality);
+  void push(const SessionList& list);
   /// The oldest notice gives way when there are too many.
   void push(Notice notice);
   /// Adds the final event; later pushes are ignored.

@@ -11,6 +11,7 @@ namespace {
 ErrorCode code_for(uint16_t close_code) {
   switch (static_cast<CloseCode>(close_code)) {
     case CloseCode::Unauthorized:
+    case CloseCode::Kicked:
       return ErrorCode::Unauthorized;
     case CloseCode::Full:
       return ErrorCode::LimitExceeded;

@@ -337,6 +337,13 @@ class ViewerClient::Connection {
                : make_error(ErrorCode::BadInput, "the server sent a stream quality before its Welcome");
   }
 
+  Status handle_control(SessionList& list) {
+    for (SessionInfo& session : list.sessions) session.name = printable(session.name);
+    if (is_welcome_) mailbox_.push(list);
+    return is_welcome_ ? Status()
+                       : make_error(ErrorCode::BadInput, "the server sent a session list before its Welcome");
+  }
+
   Status handle_control(Notice& notice) {
     notice.text = printable(notice.text);
     if (is_welcome_) mailbox_.push(std::move(notice));

@@ -73,11 +73,17 @@ void put(const SetParameter& parameter, v1::ClientMessage& message) {
   message.mutable_set_parameter()->set_assignment(parameter.assignment);
 }
 
+void put(const AdminCommand& command, v1::ClientMessage& message) {
+  const int number = v1::ADMIN_ACTION_LIST_SESSIONS + static_cast<int>(command.action);
+  message.mutable_admin()->set_action(static_cast<v1::AdminAction>(number));
+  message.mutable_admin()->set_session(command.session);
+}
+
 // ---- protobuf to domain ----
 
 Hello take(const v1::Hello& message, FieldCheck& check) {
   Hello hello;
-  hello.role = check.choice("hello.role", message.role(), v1::ROLE_VIEWER, Role::Source);
+  hello.role = check.choice("hello.role", message.role(), v1::ROLE_VIEWER, Role::Admin);
   hello.mode = check.choice("hello.mode", message.mode(), v1::STREAM_MODE_STRANDS, StreamMode::Auto);
   hello.name = message.name();
   hello.token = message.token();
@@ -131,6 +137,12 @@ SetParameter take(const v1::SetParameter& message, FieldCheck& check) {
   return {message.assignment()};
 }
 
+AdminCommand take(const v1::AdminCommand& message, FieldCheck& check) {
+  return {
+      check.choice("admin.action", message.action(), v1::ADMIN_ACTION_LIST_SESSIONS, AdminAction::ShutDown),
+      message.session()};
+}
+
 Result<ClientMessage> take(const v1::ClientMessage& message) {
   FieldCheck check;
   ClientMessage result;
@@ -161,6 +173,9 @@ Result<ClientMessage> take(const v1::ClientMessage& message) {
       break;
     case v1::ClientMessage::kSetParameter:
       result = take(message.set_parameter(), check);
+      break;
+    case v1::ClientMessage::kAdmin:
+      result = take(message.admin(), check);
       break;
     case v1::ClientMessage::KIND_NOT_SET:
       return make_error(ErrorCode::BadInput, "client message is of no kind that protocol {} knows",

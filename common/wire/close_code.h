@@ -15,6 +15,7 @@ enum class CloseCode : uint16_t {
   Internal = 1011,      // ours: please report
   TryLater = 1013,      // this client reads too slowly for its control messages
   Unauthorized = 4001,  // token refused: do not try again
+  Kicked = 4002,        // by an admin: do not try again
   Full = 4003,          // no place for another session: do not try again at once
 };
 

@@ -28,13 +28,17 @@ inline constexpr size_t kMaxTokenBytes = 256;
 inline constexpr size_t kMaxAssignmentBytes = 4096;  // SetParameter
 inline constexpr size_t kSessionIdChars = 16;
 inline constexpr uint32_t kMaxRateDivisor = 64;
+// A full SessionList stays below kMaxControlBytes.
+inline constexpr uint32_t kMaxListedSessions = 256;
+inline constexpr size_t kMaxListedNameChars = 32;
+inline constexpr size_t kMaxAddressChars = 64;
 
-enum class Role { Viewer, Controller, Source };
+enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
 
 // ---- client to server ----
 struct Hello {               // first message; answered by Welcome or Goodbye
-  Role role = Role::Viewer;  // a Controller views and may steer; a Source sends motion and wind
+  Role role = Role::Viewer;  // a Controller views and may steer; a Source sends motion and wind; an Admin all
   StreamMode mode = StreamMode::Strands;
   std::string name;                            // shown in logs, at most 64 characters
   std::string token;                           // empty on loopback
@@ -75,8 +79,13 @@ struct ControlCommand {  // from a Controller
 struct SetParameter {  // from a Controller: scene field path, value as text ("solver.name=dftl")
   std::string assignment;
 };
+enum class AdminAction { ListSessions, Kick, ShutDown };
+struct AdminCommand {  // from an Admin; answered by a SessionList or a Notice
+  AdminAction action = AdminAction::ListSessions;
+  uint64_t session = 0;  // whom to kick
+};
 using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck,
-                                   Ping, ControlCommand, SetParameter>;
+                                   Ping, ControlCommand, SetParameter, AdminCommand>;
 
 // ---- server to client ----
 struct Welcome {
@@ -93,6 +102,7 @@ struct Welcome {
   LookDesc look;
   CameraDesc camera;
   uint32_t frame_width = 0, frame_height = 0;
+  Role role = Role::Viewer;  // as granted
 };
 struct Pong {
   int64_t client_time_ns = 0;  // echoed
@@ -129,7 +139,20 @@ struct Notice {  // answer to SetParameter and ControlCommand, or a warning
   bool is_error = false;
   std::string text;
 };
-using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality>;
+struct SessionInfo {
+  uint64_t id = 0;
+  std::string name;     // shortened to kMaxListedNameChars
+  std::string address;  // of the peer, without its port
+  Role role = Role::Viewer;
+  StreamMode mode = StreamMode::Strands;
+  uint64_t sent_bytes = 0;
+  double queue_delay_ms = 0.0;  // as in ServerStatus
+  double connected_s = 0.0;
+};
+struct SessionList {                  // answer to an AdminCommand
+  std::vector<SessionInfo> sessions;  // at most kMaxListedSessions
+};
+using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, SessionList>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

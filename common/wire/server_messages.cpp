@@ -25,6 +25,7 @@ void put(const Welcome& welcome, v1::ServerMessage& message) {
   put(welcome.camera, *out.mutable_camera());
   out.set_frame_width(welcome.frame_width);
   out.set_frame_height(welcome.frame_height);
+  out.set_role(static_cast<v1::Role>(welcome.role));
 }
 
 void put(const Pong& pong, v1::ServerMessage& message) {
@@ -69,6 +70,21 @@ void put(const StreamQuality& quality, v1::ServerMessage& message) {
   out.set_reason(printable(quality.reason, kMaxTextChars));
 }
 
+void put(const SessionList& list, v1::ServerMessage& message) {
+  v1::SessionList& out = *message.mutable_sessions();
+  for (const SessionInfo& session : list.sessions) {
+    v1::SessionInfo& item = *out.add_sessions();
+    item.set_id(session.id);
+    item.set_name(printable(session.name, kMaxListedNameChars));
+    item.set_address(printable(session.address, kMaxAddressChars));
+    item.set_role(static_cast<v1::Role>(session.role));
+    item.set_mode(static_cast<v1::StreamMode>(session.mode));
+    item.set_sent_bytes(session.sent_bytes);
+    item.set_queue_delay_ms(session.queue_delay_ms);
+    item.set_connected_s(session.connected_s);
+  }
+}
+
 // ---- protobuf to domain ----
 
 bool is_session_id(const std::string& text) {
@@ -93,6 +109,7 @@ Welcome take(const v1::Welcome& message, FieldCheck& check) {
   welcome.camera = take_camera(message.camera(), check);
   welcome.frame_width = message.frame_width();
   welcome.frame_height = message.frame_height();
+  welcome.role = check.choice("welcome.role", message.role(), v1::ROLE_VIEWER, Role::Admin);
 
   if (!is_session_id(welcome.session_id))
     check.fail("welcome.session_id",
@@ -159,6 +176,28 @@ StreamQuality take(const v1::StreamQuality& message, FieldCheck& check) {
           message.bound_m(), message.reason()};
 }
 
+SessionList take(const v1::SessionList& message, FieldCheck& check) {
+  SessionList list;
+  check.count("sessions", static_cast<size_t>(message.sessions_size()), kMaxListedSessions);
+  if (!check.status()) return list;
+  for (const v1::SessionInfo& item : message.sessions()) {
+    SessionInfo& session = list.sessions.emplace_back();
+    session.id = item.id();
+    session.name = item.name();
+    session.address = item.address();
+    session.role = check.choice("sessions.role", item.role(), v1::ROLE_VIEWER, Role::Admin);
+    session.mode = check.choice("sessions.mode", item.mode(), v1::STREAM_MODE_STRANDS, StreamMode::Auto);
+    session.sent_bytes = item.sent_bytes();
+    session.queue_delay_ms = item.queue_delay_ms();
+    session.connected_s = item.connected_s();
+    check.text("sessions.name", session.name, kMaxListedNameChars);
+    check.text("sessions.address", session.address, kMaxAddressChars);
+    check.measure("sessions.queue_delay_ms", session.queue_delay_ms);
+    check.measure("sessions.connected_s", session.connected_s);
+  }
+  return list;
+}
+
 Result<ServerMessage> take(const v1::ServerMessage& message) {
   FieldCheck check;
   ServerMessage result;
@@ -180,6 +219,9 @@ Result<ServerMessage> take(const v1::ServerMessage& message) {
       break;
     case v1::ServerMessage::kQuality:
       result = take(message.quality(), check);
+      break;
+    case v1::ServerMessage::kSessions:
+      result = take(message.sessions(), check);
       break;
     case v1::ServerMessage::KIND_NOT_SET:
       return make_error(ErrorCode::BadInput, "server message is of no kind that protocol {} knows",
@@ -223,6 +265,8 @@ const char* to_string(Role role) {
       return "controller";
     case Role::Source:
       return "source";
+    case Role::Admin:
+      return "admin";
   }
   return "unknown";
 }

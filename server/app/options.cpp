@@ -2,13 +2,11 @@
 
 #include <CLI/CLI.hpp>
 
-#include "common/base/file.h"
 #include "common/scene/scene_file.h"
 
 namespace strandcast {
 namespace {
 
-constexpr uint64_t kMaxTokenFileBytes = 4'096;
 constexpr const char* kVersionText = "strandcast-server 0.1.0";
 
 void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom, std::string& explained) {
@@ -25,22 +23,34 @@ void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom
   app.add_flag("--print-scene", options.is_printing_scene, "print the scene with its overrides, and leave");
 }
 
-void add_run_options(CLI::App& app, ServerOptions& options, std::string& shader_folder, double& viewer_mbit) {
+/// What needs more than a value to be stored.
+struct RawRunOptions {
+  std::string shader_folder;
+  double viewer_mbit = 0.0;
+  bool is_loopback_distrusted = false;
+};
+
+void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
   NetConfig& net = options.config.net;
   app.add_option("--listen", net.address, "address to listen on; beyond loopback a token is needed")
       ->capture_default_str();
   app.add_option("--port", net.port, "TCP port, 0 = any free one")->capture_default_str();
   app.add_option("--port-file", options.port_path, "write the port to this file once the server is ready");
-  app.add_option("--token-file", options.token_path, "file with the token that clients must give");
+  app.add_option(
+      "--token-file", options.token_path,
+      "tokens that clients must give, one line 'role token' for each of viewer, controller, source, admin; "
+      "made and shown once when there is no such file");
+  app.add_flag("--distrust-loopback", raw.is_loopback_distrusted,
+               "treat connections from this machine like all others: behind a proxy or tunnel");
   app.add_option("--allow-host", net.allowed_hosts, "further name accepted in the Host header; repeatable")
       ->expected(1)
       ->take_all();
-  app.add_option("--viewer-mbit", viewer_mbit,
+  app.add_option("--viewer-mbit", raw.viewer_mbit,
                  "most that the strands for one viewer may take, Mbit/s; 0 = no cap")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--gl-device", options.config.gl_device, "auto, software, hardware or a device number")
       ->capture_default_str();
-  app.add_option("--shader-dir", shader_folder, "read shaders from this folder instead of the program");
+  app.add_option("--shader-dir", raw.shader_folder, "read shaders from this folder instead of the program");
   app.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
@@ -53,12 +63,11 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   ServerOptions options;
   std::string groom;
   std::string explained;
-  std::string shader_folder;
-  double viewer_mbit = 0.0;
+  RawRunOptions raw;
   CLI::App app("Simulates hair and streams it to viewers.", "strandcast-server");
   app.set_version_flag("--version", kVersionText);
   add_scene_options(app, options, groom, explained);
-  add_run_options(app, options, shader_folder, viewer_mbit);
+  add_run_options(app, options, raw);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -69,7 +78,8 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     return make_error(ErrorCode::BadInput, "{} (--help lists the options)", error.what());
   }
   constexpr double kBytesPerMbit = 125e3;
-  options.config.net.limits.viewer_bytes_per_s = viewer_mbit * kBytesPerMbit;
+  options.config.net.limits.viewer_bytes_per_s = raw.viewer_mbit * kBytesPerMbit;
+  if (raw.is_loopback_distrusted) options.config.net.loopback_trust = LoopbackTrust::LikeAllOthers;
   options.is_explaining = app.count("--explain") > 0;
   if (!explained.empty()) {
     if (!options.scene_path.empty())
@@ -84,7 +94,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     if (options.scene_path.empty()) first.push_back("head.radius_m=0");
     options.overrides.insert(options.overrides.begin(), first.begin(), first.end());
   }
-  if (!shader_folder.empty()) options.config.shader_folder = shader_folder;
+  if (!raw.shader_folder.empty()) options.config.shader_folder = raw.shader_folder;
   return options;
 }
 
@@ -94,14 +104,6 @@ Result<ServerConfig> load_config(const ServerOptions& options) {
     ASSIGN_OR_RETURN(config.scene, built_in_scene_with(options.overrides));
   } else {
     ASSIGN_OR_RETURN(config.scene, load_scene(options.scene_path, options.overrides));
-  }
-  if (!options.token_path.empty()) {
-    ASSIGN_OR_RETURN(std::string token, load_text(options.token_path, kMaxTokenFileBytes));
-    const size_t end = token.find_last_not_of(" \t\r\n");
-    token.resize(end == std::string::npos ? 0 : end + 1);
-    if (token.empty())
-      return at(options.token_path.string(), make_error(ErrorCode::BadInput, "the token file is empty"));
-    config.net.token = token;
   }
   return config;
 }

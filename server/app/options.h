@@ -15,8 +15,8 @@ namespace strandcast {
 struct ServerOptions {
   std::filesystem::path scene_path;  // empty: the built-in scene
   std::vector<std::string> overrides;
-  std::filesystem::path token_path;
-  std::filesystem::path port_path;  // the chosen port is written here
+  std::filesystem::path token_path;  // empty: no tokens
+  std::filesystem::path port_path;   // the chosen port is written here
   std::string log_level = "info";
   double run_s = 0.0;  // 0 = until a signal
   uint32_t explained_frame_viewers = 0;
@@ -24,13 +24,13 @@ struct ServerOptions {
   bool is_explaining = false;
   bool is_printing_scene = false;
   std::string help;     // not empty: print and leave
-  ServerConfig config;  // all but scene and token
+  ServerConfig config;  // all but scene and tokens
 };
 
 /// BadInput names the option; `help` is set for --help and --version.
 Result<ServerOptions> parse_options(int argc, const char* const* argv);
 
-/// The scene with its overrides, and the token: everything read from files.
+/// The scene with its overrides.
 Result<ServerConfig> load_config(const ServerOptions& options);
 
 }  // namespace strandcast

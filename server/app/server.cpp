@@ -1,5 +1,6 @@
 #include "server/app/server.h"
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <random>
@@ -51,6 +52,7 @@ class Server::State : public NetHandler {
   ServerCounters counters() const;
   uint16_t port() const { return net_->port(); }
   std::optional<Error> failure() const { return sim_->failure(); }
+  bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
 
   Result<Admission> on_hello(SessionId session, const Hello& hello) override;
   void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override {
@@ -72,6 +74,7 @@ class Server::State : public NetHandler {
     viewers_.set_strand_class(session, stream_id);
     follow_viewers();
   }
+  void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_left(SessionId session) override;
   std::string metrics() override;
 
@@ -105,6 +108,7 @@ class Server::State : public NetHandler {
   std::mutex mutex_;  // guards has_stopped_
   std::condition_variable changed_;
   bool has_stopped_ = false;
+  std::atomic<bool> is_shut_down_wanted_{false};
   std::thread status_thread_;
 };
 
@@ -201,7 +205,7 @@ void Server::State::stop() {
 
 void Server::State::wait() {
   std::unique_lock lock(mutex_);
-  while (!has_stopped_ && !sim_->failure()) changed_.wait_for(lock, kStatusInterval);
+  while (!has_stopped_ && !is_shut_down_wanted_ && !sim_->failure()) changed_.wait_for(lock, kStatusInterval);
 }
 
 Welcome Server::State::make_welcome(const Viewers::Place& place) const {
@@ -350,6 +354,9 @@ uint16_t Server::port() const {
 }
 ServerCounters Server::counters() const {
   return state_->counters();
+}
+bool Server::is_shut_down_wanted() const {
+  return state_->is_shut_down_wanted();
 }
 std::optional<Error> Server::failure() const {
   return state_->failure();

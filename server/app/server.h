@@ -53,11 +53,13 @@ class Server {
 
   uint16_t port() const;
   ServerCounters counters() const;
+  /// True once an admin has asked for the end: the owner calls stop().
+  bool is_shut_down_wanted() const;
   /// Why the simulation ended by itself; nothing while all is well.
   std::optional<Error> failure() const;
   /// Says goodbye to all viewers and ends all threads; at most about net.limits.close_ms and one step.
   void stop();
-  /// Returns after stop() or when the simulation ended by itself.
+  /// Returns after stop(), when an admin wants the end, or when the simulation ended by itself.
   void wait();
 
  private:

@@ -21,27 +21,18 @@ bool is_digits(std::string_view text) {
 
 }  // namespace
 
-Status check_listening(bool is_loopback, const std::string& address, const std::string& token) {
-  if (is_loopback) return {};
-  if (token.empty())
+Status check_listening(bool is_trusted, const std::string& address, const std::vector<AccessToken>& tokens) {
+  if (is_trusted) return {};
+  if (tokens.empty())
     return make_error(ErrorCode::Unauthorized,
                       "listening on '{}' needs a token (--token-file); without one only loopback is served",
                       address);
-  if (token.size() < kMinRemoteTokenCharacters)
-    return make_error(ErrorCode::Unauthorized,
-                      "the token has {} characters, but listening on '{}' needs at least {}", token.size(),
-                      address, kMinRemoteTokenCharacters);
+  for (const AccessToken& token : tokens)
+    if (token.secret.size() < kMinRemoteTokenCharacters)
+      return make_error(ErrorCode::Unauthorized,
+                        "a token for {} has {} characters, but listening on '{}' needs at least {}",
+                        to_string(token.grant), token.secret.size(), address, kMinRemoteTokenCharacters);
   return {};
-}
-
-bool is_token_equal(std::string_view expected, std::string_view given) {
-  // No early exit: the time must not tell how many leading characters were right.
-  volatile unsigned char difference = expected.size() == given.size() ? 0 : 1;
-  for (size_t i = 0; i < given.size(); ++i) {
-    const char wanted = expected.empty() ? '\0' : expected[i % expected.size()];
-    difference = static_cast<unsigned char>(difference | (wanted ^ given[i]));
-  }
-  return difference == 0;
 }
 
 std::string host_name_of(std::string_view host_header) {

@@ -1,4 +1,4 @@
-// Who may talk to the server: listening address, token, Host and Origin headers, message rate. Pure functions
+// Who may talk to the server: listening address, Host and Origin headers, message rate. Pure functions
 // on untrusted text, any thread.
 #pragma once
 
@@ -8,14 +8,13 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "server/net/roles.h"
 
 namespace strandcast {
 
-/// Refuses to listen beyond loopback without a token of at least kMinRemoteTokenCharacters.
-Status check_listening(bool is_loopback, const std::string& address, const std::string& token);
-
-/// Compares in a time that depends on the length of `given` only.
-bool is_token_equal(std::string_view expected, std::string_view given);
+/// Refuses to listen where others can reach us without tokens of at least kMinRemoteTokenCharacters.
+/// `is_trusted`: on loopback, and loopback is trusted.
+Status check_listening(bool is_trusted, const std::string& address, const std::vector<AccessToken>& tokens);
 
 /// Host header without its port, lower case, IPv6 without brackets; empty when malformed.
 std::string host_name_of(std::string_view host_header);

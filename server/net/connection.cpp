@@ -92,11 +92,24 @@ void Connection::on_request(const beast::error_code& error) {
   }
   if (request.method() == http::verb::get && view(request.target()) == "/healthz")
     return respond(http::status::ok, "ok\n");
-  if (request.method() == http::verb::get && view(request.target()) == "/metrics")
-    return respond(http::status::ok, format_metrics(context_.counters_now()) + context_.handler.metrics(),
-                   "text/plain; version=0.0.4");
+  if (request.method() == http::verb::get && view(request.target()) == "/metrics") return answer_metrics();
   context_.count(&NetCounters::refused_http);
   respond(http::status::not_found, "Not found. Here are: /healthz /metrics /v1 (WebSocket).\n");
+}
+
+/// What the server does is for those who may watch it: beyond trusted loopback any role's token is needed.
+void Connection::answer_metrics() {
+  constexpr std::string_view kScheme = "Bearer ";
+  const std::string_view given = view(parser_->get()[http::field::authorization]);
+  const bool is_free = is_loopback_ && context_.config.loopback_trust == LoopbackTrust::Trusted;
+  if (!is_free &&
+      (!given.starts_with(kScheme) || !find_grant(context_.config.tokens, given.substr(kScheme.size())))) {
+    context_.count(&NetCounters::refused_token);
+    response_.set(http::field::www_authenticate, "Bearer");
+    return respond(http::status::unauthorized, "/metrics needs a token here (Authorization: Bearer).\n");
+  }
+  respond(http::status::ok, format_metrics(context_.counters_now()) + context_.handler.metrics(),
+          "text/plain; version=0.0.4");
 }
 
 void Connection::upgrade() {

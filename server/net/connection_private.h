@@ -21,6 +21,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
  private:
   void on_request(const beast::error_code& error);
   void respond(http::status status, const std::string& text, const char* content_type = "text/plain");
+  void answer_metrics();
   void upgrade();
   void finish();
 

@@ -35,6 +35,10 @@ struct Context {
   }
   /// True while another session of this peer fits; sessions that are closing do not count.
   bool has_room(const std::string& peer_address) const;
+  /// Those that have joined.
+  SessionList list_sessions(int64_t time_ns) const;
+  /// Ends a session; false when there is none of this number.
+  bool kick(SessionId id);
   /// Publishes the number of open and joined sessions.
   void update_session_counts();
   /// Learns what a class costs from its frames.

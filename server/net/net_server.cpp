@@ -47,6 +47,21 @@ bool Context::has_room(const std::string& peer_address) const {
   return all < config.limits.sessions && of_peer < config.limits.sessions_per_address;
 }
 
+SessionList Context::list_sessions(int64_t time_ns) const {
+  SessionList list;
+  for (const auto& [id, session] : sessions)
+    if (session->state() == Session::State::Joined && list.sessions.size() < kMaxListedSessions)
+      list.sessions.push_back(session->info(time_ns));
+  return list;
+}
+
+bool Context::kick(SessionId id) {
+  const auto found = sessions.find(id);
+  if (found == sessions.end() || found->second->state() != Session::State::Joined) return false;
+  std::shared_ptr(found->second)->close(CloseCode::Kicked, "An admin ended this session.");
+  return true;
+}
+
 void Context::update_session_counts() {
   uint64_t joined = 0;
   for (const auto& [id, session] : sessions)
@@ -123,7 +138,8 @@ Status NetServer::State::open() {
     return make_error(ErrorCode::BadInput,
                       "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)",
                       config.address);
-  RETURN_IF_ERROR(check_listening(address.is_loopback(), config.address, config.token));
+  RETURN_IF_ERROR(check_listening(address.is_loopback() && config.loopback_trust == LoopbackTrust::Trusted,
+                                  config.address, config.tokens));
   const net::tcp::endpoint endpoint(address, config.port);
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(net::asio::socket_base::reuse_address(true), error);

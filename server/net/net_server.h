@@ -13,11 +13,13 @@
 #include "common/codec/frame_header.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
+#include "server/net/roles.h"
 #include "server/net/strand_class.h"
 
 namespace strandcast {
 
 inline constexpr uint32_t kMaxSessions = 256;
+static_assert(kMaxSessions <= kMaxListedSessions);
 inline constexpr uint32_t kMaxSessionsPerAddress = 64;
 inline constexpr size_t kMinRemoteTokenCharacters = 16;
 
@@ -39,10 +41,14 @@ struct NetLimits {
   double viewer_bytes_per_s = 0.0;     // cap of what strands may take for one viewer; 0 = none
 };
 
+/// LikeAllOthers: behind a proxy or tunnel on this machine, where everybody seems to be local.
+enum class LoopbackTrust { Trusted, LikeAllOthers };
+
 struct NetConfig {
   std::string address = "127.0.0.1";  // numeric, or "localhost"
   uint16_t port = kDefaultPort;       // 0 = any free port
-  std::string token;                  // needed beyond loopback; never logged
+  std::vector<AccessToken> tokens;    // needed beyond loopback
+  LoopbackTrust loopback_trust = LoopbackTrust::Trusted;
   std::vector<std::string>
       allowed_hosts;  // accepted in the Host header, besides the server's own address and name
   NetLimits limits;
@@ -69,6 +75,8 @@ class NetHandler {
   virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   virtual void on_ack(SessionId session, const FrameAck& ack) = 0;
+  /// An admin wants the server to end.
+  virtual void on_shut_down(SessionId) {}
   /// The session waits for a keyframe of this strand class given to publish_strands(). Repeated until one
   /// comes.
   virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;

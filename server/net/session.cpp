@@ -36,24 +36,11 @@ CloseCode close_code_for(const Error& error) {
 }
 
 const char* message_name(const ClientMessage& message) {
-  constexpr const char* kNames[] = {"Hello",        "MotionSamples",   "WindSamples",
-                                    "CameraChange", "KeyframeRequest", "FrameAck",
-                                    "Ping",         "ControlCommand",  "SetParameter"};
+  constexpr const char* kNames[] = {"Hello",           "MotionSamples", "WindSamples", "CameraChange",
+                                    "KeyframeRequest", "FrameAck",      "Ping",        "ControlCommand",
+                                    "SetParameter",    "AdminCommand"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
-}
-
-bool may_send(Role role, const ClientMessage& message) {
-  return std::visit(
-      Overloaded{[](const Hello&) { return false; },
-                 [&](const MotionSamples&) { return role == Role::Source; },
-                 [&](const WindSamples&) { return role == Role::Source; },
-                 [&](const CameraChange&) { return role != Role::Source; },
-                 [&](const KeyframeRequest&) { return role != Role::Source; },
-                 [&](const FrameAck&) { return role != Role::Source; }, [](const Ping&) { return true; },
-                 [&](const ControlCommand&) { return role == Role::Controller; },
-                 [&](const SetParameter&) { return role == Role::Controller; }},
-      message);
 }
 
 }  // namespace
@@ -167,19 +154,22 @@ void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
 }
 
 void Session::join(const Hello& hello) {
-  if (!context_.config.token.empty() && !is_token_equal(context_.config.token, hello.token)) {
+  if (const Status allowed = check_role(context_.config.tokens, hello); !allowed) {
     context_.count(&NetCounters::refused_token);
-    log_warn("net", "session {} from {}: wrong token", id_, peer_address_);
-    return close(CloseCode::Unauthorized, "The token is wrong or missing.");
+    log_warn("net", "session {} from {} as {}: {}", id_, peer_address_, to_string(hello.role),
+             allowed.error().to_string());
+    return close(close_code_for(allowed.error()), allowed.error().to_string());
   }
   Result<Admission> admission = context_.handler.on_hello(id_, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   hello_.token.clear();
+  admission->welcome.role = hello.role;
   mode_ = admission->welcome.mode;
   picture_class_ = admission->picture_class;
   has_joined_ = true;
   state_ = State::Joined;
+  state_since_ns_ = now_ns();
   context_.update_session_counts();
   log_info("net", "session {} from {} joined: {} '{}', {}", id_, peer_address_, to_string(hello.role),
            hello.name, to_string(mode_));
@@ -218,8 +208,37 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                           queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
                         },
                         [&](const ControlCommand& command) { handler.on_command(id_, command); },
-                        [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); }},
+                        [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
+                        [&](const AdminCommand& command) { obey(command, arrival_ns); }},
              message);
+}
+
+void Session::obey(const AdminCommand& command, int64_t time_ns) {
+  if (command.action == AdminAction::ListSessions) return queue_control(context_.list_sessions(time_ns));
+  log_info("net", "session {} from {}: an admin {}", id_, peer_address_,
+           command.action == AdminAction::Kick ? fmt::format("ends session {}", command.session)
+                                               : "ends the server");
+  if (command.action == AdminAction::ShutDown) {
+    queue_control(Notice{false, "The server is stopping."});
+    return context_.handler.on_shut_down(id_);
+  }
+  const bool is_known = context_.kick(command.session);
+  if (state_ != State::Joined) return;  // it was this one
+  queue_control(is_known ? Notice{false, fmt::format("Session {} was ended.", command.session)}
+                         : Notice{true, fmt::format("There is no session {}.", command.session)});
+}
+
+SessionInfo Session::info(int64_t time_ns) const {
+  SessionInfo info;
+  info.id = id_;
+  info.name = hello_.name;
+  info.address = peer_address_;
+  info.role = hello_.role;
+  info.mode = mode_;
+  info.sent_bytes = sent_bytes_;
+  info.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  info.connected_s = static_cast<double>(time_ns - state_since_ns_) * 1e-9;
+  return info;
 }
 
 void Session::reject(CloseCode code, const std::string& reason) {
@@ -384,6 +403,7 @@ void Session::on_written(const beast::error_code& error, size_t byte_count) {
   if (state_ == State::Closed) return;
   if (error) return finish();
   context_.count(&NetCounters::bytes_sent, byte_count);
+  sent_bytes_ += byte_count;
   unwritten_ = unwritten_.subspan(byte_count);
   if (!unwritten_.empty()) return write_chunk();
   is_writing_ = false;

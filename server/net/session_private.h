@@ -39,6 +39,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void abort();
 
   State state() const { return state_; }
+  /// For an admin's list.
+  SessionInfo info(int64_t time_ns) const;
   const std::string& peer_address() const { return peer_address_; }
 
  private:
@@ -50,6 +52,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
   void join(const Hello& hello);
   void dispatch(const ClientMessage& message, int64_t arrival_ns);
+  void obey(const AdminCommand& command, int64_t time_ns);
   void reject(CloseCode code, const std::string& reason);
   void queue_control(ServerMessage message);
   void pump();
@@ -82,6 +85,7 @@ class Session : public std::enable_shared_from_this<Session> {
   SendQueue queue_;
   FlowControl flow_;
   uint16_t strand_class_ = 0;
+  uint64_t sent_bytes_ = 0;
   uint64_t counted_drops_ = 0;
   uint64_t counted_losses_ = 0;
 

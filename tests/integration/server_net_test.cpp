@@ -6,137 +6,20 @@
 
 #include <algorithm>
 #include <atomic>
-#include <mutex>
-#include <set>
-#include <stdexcept>
 #include <thread>
 
 #include "common/base/profile.h"
-#include "tests/support/raw_client.h"
+#include "tests/support/server_net_fixture.h"
 
 namespace strandcast {
 namespace {
 
+using test::code;
 using test::eventually;
+using test::FakeApp;
+using test::media;
 using test::RawClient;
-
-uint16_t code(CloseCode close_code) {
-  return static_cast<uint16_t>(close_code);
-}
-
-EncodedFramePtr media(Opcode opcode, uint32_t sequence, uint32_t base_sequence, size_t payload_bytes = 64) {
-  FrameHeader header;
-  header.opcode = opcode;
-  header.sequence = sequence;
-  header.base_sequence = base_sequence;
-  return make_encoded_frame(header, std::vector<std::byte>(payload_bytes, std::byte{0x5a}));
-}
-
-/// A chain of strand frames like an encoder's; also the handler that counts what reached the application.
-class FakeApp : public NetHandler {
- public:
-  Result<Admission> on_hello(SessionId session, const Hello& hello) override {
-    if (hello.name == "throw") throw std::runtime_error("handler failed on purpose");
-    if (hello.name == "refuse") return make_error(ErrorCode::BadInput, "Refused on purpose.");
-    const std::lock_guard lock(mutex_);
-    joined_.insert(session);
-    Admission admission;
-    admission.welcome.session_id = "0123456789abcdef";
-    admission.welcome.scene_name = "fake";
-    admission.welcome.codec = "delta";
-    admission.welcome.mode = hello.mode;
-    admission.welcome.strand_count = 1;
-    admission.welcome.vertex_count = 16;
-    admission.welcome.bound_m = 1e-4f;
-    admission.asset = media(Opcode::Asset, 1, 0, asset_bytes);
-    return admission;
-  }
-  void on_motion(SessionId, const MotionSamples& samples, int64_t) override {
-    motion += samples.samples.size();
-  }
-  void on_wind(SessionId, const WindSamples& samples, int64_t) override { wind += samples.samples.size(); }
-  void on_command(SessionId session, const ControlCommand&) override {
-    ++commands;
-    server->send(session, Notice{false, "done"});
-  }
-  void on_parameter(SessionId, const SetParameter&) override { ++parameters; }
-  void on_camera(SessionId, const CameraChange&) override { ++cameras; }
-  void on_ack(SessionId, const FrameAck& ack) override { last_ack = ack.sequence; }
-  void on_keyframe_request(SessionId, uint16_t) override {
-    const std::lock_guard lock(mutex_);
-    ++keyframe_requests;
-    if (sequence_ > 0) server->publish_strands(media(Opcode::StrandKeyframe, sequence_, 0, frame_bytes));
-  }
-  void on_left(SessionId session) override {
-    const std::lock_guard lock(mutex_);
-    left_twice = left_twice || joined_.count(session) == 0;
-    joined_.erase(session);
-  }
-
-  void publish_next() {
-    const std::lock_guard lock(mutex_);
-    ++sequence_;
-    server->publish_strands(sequence_ == 1
-                                ? media(Opcode::StrandKeyframe, 1, 0, frame_bytes)
-                                : media(Opcode::StrandDelta, sequence_, sequence_ - 1, frame_bytes));
-  }
-  uint32_t sequence() const {
-    const std::lock_guard lock(mutex_);
-    return sequence_;
-  }
-  size_t joined_count() const {
-    const std::lock_guard lock(mutex_);
-    return joined_.size();
-  }
-
-  NetServer* server = nullptr;
-  size_t frame_bytes = 256;
-  size_t asset_bytes = 1'000;
-  std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0};
-  std::atomic<uint32_t> last_ack{0};
-  std::atomic<bool> left_twice{false};
-
- private:
-  mutable std::mutex mutex_;
-  std::set<SessionId> joined_;
-  uint32_t sequence_ = 0;
-};
-
-class ServerNet : public testing::Test {
- protected:
-  void start(NetConfig config = {}) {
-    config.port = 0;
-    auto server = NetServer::listen(config, app_);
-    ASSERT_TRUE(server.ok()) << server.error().to_string();
-    server_ = std::move(*server);
-    app_.server = server_.get();
-    server_->start();
-  }
-  void TearDown() override {
-    if (server_ != nullptr) server_->stop();
-    EXPECT_EQ(app_.joined_count(), 0u) << "every session that joined must leave";
-    EXPECT_FALSE(app_.left_twice);
-  }
-
-  static Hello hello(Role role = Role::Viewer, const std::string& token = {}) {
-    Hello message;
-    message.role = role;
-    message.name = "test";
-    message.token = token;
-    return message;
-  }
-  /// A client that is past Welcome.
-  std::unique_ptr<RawClient> join(const Hello& message = hello(), int receive_buffer_bytes = 0) {
-    auto client = std::make_unique<RawClient>(server_->port(), receive_buffer_bytes);
-    EXPECT_TRUE(client->handshake());
-    client->send(message);
-    EXPECT_TRUE(client->read_control<Welcome>().has_value());
-    return client;
-  }
-
-  FakeApp app_;
-  std::unique_ptr<NetServer> server_;
-};
+using test::ServerNet;
 
 TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
   start();
@@ -219,27 +102,6 @@ TEST_F(ServerNet, RolesReachTheirHandlersAndPingIsAnswered) {
   EXPECT_LE(pong->server_receive_ns, pong->server_send_ns);
 }
 
-TEST_F(ServerNet, WrongRoleIsClosedWithPolicy) {
-  start();
-  const std::vector<std::pair<Role, ClientMessage>> cases = {
-      {Role::Viewer, MotionSamples{{MotionSamples::Sample{1, Pose{}}}}},
-      {Role::Viewer, WindSamples{{WindSamples::Sample{1, glm::vec3(0.0f)}}}},
-      {Role::Viewer, ControlCommand{Command::Pause}},
-      {Role::Viewer, SetParameter{"solver.name=dftl"}},
-      {Role::Controller, MotionSamples{{MotionSamples::Sample{1, Pose{}}}}},
-      {Role::Source, ControlCommand{Command::Pause}},
-      {Role::Source, KeyframeRequest{}},
-      {Role::Viewer, hello()}};
-  for (const auto& [role, message] : cases) {
-    auto client = join(hello(role));
-    client->send(message);
-    const RawClient::End end = client->read_end();
-    EXPECT_EQ(end.close_code, code(CloseCode::Policy)) << "message " << message.index();
-    EXPECT_FALSE(end.reason.empty());
-  }
-  EXPECT_EQ(app_.motion + app_.wind + app_.commands + app_.parameters, 0u);
-}
-
 TEST_F(ServerNet, GarbageAtEveryStateClosesThatSessionOnly) {
   start();
   app_.publish_next();
@@ -284,22 +146,6 @@ TEST_F(ServerNet, OneByteTooMuchIsTooBig) {
   auto client = join();
   client->send_bytes(std::vector<std::byte>(kMaxControlBytes + 1, std::byte{1}));
   EXPECT_EQ(client->read_end().close_code, code(CloseCode::TooBig));
-}
-
-TEST_F(ServerNet, TokenIsNeededWhenSet) {
-  NetConfig config;
-  config.token = "0123456789abcdef";
-  start(config);
-  for (const char* token : {"", "0123456789abcdee", "0123456789abcdef0123456789abcdef"}) {
-    RawClient client(server_->port());
-    ASSERT_TRUE(client.handshake());
-    client.send(hello(Role::Viewer, token));
-    const RawClient::End end = client.read_end();
-    EXPECT_EQ(end.close_code, code(CloseCode::Unauthorized));
-    EXPECT_EQ(end.reason.find("0123456789"), std::string::npos) << "the token must not leak";
-  }
-  EXPECT_EQ(server_->counters().refused_token, 3u);
-  EXPECT_NE(join(hello(Role::Viewer, config.token)), nullptr);
 }
 
 TEST_F(ServerNet, HandlerErrorsAndExceptionsEndOneSession) {

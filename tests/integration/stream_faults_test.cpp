@@ -325,7 +325,7 @@ TEST_F(StreamFaults, AViewerComesBackAfterResetsAndStopsWhenItMust) {
   ServerConfig strict;
   strict.scene = small_scene();
   strict.net.port = 0;
-  strict.net.token = "0123456789abcdef";
+  strict.net.tokens = {{"0123456789abcdef", Grant::AllButAdmin}};
   auto other = Server::start(strict);
   ASSERT_TRUE(other.ok());
   link->set_to_port((*other)->port());

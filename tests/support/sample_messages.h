@@ -24,7 +24,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
           FrameAck{4'000'000'000u, -5, 1234, 65'535},
           Ping{INT64_MIN},
           ControlCommand{Command::Reset},
-          SetParameter{"solver.name=dftl"}};
+          SetParameter{"solver.name=dftl"},
+          AdminCommand{AdminAction::Kick, 1ull << 40}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {
@@ -46,6 +47,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   welcome.camera.offset_m = {0.0f, 0.0f, 2.0f};
   welcome.frame_width = 1280;
   welcome.frame_height = 720;
+  welcome.role = Role::Admin;
   ServerStatus status;
   status.tick = 1ull << 40;
   status.sim_ms = 2.5;
@@ -60,12 +62,15 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.quarantined_strands = 23;
   status.overstretched_strands = 29;
   status.queue_delay_ms = 31.5;
-  return {welcome,
-          Pong{1, -2, INT64_MAX},
-          status,
-          Goodbye{"the server is shutting down"},
-          Notice{true, "unknown field 'x'"},
-          StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link"}};
+  return {
+      welcome,
+      Pong{1, -2, INT64_MAX},
+      status,
+      Goodbye{"the server is shutting down"},
+      Notice{true, "unknown field 'x'"},
+      StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link"},
+      SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
+                   {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}}};
 }
 
 }  // namespace strandcast

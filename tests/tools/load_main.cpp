@@ -29,7 +29,7 @@ struct CommandLine {
 
 void declare(CLI::App& app, CommandLine& line) {
   app.add_option("--connect", line.connect, "HOST:PORT of the server, numeric")->capture_default_str();
-  app.add_option("--token", line.token, "Token of the server");
+  app.add_option("--token", line.token, kTokenHelp)->envname(kTokenVariable);
   app.add_option("--token-file", line.token_file, "File with the token");
   app.add_option("--viewers", line.viewers, "Viewers of strands that acknowledge")->capture_default_str();
   app.add_option("--frame-viewers", line.frame_viewers, "Viewers of the server's pictures besides");
@@ -120,7 +120,7 @@ Status join_all(LoadViewers& viewers, const CommandLine& line) {
 Status run(CommandLine line) {
   ASSIGN_OR_RETURN(const Address address, parse_address(line.connect));
   if (!line.token_file.empty()) {
-    ASSIGN_OR_RETURN(line.token, load_token(line.token_file));
+    ASSIGN_OR_RETURN(line.token, load_token(line.token_file, Role::Viewer));
   }
   const std::atomic<bool>& stop = catch_stop_signals();
   LoadViewers viewers({address.host, address.port, line.token});

@@ -193,11 +193,6 @@ TEST(ServerOptions, NamesWhatIsWrong) {
     ASSERT_FALSE(options.ok()) << arguments[0];
     EXPECT_FALSE(options.error().message.empty());
   }
-  const auto options = parse({"--token-file", "/no/such/token"});
-  ASSERT_TRUE(options.ok());
-  const auto config = load_config(*options);
-  ASSERT_FALSE(config.ok());
-  EXPECT_THAT(config.error().to_string(), HasSubstr("/no/such/token"));
 }
 
 }  // namespace

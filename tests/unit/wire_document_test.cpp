@@ -33,6 +33,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kWebSocketProtocol", kWebSocketProtocol},
       {"kMaxControlBytes", with_commas(kMaxControlBytes)},
       {"kClockWindow", with_commas(kClockWindow)},
+      {"kMaxListedSessions", with_commas(kMaxListedSessions)},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},
@@ -70,6 +71,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
   EXPECT_THAT(text, HasSubstr(fmt::format("at most {} samples of time (source", kMaxSamplesPerMessage)));
   EXPECT_THAT(text, HasSubstr(fmt::format("name <= {} printable", kMaxNameChars)));
   EXPECT_THAT(text, HasSubstr(fmt::format("token <= {} bytes", kMaxTokenBytes)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("name <= {} characters, address <= {} characters",
+                                          kMaxListedNameChars, kMaxAddressChars)));
   EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
   EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
   EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
@@ -87,9 +90,9 @@ TEST(WireDocument, ListsEveryOpcodeAndCloseCode) {
   for (const Opcode opcode :
        {Opcode::Control, Opcode::Asset, Opcode::StrandKeyframe, Opcode::StrandDelta, Opcode::JpegFrame})
     EXPECT_THAT(text, HasSubstr(fmt::format("| `0x{:02x}` |", static_cast<int>(opcode))));
-  for (const CloseCode code :
-       {CloseCode::Normal, CloseCode::GoingAway, CloseCode::BadData, CloseCode::Policy, CloseCode::TooBig,
-        CloseCode::Internal, CloseCode::TryLater, CloseCode::Unauthorized, CloseCode::Full})
+  for (const CloseCode code : {CloseCode::Normal, CloseCode::GoingAway, CloseCode::BadData, CloseCode::Policy,
+                               CloseCode::TooBig, CloseCode::Internal, CloseCode::TryLater,
+                               CloseCode::Unauthorized, CloseCode::Kicked, CloseCode::Full})
     EXPECT_THAT(text, HasSubstr(fmt::format("{} |", static_cast<int>(code))));
 }
 

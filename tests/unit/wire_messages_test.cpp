@@ -83,12 +83,17 @@ TEST(WireMessages, EveryFieldComesBack) {
   EXPECT_EQ(round_trip(Ping{INT64_MIN}).client_time_ns, INT64_MIN);
   for (const Command command : {Command::Pause, Command::Resume, Command::StepOnce, Command::Reset})
     EXPECT_EQ(round_trip(ControlCommand{command}).command, command);
-  for (const Role role : {Role::Viewer, Role::Controller, Role::Source}) {
+  for (const Role role : {Role::Viewer, Role::Controller, Role::Source, Role::Admin}) {
     Hello one;
     one.role = role;
     EXPECT_EQ(round_trip(one).role, role);
   }
   EXPECT_EQ(round_trip(SetParameter{"a.b=c"}).assignment, "a.b=c");
+  for (const AdminAction action : {AdminAction::ListSessions, AdminAction::Kick, AdminAction::ShutDown}) {
+    const AdminCommand command = round_trip(AdminCommand{action, 1ull << 63});
+    EXPECT_EQ(command.action, action);
+    EXPECT_EQ(command.session, 1ull << 63);
+  }
 }
 
 TEST(WireMessages, EveryServerFieldComesBack) {
@@ -119,6 +124,7 @@ TEST(WireMessages, EveryServerFieldComesBack) {
   EXPECT_EQ(welcome.camera.offset_m, sent.camera.offset_m);
   EXPECT_EQ(welcome.frame_width, sent.frame_width);
   EXPECT_EQ(welcome.frame_height, sent.frame_height);
+  EXPECT_EQ(welcome.role, Role::Admin);
   const Pong pong = round_trip(Pong{1, -2, INT64_MAX});
   EXPECT_EQ(pong.client_time_ns, 1);
   EXPECT_EQ(pong.server_receive_ns, -2);
@@ -142,6 +148,18 @@ TEST(WireMessages, EveryServerFieldComesBack) {
   EXPECT_EQ(quality.strand_share, 0.5f);
   EXPECT_EQ(quality.bound_m, 5e-4f);
   EXPECT_EQ(quality.reason, "slow");
+  const auto& listed = std::get<SessionList>(messages[6]).sessions;
+  const auto sessions = round_trip(SessionList{listed}).sessions;
+  ASSERT_EQ(sessions.size(), 2u);
+  EXPECT_EQ(sessions[0].id, 7u);
+  EXPECT_EQ(sessions[0].name, "Zoë");
+  EXPECT_EQ(sessions[0].address, "2001:db8::1");
+  EXPECT_EQ(sessions[0].role, Role::Controller);
+  EXPECT_EQ(sessions[1].role, Role::Admin);
+  EXPECT_EQ(sessions[0].mode, StreamMode::Frames);
+  EXPECT_EQ(sessions[0].sent_bytes, 1ull << 40);
+  EXPECT_EQ(sessions[0].queue_delay_ms, 12.5);
+  EXPECT_EQ(sessions[0].connected_s, 0.25);
   EXPECT_EQ(back.quarantined_strands, status.quarantined_strands);
   EXPECT_EQ(back.overstretched_strands, status.overstretched_strands);
   EXPECT_EQ(round_trip(Goodbye{"bye"}).reason, "bye");
@@ -262,6 +280,25 @@ TEST(WireMessages, StreamQualityIsCheckedFieldByField) {
   EXPECT_EQ(place_after([](StreamQuality& q) { q.strand_share = 0.0f; }), "quality.strand_share");
   EXPECT_EQ(place_after([](StreamQuality& q) { q.strand_share = 1.5f; }), "quality.strand_share");
   EXPECT_EQ(place_after([](StreamQuality& q) { q.bound_m = std::nanf(""); }), "quality.bound_m");
+}
+
+TEST(WireMessages, TheLongestSessionListFitsIntoOneMessage) {
+  SessionInfo longest;
+  longest.id = longest.sent_bytes = UINT64_MAX;
+  for (size_t i = 0; i < kMaxListedNameChars; ++i) longest.name += "\U0001f488";  // four bytes of UTF-8
+  longest.address = std::string(kMaxAddressChars, '6');
+  longest.role = Role::Admin;
+  longest.mode = StreamMode::Frames;
+  longest.queue_delay_ms = longest.connected_s = 1e9;
+  SessionList list{std::vector<SessionInfo>(kMaxListedSessions, longest)};
+  EXPECT_LE(encode(ServerMessage(list)).size(), kMaxControlBytes);
+  EXPECT_EQ(round_trip(list).sessions.back().name, longest.name);
+  list.sessions[0].name += "x";
+  EXPECT_EQ(round_trip(list).sessions[0].name, longest.name) << "a sender shortens";
+  list.sessions.push_back({});
+  const auto refused = decode_server_message(encode(ServerMessage(list)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
 }
 
 TEST(WireMessages, ClientLimitsAreExact) {

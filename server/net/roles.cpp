@@ -1,0 +1,94 @@
+#include "server/net/roles.h"
+
+namespace strandcast {
+namespace {
+
+template <class... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+
+}  // namespace
+
+bool may_be(Grant grant, Role role) {
+  switch (grant) {
+    case Grant::Viewer:
+      return role == Role::Viewer;
+    case Grant::Controller:
+      return role == Role::Viewer || role == Role::Controller;
+    case Grant::Source:
+      return role == Role::Source;
+    case Grant::AllButAdmin:
+      return role != Role::Admin;
+    case Grant::Admin:
+      return true;
+  }
+  return false;
+}
+
+bool may_send(Role role, const ClientMessage& message) {
+  const bool watches = role != Role::Source;
+  const bool steers = role == Role::Controller || role == Role::Admin;
+  const bool feeds = role == Role::Source || role == Role::Admin;
+  return std::visit(
+      Overloaded{[](const Hello&) { return false; }, [&](const MotionSamples&) { return feeds; },
+                 [&](const WindSamples&) { return feeds; }, [&](const CameraChange&) { return watches; },
+                 [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
+                 [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
+                 [&](const SetParameter&) { return steers; },
+                 [&](const AdminCommand&) { return role == Role::Admin; }},
+      message);
+}
+
+bool is_token_equal(std::string_view expected, std::string_view given) {
+  // No early exit: the time must not tell how many leading characters were right.
+  volatile unsigned char difference = expected.size() == given.size() ? 0 : 1;
+  for (size_t i = 0; i < given.size(); ++i) {
+    const char wanted = expected.empty() ? '\0' : expected[i % expected.size()];
+    difference = static_cast<unsigned char>(difference | (wanted ^ given[i]));
+  }
+  return difference == 0;
+}
+
+std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::string_view given) {
+  // Every token costs the same, whether it is the one or not.
+  volatile size_t found = 0;  // index + 1
+  for (size_t i = 0; i < tokens.size(); ++i) {
+    const size_t mask = size_t{0} - static_cast<size_t>(is_token_equal(tokens[i].secret, given));
+    found = (found & ~mask) | ((i + 1) & mask);
+  }
+  if (found == 0) return std::nullopt;
+  return tokens[found - 1].grant;
+}
+
+Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello) {
+  if (tokens.empty()) {
+    if (hello.role != Role::Admin) return {};
+    return make_error(ErrorCode::BadInput,
+                      "An admin needs an admin's token, and this server has none (--token-file).");
+  }
+  const std::optional<Grant> grant = find_grant(tokens, hello.token);
+  if (!grant) return make_error(ErrorCode::Unauthorized, "The token is wrong or missing.");
+  if (!may_be(*grant, hello.role))
+    return make_error(ErrorCode::BadInput, "This token is good for {}, not for {} {}.", to_string(*grant),
+                      hello.role == Role::Admin ? "an" : "a", to_string(hello.role));
+  return {};
+}
+
+const char* to_string(Grant grant) {
+  switch (grant) {
+    case Grant::Viewer:
+      return "viewer";
+    case Grant::Controller:
+      return "controller";
+    case Grant::Source:
+      return "source";
+    case Grant::AllButAdmin:
+      return "all but admin";
+    case Grant::Admin:
+      return "admin";
+  }
+  return "unknown";
+}
+
+}  // namespace strandcast

@@ -1,0 +1,209 @@
+// Who is let in as what, and what an admin may do: NetServer against raw clients.
+#include <map>
+
+#include "tests/support/sample_messages.h"
+#include "tests/support/server_net_fixture.h"
+
+namespace strandcast {
+namespace {
+
+using test::code;
+using test::eventually;
+using test::RawClient;
+
+const std::vector<AccessToken> kTokens = {{"viewer-token-0000", Grant::Viewer},
+                                          {"controller-token-1", Grant::Controller},
+                                          {"source-token-2222", Grant::Source},
+                                          {"admin-token-33333", Grant::Admin}};
+constexpr Role kRoles[] = {Role::Viewer, Role::Controller, Role::Source, Role::Admin};
+
+class ServerAccess : public test::ServerNet {
+ protected:
+  void start_with_tokens(LoopbackTrust trust = LoopbackTrust::Trusted) {
+    NetConfig config;
+    config.tokens = kTokens;
+    config.loopback_trust = trust;
+    start(config);
+  }
+  static Hello hello_as(Role role, const std::string& token) {
+    Hello message = hello(role, token);
+    message.name = to_string(role);
+    return message;
+  }
+  std::unique_ptr<RawClient> join_as(Role role) {
+    return join(hello_as(role, kTokens[static_cast<size_t>(role)].secret));
+  }
+};
+
+TEST_F(ServerAccess, EveryTokenAndRole) {
+  start_with_tokens();
+  for (const AccessToken& token : kTokens)
+    for (const Role role : kRoles) {
+      RawClient client(server_->port());
+      ASSERT_TRUE(client.handshake());
+      client.send(hello_as(role, token.secret));
+      if (may_be(token.grant, role)) {
+        const auto welcome = client.read_control<Welcome>();
+        ASSERT_TRUE(welcome) << to_string(token.grant) << " as " << to_string(role);
+        EXPECT_EQ(welcome->role, role);
+        continue;
+      }
+      const RawClient::End end = client.read_end();
+      EXPECT_EQ(end.close_code, code(CloseCode::Policy))
+          << to_string(token.grant) << " as " << to_string(role);
+      EXPECT_NE(end.reason.find(to_string(role)), std::string::npos) << end.reason;
+    }
+}
+
+TEST_F(ServerAccess, WrongTokensAreRefusedAndNotRepeated) {
+  start_with_tokens();
+  for (const char* token :
+       {"", "viewer-token-000", "viewer-token-0000viewer-token-0000", "viewer-token-0001"}) {
+    RawClient client(server_->port());
+    ASSERT_TRUE(client.handshake());
+    client.send(hello(Role::Viewer, token));
+    const RawClient::End end = client.read_end();
+    EXPECT_EQ(end.close_code, code(CloseCode::Unauthorized));
+    EXPECT_EQ(end.reason.find("-token-"), std::string::npos) << "the token must not leak";
+  }
+  EXPECT_EQ(server_->counters().refused_token, 4u);
+}
+
+TEST_F(ServerAccess, EveryMessageAndRole) {
+  start_with_tokens();
+  app_.publish_next();
+  for (const ClientMessage& message : sample_client_messages())
+    for (const Role role : kRoles) {
+      auto client = join_as(role);
+      client->send(message);
+      if (may_send(role, message)) {
+        client->send(Ping{42});
+        EXPECT_TRUE(client->read_control<Pong>()) << to_string(role) << " sends message " << message.index();
+        continue;
+      }
+      const RawClient::End end = client->read_end();
+      EXPECT_EQ(end.close_code, code(CloseCode::Policy)) << to_string(role) << " sends " << message.index();
+      EXPECT_NE(end.reason.find(to_string(role)), std::string::npos) << end.reason;
+    }
+  // A source and an admin, each once; a controller and an admin, each once.
+  EXPECT_EQ(app_.motion, 10u);
+  EXPECT_EQ(app_.wind, 10u);
+  EXPECT_EQ(app_.commands, 2u);
+  EXPECT_EQ(app_.parameters, 2u);
+}
+
+TEST_F(ServerAccess, WithoutTokensNobodyIsAdmin) {
+  start();
+  RawClient client(server_->port());
+  ASSERT_TRUE(client.handshake());
+  client.send(hello(Role::Admin));
+  EXPECT_EQ(client.read_end().close_code, code(CloseCode::Policy));
+  for (const Role role : {Role::Viewer, Role::Controller, Role::Source})
+    EXPECT_NE(join(hello(role)), nullptr);
+}
+
+TEST_F(ServerAccess, AnAdminSeesEverySessionAndNoToken) {
+  start_with_tokens();
+  auto viewer = join_as(Role::Viewer);
+  auto source = join_as(Role::Source);
+  auto admin = join_as(Role::Admin);
+  admin->send(AdminCommand{AdminAction::ListSessions, 0});
+  const auto list = admin->read_control<SessionList>();
+  ASSERT_TRUE(list);
+  ASSERT_EQ(list->sessions.size(), 3u);
+  const Role roles[] = {Role::Viewer, Role::Source, Role::Admin};
+  for (size_t i = 0; i < 3; ++i) {
+    const SessionInfo& session = list->sessions[i];
+    EXPECT_EQ(session.role, roles[i]);
+    EXPECT_EQ(session.name, to_string(roles[i]));
+    EXPECT_EQ(session.address, "127.0.0.1");
+    EXPECT_GT(session.sent_bytes, 0u) << "a Welcome at least";
+    EXPECT_GE(session.connected_s, 0.0);
+  }
+  const auto bytes = encode(ServerMessage(*list));
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  EXPECT_EQ(text.find("-token-"), std::string::npos);
+}
+
+TEST_F(ServerAccess, AnAdminEndsOneSession) {
+  start_with_tokens();
+  auto victim = join_as(Role::Viewer);
+  auto other = join_as(Role::Viewer);
+  auto admin = join_as(Role::Admin);
+  admin->send(AdminCommand{AdminAction::ListSessions, 0});
+  const auto list = admin->read_control<SessionList>();
+  ASSERT_TRUE(list);
+  admin->send(AdminCommand{AdminAction::Kick, list->sessions[0].id});
+  const RawClient::End end = victim->read_end();
+  EXPECT_EQ(end.close_code, code(CloseCode::Kicked));
+  EXPECT_FALSE(end.reason.empty());
+  auto notice = admin->read_control<Notice>();
+  ASSERT_TRUE(notice);
+  EXPECT_FALSE(notice->is_error) << notice->text;
+  other->send(Ping{1});
+  EXPECT_TRUE(other->read_control<Pong>());
+  // Nobody has this number now, and none ever had the other.
+  for (const uint64_t session : {list->sessions[0].id, uint64_t{1} << 60}) {
+    admin->send(AdminCommand{AdminAction::Kick, session});
+    notice = admin->read_control<Notice>();
+    ASSERT_TRUE(notice);
+    EXPECT_TRUE(notice->is_error);
+  }
+  admin->send(AdminCommand{AdminAction::Kick, list->sessions[2].id});
+  EXPECT_EQ(admin->read_end().close_code, code(CloseCode::Kicked)) << "itself, too";
+}
+
+TEST_F(ServerAccess, AnAdminEndsTheServer) {
+  start_with_tokens();
+  auto admin = join_as(Role::Admin);
+  admin->send(AdminCommand{AdminAction::ShutDown, 0});
+  const auto notice = admin->read_control<Notice>();
+  ASSERT_TRUE(notice);
+  EXPECT_FALSE(notice->is_error);
+  EXPECT_TRUE(eventually([&] { return app_.shut_downs == 1; }));
+}
+
+std::string metrics_with(uint16_t port, const std::string& header) {
+  RawClient client(port);
+  client.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");
+  return client.read_raw_to_end();
+}
+
+TEST_F(ServerAccess, MetricsNeedATokenWhereLoopbackIsNotTrusted) {
+  start_with_tokens(LoopbackTrust::LikeAllOthers);
+  const uint16_t port = server_->port();
+  for (const AccessToken& token : kTokens) {
+    const std::string answer = metrics_with(port, "Authorization: Bearer " + token.secret + "\r\n");
+    EXPECT_NE(answer.find("200 OK"), std::string::npos) << to_string(token.grant);
+    EXPECT_NE(answer.find("strandcast_net_connections_total"), std::string::npos);
+  }
+  for (const std::string& header :
+       {std::string(), std::string("Authorization: Bearer \r\n"),
+        std::string("Authorization: Bearer wrong\r\n"), "Authorization: Basic " + kTokens[0].secret + "\r\n",
+        "Authorization: " + kTokens[0].secret + "\r\n",
+        "Authorization: Bearer " + kTokens[0].secret + "x\r\n"}) {
+    const std::string answer = metrics_with(port, header);
+    EXPECT_NE(answer.find("401"), std::string::npos) << header;
+    EXPECT_NE(answer.find("WWW-Authenticate: Bearer"), std::string::npos);
+    EXPECT_EQ(answer.find("strandcast_net"), std::string::npos);
+  }
+  EXPECT_NE(test::http_get(port, "/healthz").find("200 OK"), std::string::npos) << "free for load balancers";
+}
+
+TEST_F(ServerAccess, MetricsAreFreeOnTrustedLoopback) {
+  start_with_tokens();
+  EXPECT_NE(metrics_with(server_->port(), "").find("200 OK"), std::string::npos);
+}
+
+TEST(ServerAccessListen, UntrustedLoopbackNeedsTokens) {
+  test::FakeApp app;
+  NetConfig config;
+  config.port = 0;
+  config.loopback_trust = LoopbackTrust::LikeAllOthers;
+  EXPECT_FALSE(NetServer::listen(config, app));
+  config.tokens = kTokens;
+  EXPECT_TRUE(NetServer::listen(config, app));
+}
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,140 @@
+// A NetServer with a made-up application behind it, for tests with raw clients.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "server/net/net_server.h"
+#include "tests/support/raw_client.h"
+
+namespace strandcast::test {
+
+inline uint16_t code(CloseCode close_code) {
+  return static_cast<uint16_t>(close_code);
+}
+
+inline EncodedFramePtr media(Opcode opcode, uint32_t sequence, uint32_t base_sequence,
+                             size_t payload_bytes = 64) {
+  FrameHeader header;
+  header.opcode = opcode;
+  header.sequence = sequence;
+  header.base_sequence = base_sequence;
+  return make_encoded_frame(header, std::vector<std::byte>(payload_bytes, std::byte{0x5a}));
+}
+
+/// A chain of strand frames like an encoder's; also the handler that counts what reached the application.
+class FakeApp : public NetHandler {
+ public:
+  Result<Admission> on_hello(SessionId session, const Hello& hello) override {
+    if (hello.name == "throw") throw std::runtime_error("handler failed on purpose");
+    if (hello.name == "refuse") return make_error(ErrorCode::BadInput, "Refused on purpose.");
+    const std::lock_guard lock(mutex_);
+    joined_.insert(session);
+    Admission admission;
+    admission.welcome.session_id = "0123456789abcdef";
+    admission.welcome.scene_name = "fake";
+    admission.welcome.codec = "delta";
+    admission.welcome.mode = hello.mode;
+    admission.welcome.strand_count = 1;
+    admission.welcome.vertex_count = 16;
+    admission.welcome.bound_m = 1e-4f;
+    admission.asset = media(Opcode::Asset, 1, 0, asset_bytes);
+    return admission;
+  }
+  void on_motion(SessionId, const MotionSamples& samples, int64_t) override {
+    motion += samples.samples.size();
+  }
+  void on_wind(SessionId, const WindSamples& samples, int64_t) override { wind += samples.samples.size(); }
+  void on_command(SessionId session, const ControlCommand&) override {
+    ++commands;
+    server->send(session, Notice{false, "done"});
+  }
+  void on_parameter(SessionId, const SetParameter&) override { ++parameters; }
+  void on_camera(SessionId, const CameraChange&) override { ++cameras; }
+  void on_ack(SessionId, const FrameAck& ack) override { last_ack = ack.sequence; }
+  void on_shut_down(SessionId) override { ++shut_downs; }
+  void on_keyframe_request(SessionId, uint16_t) override {
+    const std::lock_guard lock(mutex_);
+    ++keyframe_requests;
+    if (sequence_ > 0) server->publish_strands(media(Opcode::StrandKeyframe, sequence_, 0, frame_bytes));
+  }
+  void on_left(SessionId session) override {
+    const std::lock_guard lock(mutex_);
+    left_twice = left_twice || joined_.count(session) == 0;
+    joined_.erase(session);
+  }
+
+  void publish_next() {
+    const std::lock_guard lock(mutex_);
+    ++sequence_;
+    server->publish_strands(sequence_ == 1
+                                ? media(Opcode::StrandKeyframe, 1, 0, frame_bytes)
+                                : media(Opcode::StrandDelta, sequence_, sequence_ - 1, frame_bytes));
+  }
+  uint32_t sequence() const {
+    const std::lock_guard lock(mutex_);
+    return sequence_;
+  }
+  size_t joined_count() const {
+    const std::lock_guard lock(mutex_);
+    return joined_.size();
+  }
+
+  NetServer* server = nullptr;
+  size_t frame_bytes = 256;
+  size_t asset_bytes = 1'000;
+  std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0},
+      shut_downs{0};
+  std::atomic<uint32_t> last_ack{0};
+  std::atomic<bool> left_twice{false};
+
+ private:
+  mutable std::mutex mutex_;
+  std::set<SessionId> joined_;
+  uint32_t sequence_ = 0;
+};
+
+class ServerNet : public testing::Test {
+ protected:
+  void start(NetConfig config = {}) {
+    config.port = 0;
+    auto server = NetServer::listen(config, app_);
+    ASSERT_TRUE(server.ok()) << server.error().to_string();
+    server_ = std::move(*server);
+    app_.server = server_.get();
+    server_->start();
+  }
+  void TearDown() override {
+    if (server_ != nullptr) server_->stop();
+    EXPECT_EQ(app_.joined_count(), 0u) << "every session that joined must leave";
+    EXPECT_FALSE(app_.left_twice);
+  }
+
+  static Hello hello(Role role = Role::Viewer, const std::string& token = {}) {
+    Hello message;
+    message.role = role;
+    message.name = "test";
+    message.token = token;
+    return message;
+  }
+  /// A client that is past Welcome.
+  std::unique_ptr<RawClient> join(const Hello& message = hello(), int receive_buffer_bytes = 0) {
+    auto client = std::make_unique<RawClient>(server_->port(), receive_buffer_bytes);
+    EXPECT_TRUE(client->handshake());
+    client->send(message);
+    EXPECT_TRUE(client->read_control<Welcome>().has_value());
+    return client;
+  }
+
+  FakeApp app_;
+  std::unique_ptr<NetServer> server_;
+};
+
+}  // namespace strandcast::test
