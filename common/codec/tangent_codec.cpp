@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <thread>
 #include <utility>
 
@@ -22,13 +23,15 @@ constexpr int kTableLevel = 3;
 constexpr uint8_t kCoarseHistoryFlag = 1;
 constexpr size_t kThreadedVertices = 40'000;  // fewer are coded on the calling thread
 
-/// In front of the slices, as it is on the wire.
+/// In front of the slices, as it is on the wire; followed by the weights of each class.
 struct BodyHead {
   uint8_t flags = 0;
   uint8_t length_blend = 0;
-  MotionWeights weights{};
 };
-static_assert(sizeof(BodyHead) == 2 + sizeof(int16_t) * kMotionClassCount * kMotionFeatureCount);
+
+size_t weight_bytes(const TangentLayout& layout) {
+  return motion_class_count(layout) * sizeof(MotionWeights::value_type);
+}
 
 /// What a stream remembers on both sides.
 struct TangentChain {
@@ -204,10 +207,11 @@ class TangentEncoder final : public StrandEncoder {
     });
     chain_.tables = mean_tables(tables);
 
-    const BodyHead head{is_coarsened ? kCoarseHistoryFlag : uint8_t{0}, frame_.length_blend, frame_.weights};
+    const BodyHead head{is_coarsened ? kCoarseHistoryFlag : uint8_t{0}, frame_.length_blend};
     std::vector<std::byte> body;
-    body.reserve(sizeof(head) + layout_.plane_size());
+    body.reserve(sizeof(head) + sizeof(frame_.weights) + layout_.plane_size());
     ByteWriter(body).put_bytes(std::as_bytes(std::span(&head, 1)));
+    ByteWriter(body).put_bytes(std::as_bytes(std::span(frame_.weights)).first(weight_bytes(layout_)));
     for (ValueWriter& slice : writers) slice.finish(body);
 
     Snapshot decoded = without_lattice(snapshot);
@@ -361,13 +365,14 @@ class TangentDecoder final : public StrandDecoder {
     ByteReader body(source);
     BodyHead head;
     take_into(body, head);
+    const auto weights = body.take_bytes(weight_bytes(layout_));
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "{} bytes have no room for the weights", source.size());
     if (head.flags > kCoarseHistoryFlag)
       return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
                         kCoarseHistoryFlag);
     frame_.length_blend = head.length_blend;
-    frame_.weights = head.weights;
+    std::memcpy(frame_.weights.data(), weights.data(), weights.size());
     std::vector<ValueReader> readers(layout_.slice_count());
     ASSIGN_OR_RETURN(const auto rest, open_slices(body.rest(), readers));
     if (!rest.empty())

@@ -43,9 +43,14 @@ inline int32_t nearest(float value) {
   return static_cast<int32_t>((within + kRounder) - kRounder);
 }
 
-uint32_t motion_class(uint32_t v, uint32_t vertex_count) {
+/// Which weights serve a row. Near the root and at the tip strands move by laws of their own.
+uint32_t motion_class(const TangentLayout& layout, uint32_t v) {
   if (v < 2) return 0;
-  return v + 1 == vertex_count ? 2 : 1;
+  if (v + 1 == layout.vertex_count) return 1;
+  if (motion_class_count(layout) == kFewMotionClasses) return 2;
+  if (v + 2 == layout.vertex_count) return 3;
+  if (v < 5) return v + 2;
+  return 2 * v < layout.vertex_count ? 2 : 7;
 }
 
 /// One row of one axis: feature rows, of which absent ones point to zeros.
@@ -170,7 +175,7 @@ struct Row {
   Row(const TangentLayout& layout_, const TangentHistory& history_, TangentFrame& frame_, uint32_t v_,
       const float* zeros)
       : layout(layout_), history(history_), frame(frame_), v(v_) {
-    const auto& given = frame.weights[motion_class(v, layout.vertex_count)];
+    const auto& given = frame.weights[motion_class(layout, v)];
     for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
       weights[k] = static_cast<float>(given[k]) * kMotionWeight;
     length_blend = static_cast<float>(frame.length_blend) * kLengthWeight;
@@ -420,6 +425,11 @@ void TangentFrame::resize(const TangentLayout& layout) {
   escapes.assign(layout.slice_count(), {});
 }
 
+uint32_t motion_class_count(const TangentLayout& layout) {
+  const size_t vertices = size_t{layout.strand_count} * layout.vertex_count;
+  return vertices < kManyVertices ? kFewMotionClasses : kMotionClassCount;
+}
+
 void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
                 TangentFrame& frame) {
   const uint32_t step = std::max(1u, layout.stride / kSampleStrands);
@@ -433,7 +443,7 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
   }
   std::array<LeastSquares<kMotionFeatureCount>, kMotionClassCount> fits;
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    auto& fit = fits[motion_class(v, layout.vertex_count)];
+    auto& fit = fits[motion_class(layout, v)];
     for (size_t axis = 0; axis < 3; ++axis) {
       const FeatureRow features = feature_row(layout, history, velocity[axis], axis, v, zeros.data());
       for (size_t place = step / 2; place < layout.no_neighbour(); place += step) {

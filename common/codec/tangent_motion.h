@@ -17,7 +17,9 @@ namespace strandcast {
 
 inline constexpr int32_t kStepsPerBound = 256;  // lattice steps in the announced bound
 inline constexpr uint32_t kMotionFeatureCount = 20;
-inline constexpr uint32_t kMotionClassCount = 3;     // rows 0 and 1; rows in between; the last row
+inline constexpr uint32_t kMotionClassCount = 8;     // of rows that share weights
+inline constexpr uint32_t kFewMotionClasses = 3;     // as many of them when there are fewer vertices than
+inline constexpr uint32_t kManyVertices = 16'384;    // this, where eight cost more than they save
 inline constexpr float kMotionWeight = 1.0f / 1024;  // unit of the weights on the wire
 inline constexpr float kLengthWeight = 1.0f / 16;    // unit of the length blend
 inline constexpr int32_t kEscapedLength = 1 << 20;   // in place of a length correction
@@ -63,6 +65,9 @@ struct TangentFrame {
 
   void resize(const TangentLayout& layout);
 };
+
+/// How many classes of weights a frame of this groom has.
+uint32_t motion_class_count(const TangentLayout& layout);
 
 /// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
 /// sample of strands.

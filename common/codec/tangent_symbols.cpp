@@ -163,7 +163,7 @@ SymbolTable first_table() {
 
 /// Which weights serve a row: roots, first segments, the rest.
 uint32_t shape_class(uint32_t v) {
-  return std::min(v, kMotionClassCount - 1);
+  return std::min(v, kShapeClassCount - 1);
 }
 
 /// Values or edges on the way through a slice; entries of rows not yet coded are not read.
@@ -294,7 +294,7 @@ ShapeWeights fit_shape(const TangentLayout& layout, Shape shape, const Planes<in
   constexpr size_t kStep = 4;
   constexpr double kNoise = 0.3;  // of a unit: rounding
   const ShapeRows rows{layout, shape, unit_m};
-  std::array<LeastSquares<kShapeFeatureCount>, kMotionClassCount> fits;
+  std::array<LeastSquares<kShapeFeatureCount>, kShapeClassCount> fits;
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     auto& fit = fits[shape_class(v)];
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -304,7 +304,7 @@ ShapeWeights fit_shape(const TangentLayout& layout, Shape shape, const Planes<in
     fit.flush();
   }
   ShapeWeights weights;
-  for (uint32_t c = 0; c < kMotionClassCount; ++c) weights[c] = fits[c].weights(kMotionWeight, kNoise);
+  for (uint32_t c = 0; c < kShapeClassCount; ++c) weights[c] = fits[c].weights(kMotionWeight, kNoise);
   return weights;
 }
 

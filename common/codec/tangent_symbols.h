@@ -42,7 +42,8 @@ void read_symbols(const TangentLayout& layout, uint32_t slice, TangentFrame& fra
                   SymbolSizes& now, TangentTables& tables, ValueReader& reader);
 
 inline constexpr uint32_t kShapeFeatureCount = 10;
-using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kMotionClassCount>;
+inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest
+using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
 /// Whole numbers along strands, as they are in a keyframe: each vertex less the one before it (positions), or
 /// as it is (velocities), predicted from the strand so far, from neighbours and from the rest shape.

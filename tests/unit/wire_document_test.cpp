@@ -48,6 +48,9 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kStrandFixedBytes", with_commas(kStrandFixedBytes)},
       {"kMaxImageSide", with_commas(kMaxImageSide)},
       {"kStepsPerBound", with_commas(kStepsPerBound)},
+      {"kMotionClassCount", fmt::format("`kMotionClassCount` {}", kMotionClassCount)},
+      {"kFewMotionClasses", fmt::format("`kFewMotionClasses` {}", kFewMotionClasses)},
+      {"kManyVertices", with_commas(kManyVertices)},
       {"kBlockSize", with_commas(kBlockSize)},
       {"kEscapedLength", with_commas(kEscapedLength)},
       {"kCoarseLatticeShift", with_commas(kCoarseLatticeShift)},
@@ -76,10 +79,9 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
   EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
   EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
   EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16, in units", kMotionClassCount,
-                                          kMotionFeatureCount)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("classes x {} weights of i16, in units", kMotionFeatureCount)));
   EXPECT_THAT(text,
-              HasSubstr(fmt::format("{} x {} weights of i16 for", kMotionClassCount, kShapeFeatureCount)));
+              HasSubstr(fmt::format("{} x {} weights of i16 for", kShapeClassCount, kShapeFeatureCount)));
   EXPECT_THAT(text, HasSubstr(fmt::format("symbols 0 to {} themselves", kFirstTail - 1)));
   EXPECT_THAT(text, HasSubstr(fmt::format("({} + sum of weight x feature) >> {}", 1 << (kWeightShift - 1),
                                           kWeightShift)));
