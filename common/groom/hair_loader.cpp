@@ -5,7 +5,6 @@
 #include <string>
 
 #include "common/base/file.h"
-#include "common/groom/byte_view.h"
 
 namespace strandcast {
 namespace {
@@ -92,6 +91,8 @@ Result<std::vector<uint32_t>> read_offsets(const ByteView& file, const HairHeade
   return offset;
 }
 
+}  // namespace
+
 Result<Groom> read_hair(const ByteView& file) {
   ASSIGN_OR_RETURN(const HairHeader header, read_header(file));
   Groom groom;
@@ -113,8 +114,6 @@ Result<Groom> read_hair(const ByteView& file) {
   }
   return with_pinning(std::move(groom), Pinning::Root);
 }
-
-}  // namespace
 
 Result<Groom> load_hair(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, load_file(path, kMaxGroomFileBytes));

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -25,6 +27,9 @@ inline constexpr float kMaxMeshExtentM = 100.0f;  // |coordinate| in head space
 /// has several. Coordinates are multiplied by unit_m. Other statements are skipped. BadInput names file and
 /// line.
 Result<Mesh> load_obj(const std::filesystem::path& path, float unit_m);
+
+/// As load_obj, from text; `place` names it in errors.
+Result<Mesh> parse_obj(std::string_view text, const std::string& place, float unit_m);
 
 /// Unit normals from the triangles around each vertex, weighted by their area; +Y for a vertex without any.
 std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,

@@ -131,18 +131,21 @@ std::vector<glm::vec3> compute_normals(const std::vector<glm::vec3>& position_m,
 }
 
 Result<Mesh> load_obj(const std::filesystem::path& path, float unit_m) {
-  if (!std::isfinite(unit_m) || unit_m <= 0.0f) {
-    return at(path.string(), make_error(ErrorCode::BadInput, "unit_m is {}, it has to be above 0", unit_m));
-  }
   ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxMeshFileBytes));
+  return parse_obj(text, path.string(), unit_m);
+}
+
+Result<Mesh> parse_obj(std::string_view text, const std::string& place, float unit_m) {
+  if (!std::isfinite(unit_m) || unit_m <= 0.0f) {
+    return at(place, make_error(ErrorCode::BadInput, "unit_m is {}, it has to be above 0", unit_m));
+  }
   ObjData data;
   TextScan scan(text);
   while (scan.next_filled_line()) {
     const Status read = read_statement(scan, unit_m, data);
-    if (!read) return at(fmt::format("{}:{}", path.string(), scan.line()), read.error());
+    if (!read) return at(fmt::format("{}:{}", place, scan.line()), read.error());
   }
-  if (data.triangle.empty())
-    return at(path.string(), make_error(ErrorCode::BadInput, "the mesh has no faces"));
+  if (data.triangle.empty()) return at(place, make_error(ErrorCode::BadInput, "the mesh has no faces"));
   Mesh mesh;
   mesh.normal = compute_normals(data.position, data.triangle);
   for (size_t i = 0; i < mesh.normal.size(); ++i) {
