@@ -35,6 +35,7 @@ Result<Address> parse_address(const std::string& text) {
     if (port.empty()) return bad("the port is missing");
   }
   if (host.size() > kMaxHostLength) return bad("the host name is too long");
+  if (host.find_first_of("[]") != std::string::npos) return bad("brackets belong around an IPv6 host only");
   if (!host.empty()) address.host = host;
   if (!port.empty()) {
     const auto [end, failure] = std::from_chars(port.data(), port.data() + port.size(), address.port);
