@@ -53,8 +53,9 @@ void PlayoutClock::fit() {
   const auto rank = static_cast<size_t>(kLatenessQuantile * (count - 1.0));
   std::nth_element(lateness_ns.begin(), lateness_ns.begin() + static_cast<ptrdiff_t>(rank),
                    lateness_ns.end());
-  const double frame_ns =
-      static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0) * client_per_sim;
+  const double frame_ns = std::min(
+      static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0) * client_per_sim,
+      static_cast<double>(kPlayoutGapNs));
   delay_ns_ =
       static_cast<int64_t>(frame_ns) + std::min(static_cast<int64_t>(lateness_ns[rank]), kMaxPlayoutDelayNs);
 }
@@ -69,7 +70,7 @@ int64_t PlayoutClock::sim_time_at(int64_t client_time_ns) const {
 
 int64_t PlayoutCursor::advance(int64_t client_time_ns, int64_t wanted_ns) {
   const auto elapsed_ns = static_cast<double>(std::max<int64_t>(client_time_ns - client_time_ns_, 0));
-  const auto moved_ns = static_cast<double>(wanted_ns - wanted_ns_);
+  const double moved_ns = static_cast<double>(wanted_ns) - static_cast<double>(wanted_ns_);
   const double behind_ns = static_cast<double>(wanted_ns) - shown_ns_;
   client_time_ns_ = client_time_ns;
   wanted_ns_ = wanted_ns;

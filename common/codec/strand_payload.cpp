@@ -6,6 +6,23 @@
 #include "common/codec/byte_io.h"
 
 namespace strandcast {
+namespace {
+
+Status check_pose(const StrandFixedPart& fixed) {
+  const glm::dvec3& position = fixed.world_from_head.position_m;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(position[axis]) <= kMaxHeadPositionM))  // also when not a number
+      return make_error(ErrorCode::BadInput, "the head of tick {} lies at {} m, allowed is +-{}", fixed.tick,
+                        position[axis], kMaxHeadPositionM);
+  }
+  const double length = glm::length(fixed.world_from_head.rotation);
+  if (!(std::abs(length - 1.0) <= kRotationTolerance))
+    return make_error(ErrorCode::BadInput, "the head's rotation of tick {} has the length {}, it must be 1",
+                      fixed.tick, length);
+  return {};
+}
+
+}  // namespace
 
 void append_fixed_part(const Snapshot& snapshot, uint8_t codec_number, std::vector<std::byte>& payload) {
   const size_t begin = payload.size();
@@ -65,8 +82,13 @@ Result<StrandMessage> read_strand_message(std::span<const std::byte> message, ui
   if (!(fixed.quantum_m > 0.0f && fixed.quantum_m <= kMaxQuantumM))
     return make_error(ErrorCode::BadInput, "lattice step {} m is not in (0, {}]", fixed.quantum_m,
                       kMaxQuantumM);
-  if (!is_finite(fixed.world_from_head))
-    return make_error(ErrorCode::BadInput, "head pose of tick {} is not finite", fixed.tick);
+  RETURN_IF_ERROR(check_pose(fixed));
+  for (const int64_t time_ns :
+       {result.header.sim_time_ns, result.header.send_time_ns, fixed.motion_time_ns}) {
+    if (time_ns < -kMaxStrandTimeNs || time_ns > kMaxStrandTimeNs)
+      return make_error(ErrorCode::BadInput, "tick {} has the time {} ns, allowed is +-{}", fixed.tick,
+                        time_ns, kMaxStrandTimeNs);
+  }
   result.body = reader.rest();
   return result;
 }

@@ -8,6 +8,9 @@ namespace strandcast {
 
 inline constexpr size_t kStrandFixedBytes = 96;
 inline constexpr float kMaxQuantumM = 1.0f;
+inline constexpr int64_t kMaxStrandTimeNs = int64_t{1} << 61;  // 73 years either way: no difference overflows
+inline constexpr double kMaxHeadPositionM = 1e9;               // along every axis
+inline constexpr double kRotationTolerance = 1e-3;             // of the length of the head's quaternion
 
 /// Everything of a snapshot but its lattice, and what is needed to check that.
 struct StrandFixedPart {

@@ -21,6 +21,8 @@ int64_t mean(int64_t a, int64_t b) {
 
 void ClockOffset::add(int64_t client_send_ns, int64_t server_receive_ns, int64_t server_send_ns,
                       int64_t client_receive_ns) {
+  const auto is_possible = [](int64_t time_ns) { return time_ns >= -kMaxClockNs && time_ns <= kMaxClockNs; };
+  if (!is_possible(server_receive_ns) || !is_possible(server_send_ns)) return;
   int64_t elapsed_ns = 0, held_ns = 0, there_ns = 0, back_ns = 0;
   if (!subtract(client_receive_ns, client_send_ns, elapsed_ns) || elapsed_ns < 0) return;
   if (!subtract(server_send_ns, server_receive_ns, held_ns) || held_ns < 0 || held_ns > elapsed_ns) return;

@@ -11,7 +11,8 @@ namespace strandcast {
 class ClockOffset {
  public:
   /// Client send, server receive, server send, client receive; all ns, each in its own clock. Probes with a
-  /// negative round trip, one above 10 s or times that run backwards are ignored.
+  /// negative round trip, one above 10 s, times that run backwards and server times beyond kMaxClockNs are
+  /// ignored.
   void add(int64_t client_send_ns, int64_t server_receive_ns, int64_t server_send_ns,
            int64_t client_receive_ns);
   bool has_value() const { return !probes_.empty(); }
@@ -29,5 +30,6 @@ class ClockOffset {
   std::deque<Probe> probes_;
 };
 inline constexpr size_t kClockWindow = 100;
+inline constexpr int64_t kMaxClockNs = int64_t{1} << 61;  // of a server's time: no sum with it overflows
 
 }  // namespace strandcast

@@ -365,8 +365,10 @@ TEST(ClockOffset, IgnoresImpossibleProbes) {
   clock.add(INT64_MIN, 0, 0, INT64_MAX);  // does not fit
   clock.add(0, INT64_MIN, INT64_MAX, 10);
   clock.add(INT64_MAX - 1, INT64_MIN, INT64_MIN, INT64_MAX);
+  clock.add(0, INT64_MAX, INT64_MAX, 2);  // fits, but sums with it would not
+  clock.add(0, kMaxClockNs + 1, kMaxClockNs + 1, 2);
   EXPECT_FALSE(clock.has_value());
-  clock.add(0, INT64_MAX, INT64_MAX, 2);  // far apart, but it fits
+  clock.add(0, kMaxClockNs, kMaxClockNs, 2);
   EXPECT_TRUE(clock.has_value());
 }
 
