@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <random>
 
 #include "common/codec/byte_io.h"
@@ -12,13 +13,11 @@
 #include "common/codec/tangent_symbols.h"
 #include "common/codec/zstd_block.h"
 #include "common/wire/messages.h"
+#include "tests/fuzz/fuzz_targets.h"
+#include "tests/fuzz/strand_chain.h"
 #include "tests/support/hair_motion.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_messages.h"
-
-extern "C" int fuzz_control(const uint8_t* data, size_t size);
-extern "C" int fuzz_strand(const uint8_t* data, size_t size);
-extern "C" int fuzz_asset(const uint8_t* data, size_t size);
 
 namespace strandcast {
 namespace {
@@ -64,17 +63,23 @@ std::vector<Bytes> control_samples() {
   return samples;
 }
 
+/// To both directions: what is good for one is strange to the other.
+void feed_control(const Bytes& bytes) {
+  feed(fuzz_client_message, bytes);
+  feed(fuzz_server_message, bytes);
+}
+
 TEST(ControlBytes, TruncatedDamagedAndRandomMessagesNeverCrash) {
   for (const Bytes& good : control_samples()) {
     for (size_t size = 0; size <= good.size(); ++size)
-      feed(fuzz_control, Bytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)));
-    for_each_damage(good, 500, 7, [](const Bytes& bad) { feed(fuzz_control, bad); });
+      feed_control(Bytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)));
+    for_each_damage(good, 500, 7, feed_control);
   }
   std::mt19937 random(2);
   for (int i = 0; i < 3000; ++i) {
     Bytes bytes = random_bytes(1 + random() % 200, random);
     bytes[0] = std::byte{1};
-    feed(fuzz_control, bytes);
+    feed_control(bytes);
   }
 }
 
@@ -167,7 +172,7 @@ TEST(ControlBytes, TextThatIsNotUtf8IsRefused) {
 
 // ---- strand messages ----
 
-constexpr uint32_t kStrands = 5;  // as in the fuzz entry
+constexpr uint32_t kStrands = 5;  // as in the fuzz entries' first size
 constexpr uint32_t kVertices = 4;
 
 struct Stream {
@@ -212,27 +217,39 @@ TEST(StrandBytes, EveryTruncationIsRefusedAndTheStreamGoesOn) {
   }
 }
 
+/// Input of a strand target: `honest_count` frames of its own chain, then one hostile message.
+Bytes chain_input(int honest_count, ChainStep step, uint8_t flags, std::span<const std::byte> piece) {
+  Bytes input = {std::byte{0}};  // its hair is kStrands x kVertices without a rest shape
+  input.insert(input.end(), static_cast<size_t>(honest_count), static_cast<std::byte>(ChainStep::Honest));
+  ByteWriter writer(input);
+  writer.put(static_cast<uint8_t>(step));
+  writer.put(flags);
+  writer.put(static_cast<uint16_t>(piece.size()));
+  writer.put_bytes(piece);
+  return input;
+}
+
 TEST(StrandBytes, DamageGivesAnErrorOrAValidSnapshot) {
+  const std::map<std::string, Entry> entries = {
+      {"raw", fuzz_strand_raw}, {"delta", fuzz_strand_delta}, {"tangent", fuzz_strand_tangent}};
   for (const StrandCodecInfo& codec : strand_codecs()) {
+    ASSERT_EQ(entries.count(codec.name), 1u) << "no fuzz target for " << codec.name;
+    const Entry entry = entries.at(codec.name);
     Stream stream(codec.name);
     for (int i = 0; i < 4; ++i) {
       const auto frame = stream.next();
       for_each_damage(frame->message, 1000, 3, [&](const Bytes& bad) {
-        for (const int how : {0, 1}) {
-          Bytes input = {static_cast<std::byte>(how)};
-          input.insert(input.end(), bad.begin(), bad.end());
-          feed(fuzz_strand, input);
-        }
+        for (const int honest_count : {0, 1})
+          feed(entry, chain_input(honest_count, ChainStep::Whole, 0, bad));
       });
       // Behind a valid header, and behind a valid fixed part.
-      for (const int how : {4, 5, 7, 12, 13, 15}) {
-        const size_t skipped = kFrameHeaderBytes + ((how & 8) != 0 ? kStrandFixedBytes : 0);
+      for (const ChainStep step : {ChainStep::Payload, ChainStep::Body}) {
+        const size_t skipped = kFrameHeaderBytes + (step == ChainStep::Body ? kStrandFixedBytes : 0);
         const Bytes rest(frame->message.begin() + static_cast<std::ptrdiff_t>(skipped), frame->message.end());
-        for_each_damage(rest, 300, 5, [&](const Bytes& bad) {
-          Bytes input = {static_cast<std::byte>(how)};
-          input.insert(input.end(), bad.begin(), bad.end());
-          feed(fuzz_strand, input);
-        });
+        for (const uint8_t flags : {uint8_t{0}, kAsKeyframe, kKnowsHash}) {
+          for_each_damage(rest, 300, 5,
+                          [&](const Bytes& bad) { feed(entry, chain_input(1, step, flags, bad)); });
+        }
       }
     }
   }
@@ -253,7 +270,18 @@ TEST(StrandBytes, FixedPartIsCheckedFieldByField) {
   EXPECT_FALSE(with(12, ~0u));                // vertex_count
   EXPECT_FALSE(with(16, uint64_t{1} << 60));  // tick: no longer the announced state
   EXPECT_TRUE(with(24, int64_t{77}));         // motion_time is not part of the state
-  for (size_t i = 0; i < 7; ++i) EXPECT_FALSE(with(32 + 8 * i, std::nan("")));
+  for (const int64_t time_ns : {INT64_MIN, -kMaxStrandTimeNs - 1, kMaxStrandTimeNs + 1, INT64_MAX})
+    EXPECT_FALSE(with(24, time_ns)) << time_ns;
+  EXPECT_TRUE(with(24, kMaxStrandTimeNs));
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (const double position_m :
+         {std::nan(""), HUGE_VAL, 2.0 * kMaxHeadPositionM, -2.0 * kMaxHeadPositionM})
+      EXPECT_THAT(with(32 + 8 * axis, position_m).error().message, testing::HasSubstr("head of tick"));
+  }
+  for (size_t k = 0; k < 4; ++k) {
+    for (const double part : {std::nan(""), HUGE_VAL, 2.0})
+      EXPECT_THAT(with(56 + 8 * k, part).error().message, testing::HasSubstr("rotation"));
+  }
   EXPECT_FALSE(with(88, uint64_t{0}));  // state hash
   EXPECT_FALSE(with(kStrandFixedBytes, kMaxLattice));
   EXPECT_TRUE(stream.decoder->decode(frame->message));
@@ -350,9 +378,9 @@ TEST(AssetBytes, TruncatedDamagedAndRandomAssetsNeverCrash) {
   Bytes longer = good;
   longer.push_back(std::byte{0});
   EXPECT_FALSE(decode_scene_asset(longer));
-  for_each_damage(good, 5000, 11, [](const Bytes& bad) { feed(fuzz_asset, bad); });
+  for_each_damage(good, 5000, 11, [](const Bytes& bad) { feed(fuzz_scene_asset, bad); });
   std::mt19937 random(4);
-  for (int i = 0; i < 1000; ++i) feed(fuzz_asset, random_bytes(random() % 300, random));
+  for (int i = 0; i < 1000; ++i) feed(fuzz_scene_asset, random_bytes(random() % 300, random));
 }
 
 TEST(AssetBytes, AnAssetThatUnpacksToLessThanItDeclaresIsRefused) {
@@ -373,7 +401,7 @@ TEST(PictureBytes, DamagedJpegsNeverCrash) {
   for (size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = static_cast<uint8_t>(i * i >> 6);
   const auto good = encode_jpeg(image, 70);
   ASSERT_TRUE(good);
-  for_each_damage(*good, 3000, 13, [](const Bytes& bad) { feed(fuzz_asset, bad); });
+  for_each_damage(*good, 3000, 13, [](const Bytes& bad) { feed(fuzz_jpeg, bad); });
 }
 
 }  // namespace

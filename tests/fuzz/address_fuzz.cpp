@@ -1,0 +1,15 @@
+// libFuzzer entry: HOST:PORT as typed. What is read must come back equal from its own text.
+#include "client/net/address.h"
+
+#include "common/base/check.h"
+#include "tests/fuzz/fuzz_input.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace strandcast;
+  const auto address = parse_address(FuzzInput(data, size).take_rest_as_text());
+  if (!address) return 0;
+  CHECK(!address->host.empty() && address->port != 0);
+  const auto again = parse_address(address->to_string());
+  CHECK(again.ok() && *again == *address);
+  return 0;
+}

@@ -1,0 +1,16 @@
+// libFuzzer entry: what a client sends. What decodes must encode to bytes that decode to the same message.
+#include "common/base/check.h"
+#include "common/wire/messages.h"
+#include "tests/fuzz/fuzz_input.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace strandcast;
+  const auto message = decode_client_message(FuzzInput(data, size).take_rest());
+  if (!message) return 0;
+  const std::vector<std::byte> bytes = encode(*message);
+  CHECK(bytes.size() <= kMaxControlBytes);
+  const auto again = decode_client_message(bytes);
+  CHECK(again.ok() && again->index() == message->index());
+  CHECK(encode(*again) == bytes);
+  return 0;
+}

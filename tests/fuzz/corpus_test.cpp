@@ -1,0 +1,64 @@
+// Every committed input of every fuzzer, with any compiler. An entry stops the process where it finds
+// something wrong, and the sanitizers where they do; the file is named first.
+#include <filesystem>
+
+#include "common/base/file.h"
+#include "tests/fuzz/fuzz_targets.h"
+
+namespace strandcast {
+namespace {
+
+struct Target {
+  std::string name;
+  int (*entry)(const uint8_t*, size_t);
+};
+
+const std::vector<Target> kTargets = {
+#define FUZZ_TARGET(name) {#name, fuzz_##name},
+#include "fuzz_targets.inc"
+#undef FUZZ_TARGET
+};
+
+std::filesystem::path corpus() {
+  return std::filesystem::path(STRANDCAST_SOURCE_DIR) / "tests/fuzz/corpus";
+}
+
+class FuzzCorpus : public testing::TestWithParam<Target> {};
+
+TEST_P(FuzzCorpus, RunsThroughItsTarget) {
+  constexpr uint64_t kMaxInputBytes = 1 << 20;
+  const Target& target = GetParam();
+  EXPECT_EQ(target.entry(nullptr, 0), 0);
+  int file_count = 0;
+  for (const auto& file : std::filesystem::directory_iterator(corpus() / target.name)) {
+    fmt::print("{}\n", file.path().filename().string());
+    std::fflush(stdout);
+    const auto bytes = load_file(file.path(), kMaxInputBytes);
+    ASSERT_TRUE(bytes) << bytes.error().to_string();
+    EXPECT_EQ(target.entry(reinterpret_cast<const uint8_t*>(bytes->data()), bytes->size()), 0);
+    ++file_count;
+  }
+  EXPECT_GT(file_count, 0) << "no inputs in " << corpus() / target.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Corpus, FuzzCorpus, testing::ValuesIn(kTargets),
+                         [](const auto& target) { return target.param.name; });
+
+TEST(FuzzCorpusFolder, HoldsOneSmallFolderForEachTarget) {
+  constexpr uint64_t kMaxCorpusBytes = 400'000;
+  uint64_t corpus_bytes = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(corpus())) {
+    if (entry.is_regular_file()) {
+      corpus_bytes += entry.file_size();
+      continue;
+    }
+    const std::string name = entry.path().filename().string();
+    EXPECT_TRUE(std::any_of(kTargets.begin(), kTargets.end(),
+                            [&](const Target& target) { return target.name == name; }))
+        << "no target is called " << name;
+  }
+  EXPECT_LT(corpus_bytes, kMaxCorpusBytes);
+}
+
+}  // namespace
+}  // namespace strandcast

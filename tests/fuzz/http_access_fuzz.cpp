@@ -1,0 +1,33 @@
+// libFuzzer entry: who may talk to the server. Lines: Host header, Origin header, address the connection came
+// in on, a name that is allowed besides.
+#include <algorithm>
+
+#include "common/base/check.h"
+#include "server/net/access.h"
+#include "tests/fuzz/fuzz_input.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace strandcast;
+  FuzzInput input(data, size);
+  const std::string host = input.take_line();
+  const std::string origin = input.take_line();
+  const std::string local_address = input.take_line();
+  const std::string allowed = input.take_line();
+
+  const std::string name = host_name_of(host);
+  CHECK(name.size() <= host.size());
+  CHECK(std::none_of(name.begin(), name.end(), [](char c) { return c >= 'A' && c <= 'Z'; }));
+  const bool is_remote_allowed = is_host_allowed(host, local_address, false, {allowed});
+  if (is_remote_allowed) {
+    CHECK(!name.empty());
+    CHECK(name == local_address || name == host_name_of(allowed) || name.size() == allowed.size());
+    CHECK(is_host_allowed(host, local_address, true, {allowed}));
+  }
+  CHECK(is_origin_allowed("", host));
+  CHECK(is_origin_allowed("http://" + host, host) && is_origin_allowed("https://" + host, host));
+  CHECK(!is_origin_allowed("http://" + host + ".evil.example", host));
+  if (!origin.empty() && is_origin_allowed(origin, host)) {
+    CHECK(origin.size() == host.size() + 7 || origin.size() == host.size() + 8);
+  }
+  return 0;
+}

@@ -1,0 +1,199 @@
+#include "tests/fuzz/strand_chain.h"
+
+#include <array>
+#include <charconv>
+#include <map>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/codec/strand_payload.h"
+#include "tests/fuzz/fuzz_input.h"
+#include "tests/support/hair_motion.h"
+
+namespace strandcast {
+namespace {
+
+using SnapshotPtr = std::shared_ptr<const Snapshot>;
+
+constexpr float kBoundM = 1e-4f;
+constexpr size_t kFrames = 8;
+constexpr size_t kJoinFrame = 3;  // late joiners get a keyframe of this state
+constexpr int kMostSteps = 24;
+constexpr int kMostSlicedSteps = 4;  // of the large hair
+constexpr size_t kPayloadLengthAt = 12;
+constexpr size_t kStateHashAt = kFrameHeaderBytes + 88;
+
+struct HairSize {
+  uint32_t strands, vertices;
+};
+constexpr std::array<HairSize, 4> kSizes = {{{5, 4}, {1, 2}, {40, 6}, {1024, 2}}};  // the last one has slices
+
+/// What a good server sends, and what it decodes to.
+struct HonestChain {
+  StrandStreamLimits limits;
+  std::vector<glm::vec3> rest_in_head_m;  // empty: not announced
+  std::vector<EncodedFramePtr> frame;     // the first is a keyframe
+  EncodedFramePtr joiner;                 // of the state of frame kJoinFrame
+  std::vector<SnapshotPtr> decoded;
+};
+
+HonestChain make_chain(const std::string& codec, uint8_t settings) {
+  const HairSize size = kSizes[(settings >> 1) % kSizes.size()];
+  HairMotion hair({size.strands, size.vertices, MotionKind::Active});
+  HonestChain chain;
+  chain.limits = {size.strands, size.vertices};
+  if ((settings & kWithRestShape) != 0) chain.rest_in_head_m = hair.rest_in_head();
+  auto encoder = make_strand_encoder(codec);
+  auto decoder = make_strand_decoder(codec, chain.limits);
+  CHECK(encoder.ok() && decoder.ok());
+  (*encoder)->set_rest_shape(chain.rest_in_head_m);
+  (*decoder)->set_rest_shape(chain.rest_in_head_m);
+  for (size_t i = 0; i < kFrames; ++i) {
+    hair.step();
+    const Snapshot snapshot = hair.snapshot(lattice_step_m(codec, kBoundM).value());
+    if (i == kJoinFrame) {
+      JoinFrames frames = (*encoder)->encode_for_join(snapshot);
+      chain.frame.push_back(frames.frame);
+      chain.joiner = frames.keyframe;
+    } else {
+      chain.frame.push_back((*encoder)->encode(snapshot));
+    }
+    const auto decoded = (*decoder)->decode(chain.frame.back()->message);
+    CHECK(decoded.ok());
+    chain.decoded.push_back(*decoded);
+  }
+  return chain;
+}
+
+const HonestChain& chain_of(const std::string& codec, uint8_t settings) {
+  static std::map<std::pair<std::string, int>, HonestChain> chains;
+  const int key = settings % (2 * static_cast<int>(kSizes.size()));
+  const auto known = chains.find({codec, key});
+  if (known != chains.end()) return known->second;
+  return chains.emplace(std::pair(codec, key), make_chain(codec, static_cast<uint8_t>(key))).first->second;
+}
+
+void check_valid(const Snapshot& snapshot, const StrandStreamLimits& limits) {
+  CHECK(snapshot.strand_count == limits.strand_count && snapshot.vertex_count == limits.vertex_count);
+  CHECK(snapshot.lattice.size() == 3 * snapshot.plane_size());
+  CHECK(snapshot.quantum_m > 0.0f && is_finite(snapshot.world_from_head));
+  for (const int32_t value : snapshot.lattice) CHECK(value > -kMaxLattice && value < kMaxLattice);
+  for (const glm::vec3& point : positions_in_head(snapshot))
+    CHECK(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z));
+}
+
+class Game {
+ public:
+  Game(const std::string& codec, uint8_t settings) : chain_(chain_of(codec, settings)) {
+    auto decoder = make_strand_decoder(codec, chain_.limits);
+    CHECK(decoder.ok());
+    decoder_ = std::move(decoder).value();
+    decoder_->set_rest_shape(chain_.rest_in_head_m);
+  }
+
+  void honest() {
+    const EncodedFramePtr& frame = is_following_ ? chain_.frame[next_] : chain_.joiner;
+    if (!is_following_) next_ = kJoinFrame;
+    const auto decoded = decoder_->decode(frame->message);
+    CHECK(decoded.ok());
+    CHECK((*decoded)->lattice == chain_.decoded[next_]->lattice);
+    CHECK(state_hash(**decoded) == state_hash(*chain_.decoded[next_]));
+    sequence_ = frame->header.sequence;
+    next_ = (next_ + 1) % kFrames;
+    is_following_ = true;
+  }
+
+  void hostile(ChainStep step, uint8_t flags, std::span<const std::byte> piece) {
+    std::vector<std::byte> message = make_message(step, flags, piece);
+    if ((flags & kFixLength) != 0 && message.size() >= kFrameHeaderBytes) {
+      const auto length = static_cast<uint32_t>(message.size() - kFrameHeaderBytes);
+      std::memcpy(message.data() + kPayloadLengthAt, &length, sizeof(length));
+    }
+    auto decoded = decoder_->decode(message);
+    if (!decoded && (flags & kKnowsHash) != 0 && correct_hash(decoded.error(), message)) {
+      decoded = decoder_->decode(message);
+      CHECK(decoded.ok());
+    }
+    if (!decoded) return;
+    check_valid(**decoded, chain_.limits);
+    sequence_ = unpack_frame_header(message).value().sequence;
+    is_following_ = false;
+  }
+
+ private:
+  std::vector<std::byte> make_message(ChainStep step, uint8_t flags, std::span<const std::byte> piece) const {
+    const std::vector<std::byte>& good = chain_.frame[next_]->message;
+    if (step == ChainStep::Whole) return {piece.begin(), piece.end()};
+    if (step == ChainStep::Patched) return patched(good, FuzzInput(piece));
+    if (step == ChainStep::Spliced) {
+      FuzzInput input(piece);
+      const size_t offset = input.take<uint16_t>() % (good.size() + 1);
+      std::vector<std::byte> message(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(offset));
+      const auto rest = input.take_rest();
+      message.insert(message.end(), rest.begin(), rest.end());
+      return message;
+    }
+    FrameHeader header = chain_.frame[next_]->header;
+    const bool is_keyframe = (flags & kAsKeyframe) != 0;
+    header.opcode = is_keyframe ? Opcode::StrandKeyframe : Opcode::StrandDelta;
+    header.base_sequence = is_keyframe ? 0 : sequence_;
+    header.sequence = sequence_ + 1;
+    std::vector<std::byte> payload;
+    if (step == ChainStep::Body) {
+      const auto fixed = std::span(good).subspan(kFrameHeaderBytes, kStrandFixedBytes);
+      payload.assign(fixed.begin(), fixed.end());
+    }
+    payload.insert(payload.end(), piece.begin(), piece.end());
+    return make_encoded_frame(header, payload)->message;
+  }
+
+  static std::vector<std::byte> patched(std::vector<std::byte> message, FuzzInput input) {
+    while (!input.is_empty()) {
+      const size_t offset = input.take<uint16_t>() % message.size();
+      message[offset] ^= static_cast<std::byte>(input.take<uint8_t>());
+    }
+    return message;
+  }
+
+  /// Puts the hash that the error names into the message; false when the error is about something else.
+  static bool correct_hash(const Error& error, std::vector<std::byte>& message) {
+    constexpr std::string_view kMark = "decodes to state ";
+    const size_t mark = error.message.find(kMark);
+    if (mark == std::string::npos) return false;
+    const char* digits = error.message.data() + mark + kMark.size();
+    uint64_t hash = 0;
+    constexpr int kHashDigits = 16;
+    const auto [end, failure] = std::from_chars(digits, digits + kHashDigits, hash, 16);
+    CHECK(failure == std::errc() && end == digits + kHashDigits);
+    std::memcpy(message.data() + kStateHashAt, &hash, sizeof(hash));
+    return true;
+  }
+
+  const HonestChain& chain_;
+  std::unique_ptr<StrandDecoder> decoder_;
+  size_t next_ = 0;           // honest frame that comes next
+  bool is_following_ = true;  // the decoder's state is the one before that frame
+  uint32_t sequence_ = 0;     // last one decoded
+};
+
+}  // namespace
+
+int fuzz_strand_chain(const std::string& codec, const uint8_t* data, size_t size) {
+  FuzzInput input(data, size);
+  const auto settings = input.take<uint8_t>();
+  const bool is_sliced = (settings >> 1) % kSizes.size() == kSizes.size() - 1;
+  Game game(codec, settings);
+  for (int i = 0; i < (is_sliced ? kMostSlicedSteps : kMostSteps) && !input.is_empty(); ++i) {
+    const auto step = static_cast<ChainStep>(input.take<uint8_t>() % kChainStepKinds);
+    if (step == ChainStep::Honest) {
+      game.honest();
+      continue;
+    }
+    const auto flags = input.take<uint8_t>();
+    game.hostile(step, flags, input.take_piece());
+  }
+  game.honest();
+  return 0;
+}
+
+}  // namespace strandcast

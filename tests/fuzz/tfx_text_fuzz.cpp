@@ -1,0 +1,11 @@
+// libFuzzer entry: a `.tfx` groom of the text version.
+#include "common/groom/tfx_loader.h"
+
+#include "tests/fuzz/fuzz_input.h"
+#include "tests/fuzz/groom_checks.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace strandcast;
+  if (const auto groom = read_tfx_text(FuzzInput(data, size).take_rest_as_text())) check_loaded_groom(*groom);
+  return 0;
+}

@@ -1,0 +1,228 @@
+// Writes the first inputs of the fuzzers whose format has structure: fuzz_seeds FOLDER makes
+// FOLDER/<target>/seed_*. What fuzzing finds beside them is committed in the same folders.
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+
+#include "common/base/check.h"
+#include "common/base/file.h"
+#include "common/codec/image_codec.h"
+#include "common/codec/residual_coder.h"
+#include "common/codec/strand_payload.h"
+#include "common/codec/value_coder.h"
+#include "common/scene/scene_file.h"
+#include "tests/fuzz/strand_chain.h"
+#include "tests/support/hair_motion.h"
+#include "tests/support/sample_asset.h"
+#include "tests/support/sample_messages.h"
+
+namespace strandcast {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+Bytes bytes_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+/// Numbers one behind the other.
+template <class... Numbers>
+Bytes packed(Numbers... numbers) {
+  Bytes bytes((sizeof(Numbers) + ...));
+  size_t at = 0;
+  const auto put = [&](auto number) {
+    std::memcpy(bytes.data() + at, &number, sizeof(number));
+    at += sizeof(number);
+  };
+  (put(numbers), ...);
+  return bytes;
+}
+
+Bytes joined(std::initializer_list<Bytes> parts) {
+  Bytes bytes;
+  for (const Bytes& part : parts) bytes.insert(bytes.end(), part.begin(), part.end());
+  return bytes;
+}
+
+class SeedFolder {
+ public:
+  explicit SeedFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  void add(const std::string& target, const std::string& name, const Bytes& bytes) const {
+    std::filesystem::create_directories(folder_ / target);
+    CHECK(save_file(folder_ / target / ("seed_" + name), bytes).ok());
+  }
+  void add(const std::string& target, const std::string& name, std::string_view text) const {
+    add(target, name, bytes_of(text));
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+void add_messages(const SeedFolder& seeds) {
+  int i = 0;
+  for (const ClientMessage& message : sample_client_messages())
+    seeds.add("client_message", fmt::format("{}", i++), encode(message));
+  i = 0;
+  for (const ServerMessage& message : sample_server_messages())
+    seeds.add("server_message", fmt::format("{}", i++), encode(message));
+  FrameHeader header;
+  header.opcode = Opcode::StrandKeyframe;
+  header.sequence = 1;
+  seeds.add("frame_header", "keyframe", make_encoded_frame(header, packed(uint32_t{5}))->message);
+}
+
+void add_blocks(const SeedFolder& seeds) {
+  Bytes asset = encode_scene_asset(sample_asset(5, 3));
+  seeds.add("scene_asset", "head", asset);
+  SceneAsset bare = sample_asset(1, 2);
+  bare.head = {};
+  seeds.add("scene_asset", "bare", encode_scene_asset(bare));
+
+  Image image{16, 9, std::vector<uint8_t>(16 * 9 * 4, 200)};
+  for (size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = static_cast<uint8_t>(i * i >> 4);
+  seeds.add("jpeg", "small", encode_jpeg(image, 70).value());
+
+  Bytes block;
+  ZstdCompressor().append(bytes_of("strands and strands and strands"), 3, block);
+  seeds.add("zstd_block", "text", joined({packed(uint16_t{31}), block}));
+  Bytes planes;
+  PlaneEncoder().append(std::vector<int32_t>{0, 1, -1, 300, -70'000}, 1, planes);
+  seeds.add("zstd_block", "planes", joined({packed(uint16_t{20}), planes}));
+
+  ValueWriter writer;
+  SymbolTable table;
+  for (uint32_t k = 0; k < kSymbolCount; ++k)
+    table.start[k] = static_cast<int16_t>(k * (kProbabilityOne / static_cast<int32_t>(kSymbolCount)));
+  for (const int32_t value : {0, 1, -3, 40, 1'000, -70'000}) writer.put(fold_sign(value), table, 2);
+  Bytes slice;
+  writer.finish(slice);
+  seeds.add("value_coder", "slice", joined({packed(uint8_t{6}), slice}));
+}
+
+Bytes chain_step(ChainStep step, uint8_t flags, const Bytes& piece) {
+  return joined({packed(static_cast<uint8_t>(step), flags, static_cast<uint16_t>(piece.size())), piece});
+}
+
+/// Honest frames with each kind of hostile message between them.
+void add_chains(const SeedFolder& seeds) {
+  constexpr int kHairSizes = 4;
+  constexpr uint16_t kBodyAt = kFrameHeaderBytes + kStrandFixedBytes;
+  const Bytes honest = packed(static_cast<uint8_t>(ChainStep::Honest));
+  const Bytes body_patch =
+      packed(static_cast<uint16_t>(kBodyAt + 20), uint8_t{1}, uint16_t{500}, uint8_t{64});
+  const Bytes fixed_patch = packed(static_cast<uint16_t>(kFrameHeaderBytes + 4), uint8_t{1});
+  for (const StrandCodecInfo& codec : strand_codecs()) {
+    auto encoder = make_strand_encoder(codec.name).value();
+    HairMotion hair({5, 4, MotionKind::Active});
+    hair.step();
+    const EncodedFramePtr frame = encoder->encode(hair.snapshot(lattice_step_m(codec.name, 1e-4f).value()));
+    const Bytes body(frame->message.begin() + kBodyAt, frame->message.end());
+    for (int settings = 0; settings < 2 * kHairSizes; ++settings) {
+      const Bytes begin = packed(static_cast<uint8_t>(settings));
+      const Bytes patched = joined({begin, honest, chain_step(ChainStep::Patched, kKnowsHash, body_patch),
+                                    honest, honest, chain_step(ChainStep::Patched, 0, fixed_patch), honest});
+      const Bytes spliced = joined(
+          {begin, honest, honest,
+           chain_step(ChainStep::Spliced, kFixLength | kKnowsHash, packed(kBodyAt, uint64_t{0})), honest});
+      const std::string name = codec.name + fmt::format("_{}", settings);
+      seeds.add("strand_" + codec.name, "patched_" + name, patched);
+      seeds.add("strand_" + codec.name, "spliced_" + name, spliced);
+    }
+    const Bytes made_up = joined({packed(uint8_t{0}), chain_step(ChainStep::Whole, 0, frame->message), honest,
+                                  chain_step(ChainStep::Body, kAsKeyframe | kKnowsHash, body),
+                                  chain_step(ChainStep::Body, kKnowsHash, body),
+                                  chain_step(ChainStep::Payload, 0, body), honest});
+    seeds.add("strand_" + codec.name, "made_up", made_up);
+  }
+}
+
+void add_grooms(const SeedFolder& seeds) {
+  constexpr uint32_t kStrands = 2, kVertices = 3;
+  Bytes points;
+  Bytes points_with_mass;
+  for (uint32_t i = 0; i < kStrands * kVertices; ++i) {
+    const Bytes point = packed(0.1f * static_cast<float>(i / kVertices), 0.1f * static_cast<float>(i), 0.5f);
+    points = joined({points, point});
+    points_with_mass = joined({points_with_mass, point, packed(i % kVertices == 0 ? 0.0f : 1.0f)});
+  }
+  const Bytes uv(kStrands * 2 * sizeof(float));
+  constexpr uint32_t kHeader4Bytes = 160, kHeader3Bytes = 296;
+  Bytes tfx4 = packed(4.0f, kStrands, kVertices, kHeader4Bytes,
+                      kHeader4Bytes + static_cast<uint32_t>(points_with_mass.size()));
+  tfx4.resize(kHeader4Bytes);
+  seeds.add("tfx", "version_4", joined({tfx4, points_with_mass, uv}));
+  Bytes tfx3 = packed(3.0f, kStrands, kVertices, uint32_t{0}, int32_t{1});
+  constexpr uint32_t kPointsAt = 144, kUvAt = 152;
+  tfx3.resize(kHeader3Bytes);
+  std::memcpy(tfx3.data() + kPointsAt, &kHeader3Bytes, sizeof(uint32_t));
+  const uint32_t uv_at = kHeader3Bytes + static_cast<uint32_t>(points.size());
+  std::memcpy(tfx3.data() + kUvAt, &uv_at, sizeof(uint32_t));
+  seeds.add("tfx", "version_3", joined({tfx3, points, uv}));
+  seeds.add("tfx_text", "two_strands",
+            "version 2.0\nscale 1.0\nbothEndsImmovable 0\nmaxNumVerticesInStrand 16\nnumStrands 2\n"
+            "is sorted 1\nstrand 0 numVerts 3 texcoord 0.25 0\n0 0 0\n0 1 0\n0 2.5e-1 -1.5\n"
+            "strand 1 numVerts 2 texcoord .5 1\n1 0 0\n1 +1 0\n");
+
+  constexpr uint32_t kSegments = 1, kPoints = 2, kThickness = 4;
+  constexpr size_t kHairHeaderBytes = 128;
+  for (const uint32_t arrays : {kPoints, kPoints | kSegments | kThickness}) {
+    Bytes hair = joined({bytes_of("HAIR"), packed(kStrands, kStrands * kVertices, arrays, kVertices - 1)});
+    hair.resize(kHairHeaderBytes);
+    if ((arrays & kSegments) != 0) hair = joined({hair, packed(uint16_t{2}, uint16_t{2})});
+    hair = joined({hair, points});
+    if ((arrays & kThickness) != 0) hair.resize(hair.size() + kStrands * kVertices * sizeof(float));
+    seeds.add("hair", fmt::format("arrays_{}", arrays), hair);
+  }
+  seeds.add("obj", "tetrahedron",
+            "# a comment\nv 0 1 0\nv 1 0 0\nv 0 0 1\nv -1 0 0\nvn 0 1 0\nvt 0 0\nf 1//1 2//1 3//1\n"
+            "f 1 3 4\nf -1 -2 -3 -4\ng name\n");
+}
+
+void add_texts(const SeedFolder& seeds) {
+  const std::string bvh =
+      "HIERARCHY\nROOT Hips\n{\n OFFSET 9 9 9\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation "
+      "Xrotation\n JOINT Neck\n {\n  OFFSET 0 1 0\n  CHANNELS 3 Zrotation Yrotation Xrotation\n"
+      "  JOINT Head\n  {\n   OFFSET 0 1 .5\n   CHANNELS 3 Zrotation Yrotation Xrotation\n"
+      "   End Site\n   {\n    OFFSET 0 1 0\n   }\n  }\n }\n}\nMOTION\nFrames: 3\nFrame Time: .0083333\n"
+      "1 2 3 0 0 0 0 0 0 0 0 0\n1 2 3 10 20 30 1 2 3 4 5 6\n4 5 6 0 0 0 0 0 0 0 0 0\n";
+  for (const uint8_t settings : {0, 7, 12})
+    seeds.add("bvh", fmt::format("settings_{}", settings), joined({packed(settings), bytes_of(bvh)}));
+  seeds.add("wind_csv", "world", "# gusts\nt_s,x_mps,y_mps,z_mps\n0,1,0,0\n0.1,1.5,-2,1e-3\n\n0.25,2,0,0\n");
+  seeds.add("wind_csv", "logger", "logger_ms,u,v,w,t\n1000,1,2,3,20\n1010,1.5,2,3,20\n");
+  seeds.add("scene_text", "built_in", to_text(built_in_scene()));
+  seeds.add("scene_text", "file_groom",
+            "name: \"a\" groom { file { path: \"hair.tfx\" unit_m: 0.63 up_axis: Z origin { y: 0.7 } "
+            "vertex_count: 16 pinning: BOTH_ENDS } } colliders { radius_m: 0.08 } has_auto_collider: false "
+            "solver { name: \"xpbd\" parameters { key: \"a\" value: 1e-3 } }");
+  seeds.add("scene_override", "numbers",
+            "stream.bound_m=0.0002\nsolver.parameters.damping=0.9\nsubsteps=2\n");
+  seeds.add("scene_override", "groups",
+            "colliders.0.radius_m=0.1\ncolliders.0.center_m={ x: 1 y: 2 }\nsolver.name=dftl\n"
+            "groom.file.path=a.tfx\ngroom.file.up_axis=Z\n");
+  seeds.add("address", "ipv4", "127.0.0.1:7878");
+  seeds.add("address", "ipv6", "[::1]:80");
+  seeds.add("address", "name", "hair.example");
+  seeds.add("http_access", "name", "Hair.Example:7878\nhttps://hair.example:7878\n10.0.0.7\nhair.example");
+  seeds.add("http_access", "ipv6", "[::1]:7878\nhttp://[::1]:7878\n::1\n\n");
+}
+
+}  // namespace
+}  // namespace strandcast
+
+int main(int argument_count, char** arguments) {
+  using namespace strandcast;
+  if (argument_count != 2) {
+    fmt::print(stderr, "usage: fuzz_seeds FOLDER (for example tests/fuzz/corpus)\n");
+    return 2;
+  }
+  const SeedFolder seeds(arguments[1]);
+  add_messages(seeds);
+  add_blocks(seeds);
+  add_chains(seeds);
+  add_grooms(seeds);
+  add_texts(seeds);
+  return 0;
+}
