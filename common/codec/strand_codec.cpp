@@ -1,6 +1,10 @@
 #include "common/codec/strand_codec.h"
 
+#include <cstring>
+#include <utility>
+
 #include "common/codec/strand_payload.h"
+#include "common/codec/strand_prefix.h"
 #include "common/groom/groom.h"
 
 namespace strandcast {
@@ -41,6 +45,85 @@ Result<const Row*> find_row(const std::string& codec) {
   return make_error(ErrorCode::NotFound, "unknown strand codec '{}' (known: {})", codec.substr(0, 64), known);
 }
 
+/// Gives the codec the rest shape of those strands that the snapshots have.
+class PrefixEncoder final : public StrandEncoder {
+ public:
+  explicit PrefixEncoder(std::unique_ptr<StrandEncoder> encoder) : encoder_(std::move(encoder)) {}
+
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
+    rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
+    strand_count_ = 0;
+  }
+  EncodedFramePtr encode(const Snapshot& snapshot) override {
+    adopt(snapshot);
+    return encoder_->encode(snapshot);
+  }
+  JoinFrames encode_for_join(const Snapshot& snapshot) override {
+    adopt(snapshot);
+    return encoder_->encode_for_join(snapshot);
+  }
+
+ private:
+  void adopt(const Snapshot& snapshot) {
+    if (snapshot.strand_count == strand_count_) return;
+    strand_count_ = snapshot.strand_count;
+    encoder_->set_rest_shape(prefix_of_shape(rest_in_head_m_, snapshot.vertex_count, strand_count_));
+  }
+
+  std::unique_ptr<StrandEncoder> encoder_;
+  std::vector<glm::vec3> rest_in_head_m_;
+  uint32_t strand_count_ = 0;  // of the newest snapshot; 0 = none since the rest shape was set
+};
+
+/// A decoder for as many strands as the newest keyframe has.
+class PrefixDecoder final : public StrandDecoder {
+ public:
+  PrefixDecoder(const Row& row, const StrandStreamLimits& limits)
+      : row_(row), limits_(limits), strand_count_(limits.strand_count), decoder_(row.make_decoder(limits)) {}
+
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
+    const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
+    rest_in_head_m_.clear();
+    if (fits) rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
+    strand_count_ = limits_.strand_count;
+    decoder_ = make_decoder(strand_count_);
+  }
+
+  Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> message) override {
+    const uint32_t count = keyframe_strand_count(message);
+    if (count == 0 || count == strand_count_ || count > limits_.strand_count)
+      return decoder_->decode(message);
+    // Until the keyframe has proved right, what there is stays.
+    std::unique_ptr<StrandDecoder> decoder = make_decoder(count);
+    ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, decoder->decode(message));
+    decoder_ = std::move(decoder);
+    strand_count_ = count;
+    return snapshot;
+  }
+
+ private:
+  std::unique_ptr<StrandDecoder> make_decoder(uint32_t strand_count) const {
+    auto decoder = row_.make_decoder({strand_count, limits_.vertex_count});
+    decoder->set_rest_shape(prefix_of_shape(rest_in_head_m_, limits_.vertex_count, strand_count));
+    return decoder;
+  }
+
+  /// What a keyframe says before anything of it is checked; 0 for all else.
+  static uint32_t keyframe_strand_count(std::span<const std::byte> message) {
+    uint32_t count = 0;
+    if (message.size() < kFrameHeaderBytes + kStrandFixedBytes) return 0;
+    if (static_cast<Opcode>(message[0]) != Opcode::StrandKeyframe) return 0;
+    std::memcpy(&count, message.data() + kFrameHeaderBytes + kStrandCountOffset, sizeof count);
+    return count;
+  }
+
+  const Row& row_;
+  const StrandStreamLimits limits_;
+  std::vector<glm::vec3> rest_in_head_m_;  // of all strands
+  uint32_t strand_count_;                  // of decoder_
+  std::unique_ptr<StrandDecoder> decoder_;
+};
+
 }  // namespace
 
 const std::vector<StrandCodecInfo>& strand_codecs() {
@@ -59,7 +142,7 @@ Result<float> lattice_step_m(const std::string& codec, float bound_m) {
 
 Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec) {
   ASSIGN_OR_RETURN(const Row* row, find_row(codec));
-  return row->make_encoder();
+  return std::unique_ptr<StrandEncoder>(std::make_unique<PrefixEncoder>(row->make_encoder()));
 }
 
 Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& codec,
@@ -71,7 +154,7 @@ Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& co
   if (limits.vertex_count < kMinVertexCount || limits.vertex_count > kMaxVertexCount)
     return make_error(ErrorCode::LimitExceeded, "{} vertices per strand are not in {}..{}",
                       limits.vertex_count, kMinVertexCount, kMaxVertexCount);
-  return row->make_decoder(limits);
+  return std::unique_ptr<StrandDecoder>(std::make_unique<PrefixDecoder>(*row, limits));
 }
 
 }  // namespace strandcast

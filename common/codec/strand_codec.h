@@ -27,7 +27,8 @@ class StrandEncoder {
  public:
   virtual ~StrandEncoder() = default;
   /// Rest shape in head space, (vertex_count x strand_count), strand fastest: what the asset tells viewers.
-  /// Both sides must set the same one before the first frame, or none.
+  /// Both sides must set the same one before the first frame, or none. Of all strands, also when the
+  /// snapshots have only the first ones.
   virtual void set_rest_shape(std::span<const glm::vec3>) {}
   /// Appends `snapshot` to the chain. The result is a delta against the previous call (a keyframe the first
   /// time and whenever strand_count, vertex_count or quantum change). Null, with the chain restarted, when
@@ -38,7 +39,9 @@ class StrandEncoder {
   virtual JoinFrames encode_for_join(const Snapshot& snapshot) = 0;
 };
 
-/// Decodes one stream. Input is untrusted: errors are returned, memory is bounded by the expected sizes.
+/// Decodes one stream, of all strands or of the first ones (strand_prefix.h): a keyframe says how many, and
+/// the state hash is that of a snapshot with just those. Input is untrusted: errors are returned, memory is
+/// bounded by the expected sizes.
 class StrandDecoder {
  public:
   virtual ~StrandDecoder() = default;
@@ -52,7 +55,7 @@ class StrandDecoder {
 
 /// What a decoder accepts: the sizes announced in the Welcome.
 struct StrandStreamLimits {
-  uint32_t strand_count = 0;
+  uint32_t strand_count = 0;  // at most
   uint32_t vertex_count = 0;
 };
 

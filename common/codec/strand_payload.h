@@ -7,6 +7,7 @@
 namespace strandcast {
 
 inline constexpr size_t kStrandFixedBytes = 96;
+inline constexpr size_t kStrandCountOffset = 8;  // in the fixed part
 inline constexpr float kMaxQuantumM = 1.0f;
 inline constexpr int64_t kMaxStrandTimeNs = int64_t{1} << 61;  // 73 years either way: no difference overflows
 inline constexpr double kMaxHeadPositionM = 1e9;               // along every axis

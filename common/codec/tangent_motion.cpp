@@ -416,11 +416,12 @@ void TangentHistory::coarsen() {
 
 void TangentFrame::resize(const TangentLayout& layout) {
   const size_t size = layout.plane_size();
-  for (auto* values : {&first, &second, &length}) values->resize(size);
+  // Zeros, as places without a strand must hold them also after a chain with another layout.
+  for (auto* values : {&first, &second, &length}) values->assign(size, 0);
   for (size_t axis = 0; axis < 3; ++axis) {
-    lattice[axis].resize(size);
-    velocity[axis].resize(size);
-    residual[axis].resize(size);
+    lattice[axis].assign(size, 0);
+    velocity[axis].assign(size, 0.0f);
+    residual[axis].assign(size, 0.0f);
   }
   escapes.assign(layout.slice_count(), {});
 }
