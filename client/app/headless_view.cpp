@@ -149,10 +149,11 @@ Status render_snapshots(const ViewOptions& options, const SceneAsset& asset, con
   const gl::ShaderLibrary shaders =
       options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir);
   ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, welcome.look));
+  StrandFill fill(asset.rest_position_m, asset.vertex_count);
 
   const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot), welcome.camera, size));
+    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot, fill), welcome.camera, size));
     Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
     render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     return image;

@@ -20,8 +20,9 @@ struct HashingViewer {
 
   void listen() {
     session->set_snapshot_listener([this](const auto& snapshot) {
-      // A coarser stream for a slow link has other numbers by design.
-      if (session->quality().bound_m == session->welcome().bound_m)
+      // A coarser stream for a slow link, or one of fewer strands, has other numbers by design.
+      const bool is_whole = snapshot->strand_count == session->welcome().strand_count;
+      if (is_whole && session->quality().bound_m == session->welcome().bound_m)
         hash_by_tick[snapshot->tick] = state_hash(*snapshot);
     });
   }

@@ -89,6 +89,7 @@ ViewReport make_report(ViewerSession& session) {
   out.count("keyframe_requests", strands.keyframe_requests);
   out.count("dropped_by_client", net.dropped_strand_frames);
   out.count("dropped_by_server", server.dropped_frames);
+  out.number("strand_share", session.quality().strand_share, 3);
   out.count("rate_divisor", session.quality().rate_divisor);
   out.number("quality_bound_mm", static_cast<double>(session.quality().bound_m) * 1e3, 3);
   out.count("quality_changes", session.quality_changes());

@@ -43,8 +43,8 @@ Status ViewerSession::pump(std::chrono::milliseconds timeout) {
 void ViewerSession::take_quality(StreamQuality quality) {
   quality_ = std::move(quality);
   ++quality_changes_;
-  log_info("replay", "strands every {} steps within {:.3g} mm: {}", quality_.rate_divisor,
-           quality_.bound_m * 1e3, quality_.reason);
+  log_info("replay", "{:.3g} % of the strands every {} steps within {:.3g} mm: {}",
+           quality_.strand_share * 1e2, quality_.rate_divisor, quality_.bound_m * 1e3, quality_.reason);
 }
 
 Status ViewerSession::handle(MediaEvent& event) {

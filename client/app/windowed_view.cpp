@@ -198,9 +198,9 @@ class WindowedView {
                    ? "server's pictures"
                    : fmt::format("strands, {}", playout_ == Playout::Smooth ? "smooth" : "newest state");
     const StreamQuality& quality = session().quality();
-    if (!is_frames() && quality.rate_divisor > 1)
-      hud.mode +=
-          fmt::format(", every {} steps within {:.2g} mm", quality.rate_divisor, quality.bound_m * 1e3);
+    if (!is_frames() && session().quality_changes() > 0)
+      hud.mode += fmt::format(", {:.3g} % of them every {} steps within {:.2g} mm",
+                              quality.strand_share * 1e2, quality.rate_divisor, quality.bound_m * 1e3);
     if (static_cast<double>(time_ns - message_ns_) * 1e-9 < kMessageS) hud.message = message_;
     hud.fps = fps_.per_s();
     hud.render_ms = render_timer_.median_ms();

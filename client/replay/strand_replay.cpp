@@ -5,31 +5,41 @@
 
 namespace strandcast {
 
-StrandPicture picture_of(const Snapshot& snapshot) {
-  return StrandPicture{snapshot.world_from_head, positions_in_head(snapshot)};
+StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill) {
+  return StrandPicture{snapshot.world_from_head, fill.positions(snapshot)};
 }
 
-StrandPicture blend(const Snapshot& from, const Snapshot& to, double blend) {
-  if (blend >= 1.0) return picture_of(to);
-  if (blend <= 0.0) return picture_of(from);
-  StrandPicture picture{interpolate(from.world_from_head, to.world_from_head, blend),
-                        positions_in_head(from)};
-  const std::vector<glm::vec3> target = positions_in_head(to);
+StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend) {
+  if (blend <= 0.0) return from;
+  // Without a rest shape a change to fewer strands leaves nothing to blend.
+  if (blend >= 1.0 || from.position_m.size() != to.position_m.size()) return to;
+  from.world_from_head = interpolate(from.world_from_head, to.world_from_head, blend);
   const auto weight = static_cast<float>(blend);
-  for (size_t i = 0; i < target.size(); ++i)
-    picture.position_m[i] += weight * (target[i] - picture.position_m[i]);
-  return picture;
+  for (size_t i = 0; i < to.position_m.size(); ++i)
+    from.position_m[i] += weight * (to.position_m[i] - from.position_m[i]);
+  return from;
 }
 
 Result<std::unique_ptr<StrandReplay>> StrandReplay::make(const Welcome& welcome,
                                                          KeyframeRequester request_keyframe) {
   const StrandStreamLimits limits{welcome.strand_count, welcome.vertex_count};
   ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(welcome.codec, limits));
-  return std::unique_ptr<StrandReplay>(new StrandReplay(std::move(decoder), std::move(request_keyframe)));
+  return std::unique_ptr<StrandReplay>(
+      new StrandReplay(std::move(decoder), welcome, std::move(request_keyframe)));
 }
 
-StrandReplay::StrandReplay(std::unique_ptr<StrandDecoder> decoder, KeyframeRequester request_keyframe)
-    : decoder_(std::move(decoder)), request_keyframe_(std::move(request_keyframe)) {}
+StrandReplay::StrandReplay(std::unique_ptr<StrandDecoder> decoder, const Welcome& welcome,
+                           KeyframeRequester request_keyframe)
+    : decoder_(std::move(decoder)),
+      strand_count_(welcome.strand_count),
+      vertex_count_(welcome.vertex_count),
+      request_keyframe_(std::move(request_keyframe)) {}
+
+void StrandReplay::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
+  decoder_->set_rest_shape(rest_in_head_m);
+  const bool fits = rest_in_head_m.size() == size_t{strand_count_} * vertex_count_;
+  fill_ = fits ? StrandFill(rest_in_head_m, vertex_count_) : StrandFill();
+}
 
 std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte> message,
                                                       int64_t receive_time_ns, const ClockOffset& clock) {
@@ -133,7 +143,7 @@ std::shared_ptr<const Snapshot> StrandReplay::newest() const {
 std::optional<StrandPicture> StrandReplay::picture_at(int64_t client_time_ns) {
   if (snapshots_.empty()) return std::nullopt;
   if (playout_ == Playout::LowLatency || snapshots_.size() < 2 || !playout_clock_.has_value())
-    return picture_of(*snapshots_.back());
+    return picture_of(*snapshots_.back(), fill_);
 
   // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
   const int64_t wanted_ns =
@@ -142,12 +152,14 @@ std::optional<StrandPicture> StrandReplay::picture_at(int64_t client_time_ns) {
   const auto later = std::find_if(snapshots_.begin(), snapshots_.end(), [sim_time_ns](const auto& snapshot) {
     return snapshot->sim_time_ns > sim_time_ns;
   });
-  if (later == snapshots_.end()) return picture_of(*snapshots_.back());
-  if (later == snapshots_.begin()) return picture_of(**later);
+  if (later == snapshots_.end()) return picture_of(*snapshots_.back(), fill_);
+  if (later == snapshots_.begin()) return picture_of(**later, fill_);
   const Snapshot& from = **std::prev(later);
   const Snapshot& to = **later;
   const auto span_ns = static_cast<double>(to.sim_time_ns - from.sim_time_ns);
-  return blend(from, to, static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
+  // Both have all strands, also when the stream has changed to one with fewer in between.
+  return blend(picture_of(from, fill_), picture_of(to, fill_),
+               static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
 }
 
 double StrandReplay::state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const {

@@ -11,6 +11,7 @@
 #include <span>
 
 #include "client/replay/playout_clock.h"
+#include "client/replay/strand_fill.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
 #include "common/codec/snapshot.h"
@@ -54,7 +55,7 @@ class StrandReplay {
                                           const ClockOffset& clock);
 
   /// The asset's rest shape; comes before the first strand frame.
-  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) { decoder_->set_rest_shape(rest_in_head_m); }
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
 
   void set_playout(Playout playout) { playout_ = playout; }
   Playout playout() const { return playout_; }
@@ -74,17 +75,21 @@ class StrandReplay {
   double playout_delay_ms() const { return static_cast<double>(playout_clock_.delay_ns()) * 1e-6; }
 
  private:
-  StrandReplay(std::unique_ptr<StrandDecoder> decoder, KeyframeRequester request_keyframe);
+  StrandReplay(std::unique_ptr<StrandDecoder> decoder, const Welcome& welcome,
+               KeyframeRequester request_keyframe);
   void reject(const Error& error, int64_t receive_time_ns);
   void note_sequence(const FrameHeader& header);
   Status check_stream(const FrameHeader& header) const;
   void keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns, bool is_other_stream);
 
   std::unique_ptr<StrandDecoder> decoder_;
+  const uint32_t strand_count_;
+  const uint32_t vertex_count_;
   KeyframeRequester request_keyframe_;
   Playout playout_ = Playout::LowLatency;
   PlayoutClock playout_clock_;
   std::deque<std::shared_ptr<const Snapshot>> snapshots_;  // oldest first
+  StrandFill fill_;
   ReplayStats stats_;
   StageTimer decode_timer_;
   StageTimer motion_latency_timer_;
@@ -102,11 +107,11 @@ inline constexpr size_t kKeptSnapshots = 16;
 /// A keyframe of another stream may repeat a state this much older than the newest one.
 inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
 
-/// Strands between two snapshots of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
+/// Strands between two pictures of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
 /// space, so a turning head carries the hair round instead of cutting through it.
-StrandPicture blend(const Snapshot& from, const Snapshot& to, double blend);
+StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend);
 
-/// The picture of one snapshot, as the server draws it.
-StrandPicture picture_of(const Snapshot& snapshot);
+/// The picture of one snapshot, as the server draws it when the snapshot has all strands.
+StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill);
 
 }  // namespace strandcast

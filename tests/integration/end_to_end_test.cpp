@@ -261,10 +261,11 @@ TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {
   const Welcome& welcome = frames->welcome();
   auto renderer = Renderer::make(gl::ShaderLibrary(), (*context)->info(), *strands->asset(), welcome.look);
   ASSERT_TRUE(renderer) << renderer.error().to_string();
+  StrandFill fill;  // these states have all strands
   std::vector<Image> drawn;
   for (const Painted& server : common_pictures()) {
     const RenderSize size{welcome.frame_width, welcome.frame_height};
-    ASSERT_TRUE((*renderer)->draw(picture_of(*decoded.at(server.tick)), welcome.camera, size));
+    ASSERT_TRUE((*renderer)->draw(picture_of(*decoded.at(server.tick), fill), welcome.camera, size));
     const Image client = (*renderer)->read_image();
     ASSERT_EQ(client.width, server.image.width);
     ASSERT_EQ(client.height, server.image.height);
@@ -298,6 +299,45 @@ TEST_F(EndToEnd, AControllerPausesStepsAndIsToldWhatIsWrong) {
   EXPECT_EQ(run_command(target, SetParameter{"solver.name=spaghetti"}), kRefusedExit);
   EXPECT_EQ(run_health(target), kDoneExit);
   ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().newest()->tick > tick + 5; }));
+}
+
+// The bound on a running server: announced, then a keyframe on the new lattice, and everybody goes on.
+TEST_F(EndToEnd, TheBoundChangesWhileViewersWatch) {
+  start_feeding();
+  auto viewer = join();
+  ASSERT_TRUE(viewer);
+  States states;
+  record(*viewer, states);
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= 5; }));
+  const CtlTarget target{fmt::format("127.0.0.1:{}", server_->port()), {}, {}};
+  const auto change = [&](const std::string& assignment) {
+    // The command waits for its answer, which needs nobody to pump this viewer.
+    EXPECT_EQ(run_command(target, SetParameter{assignment}), kDoneExit) << assignment;
+  };
+  for (const float bound_m : {4e-4f, 2e-5f, 1e-4f}) {
+    const uint64_t changes = viewer->quality_changes();
+    change(fmt::format("stream.bound_m={}", bound_m));
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality_changes() > changes; }));
+    EXPECT_EQ(viewer->quality().bound_m, bound_m);
+    EXPECT_THAT(viewer->quality().reason, HasSubstr("changed"));
+    const float quantum_m = lattice_step_m(viewer->welcome().codec, bound_m).value();
+    States changed;
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] {
+      changed.clear();
+      for (const auto& item : states)
+        if (item.second->quantum_m == quantum_m) changed.insert(item);
+      return changed.size() >= 20;
+    }));
+    // The first state may share its step with one on the old lattice.
+    changed.erase(changed.begin());
+    expect_within_bound(changed, observer_.published(), bound_m);
+    auto late = join();
+    ASSERT_TRUE(late);
+    EXPECT_EQ(late->welcome().bound_m, bound_m);
+    states.clear();
+  }
+  EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u) << viewer->replay().stats().last_error;
+  EXPECT_EQ(viewer->replay().stats().keyframe_requests, 0u) << "the keyframe came by itself";
 }
 
 TEST_F(EndToEnd, TheCheckCommandComparesTwoViewers) {

@@ -205,10 +205,13 @@ TEST(Blend, MeetsBothEndsExactlyAndIsLinearBetween) {
   const Snapshot from = hair.snapshot(kQuantumM);
   hair.step();
   const Snapshot to = hair.snapshot(kQuantumM);
-  EXPECT_EQ(blend(from, to, 0.0).position_m, positions_in_head(from));
-  EXPECT_EQ(blend(from, to, 1.0).position_m, positions_in_head(to));
-  EXPECT_EQ(blend(from, to, 1.0).world_from_head, to.world_from_head);
-  const auto half = blend(from, to, 0.5);
+  StrandFill fill;
+  const StrandPicture first = picture_of(from, fill);
+  const StrandPicture last = picture_of(to, fill);
+  EXPECT_EQ(blend(first, last, 0.0).position_m, positions_in_head(from));
+  EXPECT_EQ(blend(first, last, 1.0).position_m, positions_in_head(to));
+  EXPECT_EQ(blend(first, last, 1.0).world_from_head, to.world_from_head);
+  const auto half = blend(first, last, 0.5);
   const auto a = positions_in_head(from);
   const auto b = positions_in_head(to);
   for (size_t i = 0; i < a.size(); ++i)
