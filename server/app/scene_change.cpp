@@ -10,8 +10,8 @@
 namespace strandcast {
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",    "substeps",          "gravity_mps2",
-                                                   "colliders", "has_auto_collider", "wind"};
+  static const std::vector<std::string> kFields = {
+      "solver", "substeps", "gravity_mps2", "colliders", "has_auto_collider", "wind", "stream.bound_m"};
   return kFields;
 }
 
@@ -23,10 +23,13 @@ Status check_solver(const SceneDesc& scene) {
 }
 
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment) {
-  const std::string root = assignment.substr(0, assignment.find_first_of(".= "));
+  const std::string path = assignment.substr(0, assignment.find_first_of("= "));
   const std::vector<std::string>& fields = live_fields();
-  if (std::find(fields.begin(), fields.end(), root) == fields.end())
-    return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", root,
+  const bool is_live = std::any_of(fields.begin(), fields.end(), [&](const std::string& field) {
+    return path == field || path.starts_with(field + ".");
+  });
+  if (!is_live)
+    return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));
   ASSIGN_OR_RETURN(SceneDesc changed, with_overrides(scene, {assignment}));
   if (changed.solver.name != scene.solver.name) {

@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-/// Assignments that SetParameter accepts: the first part of their path.
+/// Fields that SetParameter may assign to, whole or in part.
 const std::vector<std::string>& live_fields();
 
 /// The scene after one assignment to a live field, with the solver's name and parameters checked. Parameters

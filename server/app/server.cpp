@@ -1,5 +1,6 @@
 #include "server/app/server.h"
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
@@ -41,9 +42,7 @@ Result<EncodedFramePtr> encode_asset(const SceneAsset& asset) {
 class Server::State : public NetHandler {
  public:
   explicit State(const ServerConfig& config)
-      : config_(config),
-        classes_(make_strand_classes(config.scene.step_rate_hz, config.scene.stream.bound_m)),
-        viewers_(config.scene) {}
+      : config_(config), stream_(config.scene.stream), viewers_(config.scene) {}
   ~State() override { stop(); }
 
   Status start();
@@ -81,6 +80,9 @@ class Server::State : public NetHandler {
  private:
   void start_workers(std::unique_ptr<StrandDecoder> decoder);
   StrandEncodeWorker& encoder(uint16_t stream_id);
+  std::vector<StrandClass> classes_of(const StreamDesc& stream) const;
+  StrandEncodeConfig encode_config(uint16_t stream_id) const;
+  void change_stream(const StreamDesc& stream);
   SimLoop::Reply reply_to(SessionId session) {
     return [this, session](Notice notice) { net_->send(session, std::move(notice)); };
   }
@@ -89,7 +91,9 @@ class Server::State : public NetHandler {
   void run_status();
 
   const ServerConfig config_;
-  const std::vector<StrandClass> classes_;
+  // How strands are coded now. Network thread, and before that starts.
+  StreamDesc stream_;
+  std::vector<StrandClass> classes_;
   const std::string session_id_ = make_session_id();
   InputHub hub_;
   SnapshotSlot slot_;
@@ -126,9 +130,15 @@ Status Server::State::start() {
   strand_decoder->set_rest_shape(asset_->rest_position_m);
   // The port first: a port in use is told at once, not after compiling shaders.
   NetConfig net = config_.net;
+  classes_ = classes_of(stream_);
   net.strand_classes = classes_;
   ASSIGN_OR_RETURN(net_, NetServer::listen(net, *this));
-  SimLoopConfig sim{scene, content_, config_.gl_device, config_.shader_folder, config_.on_publish};
+  SimLoopConfig sim{scene,
+                    content_,
+                    config_.gl_device,
+                    config_.shader_folder,
+                    config_.on_publish,
+                    [this](const StreamDesc& stream) { change_stream(stream); }};
   ASSIGN_OR_RETURN(sim_, SimLoop::start(std::move(sim), hub_, slot_));
   start_workers(std::move(strand_decoder));
   net_->start();
@@ -162,7 +172,7 @@ void Server::State::start_workers(std::unique_ptr<StrandDecoder> decoder) {
 /// The encoder of a class, made when it is needed first. Network thread, and before that starts.
 StrandEncodeWorker& Server::State::encoder(uint16_t stream_id) {
   const std::lock_guard lock(workers_mutex_);
-  encoders_.resize(classes_.size());
+  encoders_.resize(std::max(classes_.size(), encoders_.size()));
   std::unique_ptr<StrandEncodeWorker>& worker = encoders_[stream_id];
   if (worker != nullptr) return *worker;
   const auto sink = [this](EncodedFramePtr frame) {
@@ -175,10 +185,33 @@ StrandEncodeWorker& Server::State::encoder(uint16_t stream_id) {
   auto made = make_strand_encoder(config_.scene.stream.codec);
   CHECK(made.ok());  // start() has made one
   (*made)->set_rest_shape(asset_->rest_position_m);
-  const StrandClass& row = classes_[stream_id];
-  worker = std::make_unique<StrandEncodeWorker>(
-      slot_, std::move(*made), sink, StrandEncodeConfig{stream_id, row.rate_divisor, row.coarsening});
+  worker = std::make_unique<StrandEncodeWorker>(slot_, std::move(*made), sink, encode_config(stream_id));
   return *worker;
+}
+
+std::vector<StrandClass> Server::State::classes_of(const StreamDesc& stream) const {
+  return make_strand_classes({config_.scene.step_rate_hz, 0.0, stream.bound_m, asset_->strand_count});
+}
+
+StrandEncodeConfig Server::State::encode_config(uint16_t stream_id) const {
+  const StrandClass& row = classes_[stream_id];
+  const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
+  CHECK(quantum_m.ok());  // as above
+  return {stream_id, row.rate_divisor, row.coarsening, row.strand_share, *quantum_m};
+}
+
+/// Simulation thread. States on the new lattice wait in the slot until the network thread has told everybody.
+void Server::State::change_stream(const StreamDesc& stream) {
+  std::vector<StrandClass> classes = classes_of(stream);
+  net_->set_strand_classes(classes, "the stream was changed", [this, stream, classes] {
+    stream_ = stream;
+    classes_ = classes;
+    const std::lock_guard lock(workers_mutex_);
+    encoders_.resize(std::max(classes_.size(), encoders_.size()));
+    for (uint16_t stream_id = 0; stream_id < encoders_.size(); ++stream_id)
+      if (encoders_[stream_id] != nullptr && stream_id < classes_.size())
+        encoders_[stream_id]->change(encode_config(stream_id));
+  });
 }
 
 void Server::State::stop() {
@@ -219,7 +252,7 @@ Welcome Server::State::make_welcome(const Viewers::Place& place) const {
   welcome.codec = scene.stream.codec;
   welcome.strand_count = asset_->strand_count;
   welcome.vertex_count = asset_->vertex_count;
-  welcome.bound_m = scene.stream.bound_m;
+  welcome.bound_m = stream_.bound_m;
   welcome.step_rate_hz = scene.step_rate_hz;
   welcome.look = scene.look;
   welcome.camera = scene.camera;
@@ -258,7 +291,7 @@ void Server::State::on_left(SessionId session) {
 void Server::State::follow_viewers() {
   const RuntimeFacts facts = viewers_.facts();
   frames_->set_views(viewers_.picture_views());
-  for (uint16_t stream_id = 0; stream_id < classes_.size(); ++stream_id) {
+  for (uint16_t stream_id = 0; stream_id < encoders_.size(); ++stream_id) {
     const bool draws = stream_id == 0 && facts.frame_viewers > 0;  // pictures are drawn from the first class
     const bool is_needed = viewers_.strand_viewers(stream_id) > 0 || draws;
     if (is_needed || encoders_[stream_id] != nullptr) encoder(stream_id).set_has_listeners(is_needed);

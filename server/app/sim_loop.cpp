@@ -5,6 +5,7 @@
 #include <future>
 #include <utility>
 
+#include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/codec/strand_codec.h"
 #include "server/app/scene_change.h"
@@ -197,9 +198,21 @@ Notice SimLoop::change(const std::string& assignment) {
   if (is_other_solver || !needs_same_solver(features, solver_features_))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
+  const bool is_other_stream = scene->stream != config_.scene.stream;
   config_.scene = *scene;
   builder_->change(*scene, colliders_of(*scene, *config_.content));
+  if (is_other_stream) change_stream();
   return {false, fmt::format("{} from step {} on.", assignment, tick_ + 1)};
+}
+
+/// Publishes the present state once more, so that viewers see the change also while paused.
+void SimLoop::change_stream() {
+  const StreamDesc& stream = config_.scene.stream;
+  const Result<float> quantum_m = lattice_step_m(stream.codec, stream.bound_m);
+  CHECK(quantum_m.ok());  // the codec cannot change while running
+  publisher_->set_quantum_m(*quantum_m);
+  if (config_.on_stream_change) config_.on_stream_change(stream);
+  publish();
 }
 
 /// Builds the scene's solver; strands keep their state.

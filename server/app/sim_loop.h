@@ -40,9 +40,10 @@ using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot
 struct SimLoopConfig {
   SceneDesc scene;
   std::shared_ptr<const SceneContent> content;
-  std::string gl_device = "auto";                      // as EglContext::make
-  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
-  SnapshotObserver on_publish;                         // may be empty; on the simulation thread
+  std::string gl_device = "auto";                           // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;       // none: the shaders in the binary
+  SnapshotObserver on_publish;                              // may be empty; on the simulation thread
+  std::function<void(const StreamDesc&)> on_stream_change;  // before the first state of it; likewise
 };
 
 /// Totals since start, and the present state.
@@ -106,6 +107,7 @@ class SimLoop {
   void carry_out(const Job& job);
   Notice command(Command command);
   Notice change(const std::string& assignment);
+  void change_stream();
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_facts(const RuntimeFacts& facts);
   void step(int64_t time_ns);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/log.h"
+#include "common/codec/strand_prefix.h"
 
 namespace strandcast {
 namespace {
@@ -12,6 +13,12 @@ namespace {
 constexpr double kMsPerNs = 1e-6;
 constexpr std::chrono::milliseconds kKeyframePatience{
     50};  // for a new state, before the present one is encoded again
+
+/// Whether there is a state on the lattice that the class is announced with.
+bool has_state(const SnapshotSlot::View& view, const StrandEncodeConfig& config) {
+  if (view.snapshot == nullptr) return false;
+  return config.quantum_m == 0.0f || view.snapshot->quantum_m == config.quantum_m;
+}
 
 }  // namespace
 
@@ -30,9 +37,12 @@ Snapshot coarsen(const Snapshot& snapshot, uint32_t factor) {
 
 StrandEncodeWorker::StrandEncodeWorker(SnapshotSlot& slot, std::unique_ptr<StrandEncoder> encoder, Sink sink,
                                        StrandEncodeConfig config)
-    : slot_(slot), encoder_(std::move(encoder)), sink_(std::move(sink)), config_(config), thread_([this] {
-        run();
-      }) {}
+    : slot_(slot),
+      encoder_(std::move(encoder)),
+      sink_(std::move(sink)),
+      stream_id_(config.stream_id),
+      config_(config),
+      thread_([this] { run(); }) {}
 
 StrandEncodeWorker::~StrandEncodeWorker() {
   is_stopping_ = true;
@@ -44,6 +54,19 @@ void StrandEncodeWorker::set_has_listeners(bool has_listeners) {
   if (has_listeners && !has_listeners_) is_restarting_ = true;
   has_listeners_ = has_listeners;
   slot_.notify();
+}
+
+void StrandEncodeWorker::change(const StrandEncodeConfig& config) {
+  {
+    const std::lock_guard lock(config_mutex_);
+    config_ = config;
+  }
+  slot_.notify();
+}
+
+StrandEncodeConfig StrandEncodeWorker::config() const {
+  const std::lock_guard lock(config_mutex_);
+  return config_;
 }
 
 void StrandEncodeWorker::request_keyframe() {
@@ -61,7 +84,7 @@ StrandEncodeCounters StrandEncodeWorker::counters() const {
 
 bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
   if (is_stopping_) return true;
-  if (!has_listeners_ || view.snapshot == nullptr) return false;
+  if (!has_listeners_ || !has_state(view, config())) return false;
   return is_due(view) || is_restarting_ || (is_keyframe_wanted_ && keyframe_ != nullptr);
 }
 
@@ -69,19 +92,19 @@ bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
 bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
   if (view.version == encoded_version_) return false;
   const uint64_t tick = view.snapshot->tick;
+  const uint32_t rate_divisor = config().rate_divisor;
   const bool is_first = encoded_version_ == 0 || is_restarting_;
   // By a fixed grid: a state that is taken late does not put off those that follow.
-  return config_.rate_divisor <= 1 || is_first ||
-         tick / config_.rate_divisor != encoded_tick_ / config_.rate_divisor;
+  return rate_divisor <= 1 || is_first || tick / rate_divisor != encoded_tick_ / rate_divisor;
 }
 
 /// Returns for a new state, or when somebody has waited long enough for a keyframe of the present one.
 SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
   const auto has_work_now = [this](const SnapshotSlot::View& now) { return has_work(now); };
   const auto has_request = [this](const SnapshotSlot::View& now) {
-    return has_work(now) || (has_listeners_ && now.snapshot != nullptr && is_keyframe_wanted_);
+    return has_work(now) || (has_listeners_ && has_state(now, config()) && is_keyframe_wanted_);
   };
-  const bool takes_all = config_.rate_divisor <= 1;
+  const bool takes_all = config().rate_divisor <= 1;
   (void)(takes_all ? slot_.wait(has_request) : slot_.wait_for(kLongestStateWait, has_request));
   return slot_.wait_for(is_keyframe_wanted_ ? kKeyframePatience : std::chrono::milliseconds(0), has_work_now);
 }
@@ -90,11 +113,12 @@ void StrandEncodeWorker::run() {
   while (true) {
     const SnapshotSlot::View view = wait_for_work();
     if (view.is_stopped || is_stopping_) return;
-    if (has_listeners_ && view.snapshot != nullptr) serve(view);
+    const StrandEncodeConfig config_now = config();
+    if (has_listeners_ && has_state(view, config_now)) serve(view, config_now);
   }
 }
 
-void StrandEncodeWorker::serve(const SnapshotSlot::View& view) {
+void StrandEncodeWorker::serve(const SnapshotSlot::View& view, const StrandEncodeConfig& config) {
   // Without work there was a long wait: no further state comes whose turn it would be.
   const bool is_overdue = !has_work(view) && view.version != encoded_version_;
   const bool is_new = is_due(view) || is_overdue;
@@ -109,18 +133,21 @@ void StrandEncodeWorker::serve(const SnapshotSlot::View& view) {
   encoded_version_ = view.version;
   encoded_tick_ = view.snapshot->tick;
   const Audience audience = is_wanted || is_restarting ? Audience::Joiners : Audience::Followers;
-  const JoinFrames frames = encode(*view.snapshot, audience);
+  const JoinFrames frames = encode(*view.snapshot, config, audience);
   keyframe_ = frames.keyframe;
   // After a pause nobody has what a delta builds on; the keyframe is all they need.
   if (frames.frame != frames.keyframe && !is_restarting) give(frames.frame);
   give(frames.keyframe);
 }
 
-JoinFrames StrandEncodeWorker::encode(const Snapshot& published, Audience audience) {
+JoinFrames StrandEncodeWorker::encode(const Snapshot& published, const StrandEncodeConfig& config,
+                                      Audience audience) {
   const int64_t begin_ns = now_ns();
-  std::optional<Snapshot> coarse;
-  if (config_.coarsening > 1) coarse = coarsen(published, config_.coarsening);
-  const Snapshot& snapshot = coarse ? *coarse : published;
+  std::optional<Snapshot> reduced;
+  if (config.strand_share < 1.0f)
+    reduced = prefix_of(published, prefix_count(published.strand_count, config.strand_share));
+  if (config.coarsening > 1) reduced = coarsen(reduced ? *reduced : published, config.coarsening);
+  const Snapshot& snapshot = reduced ? *reduced : published;
   JoinFrames frames;
   if (audience == Audience::Joiners) {
     frames = encoder_->encode_for_join(snapshot);
@@ -154,7 +181,7 @@ void StrandEncodeWorker::count(const JoinFrames& frames, double encode_ms, Audie
 }
 
 void StrandEncodeWorker::give(const EncodedFramePtr& frame) {
-  if (frame != nullptr) sink_(with_send_time(*frame, config_.stream_id, now_ns()));
+  if (frame != nullptr) sink_(with_send_time(*frame, stream_id_, now_ns()));
 }
 
 }  // namespace strandcast

@@ -33,6 +33,8 @@ struct StrandEncodeConfig {
   uint16_t stream_id = 0;     // of its frames
   uint32_t rate_divisor = 1;  // at most one state per so many simulation steps
   uint32_t coarsening = 1;    // lattice steps per step of the published lattice
+  float strand_share = 1.0f;  // in (0, 1]: the first strands only
+  float quantum_m = 0.0f;     // states on another published lattice are left out; 0 = all are taken
 };
 
 /// The newest state is encoded after this long even if its turn has not come: the simulation is paused.
@@ -59,6 +61,8 @@ class StrandEncodeWorker {
 
   /// False: nothing is encoded. From false to true the chain goes on with a keyframe of the newest snapshot.
   void set_has_listeners(bool has_listeners);
+  /// From the next state on; stream_id stays. States of the old lattice are left out from here on.
+  void change(const StrandEncodeConfig& config);
   /// Asks for a keyframe and returns at once. It comes with the next state, or with the present one when no
   /// other is published soon. Requests that come before it is made share it; later ones for the same state
   /// get the same frame again.
@@ -72,16 +76,20 @@ class StrandEncodeWorker {
   void run();
   bool has_work(const SnapshotSlot::View& view) const;
   bool is_due(const SnapshotSlot::View& view) const;
+  StrandEncodeConfig config() const;
   SnapshotSlot::View wait_for_work() const;
-  void serve(const SnapshotSlot::View& view);
-  JoinFrames encode(const Snapshot& published, Audience audience);
+  void serve(const SnapshotSlot::View& view, const StrandEncodeConfig& config);
+  JoinFrames encode(const Snapshot& published, const StrandEncodeConfig& config, Audience audience);
   void count(const JoinFrames& frames, double encode_ms, Audience audience);
   void give(const EncodedFramePtr& frame);
 
   SnapshotSlot& slot_;
   std::unique_ptr<StrandEncoder> encoder_;
   Sink sink_;
-  const StrandEncodeConfig config_;
+  const uint16_t stream_id_;
+
+  mutable std::mutex config_mutex_;
+  StrandEncodeConfig config_;
 
   std::atomic<bool> is_stopping_{false};
   std::atomic<bool> has_listeners_{false};

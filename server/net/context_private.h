@@ -23,7 +23,8 @@ inline constexpr size_t kSpareConnections = 64;
 inline constexpr size_t kSpareConnectionsPerAddress = 16;
 
 struct Context {
-  Context(const NetConfig& net_config, NetHandler& net_handler) : config(net_config), handler(net_handler) {}
+  Context(const NetConfig& net_config, NetHandler& net_handler)
+      : config(net_config), handler(net_handler), strand_classes(net_config.strand_classes) {}
 
   void count(uint64_t NetCounters::*field, uint64_t amount = 1) {
     const std::lock_guard lock(mutex);
@@ -46,9 +47,12 @@ struct Context {
   /// Bytes per second of every strand class, as measured, or estimated from the one measured last; empty at
   /// first.
   std::vector<double> strand_costs() const;
+  /// What was measured of the old classes is forgotten.
+  void set_strand_classes(std::vector<StrandClass> classes);
 
   const NetConfig config;
   NetHandler& handler;
+  std::vector<StrandClass> strand_classes;
   boost::asio::io_context io{1};
   std::map<SessionId, std::shared_ptr<Session>> sessions;
   std::set<std::shared_ptr<Connection>> connections;

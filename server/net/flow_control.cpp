@@ -171,11 +171,15 @@ size_t FlowControl::class_below(size_t present, std::span<const double> costs, d
 
 void FlowControl::change(size_t from, size_t to, int64_t time_ns) {
   const bool has_failed = to > from && improved_ns_ != 0 && time_ns - improved_ns_ < kProbationNs;
-  if (has_failed) probe_ns_ = std::min(2 * probe_ns_, kLongestProbeNs);
-  if (to < from) {
-    if (improved_ns_ != 0 && time_ns - improved_ns_ > 2 * kProbationNs) probe_ns_ = kFirstProbeNs;
-    improved_ns_ = time_ns;
+  if (has_failed) {
+    probe_ns_ = std::min(2 * probe_ns_, kLongestProbeNs);
+    failed_class_ = from;
   }
+  // What has lasted no longer counts as failed.
+  const bool has_lasted = improved_ns_ != 0 && time_ns - improved_ns_ > 2 * kProbationNs;
+  if (has_lasted && from <= failed_class_) probe_ns_ = kFirstProbeNs;
+  if (to < from) improved_ns_ = time_ns;
+  if (to > from) improved_ns_ = 0;
   quiet_since_ns_ = time_ns;
 }
 
@@ -210,8 +214,10 @@ size_t FlowControl::choose_class(size_t present, std::span<const double> costs, 
   const bool has_delay = std::any_of(delays_.begin(), delays_.end(), [](const Sample& sample) {
     return sample.value > static_cast<double>(kLowDelayNs);
   });
-  if (has_delay) quiet_since_ns_ = std::max(quiet_since_ns_, time_ns - probe_ns_ / 2);
-  if (present == 0 || has_delay || time_ns - quiet_since_ns_ < probe_ns_) return present;
+  // Back to where it went well the way is short; what failed is tried more and more rarely.
+  const int64_t wait_ns = present == 0 || present - 1 > failed_class_ ? kFirstProbeNs : probe_ns_;
+  if (has_delay) quiet_since_ns_ = std::max(quiet_since_ns_, time_ns - wait_ns / 2);
+  if (present == 0 || has_delay || time_ns - quiet_since_ns_ < wait_ns) return present;
   if (allowed > 0.0 && costs[present - 1] > allowed) return present;
   change(present, present - 1, time_ns);
   return present - 1;

@@ -32,7 +32,7 @@ inline constexpr size_t kTroublingLosses = 2;
 inline constexpr int64_t kLossWindowNs = 2'000 * kNsPerMs;
 /// Share of the measured capacity that a class may take.
 inline constexpr double kUsableShare = 0.85;
-/// Quiet time before a better class is tried; doubles with every try that fails.
+/// Quiet time before a better class is tried; before one that failed it doubles with every try.
 inline constexpr int64_t kFirstProbeNs = 3'000 * kNsPerMs;
 inline constexpr int64_t kLongestProbeNs = 60'000 * kNsPerMs;
 /// Trouble this soon after a change for the better means that the try has failed.
@@ -117,8 +117,9 @@ class FlowControl {
   std::optional<Frame> keyframe_;    // the newest one sent
   std::deque<int64_t> losses_ns_;
   int64_t quiet_since_ns_ = 0;  // the last trouble or change
-  int64_t improved_ns_ = 0;     // the last change for the better
+  int64_t improved_ns_ = 0;     // the last change, if it was for the better
   int64_t probe_ns_ = kFirstProbeNs;
+  size_t failed_class_ = 0;  // that was tried last and failed; probe_ns_ is for it and for better ones
 };
 
 }  // namespace strandcast

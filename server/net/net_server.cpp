@@ -72,8 +72,8 @@ void Context::update_session_counts() {
 }
 
 void Context::note_strand_frame(const FrameHeader& header, size_t bytes, int64_t time_ns) {
-  if (header.opcode != Opcode::StrandDelta || header.stream_id >= config.strand_classes.size()) return;
-  class_loads.resize(config.strand_classes.size());
+  if (header.opcode != Opcode::StrandDelta || header.stream_id >= strand_classes.size()) return;
+  class_loads.resize(strand_classes.size());
   ClassLoad& load = class_loads[header.stream_id];
   const auto measured = static_cast<double>(bytes);
   load.delta_bytes =
@@ -86,7 +86,7 @@ std::vector<double> Context::strand_costs() const {
       std::max_element(class_loads.begin(), class_loads.end(),
                        [](const ClassLoad& a, const ClassLoad& b) { return a.time_ns < b.time_ns; });
   if (newest == class_loads.end() || newest->time_ns == 0) return {};
-  const auto& classes = config.strand_classes;
+  const auto& classes = strand_classes;
   const auto reference = static_cast<size_t>(newest - class_loads.begin());
   const double full =
       newest->delta_bytes * classes[reference].frame_rate_hz / classes[reference].relative_cost;
@@ -98,6 +98,11 @@ std::vector<double> Context::strand_costs() const {
                              : full * classes[i].relative_cost);
   }
   return costs;
+}
+
+void Context::set_strand_classes(std::vector<StrandClass> classes) {
+  strand_classes = std::move(classes);
+  class_loads.clear();
 }
 
 }  // namespace net
@@ -286,6 +291,18 @@ void NetServer::set_picture_class(SessionId session, PictureClass picture_class)
   net::asio::post(state_->context.io, [state = state_.get(), session, picture_class] {
     const auto found = state->context.sessions.find(session);
     if (found != state->context.sessions.end()) found->second->set_picture_class(picture_class);
+  });
+}
+
+void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string reason,
+                                   std::function<void()> then) {
+  CHECK(!classes.empty());
+  net::asio::post(state_->context.io, [state = state_.get(), classes = std::move(classes),
+                                       reason = std::move(reason), then = std::move(then)] {
+    state->context.set_strand_classes(classes);
+    const auto sessions = state->context.sessions;
+    for (const auto& [id, session] : sessions) session->follow_strand_classes(reason);
+    then();
   });
 }
 

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -52,7 +53,7 @@ struct NetConfig {
   std::vector<std::string>
       allowed_hosts;  // accepted in the Host header, besides the server's own address and name
   NetLimits limits;
-  std::vector<StrandClass> strand_classes = {StrandClass{}};  // best first; the index is the stream_id
+  std::vector<StrandClass> strand_classes = {StrandClass{}};  // at first; best first, index = stream_id
 };
 
 /// Answer to a Hello. Without an asset none is sent; strands or pictures follow by welcome.mode.
@@ -129,6 +130,9 @@ class NetServer {
   /// The newest picture for the viewers of one class; replaces one not yet being sent.
   void publish_picture(PictureClass picture_class, EncodedFramePtr frame);
   void set_picture_class(SessionId session, PictureClass picture_class);
+  /// Strands are coded otherwise from now on: tells every viewer of strands and moves those whose class is
+  /// gone. `then` runs on the network thread after that, before any frame published later.
+  void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then);
   /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
   void broadcast(ServerMessage message);
   /// To those who watch the pictures of one class.

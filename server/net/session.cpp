@@ -185,6 +185,9 @@ void Session::join(const Hello& hello) {
     probe(now_ns());
   }
   queue_control(std::move(admission->welcome));
+  // The Welcome says nothing about a rate below that of the simulation.
+  if (mode_ == StreamMode::Strands && flow_.expects_acks() && context_.strand_classes[0].rate_divisor > 1)
+    announce_quality("the stream is set so");
   ask_for_keyframe(now_ns());
 }
 
@@ -323,19 +326,36 @@ void Session::adapt(int64_t time_ns) {
   const size_t chosen = flow_.choose_class(strand_class_, costs, cap, time_ns);
   if (chosen == strand_class_) return;
   const bool is_better = chosen < strand_class_;
+  change_strand_class(chosen);
+  announce_quality(fmt::format("{}: {}; link {:.2f} Mbit/s, {:.0f} ms of data on its way",
+                               is_better ? "the link has room" : "the link or this viewer is too slow",
+                               to_string(context_.strand_classes[strand_class_]),
+                               flow_.capacity_bytes_per_s(time_ns) * 8e-6,
+                               static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs));
+  ask_for_keyframe(time_ns);
+}
+
+void Session::change_strand_class(size_t chosen) {
   strand_class_ = static_cast<uint16_t>(chosen);
-  const StrandClass& now = context_.config.strand_classes[chosen];
-  const std::string reason =
-      fmt::format("{}: {:.3g} Hz, {:.3g} mm; link {:.2f} Mbit/s, {:.0f} ms of data on its way",
-                  is_better ? "the link has room" : "the link or this viewer is too slow", now.frame_rate_hz,
-                  now.bound_m * 1e3, flow_.capacity_bytes_per_s(time_ns) * 8e-6,
-                  static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs);
-  log_info("net", "session {}: {}", id_, reason);
   context_.count(&NetCounters::class_changes);
   queue_.restart_strands();
   context_.handler.on_strand_class(id_, strand_class_);
+}
+
+void Session::announce_quality(const std::string& reason) {
+  log_info("net", "session {}: {}", id_, reason);
+  const StrandClass& now = context_.strand_classes[strand_class_];
   queue_control(StreamQuality{strand_class_, now.rate_divisor, now.strand_share, now.bound_m, reason});
-  ask_for_keyframe(time_ns);
+}
+
+void Session::follow_strand_classes(const std::string& reason) {
+  if (state_ != State::Joined || mode_ != StreamMode::Strands || hello_.role == Role::Source) return;
+  guarded([&] {
+    const size_t last = context_.strand_classes.size() - 1;
+    if (strand_class_ > last) change_strand_class(last);
+    announce_quality(fmt::format("{}: {}", reason, to_string(context_.strand_classes[strand_class_])));
+    ask_for_keyframe(now_ns());
+  });
 }
 
 /// Measures the bare round trip, and shows whether a viewer still reads.

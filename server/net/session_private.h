@@ -25,6 +25,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void start(http::request<http::empty_body> request, bool has_room);
 
   void deliver_strands(const EncodedFramePtr& frame);
+  /// The strand classes are others now: announces what this session gets.
+  void follow_strand_classes(const std::string& reason);
   /// Whether pictures of this class are for this session.
   bool watches(PictureClass picture_class) const;
   void deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame);
@@ -62,6 +64,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void ask_for_keyframe(int64_t time_ns);
   void on_ack(const FrameAck& ack, int64_t time_ns);
   void adapt(int64_t time_ns);
+  void change_strand_class(size_t chosen);
+  void announce_quality(const std::string& reason);
   void probe(int64_t time_ns);
   void on_control_frame(websocket::frame_type kind);
   bool is_stalled(int64_t time_ns) const;

@@ -1,6 +1,11 @@
 #include "server/net/strand_class.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+
+#include "common/wire/messages.h"
 
 namespace strandcast {
 namespace {
@@ -10,6 +15,8 @@ namespace {
 constexpr double kRatePower = 0.54;
 /// Measured likewise, from 0.1 mm to 0.5 mm: 0.60 to 0.67.
 constexpr double kCoarseCost = 0.63;
+/// And with this power of the share of strands: neighbours that are farther away say less.
+constexpr double kSharePower = 0.95;
 /// A lattice that is coarser by less saves too little to be worth a keyframe.
 constexpr uint32_t kLeastCoarsening = 2;
 
@@ -20,28 +27,56 @@ uint32_t coarsening_for(float bound_m) {
   return factor >= kLeastCoarsening ? static_cast<uint32_t>(factor) : 1;
 }
 
+uint32_t first_divisor(const StrandStreamPlan& plan) {
+  if (plan.rate_hz <= 0.0 || plan.rate_hz >= plan.step_rate_hz) return 1;
+  constexpr double kRounding = 1e-9;
+  const double steps = std::ceil(plan.step_rate_hz / plan.rate_hz - kRounding);
+  return static_cast<uint32_t>(std::min<double>(steps, kMaxRateDivisor));
+}
+
+/// The smallest of 1, 1/2, 1/4, 1/8 that leaves enough strands, but not below `wanted`.
+float share_of(float wanted, uint32_t strand_count) {
+  float share = 1.0f;
+  while (share > wanted && 0.5f * share * static_cast<float>(strand_count) >= kLeastPrefixStrands)
+    share *= 0.5f;
+  return share;
+}
+
 }  // namespace
 
-std::vector<StrandClass> make_strand_classes(double step_rate_hz, float bound_m) {
+std::vector<StrandClass> make_strand_classes(const StrandStreamPlan& plan) {
   struct Row {
+    float strand_share;
     uint32_t rate_divisor;
     bool is_coarse;
   };
-  constexpr Row kRows[] = {{1, false}, {2, false}, {3, false}, {3, true}, {4, true}, {6, true}};
-  const uint32_t coarsening = coarsening_for(bound_m);
+  constexpr Row kRows[] = {{1.0f, 1, false},   {0.5f, 1, false},   {0.25f, 1, false},
+                           {0.125f, 1, false}, {0.125f, 2, false}, {0.125f, 3, false},
+                           {0.125f, 3, true},  {0.125f, 4, true},  {0.125f, 6, true}};
+  const uint32_t coarsening = coarsening_for(plan.bound_m);
+  const uint32_t divisor = first_divisor(plan);
   std::vector<StrandClass> classes;
   for (const Row& row : kRows) {
     StrandClass made;
-    made.rate_divisor = row.rate_divisor;
-    made.frame_rate_hz = step_rate_hz / row.rate_divisor;
+    made.strand_share = share_of(row.strand_share, plan.strand_count);
+    made.rate_divisor = divisor * row.rate_divisor;
+    made.frame_rate_hz = plan.step_rate_hz / made.rate_divisor;
     made.coarsening = row.is_coarse ? coarsening : 1;
-    made.bound_m = made.coarsening > 1 ? bound_m * static_cast<float>(1 + coarsening) : bound_m;
-    made.relative_cost = std::pow(row.rate_divisor, -kRatePower) * (made.coarsening > 1 ? kCoarseCost : 1.0);
+    made.bound_m = made.coarsening > 1 ? plan.bound_m * static_cast<float>(1 + coarsening) : plan.bound_m;
+    made.relative_cost = std::pow(row.rate_divisor, -kRatePower) * std::pow(made.strand_share, kSharePower) *
+                         (made.coarsening > 1 ? kCoarseCost : 1.0);
     const bool is_new = classes.empty() || made.relative_cost < classes.back().relative_cost;
     const bool is_fast_enough = row.rate_divisor == 1 || made.frame_rate_hz >= kLeastFrameRateHz;
-    if (is_new && is_fast_enough) classes.push_back(made);
+    if (is_new && is_fast_enough && made.rate_divisor <= kMaxRateDivisor) classes.push_back(made);
   }
   return classes;
+}
+
+std::string to_string(const StrandClass& row) {
+  const std::string strands = row.strand_share < 1.0f
+                                  ? fmt::format("1/{:.0f} of the strands", 1.0f / row.strand_share)
+                                  : "all strands";
+  return fmt::format("{}, {:.3g} Hz, {:.3g} mm", strands, row.frame_rate_hz, row.bound_m * 1e3);
 }
 
 }  // namespace strandcast

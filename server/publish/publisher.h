@@ -68,6 +68,8 @@ class Publisher {
   /// Strands put back to rest because they had stretched too far, since start.
   uint64_t overstretch_count() const { return overstretch_count_; }
   float quantum_m() const { return quantum_m_; }
+  /// From the next publish() on.
+  void set_quantum_m(float quantum_m) { quantum_m_ = quantum_m; }
   const StageTimer& read_timer() const { return read_timer_; }
   const StageTimer& quantise_timer() const { return quantise_timer_; }
 

@@ -319,6 +319,9 @@ TEST_F(LiveServer, BadChangesAreRefusedInOneSentenceAndChangeNothing) {
       {"solver.parameters.nonsense=1", "nonsense"},
       {"solver.parameters.s_damping=1e9", "s_damping"},
       {"groom.procedural.strand_count=5", "known: solver"},
+      {"stream.bound_m=1", "bound_m"},
+      {"stream.codec=raw", "stream.bound_m"},
+      {"stream", "stream.bound_m"},
       {"substeps=100000", "substeps"},
       {"wind.mean_mps.x=nan", "wind"},
       {"no assignment", "known: solver"}};

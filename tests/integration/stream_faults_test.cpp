@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "client/app/live_connection.h"
+#include "common/codec/strand_prefix.h"
 #include "server/app/server.h"
 #include "tests/support/eventually.h"
 #include "tests/tools/chaos_relay.h"
@@ -181,6 +182,51 @@ TEST_F(StreamFaults, SlowLinkGetsACheaperClassThatOthersDoNotNotice) {
     for (size_t i = 1; i < counters.strand_classes.size(); ++i)
       EXPECT_LE(counters.strand_classes[i].encodes, counters.sim.published + kStatsSteps);
   }
+  expect_undisturbed();
+}
+
+// The first thing that a slow link costs is strands: announced, and completed in the picture.
+TEST_F(StreamFaults, SlowLinkGetsFewerStrandsFirst) {
+  constexpr uint32_t kStrands = 1'000;
+  ASSERT_NO_FATAL_FAILURE(start({}, scene_of(kStrands, 12)));
+  if (server_ == nullptr) return;
+  watch();
+  LinkPlan slow;
+  slow.bytes_per_s = static_cast<uint64_t>(0.45 * full_bytes_per_s());
+  slow.queue_bytes = 1u << 20;
+  const auto link = relay({}, slow);
+  ClientConfig config;
+  config.address.port = link->port();
+  auto opened = ViewerSession::open(config);
+  ASSERT_TRUE(opened) << opened.error().to_string();
+  ViewerSession& viewer = **opened;
+  uint64_t thinned = 0, wrong = 0;
+  uint32_t strand_count = 0;
+  viewer.set_snapshot_listener([&](const auto& snapshot) {
+    // Every state has passed its hash. Whatever was sent, what is drawn has all strands.
+    strand_count = snapshot->strand_count;
+    thinned += strand_count < kStrands ? 1 : 0;
+    const auto picture = viewer.replay().picture_at(now_ns());
+    wrong += !picture || picture->position_m.size() != viewer.asset()->rest_position_m.size() ? 1 : 0;
+  });
+  const auto pump = [&] {
+    EXPECT_TRUE(viewer.pump(std::chrono::milliseconds(5)));
+    viewers_->run_for(5);
+  };
+  const auto sees = [&](auto condition) {
+    return eventually([&] {
+      pump();
+      return condition();
+    });
+  };
+  ASSERT_TRUE(sees([&] { return thinned >= 20; }));
+  EXPECT_LT(viewer.quality().strand_share, 1.0f) << "announced";
+  EXPECT_EQ(strand_count, prefix_count(kStrands, viewer.quality().strand_share));
+  EXPECT_THAT(viewer.quality().reason, testing::HasSubstr("of the strands"));
+  EXPECT_TRUE(viewer.quality().rate_divisor == 1 || viewer.quality().strand_share == 0.125f)
+      << "the rate falls only when there are as few strands as can be";
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_EQ(viewer.replay().stats().rejected_frames, 0u) << viewer.replay().stats().last_error;
   expect_undisturbed();
 }
 

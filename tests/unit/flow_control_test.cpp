@@ -23,6 +23,10 @@ constexpr double kFullBytesPerS = 6.6e6 / 8.0;
 constexpr size_t kKeyframeBytes = 124'000;
 constexpr size_t kAssetBytes = 330'000;
 
+StrandStreamPlan built_in_plan() {
+  return {.step_rate_hz = 60.0, .bound_m = 1e-4f, .strand_count = 2'000};
+}
+
 struct Link {
   double bytes_per_s = 1e9;
   int64_t round_trip_ns = 1 * kMs;
@@ -33,7 +37,7 @@ struct Link {
 /// One viewer: what Session does with FlowControl and SendQueue, and a link that delivers in order.
 class Viewer {
  public:
-  explicit Viewer(Link path) : link(std::move(path)), classes_(make_strand_classes(60.0, 1e-4f)) {
+  explicit Viewer(Link path) : link(std::move(path)), classes_(make_strand_classes(built_in_plan())) {
     for (const StrandClass& row : classes_) costs_.push_back(row.relative_cost * kFullBytesPerS);
     flow.expect_acks();
     queue.set_asset(frame(Opcode::Asset, 1, 0, kAssetBytes));
@@ -78,6 +82,7 @@ class Viewer {
   double cap_bytes_per_s = 0.0;
   size_t most_in_flight_bytes = 0;
   std::vector<Arrival> arrivals;
+  std::map<size_t, std::vector<int64_t>> tries;  // of better classes: when
 
  private:
   struct OnItsWay {
@@ -111,7 +116,7 @@ class Viewer {
   void offer(Opcode opcode) {
     const bool is_keyframe = opcode == Opcode::StrandKeyframe;
     const StrandClass& row = classes_[present];
-    const double coarse = row.coarsening > 1 ? 0.7 : 1.0;
+    const double coarse = (row.coarsening > 1 ? 0.7 : 1.0) * static_cast<double>(row.strand_share);
     const auto bytes = is_keyframe ? static_cast<size_t>(coarse * kKeyframeBytes)
                                    : static_cast<size_t>(costs_[present] / row.frame_rate_hz);
     if (!is_keyframe) ++sequence_;
@@ -127,6 +132,7 @@ class Viewer {
   void adapt() {
     const size_t chosen = flow.choose_class(present, costs_, cap_bytes_per_s, time_ns);
     if (chosen == present) return;
+    if (chosen < present) tries[chosen].push_back(time_ns);
     present = chosen;
     ++changes;
     queue.restart_strands();
@@ -261,11 +267,43 @@ TEST(FlowControl, StalledViewerGetsNothingButAKnockNowAndThen) {
   EXPECT_GE(viewer.rate_hz(from_ns), 9.0) << "and goes on when it reads again";
 }
 
+// A class that the link cannot carry is tried more and more rarely; what it can is found again soon.
+TEST(FlowControl, TriesThatFailAreRepeatedAtDoubledTimes) {
+  Viewer viewer({.round_trip_ns = 20 * kMs});
+  viewer.run(5 * kS);
+  const auto classes = make_strand_classes(built_in_plan());
+  constexpr size_t kTooMuch = 1;
+  ASSERT_GT(classes[kTooMuch].relative_cost, 0.45);
+  ASSERT_LT(classes[kTooMuch + 1].relative_cost, 0.35);
+  viewer.link.bytes_per_s = 0.4 * kFullBytesPerS;
+  viewer.run(30 * kS);
+  viewer.tries.clear();
+  viewer.run(1'200 * kS);
+  const std::vector<int64_t> tries_ns = viewer.tries[kTooMuch];
+  ASSERT_GE(tries_ns.size(), 6u) << "it never gives up";
+  EXPECT_TRUE(viewer.tries[0].empty()) << "no try lasted";
+  int64_t least_ns = kFirstProbeNs;
+  for (size_t i = 1; i < tries_ns.size(); ++i) {
+    least_ns = std::min(2 * least_ns, kLongestProbeNs);
+    EXPECT_GE(tries_ns[i] - tries_ns[i - 1], least_ns) << "after " << i << " failures";
+  }
+  EXPECT_EQ(least_ns, kLongestProbeNs);
+  // Once it lasts, the next failure counts as the first.
+  viewer.link.bytes_per_s = 1e9;
+  viewer.run(3 * kLongestProbeNs);
+  ASSERT_EQ(viewer.present, 0u);
+  viewer.link.bytes_per_s = 0.4 * kFullBytesPerS;
+  viewer.run(kCapacityAgeNs);
+  viewer.link.bytes_per_s = 1e9;
+  viewer.run(kCapacityAgeNs + 6 * kFirstProbeNs);
+  EXPECT_EQ(viewer.present, 0u);
+}
+
 TEST(FlowControl, CapIsKept) {
   Viewer viewer({.round_trip_ns = 5 * kMs});
   viewer.cap_bytes_per_s = 0.5 * kFullBytesPerS;
   viewer.run(60 * kS);
-  const auto classes = make_strand_classes(60.0, 1e-4f);
+  const auto classes = make_strand_classes(built_in_plan());
   EXPECT_LE(classes[viewer.present].relative_cost, 0.5);
   EXPECT_GT(classes[viewer.present - 1].relative_cost, 0.5) << "no lower than the cap asks for";
 }
@@ -303,7 +341,7 @@ TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
 TEST(StrandClasses, GetCheaperAndKeepTheirBounds) {
   for (const float bound_m : {2e-5f, 5e-5f, 1e-4f, 5e-4f})
     for (const double step_rate_hz : {10.0, 30.0, 60.0, 240.0}) {
-      const auto classes = make_strand_classes(step_rate_hz, bound_m);
+      const auto classes = make_strand_classes({step_rate_hz, 0.0, bound_m, 10'000});
       ASSERT_FALSE(classes.empty());
       EXPECT_EQ(classes[0].rate_divisor, 1u);
       EXPECT_EQ(classes[0].bound_m, bound_m);
@@ -317,6 +355,49 @@ TEST(StrandClasses, GetCheaperAndKeepTheirBounds) {
                       0.9999f);
       }
     }
+}
+
+TEST(StrandClasses, FirstHaveFewerStrandsThenALowerRateThenACoarserBound) {
+  const auto classes = make_strand_classes({60.0, 0.0, 1e-4f, 10'000});
+  for (size_t i = 1; i < classes.size(); ++i) {
+    const StrandClass& worse = classes[i];
+    const StrandClass& better = classes[i - 1];
+    EXPECT_LE(worse.strand_share, better.strand_share);
+    EXPECT_GE(worse.rate_divisor, better.rate_divisor);
+    EXPECT_GE(worse.coarsening, better.coarsening);
+    EXPECT_TRUE(worse.rate_divisor == 1 || worse.strand_share == classes.back().strand_share) << i;
+    EXPECT_TRUE(worse.rate_divisor == better.rate_divisor || better.rate_divisor > 1 || worse.coarsening == 1)
+        << i;
+  }
+  EXPECT_EQ(classes[1].strand_share, 0.5f);
+  EXPECT_EQ(classes.back().strand_share, 0.125f);
+  EXPECT_GT(classes.back().coarsening, 1u);
+}
+
+TEST(StrandClasses, KeepEnoughStrands) {
+  for (const uint32_t strands : {1u, kLeastPrefixStrands, 2 * kLeastPrefixStrands - 1,
+                                 2 * kLeastPrefixStrands, 4 * kLeastPrefixStrands, 200'000u})
+    for (const StrandClass& row : make_strand_classes({60.0, 0.0, 1e-4f, strands})) {
+      const auto left = static_cast<uint32_t>(row.strand_share * static_cast<float>(strands));
+      EXPECT_TRUE(row.strand_share == 1.0f || left >= kLeastPrefixStrands) << strands;
+    }
+  EXPECT_EQ(make_strand_classes({60.0, 0.0, 1e-4f, 2 * kLeastPrefixStrands})[1].strand_share, 0.5f);
+}
+
+TEST(StrandClasses, KeepTheRateThatIsSet) {
+  for (const double rate_hz : {0.0, 0.5, 7.0, 20.0, 30.0, 59.9, 60.0, 1'000.0})
+    for (const StrandClass& row : make_strand_classes({60.0, rate_hz, 1e-4f, 2'000})) {
+      EXPECT_TRUE(rate_hz < 1.0 || row.frame_rate_hz <= rate_hz + 1e-9) << rate_hz;
+      EXPECT_LE(row.rate_divisor, kMaxRateDivisor);
+    }
+  EXPECT_EQ(make_strand_classes({60.0, 20.0, 1e-4f, 2'000})[0].rate_divisor, 3u);
+  EXPECT_EQ(make_strand_classes({60.0, 0.0, 1e-4f, 2'000})[0].rate_divisor, 1u);
+}
+
+TEST(StrandClasses, AreToldInWords) {
+  const auto classes = make_strand_classes({60.0, 0.0, 1e-4f, 10'000});
+  EXPECT_EQ(to_string(classes[0]), "all strands, 60 Hz, 0.1 mm");
+  EXPECT_EQ(to_string(classes[2]), "1/4 of the strands, 60 Hz, 0.1 mm");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "common/base/profile.h"
+#include "common/codec/strand_prefix.h"
 #include "tests/support/eventually.h"
 
 namespace strandcast {
@@ -279,6 +280,57 @@ TEST(StrandClassEncoding, EncodesOneStateInSoManySteps) {
   // A paused simulation: the newest state is shown although its turn will never come.
   slot.put(make_state(14));
   EXPECT_TRUE(eventually([&] { return control->seen().back() == 14; }));
+}
+
+/// States as a viewer of the "raw" codec has them.
+std::vector<std::shared_ptr<const Snapshot>> decoded(const FrameList& frames) {
+  const auto decoder = std::move(*make_strand_decoder("raw", {kStrands, kVertices}));
+  std::vector<std::shared_ptr<const Snapshot>> states;
+  for (const EncodedFramePtr& frame : frames.frames()) {
+    auto state = decoder->decode(frame->message);
+    EXPECT_TRUE(state) << state.error().to_string();
+    if (state) states.push_back(*state);
+  }
+  return states;
+}
+
+TEST(StrandClassEncoding, CodesTheFirstStrandsAndCoarsensThem) {
+  SnapshotSlot slot;
+  FrameList frames;
+  StrandEncodeWorker worker(slot, std::move(*make_strand_encoder("raw")), frames.sink(), {2, 1, 3, 0.5f});
+  worker.set_has_listeners(true);
+  const auto state = make_state(4);
+  slot.put(state);
+  ASSERT_TRUE(eventually([&] { return frames.count() == 1; }));
+  const auto sent = decoded(frames);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_EQ(state_hash(*sent[0]), state_hash(coarsen(prefix_of(*state, kStrands / 2), 3)));
+}
+
+// What was announced is what is coded: nothing of the old lattice after a change, and a keyframe first.
+TEST(StrandClassEncoding, AChangeLeavesStatesOfTheOldLatticeOut) {
+  SnapshotSlot slot;
+  FrameList frames;
+  StrandEncodeWorker worker(slot, std::move(*make_strand_encoder("delta")), frames.sink(),
+                            {0, 1, 1, 1.0f, 1e-4f});
+  worker.set_has_listeners(true);
+  slot.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return frames.count() == 1; }));
+  worker.change({0, 1, 1, 0.5f, 2e-4f});
+  slot.put(make_state(2));
+  worker.request_keyframe();
+  give_time_to_misbehave();
+  EXPECT_EQ(frames.count(), 1u) << "a state on the old lattice";
+  Snapshot other = *make_state(3);
+  other.quantum_m = 2e-4f;
+  slot.put(std::make_shared<const Snapshot>(other));
+  ASSERT_TRUE(eventually([&] { return frames.count() >= 2; }));
+  const auto frame = frames.frames()[1];
+  EXPECT_EQ(frame->header.opcode, Opcode::StrandKeyframe);
+  const auto decoder = std::move(*make_strand_decoder("delta", {kStrands, kVertices}));
+  const auto state = decoder->decode(frame->message);
+  ASSERT_TRUE(state) << state.error().to_string();
+  EXPECT_EQ(state_hash(**state), state_hash(prefix_of(other, kStrands / 2)));
 }
 
 TEST(Coarsen, RoundsToTheNearestPointOfTheCoarserLattice) {
