@@ -92,6 +92,10 @@ void print_measures(const LoadMeasures& measures, size_t viewers, double seconds
   print("keyframes", static_cast<double>(measures.keyframes));
   print("chain_errors", static_cast<double>(measures.chain_errors));
   print("quality_changes", static_cast<double>(measures.quality_changes));
+  print("newest_strand_share", static_cast<double>(measures.newest_quality.strand_share));
+  print("newest_rate_divisor", measures.newest_quality.rate_divisor);
+  print("newest_bound_mm", static_cast<double>(measures.newest_quality.bound_m) * 1e3);
+  print("newest_quality_after_ms", static_cast<double>(measures.newest_quality_ms));
   print("joined", static_cast<double>(measures.joined));
   print("ended_by_server", static_cast<double>(measures.ended));
   for (const auto& [code, count] : measures.close_codes)

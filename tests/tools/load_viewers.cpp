@@ -60,7 +60,8 @@ struct Viewer {
   uint64_t message_bytes = 0;
   uint16_t stream_id = 0;
   uint32_t sequence = 0;
-  int64_t frame_ns = 0;  // arrival of the newest strand frame or picture
+  int64_t frame_ns = 0;        // arrival of the newest strand frame or picture
+  int64_t first_frame_ns = 0;  // and of the first
   bool has_chain = false;
 };
 
@@ -305,6 +306,7 @@ class LoadViewers::State {
     if (viewer.frame_ns != 0)
       measures_.interval_ms.push_back(static_cast<float>(time_ns - viewer.frame_ns) * kMsPerNs);
     viewer.frame_ns = time_ns;
+    if (viewer.first_frame_ns == 0) viewer.first_frame_ns = time_ns;
     if (!is_keyframe)
       measures_.latency_ms.push_back(static_cast<float>(time_ns - header.send_time_ns) * kMsPerNs);
   }
@@ -316,7 +318,12 @@ class LoadViewers::State {
       viewer.has_welcome = true;
       ++measures_.joined;
     }
-    if (std::holds_alternative<StreamQuality>(*message)) ++measures_.quality_changes;
+    if (const auto* quality = std::get_if<StreamQuality>(&*message)) {
+      ++measures_.quality_changes;
+      measures_.newest_quality = *quality;
+      measures_.newest_quality_ms =
+          viewer.first_frame_ns == 0 ? 0.0f : static_cast<float>(now_ns() - viewer.first_frame_ns) * kMsPerNs;
+    }
     if (const auto* goodbye = std::get_if<Goodbye>(&*message)) measures_.last_goodbye = goodbye->reason;
   }
 
@@ -352,7 +359,10 @@ const LoadMeasures& LoadViewers::measures() const {
   return state_->measures_;
 }
 void LoadViewers::reset_measures() {
-  state_->measures_ = {};
+  LoadMeasures fresh;
+  fresh.newest_quality = state_->measures_.newest_quality;
+  fresh.newest_quality_ms = state_->measures_.newest_quality_ms;
+  state_->measures_ = std::move(fresh);
 }
 
 float quantile(std::vector<float> values, double share) {

@@ -34,6 +34,8 @@ struct LoadMeasures {
   uint64_t bytes = 0;
   uint64_t chain_errors = 0;  // deltas whose base this viewer had not received: must be 0
   uint64_t quality_changes = 0;
+  StreamQuality newest_quality;    // of any viewer; survives a reset, as the next one does
+  float newest_quality_ms = 0.0f;  // from that viewer's first frame
   uint64_t joined = 0;
   uint64_t ended = 0;                        // by the server or the network, not by leave()
   std::map<uint16_t, uint64_t> close_codes;  // of those; 0 = broken off
