@@ -1,4 +1,4 @@
-// strandcast-report: measures the strand models and writes tables, plots and pages that a person can read.
+// strandcast-report: measures strand models and strand codecs and writes tables, plots and pages that a person can read.
 // Exit code 0 when all was measured and written, 2 for bad input.
 #include <fmt/format.h>
 
@@ -16,10 +16,10 @@ constexpr int kExitBadInput = 2;
 constexpr int kExitFailure = 1;
 
 constexpr AddReportCommand kCommands[] = {add_work_precision_command, add_recommend_command,
-                                          add_stability_command};
+                                          add_stability_command, add_streaming_command};
 
 int run(int argc, const char* const* argv) {
-  CLI::App app("Measures the strand models: error against run time, and more.", "strandcast-report");
+  CLI::App app("Measures strand models and strand codecs.", "strandcast-report");
   app.require_subcommand(1);
   ReportAction action;
   for (const AddReportCommand add : kCommands) add(app, action);

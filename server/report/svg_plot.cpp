@@ -232,6 +232,14 @@ std::vector<double> linear_ticks(double minimum, double maximum) {
 
 }  // namespace
 
+const char* plot_style_sheet() {
+  return kStyle;
+}
+
+const char* plot_color(size_t style) {
+  return kColors[style % kColors.size()];
+}
+
 std::vector<double> plot_ticks(PlotScale scale, double minimum, double maximum) {
   if (!(minimum < maximum) || !std::isfinite(minimum) || !std::isfinite(maximum)) return {};
   if (scale == PlotScale::Linear) return linear_ticks(minimum, maximum);

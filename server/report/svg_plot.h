@@ -56,6 +56,10 @@ struct PlotDesc {
 /// outside a given range is drawn on the border. A plot without any point says so.
 std::string make_svg_plot(const PlotDesc& desc);
 
+/// What every plot of a page shares: its <style>, and the colour of a series' style.
+const char* plot_style_sheet();
+const char* plot_color(size_t style);
+
 /// Where an axis has its labels, ascending, within [minimum, maximum].
 std::vector<double> plot_ticks(PlotScale scale, double minimum, double maximum);
 

@@ -1,9 +1,11 @@
-// strandcast-report as a person runs it: a very small work-precision, its files, and bad input.
+// strandcast-report as a person runs it: a very small work-precision and streaming, their files, and bad
+// input.
 #include <sys/wait.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <map>
+#include <set>
 
 #include "common/base/file.h"
 #include "tests/support/temporary_folder.h"
@@ -112,6 +114,46 @@ TEST_F(ReportProgram, ASmallWorkPrecisionKeepsTheLaws) {
   EXPECT_THAT(load_text(out / "work_precision.svg", 1u << 24).value(), HasSubstr("direct_rod"));
 }
 
+// Few strands, half a second: every codec at every bound, and none of ours beyond it.
+TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
+  const auto out = folder_.path() / "report";
+  const Outcome outcome = run_report(
+      folder_,
+      fmt::format("streaming --quick --size 60x8 --seconds 0.5 --gl-device none --out '{}'", out.string()));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr("run 1 of "));
+
+  std::map<std::string, std::set<std::string>> bounds_mm;  // of each codec of ours
+  std::set<std::string> clips;
+  rows_ = parse_csv(load_text(out / "streaming.csv", 1u << 20).value());
+  for (const auto& row : rows_) {
+    clips.insert(row.at("clip"));
+    EXPECT_EQ(row.at("strands"), "60");
+    for (const char* column : {"bits_per_vertex", "keyframe_bits_per_vertex", "mbit_per_s", "encode_wall_ms"})
+      EXPECT_GT(number(row, column), 0.0) << row.at("codec") << ", " << column;
+    // 60 x 8 vertices, 60 times a second.
+    EXPECT_NEAR(number(row, "mbit_per_s"), number(row, "bits_per_vertex") * 60.0 * 8.0 * 60.0 * 1e-6,
+                1e-4 * number(row, "mbit_per_s"));
+    EXPECT_LE(number(row, "rms_error_mm"), number(row, "max_error_mm"));
+    if (row.at("kind") != "ours") continue;
+    bounds_mm[row.at("codec")].insert(row.at("bound_mm"));
+    EXPECT_EQ(row.at("keeps_bound"), "yes") << row.at("codec");
+    EXPECT_LE(number(row, "max_error_mm"), 1.0001 * number(row, "bound_mm")) << row.at("codec");
+  }
+  EXPECT_EQ(clips.size(), 3u);
+  const std::set<std::string> all_bounds = {"0.02", "0.05", "0.1", "0.5"};
+  for (const char* codec : {"tangent", "delta", "raw"}) EXPECT_EQ(bounds_mm[codec], all_bounds) << codec;
+
+  const std::string page = load_text(out / "streaming.html", 1u << 24).value();
+  for (const char* part : {"</html>", "walking and turning: at most 3.5 bits per vertex", "idle: at most 1.8",
+                           "violent: at most 6", "at least 2 times fewer bits", "at least 6 times fewer bits",
+                           "decode 160000 vertices in 12 ms", "encode them in 16 ms", "at most 13 bits",
+                           "every vertex of every frame within the bound", "TCP on loopback"})
+    EXPECT_THAT(page, HasSubstr(part));
+  for (const char* plot : {"streaming_bound.svg", "streaming_time.svg", "streaming_motion.svg"})
+    EXPECT_THAT(load_text(out / plot, 1u << 24).value(), HasSubstr("tangent")) << plot;
+}
+
 TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
   const std::string out = (folder_.path() / "report").string();
   folder_.write("file", "");
@@ -127,6 +169,14 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
        "bad.bvh"},
       {fmt::format("work-precision --out '{}' --gl-device nonsense", out), "nonsense"},
       {fmt::format("work-precision --out '{}'", (folder_.path() / "file").string()), "folder"},
+      {"streaming", "--out"},
+      {fmt::format("streaming --out '{}' --size 10", out), "--size is '10'"},
+      {fmt::format("streaming --out '{}' --size 10x65", out), "--size is '10x65'"},
+      {fmt::format("streaming --out '{}' --seconds 0.1", out), "--seconds is 0.1"},
+      {fmt::format("streaming --out '{}' --solver nonsense", out), "unknown solver 'nonsense' (known: "},
+      {fmt::format("streaming --out '{}' --motion '{}'", out, (folder_.path() / "bad.bvh").string()),
+       "bad.bvh"},
+      {fmt::format("streaming --out '{}' --size 200000x64 --gl-device none", out), "MiB"},
   };
   for (const auto& [arguments, part] : bad) {
     const Outcome outcome = run_report(folder_, arguments);

@@ -86,6 +86,9 @@ const std::vector<LibraryRule>& library_rules() {
       {"GLFW/", {"client/window"}},
       {"imgui", {"client/window"}},
       {"CLI/", kApp},
+      {"meshoptimizer", {"server/report"}},
+      {"draco/", {"server/report"}},
+      {"zfp", {"server/report"}},
   };
   return kRules;
 }

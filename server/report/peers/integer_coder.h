@@ -1,0 +1,44 @@
+// IntegerCoder: a general library's lossless coding of integers, behind one small interface; one .cpp per
+// library. What turns positions into integers, and predicts them in time, is lattice_peer.h's. One thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+/// Positions change slowly along a strand; residuals of a prediction are small and nearly independent.
+enum class IntegerKind { Positions, Residuals };
+
+/// (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest; neighbours in space are
+/// neighbours in the array.
+struct IntegerPlanes {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  std::vector<int32_t> value;
+
+  size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
+};
+
+class IntegerCoder {
+ public:
+  virtual ~IntegerCoder() = default;
+  virtual Result<std::vector<std::byte>> encode(const IntegerPlanes& planes, IntegerKind kind) = 0;
+  /// `planes` has the sizes that were encoded; its values are replaced.
+  virtual Status decode(std::span<const std::byte> bytes, IntegerKind kind, IntegerPlanes& planes) = 0;
+};
+
+/// 16 bits for each integer, then zstd level 3: what a person would write first. LimitExceeded beyond 16
+/// bits.
+std::unique_ptr<IntegerCoder> make_zstd_coder();
+/// meshoptimizer's vertex codec, then zstd level 3, as its author advises.
+std::unique_ptr<IntegerCoder> make_meshopt_coder();
+/// Draco's sequential point cloud of integers.
+std::unique_ptr<IntegerCoder> make_draco_coder();
+
+}  // namespace strandcast

@@ -1,0 +1,45 @@
+#include <cstring>
+
+#include "common/codec/zstd_block.h"
+#include "server/report/peers/integer_coder.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int kLevel = 3;
+
+class ZstdCoder final : public IntegerCoder {
+ public:
+  Result<std::vector<std::byte>> encode(const IntegerPlanes& planes, IntegerKind) override {
+    narrow_.resize(planes.value.size());
+    for (size_t i = 0; i < narrow_.size(); ++i) {
+      narrow_[i] = static_cast<int16_t>(planes.value[i]);
+      if (narrow_[i] != planes.value[i])
+        return make_error(ErrorCode::LimitExceeded, "{} does not fit into 16 bits", planes.value[i]);
+    }
+    std::vector<std::byte> bytes;
+    compressor_.append(std::as_bytes(std::span(narrow_)), kLevel, bytes);
+    return bytes;
+  }
+
+  Status decode(std::span<const std::byte> bytes, IntegerKind, IntegerPlanes& planes) override {
+    decoded_.resize(planes.value.size());
+    RETURN_IF_ERROR(decompressor_.fill(bytes, std::as_writable_bytes(std::span(decoded_))));
+    for (size_t i = 0; i < decoded_.size(); ++i) planes.value[i] = decoded_[i];
+    return {};
+  }
+
+ private:
+  ZstdCompressor compressor_;
+  ZstdDecompressor decompressor_;
+  std::vector<int16_t> narrow_;
+  std::vector<int16_t> decoded_;
+};
+
+}  // namespace
+
+std::unique_ptr<IntegerCoder> make_zstd_coder() {
+  return std::make_unique<ZstdCoder>();
+}
+
+}  // namespace strandcast

@@ -1,0 +1,61 @@
+// StreamCodec: one way to send strands, ours or a general library's, as the streaming report runs it: a frame
+// in, a message out, a frame back. Encoder and decoder side live in one object but share nothing but the
+// message. One thread.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+/// What both sides know before the first frame.
+struct StreamShape {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;              // per strand
+  std::vector<glm::vec3> rest_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
+  size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
+};
+
+/// One recorded state.
+struct StreamFrame {
+  Pose world_from_head;
+  std::vector<glm::vec3> position_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
+};
+
+class StreamCodec {
+ public:
+  virtual ~StreamCodec() = default;
+  /// The frame to encode next, brought into the form that the encoder is given; not part of its time.
+  /// `frame` outlives the following encode().
+  virtual Status take(const StreamFrame& frame) = 0;
+  /// The taken frame as one message; frames depend on those before.
+  virtual Result<std::vector<std::byte>> encode() = 0;
+  /// Messages come in the order in which they were encoded.
+  virtual Status decode(std::span<const std::byte> message) = 0;
+  /// What the last decode() gave, (vertex_count x strand_count) as in StreamFrame; not part of its time.
+  virtual std::vector<glm::vec3> decoded() const = 0;
+  /// Bytes of what somebody who joins at `frame` needs to see it; ends the stream.
+  virtual Result<size_t> join_bytes(const StreamFrame& frame) = 0;
+};
+
+/// A codec at one bound: a row of the report.
+struct StreamCodecRow {
+  std::string name;  // "tangent", "zfp temporal"
+  bool is_ours = false;
+  bool is_temporal = false;    // uses the frames before
+  double bound_m = 0.0;        // Euclidean, of every vertex
+  bool is_bound_free = false;  // the same whatever the bound: bound_m is what it keeps by itself
+  std::function<Result<std::unique_ptr<StreamCodec>>(const StreamShape&)> make;
+};
+
+/// Every strand codec of the project at one bound.
+std::vector<StreamCodecRow> own_stream_codecs(double bound_m);
+
+}  // namespace strandcast

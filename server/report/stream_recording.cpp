@@ -1,0 +1,136 @@
+#include "server/report/stream_recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/profile.h"
+#include "common/codec/scene_asset.h"
+#include "server/scene/scene_content.h"
+#include "server/scene/step_builder.h"
+#include "server/sim/solver_registry.h"
+
+namespace strandcast {
+namespace {
+
+// Strands swing into the motion before anything is recorded.
+constexpr double kSettleS = 1.5;
+constexpr double kNsPerMs = 1e6;
+
+SceneDesc scene_for(const RecordingDesc& desc) {
+  SceneDesc scene = built_in_scene();
+  auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
+  groom.strand_count = desc.size.strand_count;
+  groom.vertex_count = desc.size.vertex_count;
+  if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
+  scene.step_rate_hz = 1.0 / kStreamFrameS;
+  return scene;
+}
+
+Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, const gl::ShaderLibrary* shaders) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
+  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
+  RETURN_IF_ERROR(check_step(*row, parameters, kStreamFrameS / scene.substeps));
+  if (shaders == nullptr) return row->make_reference(parameters);
+  return row->make_gpu(parameters, {shaders, analyse(scene, {})});
+}
+
+/// As the publisher does: head-relative world axes to head space, in double.
+Result<StreamFrame> frame_of(const SolverState& state, const Pose& world_from_head) {
+  StreamFrame frame;
+  frame.world_from_head = world_from_head;
+  frame.position_in_head_m.reserve(state.position_m.size());
+  const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(world_from_head.rotation));
+  for (const glm::vec3& position : state.position_m) {
+    const glm::vec3 in_head(head_from_world * glm::dvec3(position));
+    if (!std::isfinite(in_head.x) || !std::isfinite(in_head.y) || !std::isfinite(in_head.z))
+      return make_error(ErrorCode::Unsupported, "the solver left numbers that cannot be used");
+    frame.position_in_head_m.push_back(in_head);
+  }
+  return frame;
+}
+
+double hair_rms_mps(const std::vector<StreamFrame>& frames) {
+  double sum_m2 = 0.0;
+  double count = 0.0;
+  for (size_t i = 1; i < frames.size(); ++i) {
+    const std::vector<glm::vec3>& before = frames[i - 1].position_in_head_m;
+    const std::vector<glm::vec3>& now = frames[i].position_in_head_m;
+    for (size_t k = 0; k < now.size(); ++k) {
+      const glm::dvec3 moved_m = glm::dvec3(now[k]) - glm::dvec3(before[k]);
+      sum_m2 += glm::dot(moved_m, moved_m);
+    }
+    count += static_cast<double>(now.size());
+  }
+  return count > 0.0 ? std::sqrt(sum_m2 / count) / kStreamFrameS : 0.0;
+}
+
+double elapsed_ms(int64_t begin_ns) {
+  return static_cast<double>(now_ns() - begin_ns) / kNsPerMs;
+}
+
+}  // namespace
+
+std::string to_string(const StreamSize& size) {
+  return fmt::format("{} x {}", size.strand_count, size.vertex_count);
+}
+
+Status check_recording(const RecordingDesc& desc) {
+  const double bytes =
+      std::ceil(desc.seconds / kStreamFrameS) * static_cast<double>(desc.size.vertices() * sizeof(glm::vec3));
+  if (bytes > static_cast<double>(kMaxRecordingBytes))
+    return make_error(ErrorCode::LimitExceeded,
+                      "{:g} s of {} strands are {:.0f} MiB (at most {} are kept in memory)", desc.seconds,
+                      to_string(desc.size), bytes / (1 << 20), kMaxRecordingBytes >> 20);
+  if (desc.motion.duration_s < desc.seconds)
+    return at(desc.motion.name,
+              make_error(ErrorCode::BadInput, "the motion lasts {:.2f} s (at least {:g} s are recorded)",
+                         desc.motion.duration_s, desc.seconds));
+  return {};
+}
+
+Result<StreamRecording> record_strands(const RecordingDesc& desc) {
+  RETURN_IF_ERROR(check_recording(desc));
+  const SceneDesc scene = scene_for(desc);
+  ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
+  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, desc.shaders));
+
+  StreamRecording recording;
+  recording.motion_name = desc.motion.name;
+  recording.shape = {desc.size.strand_count, desc.size.vertex_count,
+                     make_scene_asset(content.groom, {}).rest_position_m};
+  const bool is_endless = std::isinf(desc.motion.duration_s);
+  const double begin_s = is_endless ? kSettleS : 0.5 * (desc.motion.duration_s - desc.seconds);
+  // Before the clip's own beginning the head rests in its first pose.
+  const auto head_at = [&](double t_s) { return desc.motion.head_at(std::max(0.0, begin_s + t_s)); };
+
+  StepBuilder builder(scene, content.colliders);
+  const SceneFeatures features = analyse(scene, {});
+  RETURN_IF_ERROR(solver->load(content.groom, head_at(-kSettleS).rotation));
+  const auto settle_frames = static_cast<int>(std::lround(kSettleS / kStreamFrameS));
+  const auto frame_count = static_cast<int>(std::lround(desc.seconds / kStreamFrameS));
+  std::vector<Pose> poses;
+  SolverState state;
+  for (int i = -settle_frames; i < frame_count; ++i) {
+    const double t_s = i * kStreamFrameS;
+    InputFrame input;
+    input.has_motion = true;
+    input.world_from_head = head_at(t_s);
+    const int64_t begin_ns = now_ns();
+    const SceneStep& step = builder.build(input, features, kSettleS + t_s);
+    for (const StepInput& substep : step.substeps) solver->substep(substep);
+    if (i < 0) continue;
+    solver->read(state);
+    recording.step_ms.push_back(elapsed_ms(begin_ns));
+    poses.push_back(input.world_from_head);
+    ASSIGN_OR_RETURN(StreamFrame frame, frame_of(state, input.world_from_head));
+    recording.frames.push_back(std::move(frame));
+  }
+  recording.head = measure_head(poses, kStreamFrameS);
+  recording.hair_rms_mps = hair_rms_mps(recording.frames);
+  recording.motion_class = motion_class_of(recording.hair_rms_mps);
+  return recording;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,53 @@
+// StreamRecording: strands as the server's own solver moves them under a head motion, kept as float positions
+// in head space, so that every codec gets the same frames. GPU solvers need the thread's GL context.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/gl/program.h"
+#include "server/report/stream_codec.h"
+#include "server/report/stream_motion.h"
+
+namespace strandcast {
+
+/// A recording is kept in memory; more than this is refused.
+inline constexpr size_t kMaxRecordingBytes = size_t{1} << 30;
+
+struct StreamSize {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+
+  size_t vertices() const { return static_cast<size_t>(strand_count) * vertex_count; }
+};
+/// "10000 x 16".
+std::string to_string(const StreamSize& size);
+
+struct RecordingDesc {
+  StreamMotion motion;
+  StreamSize size;
+  double seconds = 3.0;
+  std::string solver;                          // empty: the built-in scene's
+  const gl::ShaderLibrary* shaders = nullptr;  // nullptr: the double-precision solver
+};
+
+struct StreamRecording {
+  std::string motion_name;
+  HeadMeasure head;           // of the recorded part
+  double hair_rms_mps = 0.0;  // of all vertices, in head space
+  MotionClass motion_class = MotionClass::Idle;
+  StreamShape shape;
+  std::vector<StreamFrame> frames;
+  std::vector<double> step_ms;  // (frames) wall time of solving and reading back
+};
+
+inline constexpr double kStreamFrameS = 1.0 / 60.0;
+
+/// BadInput when the motion is too short, LimitExceeded when the recording would be too large.
+Status check_recording(const RecordingDesc& desc);
+
+/// Records the middle of the motion, after strands have settled into it. The built-in scene's groom, wind and
+/// collider; 60 steps a second.
+Result<StreamRecording> record_strands(const RecordingDesc& desc);
+
+}  // namespace strandcast

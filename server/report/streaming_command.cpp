@@ -1,0 +1,45 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "server/report/report_commands.h"
+#include "server/report/report_folder.h"
+#include "server/report/streaming_page.h"
+
+namespace strandcast {
+
+Status run_streaming(const StreamingOptions& options) {
+  // Before anything is measured for minutes.
+  RETURN_IF_ERROR(make_report_folder(options.out));
+  ASSIGN_OR_RETURN(const StreamingReport report, measure_streaming(options));
+  RETURN_IF_ERROR(save_streaming(report, options.out));
+  fmt::print("{}{}\n{}\n", streaming_summary(report), (options.out / kStreamingCsv).string(),
+             (options.out / kStreamingPage).string());
+  return {};
+}
+
+void add_streaming_command(CLI::App& app, ReportAction& action) {
+  const auto options = std::make_shared<StreamingOptions>();
+  CLI::App* command = app.add_subcommand(
+      "streaming", "error, bytes and milliseconds of every strand codec, beside general codecs");
+  command->add_option("--out", options->out, "folder for the CSV, plots and page")->required();
+  command
+      ->add_option("--motion", options->motions,
+                   "head motion from this .bvh file; repeatable; default: built in")
+      ->expected(1)
+      ->take_all();
+  command->add_option("--size", options->sizes, "STRANDSxVERTICES; repeatable; default: 10000x16, 2228x32")
+      ->expected(1)
+      ->take_all();
+  command->add_option("--solver", options->solver, "what moves the strands; default: the built-in scene's");
+  command->add_option("--seconds", options->seconds, "recorded of each motion")->check(CLI::PositiveNumber);
+  command
+      ->add_option("--gl-device", options->gl_device,
+                   "auto, software, hardware, a device number, or none: the solver in double precision")
+      ->capture_default_str();
+  command->add_flag("--quick", options->is_quick, "fewer and shorter: less than a minute on two cores");
+  command->callback([options, &action] { action = [options] { return run_streaming(*options); }; });
+}
+
+}  // namespace strandcast

@@ -1,0 +1,179 @@
+#include "server/report/streaming_goals.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+
+namespace strandcast {
+namespace {
+
+constexpr const char* kJudgedCodec = "tangent";
+constexpr size_t kTimedVertices = 160'000;
+constexpr unsigned kEncodeCores = 2;
+
+// At kGoalBoundM, bits per vertex.
+constexpr double kActiveBits = 3.5;
+constexpr double kIdleBits = 1.8;
+constexpr double kViolentBits = 6.0;
+constexpr double kJoinBits = 13.0;
+// Times fewer bits than the best peer.
+constexpr double kTemporalRatio = 2.0;
+constexpr double kPlainRatio = 6.0;
+constexpr double kDecodeMs = 12.0;
+constexpr double kEncodeMs = 16.0;
+
+std::string place_of(const StreamingRow& row) {
+  return fmt::format("{}, {}", row.motion, to_string(row.size));
+}
+
+std::vector<const StreamingRow*> judged_rows(const StreamingReport& report) {
+  std::vector<const StreamingRow*> rows;
+  for (const StreamingRow& row : report.rows)
+    if (row.codec == kJudgedCodec && row.bound_m == kGoalBoundM) rows.push_back(&row);
+  return rows;
+}
+
+enum class Better { Low, High };
+
+/// The row whose value is worst, and the mean of all, against a limit.
+class Worst {
+ public:
+  Worst(Better better, double limit) : better_(better), limit_(limit) {}
+
+  void add(double value, std::string place) {
+    const bool is_worse = better_ == Better::Low ? value > worst_ : value < worst_;
+    if (count_ == 0 || is_worse) {
+      worst_ = value;
+      place_ = std::move(place);
+    }
+    ++count_;
+    sum_ += value;
+    kept_ += is_kept(value) ? 1 : 0;
+  }
+  GoalLine line(std::string goal, const std::string& unit) const {
+    if (count_ == 0) return {std::move(goal), "nothing recorded that it is stated for", Verdict::NotMeasured};
+    return {std::move(goal),
+            fmt::format("{:.2f}{} at worst ({}), {:.2f} in the mean; {} of {} recordings", worst_, unit,
+                        place_, sum_ / count_, kept_, count_),
+            is_kept(worst_) ? Verdict::Met : Verdict::Missed};
+  }
+
+ private:
+  bool is_kept(double value) const { return better_ == Better::Low ? value <= limit_ : value >= limit_; }
+
+  Better better_;
+  double limit_;
+  double worst_ = 0.0;
+  double sum_ = 0.0;
+  int count_ = 0;
+  int kept_ = 0;
+  std::string place_;
+};
+
+GoalLine class_goal(const StreamingReport& report, MotionClass motion_class, double limit) {
+  Worst worst(Better::Low, limit);
+  for (const StreamingRow* row : judged_rows(report))
+    if (row->motion_class == motion_class) worst.add(row->bits, place_of(*row));
+  return worst.line(fmt::format("{}: at most {:g} bits per vertex", to_string(motion_class), limit), " bits");
+}
+
+GoalLine ratio_goal(const StreamingReport& report, PeerKind kind) {
+  const double limit = kind == PeerKind::Temporal ? kTemporalRatio : kPlainRatio;
+  Worst worst(Better::High, limit);
+  for (const StreamingRow* row : judged_rows(report)) {
+    // Positions of a violent motion cost others no more than any; the goal is not stated for them.
+    if (kind == PeerKind::Plain && row->motion_class == MotionClass::Violent) continue;
+    if (const StreamingRow* peer = best_peer(report, *row, kind); peer != nullptr)
+      worst.add(peer->bits / row->bits, fmt::format("{}, {}", place_of(*row), peer->codec));
+  }
+  return worst.line(
+      kind == PeerKind::Temporal
+          ? fmt::format("at least {:g} times fewer bits than the best peer given a prediction in "
+                        "time",
+                        limit)
+          : fmt::format("at least {:g} times fewer bits than the best peer on positions, "
+                        "violent motion aside",
+                        limit),
+      " times");
+}
+
+GoalLine join_goal(const StreamingReport& report) {
+  Worst worst(Better::Low, kJoinBits);
+  for (const StreamingRow* row : judged_rows(report)) worst.add(row->join_bits, place_of(*row));
+  return worst.line(fmt::format("keyframe: at most {:g} bits per vertex", kJoinBits), " bits");
+}
+
+GoalLine time_goal(const StreamingReport& report, std::string goal, double limit_ms,
+                   const std::function<double(const StreamingRow&)>& ms) {
+  Worst worst(Better::Low, limit_ms);
+  for (const StreamingRow* row : judged_rows(report))
+    if (row->size.vertices() == kTimedVertices) worst.add(ms(*row), place_of(*row));
+  return worst.line(std::move(goal), " ms");
+}
+
+GoalLine bound_goal(const StreamingReport& report) {
+  size_t count = 0;
+  size_t kept = 0;
+  double largest = 0.0;
+  for (const StreamingRow& row : report.rows) {
+    if (!row.is_ours) continue;
+    ++count;
+    kept += row.keeps_bound() ? 1 : 0;
+    largest = std::max(largest, row.max_error_m / row.bound_m);
+  }
+  return {"every vertex of every frame within the bound, at every bound, with every codec of ours",
+          fmt::format("{} of {} runs; the largest error is {:.4f} of its bound", kept, count, largest),
+          count == 0      ? Verdict::NotMeasured
+          : kept == count ? Verdict::Met
+                          : Verdict::Missed};
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::Met:
+      return "met";
+    case Verdict::Missed:
+      return "missed";
+    case Verdict::NotMeasured:
+      return "not measured";
+  }
+  return "";
+}
+
+const StreamingRow* best_peer(const StreamingReport& report, const StreamingRow& ours, PeerKind kind) {
+  const StreamingRow* best = nullptr;
+  for (const StreamingRow& row : report.rows) {
+    const bool is_candidate =
+        !row.is_ours && !row.is_bound_free && row.motion == ours.motion &&
+        row.size.strand_count == ours.size.strand_count && row.size.vertex_count == ours.size.vertex_count &&
+        row.bound_m == ours.bound_m && row.keeps_bound() && row.is_temporal == (kind == PeerKind::Temporal);
+    if (is_candidate && (best == nullptr || row.bits < best->bits)) best = &row;
+  }
+  return best;
+}
+
+std::vector<GoalLine> judge_streaming(const StreamingReport& report) {
+  // With one core only there is no more to see than the work itself.
+  const bool has_cores = report.processors >= kEncodeCores;
+  return {
+      bound_goal(report),
+      class_goal(report, MotionClass::Active, kActiveBits),
+      class_goal(report, MotionClass::Idle, kIdleBits),
+      class_goal(report, MotionClass::Violent, kViolentBits),
+      ratio_goal(report, PeerKind::Temporal),
+      ratio_goal(report, PeerKind::Plain),
+      join_goal(report),
+      time_goal(report, fmt::format("decode {} vertices in {:g} ms of one core", kTimedVertices, kDecodeMs),
+                kDecodeMs, [](const StreamingRow& row) { return row.decode_cpu_ms; }),
+      time_goal(report,
+                fmt::format("encode them in {:g} ms on {} cores (by the clock on {} here)", kEncodeMs,
+                            kEncodeCores, report.processors),
+                kEncodeMs, [has_cores](const StreamingRow& row) {
+                  return has_cores ? row.encode_wall_ms : row.encode_cpu_ms;
+                })};
+}
+
+}  // namespace strandcast

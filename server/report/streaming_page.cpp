@@ -1,0 +1,341 @@
+#include "server/report/streaming_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "server/report/csv_file.h"
+#include "server/report/html_page.h"
+#include "server/report/peers/peer_codecs.h"
+#include "server/report/report_folder.h"
+#include "server/report/streaming_goals.h"
+#include "server/report/svg_bars.h"
+#include "server/report/svg_plot.h"
+
+namespace strandcast {
+namespace {
+
+// The place of a name is its style in all plots.
+constexpr std::array kCodecStyles = {"tangent",
+                                     "meshopt+zstd temporal",
+                                     "draco temporal",
+                                     "delta",
+                                     "zfp temporal",
+                                     "zstd 16 bit temporal",
+                                     "raw",
+                                     "zstd float",
+                                     "meshopt+zstd",
+                                     "draco",
+                                     "zfp",
+                                     "zstd 16 bit"};
+
+size_t style_of(const std::string& codec) {
+  const auto* found = std::find(kCodecStyles.begin(), kCodecStyles.end(), codec);
+  return static_cast<size_t>(found - kCodecStyles.begin());
+}
+
+double mm(double m) {
+  return 1e3 * m;
+}
+
+bool is_same_recording(const StreamingRow& a, const StreamingRow& b) {
+  return a.motion == b.motion && a.size.strand_count == b.size.strand_count &&
+         a.size.vertex_count == b.size.vertex_count;
+}
+
+/// The recording that plots of one recording are of: walking and turning where there is any.
+const StreamingRow* shown_recording(const StreamingReport& report) {
+  for (const StreamingRow& row : report.rows)
+    if (row.motion_class == MotionClass::Active) return &row;
+  return report.rows.empty() ? nullptr : &report.rows.front();
+}
+
+std::string recording_words(const StreamingRow& row) {
+  return fmt::format("{} ({}), {} vertices", row.motion, to_string(row.motion_class), to_string(row.size));
+}
+
+/// The names of a report's codecs, in the order of kCodecStyles.
+std::vector<std::string> codec_names(const StreamingReport& report) {
+  std::vector<std::string> names;
+  for (const char* name : kCodecStyles)
+    if (std::any_of(report.rows.begin(), report.rows.end(),
+                    [&](const StreamingRow& row) { return row.codec == name; }))
+      names.emplace_back(name);
+  return names;
+}
+
+std::string row_note(const StreamingRow& row) {
+  return fmt::format(
+      "{}, bound {:g} mm: {:.2f} bits per vertex, largest error {:.4f} mm, encode {:.1f} ms, "
+      "decode {:.1f} ms",
+      row.codec, mm(row.bound_m), row.bits, mm(row.max_error_m), row.encode_cpu_ms, row.decode_cpu_ms);
+}
+
+HtmlTable goal_table(const StreamingReport& report) {
+  HtmlTable table;
+  table.columns = {"goal, at 0.1 mm", "measured", "verdict"};
+  for (const GoalLine& line : judge_streaming(report)) {
+    const HtmlMark mark = line.verdict == Verdict::Met      ? HtmlMark::Good
+                          : line.verdict == Verdict::Missed ? HtmlMark::Bad
+                                                            : HtmlMark::None;
+    table.rows.push_back({line.goal, line.measured, {to_string(line.verdict), mark}});
+  }
+  return table;
+}
+
+HtmlTable recording_table(const StreamingReport& report) {
+  HtmlTable table;
+  table.columns = {"motion",
+                   "class",
+                   "hair, RMS m/s in head space",
+                   "head, mean m/s",
+                   "head turns, mean degrees/s",
+                   "strands x vertices",
+                   "frames of 1/60 s"};
+  for (const StreamRecording& recording : report.recordings) {
+    table.rows.push_back(
+        {recording.motion_name, to_string(recording.motion_class),
+         fmt::format("{:.2f}", recording.hair_rms_mps), fmt::format("{:.2f}", recording.head.mean_speed_mps),
+         fmt::format("{:.0f}", recording.head.mean_turn_rad_per_s * 180.0 / std::numbers::pi),
+         to_string(StreamSize{recording.shape.strand_count, recording.shape.vertex_count}),
+         fmt::format("{}", recording.step_ms.size())});
+  }
+  return table;
+}
+
+HtmlTable codec_table(const StreamingReport& report, const StreamRecording& recording) {
+  const StreamSize size{recording.shape.strand_count, recording.shape.vertex_count};
+  HtmlTable table;
+  table.caption =
+      fmt::format("{}, {}, {}", recording.motion_name, to_string(recording.motion_class), to_string(size));
+  table.columns = {"codec",
+                   "bound, mm",
+                   "bits/vertex",
+                   "with start",
+                   "keyframe",
+                   "Mbit/s",
+                   "max error, mm",
+                   "RMS error, mm",
+                   "encode, ms of one core",
+                   "decode, ms of one core",
+                   "encode, ms by the clock"};
+  for (const StreamingRow& row : report.rows) {
+    if (row.motion != recording.motion_name || row.size.strand_count != size.strand_count ||
+        row.size.vertex_count != size.vertex_count)
+      continue;
+    const bool keeps = row.keeps_bound();
+    table.rows.push_back({row.codec,
+                          row.bound_m > 0.0 ? fmt::format("{:.3g}", mm(row.bound_m)) : "lossless",
+                          fmt::format("{:.2f}", row.bits),
+                          fmt::format("{:.2f}", row.all_bits),
+                          fmt::format("{:.2f}", row.join_bits),
+                          fmt::format("{:.1f}", row.mbit_per_s()),
+                          {fmt::format("{:.4f}{}", mm(row.max_error_m), keeps ? "" : " misses the bound"),
+                           keeps ? HtmlMark::None : HtmlMark::Bad},
+                          fmt::format("{:.4f}", mm(row.rms_error_m)),
+                          fmt::format("{:.2f}", row.encode_cpu_ms),
+                          fmt::format("{:.2f}", row.decode_cpu_ms),
+                          fmt::format("{:.2f}", row.encode_wall_ms)});
+  }
+  return table;
+}
+
+HtmlTable latency_table(const StreamLatency& latency) {
+  HtmlTable table;
+  table.caption = fmt::format("{}, {}, codec {} at {:g} mm, {:.0f} bytes per frame", latency.motion,
+                              to_string(latency.size), latency.codec, mm(latency.bound_m), latency.bytes);
+  table.columns = {"stage", "median, ms", "99th percentile, ms"};
+  std::vector<LatencyStage> stages = latency.stages;
+  stages.push_back(latency.total);
+  for (const LatencyStage& stage : stages)
+    table.rows.push_back(
+        {stage.name, fmt::format("{:.2f}", stage.median_ms), fmt::format("{:.2f}", stage.p99_ms)});
+  return table;
+}
+
+std::string method_text(const StreamingReport& report) {
+  return fmt::format(
+      "Strands are the built-in scene's, moved by {} on {} at 60 Hz in its breeze; the middle {:g} s of each "
+      "motion are kept as 32-bit floats in head space, and every codec gets the same frames. Errors are "
+      "Euclidean, of every vertex of every frame, against those floats. Bits leave out the first {} frames "
+      "(\"with start\" has them). Times are processor time of the whole process, the median over frames, on "
+      "a "
+      "machine with {} processors that may have had other work. What a codec of ours is given is rounded to "
+      "its fine lattice before the clock starts, as publishing does on a server; peers round while it runs.",
+      report.solver, report.device, report.seconds, kStartFrames, report.processors);
+}
+
+constexpr const char* kPeerText =
+    "Peers get strands sorted along a Morton curve through their roots. meshoptimizer (vertex codec, then "
+    "zstd "
+    "3) and Draco (sequential point cloud) code integers on the coarsest cubic lattice that keeps the bound; "
+    "zfp runs in accuracy mode on one array per axis with the largest power-of-two tolerance that keeps it, "
+    "found outside its time. \"Temporal\" is our prediction around them: the last movement, its change and, "
+    "on "
+    "integers, what the parent vertex just did, with weights fitted to each frame. Integers lose nothing, so "
+    "that chain is closed; zfp's is closed over decoded values. \"zstd 16 bit\" has a box of one metre and "
+    "the "
+    "error that follows from it; \"zstd float\" loses nothing. At bounds other than 0.1 mm peers run on the "
+    "first motion of each class.";
+
+constexpr const char* kClassText =
+    "A motion's class follows from what the hair does, whatever the head did: the root of the mean square "
+    "speed "
+    "of all vertices in head space is below 0.04 m/s when idle, below 0.5 m/s walking and turning, else "
+    "violent.";
+
+constexpr const char* kLatencyText =
+    "From the motion sample that a step takes to the decoded frame, in one process, one stage after the "
+    "other: "
+    "the server's stages, TCP on loopback without the WebSocket framing, and a viewer's decoder. Not in it: "
+    "how long a sample waits for the next step (0 to 16.7 ms at 60 Hz) and drawing, which strandcast-view "
+    "measures (--report).";
+
+}  // namespace
+
+std::string streaming_csv(const StreamingReport& report) {
+  CsvFile csv({"clip", "class", "strands", "vertices", "codec", "kind", "bound_mm", "bits_per_vertex",
+               "bits_per_vertex_with_start", "keyframe_bits_per_vertex", "mbit_per_s", "max_error_mm",
+               "rms_error_mm", "keeps_bound", "encode_cpu_ms", "decode_cpu_ms", "encode_wall_ms",
+               "decode_wall_ms"});
+  for (const StreamingRow& row : report.rows) {
+    csv.add_row({row.motion, to_string(row.motion_class), fmt::format("{}", row.size.strand_count),
+                 fmt::format("{}", row.size.vertex_count), row.codec,
+                 row.is_ours       ? "ours"
+                 : row.is_temporal ? "peer, temporal"
+                                   : "peer, positions",
+                 csv_number(mm(row.bound_m)), csv_number(row.bits), csv_number(row.all_bits),
+                 csv_number(row.join_bits), csv_number(row.mbit_per_s()), csv_number(mm(row.max_error_m)),
+                 csv_number(mm(row.rms_error_m)), row.keeps_bound() ? "yes" : "no",
+                 csv_number(row.encode_cpu_ms), csv_number(row.decode_cpu_ms), csv_number(row.encode_wall_ms),
+                 csv_number(row.decode_wall_ms)});
+  }
+  return csv.text();
+}
+
+std::string streaming_bound_plot(const StreamingReport& report) {
+  PlotDesc desc;
+  const StreamingRow* shown = shown_recording(report);
+  desc.title = "Bits against error bound" + (shown != nullptr ? ": " + recording_words(*shown) : "");
+  desc.x.title = "largest error allowed for any vertex, mm";
+  desc.y.title = "bits per vertex and frame";
+  for (const std::string& name : codec_names(report)) {
+    PlotSeries series;
+    series.name = name;
+    series.style = static_cast<int>(style_of(name));
+    for (const StreamingRow& row : report.rows)
+      if (row.codec == name && is_same_recording(row, *shown) && !row.is_bound_free)
+        series.points.push_back({mm(row.bound_m), row.bits, row_note(row)});
+    if (!series.points.empty()) desc.series.push_back(std::move(series));
+  }
+  return make_svg_plot(desc);
+}
+
+std::string streaming_time_plot(const StreamingReport& report) {
+  PlotDesc desc;
+  const StreamingRow* shown = shown_recording(report);
+  desc.title = "Bits against time at 0.1 mm" + (shown != nullptr ? ": " + recording_words(*shown) : "");
+  desc.x.title = "encode and decode, ms of one core per frame";
+  desc.y.title = "bits per vertex and frame";
+  for (const std::string& name : codec_names(report)) {
+    PlotSeries series;
+    series.name = name;
+    series.style = static_cast<int>(style_of(name));
+    series.mark = PlotMark::Dots;
+    for (const StreamingRow& row : report.rows)
+      if (row.codec == name && is_same_recording(row, *shown) &&
+          (row.is_bound_free || row.bound_m == kGoalBoundM))
+        series.points.push_back({row.encode_cpu_ms + row.decode_cpu_ms, row.bits, row_note(row)});
+    desc.series.push_back(std::move(series));
+  }
+  return make_svg_plot(desc);
+}
+
+std::string streaming_motion_plot(const StreamingReport& report) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  BarDesc desc;
+  desc.y_title = "bits per vertex and frame";
+  BarSeries tangent{"tangent", {}, style_of("tangent")};
+  BarSeries delta{"delta", {}, style_of("delta")};
+  BarSeries temporal{"best peer, temporal", {}, style_of("meshopt+zstd temporal")};
+  BarSeries plain{"best peer, positions", {}, style_of("meshopt+zstd")};
+  const StreamingRow* first = report.rows.empty() ? nullptr : &report.rows.front();
+  for (const StreamingRow& row : report.rows) {
+    if (row.codec != "tangent" || row.bound_m != kGoalBoundM ||
+        row.size.strand_count != first->size.strand_count ||
+        row.size.vertex_count != first->size.vertex_count)
+      continue;
+    desc.groups.push_back(row.motion);
+    tangent.value.push_back(row.bits);
+    const auto other =
+        std::find_if(report.rows.begin(), report.rows.end(), [&](const StreamingRow& candidate) {
+          return candidate.codec == "delta" && candidate.bound_m == row.bound_m &&
+                 is_same_recording(candidate, row);
+        });
+    delta.value.push_back(other != report.rows.end() ? other->bits : kNone);
+    const StreamingRow* peer = best_peer(report, row, PeerKind::Temporal);
+    temporal.value.push_back(peer != nullptr ? peer->bits : kNone);
+    peer = best_peer(report, row, PeerKind::Plain);
+    plain.value.push_back(peer != nullptr ? peer->bits : kNone);
+  }
+  desc.title = "Bits at 0.1 mm" + (first != nullptr ? ", " + to_string(first->size) + " vertices" : "");
+  desc.series = {tangent, delta, temporal, plain};
+  return make_svg_bars(desc);
+}
+
+std::string streaming_page(const StreamingReport& report) {
+  HtmlPage page("Streaming strands: error, bytes, milliseconds");
+  const std::vector<GoalLine> goals = judge_streaming(report);
+  const auto count = [&](Verdict verdict) {
+    return std::count_if(goals.begin(), goals.end(),
+                         [&](const GoalLine& line) { return line.verdict == verdict; });
+  };
+  page.answer(
+      fmt::format("Of {} goals {} are met, {} missed, {} not measured{}.", goals.size(), count(Verdict::Met),
+                  count(Verdict::Missed), count(Verdict::NotMeasured),
+                  report.is_quick ? " (a quick run: small, short, goals for full size do not apply)" : ""));
+  page.table(goal_table(report));
+  for (const std::string& sentence : missing_peers()) page.paragraph(sentence);
+  page.heading("Plots");
+  page.figure(streaming_bound_plot(report), "Lower is better. The slope is what a finer bound costs.");
+  page.figure(streaming_time_plot(report), "Lower left is better.");
+  page.figure(streaming_motion_plot(report),
+              "Peers: the one with the fewest bits that keeps the bound, per motion.");
+  page.heading("From motion to decoded frame");
+  page.paragraph(kLatencyText);
+  page.table(latency_table(report.latency));
+  page.heading("How it was measured");
+  page.paragraph(method_text(report));
+  page.paragraph(kPeerText);
+  page.paragraph(kClassText);
+  page.table(recording_table(report));
+  page.heading("Everything");
+  for (const StreamRecording& recording : report.recordings) page.table(codec_table(report, recording));
+  return page.text();
+}
+
+std::string streaming_summary(const StreamingReport& report) {
+  std::string text;
+  for (const GoalLine& line : judge_streaming(report))
+    text += fmt::format("{:<13} {}: {}\n", to_string(line.verdict), line.goal, line.measured);
+  for (const StreamingRow& row : report.rows)
+    if (!row.keeps_bound())
+      text += fmt::format("misses its bound: {} at {:.3g} mm on {}, {}: {:.4g} mm\n", row.codec,
+                          mm(row.bound_m), row.motion, to_string(row.size), mm(row.max_error_m));
+  for (const std::string& sentence : missing_peers()) text += sentence + "\n";
+  return text;
+}
+
+Status save_streaming(const StreamingReport& report, const std::filesystem::path& folder) {
+  RETURN_IF_ERROR(save_text(folder / kStreamingCsv, streaming_csv(report)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_bound.svg", streaming_bound_plot(report)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_time.svg", streaming_time_plot(report)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_motion.svg", streaming_motion_plot(report)));
+  return save_text(folder / kStreamingPage, streaming_page(report));
+}
+
+}  // namespace strandcast

@@ -1,0 +1,157 @@
+// The streaming report without measuring for long: classes of motion, verdicts, the page and the CSV.
+#include "server/report/streaming.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/report/streaming_goals.h"
+#include "server/report/streaming_page.h"
+#include "server/report/svg_bars.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(StreamMotion, AHeadIsMeasuredByItsWayAndItsTurn) {
+  std::vector<Pose> poses;
+  for (int i = 0; i < 120; ++i) {
+    const double t_s = i * kStreamFrameS;
+    poses.push_back({t_s * glm::dvec3(3.0, 0.0, 4.0), glm::angleAxis(2.0 * t_s, glm::dvec3(0.0, 1.0, 0.0))});
+  }
+  const HeadMeasure head = measure_head(poses, kStreamFrameS);
+  EXPECT_NEAR(head.mean_speed_mps, 5.0, 1e-9);
+  EXPECT_NEAR(head.mean_turn_rad_per_s, 2.0, 1e-6);
+  EXPECT_EQ(measure_head({}, kStreamFrameS).mean_speed_mps, 0.0);
+}
+
+TEST(StreamMotion, TheBuiltInOnesAreWhatTheyAreCalled) {
+  std::vector<MotionClass> classes;
+  for (const StreamMotion& motion : built_in_stream_motions()) {
+    const auto recording = record_strands({motion, {24, 8}, 3.0, "", nullptr});
+    ASSERT_TRUE(recording.ok()) << recording.error().to_string();
+    EXPECT_EQ(recording->frames.size(), 180u);
+    classes.push_back(recording->motion_class);
+  }
+  EXPECT_THAT(classes, testing::ElementsAre(MotionClass::Idle, MotionClass::Active, MotionClass::Violent));
+}
+
+TEST(StreamRecording, RefusesWhatDoesNotFit) {
+  StreamMotion motion = built_in_stream_motions().front();
+  motion.duration_s = 1.0;
+  const auto too_short = record_strands({motion, {10, 4}, 2.0, "", nullptr});
+  ASSERT_FALSE(too_short.ok());
+  EXPECT_THAT(too_short.error().to_string(), HasSubstr("lasts 1.00 s"));
+  motion.duration_s = 100.0;
+  const auto too_large = record_strands({motion, {200'000, 64}, 60.0, "", nullptr});
+  ASSERT_FALSE(too_large.ok());
+  EXPECT_EQ(too_large.error().code, ErrorCode::LimitExceeded);
+}
+
+StreamingRow row(const char* codec, MotionClass motion_class, double bits) {
+  StreamingRow result;
+  result.motion = to_string(motion_class);
+  result.motion_class = motion_class;
+  result.size = {10'000, 16};
+  result.codec = codec;
+  result.is_ours = std::string(codec) == "tangent" || std::string(codec) == "delta";
+  result.is_temporal = result.is_ours || std::string(codec).ends_with("temporal");
+  result.bound_m = kGoalBoundM;
+  result.max_error_m = 0.99 * kGoalBoundM;
+  result.bits = result.all_bits = bits;
+  result.join_bits = 12.9;
+  result.decode_cpu_ms = 11.9;
+  result.encode_wall_ms = result.encode_cpu_ms = 15.9;
+  return result;
+}
+
+/// Exactly what the goals ask for.
+StreamingReport just_met() {
+  StreamingReport report;
+  report.processors = 2;
+  const std::pair<MotionClass, double> bits[] = {
+      {MotionClass::Active, 3.5}, {MotionClass::Idle, 1.8}, {MotionClass::Violent, 6.0}};
+  for (const auto& [motion_class, ours] : bits) {
+    report.rows.push_back(row("tangent", motion_class, ours));
+    report.rows.push_back(row("delta", motion_class, 2.0 * ours));
+    report.rows.push_back(row("draco temporal", motion_class, 2.0 * ours));
+    report.rows.push_back(row("zfp temporal", motion_class, 3.0 * ours));
+    report.rows.push_back(
+        row("draco", motion_class, motion_class == MotionClass::Violent ? 4.0 * ours : 6.0 * ours));
+  }
+  return report;
+}
+
+std::vector<Verdict> verdicts(const StreamingReport& report) {
+  std::vector<Verdict> result;
+  for (const GoalLine& line : judge_streaming(report)) result.push_back(line.verdict);
+  return result;
+}
+
+TEST(StreamingGoals, AreMetWhenExactlyReached) {
+  EXPECT_THAT(verdicts(just_met()), testing::Each(Verdict::Met));
+}
+
+TEST(StreamingGoals, EachIsMissedByALittleTooMuchOfItsOwn) {
+  const size_t count = judge_streaming(just_met()).size();
+  const std::vector<void (*)(StreamingRow&)> spoils = {
+      [](StreamingRow& r) { r.max_error_m = 1.01 * r.bound_m; },
+      [](StreamingRow& r) { r.bits *= r.motion_class == MotionClass::Active ? 1.01 : 1.0; },
+      [](StreamingRow& r) { r.bits *= r.motion_class == MotionClass::Idle ? 1.01 : 1.0; },
+      [](StreamingRow& r) { r.bits *= r.motion_class == MotionClass::Violent ? 1.01 : 1.0; },
+  };
+  for (size_t i = 0; i < spoils.size(); ++i) {
+    StreamingReport report = just_met();
+    for (StreamingRow& r : report.rows)
+      if (r.codec == "tangent") spoils[i](r);
+    EXPECT_EQ(verdicts(report)[i], Verdict::Missed) << i;
+  }
+  StreamingReport report = just_met();
+  for (StreamingRow& r : report.rows) {
+    r.join_bits = 13.1;
+    r.decode_cpu_ms = 12.1;
+    r.encode_wall_ms = 16.1;
+    if (!r.is_ours) r.bits *= 0.99;
+  }
+  for (size_t i = spoils.size(); i < count; ++i) EXPECT_EQ(verdicts(report)[i], Verdict::Missed) << i;
+  EXPECT_THAT(verdicts(StreamingReport{}), testing::Each(Verdict::NotMeasured));
+}
+
+TEST(StreamingGoals, APeerThatMissesTheBoundIsNoPeer) {
+  StreamingReport report = just_met();
+  StreamingRow cheat = row("meshopt+zstd temporal", MotionClass::Active, 1.0);
+  cheat.max_error_m = 2.0 * cheat.bound_m;
+  report.rows.push_back(cheat);
+  EXPECT_THAT(verdicts(report), testing::Each(Verdict::Met));
+  EXPECT_THAT(streaming_summary(report), HasSubstr("misses its bound: meshopt+zstd temporal"));
+}
+
+TEST(StreamingPage, SaysEveryGoalAndItsVerdict) {
+  const StreamingReport report = just_met();
+  const std::string page = streaming_page(report);
+  for (const GoalLine& line : judge_streaming(report)) EXPECT_THAT(page, HasSubstr(line.goal));
+  EXPECT_THAT(page, HasSubstr("Of 9 goals 9 are met, 0 missed, 0 not measured."));
+  for (const char* loader : {"src=", "href=", "@import", "url(", "<script"})
+    EXPECT_THAT(page, Not(HasSubstr(loader)));
+  const std::string csv = streaming_csv(report);
+  EXPECT_EQ(static_cast<size_t>(std::count(csv.begin(), csv.end(), '\n')), report.rows.size() + 1);
+  EXPECT_THAT(streaming_page(StreamingReport{}), HasSubstr("nothing was measured"));
+}
+
+TEST(SvgBars, DrawsABarPerNumber) {
+  BarDesc desc;
+  desc.title = "bits & bytes";
+  desc.groups = {"one", "two"};
+  desc.series = {{"a", {1.0, 2.0}, 0}, {"b", {3.0, NAN}, 1}};
+  const std::string svg = make_svg_bars(desc);
+  size_t bars = 0;
+  for (size_t at = svg.find("<title>"); at != std::string::npos; at = svg.find("<title>", at + 1)) ++bars;
+  EXPECT_EQ(bars, 3u);
+  EXPECT_THAT(svg, HasSubstr("bits &amp; bytes"));
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(make_svg_bars({}), HasSubstr("nothing was measured"));
+}
+
+}  // namespace
+}  // namespace strandcast
