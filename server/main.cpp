@@ -27,11 +27,13 @@ int fail(const Error& error) {
   return kExitBadInput;
 }
 
-sigset_t stop_signals() {
+/// Those that stop the server, and SIGHUP where it means to read the certificate again.
+sigset_t handled_signals(const ServerConfig& config) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  if (config.net.tls) sigaddset(&signals, SIGHUP);
   return signals;
 }
 
@@ -72,12 +74,18 @@ Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
   return std::move(file.tokens);
 }
 
+void reload_tls(Server& server) {
+  if (const Status status = server.reload_tls(); !status)
+    return log_error("app", "the old certificate stays: {}", status.error().to_string());
+  log_info("app", "certificate read again");
+}
+
 /// Serves until a signal, the end of the time or a failure. The signals are blocked in every thread.
 int serve(const ServerOptions& options, ServerConfig config) {
   auto tokens = load_tokens(options);
   if (!tokens) return fail(tokens.error());
   config.net.tokens = std::move(tokens).value();
-  const sigset_t signals = stop_signals();
+  const sigset_t signals = handled_signals(config);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   auto server = Server::start(config);
   if (!server) return fail(server.error());
@@ -88,12 +96,15 @@ int serve(const ServerOptions& options, ServerConfig config) {
   const int64_t begin_ns = now_ns();
   const timespec poll{0, kPollNs};
   while (!(*server)->failure() && !(*server)->is_shut_down_wanted()) {
-    if (sigtimedwait(&signals, nullptr, &poll) > 0) break;
+    const int signal = sigtimedwait(&signals, nullptr, &poll);
+    if (signal == SIGHUP) reload_tls(**server);
+    if (signal > 0 && signal != SIGHUP) break;
     if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
   }
   // A second signal ends the process at once.
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
+  if (config.net.tls) std::signal(SIGHUP, SIG_IGN);
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
   const std::optional<Error> failure = (*server)->failure();
   (*server)->stop();

@@ -28,9 +28,16 @@ int fail(const Error& error, int exit_code = kBadInputExit) {
   return exit_code;
 }
 
+Result<Address> address_of(const CtlTarget& target) {
+  ASSIGN_OR_RETURN(Address address, parse_address(target.connect));
+  address.is_tls = address.is_tls || target.is_tls || !target.tls_authorities.empty();
+  return address;
+}
+
 Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
   ClientConfig config;
-  ASSIGN_OR_RETURN(config.address, parse_address(target.connect));
+  ASSIGN_OR_RETURN(config.address, address_of(target));
+  config.tls_authorities = target.tls_authorities;
   config.hello.role = role;
   config.hello.mode = StreamMode::Strands;
   config.hello.name = "strandcast-ctl";
@@ -229,9 +236,9 @@ int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {
 }
 
 int run_health(const CtlTarget& target) {
-  const auto address = parse_address(target.connect);
+  const auto address = address_of(target);
   if (!address) return fail(address.error());
-  const auto answer = http_get(*address, "/healthz", kHealthTimeout);
+  const auto answer = http_get(*address, "/healthz", kHealthTimeout, {target.tls_authorities, {}});
   if (!answer) return fail(answer.error());
   constexpr unsigned kHttpOk = 200;
   std::cout << answer->body;

@@ -21,6 +21,8 @@ struct CtlTarget {
   std::string connect;
   std::string token;
   std::filesystem::path token_file;  // read when not empty
+  bool is_tls = false;
+  std::filesystem::path tls_authorities;  // means TLS when not empty
 };
 
 struct FeedOptions {

@@ -14,7 +14,7 @@ namespace {
 using namespace strandcast;
 
 struct CommandLine {
-  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}};
+  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}};
   std::string log_level = "warn";
   FeedOptions feed;
   std::vector<float> wind_mps;
@@ -64,6 +64,8 @@ int run(int argc, char** argv) {
   app.add_option("--token-file", line.target.token_file,
                  "File with the token: the token alone, or lines 'role token'");
   app.add_option("--token", line.target.token, kTokenHelp)->envname(kTokenVariable);
+  app.add_flag("--tls", line.target.is_tls, "Encrypt the connection, as an address with wss:// does");
+  app.add_option("--tls-ca", line.target.tls_authorities, kTlsAuthoritiesHelp);
   app.add_option("--log", line.log_level, "error, warn, info, debug or off")->capture_default_str();
 
   CLI::App* feed = app.add_subcommand("feed", "Send head motion and wind in real time");

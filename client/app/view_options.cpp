@@ -65,6 +65,7 @@ Role role_of(const ViewOptions& options) {
 ClientConfig client_config(const ViewOptions& options) {
   ClientConfig config;
   config.address = options.address;
+  config.tls_authorities = options.tls_authorities;
   config.hello.role = role_of(options);
   config.hello.mode = options.mode;
   config.hello.name = "strandcast-view";
@@ -83,6 +84,7 @@ struct RawOptions {
   std::string size = "960x540";
   std::string clip_size;  // empty = as size
   std::string token_file;
+  bool is_tls = false;
   double seconds = 0.0;
   std::string playout = "low-latency";
 };
@@ -93,6 +95,8 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--token-file", raw.token_file,
                  "File with the token: the token alone, or lines 'role token'");
   app.add_option("--token", options.token, kTokenHelp)->envname(kTokenVariable);
+  app.add_flag("--tls", raw.is_tls, "Encrypt the connection, as an address with wss:// does");
+  app.add_option("--tls-ca", options.tls_authorities, kTlsAuthoritiesHelp);
   app.add_flag("--view-only", options.is_view_only, "Ask for a viewer's role: no steering of the server");
   app.add_option("--size", raw.size, "Picture or window size, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--playout", raw.playout,
@@ -122,6 +126,7 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
 
 Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   ASSIGN_OR_RETURN(options.address, parse_address(raw.connect));
+  options.address.is_tls = options.address.is_tls || raw.is_tls || !options.tls_authorities.empty();
   ASSIGN_OR_RETURN(options.mode, parse_mode(raw.mode));
   ASSIGN_OR_RETURN(options.size, parse_size(raw.size));
   ASSIGN_OR_RETURN(options.clip_size, parse_size(raw.clip_size.empty() ? raw.size : raw.clip_size));

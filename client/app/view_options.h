@@ -16,6 +16,7 @@ struct ViewOptions {
   Address address;
   StreamMode mode = StreamMode::Auto;
   Playout playout = Playout::LowLatency;
+  std::filesystem::path tls_authorities;
   std::string token;
   RenderSize size{960, 540};
   bool is_headless = false;
@@ -35,6 +36,8 @@ struct ViewOptions {
 
 /// Everybody on the machine sees command lines; a file or the environment is private.
 inline constexpr const char* kTokenVariable = "STRANDCAST_TOKEN";
+inline constexpr const char* kTlsAuthoritiesHelp =
+    "Certificates (PEM) that the server's must come from, instead of the system's; means --tls";
 inline constexpr const char* kTokenHelp =
     "Token itself; other users of this machine can see it here, so prefer --token-file";
 

@@ -1,6 +1,7 @@
 #include "client/net/address.h"
 
 #include <charconv>
+#include <string_view>
 
 namespace strandcast {
 
@@ -9,14 +10,20 @@ std::string Address::to_string() const {
   return is_ipv6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
 }
 
-Result<Address> parse_address(const std::string& text) {
+Result<Address> parse_address(const std::string& typed) {
   constexpr size_t kMaxHostLength = 253;  // of a DNS name
+  constexpr std::string_view kPlainScheme = "ws://", kTlsScheme = "wss://";
+  const bool is_tls = typed.starts_with(kTlsScheme);
+  const std::string text = typed.substr(is_tls                            ? kTlsScheme.size()
+                                        : typed.starts_with(kPlainScheme) ? kPlainScheme.size()
+                                                                          : 0);
   const auto bad = [&](const char* why) {
     return make_error(ErrorCode::BadInput,
                       "'{}' is not an address: {} (use HOST:PORT, for example 127.0.0.1:{})",
                       text.substr(0, kMaxHostLength), why, kDefaultPort);
   };
   Address address;
+  address.is_tls = is_tls;
   std::string host = text;
   std::string port;
   if (text.starts_with('[')) {

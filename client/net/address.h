@@ -1,4 +1,4 @@
-// HOST:PORT as people type it. Pure, any thread.
+// HOST:PORT as people type it, with wss:// in front for TLS. Pure, any thread.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,15 @@ namespace strandcast {
 struct Address {
   std::string host = "127.0.0.1";
   uint16_t port = kDefaultPort;
+  bool is_tls = false;
 
   bool operator==(const Address&) const = default;
+  /// HOST:PORT.
   std::string to_string() const;
 };
 
-/// Reads "host", "host:port", ":port", "[ipv6]" or "[ipv6]:port"; what is missing keeps its default. BadInput
-/// names the text.
+/// Reads "host", "host:port", ":port", "[ipv6]" or "[ipv6]:port", after "ws://" or "wss://" if any; what is
+/// missing keeps its default. BadInput names the text.
 Result<Address> parse_address(const std::string& text);
 
 }  // namespace strandcast

@@ -1,10 +1,14 @@
 #include "client/net/http_get.h"
 
+#include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <optional>
+
+#include "client/net/tls_error_private.h"
+#include "common/net/net_stream_private.h"
 
 namespace strandcast {
 namespace {
@@ -18,25 +22,24 @@ using boost::system::error_code;
 /// The request as a chain of completions on one thread; the io_context ends when the chain does.
 class Exchange {
  public:
-  Exchange(const Address& address, const std::string& target)
-      : resolver_(io_), stream_(io_), request_(http::verb::get, target, 11) {
+  Exchange(const Address& address, const std::string& target, TlsContextPtr tls, const std::string& token)
+      : host_(address.host), tls_(std::move(tls)), request_(http::verb::get, target, 11) {
     request_.set(http::field::host, address.to_string());
     request_.set(http::field::user_agent, "strandcast");
+    if (!token.empty()) request_.set(http::field::authorization, "Bearer " + token);
     parser_.body_limit(kMaxHttpBodyBytes);
     resolver_.async_resolve(address.host, std::to_string(address.port),
                             [this](error_code failure, const tcp::resolver::results_type& results) {
                               if (!keep(failure)) return;
-                              stream_.async_connect(results,
-                                                    [this](error_code f, const tcp::endpoint&) { write(f); });
+                              connect(results);
                             });
   }
 
   Result<HttpAnswer> run(std::chrono::milliseconds timeout) {
-    stream_.expires_after(timeout);
     io_.run_for(timeout);
     if (is_done_) return HttpAnswer{parser_.get().result_int(), parser_.get().body()};
-    if (failure_ && failure_ != beast::error::timeout)
-      return make_error(ErrorCode::Unavailable, "no HTTP answer: {}", failure_.message());
+    if (tls_error_) return *tls_error_;
+    if (failure_) return make_error(ErrorCode::Unavailable, "no HTTP answer: {}", failure_.message());
     return make_error(ErrorCode::Timeout, "no HTTP answer within {} ms", timeout.count());
   }
 
@@ -44,6 +47,16 @@ class Exchange {
   bool keep(const error_code& failure) {
     if (failure) failure_ = failure;
     return !failure;
+  }
+
+  void connect(const tcp::resolver::results_type& results) {
+    asio::async_connect(stream_.socket(), results, [this](error_code failure, const tcp::endpoint&) {
+      if (tls_ == nullptr || failure) return write(failure);
+      stream_.async_connect_tls(tls_, host_, [this](error_code f) {
+        if (f) tls_error_ = error_from_tls(stream_, f);
+        write(f);
+      });
+    });
   }
 
   void write(const error_code& failure) {
@@ -55,21 +68,28 @@ class Exchange {
   }
 
   asio::io_context io_{1};
-  tcp::resolver resolver_;
-  beast::tcp_stream stream_;
+  const std::string host_;
+  const TlsContextPtr tls_;
+  tcp::resolver resolver_{io_};
+  net::NetStream stream_{tcp::socket(io_)};
   http::request<http::empty_body> request_;
   http::response_parser<http::string_body> parser_;
   beast::flat_buffer buffer_;
   error_code failure_;
+  std::optional<Error> tls_error_;
   bool is_done_ = false;
 };
 
 }  // namespace
 
 Result<HttpAnswer> http_get(const Address& address, const std::string& target,
-                            std::chrono::milliseconds timeout) {
+                            std::chrono::milliseconds timeout, const HttpAccess& access) {
   try {
-    auto answer = Exchange(address, target).run(timeout);
+    TlsContextPtr tls;
+    if (address.is_tls) {
+      ASSIGN_OR_RETURN(tls, make_client_tls(access.tls_authorities));
+    }
+    auto answer = Exchange(address, target, std::move(tls), access.token).run(timeout);
     if (!answer) return at(address.to_string(), answer.error());
     return answer;
   } catch (const std::exception& failure) {

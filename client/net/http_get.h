@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "client/net/address.h"
@@ -17,8 +18,14 @@ struct HttpAnswer {
   std::string body;
 };
 
-/// Unavailable when nobody listens or the answer is not HTTP, Timeout when it takes too long.
+struct HttpAccess {
+  std::filesystem::path tls_authorities;  // as in ClientConfig
+  std::string token;                      // sent as Authorization: Bearer when not empty
+};
+
+/// Unavailable when nobody listens or the answer is not HTTP, Timeout when it takes too long,
+/// Unauthorized or Unsupported when TLS fails.
 Result<HttpAnswer> http_get(const Address& address, const std::string& target,
-                            std::chrono::milliseconds timeout);
+                            std::chrono::milliseconds timeout, const HttpAccess& access = {});
 
 }  // namespace strandcast

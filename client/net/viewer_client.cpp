@@ -18,8 +18,10 @@
 #include <utility>
 
 #include "client/net/reconnect_policy.h"
+#include "client/net/tls_error_private.h"
 #include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/net/net_stream_private.h"
 
 namespace strandcast {
 namespace {
@@ -75,10 +77,11 @@ Error error_from_http(const websocket::response_type& response) {
 // Everything but the members under mutex_ and mailbox_ belongs to the network thread.
 class ViewerClient::Connection {
  public:
-  explicit Connection(const ClientConfig& config)
+  Connection(const ClientConfig& config, TlsContextPtr tls)
       : config_(config),
+        tls_(std::move(tls)),
         resolver_(io_),
-        ws_(io_),
+        ws_(net::NetStream(tcp::socket(io_))),
         deadline_(io_),
         ping_timer_(io_),
         mailbox_(config.mailbox) {}
@@ -173,22 +176,27 @@ class ViewerClient::Connection {
   }
 
   void connect_tcp(const tcp::resolver::results_type& results) {
-    beast::get_lowest_layer(ws_).async_connect(
-        results, [this](error_code failure, const tcp::resolver::results_type::endpoint_type&) {
-          if (is_finished_) return;
-          if (failure)
-            return finish(make_error(ErrorCode::Unavailable,
-                                     "cannot connect: {} (is strandcast-server running?)",
-                                     failure.message()));
-          upgrade();
-        });
+    asio::async_connect(ws_.next_layer().socket(), results, [this](error_code failure, const tcp::endpoint&) {
+      if (is_finished_) return;
+      if (failure)
+        return finish(make_error(ErrorCode::Unavailable, "cannot connect: {} (is strandcast-server running?)",
+                                 failure.message()));
+      error_code ignored;
+      ws_.next_layer().socket().set_option(tcp::no_delay(true), ignored);
+      if (tls_ == nullptr) return upgrade();
+      connect_tls();
+    });
+  }
+
+  void connect_tls() {
+    ws_.next_layer().async_connect_tls(tls_, config_.address.host, [this](error_code failure) {
+      if (is_finished_) return;
+      if (failure) return finish(error_from_tls(ws_.next_layer(), failure));
+      upgrade();
+    });
   }
 
   void upgrade() {
-    auto& layer = beast::get_lowest_layer(ws_);
-    error_code ignored;
-    layer.socket().set_option(tcp::no_delay(true), ignored);
-    layer.expires_never();  // from here on the WebSocket layer keeps the time
     websocket::stream_base::timeout timeout{};
     timeout.handshake_timeout = config_.connect_timeout;
     timeout.idle_timeout = config_.idle_timeout;
@@ -426,15 +434,15 @@ class ViewerClient::Connection {
   }
 
   void hard_close() {
-    error_code ignored;
-    beast::get_lowest_layer(ws_).socket().close(ignored);
+    ws_.next_layer().close();
     io_.stop();  // the WebSocket layer's own idle timer would keep run() going for seconds
   }
 
   const ClientConfig config_;
+  const TlsContextPtr tls_;  // null: no TLS
   asio::io_context io_{1};
   tcp::resolver resolver_;
-  websocket::stream<beast::tcp_stream> ws_;
+  websocket::stream<net::NetStream> ws_;
   asio::steady_timer deadline_;
   asio::steady_timer ping_timer_;
   websocket::response_type response_;
@@ -463,7 +471,11 @@ class ViewerClient::Connection {
 };
 
 Result<std::unique_ptr<ViewerClient>> ViewerClient::connect(const ClientConfig& config) {
-  auto connection = std::make_unique<Connection>(config);
+  TlsContextPtr tls;
+  if (config.address.is_tls) {
+    ASSIGN_OR_RETURN(tls, make_client_tls(config.tls_authorities));
+  }
+  auto connection = std::make_unique<Connection>(config, std::move(tls));
   RETURN_IF_ERROR(connection->open());
   return std::unique_ptr<ViewerClient>(new ViewerClient(std::move(connection)));
 }

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ namespace strandcast {
 
 struct ClientConfig {
   Address address;
+  std::filesystem::path tls_authorities;  // PEM, for an address with TLS; empty: the system's
   std::string path = "/v1";
   Hello hello;
   std::chrono::milliseconds connect_timeout{5000};  // name, TCP and WebSocket handshake together
@@ -46,7 +48,8 @@ struct ConnectionCounters {
 class ViewerClient {
  public:
   /// Blocks until the server has sent its Welcome. Unavailable: nobody listens or the connection broke;
-  /// Timeout; Unauthorized, LimitExceeded, Unsupported: the server refused; BadInput: it does not speak this
+  /// Timeout; Unauthorized: the server refused, or its certificate is not to be
+  /// trusted; LimitExceeded, Unsupported: the server refused; BadInput: it does not speak this
   /// protocol.
   static Result<std::unique_ptr<ViewerClient>> connect(const ClientConfig& config);
   /// Says goodbye to the server (waiting a fraction of a second at most) and ends the network thread.

@@ -28,6 +28,8 @@ struct RawRunOptions {
   std::string shader_folder;
   double viewer_mbit = 0.0;
   bool is_loopback_distrusted = false;
+  TlsFiles tls;
+  bool is_tls_only = false;
 };
 
 void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
@@ -45,6 +47,17 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   app.add_option("--allow-host", net.allowed_hosts, "further name accepted in the Host header; repeatable")
       ->expected(1)
       ->take_all();
+  app.add_option("--allow-origin", net.allowed_origins,
+                 "further web origin that may connect, exactly (https://HOST:PORT); repeatable")
+      ->expected(1)
+      ->take_all();
+  auto* certificate =
+      app.add_option("--tls-cert", raw.tls.certificate, "certificate (PEM) for TLS, with its chain");
+  auto* key = app.add_option("--tls-key", raw.tls.key, "key (PEM) of the certificate");
+  certificate->needs(key);
+  key->needs(certificate);
+  app.add_flag("--tls-only", raw.is_tls_only, "refuse connections without TLS on loopback too")
+      ->needs(certificate);
   app.add_option("--viewer-mbit", raw.viewer_mbit,
                  "most that the strands for one viewer may take, Mbit/s; 0 = no cap")
       ->check(CLI::NonNegativeNumber);
@@ -79,6 +92,8 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   }
   constexpr double kBytesPerMbit = 125e3;
   options.config.net.limits.viewer_bytes_per_s = raw.viewer_mbit * kBytesPerMbit;
+  if (!raw.tls.certificate.empty()) options.config.net.tls = raw.tls;
+  if (raw.is_tls_only) options.config.net.plain_access = PlainAccess::Nobody;
   if (raw.is_loopback_distrusted) options.config.net.loopback_trust = LoopbackTrust::LikeAllOthers;
   options.is_explaining = app.count("--explain") > 0;
   if (!explained.empty()) {

@@ -51,6 +51,7 @@ class Server::State : public NetHandler {
   ServerCounters counters() const;
   uint16_t port() const { return net_->port(); }
   std::optional<Error> failure() const { return sim_->failure(); }
+  Status reload_tls() { return net_->reload_tls(); }
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
 
   Result<Admission> on_hello(SessionId session, const Hello& hello) override;
@@ -387,6 +388,9 @@ uint16_t Server::port() const {
 }
 ServerCounters Server::counters() const {
   return state_->counters();
+}
+Status Server::reload_tls() {
+  return state_->reload_tls();
 }
 bool Server::is_shut_down_wanted() const {
   return state_->is_shut_down_wanted();

@@ -53,6 +53,8 @@ class Server {
 
   uint16_t port() const;
   ServerCounters counters() const;
+  /// As NetServer::reload_tls().
+  Status reload_tls();
   /// True once an admin has asked for the end: the owner calls stop().
   bool is_shut_down_wanted() const;
   /// Why the simulation ended by itself; nothing while all is well.

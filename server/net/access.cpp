@@ -62,11 +62,14 @@ bool is_host_allowed(std::string_view host_header, const std::string& local_addr
                      [&](const std::string& allowed) { return lower(allowed) == name; });
 }
 
-bool is_origin_allowed(std::string_view origin_header, std::string_view host_header) {
+bool is_origin_allowed(std::string_view origin_header, std::string_view host_header,
+                       const std::vector<std::string>& allowed_origins) {
   if (origin_header.empty()) return true;
   const std::string origin = lower(origin_header);
   const std::string host = lower(host_header);
-  return origin == "http://" + host || origin == "https://" + host;
+  if (origin == "http://" + host || origin == "https://" + host) return true;
+  return std::any_of(allowed_origins.begin(), allowed_origins.end(),
+                     [&](const std::string& allowed) { return lower(allowed) == origin; });
 }
 
 bool RateLimit::take(int64_t time_ns) {

@@ -24,8 +24,10 @@ std::string host_name_of(std::string_view host_header);
 bool is_host_allowed(std::string_view host_header, const std::string& local_address, bool is_loopback,
                      const std::vector<std::string>& allowed_names);
 
-/// Absent (empty: not a browser), or the page came from this very server.
-bool is_origin_allowed(std::string_view origin_header, std::string_view host_header);
+/// Absent (empty: not a browser), or the page came from this very server, or exactly one of the allowed
+/// origins ("https://hair.example:8443").
+bool is_origin_allowed(std::string_view origin_header, std::string_view host_header,
+                       const std::vector<std::string>& allowed_origins);
 
 /// Token bucket: `rate_per_s` on average, as many at once.
 class RateLimit {

@@ -8,6 +8,8 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 
+#include "common/net/net_stream_private.h"
+
 namespace strandcast::net {
 
 namespace asio = boost::asio;

@@ -15,10 +15,17 @@ class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(Context& context, tcp::socket socket);
   void start();
+  /// Ends what takes too long.
+  void check_deadline(int64_t time_ns);
   void abort();
-  const std::string& peer_address() const { return peer_address_; }
+  const Peer& peer() const { return peer_; }
 
  private:
+  template <class Work>
+  void guarded(Work&& work);
+  void begin();
+  void on_tls(const beast::error_code& error);
+  void read_request();
   void on_request(const beast::error_code& error);
   void respond(http::status status, const std::string& text, const char* content_type = "text/plain");
   void answer_metrics();
@@ -26,8 +33,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void finish();
 
   Context& context_;
-  beast::tcp_stream stream_;
-  std::string peer_address_;
+  NetStream stream_;
+  Peer peer_;
   std::string local_address_;
   bool is_loopback_ = false;
   bool is_finished_ = false;

@@ -17,6 +17,8 @@ std::string format_metrics(const NetCounters& counters) {
                              {"net_accept_errors_total", &NetCounters::accept_errors},
                              {"net_refused_full_total", &NetCounters::refused_full},
                              {"net_refused_token_total", &NetCounters::refused_token},
+                             {"net_refused_rate_total", &NetCounters::refused_rate},
+                             {"net_refused_tls_total", &NetCounters::refused_tls},
                              {"net_refused_http_total", &NetCounters::refused_http},
                              {"net_bad_messages_total", &NetCounters::bad_messages},
                              {"net_stalled_total", &NetCounters::stalled},

@@ -36,13 +36,21 @@ std::string own_host_name() {
 
 }  // namespace
 
-bool Context::has_room(const std::string& peer_address) const {
+Context::Context(const NetConfig& net_config, NetHandler& net_handler)
+    : config(net_config),
+      handler(net_handler),
+      strand_classes(net_config.strand_classes),
+      guard({net_config.limits.connections_per_s, net_config.limits.wrong_tokens,
+             net_config.limits.wrong_token_window_ms * kNsPerMs,
+             net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}) {}
+
+bool Context::has_room(const std::string& peer_key) const {
   size_t all = 0;
   size_t of_peer = 0;
   for (const auto& [id, session] : sessions) {
     if (session->state() == Session::State::Closing) continue;
     ++all;
-    if (session->peer_address() == peer_address) ++of_peer;
+    if (session->peer().key == peer_key) ++of_peer;
   }
   return all < config.limits.sessions && of_peer < config.limits.sessions_per_address;
 }
@@ -116,7 +124,7 @@ struct NetServer::State {
   Status open();
   void accept();
   void on_accept(const error_code& error, net::tcp::socket socket);
-  bool has_place(const std::string& peer_address) const;
+  bool has_place(const std::string& peer_key) const;
   void sweep();
   void begin_stop();
   void end_if_done(int64_t time_ns);
@@ -143,8 +151,15 @@ Status NetServer::State::open() {
     return make_error(ErrorCode::BadInput,
                       "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)",
                       config.address);
-  RETURN_IF_ERROR(check_listening(address.is_loopback() && config.loopback_trust == LoopbackTrust::Trusted,
-                                  config.address, config.tokens));
+  const bool is_trusted = address.is_loopback() && config.loopback_trust == LoopbackTrust::Trusted;
+  RETURN_IF_ERROR(check_listening(is_trusted, config.address, config.tokens));
+  if (config.tls) {
+    ASSIGN_OR_RETURN(context.tls, make_server_tls(*config.tls));
+  } else if (!is_trusted) {
+    log_warn("net",
+             "listening on {} without TLS: whoever is on the way can read tokens and frames (--tls-cert)",
+             config.address);
+  }
   const net::tcp::endpoint endpoint(address, config.port);
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(net::asio::socket_base::reuse_address(true), error);
@@ -179,21 +194,24 @@ void NetServer::State::on_accept(const error_code& error, net::tcp::socket socke
   }
   context.count(&NetCounters::connections);
   auto connection = std::make_shared<net::Connection>(context, std::move(socket));
-  if (has_place(connection->peer_address())) {
+  const net::Peer& peer = connection->peer();
+  const auto verdict = peer.is_trusted ? AddressGuard::Verdict::Welcome
+                                       : context.guard.on_connection(peer.key, peer.accepted_ns);
+  if (verdict != AddressGuard::Verdict::Welcome) {
+    context.count(&NetCounters::refused_rate);
+  } else if (!has_place(peer.key)) {
+    context.count(&NetCounters::refused_full);
+  } else {
     context.connections.insert(connection);
     connection->start();
-  } else {
-    context.count(&NetCounters::refused_full);
   }
   accept();
 }
 
-bool NetServer::State::has_place(const std::string& peer_address) const {
+bool NetServer::State::has_place(const std::string& peer_key) const {
   size_t of_peer = 0;
-  for (const auto& connection : context.connections)
-    of_peer += connection->peer_address() == peer_address ? 1 : 0;
-  for (const auto& [id, session] : context.sessions)
-    of_peer += session->peer_address() == peer_address ? 1 : 0;
+  for (const auto& connection : context.connections) of_peer += connection->peer().key == peer_key ? 1 : 0;
+  for (const auto& [id, session] : context.sessions) of_peer += session->peer().key == peer_key ? 1 : 0;
   const NetLimits& limits = context.config.limits;
   return context.connections.size() + context.sessions.size() < limits.sessions + net::kSpareConnections &&
          of_peer < limits.sessions_per_address + net::kSpareConnectionsPerAddress;
@@ -204,7 +222,9 @@ void NetServer::State::sweep() {
   sweep_timer.async_wait([this](const error_code& error) {
     if (error) return;
     const int64_t time_ns = now_ns();
-    const auto sessions = context.sessions;  // a deadline may remove a session
+    const auto connections = context.connections;  // a deadline may remove one
+    for (const auto& connection : connections) connection->check_deadline(time_ns);
+    const auto sessions = context.sessions;
     for (const auto& [id, session] : sessions) session->check_deadlines(time_ns);
     if (context.is_stopping) end_if_done(time_ns);
     sweep();
@@ -267,6 +287,15 @@ void NetServer::start() {
   state->accept();
   state->sweep();
   state->thread = std::thread([state] { state->run(); });
+}
+
+Status NetServer::reload_tls() {
+  if (!state_->context.config.tls) return {};
+  ASSIGN_OR_RETURN(TlsContextPtr fresh, make_server_tls(*state_->context.config.tls));
+  net::asio::post(state_->context.io, [state = state_.get(), fresh = std::move(fresh)]() mutable {
+    state->context.tls = std::move(fresh);
+  });
+  return {};
 }
 
 uint16_t NetServer::port() const {

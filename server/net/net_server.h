@@ -7,11 +7,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/codec/frame_header.h"
+#include "common/net/tls_context.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
 #include "server/net/roles.h"
@@ -31,27 +33,37 @@ using PictureClass = uint32_t;  // viewers of one class get the same rendered fr
 struct NetLimits {
   uint32_t sessions = kMaxSessions;
   uint32_t sessions_per_address = kMaxSessionsPerAddress;
-  int64_t handshake_ms = 5'000;  // TCP accept to a complete HTTP request
-  int64_t hello_ms = 5'000;      // WebSocket open to Hello
+  int64_t handshake_ms = 5'000;  // TCP accept to Hello, or to the end of another HTTP request
   int64_t idle_ms = 15'000;      // nothing received, pings included
   int64_t stalled_ms = 4'500;    // no progress of one write, or a viewer's silence while an answer is due
   int64_t unused_ms = 30'000;    // frames wait for acknowledgement, although the client sends other things
   int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
   double messages_per_s = 1'000.0;     // per session, and as many at once
-  double viewer_bytes_per_s = 0.0;     // cap of what strands may take for one viewer; 0 = none
+  // Of one address, where it is not on trusted loopback.
+  double connections_per_s = 10.0;  // and as many at once
+  uint32_t wrong_tokens = 5;        // in wrong_token_window_ms; one more blocks
+  int64_t wrong_token_window_ms = 60'000;
+  int64_t wrong_token_block_ms = 60'000;  // nothing is accepted from there
+  uint32_t guarded_addresses = 1'024;     // remembered for this at once
+  double viewer_bytes_per_s = 0.0;        // cap of what strands may take for one viewer; 0 = none
 };
 
 /// LikeAllOthers: behind a proxy or tunnel on this machine, where everybody seems to be local.
 enum class LoopbackTrust { Trusted, LikeAllOthers };
+/// Who may do without TLS when the server has a certificate.
+enum class PlainAccess { TrustedLoopback, Nobody };
 
 struct NetConfig {
   std::string address = "127.0.0.1";  // numeric, or "localhost"
   uint16_t port = kDefaultPort;       // 0 = any free port
   std::vector<AccessToken> tokens;    // needed beyond loopback
   LoopbackTrust loopback_trust = LoopbackTrust::Trusted;
+  std::optional<TlsFiles> tls;  // none: no TLS
+  PlainAccess plain_access = PlainAccess::TrustedLoopback;
   std::vector<std::string>
       allowed_hosts;  // accepted in the Host header, besides the server's own address and name
+  std::vector<std::string> allowed_origins;  // of web pages, besides this very server
   NetLimits limits;
   std::vector<StrandClass> strand_classes = {StrandClass{}};  // at first; best first, index = stream_id
 };
@@ -97,10 +109,12 @@ struct NetCounters {
   uint64_t accept_errors = 0;
   uint64_t refused_full = 0;
   uint64_t refused_token = 0;
+  uint64_t refused_rate = 0;  // too many connections or wrong tokens from one address
+  uint64_t refused_tls = 0;   // failed TLS handshakes, and requests without TLS
   uint64_t refused_http = 0;  // wrong path, host, origin or request
   uint64_t bad_messages = 0;  // malformed, out of order, wrong role or too many
   uint64_t stalled = 0;       // dropped for a write without progress
-  uint64_t timeouts = 0;      // no request or no Hello in time
+  uint64_t timeouts = 0;      // no Hello or request in time
   uint64_t messages_received = 0;
   uint64_t frames_sent = 0;
   uint64_t frames_dropped = 0;  // media a session was too slow for
@@ -123,6 +137,8 @@ class NetServer {
   /// Starts the network thread. Call once.
   void start();
   uint16_t port() const;
+  /// Reads the certificate and the key again; new connections get them. On an error the old ones stay.
+  Status reload_tls();
 
   /// Strand frames of one class (stream_id) in the order of their chain. A delta goes to sessions of the
   /// class whose last frame it builds on, a keyframe to those that wait for one.

@@ -11,9 +11,7 @@
 namespace strandcast::net {
 namespace {
 
-/// Enough to keep a long fast link busy. How much of it waits unsent is bounded apart, so that a late frame
-/// is dropped here and not queued in the kernel.
-constexpr int kSendBufferBytes = 1 << 20;
+/// How much waits unsent in the kernel, so that a late frame is dropped here and not queued there.
 constexpr int kUnsentBytes = 128 << 10;
 constexpr int64_t kProbeIntervalNs = 1'000 * kNsPerMs;
 /// Longest sentence of ours put into a Goodbye.
@@ -45,13 +43,13 @@ const char* message_name(const ClientMessage& message) {
 
 }  // namespace
 
-Session::Session(Context& context, SessionId id, beast::tcp_stream stream, std::string peer_address)
+Session::Session(Context& context, SessionId id, NetStream stream, Peer peer)
     : context_(context),
       id_(id),
       socket_(std::move(stream)),
-      peer_address_(std::move(peer_address)),
+      peer_(std::move(peer)),
       rate_(context.config.limits.messages_per_s),
-      state_since_ns_(now_ns()) {}
+      state_since_ns_(peer_.accepted_ns) {}
 
 template <class Work>
 void Session::guarded(Work&& work) {
@@ -67,10 +65,9 @@ void Session::guarded(Work&& work) {
 void Session::start(http::request<http::empty_body> request, bool has_room) {
   request_ = std::move(request);
   const NetLimits& limits = context_.config.limits;
-  beast::get_lowest_layer(socket_).expires_never();
   beast::error_code ignored;
-  auto& tcp_socket = beast::get_lowest_layer(socket_).socket();
-  tcp_socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
+  auto& tcp_socket = socket_.next_layer().socket();
+  tcp_socket.set_option(asio::socket_base::send_buffer_size(static_cast<int>(kSendBufferBytes)), ignored);
   using UnsentLowWater = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   tcp_socket.set_option(UnsentLowWater(kUnsentBytes), ignored);
 
@@ -95,7 +92,6 @@ void Session::start(http::request<http::empty_body> request, bool has_room) {
 void Session::on_open(bool has_room) {
   if (state_ != State::Handshake) return;
   state_ = State::AwaitHello;
-  state_since_ns_ = now_ns();
   read();
   if (context_.is_stopping) return close(CloseCode::GoingAway, "The server is stopping.");
   if (!has_room) {
@@ -156,7 +152,9 @@ void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
 void Session::join(const Hello& hello) {
   if (const Status allowed = check_role(context_.config.tokens, hello); !allowed) {
     context_.count(&NetCounters::refused_token);
-    log_warn("net", "session {} from {} as {}: {}", id_, peer_address_, to_string(hello.role),
+    if (allowed.error().code == ErrorCode::Unauthorized && !peer_.is_trusted)
+      context_.guard.on_wrong_token(peer_.key, now_ns());
+    log_warn("net", "session {} from {} as {}: {}", id_, peer_.address, to_string(hello.role),
              allowed.error().to_string());
     return close(close_code_for(allowed.error()), allowed.error().to_string());
   }
@@ -171,7 +169,7 @@ void Session::join(const Hello& hello) {
   state_ = State::Joined;
   state_since_ns_ = now_ns();
   context_.update_session_counts();
-  log_info("net", "session {} from {} joined: {} '{}', {}", id_, peer_address_, to_string(hello.role),
+  log_info("net", "session {} from {} joined: {} '{}', {}", id_, peer_.address, to_string(hello.role),
            hello.name, to_string(mode_));
   // The asset is set before anything is written, and strands start only once it is: nothing can overtake it.
   if (hello.role != Role::Source) {
@@ -218,7 +216,7 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
 
 void Session::obey(const AdminCommand& command, int64_t time_ns) {
   if (command.action == AdminAction::ListSessions) return queue_control(context_.list_sessions(time_ns));
-  log_info("net", "session {} from {}: an admin {}", id_, peer_address_,
+  log_info("net", "session {} from {}: an admin {}", id_, peer_.address,
            command.action == AdminAction::Kick ? fmt::format("ends session {}", command.session)
                                                : "ends the server");
   if (command.action == AdminAction::ShutDown) {
@@ -235,7 +233,7 @@ SessionInfo Session::info(int64_t time_ns) const {
   SessionInfo info;
   info.id = id_;
   info.name = hello_.name;
-  info.address = peer_address_;
+  info.address = peer_.address;
   info.role = hello_.role;
   info.mode = mode_;
   info.sent_bytes = sent_bytes_;
@@ -246,7 +244,7 @@ SessionInfo Session::info(int64_t time_ns) const {
 
 void Session::reject(CloseCode code, const std::string& reason) {
   context_.count(&NetCounters::bad_messages);
-  log_warn("net", "session {} from {}: {}", id_, peer_address_, reason);
+  log_warn("net", "session {} from {}: {}", id_, peer_.address, reason);
   close(code, reason);
 }
 
@@ -462,13 +460,13 @@ void Session::check_deadlines(int64_t time_ns) {
     if (in_state_ms >= limits.close_ms) abort();
     return;
   }
-  if (state_ == State::AwaitHello && in_state_ms >= limits.hello_ms) {
+  if (state_ == State::AwaitHello && in_state_ms >= limits.handshake_ms) {
     context_.count(&NetCounters::timeouts);
-    return close(CloseCode::Policy, fmt::format("No Hello within {} ms.", limits.hello_ms));
+    return close(CloseCode::Policy, fmt::format("No Hello within {} ms.", limits.handshake_ms));
   }
   if (is_stalled(time_ns)) {
     context_.count(&NetCounters::stalled);
-    log_warn("net", "session {} from {}: takes nothing for {} ms, dropped", id_, peer_address_,
+    log_warn("net", "session {} from {}: takes nothing for {} ms, dropped", id_, peer_.address,
              limits.stalled_ms);
     return abort();
   }
@@ -495,7 +493,7 @@ void Session::finish() {
   if (state_ == State::Closed) return;
   state_ = State::Closed;
   queue_.clear();
-  beast::get_lowest_layer(socket_).close();
+  socket_.next_layer().close();
   context_.sessions.erase(id_);
   context_.update_session_counts();
   try {

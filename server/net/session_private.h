@@ -19,7 +19,7 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   enum class State { Handshake, AwaitHello, Joined, Closing, Closed };
 
-  Session(Context& context, SessionId id, beast::tcp_stream stream, std::string peer_address);
+  Session(Context& context, SessionId id, NetStream stream, Peer peer);
 
   /// Answers the upgrade request. With `has_room` false the session is told so and closed.
   void start(http::request<http::empty_body> request, bool has_room);
@@ -43,7 +43,7 @@ class Session : public std::enable_shared_from_this<Session> {
   State state() const { return state_; }
   /// For an admin's list.
   SessionInfo info(int64_t time_ns) const;
-  const std::string& peer_address() const { return peer_address_; }
+  const Peer& peer() const { return peer_; }
 
  private:
   template <class Work>
@@ -75,8 +75,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   Context& context_;
   const SessionId id_;
-  websocket::stream<beast::tcp_stream> socket_;
-  const std::string peer_address_;
+  websocket::stream<NetStream> socket_;
+  const Peer peer_;
   http::request<http::empty_body> request_;
   State state_ = State::Handshake;
   Hello hello_;
@@ -84,7 +84,7 @@ class Session : public std::enable_shared_from_this<Session> {
   PictureClass picture_class_ = 0;
   bool has_joined_ = false;
 
-  beast::flat_buffer read_buffer_;
+  beast::flat_buffer read_buffer_{kMaxSessionReadBytes};
   RateLimit rate_;
   SendQueue queue_;
   FlowControl flow_;

@@ -23,6 +23,8 @@ class ServerAccess : public test::ServerNet {
     NetConfig config;
     config.tokens = kTokens;
     config.loopback_trust = trust;
+    config.limits.connections_per_s = 1e6;
+    config.limits.wrong_tokens = 1'000;
     start(config);
   }
   static Hello hello_as(Role role, const std::string& token) {

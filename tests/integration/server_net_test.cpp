@@ -188,7 +188,6 @@ TEST_F(ServerNet, FullServerSaysSoAndHasRoomAgainLater) {
 TEST_F(ServerNet, SilentConnectionsAreEndedInTime) {
   NetConfig config;
   config.limits.handshake_ms = 200;
-  config.limits.hello_ms = 200;
   start(config);
   RawClient nothing(server_->port());
   RawClient half(server_->port());

@@ -159,6 +159,9 @@ TEST(Address, ReadsWhatPeopleType) {
   EXPECT_EQ(*parse_address("[::1]:82"), (Address{"::1", 82}));
   EXPECT_EQ(*parse_address("[::1]"), (Address{"::1", kDefaultPort}));
   EXPECT_EQ(*parse_address(""), Address{});
+  EXPECT_EQ(*parse_address("wss://studio:83"), (Address{"studio", 83, true}));
+  EXPECT_EQ(*parse_address("ws://[::1]:84"), (Address{"::1", 84, false}));
+  EXPECT_EQ(parse_address("wss://[::1]:84")->to_string(), "[::1]:84");
   EXPECT_EQ((Address{"::1", 82}).to_string(), "[::1]:82");
 }
 

@@ -36,6 +36,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/scene", kScene},
       {"common/codec", kCodec},
       {"common/wire", kWire},
+      {"common/net", kBase},
       {"common/gl", kGl},
       {"common/render", kRender},
       {"server/input", kWire},
@@ -43,14 +44,14 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"server/scene", with(with({"server/input", "server/sim"}, kGl), kScene)},
       {"server/publish", with(with({"server/sim"}, kGl), kCodec)},
       {"server/encode", with({"server/publish"}, kRender)},
-      {"server/net", with({"server/input"}, kWire)},
+      {"server/net", with({"server/input", "common/net"}, kWire)},
       {"server/app",
        with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode", "server/net"},
             kAll)},
       {"server/report",
        with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode"}, kAll)},
       {"server", with({"server/app"}, kAll)},
-      {"client/net", kWire},
+      {"client/net", with({"common/net"}, kWire)},
       {"client/replay", kAll},
       {"client/window", with({"client/replay"}, kAll)},
       {"client/app", with({"client/net", "client/replay", "client/window"}, kAll)},
@@ -68,7 +69,7 @@ struct LibraryRule {
 
 const std::vector<LibraryRule>& library_rules() {
   static const std::set<std::string> kProto = {"common/scene", "common/wire"};
-  static const std::set<std::string> kNet = {"server/net", "client/net"};
+  static const std::set<std::string> kNet = {"server/net", "client/net", "common/net"};
   static const std::set<std::string> kGl = {"common/gl", "common/render", "server/sim", "server/publish",
                                             "client/window"};
   static const std::set<std::string> kApp = {"server/app", "server/report", "client/app", "server", "client"};
@@ -76,6 +77,7 @@ const std::vector<LibraryRule>& library_rules() {
       {"google/protobuf", kProto, {".cpp"}},
       {"strandcast/v1/", kProto, {".cpp"}},
       {"boost/", kNet, {".cpp", "_private.h"}},
+      {"openssl/", {"common/net"}, {".cpp"}},
       {"epoxy/", kGl},
       {"EGL/", kGl},
       {"GL/", kGl},
@@ -113,7 +115,9 @@ std::string check_include(const std::string& path, const std::string& included) 
   const std::string top = included.substr(0, included.find('/'));
   if (top != "common" && top != "server" && top != "client" && top != "shaders") return "";
   const std::string target = folder_of(included);
-  if (included.ends_with("_private.h") && target != folder)
+  // The stream that both sides of the network share is private to the net folders.
+  const bool is_shared = target == "common/net" && (folder == "server/net" || folder == "client/net");
+  if (included.ends_with("_private.h") && target != folder && !is_shared)
     return fmt::format("{}: {} is private to {}", path, included, target);
   if (target == folder) return "";
   const auto allowed = allowed_folders().find(folder);

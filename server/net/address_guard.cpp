@@ -1,0 +1,44 @@
+#include "server/net/address_guard.h"
+
+#include <algorithm>
+#include <tuple>
+
+namespace strandcast {
+
+AddressGuard::Verdict AddressGuard::on_connection(const std::string& address, int64_t time_ns) {
+  Entry& one = entry(address, time_ns);
+  if (time_ns < one.blocked_until_ns) return Verdict::Blocked;
+  return one.rate.take(time_ns) ? Verdict::Welcome : Verdict::TooFast;
+}
+
+void AddressGuard::on_wrong_token(const std::string& address, int64_t time_ns) {
+  Entry& one = entry(address, time_ns);
+  std::erase_if(one.wrong_ns, [&](int64_t then_ns) { return then_ns <= time_ns - limits_.window_ns; });
+  if (one.wrong_ns.size() < limits_.wrong_tokens) return one.wrong_ns.push_back(time_ns);
+  one.wrong_ns.clear();
+  one.blocked_until_ns = time_ns + limits_.block_ns;
+}
+
+AddressGuard::Entry& AddressGuard::entry(const std::string& address, int64_t time_ns) {
+  auto found = entries_.find(address);
+  if (found == entries_.end()) {
+    if (entries_.size() >= limits_.addresses) make_room(time_ns);
+    found = entries_.emplace(address, Entry(limits_.connections_per_s)).first;
+  }
+  found->second.seen_ns = time_ns;
+  return found->second;
+}
+
+/// Forgets the address that matters least: unblocked before blocked, then without wrong tokens, then the one
+/// not seen for longest.
+void AddressGuard::make_room(int64_t time_ns) {
+  const auto worth = [&](const auto& item) {
+    const Entry& one = item.second;
+    return std::tuple(std::max(one.blocked_until_ns, time_ns), !one.wrong_ns.empty(), one.seen_ns);
+  };
+  const auto least = std::min_element(entries_.begin(), entries_.end(),
+                                      [&](const auto& a, const auto& b) { return worth(a) < worth(b); });
+  if (least != entries_.end()) entries_.erase(least);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,47 @@
+// AddressGuard: how fast one address connects and how often its token was wrong, in a table of bounded size.
+// Plain logic without a clock; one thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "server/net/access.h"
+
+namespace strandcast {
+
+struct GuardLimits {
+  double connections_per_s = 10.0;  // and as many at once
+  uint32_t wrong_tokens = 5;        // in a window; one more blocks
+  int64_t window_ns = 60'000'000'000;
+  int64_t block_ns = 60'000'000'000;
+  uint32_t addresses = 1'024;  // remembered at once
+};
+
+class AddressGuard {
+ public:
+  explicit AddressGuard(const GuardLimits& limits) : limits_(limits) {}
+
+  enum class Verdict { Welcome, TooFast, Blocked };
+  Verdict on_connection(const std::string& address, int64_t time_ns);
+  void on_wrong_token(const std::string& address, int64_t time_ns);
+
+  size_t size() const { return entries_.size(); }
+
+ private:
+  struct Entry {
+    explicit Entry(double connections_per_s) : rate(connections_per_s) {}
+    RateLimit rate;
+    std::vector<int64_t> wrong_ns;  // times of wrong tokens, oldest first; limits_.wrong_tokens at most
+    int64_t blocked_until_ns = 0;
+    int64_t seen_ns = 0;
+  };
+  Entry& entry(const std::string& address, int64_t time_ns);
+  void make_room(int64_t time_ns);
+
+  const GuardLimits limits_;
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,67 @@
+// What the clients' command lines make of addresses, roles and token files.
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "client/app/view_options.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+
+ViewOptions read(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "strandcast-view");
+  const auto line = read_view_command_line(static_cast<int>(arguments.size()), arguments.data());
+  EXPECT_TRUE(line.options.has_value());
+  return line.options.value_or(ViewOptions{});
+}
+
+TEST(ViewOptions, AskForNoMoreThanTheyNeed) {
+  EXPECT_EQ(client_config(read({})).hello.role, Role::Controller);
+  EXPECT_EQ(client_config(read({"--view-only"})).hello.role, Role::Viewer);
+  EXPECT_EQ(client_config(read({"--headless"})).hello.role, Role::Viewer);
+}
+
+TEST(ViewOptions, EncryptWhenTheAddressOrAnOptionSaysSo) {
+  EXPECT_FALSE(client_config(read({})).address.is_tls);
+  EXPECT_FALSE(client_config(read({"--connect", "ws://localhost:1"})).address.is_tls);
+  EXPECT_TRUE(client_config(read({"--connect", "wss://localhost:1"})).address.is_tls);
+  EXPECT_TRUE(client_config(read({"--tls"})).address.is_tls);
+  const ClientConfig config = client_config(read({"--tls-ca", "ca.pem"}));
+  EXPECT_TRUE(config.address.is_tls);
+  EXPECT_EQ(config.tls_authorities, "ca.pem");
+}
+
+class ClientTokenFile : public testing::Test {
+ protected:
+  std::string token_of(const std::string& text, Role role) {
+    std::ofstream(path_) << text;
+    const auto token = load_token(path_, role);
+    return token ? *token : token.error().to_string();
+  }
+  TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_.path() / "tokens";
+};
+
+TEST_F(ClientTokenFile, GivesTheLeastThatServes) {
+  const std::string all = "# made by the server\nviewer v1\ncontroller c1\nsource s1\nadmin a1\n";
+  EXPECT_EQ(token_of(all, Role::Viewer), "v1");
+  EXPECT_EQ(token_of(all, Role::Controller), "c1");
+  EXPECT_EQ(token_of(all, Role::Source), "s1");
+  EXPECT_EQ(token_of(all, Role::Admin), "a1");
+  EXPECT_EQ(token_of("controller c1\n", Role::Viewer), "c1");
+  EXPECT_EQ(token_of("admin a1\n", Role::Source), "a1");
+  for (const Role role : {Role::Viewer, Role::Admin}) EXPECT_EQ(token_of("\nplain\n", role), "plain");
+}
+
+TEST_F(ClientTokenFile, SaysWhatIsMissing) {
+  EXPECT_THAT(token_of("viewer v1\n", Role::Controller), HasSubstr("--view-only"));
+  EXPECT_THAT(token_of("source s1\n", Role::Viewer), HasSubstr("no token for a viewer"));
+  EXPECT_THAT(token_of("# nothing\n", Role::Viewer), HasSubstr("no token"));
+  EXPECT_THAT(token_of("source s1\n", Role::Viewer), testing::Not(HasSubstr("s1")));
+}
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,193 @@
+// Limits of the server on sockets, at the limit and one over. SECURITY.md lists which test is for which
+// limit.
+#include "tests/support/server_net_fixture.h"
+
+namespace strandcast {
+namespace {
+
+using test::code;
+using test::eventually;
+using test::RawClient;
+
+constexpr const char* kToken = "0123456789abcdef";
+
+class ServerLimits : public test::ServerNet {
+ protected:
+  /// Loopback treated like any other address, which the limits per address are for.
+  static NetConfig strict() {
+    NetConfig config;
+    config.tokens = {{kToken, Grant::AllButAdmin}};
+    config.loopback_trust = LoopbackTrust::LikeAllOthers;
+    config.limits.connections_per_s = 1e6;
+    return config;
+  }
+  uint16_t port() const { return server_->port(); }
+};
+
+/// A request whose header has exactly this many bytes.
+std::string request_of(size_t header_bytes) {
+  const std::string begin = "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ";
+  const std::string end = "\r\n\r\n";
+  return begin + std::string(header_bytes - begin.size() - end.size(), 'x') + end;
+}
+
+TEST_F(ServerLimits, HttpHeader) {
+  start();
+  constexpr size_t kMaxHeaderBytes = 8'192;
+  RawClient longest(port());
+  longest.send_raw(request_of(kMaxHeaderBytes));
+  EXPECT_NE(longest.read_raw_to_end().find("200 OK"), std::string::npos);
+  RawClient one_over(port());
+  one_over.send_raw(request_of(kMaxHeaderBytes + 1));
+  EXPECT_EQ(one_over.read_raw_to_end().find("200 OK"), std::string::npos);
+}
+
+/// A ping and a field that no version knows, `size` bytes together.
+std::vector<std::byte> padded_ping(size_t size) {
+  std::vector<std::byte> bytes = encode(ClientMessage(Ping{7}));
+  const size_t content = size - bytes.size() - 6;  // three bytes of tag, three of length
+  for (const uint32_t number : {uint32_t{2000 << 3 | 2}, static_cast<uint32_t>(content)})
+    for (const uint32_t byte : {(number & 0x7f) | 0x80, ((number >> 7) & 0x7f) | 0x80, number >> 14})
+      bytes.push_back(static_cast<std::byte>(byte));
+  bytes.resize(size);
+  return bytes;
+}
+
+TEST_F(ServerLimits, MessageSize) {
+  start();
+  auto client = join();
+  for (int i = 0; i < 3; ++i) {
+    client->send_bytes(padded_ping(kMaxControlBytes));
+    EXPECT_TRUE(client->read_control<Pong>()) << "at the limit, again and again";
+  }
+  client->send_bytes(padded_ping(kMaxControlBytes + 1));
+  EXPECT_EQ(client->read_end().close_code, code(CloseCode::TooBig));
+}
+
+TEST_F(ServerLimits, SessionsInAll) {
+  NetConfig config;
+  config.limits.sessions = 3;
+  start(config);
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 3; ++i) clients.push_back(join());
+  RawClient one_over(port());
+  ASSERT_TRUE(one_over.handshake());
+  EXPECT_EQ(one_over.read_end().close_code, code(CloseCode::Full));
+  clients[0]->send(Ping{1});
+  EXPECT_TRUE(clients[0]->read_control<Pong>());
+}
+
+/// So many connections that say nothing, then one more, which is closed at once.
+void expect_connection_limit(uint16_t port, size_t limit) {
+  std::vector<std::unique_ptr<RawClient>> silent;
+  for (size_t i = 0; i < limit; ++i) silent.push_back(std::make_unique<RawClient>(port));
+  RawClient one_over(port);
+  EXPECT_EQ(one_over.read_raw_to_end(), "");
+  silent.back()->send_raw("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+  EXPECT_NE(silent.back()->read_raw_to_end().find("200 OK"), std::string::npos) << "at the limit";
+}
+
+TEST_F(ServerLimits, ConnectionsOfOneAddress) {
+  NetConfig config;
+  config.limits.sessions_per_address = 1;
+  config.limits.handshake_ms = 60'000;
+  start(config);
+  expect_connection_limit(port(), 1 + 16);
+  EXPECT_EQ(server_->counters().refused_full, 1u);
+}
+
+TEST_F(ServerLimits, ConnectionsInAll) {
+  NetConfig config;
+  config.limits.sessions = 1;
+  config.limits.sessions_per_address = 1'000;
+  config.limits.handshake_ms = 60'000;
+  start(config);
+  expect_connection_limit(port(), 1 + 64);
+  EXPECT_EQ(server_->counters().refused_full, 1u);
+}
+
+TEST_F(ServerLimits, ConnectionsPerSecond) {
+  NetConfig config = strict();
+  config.limits.connections_per_s = 1.0;
+  start(config);
+  // A place comes back every second; unit tests have the exact figures.
+  EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos);
+  constexpr int kAttempts = 50;
+  for (int i = 0; i < kAttempts && server_->counters().refused_rate == 0; ++i)
+    (void)test::http_get(port(), "/healthz");
+  EXPECT_GT(server_->counters().refused_rate, 0u);
+}
+
+TEST_F(ServerLimits, ConnectionsOnTrustedLoopbackAreNotCounted) {
+  NetConfig config;
+  config.limits.connections_per_s = 1.0;
+  start(config);
+  for (int i = 0; i < 20; ++i)
+    EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos) << i;
+}
+
+constexpr uint16_t kNoHandshake = 1;  // no close code
+
+/// How a session with this token ends; Normal when it is let in.
+uint16_t close_code_with(uint16_t port, const std::string& token) {
+  RawClient client(port);
+  if (!client.handshake()) return kNoHandshake;
+  Hello hello;
+  hello.token = token;
+  client.send(hello);
+  while (true) {
+    const test::Received received = client.read();
+    if (received.is_end) return received.close_code;
+    const auto message = decode_server_message(received.bytes);
+    if (message && std::holds_alternative<Welcome>(*message)) return code(CloseCode::Normal);
+  }
+}
+
+TEST_F(ServerLimits, WrongTokensOfOneAddress) {
+  NetConfig config = strict();
+  config.limits.wrong_token_window_ms = config.limits.wrong_token_block_ms = 3'600'000;
+  start(config);
+  for (uint32_t i = 0; i < config.limits.wrong_tokens; ++i)
+    EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
+  EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::Normal)) << "at the limit";
+  EXPECT_EQ(server_->counters().refused_rate, 0u);
+  EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
+  EXPECT_EQ(close_code_with(port(), kToken), kNoHandshake) << "one over: closed unanswered";
+  EXPECT_EQ(server_->counters().refused_rate, 1u);
+  EXPECT_EQ(server_->counters().refused_token, config.limits.wrong_tokens + 1);
+}
+
+TEST_F(ServerLimits, WrongTokensForMetricsCountToo) {
+  NetConfig config = strict();
+  config.limits.wrong_tokens = 0;
+  config.limits.wrong_token_block_ms = 3'600'000;
+  start(config);
+  EXPECT_NE(test::http_get(port(), "/metrics").find("401"), std::string::npos) << "none at all is no guess";
+  EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos);
+  RawClient guess(port());
+  guess.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer wrong\r\n\r\n");
+  EXPECT_NE(guess.read_raw_to_end().find("401"), std::string::npos);
+  EXPECT_EQ(test::http_get(port(), "/healthz"), "");
+}
+
+TEST_F(ServerLimits, ABlockEnds) {
+  NetConfig config = strict();
+  config.limits.wrong_tokens = 0;
+  config.limits.wrong_token_block_ms = 50;
+  start(config);
+  EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
+  EXPECT_TRUE(eventually([&] { return close_code_with(port(), kToken) == code(CloseCode::Normal); }));
+}
+
+TEST_F(ServerLimits, WrongTokensOnTrustedLoopbackDoNotBlock) {
+  NetConfig config = strict();
+  config.loopback_trust = LoopbackTrust::Trusted;
+  config.limits.wrong_tokens = 0;
+  config.limits.wrong_token_block_ms = 3'600'000;
+  start(config);
+  EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
+  EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::Normal));
+}
+
+}  // namespace
+}  // namespace strandcast
