@@ -8,6 +8,8 @@ target_compile_options(strandcast_flags INTERFACE
   $<$<BOOL:${STRANDCAST_WARNINGS_AS_ERRORS}>:-Werror>)
 if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT STRANDCAST_SANITIZE)
   target_compile_definitions(strandcast_flags INTERFACE _FORTIFY_SOURCE=2)
+  # Checked by tests/tools/check_hardening.sh.
+  target_link_options(strandcast_flags INTERFACE -pie -Wl,-z,relro,-z,now,-z,noexecstack)
 endif()
 if(STRANDCAST_SANITIZE)
   set(strandcast_sanitize_options -fsanitize=${STRANDCAST_SANITIZE})

@@ -23,10 +23,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     CHECK(name == local_address || name == host_name_of(allowed) || name.size() == allowed.size());
     CHECK(is_host_allowed(host, local_address, true, {allowed}));
   }
-  CHECK(is_origin_allowed("", host));
-  CHECK(is_origin_allowed("http://" + host, host) && is_origin_allowed("https://" + host, host));
-  CHECK(!is_origin_allowed("http://" + host + ".evil.example", host));
-  if (!origin.empty() && is_origin_allowed(origin, host)) {
+  CHECK(is_origin_allowed("", host, {}));
+  CHECK(is_origin_allowed("http://" + host, host, {}) && is_origin_allowed("https://" + host, host, {}));
+  CHECK(!is_origin_allowed("http://" + host + ".evil.example", host, {}));
+  if (!origin.empty() && is_origin_allowed(origin, host, {})) {
     CHECK(origin.size() == host.size() + 7 || origin.size() == host.size() + 8);
   }
   return 0;

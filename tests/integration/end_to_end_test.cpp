@@ -294,7 +294,8 @@ TEST_F(EndToEnd, AControllerPausesStepsAndIsToldWhatIsWrong) {
   ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().newest()->tick != tick; }));
   EXPECT_EQ(viewer->replay().newest()->tick, tick + 1);
 
-  const CtlTarget target{fmt::format("127.0.0.1:{}", server_->port()), {}, {}};
+  CtlTarget target;
+  target.connect = fmt::format("127.0.0.1:{}", server_->port());
   EXPECT_EQ(run_command(target, ControlCommand{Command::Resume}), kDoneExit);
   EXPECT_EQ(run_command(target, SetParameter{"solver.name=spaghetti"}), kRefusedExit);
   EXPECT_EQ(run_health(target), kDoneExit);
@@ -309,7 +310,8 @@ TEST_F(EndToEnd, TheBoundChangesWhileViewersWatch) {
   States states;
   record(*viewer, states);
   ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= 5; }));
-  const CtlTarget target{fmt::format("127.0.0.1:{}", server_->port()), {}, {}};
+  CtlTarget target;
+  target.connect = fmt::format("127.0.0.1:{}", server_->port());
   const auto change = [&](const std::string& assignment) {
     // The command waits for its answer, which needs nobody to pump this viewer.
     EXPECT_EQ(run_command(target, SetParameter{assignment}), kDoneExit) << assignment;

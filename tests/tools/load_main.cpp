@@ -123,6 +123,9 @@ Status join_all(LoadViewers& viewers, const CommandLine& line) {
 
 Status run(CommandLine line) {
   ASSIGN_OR_RETURN(const Address address, parse_address(line.connect));
+  if (address.is_tls)
+    return make_error(ErrorCode::Unsupported,
+                      "strandcast-load speaks no TLS: connect to the server on its own machine");
   if (!line.token_file.empty()) {
     ASSIGN_OR_RETURN(line.token, load_token(line.token_file, Role::Viewer));
   }
