@@ -33,7 +33,7 @@ class Secrets : public testing::Test {
         std::vector<std::string>{"--port", "0", "--port-file", port_path, "--token-file", token_path_,
                                  "--set", "groom.procedural.strand_count=50", "--log-level", "debug"},
         folder_.path() / "server.txt");
-    EXPECT_TRUE(test::eventually([&] { return server->has_ended() || std::filesystem::exists(port_path); }));
+    EXPECT_TRUE(eventually([&] { return server->has_ended() || std::filesystem::exists(port_path); }));
     if (server->has_ended()) return nullptr;
     connect_ = "127.0.0.1:" + text_of(port_path);
     connect_.pop_back();
