@@ -9,7 +9,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const auto address = parse_address(FuzzInput(data, size).take_rest_as_text());
   if (!address) return 0;
   CHECK(!address->host.empty() && address->port != 0);
-  const auto again = parse_address(address->to_string());
+  const auto again = parse_address((address->is_tls ? "wss://" : "") + address->to_string());
   CHECK(again.ok() && *again == *address);
   return 0;
 }

@@ -26,8 +26,14 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   CHECK(is_origin_allowed("", host, {}));
   CHECK(is_origin_allowed("http://" + host, host, {}) && is_origin_allowed("https://" + host, host, {}));
   CHECK(!is_origin_allowed("http://" + host + ".evil.example", host, {}));
-  if (!origin.empty() && is_origin_allowed(origin, host, {})) {
-    CHECK(origin.size() == host.size() + 7 || origin.size() == host.size() + 8);
+  if (!origin.empty()) {
+    constexpr size_t kHttpChars = 7, kHttpsChars = 8;  // of the scheme
+    const size_t name_chars = host.size();
+    if (is_origin_allowed(origin, host, {}))
+      CHECK(origin.size() == name_chars + kHttpChars || origin.size() == name_chars + kHttpsChars);
+    CHECK(is_origin_allowed(origin, host, {origin}));
+    if (is_origin_allowed(origin, host, {allowed}))
+      CHECK(is_origin_allowed(origin, host, {}) || origin.size() == allowed.size());
   }
   return 0;
 }
