@@ -15,7 +15,7 @@ using namespace strandcast;
 enum class Step : uint8_t { Frame, Pong, Picture, Playout, Damaged };
 constexpr int kStepKinds = 5;
 constexpr int kMostSteps = 200;
-constexpr uint32_t kStrands = 1;
+constexpr uint32_t kStrands = 6;  // of the scene; frames have 1 or more of them
 constexpr uint32_t kVertices = 2;
 
 class ReplayGame {
@@ -44,9 +44,12 @@ class ReplayGame {
       case Step::Picture:
         check_picture();
         break;
-      case Step::Playout:
-        replay_->set_playout((input.take<uint8_t>() & 1) != 0 ? Playout::Smooth : Playout::LowLatency);
+      case Step::Playout: {
+        const auto what = input.take<uint8_t>();
+        replay_->set_playout((what & 1) != 0 ? Playout::Smooth : Playout::LowLatency);
+        if ((what & 2) != 0) set_rest_shape(input);
         break;
+      }
       case Step::Damaged:
         (void)replay_->receive(input.take_bytes(input.take<uint8_t>()), now_ns_, clock_);
         break;
@@ -59,7 +62,8 @@ class ReplayGame {
     CHECK(picture.has_value() == (replay_->newest() != nullptr));
     if (!picture) return;
     CHECK(is_finite(picture->world_from_head));
-    CHECK(picture->position_m.size() == size_t{kStrands} * kVertices);
+    CHECK(picture->position_m.size() % kVertices == 0 && !picture->position_m.empty());
+    CHECK(picture->position_m.size() <= size_t{kStrands} * kVertices);
     for (const glm::vec3& point : picture->position_m)
       CHECK(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z));
   }
@@ -69,6 +73,15 @@ class ReplayGame {
   int64_t take_time(FuzzInput& input) const {
     const auto kind = input.take<uint8_t>();
     return (kind & 1) != 0 ? input.take<int64_t>() : now_ns_ + input.take<int32_t>();
+  }
+
+  /// Any that an asset may hold.
+  void set_rest_shape(FuzzInput& input) {
+    std::vector<glm::vec3> rest_in_head_m(size_t{kStrands} * kVertices);
+    for (glm::vec3& point : rest_in_head_m)
+      for (int axis = 0; axis < 3; ++axis)
+        point[axis] = static_cast<float>(input.take<int16_t>()) * (kMaxGroomExtentM / 0x8000);
+    replay_->set_rest_shape(rest_in_head_m);
   }
 
   void receive(FuzzInput& input) {
@@ -81,7 +94,7 @@ class ReplayGame {
       for (int axis = 0; axis < 3; ++axis) snapshot.world_from_head.position_m[axis] = input.take<double>();
       for (int k = 0; k < 4; ++k) snapshot.world_from_head.rotation[k] = input.take<double>();
     }
-    snapshot.strand_count = kStrands;
+    snapshot.strand_count = (kind & 32) != 0 ? 1 + input.take<uint8_t>() % kStrands : 1;
     snapshot.vertex_count = kVertices;
     snapshot.quantum_m = (kind & 4) != 0 ? input.take<float>() : 1e-4f;
     for (size_t i = 0; i < 3 * snapshot.plane_size(); ++i) snapshot.lattice.push_back(input.take<int16_t>());
