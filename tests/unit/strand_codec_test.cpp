@@ -245,8 +245,9 @@ TEST_P(EveryChainedCodec, StateIsUnchangedAfterADamagedFrame) {
   const auto decoder = decoder_for(GetParam(), 20, 8);
   std::mt19937 random(1);
   // Behind the weights, of which many carry little: the features of so few strands are often zero.
-  const size_t weight_bytes =
-      GetParam() == kRoundingCodec ? 2 + sizeof(MotionWeights) : sizeof(PredictorWeights);
+  const size_t weight_bytes = GetParam() == kRoundingCodec
+                                  ? 2 + kFewMotionClasses * sizeof(MotionWeights::value_type)
+                                  : sizeof(PredictorWeights);
   const size_t content_at = kFrameHeaderBytes + kStrandFixedBytes + weight_bytes;
   int refused_everything = 0;
   for (int i = 0; i < 40; ++i) {
