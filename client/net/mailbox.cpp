@@ -80,6 +80,10 @@ void Mailbox::push(const SessionList& list) {
   keep_newest(list);
 }
 
+void Mailbox::push(const ModeChange& change) {
+  keep_newest(change);
+}
+
 void Mailbox::push(Notice notice) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return;

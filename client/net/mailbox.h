@@ -1,5 +1,5 @@
 // Mailbox: hands what the network thread received to the application thread; bounded in every kind. Strand
-// frames keep their order (a delta needs every frame before it); pictures, assets, status and stream quality
+// frames keep their order (a delta needs every frame before it); pictures, assets, status, quality and mode
 // keep only the newest. Any thread. Does not decode.
 #pragma once
 
@@ -32,7 +32,8 @@ struct ClosedEvent {
   Error error;
 };
 
-using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, SessionList, ClosedEvent>;
+using ClientEvent =
+    std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, ModeChange, SessionList, ClosedEvent>;
 
 struct MailboxLimits {
   size_t strand_frames = 240;            // four seconds at 60 Hz
@@ -52,6 +53,7 @@ class Mailbox {
   void push(const ServerStatus& status);
   void push(const StreamQuality& quality);
   void push(const SessionList& list);
+  void push(const ModeChange& change);
   /// The oldest notice gives way when there are too many.
   void push(Notice notice);
   /// Adds the final event; later pushes are ignored.

@@ -352,6 +352,14 @@ class ViewerClient::Connection {
                        : make_error(ErrorCode::BadInput, "the server sent a session list before its Welcome");
   }
 
+  Status handle_control(ModeChange& change) {
+    change.reason = printable(change.reason);
+    if (is_welcome_) mailbox_.push(change);
+    return is_welcome_
+               ? Status()
+               : make_error(ErrorCode::BadInput, "the server sent a change of mode before its Welcome");
+  }
+
   Status handle_control(Notice& notice) {
     notice.text = printable(notice.text);
     if (is_welcome_) mailbox_.push(std::move(notice));

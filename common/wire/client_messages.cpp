@@ -79,6 +79,19 @@ void put(const AdminCommand& command, v1::ClientMessage& message) {
   message.mutable_admin()->set_session(command.session);
 }
 
+void put(const ViewerReport& report, v1::ClientMessage& message) {
+  v1::ViewerReport& out = *message.mutable_viewer_report();
+  out.set_decode_ms(report.decode_ms);
+  out.set_draw_ms(report.draw_ms);
+  out.set_picture_decode_ms(report.picture_decode_ms);
+  out.set_shown_hz(report.shown_hz);
+  out.set_device(static_cast<v1::DrawingDevice>(report.device));
+}
+
+void put(const ModeRequest& request, v1::ClientMessage& message) {
+  message.mutable_mode_request()->set_mode(static_cast<v1::StreamMode>(request.mode));
+}
+
 // ---- protobuf to domain ----
 
 Hello take(const v1::Hello& message, FieldCheck& check) {
@@ -143,6 +156,22 @@ AdminCommand take(const v1::AdminCommand& message, FieldCheck& check) {
       message.session()};
 }
 
+ViewerReport take(const v1::ViewerReport& message, FieldCheck& check) {
+  constexpr scene_fields::Range kTime{0.0, kMaxReportedMs, "ms"};
+  constexpr scene_fields::Range kRate{0.0, kMaxReportedHz, "Hz"};
+  check.number("viewer_report.decode_ms", message.decode_ms(), kTime);
+  check.number("viewer_report.draw_ms", message.draw_ms(), kTime);
+  check.number("viewer_report.picture_decode_ms", message.picture_decode_ms(), kTime);
+  check.number("viewer_report.shown_hz", message.shown_hz(), kRate);
+  return {message.decode_ms(), message.draw_ms(), message.picture_decode_ms(), message.shown_hz(),
+          check.choice("viewer_report.device", message.device(), v1::DRAWING_DEVICE_UNKNOWN,
+                       DrawingDevice::Hardware)};
+}
+
+ModeRequest take(const v1::ModeRequest& message, FieldCheck& check) {
+  return {check.choice("mode_request.mode", message.mode(), v1::STREAM_MODE_STRANDS, StreamMode::Auto)};
+}
+
 Result<ClientMessage> take(const v1::ClientMessage& message) {
   FieldCheck check;
   ClientMessage result;
@@ -176,6 +205,12 @@ Result<ClientMessage> take(const v1::ClientMessage& message) {
       break;
     case v1::ClientMessage::kAdmin:
       result = take(message.admin(), check);
+      break;
+    case v1::ClientMessage::kViewerReport:
+      result = take(message.viewer_report(), check);
+      break;
+    case v1::ClientMessage::kModeRequest:
+      result = take(message.mode_request(), check);
       break;
     case v1::ClientMessage::KIND_NOT_SET:
       return make_error(ErrorCode::BadInput, "client message is of no kind that protocol {} knows",

@@ -32,6 +32,8 @@ inline constexpr uint32_t kMaxRateDivisor = 64;
 inline constexpr uint32_t kMaxListedSessions = 256;
 inline constexpr size_t kMaxListedNameChars = 32;
 inline constexpr size_t kMaxAddressChars = 64;
+inline constexpr double kMaxReportedMs = 60'000.0;  // ViewerReport
+inline constexpr double kMaxReportedHz = 1'000.0;
 
 enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
@@ -84,8 +86,20 @@ struct AdminCommand {  // from an Admin; answered by a SessionList or a Notice
   AdminAction action = AdminAction::ListSessions;
   uint64_t session = 0;  // whom to kick
 };
-using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck,
-                                   Ping, ControlCommand, SetParameter, AdminCommand>;
+enum class DrawingDevice { Unknown, None, Software, Hardware };
+struct ViewerReport {      // about once a second: what this machine makes of what it gets; 0 = not measured
+  double decode_ms = 0.0;  // median per state of strands
+  double draw_ms = 0.0;    // median per picture of strands
+  double picture_decode_ms = 0.0;  // median per picture of the server's
+  double shown_hz = 0.0;           // different pictures shown per second
+  DrawingDevice device = DrawingDevice::Unknown;
+};
+struct ModeRequest {  // answered by a ModeChange
+  StreamMode mode = StreamMode::Auto;
+};
+using ClientMessage =
+    std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
+                 ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand>;
 
 // ---- server to client ----
 struct Welcome {
@@ -132,6 +146,11 @@ struct StreamQuality {        // how strands are coded for this viewer from the 
   float bound_m = 0.0f;       // Euclidean error
   std::string reason;         // for a person
 };
+struct ModeChange {                       // what the client gets from the next frame on, and why
+  StreamMode mode = StreamMode::Strands;  // never Auto
+  std::string reason;                     // for a person
+  uint32_t frame_width = 0, frame_height = 0;
+};
 struct Goodbye {       // the server closes right after it
   std::string reason;  // one sentence
 };
@@ -152,7 +171,8 @@ struct SessionInfo {
 struct SessionList {                  // answer to an AdminCommand
   std::vector<SessionInfo> sessions;  // at most kMaxListedSessions
 };
-using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, SessionList>;
+using ServerMessage =
+    std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange, SessionList>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become
@@ -166,5 +186,6 @@ Result<ServerMessage> decode_server_message(std::span<const std::byte> bytes);
 
 const char* to_string(StreamMode mode);
 const char* to_string(Role role);
+const char* to_string(DrawingDevice device);
 
 }  // namespace strandcast

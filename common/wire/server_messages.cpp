@@ -85,6 +85,14 @@ void put(const SessionList& list, v1::ServerMessage& message) {
   }
 }
 
+void put(const ModeChange& change, v1::ServerMessage& message) {
+  v1::ModeChange& out = *message.mutable_mode_change();
+  out.set_mode(static_cast<v1::StreamMode>(change.mode));
+  out.set_reason(printable(change.reason, kMaxTextChars));
+  out.set_frame_width(change.frame_width);
+  out.set_frame_height(change.frame_height);
+}
+
 // ---- protobuf to domain ----
 
 bool is_session_id(const std::string& text) {
@@ -198,6 +206,14 @@ SessionList take(const v1::SessionList& message, FieldCheck& check) {
   return list;
 }
 
+ModeChange take(const v1::ModeChange& message, FieldCheck& check) {
+  check.text("mode_change.reason", message.reason(), kMaxTextChars);
+  check.frame_side("mode_change.frame_width", message.frame_width());
+  check.frame_side("mode_change.frame_height", message.frame_height());
+  return {check.choice("mode_change.mode", message.mode(), v1::STREAM_MODE_STRANDS, StreamMode::Frames),
+          message.reason(), message.frame_width(), message.frame_height()};
+}
+
 Result<ServerMessage> take(const v1::ServerMessage& message) {
   FieldCheck check;
   ServerMessage result;
@@ -222,6 +238,9 @@ Result<ServerMessage> take(const v1::ServerMessage& message) {
       break;
     case v1::ServerMessage::kSessions:
       result = take(message.sessions(), check);
+      break;
+    case v1::ServerMessage::kModeChange:
+      result = take(message.mode_change(), check);
       break;
     case v1::ServerMessage::KIND_NOT_SET:
       return make_error(ErrorCode::BadInput, "server message is of no kind that protocol {} knows",
@@ -253,6 +272,20 @@ const char* to_string(StreamMode mode) {
       return "frames";
     case StreamMode::Auto:
       return "auto";
+  }
+  return "unknown";
+}
+
+const char* to_string(DrawingDevice device) {
+  switch (device) {
+    case DrawingDevice::Unknown:
+      return "unknown";
+    case DrawingDevice::None:
+      return "none";
+    case DrawingDevice::Software:
+      return "software";
+    case DrawingDevice::Hardware:
+      return "hardware";
   }
   return "unknown";
 }

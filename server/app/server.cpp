@@ -11,6 +11,7 @@
 #include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/codec/scene_asset.h"
+#include "server/app/mode_facts.h"
 #include "server/app/scene_change.h"
 #include "server/app/viewers.h"
 #include "server/net/metrics.h"
@@ -75,6 +76,17 @@ class Server::State : public NetHandler {
     follow_viewers();
   }
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
+  void on_report(SessionId session, const ViewerReport& report) override {
+    viewers_.set_report(session, report);
+  }
+  void on_mode_request(SessionId session, const ModeRequest& request) override {
+    viewers_.request_mode(session, request.mode);
+  }
+  void on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
+  void on_mode(SessionId session, StreamMode mode) override {
+    viewers_.set_mode(session, mode, now_ns());
+    follow_viewers();
+  }
   void on_left(SessionId session) override;
   std::string metrics() override;
 
@@ -276,10 +288,32 @@ Result<Admission> Server::State::on_hello(SessionId session, const Hello& hello)
 }
 
 void Server::State::on_camera(SessionId session, const CameraChange& camera) {
-  const Result<PictureClass> picture_class = viewers_.set_camera(session, camera.camera);
+  const Result<std::optional<PictureClass>> picture_class = viewers_.set_camera(session, camera.camera);
   if (!picture_class) return net_->send(session, Notice{true, picture_class.error().to_string()});
-  net_->set_picture_class(session, *picture_class);
+  if (!*picture_class) return;
+  net_->set_picture_class(session, **picture_class);
   frames_->set_views(viewers_.picture_views());
+}
+
+/// Looks whether this session should change between strands and frames.
+void Server::State::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
+  const auto views = viewers_.picture_views();
+  const std::optional<Error> failure = frames_->failure();
+  const ModeSources sources{
+      .strand_classes = classes_,
+      .link = link,
+      .report = viewers_.report(session),
+      .pictures = frames_->counters(),
+      .paint_trouble = failure ? failure->to_string() : std::string(),
+      .is_software = sim_->stats().is_software,
+      .picture_size = viewers_.picture_size(session),
+      .view_count = std::max<size_t>(views.size() + (link.mode == StreamMode::Strands ? 1 : 0), 1),
+      .picture_rate_hz = config_.scene.stream.frame_rate_hz};
+  std::optional<ModeSwitch> change = viewers_.consider(session, gather_mode_facts(sources), time_ns);
+  if (!change) return;
+  change->asset = asset_frame_;
+  net_->change_mode(session, std::move(*change));
+  follow_viewers();
 }
 
 void Server::State::on_left(SessionId session) {

@@ -331,6 +331,7 @@ void SimLoop::update_stats() {
   stats.solver_builds = solver_builds_;
   stats.solver_bytes = solver_->memory_bytes();
   stats.solver_name = config_.scene.solver.name;
+  stats.is_software = context_->info().is_software;
   const std::lock_guard lock(mutex_);
   stats_ = std::move(stats);
 }

@@ -62,6 +62,7 @@ struct SimStats {
   uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
   uint64_t solver_builds = 0;
   uint64_t solver_bytes = 0;
+  bool is_software = false;  // OpenGL runs on processor cores
   std::string solver_name;
 };
 

@@ -1,6 +1,7 @@
 #include "server/app/viewers.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace strandcast {
 
@@ -8,20 +9,21 @@ Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
   Place place;
   Viewer viewer;
   viewer.role = hello.role;
+  viewer.wanted = hello.mode;
   place.size = {hello.frame_width > 0 ? hello.frame_width : scene_.stream.frame_width,
                 hello.frame_height > 0 ? hello.frame_height : scene_.stream.frame_height};
+  viewer.view = {scene_.camera, place.size, static_cast<int>(scene_.stream.jpeg_quality)};
   if (hello.role == Role::Source) {
     place.reason = "a source gets no stream";
   } else if (hello.mode == StreamMode::Frames) {
     place.mode = StreamMode::Frames;
     place.reason = "frames were asked for";
-    viewer.view = {scene_.camera, place.size, static_cast<int>(scene_.stream.jpeg_quality)};
     RETURN_IF_ERROR(validate(viewer.view));
     ASSIGN_OR_RETURN(place.picture_class, views_.assign(session, viewer.view));
   } else {
     place.reason = hello.mode == StreamMode::Strands
                        ? "strands were asked for"
-                       : "strands: one stream serves every camera, and the viewer draws at its own rate";
+                       : "strands: one stream serves every camera, and nothing speaks against it yet";
   }
   viewer.mode = place.mode;
   viewers_[session] = viewer;
@@ -35,16 +37,119 @@ void Viewers::remove(SessionId session) {
   count();
 }
 
-Result<PictureClass> Viewers::set_camera(SessionId session, const CameraDesc& camera) {
+Result<std::optional<PictureClass>> Viewers::set_camera(SessionId session, const CameraDesc& camera) {
   const auto found = viewers_.find(session);
-  if (found == viewers_.end() || found->second.mode != StreamMode::Frames)
-    return make_error(ErrorCode::NotFound, "only viewers of frames have a camera on the server");
-  PictureView view = found->second.view;
+  if (found == viewers_.end() || found->second.role == Role::Source)
+    return make_error(ErrorCode::NotFound, "only viewers have a camera");
+  Viewer& viewer = found->second;
+  PictureView view = viewer.view;
   view.camera = camera;
-  RETURN_IF_ERROR(validate(view));
-  ASSIGN_OR_RETURN(const uint32_t picture_class, views_.assign(session, view));
-  found->second.view = view;
+  std::optional<PictureClass> picture_class;
+  if (viewer.gets(StreamMode::Frames)) {
+    RETURN_IF_ERROR(validate(view));
+    ASSIGN_OR_RETURN(picture_class, views_.assign(session, view));
+  }
+  viewer.view = view;
   return picture_class;
+}
+
+void Viewers::set_report(SessionId session, const ViewerReport& report) {
+  const auto found = viewers_.find(session);
+  if (found != viewers_.end()) found->second.report = report;
+}
+
+ViewerReport Viewers::report(SessionId session) const {
+  const auto found = viewers_.find(session);
+  return found != viewers_.end() ? found->second.report : ViewerReport{};
+}
+
+void Viewers::request_mode(SessionId session, StreamMode mode) {
+  const auto found = viewers_.find(session);
+  if (found != viewers_.end()) found->second.request = mode;
+}
+
+std::optional<ModeSwitch> Viewers::consider(SessionId session, const ModeFacts& facts, int64_t time_ns) {
+  const auto found = viewers_.find(session);
+  if (found == viewers_.end() || found->second.role == Role::Source) return std::nullopt;
+  Viewer& viewer = found->second;
+  if (viewer.request && (viewer.request_ns == 0 || time_ns - viewer.request_ns >= kModeRequestNs)) {
+    viewer.wanted = *std::exchange(viewer.request, std::nullopt);
+    viewer.request_ns = time_ns;
+    viewer.is_answer_due = true;
+    viewer.policy = {};
+  }
+  if (viewer.next && time_ns - viewer.next_since_ns >= kModeChangeNs) {
+    viewer.policy.note_failure(time_ns);
+    return stay(session, fmt::format("{}: no first frame of the other mode came for {} s",
+                                     to_string(viewer.mode), kModeChangeNs / 1'000'000'000));
+  }
+  const ModeChoice choice = choose(viewer, facts, time_ns);
+  if (choice.mode == viewer.next.value_or(viewer.mode)) {
+    const bool is_told_with_change = viewer.next.has_value();
+    if (!std::exchange(viewer.is_answer_due, false) || is_told_with_change) return std::nullopt;
+    return stay(session, choice.reason);
+  }
+  return begin_change(session, choice, time_ns);
+}
+
+/// What the viewer should get, given what it gets or is about to get.
+ModeChoice Viewers::choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns) {
+  if (viewer.wanted == StreamMode::Auto)
+    return viewer.policy.choose(viewer.next.value_or(viewer.mode), facts, time_ns);
+  if (viewer.wanted == StreamMode::Frames && !facts.paint_trouble.empty())
+    return {StreamMode::Strands, "strands: no frames can be drawn here: " + facts.paint_trouble, 0};
+  return {viewer.wanted, fmt::format("{} were asked for", to_string(viewer.wanted)),
+          predict_strands(facts).strand_class};
+}
+
+std::optional<ModeSwitch> Viewers::begin_change(SessionId session, const ModeChoice& choice,
+                                                int64_t time_ns) {
+  Viewer& viewer = viewers_.at(session);
+  // Back to what it has: the change under way is given up.
+  if (choice.mode == viewer.mode) return stay(session, choice.reason);
+  ModeSwitch change;
+  change.change = {choice.mode, choice.reason, viewer.view.size.width, viewer.view.size.height};
+  change.strand_class = static_cast<uint16_t>(choice.strand_class);
+  if (choice.mode == StreamMode::Frames) {
+    Status usable = validate(viewer.view);
+    if (usable) {
+      auto assigned = views_.assign(session, viewer.view);
+      usable = assigned ? Status() : assigned.error();
+      if (assigned) change.picture_class = *assigned;
+    }
+    if (!usable) {
+      viewer.policy.note_failure(time_ns);
+      if (viewer.wanted == StreamMode::Frames) viewer.wanted = viewer.mode;
+      return stay(session, "strands: no frames: " + usable.error().to_string());
+    }
+  }
+  viewer.next = choice.mode;
+  viewer.next_since_ns = time_ns;
+  viewer.is_answer_due = false;
+  count();
+  return change;
+}
+
+ModeSwitch Viewers::stay(SessionId session, const std::string& reason) {
+  Viewer& viewer = viewers_.at(session);
+  if (viewer.next == StreamMode::Frames) views_.remove(session);
+  viewer.next.reset();
+  viewer.is_answer_due = false;
+  count();
+  ModeSwitch change;
+  change.change = {viewer.mode, reason, viewer.view.size.width, viewer.view.size.height};
+  return change;
+}
+
+void Viewers::set_mode(SessionId session, StreamMode mode, int64_t time_ns) {
+  const auto found = viewers_.find(session);
+  if (found == viewers_.end()) return;
+  Viewer& viewer = found->second;
+  viewer.mode = mode;
+  viewer.next.reset();
+  if (mode == StreamMode::Strands) views_.remove(session);
+  if (viewer.wanted == StreamMode::Auto) viewer.policy.note_change(time_ns);
+  count();
 }
 
 void Viewers::set_strand_class(SessionId session, uint16_t stream_id) {
@@ -54,10 +159,13 @@ void Viewers::set_strand_class(SessionId session, uint16_t stream_id) {
 
 uint32_t Viewers::strand_viewers(uint16_t stream_id) const {
   return static_cast<uint32_t>(std::count_if(viewers_.begin(), viewers_.end(), [&](const auto& item) {
-    const Viewer& viewer = item.second;
-    return viewer.role != Role::Source && viewer.mode == StreamMode::Strands &&
-           viewer.strand_class == stream_id;
+    return item.second.gets(StreamMode::Strands) && item.second.strand_class == stream_id;
   }));
+}
+
+RenderSize Viewers::picture_size(SessionId session) const {
+  const auto found = viewers_.find(session);
+  return found != viewers_.end() ? found->second.view.size : RenderSize{};
 }
 
 RuntimeFacts Viewers::facts() const {
@@ -70,8 +178,10 @@ RuntimeFacts Viewers::facts() const {
 void Viewers::count() {
   uint32_t strands = 0;
   uint32_t frames = 0;
-  for (const auto& [session, viewer] : viewers_)
-    if (viewer.role != Role::Source) ++(viewer.mode == StreamMode::Frames ? frames : strands);
+  for (const auto& [session, viewer] : viewers_) {
+    strands += viewer.gets(StreamMode::Strands) ? 1 : 0;
+    frames += viewer.gets(StreamMode::Frames) ? 1 : 0;
+  }
   strand_viewers_ = strands;
   frame_viewers_ = frames;
 }

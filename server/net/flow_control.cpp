@@ -103,7 +103,7 @@ double FlowControl::capacity_bytes_per_s(int64_t time_ns) const {
     std::nth_element(rates.begin(), rates.begin() + static_cast<ptrdiff_t>(rates.size() / 2), rates.end());
     return rates[rates.size() / 2];
   }
-  const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - kCapacityAgeNs;
+  const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
   return is_known ? seen_rate_->value : 0.0;
 }
 

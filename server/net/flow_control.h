@@ -52,6 +52,10 @@ class FlowControl {
   /// that promises them, starts with the asset.
   void expect_acks() { has_acks_ = true; }
   bool expects_acks() const { return has_acks_; }
+  /// Instead of kCapacityAgeNs.
+  void remember_capacity_for(int64_t duration_ns) { capacity_age_ns_ = duration_ns; }
+  /// Other frames follow: what was seen of the ones before is no reason to change the class.
+  void start_over(int64_t time_ns) { quiet_since_ns_ = time_ns; }
 
   /// A media frame goes to the socket.
   void on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns);
@@ -106,6 +110,7 @@ class FlowControl {
   void change(size_t from, size_t to, int64_t time_ns);
 
   bool has_acks_ = false;
+  int64_t capacity_age_ns_ = kCapacityAgeNs;
   std::deque<Frame> in_flight_;  // oldest first
   size_t in_flight_bytes_ = 0;
   int64_t last_ack_ns_ = 0;

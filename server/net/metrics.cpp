@@ -29,6 +29,7 @@ std::string format_metrics(const NetCounters& counters) {
                              {"net_chain_losses_total", &NetCounters::chain_losses},
                              {"net_keyframe_requests_total", &NetCounters::keyframe_requests},
                              {"net_class_changes_total", &NetCounters::class_changes},
+                             {"net_mode_changes_total", &NetCounters::mode_changes},
                              {"net_sent_bytes_total", &NetCounters::bytes_sent}};
   std::string text;
   for (const Row& row : kGauges)

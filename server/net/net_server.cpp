@@ -335,6 +335,14 @@ void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string
   });
 }
 
+void NetServer::change_mode(SessionId session, ModeSwitch change) {
+  net::asio::post(state_->context.io, [state = state_.get(), session, change = std::move(change)] {
+    const auto found = state->context.sessions.find(session);
+    // A copy of the pointer: a full queue ends the session under our feet.
+    if (found != state->context.sessions.end()) std::shared_ptr(found->second)->change_mode(change);
+  });
+}
+
 void NetServer::broadcast(ServerMessage message) {
   state_->post_to_all([message = std::move(message)](net::Session& session) { session.send(message); });
 }

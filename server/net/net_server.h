@@ -39,6 +39,8 @@ struct NetLimits {
   int64_t unused_ms = 30'000;    // frames wait for acknowledgement, although the client sends other things
   int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
+  int64_t link_interval_ms = 250;      // between two looks at a link for the choice of its mode
+  int64_t link_memory_ms = 30'000;     // a capacity that was seen says nothing about the link after this long
   double messages_per_s = 1'000.0;     // per session, and as many at once
   // Of one address, where it is not on trusted loopback.
   double connections_per_s = 10.0;  // and as many at once
@@ -75,6 +77,23 @@ struct Admission {
   PictureClass picture_class = 0;  // of a viewer in frames mode
 };
 
+/// What one session's link does, for choosing between strands and frames; 0 = unknown.
+struct LinkState {
+  StreamMode mode = StreamMode::Strands;  // of the frames it gets now
+  double capacity_bytes_per_s = 0.0;
+  double queue_delay_ms = 0.0;
+  double round_trip_ms = 0.0;
+  std::vector<double> strand_bytes_per_s;  // what each strand class takes; empty = unknown
+};
+
+/// A change of mode, or only an answer when the mode is the one the session has.
+struct ModeSwitch {
+  ModeChange change;
+  EncodedFramePtr asset;           // for strands
+  uint16_t strand_class = 0;       // to begin with
+  PictureClass picture_class = 0;  // for frames
+};
+
 /// What the application does with sessions. Called on the network thread: return quickly, never wait.
 class NetHandler {
  public:
@@ -95,6 +114,12 @@ class NetHandler {
   virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
   /// The session now gets the frames of this strand class; it starts with the first one.
   virtual void on_strand_class(SessionId, uint16_t /*stream_id*/) {}
+  virtual void on_report(SessionId, const ViewerReport&) {}
+  virtual void on_mode_request(SessionId, const ModeRequest&) {}
+  /// For every viewer, each limits.link_interval_ms.
+  virtual void on_link(SessionId, const LinkState&, int64_t /*time_ns*/) {}
+  /// A change of mode is done: the first frame of the new mode is next in line.
+  virtual void on_mode(SessionId, StreamMode) {}
   /// Once for every session whose on_hello succeeded.
   virtual void on_left(SessionId session) = 0;
   /// Lines added to /metrics, in Prometheus text form.
@@ -121,6 +146,7 @@ struct NetCounters {
   uint64_t chain_losses = 0;    // sessions that had to wait for a keyframe
   uint64_t keyframe_requests = 0;
   uint64_t class_changes = 0;  // of the strand class of a viewer
+  uint64_t mode_changes = 0;   // between strands and frames
   uint64_t bytes_sent = 0;     // WebSocket payload
 };
 
@@ -149,6 +175,9 @@ class NetServer {
   /// Strands are coded otherwise from now on: tells every viewer of strands and moves those whose class is
   /// gone. `then` runs on the network thread after that, before any frame published later.
   void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then);
+  /// The session gets frames of the old mode until the first one of the new mode is here; ModeChange goes
+  /// right before that. With the mode it has, a change under way is given up and ModeChange sent at once.
+  void change_mode(SessionId session, ModeSwitch change);
   /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
   void broadcast(ServerMessage message);
   /// To those who watch the pictures of one class.

@@ -19,6 +19,12 @@ void SendQueue::start_strands() {
   chain_ = Chain::Waiting;
 }
 
+bool SendQueue::stop_strands() {
+  chain_ = Chain::None;
+  pending_ = nullptr;
+  return !std::exchange(is_pending_asset_, false);
+}
+
 SendQueue::Offer SendQueue::offer_strands(const EncodedFramePtr& frame) {
   const FrameHeader& header = frame->header;
   if (chain_ == Chain::None) return Offer::Ignored;
@@ -42,7 +48,7 @@ SendQueue::Offer SendQueue::offer_strands(const EncodedFramePtr& frame) {
 }
 
 void SendQueue::offer_picture(const EncodedFramePtr& frame) {
-  if (pending_ != nullptr && is_pending_asset_) {
+  if (chain_ == Chain::Waiting || (pending_ != nullptr && is_pending_asset_)) {
     ++dropped_frames_;
     return;
   }

@@ -31,7 +31,10 @@ class SendQueue {
   /// From now on the session wants strand frames, beginning with a keyframe.
   void start_strands();
   Offer offer_strands(const EncodedFramePtr& frame);
-  /// Latest wins: Queued; the replaced picture is counted in dropped_frames().
+  /// No more strand frames, and none that waits. False when the asset waited: it will not be sent.
+  bool stop_strands();
+  /// Latest wins; the replaced picture is counted in dropped_frames(). None is taken while a keyframe is
+  /// waited for, which needs an empty pipe.
   void offer_picture(const EncodedFramePtr& frame);
   /// The client lost its state: forget the chain.
   void lose_chain();

@@ -36,7 +36,7 @@ CloseCode close_code_for(const Error& error) {
 const char* message_name(const ClientMessage& message) {
   constexpr const char* kNames[] = {"Hello",           "MotionSamples", "WindSamples", "CameraChange",
                                     "KeyframeRequest", "FrameAck",      "Ping",        "ControlCommand",
-                                    "SetParameter",    "AdminCommand"};
+                                    "SetParameter",    "ViewerReport",  "ModeRequest", "AdminCommand"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
 }
@@ -174,10 +174,12 @@ void Session::join(const Hello& hello) {
   // The asset is set before anything is written, and strands start only once it is: nothing can overtake it.
   if (hello.role != Role::Source) {
     queue_.set_asset(admission->asset);
+    has_asset_ = admission->asset != nullptr;
     if (mode_ == StreamMode::Strands) queue_.start_strands();
   }
   if (hello.role != Role::Source) {
     if (hello.acknowledges) flow_.expect_acks();
+    flow_.remember_capacity_for(context_.config.limits.link_memory_ms * kNsPerMs);
     socket_.control_callback(
         [this](websocket::frame_type kind, beast::string_view) { on_control_frame(kind); });
     probe(now_ns());
@@ -210,6 +212,8 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                         },
                         [&](const ControlCommand& command) { handler.on_command(id_, command); },
                         [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
+                        [&](const ViewerReport& report) { handler.on_report(id_, report); },
+                        [&](const ModeRequest& request) { handler.on_mode_request(id_, request); },
                         [&](const AdminCommand& command) { obey(command, arrival_ns); }},
              message);
 }
@@ -269,23 +273,21 @@ void Session::deliver_strands(const EncodedFramePtr& frame) {
   if (state_ != State::Joined || frame->header.stream_id != strand_class_) return;
   guarded([&] {
     const int64_t time_ns = now_ns();
-    if (queue_.offer_strands(frame) == SendQueue::Offer::LostChain) {
+    const SendQueue::Offer offer = queue_.offer_strands(frame);
+    if (offer == SendQueue::Offer::LostChain) {
       flow_.on_chain_loss(time_ns);
       adapt(time_ns);
     }
+    if (offer == SendQueue::Offer::Queued) finish_mode_switch();
     account_drops();
     pump();
   });
 }
 
-bool Session::watches(PictureClass picture_class) const {
-  return state_ == State::Joined && mode_ == StreamMode::Frames && hello_.role != Role::Source &&
-         picture_class == picture_class_;
-}
-
 void Session::deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame) {
   if (!watches(picture_class)) return;
   guarded([&] {
+    if (mode_ == StreamMode::Strands) finish_mode_switch();
     queue_.offer_picture(frame);
     account_drops();
     pump();
@@ -347,7 +349,9 @@ void Session::announce_quality(const std::string& reason) {
 }
 
 void Session::follow_strand_classes(const std::string& reason) {
-  if (state_ != State::Joined || mode_ != StreamMode::Strands || hello_.role == Role::Source) return;
+  const bool is_coming = next_mode_ && next_mode_->change.mode == StreamMode::Strands;
+  const bool is_concerned = mode_ == StreamMode::Strands || is_coming;
+  if (state_ != State::Joined || !is_concerned || hello_.role == Role::Source) return;
   guarded([&] {
     const size_t last = context_.strand_classes.size() - 1;
     if (strand_class_ > last) change_strand_class(last);
@@ -474,6 +478,7 @@ void Session::check_deadlines(int64_t time_ns) {
   guarded([&] {
     if (hello_.role != Role::Source) probe(time_ns);
     adapt(time_ns);
+    report_link(time_ns);
     ask_for_keyframe(time_ns);
     pump();
   });

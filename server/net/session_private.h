@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,7 +31,9 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Whether pictures of this class are for this session.
   bool watches(PictureClass picture_class) const;
   void deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame);
-  void set_picture_class(PictureClass picture_class) { picture_class_ = picture_class; }
+  void set_picture_class(PictureClass picture_class);
+  /// As NetServer::change_mode.
+  void change_mode(const ModeSwitch& change);
   /// Queues a control message; ignored before Welcome and while closing.
   void send(ServerMessage message);
   /// Goodbye with one sentence, then the closing handshake.
@@ -66,6 +69,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void adapt(int64_t time_ns);
   void change_strand_class(size_t chosen);
   void announce_quality(const std::string& reason);
+  void finish_mode_switch();
+  void report_link(int64_t time_ns);
   void probe(int64_t time_ns);
   void on_control_frame(websocket::frame_type kind);
   bool is_stalled(int64_t time_ns) const;
@@ -82,6 +87,8 @@ class Session : public std::enable_shared_from_this<Session> {
   Hello hello_;
   StreamMode mode_ = StreamMode::Strands;
   PictureClass picture_class_ = 0;
+  std::optional<ModeSwitch> next_mode_;  // its first frame has not come yet
+  bool has_asset_ = false;               // sent, or next in line
   bool has_joined_ = false;
 
   beast::flat_buffer read_buffer_{kMaxSessionReadBytes};
@@ -102,6 +109,7 @@ class Session : public std::enable_shared_from_this<Session> {
   int64_t state_since_ns_ = 0;
   int64_t write_since_ns_ = 0;
   int64_t keyframe_asked_ns_ = 0;
+  int64_t link_reported_ns_ = 0;
   int64_t received_ns_ = 0;          // the newest message
   int64_t probe_sent_ns_ = 0;        // the newest WebSocket ping of ours
   bool is_probe_under_way_ = false;  // not yet answered

@@ -25,6 +25,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
           Ping{INT64_MIN},
           ControlCommand{Command::Reset},
           SetParameter{"solver.name=dftl"},
+          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software},
+          ModeRequest{StreamMode::Auto},
           AdminCommand{AdminAction::Kick, 1ull << 40}};
 }
 
@@ -69,6 +71,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
       Goodbye{"the server is shutting down"},
       Notice{true, "unknown field 'x'"},
       StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link"},
+      ModeChange{StreamMode::Frames, "the viewer draws 3 pictures per second", 640, 360},
       SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
                    {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}}};
 }

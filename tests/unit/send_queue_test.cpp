@@ -140,5 +140,34 @@ TEST(SendQueue, NewestPictureReplacesTheOneNotYetSent) {
   EXPECT_EQ(queue.dropped_frames(), 2u);
 }
 
+TEST(SendQueue, PicturesWaitForTheKeyframeOfAChangeToStrands) {
+  SendQueue queue;
+  queue.offer_picture(frame(Opcode::JpegFrame, 1, 0));
+  queue.set_asset(frame(Opcode::Asset, 1, 0));
+  queue.start_strands();
+  queue.offer_picture(frame(Opcode::JpegFrame, 2, 0));
+  EXPECT_EQ(taken_opcode(queue), Opcode::Asset);
+  queue.written();
+  queue.offer_picture(frame(Opcode::JpegFrame, 3, 0));
+  EXPECT_FALSE(queue.take_next().has_value());
+  EXPECT_TRUE(queue.needs_keyframe()) << "a picture would have kept it away";
+  EXPECT_EQ(queue.offer_strands(keyframe(7)), SendQueue::Offer::Queued);
+  EXPECT_EQ(taken_opcode(queue), Opcode::StrandKeyframe);
+}
+
+TEST(SendQueue, StoppingStrandsDropsWhatWaitsAndSaysWhetherTheAssetDid) {
+  SendQueue queue;
+  queue.set_asset(frame(Opcode::Asset, 1, 0));
+  queue.start_strands();
+  EXPECT_FALSE(queue.stop_strands()) << "the asset was still to be sent";
+  EXPECT_FALSE(queue.take_next().has_value());
+  queue.start_strands();
+  ASSERT_EQ(queue.offer_strands(keyframe(7)), SendQueue::Offer::Queued);
+  EXPECT_TRUE(queue.stop_strands());
+  EXPECT_EQ(queue.offer_strands(delta(8)), SendQueue::Offer::Ignored);
+  queue.offer_picture(frame(Opcode::JpegFrame, 1, 0));
+  EXPECT_EQ(taken_opcode(queue), Opcode::JpegFrame);
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -106,7 +106,9 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   const auto moved = viewers.set_camera(4, camera);
   ASSERT_TRUE(moved.ok());
   EXPECT_NE(*moved, first->picture_class);
-  EXPECT_FALSE(viewers.set_camera(1, camera).ok()) << "a viewer of strands has its camera at home";
+  const auto kept = viewers.set_camera(1, camera);
+  EXPECT_TRUE(kept.ok() && !*kept) << "a viewer of strands has no picture, but its camera is remembered";
+  EXPECT_FALSE(viewers.set_camera(2, camera).ok()) << "a source has none";
   for (SessionId session = 1; session <= 4; ++session) viewers.remove(session);
   EXPECT_EQ(viewers.facts().strand_viewers + viewers.facts().frame_viewers, 0u);
   EXPECT_TRUE(viewers.picture_views().empty());
@@ -121,6 +123,98 @@ TEST(Viewers, RefusesPicturesBeyondTheLimit) {
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
   EXPECT_FALSE(viewers.add(101, hello(Role::Viewer, StreamMode::Frames, 1'000'000, 2)).ok());
   EXPECT_EQ(viewers.facts().frame_viewers, kMaxPictureViews);
+}
+
+/// Facts under which both modes work and strands are the better ones.
+ModeFacts good_facts() {
+  ModeFacts facts;
+  facts.strand_classes = {{500e3, 60.0}, {120e3, 10.0}};
+  facts.paint_ms = 20.0;
+  facts.picture_bytes = 10e3;
+  return facts;
+}
+constexpr int64_t kTick = 250'000'000;
+
+TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
+  Viewers viewers(built_in_scene());
+  ASSERT_TRUE(viewers.add(1, hello(Role::Viewer, StreamMode::Strands, 64, 64)).ok());
+  int64_t time_ns = 1'000 * kTick;
+  EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns)) << "nothing was asked for";
+  viewers.request_mode(1, StreamMode::Frames);
+  const auto change = viewers.consider(1, good_facts(), time_ns);
+  ASSERT_TRUE(change);
+  EXPECT_EQ(change->change.mode, StreamMode::Frames);
+  EXPECT_THAT(change->change.reason, HasSubstr("asked for"));
+  EXPECT_EQ(change->change.frame_width, 64u);
+  EXPECT_NE(change->picture_class, 0u);
+  EXPECT_EQ(viewers.facts().strand_viewers, 1u) << "strands go on until the first picture";
+  EXPECT_EQ(viewers.facts().frame_viewers, 1u);
+  viewers.set_mode(1, StreamMode::Frames, time_ns);
+  EXPECT_EQ(viewers.facts().strand_viewers, 0u);
+
+  // Three more within a second: none is carried out before the second has passed, then the newest.
+  viewers.request_mode(1, StreamMode::Strands);
+  viewers.request_mode(1, StreamMode::Frames);
+  viewers.request_mode(1, StreamMode::Strands);
+  for (int tick = 1; tick < 4; ++tick)
+    EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns + tick * kTick)) << tick;
+  const auto back = viewers.consider(1, good_facts(), time_ns + 4 * kTick);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->change.mode, StreamMode::Strands);
+  viewers.set_mode(1, StreamMode::Strands, time_ns + 4 * kTick);
+  EXPECT_TRUE(viewers.picture_views().empty());
+
+  // What it has already is answered too.
+  viewers.request_mode(1, StreamMode::Auto);
+  const auto answer = viewers.consider(1, good_facts(), time_ns + 8 * kTick);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->change.mode, StreamMode::Strands);
+  EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns + 9 * kTick)) << "once";
+}
+
+TEST(Viewers, AChangeWithoutAFirstFrameIsGivenUp) {
+  Viewers viewers(built_in_scene());
+  ASSERT_TRUE(viewers.add(1, hello(Role::Viewer, StreamMode::Auto)).ok());
+  viewers.set_report(1, {.device = DrawingDevice::None});
+  EXPECT_EQ(viewers.report(1).device, DrawingDevice::None);
+  ModeFacts facts = good_facts();
+  facts.device = DrawingDevice::None;
+  int64_t time_ns = kTick;
+  const auto change = viewers.consider(1, facts, time_ns);
+  ASSERT_TRUE(change) << "who cannot draw waits for nothing";
+  EXPECT_EQ(change->change.mode, StreamMode::Frames);
+  EXPECT_FALSE(viewers.consider(1, facts, time_ns += kModeChangeNs - 1)) << "under way";
+  const auto given_up = viewers.consider(1, facts, time_ns += 1);
+  ASSERT_TRUE(given_up);
+  EXPECT_EQ(given_up->change.mode, StreamMode::Strands);
+  EXPECT_TRUE(viewers.picture_views().empty());
+  EXPECT_EQ(viewers.facts().frame_viewers, 0u);
+  EXPECT_FALSE(viewers.consider(1, facts, time_ns + kTick)) << "not tried again at once";
+  EXPECT_TRUE(viewers.consider(1, facts, time_ns + 2 * kFirstDwellNs));
+}
+
+TEST(Viewers, FramesThatCannotBeHadAreRefusedWithTheReason) {
+  Viewers viewers(built_in_scene());
+  for (uint32_t i = 0; i < kMaxPictureViews; ++i)
+    ASSERT_TRUE(viewers.add(10 + i, hello(Role::Viewer, StreamMode::Frames, 64 + i, 64)).ok());
+  ASSERT_TRUE(viewers.add(1, hello(Role::Viewer, StreamMode::Strands)).ok());
+  viewers.request_mode(1, StreamMode::Frames);
+  const auto full = viewers.consider(1, good_facts(), kTick);
+  ASSERT_TRUE(full);
+  EXPECT_EQ(full->change.mode, StreamMode::Strands);
+  EXPECT_THAT(full->change.reason, HasSubstr("different pictures"));
+  EXPECT_FALSE(viewers.consider(1, good_facts(), 2 * kTick)) << "told once";
+  ModeFacts broken = good_facts();
+  broken.paint_trouble = "no OpenGL here";
+  viewers.request_mode(1, StreamMode::Frames);
+  const auto refused = viewers.consider(1, broken, 100 * kTick);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->change.mode, StreamMode::Strands);
+  EXPECT_THAT(refused->change.reason, HasSubstr("no OpenGL here"));
+  // Those who watch frames when drawing fails get strands.
+  const auto rescued = viewers.consider(10, broken, 100 * kTick);
+  ASSERT_TRUE(rescued);
+  EXPECT_EQ(rescued->change.mode, StreamMode::Strands);
 }
 
 TEST(ServerPlan, RunsOnlyWhatTheSceneAndItsViewersNeed) {

@@ -34,6 +34,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxControlBytes", with_commas(kMaxControlBytes)},
       {"kClockWindow", with_commas(kClockWindow)},
       {"kMaxListedSessions", with_commas(kMaxListedSessions)},
+      {"kMaxReportedMs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedMs)))},
+      {"kMaxReportedHz", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedHz)))},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},

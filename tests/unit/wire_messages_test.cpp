@@ -301,6 +301,53 @@ TEST(WireMessages, TheLongestSessionListFitsIntoOneMessage) {
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
 }
 
+TEST(WireMessages, ModesAndReportsComeBack) {
+  const auto report = round_trip(ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software});
+  EXPECT_EQ(report.decode_ms, 3.5);
+  EXPECT_EQ(report.draw_ms, 200.0);
+  EXPECT_EQ(report.picture_decode_ms, 1.25);
+  EXPECT_EQ(report.shown_hz, 4.5);
+  for (const DrawingDevice device :
+       {DrawingDevice::Unknown, DrawingDevice::None, DrawingDevice::Software, DrawingDevice::Hardware})
+    EXPECT_EQ(round_trip(ViewerReport{0.0, 0.0, 0.0, 0.0, device}).device, device);
+  for (const StreamMode mode : {StreamMode::Strands, StreamMode::Frames, StreamMode::Auto})
+    EXPECT_EQ(round_trip(ModeRequest{mode}).mode, mode);
+  const auto change = round_trip(ModeChange{StreamMode::Frames, "slow", 640, 360});
+  EXPECT_EQ(change.mode, StreamMode::Frames);
+  EXPECT_EQ(change.reason, "slow");
+  EXPECT_EQ(change.frame_width, 640u);
+  EXPECT_EQ(change.frame_height, 360u);
+}
+
+TEST(WireMessages, ViewerReportNumbersMustBeFiniteAndInRange) {
+  using Field = double ViewerReport::*;
+  const std::vector<std::tuple<std::string, Field, double>> fields = {
+      {"viewer_report.decode_ms", &ViewerReport::decode_ms, kMaxReportedMs},
+      {"viewer_report.draw_ms", &ViewerReport::draw_ms, kMaxReportedMs},
+      {"viewer_report.picture_decode_ms", &ViewerReport::picture_decode_ms, kMaxReportedMs},
+      {"viewer_report.shown_hz", &ViewerReport::shown_hz, kMaxReportedHz}};
+  for (const auto& [name, field, limit] : fields) {
+    ViewerReport report;
+    report.*field = limit;
+    EXPECT_TRUE(decode_client_message(encode(ClientMessage(report)))) << name;
+    for (const double bad : {std::nan(""), double{INFINITY}, -double{INFINITY}, -1.0, 1.001 * limit}) {
+      report.*field = bad;
+      const auto refused = decode_client_message(encode(ClientMessage(report)));
+      ASSERT_FALSE(refused) << name << " = " << bad;
+      EXPECT_EQ(refused.error().place, name);
+    }
+  }
+}
+
+TEST(WireMessages, ModeChangeIsCheckedFieldByField) {
+  const auto place_of = [](const ModeChange& change) {
+    return decode_server_message(encode(ServerMessage(change))).error().place;
+  };
+  EXPECT_EQ(place_of({StreamMode::Auto, "", 0, 0}), "mode_change.mode");
+  EXPECT_EQ(place_of({StreamMode::Frames, "", 15, 360}), "mode_change.frame_width");
+  EXPECT_EQ(place_of({StreamMode::Frames, "", 640, 4097}), "mode_change.frame_height");
+}
+
 TEST(WireMessages, ClientLimitsAreExact) {
   Hello hello;
   hello.token = std::string(kMaxTokenBytes, 't');

@@ -139,6 +139,13 @@ TEST(ControlBytes, UnknownEnumValuesAreNamed) {
   EXPECT_EQ(decode_client_message(control_of({0x42, 0x00})).error().place, "command");
   // command { command = 5 }
   EXPECT_EQ(decode_client_message(control_of({0x42, 0x02, 0x08, 0x05})).error().place, "command");
+  // viewer_report (field 10) { device (field 5) = 4 }
+  EXPECT_EQ(decode_client_message(control_of({0x52, 0x02, 0x28, 0x04})).error().place,
+            "viewer_report.device");
+  // mode_request (field 11) { mode = 3 }
+  EXPECT_EQ(decode_client_message(control_of({0x5a, 0x02, 0x08, 0x03})).error().place, "mode_request.mode");
+  // mode_change (field 9) { mode = 3 }
+  EXPECT_EQ(decode_server_message(control_of({0x4a, 0x02, 0x08, 0x03})).error().place, "mode_change.mode");
   // hello { role = -1 }, as ten bytes of varint
   EXPECT_FALSE(decode_client_message(
       control_of({0x0a, 0x0b, 0x08, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x01})));

@@ -1,0 +1,73 @@
+// The part of Session that changes between strands and frames without a gap: the old frames go on until the
+// first new one is here.
+#include <algorithm>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/base/profile.h"
+#include "server/net/session_private.h"
+
+namespace strandcast::net {
+
+bool Session::watches(PictureClass picture_class) const {
+  if (state_ != State::Joined || hello_.role == Role::Source) return false;
+  if (mode_ == StreamMode::Frames) return picture_class == picture_class_;
+  return next_mode_ && next_mode_->change.mode == StreamMode::Frames &&
+         picture_class == next_mode_->picture_class;
+}
+
+void Session::set_picture_class(PictureClass picture_class) {
+  const bool is_next = next_mode_ && next_mode_->change.mode == StreamMode::Frames;
+  (is_next ? next_mode_->picture_class : picture_class_) = picture_class;
+}
+
+void Session::change_mode(const ModeSwitch& change) {
+  if (state_ != State::Joined || hello_.role == Role::Source) return;
+  if (change.change.mode == mode_) {
+    if (std::exchange(next_mode_, std::nullopt) && mode_ == StreamMode::Frames && !queue_.stop_strands())
+      has_asset_ = false;
+    return queue_control(change.change);
+  }
+  next_mode_ = change;
+  if (change.change.mode == StreamMode::Frames) return;
+  strand_class_ =
+      static_cast<uint16_t>(std::min<size_t>(change.strand_class, context_.strand_classes.size() - 1));
+  context_.handler.on_strand_class(id_, strand_class_);
+  if (!std::exchange(has_asset_, true)) queue_.set_asset(change.asset);
+  queue_.start_strands();
+  ask_for_keyframe(now_ns());
+  pump();
+}
+
+/// Called when a frame of the new mode is here: the old ones stop, and the client is told right before it.
+void Session::finish_mode_switch() {
+  if (!next_mode_) return;
+  const ModeSwitch next = *std::exchange(next_mode_, std::nullopt);
+  const int64_t time_ns = now_ns();
+  mode_ = next.change.mode;
+  picture_class_ = next.picture_class;
+  flow_.start_over(time_ns);
+  if (mode_ == StreamMode::Frames && !queue_.stop_strands()) has_asset_ = false;
+  context_.count(&NetCounters::mode_changes);
+  log_info("net", "session {} gets {}: {}", id_, to_string(mode_), next.change.reason);
+  context_.handler.on_mode(id_, mode_);
+  queue_control(next.change);
+  if (mode_ == StreamMode::Frames || state_ != State::Joined) return;
+  announce_quality(to_string(context_.strand_classes[strand_class_]));
+}
+
+void Session::report_link(int64_t time_ns) {
+  if (hello_.role == Role::Source ||
+      time_ns - link_reported_ns_ < context_.config.limits.link_interval_ms * kNsPerMs)
+    return;
+  link_reported_ns_ = time_ns;
+  LinkState link;
+  link.mode = mode_;
+  link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
+  link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
+  link.strand_bytes_per_s = context_.strand_costs();
+  context_.handler.on_link(id_, link, time_ns);
+}
+
+}  // namespace strandcast::net
