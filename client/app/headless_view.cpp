@@ -26,6 +26,13 @@ struct Collected {
   std::optional<Image> screenshot_image;
 };
 
+/// What snapshots are drawn with, after the connection is gone.
+struct Drawn {
+  gl::DeviceInfo device;
+  std::shared_ptr<const SceneAsset> asset;
+  Welcome welcome;
+};
+
 class Collector {
  public:
   Collector(const ViewOptions& options, LiveConnection& live, const std::atomic<bool>& stop)
@@ -40,7 +47,7 @@ class Collector {
     int64_t last_frame_ns = now_ns();
     while (!stop_ && !is_complete()) {
       RETURN_IF_ERROR(pump());
-      if (session().welcome().mode == StreamMode::Frames) take_image();
+      if (session().mode() == StreamMode::Frames) take_image();
       if (decoded_frames() != seen_frames) {
         seen_frames = decoded_frames();
         last_frame_ns = now_ns();
@@ -79,7 +86,20 @@ class Collector {
         return make_error(ErrorCode::Unavailable, "the server came back with another scene");
     }
     if (live_.final_error()) return *live_.final_error();
+    report();
     return {};
+  }
+
+  /// Tells the server about once a second how fast this machine decodes; it draws afterwards.
+  void report() {
+    constexpr int64_t kReportNs = 1'000'000'000;
+    if (!live_.is_connected() || now_ns() - reported_ns_ < kReportNs) return;
+    reported_ns_ = now_ns();
+    ViewerReport now;
+    now.decode_ms = std::min(session().replay().decode_timer().median_ms(), kMaxReportedMs);
+    now.picture_decode_ms = std::min(session().picture_decode_timer().median_ms(), kMaxReportedMs);
+    // One that is lost is followed by the next.
+    (void)session().client().send(now);
   }
 
   Status wait_for_first_picture() {
@@ -128,6 +148,7 @@ class Collector {
   ClipSampler sampler_;
   Collected collected_;
   const int64_t begin_ns_ = now_ns();
+  int64_t reported_ns_ = 0;
   uint64_t earlier_frames_ = 0;  // of sessions that broke
   uint64_t known_frames_ = 0;    // of the running one
   uint64_t taken_images_ = 0;
@@ -142,18 +163,17 @@ Status write_images(const ViewOptions& options, const Collected& collected) {
   return clip.finish();
 }
 
-/// Draws the collected snapshots with the same renderer as the server and the window.
-Status render_snapshots(const ViewOptions& options, const SceneAsset& asset, const Welcome& welcome,
-                        const Collected& collected, StageTimer& render_timer) {
-  ASSIGN_OR_RETURN(auto context, gl::EglContext::make(options.device));
+/// Draws the collected snapshots with the same renderer as the server and the window, in the current context.
+Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Collected& collected,
+                        StageTimer& render_timer) {
   const gl::ShaderLibrary shaders =
       options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir);
-  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, welcome.look));
-  StrandFill fill(asset.rest_position_m, asset.vertex_count);
+  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, scene.device, *scene.asset, scene.welcome.look));
+  StrandFill fill(scene.asset->rest_position_m, scene.asset->vertex_count);
 
   const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot, fill), welcome.camera, size));
+    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot, fill), scene.welcome.camera, size));
     Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
     render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     return image;
@@ -192,20 +212,34 @@ bool ClipSampler::wants(int64_t sim_time_ns) {
 }
 
 Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto live, LiveConnection::open(client_config(options)));
+  const bool wants_render = !options.screenshot.empty() || !options.clip.empty();
+  ClientConfig config = client_config(options);
+  std::unique_ptr<gl::EglContext> context;
+  std::string own_reason;
+  if (wants_render && options.mode != StreamMode::Frames) {
+    auto made = gl::EglContext::make(options.device);
+    if (!made && options.mode == StreamMode::Strands) return made.error();
+    if (made) {
+      context = std::move(made).value();
+    } else {
+      config.hello.mode = StreamMode::Frames;
+      own_reason = "frames: strands cannot be drawn here: " + made.error().to_string();
+    }
+  }
+  ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
   ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, stop).run());
   ViewerSession* session = &live->session();
 
   StageTimer render_timer;
   ViewReport report = make_report(*session);
-  const bool wants_render = !options.screenshot.empty() || !options.clip.empty();
-  const Welcome welcome = session->welcome();
-  const std::optional<SceneAsset> asset =
-      session->asset() ? std::optional<SceneAsset>(*session->asset()) : std::nullopt;
+  if (!own_reason.empty()) set_mode_reason(report, own_reason);
+  const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
+  const Drawn scene{context ? context->info() : gl::DeviceInfo{}, session->shared_asset(),
+                    session->welcome()};
   live.reset();  // the server need not serve a viewer that only draws now
-  if (wants_render && welcome.mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
-  if (wants_render && welcome.mode == StreamMode::Strands && asset)
-    RETURN_IF_ERROR(render_snapshots(options, *asset, welcome, collected, render_timer));
+  if (wants_render && mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
+  if (wants_render && mode == StreamMode::Strands && scene.asset)
+    RETURN_IF_ERROR(render_snapshots(options, scene, collected, render_timer));
   set_render_times(report, render_timer);
   return report;
 }

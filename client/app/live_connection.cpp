@@ -33,17 +33,14 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   }
   session_ = std::move(opened).value();
   is_connected_ = true;
+  if (attempted_mode_ != config_.hello.mode) session_->request_mode(config_.hello.mode);
   log_info("net", "connected to {} again", config_.address.to_string());
   return true;
 }
 
-void LiveConnection::change_mode(StreamMode mode) {
+void LiveConnection::request_mode(StreamMode mode) {
   config_.hello.mode = mode;
-  if (attempt_.valid()) return;  // the attempt under way ends first; the mode then applies to the next one
-  is_connected_ = false;
-  final_error_.reset();
-  last_error_ = make_error(ErrorCode::Unavailable, "changing to {}", to_string(mode));
-  start_attempt();
+  if (is_connected_) session_->request_mode(mode);
 }
 
 void LiveConnection::lose(const Error& error) {
@@ -62,6 +59,7 @@ void LiveConnection::lose(const Error& error) {
 }
 
 void LiveConnection::start_attempt() {
+  attempted_mode_ = config_.hello.mode;
   attempt_ = std::async(std::launch::async, [config = config_] { return ViewerSession::open(config); });
 }
 

@@ -19,8 +19,8 @@ class LiveConnection {
 
   /// Handles what arrived; starts and finishes attempts to reconnect. True when the session is a new one.
   bool pump(std::chrono::milliseconds timeout);
-  /// Drops the session and connects again with this mode.
-  void change_mode(StreamMode mode);
+  /// Asks the server for this mode, now and after every new connection.
+  void request_mode(StreamMode mode);
 
   /// The running session, or the last one: its snapshots stay readable while the server is away.
   ViewerSession& session() { return *session_; }
@@ -39,6 +39,7 @@ class LiveConnection {
   void start_attempt();
 
   ClientConfig config_;
+  StreamMode attempted_mode_ = StreamMode::Auto;  // of the attempt under way
   std::unique_ptr<ViewerSession> session_;
   ReconnectPolicy policy_;
   bool is_connected_ = true;

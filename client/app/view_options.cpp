@@ -80,7 +80,7 @@ namespace {
 /// Values that need more than CLI11's own conversion.
 struct RawOptions {
   std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
-  std::string mode = "strands";
+  std::string mode = "auto";
   std::string size = "960x540";
   std::string clip_size;  // empty = as size
   std::string token_file;
@@ -91,7 +91,9 @@ struct RawOptions {
 
 void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
-  app.add_option("--mode", raw.mode, "strands, frames or auto")->capture_default_str();
+  app.add_option("--mode", raw.mode,
+                 "strands: drawn here; frames: the server's pictures; auto: whichever is better now")
+      ->capture_default_str();
   app.add_option("--token-file", raw.token_file,
                  "File with the token: the token alone, or lines 'role token'");
   app.add_option("--token", options.token, kTokenHelp)->envname(kTokenVariable);

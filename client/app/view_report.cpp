@@ -53,16 +53,18 @@ ViewReport make_report(ViewerSession& session) {
   const ConnectionCounters net = session.client().counters();
   const ClockOffset clock = session.client().clock();
   const ServerStatus& server = session.status();
-  const bool is_frames = welcome.mode == StreamMode::Frames;
-  const uint64_t received_frames = is_frames ? pictures.received_frames : strands.received_frames;
-  const auto received_bytes =
-      static_cast<double>(is_frames ? pictures.received_bytes : strands.received_bytes);
+  const bool is_frames = session.mode() == StreamMode::Frames;
+  const uint64_t received_frames = pictures.received_frames + strands.received_frames;
+  const auto received_bytes = static_cast<double>(pictures.received_bytes + strands.received_bytes);
   const StageTimer& decode = is_frames ? session.picture_decode_timer() : session.replay().decode_timer();
   const StageTimer& motion = session.replay().motion_latency_timer();
   const double seconds = session.connected_s();
 
   Builder out;
-  out.word("mode", to_string(welcome.mode));
+  out.word("mode", to_string(session.mode()));
+  out.word("mode_reason", session.mode_reason());
+  out.count("mode_changes", session.mode_changes());
+  out.count("blank_frames", session.blank_frames());
   out.word("scene", welcome.scene_name);
   out.word("codec", is_frames ? "jpeg" : welcome.codec);
   out.count("strands", welcome.strand_count);
@@ -84,8 +86,8 @@ ViewReport make_report(ViewerSession& session) {
   out.number("clock_error_ms", clock.has_value() ? static_cast<double>(clock.error_ns()) * 1e-6 : 0.0, 3);
   out.count("keyframes", strands.keyframes);
   out.count("gaps", strands.gaps);
-  out.count("missed_frames", is_frames ? pictures.missed_frames : strands.missed_frames);
-  out.count("rejected_frames", is_frames ? pictures.rejected_frames : strands.rejected_frames);
+  out.count("missed_frames", pictures.missed_frames + strands.missed_frames);
+  out.count("rejected_frames", pictures.rejected_frames + strands.rejected_frames);
   out.count("keyframe_requests", strands.keyframe_requests);
   out.count("dropped_by_client", net.dropped_strand_frames);
   out.count("dropped_by_server", server.dropped_frames);
@@ -100,6 +102,11 @@ ViewReport make_report(ViewerSession& session) {
   out.number("server_realtime_factor", server.realtime_factor, 3);
   out.count("server_tick", server.tick);
   return out.take();
+}
+
+void set_mode_reason(ViewReport& report, const std::string& reason) {
+  for (ReportEntry& entry : report)
+    if (entry.key == "mode_reason") entry.text = reason;
 }
 
 void set_render_times(ViewReport& report, const StageTimer& render_timer) {
@@ -136,17 +143,18 @@ std::string to_summary(const ViewReport& report) {
                                           v("dropped_by_server"), v("missed_frames"), v("dropped_by_client"));
   return fmt::format(
       "scene {} ({} strands x {}), {} by {}\n"
+      "  mode            {}\n"
       "  decoded         {} frames in {} s ({} per second), {} bytes per frame, {} Mbit/s\n"
       "  decode          {} ms (p99 {} ms)\n"
       "  render          {} ms ({} frames)\n"
       "  motion->decoded {} ms median, {} ms p99 ({} samples, clock +-{} ms)\n"
       "  dropped         {}\n"
       "  server          {} ms per step, realtime factor {}\n",
-      v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("decoded_frames"),
-      v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"), v("decode_ms_median"),
-      v("decode_ms_p99"), v("render_ms_median"), v("rendered_frames"), v("motion_to_decoded_ms_median"),
-      v("motion_to_decoded_ms_p99"), v("motion_samples_seen"), v("clock_error_ms"), dropped,
-      v("server_sim_ms"), v("server_realtime_factor"));
+      v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
+      v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
+      v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_frames"),
+      v("motion_to_decoded_ms_median"), v("motion_to_decoded_ms_p99"), v("motion_samples_seen"),
+      v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"));
 }
 
 }  // namespace strandcast

@@ -19,6 +19,8 @@ using ViewReport = std::vector<ReportEntry>;
 
 /// Everything a session measured, without render times.
 ViewReport make_report(ViewerSession& session);
+/// In place of the server's reason.
+void set_mode_reason(ViewReport& report, const std::string& reason);
 /// Fills in the render times of a report.
 void set_render_times(ViewReport& report, const StageTimer& render_timer);
 

@@ -5,6 +5,18 @@
 #include "common/base/log.h"
 
 namespace strandcast {
+namespace {
+
+constexpr size_t kBytesPerPixel = 4;
+
+/// Whether every pixel has the colour of the first.
+bool is_blank(const Image& image) {
+  for (size_t i = kBytesPerPixel; i < image.rgba.size(); ++i)
+    if (image.rgba[i] != image.rgba[i % kBytesPerPixel]) return false;
+  return true;
+}
+
+}  // namespace
 
 Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
   ClientConfig acknowledging = config;
@@ -17,12 +29,15 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
   session->replay_ = std::move(replay).value();
   session->opened_ns_ = now_ns();
   session->quality_.bound_m = session->welcome().bound_m;
+  session->mode_ = session->welcome().mode;
+  session->mode_reason_ = session->welcome().mode_reason;
   return session;
 }
 
-ViewerSession::ViewerSession(std::unique_ptr<ViewerClient> client) : client_(std::move(client)) {}
+ViewerSession::ViewerSession(std::shared_ptr<ViewerClient> client) : client_(std::move(client)) {}
 
 Status ViewerSession::pump(std::chrono::milliseconds timeout) {
+  send_mode_request();
   for (ClientEvent& event : client_->wait(timeout)) {
     if (auto* media = std::get_if<MediaEvent>(&event)) {
       RETURN_IF_ERROR(handle(*media));
@@ -33,11 +48,39 @@ Status ViewerSession::pump(std::chrono::milliseconds timeout) {
       notices_.push_back(std::move(*notice));
     } else if (auto* quality = std::get_if<StreamQuality>(&event)) {
       take_quality(std::move(*quality));
+    } else if (auto* change = std::get_if<ModeChange>(&event)) {
+      take_mode(std::move(*change));
     } else {
       return std::get<ClosedEvent>(event).error;
     }
+    if (was_shown_ && !has_picture()) ++blank_frames_;
+    was_shown_ = was_shown_ || has_picture();
   }
   return {};
+}
+
+void ViewerSession::take_mode(ModeChange change) {
+  mode_reason_ = std::move(change.reason);
+  log_info("replay", "{}", mode_reason_);
+}
+
+/// A frame of this mode was decoded.
+void ViewerSession::show(StreamMode mode) {
+  if (std::exchange(mode_, mode) == mode) return;
+  ++mode_changes_;
+  // Each stream counts its frames by itself, and those that were not sent to us are not missing.
+  last_picture_sequence_ = 0;
+  if (mode == StreamMode::Frames) replay_->forget_sequence();
+}
+
+void ViewerSession::send_mode_request() {
+  const int64_t time_ns = now_ns();
+  const int64_t interval_ns = std::chrono::nanoseconds(kModeRequestInterval).count();
+  if (!requested_mode_ || (mode_requested_ns_ != 0 && time_ns - mode_requested_ns_ < interval_ns)) return;
+  const auto sent = client_->send(ModeRequest{*requested_mode_});
+  if (!sent) return;  // asked again with the next pump
+  mode_requested_ns_ = time_ns;
+  requested_mode_.reset();
 }
 
 void ViewerSession::take_quality(StreamQuality quality) {
@@ -55,6 +98,7 @@ Status ViewerSession::handle(MediaEvent& event) {
     case Opcode::StrandKeyframe:
     case Opcode::StrandDelta:
       if (const auto snapshot = replay_->receive(event.message, event.receive_time_ns, client_->clock())) {
+        if (asset_) show(StreamMode::Strands);
         acknowledge(event, begin_ns);
         if (listener_) listener_(snapshot);
       } else {
@@ -78,7 +122,7 @@ Status ViewerSession::take_asset(const MediaEvent& event) {
     return make_error(ErrorCode::BadInput, "the asset has {} x {} vertices, the Welcome announced {} x {}",
                       asset.strand_count, asset.vertex_count, announced.strand_count, announced.vertex_count);
   replay_->set_rest_shape(asset.rest_position_m);
-  asset_ = std::move(asset);
+  asset_ = std::make_shared<const SceneAsset>(std::move(asset));
   acknowledge(event, begin_ns);
   return {};
 }
@@ -93,11 +137,13 @@ void ViewerSession::take_picture(const MediaEvent& event) {
     log_debug("replay", "picture {} not used: {}", event.header.sequence, image.error().to_string());
     return;
   }
+  show(StreamMode::Frames);
   if (last_picture_sequence_ != 0 && event.header.sequence > last_picture_sequence_ + 1)
     picture_stats_.missed_frames += event.header.sequence - last_picture_sequence_ - 1;
   last_picture_sequence_ = event.header.sequence;
   picture_decode_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
-  image_ = std::move(image).value();
+  if (is_blank(*image)) ++blank_frames_;
+  image_ = std::make_shared<const Image>(std::move(image).value());
   ++image_count_;
   acknowledge(event, begin_ns);
 }
@@ -111,12 +157,12 @@ void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns
 }
 
 bool ViewerSession::has_picture() const {
-  if (welcome().mode == StreamMode::Frames) return image_.has_value();
-  return asset_.has_value() && replay_->newest() != nullptr;
+  if (mode_ == StreamMode::Frames) return image_ != nullptr;
+  return asset_ != nullptr && replay_->newest() != nullptr;
 }
 
 uint64_t ViewerSession::decoded_frames() const {
-  return welcome().mode == StreamMode::Frames ? image_count_ : replay_->stats().decoded_frames;
+  return image_count_ + replay_->stats().decoded_frames;
 }
 
 double ViewerSession::connected_s() const {

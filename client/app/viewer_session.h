@@ -22,6 +22,9 @@ namespace strandcast {
 /// Called for every decoded snapshot, in order.
 using SnapshotListener = std::function<void(const std::shared_ptr<const Snapshot>&)>;
 
+/// The server carries out one request a second.
+inline constexpr std::chrono::milliseconds kModeRequestInterval{1200};
+
 struct PictureStats {  // frames mode
   uint64_t received_frames = 0;
   uint64_t received_bytes = 0;
@@ -40,15 +43,31 @@ class ViewerSession {
 
   const Welcome& welcome() const { return client_->welcome(); }
   ViewerClient& client() { return *client_; }
+  /// For other threads that send.
+  std::shared_ptr<ViewerClient> shared_client() const { return client_; }
   StrandReplay& replay() { return *replay_; }
   const StrandReplay& replay() const { return *replay_; }
 
   /// Null until it arrived.
-  const SceneAsset* asset() const { return asset_ ? &*asset_ : nullptr; }
+  const SceneAsset* asset() const { return asset_.get(); }
+  std::shared_ptr<const SceneAsset> shared_asset() const { return asset_; }
+  /// What is to be shown: strands or the server's pictures, whichever was decoded last; before the first,
+  /// what the Welcome says. A change of mode thus shows only once there is something to show.
+  StreamMode mode() const { return mode_; }
+  /// Why, for a person.
+  const std::string& mode_reason() const { return mode_reason_; }
+  uint64_t mode_changes() const { return mode_changes_; }
+  /// Asks for another mode, or leaves the choice to the server; at most once in kModeRequestInterval, of
+  /// several the newest.
+  void request_mode(StreamMode mode) { requested_mode_ = mode; }
+
   /// True once there is something to show: asset and snapshot, or a picture.
   bool has_picture() const;
-  /// Frames mode: the newest decoded picture, null before the first.
-  const Image* image() const { return image_ ? &*image_ : nullptr; }
+  /// Frames of one colour only, and moments without anything to show after the first frame: must be 0.
+  uint64_t blank_frames() const { return blank_frames_; }
+  /// The newest decoded picture of the server, null before the first.
+  const Image* image() const { return image_.get(); }
+  std::shared_ptr<const Image> shared_image() const { return image_; }
   uint64_t image_count() const { return image_count_; }
 
   /// How the server codes strands for this viewer; changes with the link.
@@ -61,24 +80,34 @@ class ViewerSession {
   std::vector<Notice> take_notices() { return std::exchange(notices_, {}); }
   const PictureStats& picture_stats() const { return picture_stats_; }
   const StageTimer& picture_decode_timer() const { return picture_decode_timer_; }
-  /// Frames decoded so far in the mode chosen by the server.
+  /// Frames decoded so far, strands and pictures.
   uint64_t decoded_frames() const;
   double connected_s() const;
 
   void set_snapshot_listener(SnapshotListener listener) { listener_ = std::move(listener); }
 
  private:
-  ViewerSession(std::unique_ptr<ViewerClient> client);
+  explicit ViewerSession(std::shared_ptr<ViewerClient> client);
   Status handle(MediaEvent& event);
   Status take_asset(const MediaEvent& event);
   void take_picture(const MediaEvent& event);
   void take_quality(StreamQuality quality);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
+  void take_mode(ModeChange change);
+  void show(StreamMode mode);
+  void send_mode_request();
 
-  std::unique_ptr<ViewerClient> client_;
+  std::shared_ptr<ViewerClient> client_;
   std::unique_ptr<StrandReplay> replay_;
-  std::optional<SceneAsset> asset_;
-  std::optional<Image> image_;
+  std::shared_ptr<const SceneAsset> asset_;
+  std::shared_ptr<const Image> image_;
+  StreamMode mode_ = StreamMode::Strands;
+  std::string mode_reason_;
+  uint64_t mode_changes_ = 0;
+  std::optional<StreamMode> requested_mode_;  // not yet sent
+  int64_t mode_requested_ns_ = 0;
+  bool was_shown_ = false;
+  uint64_t blank_frames_ = 0;
   uint64_t image_count_ = 0;
   uint32_t last_picture_sequence_ = 0;
   StreamQuality quality_;

@@ -5,21 +5,6 @@
 
 namespace strandcast {
 
-StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill) {
-  return StrandPicture{snapshot.world_from_head, fill.positions(snapshot)};
-}
-
-StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend) {
-  if (blend <= 0.0) return from;
-  // Without a rest shape a change to fewer strands leaves nothing to blend.
-  if (blend >= 1.0 || from.position_m.size() != to.position_m.size()) return to;
-  from.world_from_head = interpolate(from.world_from_head, to.world_from_head, blend);
-  const auto weight = static_cast<float>(blend);
-  for (size_t i = 0; i < to.position_m.size(); ++i)
-    from.position_m[i] += weight * (to.position_m[i] - from.position_m[i]);
-  return from;
-}
-
 Result<std::unique_ptr<StrandReplay>> StrandReplay::make(const Welcome& welcome,
                                                          KeyframeRequester request_keyframe) {
   const StrandStreamLimits limits{welcome.strand_count, welcome.vertex_count};
@@ -38,7 +23,7 @@ StrandReplay::StrandReplay(std::unique_ptr<StrandDecoder> decoder, const Welcome
 void StrandReplay::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
   decoder_->set_rest_shape(rest_in_head_m);
   const bool fits = rest_in_head_m.size() == size_t{strand_count_} * vertex_count_;
-  fill_ = fits ? StrandFill(rest_in_head_m, vertex_count_) : StrandFill();
+  player_.set_fill(fits ? StrandFill(rest_in_head_m, vertex_count_) : StrandFill());
 }
 
 std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte> message,
@@ -81,7 +66,8 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
     if (last_motion_time_ns_ != 0) motion_latency_timer_.add_ms(static_cast<double>(latency_ns) * 1e-6);
     last_motion_time_ns_ = motion_time_ns;
   }
-  keep(snapshot, receive_time_ns, is_other_stream);
+  timeline_.add(snapshot, receive_time_ns,
+                is_other_stream ? Continuity::OtherStream : Continuity::SameStream);
   return snapshot;
 }
 
@@ -111,59 +97,8 @@ void StrandReplay::reject(const Error& error, int64_t receive_time_ns) {
   if (request_keyframe_) request_keyframe_();
 }
 
-void StrandReplay::keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns,
-                        bool is_other_stream) {
-  // A keyframe on request repeats the state that is already here.
-  if (!snapshots_.empty() && snapshot->sim_time_ns == snapshots_.back()->sim_time_ns) {
-    snapshots_.back() = std::move(snapshot);
-    return;
-  }
-  // The first keyframe of another stream may be of a state that the old stream has passed: what is shown
-  // stays.
-  if (is_other_stream && !snapshots_.empty()) {
-    const int64_t behind_ns = snapshots_.back()->sim_time_ns - snapshot->sim_time_ns;
-    if (behind_ns > 0 && behind_ns < kStreamOverlapNs) return;
-  }
-  playout_clock_.add(receive_time_ns, snapshot->sim_time_ns);
-  // A reset server starts at zero again: blending across it would sweep the hair through the head.
-  const bool goes_back = !snapshots_.empty() && snapshot->sim_time_ns < snapshots_.back()->sim_time_ns;
-  if (goes_back) {
-    snapshots_.clear();
-    cursor_ = {};
-  }
-  snapshots_.push_back(std::move(snapshot));
-  const size_t kept = playout_ == Playout::Smooth ? kKeptSnapshots : 1;
-  while (snapshots_.size() > kept) snapshots_.pop_front();
-}
-
-std::shared_ptr<const Snapshot> StrandReplay::newest() const {
-  return snapshots_.empty() ? nullptr : snapshots_.back();
-}
-
-std::optional<StrandPicture> StrandReplay::picture_at(int64_t client_time_ns) {
-  if (snapshots_.empty()) return std::nullopt;
-  if (playout_ == Playout::LowLatency || snapshots_.size() < 2 || !playout_clock_.has_value())
-    return picture_of(*snapshots_.back(), fill_);
-
-  // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
-  const int64_t wanted_ns =
-      std::min(playout_clock_.sim_time_at(client_time_ns), snapshots_.back()->sim_time_ns);
-  const int64_t sim_time_ns = cursor_.advance(client_time_ns, wanted_ns);
-  const auto later = std::find_if(snapshots_.begin(), snapshots_.end(), [sim_time_ns](const auto& snapshot) {
-    return snapshot->sim_time_ns > sim_time_ns;
-  });
-  if (later == snapshots_.end()) return picture_of(*snapshots_.back(), fill_);
-  if (later == snapshots_.begin()) return picture_of(**later, fill_);
-  const Snapshot& from = **std::prev(later);
-  const Snapshot& to = **later;
-  const auto span_ns = static_cast<double>(to.sim_time_ns - from.sim_time_ns);
-  // Both have all strands, also when the stream has changed to one with fewer in between.
-  return blend(picture_of(from, fill_), picture_of(to, fill_),
-               static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
-}
-
 double StrandReplay::state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const {
-  if (snapshots_.empty() || newest_send_time_ns_ == 0 || !clock.has_value()) return 0.0;
+  if (timeline_.newest() == nullptr || newest_send_time_ns_ == 0 || !clock.has_value()) return 0.0;
   return static_cast<double>(clock.to_server_ns(client_time_ns) - newest_send_time_ns_) * 1e-6;
 }
 

@@ -10,22 +10,15 @@
 #include <optional>
 #include <span>
 
-#include "client/replay/playout_clock.h"
-#include "client/replay/strand_fill.h"
+#include "client/replay/snapshot_timeline.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
 #include "common/codec/snapshot.h"
 #include "common/codec/strand_codec.h"
-#include "common/render/renderer.h"
 #include "common/wire/clock_offset.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {
-
-enum class Playout {
-  LowLatency,  // the newest snapshot as it is: the same picture the server would draw
-  Smooth,      // interpolated between snapshots, behind by an adaptive delay
-};
 
 struct ReplayStats {
   uint64_t decoded_frames = 0;
@@ -54,16 +47,23 @@ class StrandReplay {
   std::shared_ptr<const Snapshot> receive(std::span<const std::byte> message, int64_t receive_time_ns,
                                           const ClockOffset& clock);
 
+  /// Other frames were sent instead for a while: the next keyframe continues nothing that could be missing.
+  void forget_sequence() { last_sequence_ = 0; }
+
   /// The asset's rest shape; comes before the first strand frame.
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
 
-  void set_playout(Playout playout) { playout_ = playout; }
-  Playout playout() const { return playout_; }
+  void set_playout(Playout playout) { timeline_.set_playout(playout); }
+  Playout playout() const { return timeline_.playout(); }
 
   /// Newest snapshot, null before the first keyframe.
-  std::shared_ptr<const Snapshot> newest() const;
+  std::shared_ptr<const Snapshot> newest() const { return timeline_.newest(); }
+  /// The newest states, for a drawing thread to copy.
+  const SnapshotTimeline& timeline() const { return timeline_; }
   /// What to draw at client time `client_time_ns`; nothing before the first keyframe.
-  std::optional<StrandPicture> picture_at(int64_t client_time_ns);
+  std::optional<StrandPicture> picture_at(int64_t client_time_ns) {
+    return player_.picture_at(timeline_, client_time_ns);
+  }
   /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
   double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;
 
@@ -72,7 +72,7 @@ class StrandReplay {
   /// From the arrival of a motion sample at the server to the decoded state that contains it, ms.
   const StageTimer& motion_latency_timer() const { return motion_latency_timer_; }
   /// How far smooth playout stays behind, ms.
-  double playout_delay_ms() const { return static_cast<double>(playout_clock_.delay_ns()) * 1e-6; }
+  double playout_delay_ms() const { return static_cast<double>(timeline_.clock().delay_ns()) * 1e-6; }
 
  private:
   StrandReplay(std::unique_ptr<StrandDecoder> decoder, const Welcome& welcome,
@@ -80,20 +80,16 @@ class StrandReplay {
   void reject(const Error& error, int64_t receive_time_ns);
   void note_sequence(const FrameHeader& header);
   Status check_stream(const FrameHeader& header) const;
-  void keep(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns, bool is_other_stream);
 
   std::unique_ptr<StrandDecoder> decoder_;
   const uint32_t strand_count_;
   const uint32_t vertex_count_;
   KeyframeRequester request_keyframe_;
-  Playout playout_ = Playout::LowLatency;
-  PlayoutClock playout_clock_;
-  std::deque<std::shared_ptr<const Snapshot>> snapshots_;  // oldest first
-  StrandFill fill_;
+  SnapshotTimeline timeline_;
+  TimelinePlayer player_;
   ReplayStats stats_;
   StageTimer decode_timer_;
   StageTimer motion_latency_timer_;
-  PlayoutCursor cursor_;
   uint16_t stream_id_ = 0;  // of the newest keyframe
   uint32_t last_sequence_ = 0;
   int64_t last_motion_time_ns_ = 0;
@@ -102,16 +98,4 @@ class StrandReplay {
 };
 
 inline constexpr int64_t kReplayKeyframeRequestNs = 1'000'000'000;
-/// Smooth playout at 60 Hz is at most 100 ms behind, and as much again after a burst.
-inline constexpr size_t kKeptSnapshots = 16;
-/// A keyframe of another stream may repeat a state this much older than the newest one.
-inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
-
-/// Strands between two pictures of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
-/// space, so a turning head carries the hair round instead of cutting through it.
-StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend);
-
-/// The picture of one snapshot, as the server draws it when the snapshot has all strands.
-StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill);
-
 }  // namespace strandcast

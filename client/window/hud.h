@@ -7,10 +7,11 @@
 namespace strandcast {
 
 struct HudState {
-  std::string title;       // scene name and sizes
-  std::string connection;  // "127.0.0.1:7878", or what is wrong with it
-  std::string mode;        // strands or frames, playout
-  std::string message;     // newest notice, fades out by the application
+  std::string title;        // scene name and sizes
+  std::string connection;   // "127.0.0.1:7878", or what is wrong with it
+  std::string mode;         // strands or frames, playout
+  std::string mode_reason;  // why, by the server or this machine
+  std::string message;      // newest notice, fades out by the application
   double fps = 0.0;
   double render_ms = 0.0;
   double decode_ms = 0.0;

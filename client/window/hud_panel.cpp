@@ -38,6 +38,7 @@ void draw_hud_panel(const HudState& hud) {
     ImGui::TextUnformatted(hud.connection.c_str());
     ImGui::Separator();
     row("shows", hud.mode);
+    if (!hud.mode_reason.empty()) row("because", hud.mode_reason);
     row("picture", fmt::format("{:.0f} fps, {:.1f} ms", hud.fps, hud.render_ms));
     row("server step", fmt::format("{:.2f} ms, x{:.2f} real time", hud.sim_ms, hud.realtime_factor));
     row("stream", fmt::format("{:.1f} kB/s, {:.0f} frames/s", hud.kilobytes_per_s, hud.frames_per_s));
@@ -69,7 +70,7 @@ void draw_help_panel() {
       {"Space", "pause or resume the server"},
       {"N", "one simulation step"},
       {"P", "newest state or smooth playout"},
-      {"M", "strands drawn here, or the server's pictures"},
+      {"M", "auto, strands drawn here, or the server's pictures"},
       {"S", "save a picture"},
       {"U", "hide or show the measurements"},
       {"H, F1", "hide or show this help"},

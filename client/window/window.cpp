@@ -12,7 +12,6 @@
 
 #include "client/window/hud_panel.h"
 #include "common/base/log.h"
-#include "common/gl/objects.h"
 
 namespace strandcast {
 namespace {
@@ -25,6 +24,15 @@ std::string& last_glfw_error() {
 void remember_glfw_error(int, const char* description) {
   last_glfw_error() = description;
   log_debug("window", "GLFW: {}", description);
+}
+
+/// A window with a core context of this version; null when there is none.
+GLFWwindow* make_window(const std::string& title, RenderSize size, int major, int minor) {
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, major);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, minor);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  return glfwCreateWindow(static_cast<int>(size.width), static_cast<int>(size.height), title.c_str(), nullptr,
+                          nullptr);
 }
 
 Error no_window(const char* what) {
@@ -42,11 +50,13 @@ struct Window::State {
   bool is_help_visible = false;
   glm::dvec2 cursor{0.0};
   WindowActions actions;
-  gl::Texture picture;
+  std::string why_no_strands;
+  GLuint picture = 0;  // plain OpenGL 3.3: it must work where nothing better is to be had
+  RenderSize picture_size{0, 0};
   uint64_t picture_number = 0;
 
   ~State() {
-    picture = gl::Texture();  // needs the context that goes below
+    if (picture != 0) glDeleteTextures(1, &picture);  // needs the context that goes below
     if (has_imgui) {
       ImGui_ImplOpenGL3_Shutdown();
       ImGui_ImplGlfw_Shutdown();
@@ -126,12 +136,13 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title, RenderSiz
   glfwSetErrorCallback(remember_glfw_error);
   if (glfwInit() != GLFW_TRUE) return no_window("cannot open a display");
   auto state = std::make_unique<State>();
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
-  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-  state->window = glfwCreateWindow(static_cast<int>(size.width), static_cast<int>(size.height), title.c_str(),
-                                   nullptr, nullptr);
-  if (state->window == nullptr) return no_window("cannot open a window with OpenGL 4.5");
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
+  state->window = make_window(title, size, 4, 5);
+  if (state->window == nullptr) {
+    state->why_no_strands = fmt::format("this machine has no OpenGL 4.5 ({})", last_glfw_error());
+    state->window = make_window(title, size, 3, 3);
+  }
+  if (state->window == nullptr) return no_window("cannot open a window with OpenGL 4.5 or 3.3");
   glfwMakeContextCurrent(state->window);
   glfwSwapInterval(1);
   glfwGetCursorPos(state->window, &state->cursor.x, &state->cursor.y);
@@ -141,9 +152,17 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title, RenderSiz
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // leaves no files behind
   ImGui_ImplGlfw_InitForOpenGL(state->window, true);
-  ImGui_ImplOpenGL3_Init("#version 450 core");
+  ImGui_ImplOpenGL3_Init("#version 330 core");
   state->has_imgui = true;
   return std::unique_ptr<Window>(new Window(std::move(state)));
+}
+
+void Window::show() {
+  glfwShowWindow(state_->window);
+}
+
+const std::string& Window::why_no_strands() const {
+  return state_->why_no_strands;
 }
 
 WindowActions Window::begin_frame() {
@@ -164,24 +183,28 @@ RenderSize Window::framebuffer_size() const {
 }
 
 void Window::show_image(const Image& image, uint64_t image_number) {
-  gl::Texture& picture = state_->picture;
-  if (picture.width() != image.width || picture.height() != image.height) {
-    picture = gl::Texture("received picture", GL_RGBA8, image.width, image.height, 1);
-    glTextureParameteri(picture.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTextureParameteri(picture.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  const auto width = static_cast<GLsizei>(image.width);
+  const auto height = static_cast<GLsizei>(image.height);
+  if (state_->picture == 0) glGenTextures(1, &state_->picture);
+  glBindTexture(GL_TEXTURE_2D, state_->picture);
+  if (state_->picture_size.width != image.width || state_->picture_size.height != image.height) {
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    state_->picture_size = {image.width, image.height};
     state_->picture_number = 0;
   }
   if (state_->picture_number != image_number) {
-    glTextureSubImage2D(picture.name(), 0, 0, 0, static_cast<GLsizei>(image.width),
-                        static_cast<GLsizei>(image.height), GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
     state_->picture_number = image_number;
   }
+  glBindTexture(GL_TEXTURE_2D, 0);
   const ImVec2 area = ImGui::GetIO().DisplaySize;
   const float scale =
       std::min(area.x / static_cast<float>(image.width), area.y / static_cast<float>(image.height));
   const ImVec2 shown(scale * static_cast<float>(image.width), scale * static_cast<float>(image.height));
   const ImVec2 corner((area.x - shown.x) * 0.5f, (area.y - shown.y) * 0.5f);
-  ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(uintptr_t{picture.name()}), corner,
+  ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(uintptr_t{state_->picture}), corner,
                                            ImVec2(corner.x + shown.x, corner.y + shown.y));
 }
 

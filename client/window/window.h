@@ -20,7 +20,7 @@ struct WindowActions {
   bool wants_step = false;            // N
   bool wants_view_reset = false;      // R
   bool wants_screenshot = false;      // S
-  bool wants_mode_toggle = false;     // M: strands or frames
+  bool wants_mode_toggle = false;     // M: strands, frames or auto
   bool wants_playout_toggle = false;  // P: low latency or smooth
   glm::vec2 orbit_heights{0.0f};      // left drag, in window heights
   glm::vec2 pan_heights{0.0f};        // middle or right drag
@@ -29,11 +29,16 @@ struct WindowActions {
 
 class Window {
  public:
-  /// Opens the window and makes its context current. Unavailable without a display, and says what to do then.
+  /// Opens the window, hidden, and makes its context current: OpenGL 4.5, or 3.3 for pictures only.
+  /// Unavailable without a display, and says what to do then.
   static Result<std::unique_ptr<Window>> open(const std::string& title, RenderSize size);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
+
+  void show();
+  /// Why strands cannot be drawn in this window; empty when they can.
+  const std::string& why_no_strands() const;
 
   /// Handles events and begins a frame.
   WindowActions begin_frame();

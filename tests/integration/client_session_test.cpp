@@ -5,6 +5,8 @@
 #include <atomic>
 
 #include "client/app/viewer_session.h"
+#include "client/app/viewer_thread.h"
+#include "tests/support/eventually.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/hair_motion.h"
 
@@ -147,6 +149,43 @@ TEST(ClientSession, ALateKeyframeBringsTheStreamBack) {
   EXPECT_EQ(ticks, (std::vector<uint64_t>{6, 7, 8, 9, 10, 11}));
   EXPECT_EQ((*session)->replay().stats().rejected_frames, 5u);
   EXPECT_EQ((*session)->replay().stats().keyframe_requests, 1u);
+}
+
+TEST(ViewerThread, DecodesAndAcknowledgesEveryFrameWhileNobodyLooks) {
+  constexpr uint32_t kFrames = 50;
+  std::atomic<uint32_t> acknowledged{0};
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(kStrands, kVertices));
+    HairMotion hair({.strand_count = kStrands, .vertex_count = kVertices});
+    auto encoder = make_strand_encoder("delta");
+    // Each waits for the acknowledgement of the one before: nothing but decoding can bring the next.
+    for (uint32_t i = 1; i <= kFrames; ++i) {
+      hair.step();
+      peer.send(*(*encoder)->encode(hair.snapshot(quantum_for_bound(1e-4f))));
+      const auto ack = peer.read_until<FrameAck>();
+      if (!ack || ack->sequence != i) break;
+      acknowledged = i;
+    }
+    peer.send(Notice{false, "done"});
+    peer.read_until<ModeRequest>();
+    peer.send(ModeChange{StreamMode::Strands, "as before", 0, 0});
+    peer.read_to_end();
+  });
+  auto live = LiveConnection::open(config_for(server.port()));
+  ASSERT_TRUE(live) << live.error().to_string();
+  ViewerThread viewer(std::move(*live));
+  ASSERT_TRUE(eventually([&] { return acknowledged == kFrames; }));
+  std::vector<Notice> notices;
+  ASSERT_TRUE(eventually([&] { return !(notices = viewer.take_notices()).empty(); }));
+  EXPECT_EQ(notices[0].text, "done");
+  const auto state = viewer.look();
+  EXPECT_EQ(state->decoded_frames, kFrames);
+  ASSERT_NE(state->timeline.newest(), nullptr);
+  EXPECT_EQ(state->timeline.newest()->tick, kFrames);
+  EXPECT_EQ(state->timeline.snapshots().size(), 1u) << "what nobody looked at does not pile up";
+  viewer.request_mode(StreamMode::Auto);
+  EXPECT_TRUE(eventually([&] { return viewer.look()->mode_reason == "as before"; }));
+  EXPECT_THAT(to_lines(viewer.stop_and_report()), HasSubstr("decoded_frames=50\n"));
 }
 
 }  // namespace

@@ -404,6 +404,27 @@ TEST_F(EndToEnd, TheWindowOpensDrawsAndLeaves) {
   EXPECT_EQ(lines->find("rendered_frames=0\n"), std::string::npos) << *lines;
 }
 
+/// A driver with OpenGL 3.3 can show pictures only.
+TEST_F(EndToEnd, AWindowWithoutOpenGl45AsksForTheServersPictures) {
+  if (std::system("command -v xvfb-run >/dev/null") != 0)
+    GTEST_SKIP() << "xvfb-run (package xvfb) is not installed: no display to open a window on";
+  const TemporaryFolder folder;
+  const auto report = folder.path() / "report.txt";
+  const std::string command = fmt::format(
+      "MESA_GL_VERSION_OVERRIDE=3.3 xvfb-run -a -s '-screen 0 320x240x24' {} --connect 127.0.0.1:{} "
+      "--size 160x120 --seconds 4 --report {} >{} 2>&1",
+      STRANDCAST_VIEW_PROGRAM, server_->port(), report.string(), (folder.path() / "log").string());
+  const int status = std::system(command.c_str());
+  const auto log = load_text(folder.path() / "log", 1u << 20);
+  ASSERT_EQ(status, 0) << (log ? *log : "no output");
+  const auto lines = load_text(report, 1u << 20);
+  ASSERT_TRUE(lines) << lines.error().to_string();
+  EXPECT_THAT(*lines, HasSubstr("mode=frames\n"));
+  EXPECT_THAT(*lines, HasSubstr("no OpenGL 4.5"));
+  EXPECT_THAT(*lines, HasSubstr("blank_frames=0\n"));
+  EXPECT_EQ(lines->find("decoded_frames=0\n"), std::string::npos) << *lines;
+}
+
 TEST_F(EndToEnd, WithoutADisplayTheErrorNamesTheWayOut) {
   const TemporaryFolder folder;
   const std::string command =

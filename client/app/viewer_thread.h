@@ -1,0 +1,96 @@
+// ViewerThread: receives, decodes and acknowledges on a thread of its own, so that slow drawing delays no
+// acknowledgement and slow decoding no picture. It hands over one immutable state, the newest; its size is
+// bounded by what a ViewerSession keeps. All functions from one other thread.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "client/app/live_connection.h"
+#include "client/app/view_report.h"
+#include "client/replay/snapshot_timeline.h"
+
+namespace strandcast {
+
+/// What there is to show and to tell, as of one moment.
+struct ViewerState {
+  uint64_t session_number = 0;  // another one after every new connection
+  bool is_connected = false;
+  std::string trouble;               // why not, and what happens next
+  std::optional<Error> final_error;  // trying again cannot help
+  Welcome welcome;
+  std::shared_ptr<const SceneAsset> asset;  // null until it came
+  StreamMode mode = StreamMode::Strands;    // what is to be shown
+  std::string mode_reason;
+  SnapshotTimeline timeline;           // strands
+  std::shared_ptr<const Image> image;  // the server's newest picture
+  uint64_t image_count = 0;
+  StreamQuality quality;
+  uint64_t quality_changes = 0;
+  ServerStatus status;
+  bool has_status = false;
+  ConnectionCounters net;
+  uint64_t decoded_frames = 0;
+  uint64_t missed_frames = 0;
+  double strand_decode_ms = 0.0;  // medians
+  double picture_decode_ms = 0.0;
+  double motion_to_decoded_ms = 0.0;
+  double playout_delay_ms = 0.0;
+  double round_trip_ms = 0.0;
+  double state_age_ms = 0.0;  // when this was made
+  int64_t made_ns = 0;
+};
+
+/// Notices that may wait for the drawing thread; the oldest give way.
+inline constexpr size_t kMaxWaitingNotices = 64;
+
+class ViewerThread {
+ public:
+  explicit ViewerThread(std::unique_ptr<LiveConnection> live);
+  /// Ends the thread.
+  ~ViewerThread();
+  ViewerThread(const ViewerThread&) = delete;
+  ViewerThread& operator=(const ViewerThread&) = delete;
+
+  /// The newest state; never null.
+  std::shared_ptr<const ViewerState> look() const;
+  /// As look(), but waits up to `timeout` for one that is newer than `last`.
+  std::shared_ptr<const ViewerState> look(const std::shared_ptr<const ViewerState>& last,
+                                          std::chrono::milliseconds timeout);
+  /// Notices since the last call.
+  std::vector<Notice> take_notices();
+  /// As ViewerClient::send, to the running connection.
+  Status send(const ClientMessage& message);
+  void set_playout(Playout playout) { playout_ = playout; }
+  /// As LiveConnection::request_mode, with the next turn of the thread.
+  void request_mode(StreamMode mode);
+  /// Ends the thread; what it measured.
+  ViewReport stop_and_report();
+
+ private:
+  void run();
+  void stop();
+  void publish();
+
+  std::unique_ptr<LiveConnection> live_;  // of the thread while it runs
+  uint64_t session_number_ = 1;
+  std::atomic<bool> is_stopping_{false};
+  std::atomic<Playout> playout_{Playout::LowLatency};
+
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable published_;
+  std::shared_ptr<const ViewerState> state_;
+  std::shared_ptr<ViewerClient> client_;
+  std::vector<Notice> notices_;
+  std::optional<StreamMode> requested_mode_;
+
+  std::thread thread_;  // last: starts when everything else is there
+};
+
+}  // namespace strandcast

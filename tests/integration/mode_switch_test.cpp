@@ -1,0 +1,223 @@
+// Changing between strands and frames in mid-session, by a person and by `auto`: somebody who watches must
+// never see nothing. A painter without OpenGL stands in for the server's, so that pictures cost nothing.
+// Counts decide, never times.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "client/app/viewer_session.h"
+#include "common/base/profile.h"
+#include "server/app/server.h"
+#include "tests/support/eventually.h"
+#include "tests/support/raw_client.h"
+#include "tests/tools/chaos_relay.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+using test::RawClient;
+using testing::HasSubstr;
+
+/// Pictures that differ from pixel to pixel and from state to state.
+class PatternPainter : public PicturePainter {
+ public:
+  Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
+    Image image{view.size.width, view.size.height, {}};
+    image.rgba.resize(size_t{4} * view.size.width * view.size.height);
+    for (size_t i = 0; i < image.rgba.size(); ++i)
+      image.rgba[i] = static_cast<uint8_t>((i / 4 * 7 + snapshot->tick * 5) % 256);
+    return image;
+  }
+};
+
+MakePicturePainter pattern_painter(const GlPainterConfig&) {
+  return []() -> Result<std::unique_ptr<PicturePainter>> {
+    return std::unique_ptr<PicturePainter>(std::make_unique<PatternPainter>());
+  };
+}
+MakePicturePainter broken_painter(const GlPainterConfig&) {
+  return []() -> Result<std::unique_ptr<PicturePainter>> {
+    return make_error(ErrorCode::Unavailable, "no OpenGL on this server");
+  };
+}
+
+class ModeSwitching : public testing::Test {
+ protected:
+  void start(uint32_t strand_count = 150, uint32_t vertex_count = 8,
+             std::function<MakePicturePainter(GlPainterConfig)> painter = pattern_painter) {
+    ServerConfig config;
+    config.scene = built_in_scene();
+    ProceduralGroomDesc groom;
+    groom.strand_count = strand_count;
+    groom.vertex_count = vertex_count;
+    config.scene.groom = groom;
+    config.scene.head.is_visible = false;
+    config.scene.stream.frame_width = 32;
+    config.scene.stream.frame_height = 24;
+    config.net.port = 0;
+    config.net.limits.link_memory_ms = 4'000;
+    config.make_painter = std::move(painter);
+    auto server = Server::start(config);
+    if (!server.ok() && server.error().code == ErrorCode::Unavailable)
+      GTEST_SKIP() << "needs OpenGL 4.5: " << server.error().to_string();
+    ASSERT_TRUE(server.ok()) << server.error().to_string();
+    server_ = std::move(*server);
+  }
+  void join(StreamMode mode, uint16_t port = 0) {
+    ClientConfig config;
+    config.address = {"127.0.0.1", port != 0 ? port : server_->port()};
+    config.hello.mode = mode;
+    auto session = ViewerSession::open(config);
+    ASSERT_TRUE(session) << session.error().to_string();
+    viewer_ = std::move(*session);
+    ASSERT_TRUE(pump_until([&] { return viewer_->has_picture(); }));
+  }
+  template <class Condition>
+  bool pump_until(Condition condition) {
+    return eventually([&] {
+             const Status pumped = viewer_->pump(milliseconds(10));
+             if (!pumped) ADD_FAILURE() << pumped.error().to_string();
+             return !pumped || condition();
+           }) &&
+           !HasFailure();
+  }
+  /// Until the viewer shows this mode and has decoded ten more frames.
+  bool pump_to(StreamMode mode) {
+    if (!pump_until([&] { return viewer_->mode() == mode; })) return false;
+    const uint64_t frames = viewer_->decoded_frames();
+    return pump_until([&] { return viewer_->decoded_frames() >= frames + 10; });
+  }
+  void expect_no_gap() const {
+    EXPECT_EQ(viewer_->blank_frames(), 0u);
+    EXPECT_EQ(viewer_->picture_stats().rejected_frames, 0u);
+  }
+
+  std::unique_ptr<Server> server_;
+  std::unique_ptr<ViewerSession> viewer_;
+};
+
+TEST_F(ModeSwitching, APersonSwitchesThereAndBackWithoutABlankFrame) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
+  for (int round = 0; round < 2; ++round) {
+    viewer_->request_mode(StreamMode::Frames);
+    ASSERT_TRUE(pump_to(StreamMode::Frames));
+    EXPECT_THAT(viewer_->mode_reason(), HasSubstr("frames were asked for"));
+    EXPECT_TRUE(eventually([&] { return server_->counters().strand_viewers == 0; }));
+    viewer_->request_mode(StreamMode::Strands);
+    ASSERT_TRUE(pump_to(StreamMode::Strands));
+    EXPECT_TRUE(eventually([&] { return server_->counters().frame_viewers == 0; }));
+  }
+  expect_no_gap();
+  EXPECT_EQ(viewer_->mode_changes(), 4u);
+  EXPECT_EQ(server_->counters().net.mode_changes, 4u);
+  EXPECT_EQ(viewer_->replay().stats().rejected_frames, 0u) << viewer_->replay().stats().last_error;
+  EXPECT_LE(viewer_->replay().stats().missed_frames, server_->counters().net.frames_dropped)
+      << "frames that were not meant for it are not missing";
+}
+
+TEST_F(ModeSwitching, WhoBeganWithFramesGetsTheAssetBeforeStrands) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Frames));
+  EXPECT_EQ(viewer_->asset(), nullptr);
+  viewer_->request_mode(StreamMode::Strands);
+  ASSERT_TRUE(pump_to(StreamMode::Strands));
+  EXPECT_NE(viewer_->asset(), nullptr);
+  EXPECT_EQ(viewer_->replay().stats().rejected_frames, 0u) << viewer_->replay().stats().last_error;
+  expect_no_gap();
+}
+
+TEST_F(ModeSwitching, FramesThatCannotBeDrawnAreRefusedAndStrandsGoOn) {
+  ASSERT_NO_FATAL_FAILURE(start(150, 8, broken_painter));
+  if (server_ == nullptr) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
+  viewer_->request_mode(StreamMode::Frames);
+  ASSERT_TRUE(pump_until([&] {
+    return viewer_->mode_reason().find("no OpenGL on this server") != std::string::npos;
+  })) << viewer_->mode_reason();
+  ASSERT_TRUE(pump_to(StreamMode::Strands));
+  EXPECT_EQ(viewer_->mode_changes(), 0u);
+  expect_no_gap();
+}
+
+TEST_F(ModeSwitching, AFloodOfRequestsCausesOneChangeASecondAtMost) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
+  const int64_t begin_ns = now_ns();
+  for (int i = 0; i < 400; ++i)
+    ASSERT_TRUE(viewer_->client().send(ModeRequest{i % 2 == 0 ? StreamMode::Strands : StreamMode::Frames}));
+  ASSERT_TRUE(pump_to(StreamMode::Frames)) << "the newest request counts";
+  const auto seconds = static_cast<uint64_t>((now_ns() - begin_ns) / 1'000'000'000);
+  EXPECT_LE(server_->counters().net.mode_changes, seconds + 1);
+  expect_no_gap();
+}
+
+TEST_F(ModeSwitching, ASourceHasNoMode) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  for (const ClientMessage& message : {ClientMessage(ModeRequest{}), ClientMessage(ViewerReport{})}) {
+    RawClient source(server_->port());
+    ASSERT_TRUE(source.handshake());
+    Hello hello;
+    hello.role = Role::Source;
+    source.send(hello);
+    ASSERT_TRUE(source.read_control<Welcome>().has_value());
+    source.send(message);
+    EXPECT_EQ(source.read_end().close_code, static_cast<uint16_t>(CloseCode::Policy));
+  }
+}
+
+TEST_F(ModeSwitching, AutoFollowsHowFastTheViewerDraws) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Auto));
+  EXPECT_EQ(viewer_->mode(), StreamMode::Strands) << "until something speaks against it";
+  ASSERT_TRUE(viewer_->client().send(ViewerReport{2.0, 500.0, 0.0, 2.0, DrawingDevice::Software}));
+  ASSERT_TRUE(pump_to(StreamMode::Frames));
+  EXPECT_THAT(viewer_->mode_reason(), HasSubstr("this machine draws 2.0 pictures per second"));
+  ASSERT_TRUE(viewer_->client().send(ViewerReport{2.0, 5.0, 1.0, 15.0, DrawingDevice::Software}));
+  ASSERT_TRUE(pump_to(StreamMode::Strands));
+  EXPECT_THAT(viewer_->mode_reason(), HasSubstr("drawn here"));
+  expect_no_gap();
+}
+
+TEST_F(ModeSwitching, AutoGivesFramesToWhoCannotDrawStrands) {
+  ASSERT_NO_FATAL_FAILURE(start());
+  if (server_ == nullptr) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Auto));
+  ASSERT_TRUE(viewer_->client().send(ViewerReport{0.0, 0.0, 0.0, 0.0, DrawingDevice::None}));
+  ASSERT_TRUE(pump_to(StreamMode::Frames));
+  EXPECT_THAT(viewer_->mode_reason(), HasSubstr("cannot draw strands"));
+  expect_no_gap();
+}
+
+TEST_F(ModeSwitching, AutoTakesFramesOnALinkTooSlowForStrandsAndComesBack) {
+  constexpr uint32_t kStrands = 240;  // long ones: no class can leave out more than half of so few
+  ASSERT_NO_FATAL_FAILURE(start(kStrands, 64));
+  if (server_ == nullptr) return;
+  chaos::RelayConfig relay;
+  relay.to_port = server_->port();
+  auto link = chaos::ChaosRelay::start(relay);
+  ASSERT_TRUE(link);
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Auto, (*link)->port()));
+  ASSERT_TRUE(pump_until([&] { return viewer_->decoded_frames() >= 90; }));
+  const StrandEncodeCounters encode = server_->counters().encode;
+  const double full = static_cast<double>(encode.delta_bytes) / static_cast<double>(encode.encodes) * 60.0;
+  chaos::LinkPlan slow;
+  const double least_share = make_strand_classes({60.0, 0.0, 1e-4f, kStrands}).back().relative_cost;
+  slow.bytes_per_s = static_cast<uint64_t>(0.3 * least_share * full);
+  (*link)->set_plan(chaos::Direction::Down, slow);
+  ASSERT_TRUE(pump_to(StreamMode::Frames)) << viewer_->mode_reason();
+  EXPECT_THAT(viewer_->mode_reason(), HasSubstr("the link takes"));
+  (*link)->set_plan(chaos::Direction::Down, {});
+  ASSERT_TRUE(pump_to(StreamMode::Strands)) << viewer_->mode_reason();
+  expect_no_gap();
+}
+
+}  // namespace
+}  // namespace strandcast
