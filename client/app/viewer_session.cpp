@@ -50,8 +50,8 @@ Status ViewerSession::pump(std::chrono::milliseconds timeout) {
       take_quality(std::move(*quality));
     } else if (auto* change = std::get_if<ModeChange>(&event)) {
       take_mode(std::move(*change));
-    } else {
-      return std::get<ClosedEvent>(event).error;
+    } else if (const auto* closed = std::get_if<ClosedEvent>(&event)) {
+      return closed->error;
     }
     if (was_shown_ && !has_picture()) ++blank_frames_;
     was_shown_ = was_shown_ || has_picture();

@@ -1,6 +1,7 @@
 #include "client/app/viewer_thread.h"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 namespace strandcast {
@@ -27,6 +28,27 @@ void ViewerThread::stop() {
 }
 
 void ViewerThread::run() {
+  try {
+    receive();
+  } catch (const std::exception& failure) {
+    fail(failure.what());
+  }
+}
+
+/// Out of memory, say: the last state stays, with the reason.
+void ViewerThread::fail(const std::string& what) {
+  auto state = std::make_shared<ViewerState>(*look());
+  state->is_connected = false;
+  state->final_error = make_error(ErrorCode::Internal, "the receiving thread failed: {}", what);
+  state->trouble = state->final_error->to_string();
+  {
+    const std::lock_guard lock(mutex_);
+    state_ = std::move(state);
+  }
+  published_.notify_one();
+}
+
+void ViewerThread::receive() {
   while (!is_stopping_) {
     live_->session().replay().set_playout(playout_);
     std::optional<StreamMode> mode;

@@ -75,6 +75,8 @@ class ViewerThread {
 
  private:
   void run();
+  void receive();
+  void fail(const std::string& what);
   void stop();
   void publish();
 

@@ -151,6 +151,18 @@ TEST(ClientSession, ALateKeyframeBringsTheStreamBack) {
   EXPECT_EQ((*session)->replay().stats().keyframe_requests, 1u);
 }
 
+TEST(ClientSession, AListThatNobodyAskedForEndsNothing) {
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(kStrands, kVertices));
+    peer.send(SessionList{});
+    peer.send(Notice{false, "done"});
+    peer.read_to_end();
+  });
+  auto session = ViewerSession::open(config_for(server.port()));
+  ASSERT_TRUE(session) << session.error().to_string();
+  while ((*session)->take_notices().empty()) ASSERT_TRUE((*session)->pump(kLong));
+}
+
 TEST(ViewerThread, DecodesAndAcknowledgesEveryFrameWhileNobodyLooks) {
   constexpr uint32_t kFrames = 50;
   std::atomic<uint32_t> acknowledged{0};
