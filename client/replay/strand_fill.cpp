@@ -1,6 +1,6 @@
 #include "client/replay/strand_fill.h"
 
-#include <glm/gtc/quaternion.hpp>
+#include <algorithm>
 
 #include "common/groom/point_tree.h"
 
@@ -9,18 +9,16 @@ namespace {
 
 /// Nearer than this two roots are one place, m.
 constexpr float kSameRootM = 1e-4f;
-/// A shorter segment has no direction, m.
-constexpr float kShortestM = 1e-7f;
+/// How much of what sets a strand's rest shape apart from its guides' it keeps: with 1 hanging hair is
+/// frizzy, with 0 it clumps. Median distance to the truth on the built-in scene in motion with 1/4 of the
+/// strands: 3.3 mm with 0, 1.8 mm with 0.5, 2.9 mm with 1.
+constexpr float kOwnShape = 0.5f;
 
-/// The shortest turn from one direction to another; none when either has no length.
-glm::quat turn_between(const glm::vec3& from, const glm::vec3& to) {
-  const float scale = glm::length(from) * glm::length(to);
-  if (!(scale > kShortestM * kShortestM)) return {1.0f, 0.0f, 0.0f, 0.0f};
-  const glm::vec3 axis = glm::cross(from, to) / scale;
-  const glm::quat turn(1.0f + glm::dot(from, to) / scale, axis.x, axis.y, axis.z);
-  constexpr float kLeastSquare = 1e-6f;  // straight back: any axis would do, none is as good
-  const float square = glm::dot(turn, turn);
-  return square > kLeastSquare ? turn * (1.0f / std::sqrt(square)) : glm::quat(1.0f, 0.0f, 0.0f, 0.0f);
+/// `along` brought to this length; `otherwise`, which has it, when it has no direction.
+glm::vec3 with_length(const glm::vec3& along, float length_m, const glm::vec3& otherwise) {
+  constexpr float kShortestM = 1e-7f;
+  const float now_m = glm::length(along);
+  return now_m > kShortestM ? along * (length_m / now_m) : otherwise;
 }
 
 }  // namespace
@@ -54,29 +52,29 @@ std::vector<glm::vec3> StrandFill::positions(const Snapshot& snapshot) {
   if (sent_count >= strand_count_ || snapshot.vertex_count != vertex_count_) return sent;
   choose_guides(sent_count);
   std::vector<glm::vec3> all(rest_in_head_m_.size());
-  std::vector<glm::quat> turn(sent_count);
   for (size_t v = 0; v < vertex_count_; ++v) {
     const glm::vec3* rest = rest_in_head_m_.data() + v * strand_count_;
-    const glm::vec3* row = sent.data() + v * sent_count;
     glm::vec3* out = all.data() + v * strand_count_;
-    for (uint32_t s = 0; s < sent_count; ++s) {
-      out[s] = row[s];
-      if (v > 0) turn[s] = turn_between(rest[s] - (rest - strand_count_)[s], row[s] - (row - sent_count)[s]);
-    }
+    std::copy_n(sent.data() + v * sent_count, sent_count, out);
     for (uint32_t s = sent_count; s < strand_count_; ++s) {
       const Guides& guides = guides_[s - sent_count];
-      glm::vec3 moved(0.0f);
-      glm::quat turned(0.0f, 0.0f, 0.0f, 0.0f);
+      glm::vec3 moved(0.0f);  // the guides' root, or their segment, less where it is at rest
+      glm::vec3 guides_rest(0.0f);
       for (size_t i = 0; i < kGuides; ++i) {
         const uint32_t guide = guides.strand[i];
-        if (v == 0) moved += guides.weight[i] * (row[guide] - rest[guide]);
-        // Of the two signs of a turn the one on the same side as the first guide's.
-        const float side = glm::dot(turn[guide], turn[guides.strand[0]]) < 0.0f ? -1.0f : 1.0f;
-        turned = turned + turn[guide] * (side * guides.weight[i]);
+        const float weight = guides.weight[i];
+        const glm::vec3 at_rest = v == 0 ? rest[guide] : rest[guide] - (rest - strand_count_)[guide];
+        const glm::vec3 now = v == 0 ? out[guide] : out[guide] - (out - strand_count_)[guide];
+        moved += weight * (now - at_rest);
+        guides_rest += weight * at_rest;
       }
-      out[s] =
-          v == 0 ? rest[s] + moved
-                 : (out - strand_count_)[s] + glm::normalize(turned) * (rest[s] - (rest - strand_count_)[s]);
+      if (v == 0) {
+        out[s] = rest[s] + moved;
+        continue;
+      }
+      const glm::vec3 own = rest[s] - (rest - strand_count_)[s];
+      const glm::vec3 along = moved + guides_rest + kOwnShape * (own - guides_rest);
+      out[s] = (out - strand_count_)[s] + with_length(along, glm::length(own), own);
     }
   }
   return all;

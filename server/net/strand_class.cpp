@@ -15,7 +15,8 @@ namespace {
 constexpr double kRatePower = 0.54;
 /// Measured likewise, from 0.1 mm to 0.5 mm: 0.60 to 0.67.
 constexpr double kCoarseCost = 0.63;
-/// And with this power of the share of strands: neighbours that are farther away say less.
+/// And with this power of the share of strands: neighbours that are farther away say less. Measured on the
+/// built-in scene, shares 1/2 to 1/8: 1.00 to 0.92.
 constexpr double kSharePower = 0.95;
 /// A lattice that is coarser by less saves too little to be worth a keyframe.
 constexpr uint32_t kLeastCoarsening = 2;
