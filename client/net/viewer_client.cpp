@@ -243,7 +243,7 @@ class ViewerClient::Connection {
   void read_next() {
     ws_.async_read(buffer_, [this](error_code failure, size_t) {
       if (is_finished_) return;
-      if (failure) return finish(error_from_read(failure));
+      if (failure) return finish(error_from_stream(failure));
       const auto data = buffer_.cdata();
       const std::span bytes(static_cast<const std::byte*>(data.data()), data.size());
       if (auto handled = handle(bytes); !handled) {
@@ -255,7 +255,7 @@ class ViewerClient::Connection {
     });
   }
 
-  Error error_from_read(const error_code& failure) {
+  Error error_from_stream(const error_code& failure) {
     const auto& close = ws_.reason();
     const std::string reason =
         goodbye_.empty() ? printable(std::string_view(close.reason.data(), close.reason.size())) : goodbye_;
@@ -386,8 +386,8 @@ class ViewerClient::Connection {
         ++counters_.sent_messages;
       }
       if (is_finished_) return;
-      if (failure)
-        return finish(make_error(ErrorCode::Unavailable, "connection lost: {}", failure.message()));
+      // Whichever comes first, the read or a write, is told that the time is over.
+      if (failure) return finish(error_from_stream(failure));
       write_next();
     });
   }
