@@ -7,7 +7,7 @@ packages=(
   g++ cmake ninja-build pkg-config protobuf-compiler
   libboost1.81-dev libprotobuf-dev libzstd-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev libglm-dev
   libegl-dev libepoxy-dev libegl1 libgl1-mesa-dri libglfw3-dev libimgui-dev
-  libturbojpeg0-dev libpng-dev libwebp-dev libgtest-dev libgmock-dev libbenchmark-dev libbullet-dev
+  libturbojpeg0-dev libpng-dev libwebp-dev libvpx-dev libyuv-dev libgtest-dev libgmock-dev libbenchmark-dev libbullet-dev
   libmeshoptimizer-dev libdraco-dev libzfp-dev
   "$@"
 )

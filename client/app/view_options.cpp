@@ -1,6 +1,7 @@
 #include "client/app/view_options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <iostream>
 #include <map>
@@ -70,8 +71,9 @@ ClientConfig client_config(const ViewOptions& options) {
   config.hello.mode = options.mode;
   config.hello.name = "strandcast-view";
   config.hello.token = options.token;
-  config.hello.frame_width = options.size.width;
-  config.hello.frame_height = options.size.height;
+  config.hello.frame_width = std::min(options.size.width, kMaxPictureWidth);
+  config.hello.frame_height = std::min(options.size.height, kMaxPictureHeight);
+  config.hello.picture_codecs = options.picture_codecs;
   return config;
 }
 
@@ -81,6 +83,7 @@ namespace {
 struct RawOptions {
   std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
   std::string mode = "auto";
+  std::string pictures = "any";
   std::string size = "960x540";
   std::string clip_size;  // empty = as size
   std::string token_file;
@@ -93,6 +96,9 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
   app.add_option("--mode", raw.mode,
                  "strands: drawn here; frames: the server's pictures; auto: whichever is better now")
+      ->capture_default_str();
+  app.add_option("--pictures", raw.pictures, "In frames mode: jpeg, tiles, vp8 or any (the server chooses)")
+      ->check(CLI::IsMember({"jpeg", "tiles", "vp8", "any"}))
       ->capture_default_str();
   app.add_option("--token-file", raw.token_file,
                  "File with the token: the token alone, or lines 'role token'");
@@ -136,6 +142,8 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     ASSIGN_OR_RETURN(options.token, load_token(raw.token_file, role_of(options)));
   }
   if (raw.seconds > 0.0) options.seconds = raw.seconds;
+  for (const PictureCodec codec : {PictureCodec::Jpeg, PictureCodec::JpegTiles, PictureCodec::Vp8})
+    if (raw.pictures == to_string(codec)) options.picture_codecs = codec_bit(codec);
   if (raw.playout == "smooth") options.playout = Playout::Smooth;
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,

@@ -66,7 +66,8 @@ ViewReport make_report(ViewerSession& session) {
   out.count("mode_changes", session.mode_changes());
   out.count("blank_frames", session.blank_frames());
   out.word("scene", welcome.scene_name);
-  out.word("codec", is_frames ? "jpeg" : welcome.codec);
+  const FrameQuality quality = session.frame_quality().value_or(FrameQuality{});
+  out.word("codec", is_frames ? to_string(quality.codec) : welcome.codec);
   out.count("strands", welcome.strand_count);
   out.count("vertices_per_strand", welcome.vertex_count);
   out.number("bound_mm", static_cast<double>(welcome.bound_m) * 1e3, 3);
@@ -95,6 +96,11 @@ ViewReport make_report(ViewerSession& session) {
   out.count("rate_divisor", session.quality().rate_divisor);
   out.number("quality_bound_mm", static_cast<double>(session.quality().bound_m) * 1e3, 3);
   out.count("quality_changes", session.quality_changes());
+  out.count("picture_width", quality.width);
+  out.count("picture_height", quality.height);
+  out.count("picture_quality", quality.quality);
+  out.number("picture_rate_hz", quality.rate_hz, 2);
+  out.count("whole_pictures", pictures.whole_frames);
   out.number("queue_delay_ms", server.queue_delay_ms, 1);
   out.number("server_sim_ms", server.sim_ms, 3);
   out.number("server_encode_ms", server.encode_ms, 3);

@@ -21,6 +21,7 @@ bool is_blank(const Image& image) {
 Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
   ClientConfig acknowledging = config;
   acknowledging.hello.acknowledges = true;
+  if (acknowledging.hello.picture_codecs == 0) acknowledging.hello.picture_codecs = kAllPictureCodecs;
   ASSIGN_OR_RETURN(auto client, ViewerClient::connect(acknowledging));
   std::unique_ptr<ViewerSession> session(new ViewerSession(std::move(client)));
   ViewerClient* requester = session->client_.get();
@@ -48,6 +49,8 @@ Status ViewerSession::pump(std::chrono::milliseconds timeout) {
       notices_.push_back(std::move(*notice));
     } else if (auto* quality = std::get_if<StreamQuality>(&event)) {
       take_quality(std::move(*quality));
+    } else if (auto* frame_quality = std::get_if<FrameQuality>(&event)) {
+      take_quality(std::move(*frame_quality));
     } else if (auto* change = std::get_if<ModeChange>(&event)) {
       take_mode(std::move(*change));
     } else if (const auto* closed = std::get_if<ClosedEvent>(&event)) {
@@ -90,6 +93,13 @@ void ViewerSession::take_quality(StreamQuality quality) {
            quality_.strand_share * 1e2, quality_.rate_divisor, quality_.bound_m * 1e3, quality_.reason);
 }
 
+void ViewerSession::take_quality(FrameQuality quality) {
+  frame_quality_ = std::move(quality);
+  log_info("replay", "pictures of {} x {} by {}, quality {}, at most {:.3g} Hz: {}", frame_quality_->width,
+           frame_quality_->height, to_string(frame_quality_->codec), frame_quality_->quality,
+           frame_quality_->rate_hz, frame_quality_->reason);
+}
+
 Status ViewerSession::handle(MediaEvent& event) {
   const int64_t begin_ns = now_ns();
   switch (event.header.opcode) {
@@ -106,6 +116,8 @@ Status ViewerSession::handle(MediaEvent& event) {
       }
       return {};
     case Opcode::JpegFrame:
+    case Opcode::JpegTiles:
+    case Opcode::Vp8Frame:
       take_picture(event);
       return {};
     case Opcode::Control:
@@ -131,19 +143,23 @@ void ViewerSession::take_picture(const MediaEvent& event) {
   const int64_t begin_ns = now_ns();
   ++picture_stats_.received_frames;
   picture_stats_.received_bytes += event.message.size();
-  auto image = decode_jpeg(event.payload());
-  if (!image) {
+  const FrameHeader& header = event.header;
+  if (const Status decoded = pictures_.decode(header, event.payload()); !decoded) {
     ++picture_stats_.rejected_frames;
-    log_debug("replay", "picture {} not used: {}", event.header.sequence, image.error().to_string());
+    log_debug("replay", "picture {} not used: {}", header.sequence, decoded.error().to_string());
+    client_->request_keyframe();
     return;
   }
   show(StreamMode::Frames);
-  if (last_picture_sequence_ != 0 && event.header.sequence > last_picture_sequence_ + 1)
-    picture_stats_.missed_frames += event.header.sequence - last_picture_sequence_ - 1;
-  last_picture_sequence_ = event.header.sequence;
+  if (header.base_sequence == 0) ++picture_stats_.whole_frames;
+  const bool is_same_stream = last_picture_sequence_ != 0 && header.stream_id == last_picture_stream_;
+  if (is_same_stream && header.sequence > last_picture_sequence_ + 1)
+    picture_stats_.missed_frames += header.sequence - last_picture_sequence_ - 1;
+  last_picture_sequence_ = header.sequence;
+  last_picture_stream_ = header.stream_id;
   picture_decode_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
-  if (is_blank(*image)) ++blank_frames_;
-  image_ = std::make_shared<const Image>(std::move(image).value());
+  image_ = std::make_shared<const Image>(*pictures_.image());
+  if (is_blank(*image_)) ++blank_frames_;
   ++image_count_;
   acknowledge(event, begin_ns);
 }

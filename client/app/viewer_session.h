@@ -14,7 +14,7 @@
 #include "client/replay/strand_replay.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
-#include "common/codec/image_codec.h"
+#include "common/codec/picture_decoder.h"
 #include "common/codec/scene_asset.h"
 
 namespace strandcast {
@@ -30,6 +30,7 @@ struct PictureStats {  // frames mode
   uint64_t received_bytes = 0;
   uint64_t rejected_frames = 0;
   uint64_t missed_frames = 0;
+  uint64_t whole_frames = 0;  // that needed no other
 };
 
 class ViewerSession {
@@ -74,6 +75,9 @@ class ViewerSession {
   const StreamQuality& quality() const { return quality_; }
   uint64_t quality_changes() const { return quality_changes_; }
 
+  /// How the server makes pictures for this viewer; nothing before it said so.
+  const std::optional<FrameQuality>& frame_quality() const { return frame_quality_; }
+
   const ServerStatus& status() const { return status_; }
   bool has_status() const { return has_status_; }
   /// Notices since the last call.
@@ -92,6 +96,7 @@ class ViewerSession {
   Status take_asset(const MediaEvent& event);
   void take_picture(const MediaEvent& event);
   void take_quality(StreamQuality quality);
+  void take_quality(FrameQuality quality);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
   void show(StreamMode mode);
@@ -100,7 +105,8 @@ class ViewerSession {
   std::shared_ptr<ViewerClient> client_;
   std::unique_ptr<StrandReplay> replay_;
   std::shared_ptr<const SceneAsset> asset_;
-  std::shared_ptr<const Image> image_;
+  PictureDecoder pictures_;
+  std::shared_ptr<const Image> image_;  // a copy: others may still show it when the next one is decoded
   StreamMode mode_ = StreamMode::Strands;
   std::string mode_reason_;
   uint64_t mode_changes_ = 0;
@@ -110,6 +116,8 @@ class ViewerSession {
   uint64_t blank_frames_ = 0;
   uint64_t image_count_ = 0;
   uint32_t last_picture_sequence_ = 0;
+  uint16_t last_picture_stream_ = 0;
+  std::optional<FrameQuality> frame_quality_;
   StreamQuality quality_;
   uint64_t quality_changes_ = 0;
   ServerStatus status_;

@@ -11,6 +11,16 @@ bool is_strand_frame(Opcode opcode) {
   return opcode == Opcode::StrandKeyframe || opcode == Opcode::StrandDelta;
 }
 
+/// Pictures that may build on the one before.
+bool is_chained_picture(Opcode opcode) {
+  return opcode == Opcode::JpegTiles || opcode == Opcode::Vp8Frame;
+}
+
+bool stands_alone(const FrameHeader& header) {
+  return is_chained_picture(header.opcode) ? header.base_sequence == 0
+                                           : header.opcode == Opcode::StrandKeyframe;
+}
+
 }  // namespace
 
 template <class Predicate>
@@ -30,32 +40,35 @@ Mailbox::Outcome Mailbox::push(MediaEvent event) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return Outcome::Kept;
   const Opcode opcode = event.header.opcode;
-  if (!is_strand_frame(opcode)) {
-    erase_media([opcode](Opcode other) { return other == opcode; });
-    append(std::move(event));
-    return Outcome::Kept;
-  }
+  if (is_strand_frame(opcode)) return push_chained(std::move(event), strands_);
+  if (is_chained_picture(opcode)) return push_chained(std::move(event), pictures_);
+  erase_media([opcode](Opcode other) { return other == opcode; });
+  append(std::move(event));
+  return Outcome::Kept;
+}
 
-  if (opcode == Opcode::StrandKeyframe) is_waiting_for_keyframe_ = false;
-  if (is_waiting_for_keyframe_) {
+Mailbox::Outcome Mailbox::push_chained(MediaEvent event, Lane& lane) {
+  const bool is_alone = stands_alone(event.header);
+  if (is_alone) lane.is_waiting_for_keyframe = false;
+  if (lane.is_waiting_for_keyframe) {
     ++dropped_strand_frames_;
     return Outcome::KeyframeNeeded;
   }
-  const bool overflows = strand_frame_count_ + 1 > limits_.strand_frames ||
-                         strand_bytes_ + event.message.size() > limits_.strand_bytes;
+  const bool overflows = lane.frame_count + 1 > limits_.strand_frames ||
+                         lane.bytes + event.message.size() > limits_.strand_bytes;
   if (overflows) {
-    dropped_strand_frames_ += erase_media(is_strand_frame);
-    strand_frame_count_ = 0;
-    strand_bytes_ = 0;
+    const bool is_strands = is_strand_frame(event.header.opcode);
+    dropped_strand_frames_ += erase_media(is_strands ? is_strand_frame : is_chained_picture);
+    lane = {};
     // A keyframe stands alone, so it may start the queue afresh; a delta cannot be used any more.
-    if (opcode == Opcode::StrandDelta) {
+    if (!is_alone) {
       ++dropped_strand_frames_;
-      is_waiting_for_keyframe_ = true;
+      lane.is_waiting_for_keyframe = true;
       return Outcome::KeyframeNeeded;
     }
   }
-  ++strand_frame_count_;
-  strand_bytes_ += event.message.size();
+  ++lane.frame_count;
+  lane.bytes += event.message.size();
   append(std::move(event));
   return Outcome::Kept;
 }
@@ -84,6 +97,10 @@ void Mailbox::push(const ModeChange& change) {
   keep_newest(change);
 }
 
+void Mailbox::push(const FrameQuality& quality) {
+  keep_newest(quality);
+}
+
 void Mailbox::push(Notice notice) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return;
@@ -110,8 +127,10 @@ std::vector<ClientEvent> Mailbox::wait(std::chrono::milliseconds timeout) {
   std::vector<ClientEvent> taken(std::make_move_iterator(events_.begin()),
                                  std::make_move_iterator(events_.end()));
   events_.clear();
-  strand_frame_count_ = 0;
-  strand_bytes_ = 0;
+  for (Lane* lane : {&strands_, &pictures_}) {
+    lane->frame_count = 0;
+    lane->bytes = 0;
+  }
   return taken;
 }
 

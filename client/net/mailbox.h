@@ -1,6 +1,6 @@
 // Mailbox: hands what the network thread received to the application thread; bounded in every kind. Strand
-// frames keep their order (a delta needs every frame before it); pictures, assets, status, quality and mode
-// keep only the newest. Any thread. Does not decode.
+// frames keep their order (a delta needs every frame before it), and so do pictures that build on each other;
+// whole pictures, assets, status, qualities and mode keep only the newest. Any thread. Does not decode.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,7 @@
 
 namespace strandcast {
 
-/// One media message as received: asset, strand frame or JPEG picture. Header checked, payload not.
+/// One media message as received: asset, strand frame or picture. Header checked, payload not.
 struct MediaEvent {
   FrameHeader header;
   std::vector<std::byte> message;  // header + payload
@@ -32,12 +32,12 @@ struct ClosedEvent {
   Error error;
 };
 
-using ClientEvent =
-    std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, ModeChange, SessionList, ClosedEvent>;
+using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, FrameQuality, ModeChange,
+                                 SessionList, ClosedEvent>;
 
 struct MailboxLimits {
-  size_t strand_frames = 240;            // four seconds at 60 Hz
-  uint64_t strand_bytes = 128ull << 20;  // at least one message of the largest size fits
+  size_t strand_frames = 240;            // four seconds at 60 Hz; as many pictures that build on each other
+  uint64_t strand_bytes = 128ull << 20;  // likewise; at least one message of the largest size fits
   size_t notices = 64;
 };
 
@@ -48,12 +48,13 @@ class Mailbox {
   enum class Outcome { Kept, KeyframeNeeded };
 
   /// Takes a media message. When strand frames pass their limit all of them are dropped, and so is every
-  /// delta until the next keyframe; KeyframeNeeded tells the caller to ask for one.
+  /// delta until the next keyframe; KeyframeNeeded tells the caller to ask for one. Likewise pictures.
   Outcome push(MediaEvent event);
   void push(const ServerStatus& status);
   void push(const StreamQuality& quality);
   void push(const SessionList& list);
   void push(const ModeChange& change);
+  void push(const FrameQuality& quality);
   /// The oldest notice gives way when there are too many.
   void push(Notice notice);
   /// Adds the final event; later pushes are ignored.
@@ -64,10 +65,12 @@ class Mailbox {
   /// As take(), but waits for the first event up to `timeout`.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
 
-  /// Strand frames thrown away because the application did not keep up.
+  /// Strand frames and pictures thrown away because the application did not keep up.
   uint64_t dropped_strand_frames() const;
 
  private:
+  struct Lane;
+  Outcome push_chained(MediaEvent event, Lane& lane);
   template <class Predicate>
   size_t erase_media(Predicate predicate);
   template <class Event>
@@ -78,10 +81,14 @@ class Mailbox {
   mutable std::mutex mutex_;
   std::condition_variable arrived_;
   std::deque<ClientEvent> events_;
-  size_t strand_frame_count_ = 0;
-  uint64_t strand_bytes_ = 0;
+  struct Lane {  // frames that build on each other
+    size_t frame_count = 0;
+    uint64_t bytes = 0;
+    bool is_waiting_for_keyframe = false;
+  };
+  Lane strands_;
+  Lane pictures_;
   uint64_t dropped_strand_frames_ = 0;
-  bool is_waiting_for_keyframe_ = false;
   bool is_closed_ = false;
 };
 

@@ -358,6 +358,14 @@ class ViewerClient::Connection {
     return is_welcome_
                ? Status()
                : make_error(ErrorCode::BadInput, "the server sent a change of mode before its Welcome");
+}
+
+  Status handle_control(FrameQuality& quality) {
+    quality.reason = printable(quality.reason);
+    if (is_welcome_) mailbox_.push(quality);
+    return is_welcome_
+               ? Status()
+               : make_error(ErrorCode::BadInput, "the server sent a frame quality before its Welcome");
   }
 
   Status handle_control(Notice& notice) {

@@ -15,6 +15,8 @@ bool is_media(Opcode opcode) {
     case Opcode::StrandKeyframe:
     case Opcode::StrandDelta:
     case Opcode::JpegFrame:
+    case Opcode::JpegTiles:
+    case Opcode::Vp8Frame:
       return true;
     case Opcode::Control:
       return false;
@@ -58,8 +60,8 @@ Result<FrameHeader> unpack_frame_header(std::span<const std::byte> message) {
   header.sim_time_ns = reader.take<int64_t>();
   header.send_time_ns = reader.take<int64_t>();
   if (!is_media(header.opcode))
-    return make_error(ErrorCode::BadInput, "unknown media opcode 0x{:02x} (known: 0x10, 0x20, 0x21, 0x30)",
-                      opcode);
+    return make_error(ErrorCode::BadInput,
+                      "unknown media opcode 0x{:02x} (known: 0x10, 0x20, 0x21, 0x30, 0x31, 0x32)", opcode);
   if (header.payload_bytes > kMaxMediaPayloadBytes)
     return make_error(ErrorCode::LimitExceeded, "media payload of {} bytes, the limit is {}",
                       header.payload_bytes, kMaxMediaPayloadBytes);

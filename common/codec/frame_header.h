@@ -17,16 +17,24 @@ enum class Opcode : uint8_t {
   Asset = 0x10,    // SceneAsset: groom topology and head mesh
   StrandKeyframe = 0x20,
   StrandDelta = 0x21,
-  JpegFrame = 0x30,
+  JpegFrame = 0x30,  // one whole picture
+  JpegTiles = 0x31,  // the tiles that changed, or all
+  Vp8Frame = 0x32,
 };
 
 inline constexpr size_t kFrameHeaderBytes = 32;
+/// Set in the stream_id of pictures, so that none is a strand stream's.
+inline constexpr uint16_t kPictureStreamBit = 0x8000;
+/// The stream_id of a picture class.
+constexpr uint16_t picture_stream_id(uint32_t picture_class) {
+  return static_cast<uint16_t>(kPictureStreamBit | (picture_class & (kPictureStreamBit - 1u)));
+}
 inline constexpr uint32_t kMaxMediaPayloadBytes = 64u << 20;
 
 struct FrameHeader {
   Opcode opcode = Opcode::StrandDelta;
   uint8_t flags = 0;           // reserved, 0
-  uint16_t stream_id = 0;      // strands: the class they are coded for
+  uint16_t stream_id = 0;      // the strand class; of pictures, their class and kPictureStreamBit
   uint32_t sequence = 0;       // counts per stream, from 1
   uint32_t base_sequence = 0;  // a delta decodes only right after this one; 0 = none needed
   uint32_t payload_bytes = 0;

@@ -69,7 +69,7 @@ Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality) {
   return std::vector<std::byte>(begin, begin + size);
 }
 
-Result<Image> decode_jpeg(std::span<const std::byte> bytes) {
+Result<Image> decode_jpeg(std::span<const std::byte> bytes, ImageLimit limit) {
   const TurboHandle turbo(tjInitDecompress());
   if (!turbo) return make_error(ErrorCode::Internal, "cannot start the JPEG decoder");
   const auto* source = reinterpret_cast<const unsigned char*>(bytes.data());
@@ -83,6 +83,9 @@ Result<Image> decode_jpeg(std::span<const std::byte> bytes) {
   image.width = static_cast<uint32_t>(width);
   image.height = static_cast<uint32_t>(height);
   RETURN_IF_ERROR(check_image_size(image.width, image.height));
+  if (image.width > limit.width || image.height > limit.height)
+    return make_error(ErrorCode::LimitExceeded, "JPEG picture of {} x {} pixels, the limit is {} x {}",
+                      image.width, image.height, limit.width, limit.height);
   image.rgba.resize(static_cast<size_t>(image.width) * image.height * kChannels);
   // A picture with thousands of progressive scans, or with warnings, is not one of ours.
   const int failed = tjDecompress2(turbo.get(), source, bytes.size(), image.rgba.data(), width, 0, height,

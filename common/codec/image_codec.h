@@ -27,9 +27,13 @@ struct Image {
 /// quality 1..100, 4:2:0; alpha is dropped. BadInput for an empty image or one whose sizes disagree,
 /// LimitExceeded above kMaxImageSide.
 Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality);
-/// Untrusted input: size is read from the header and checked against kMaxImageSide before allocation; damaged
+struct ImageLimit {
+  uint32_t width = kMaxImageSide;
+  uint32_t height = kMaxImageSide;
+};
+/// Untrusted input: the size is read from the header and checked against the limit before allocation; damaged
 /// or cut-off pictures are BadInput.
-Result<Image> decode_jpeg(std::span<const std::byte> bytes);
+Result<Image> decode_jpeg(std::span<const std::byte> bytes, ImageLimit limit = {});
 
 inline constexpr uint64_t kMaxPngFileBytes = 256ull << 20;
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/groom/procedural.h"
+#include "common/scene/picture_size.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast::scene_fields {
@@ -52,7 +53,8 @@ inline constexpr Range kDirection{-1e3, 1e3, ""};
 inline constexpr Range kCameraOffset{-100.0, 100.0, "m"};
 inline constexpr Range kFieldOfView{0.02, 2.8, "rad"};
 inline constexpr Range kStreamBound{2e-5, 5e-4, "m"};
-inline constexpr Range kFrameSize{16, 4096, "pixels"};
+inline constexpr Range kFrameWidth{kMinPictureSide, kMaxPictureWidth, "pixels"};
+inline constexpr Range kFrameHeight{kMinPictureSide, kMaxPictureHeight, "pixels"};
 inline constexpr Range kJpegQuality{1, 100, ""};
 inline constexpr Range kFrameRate{0.1, 240.0, "Hz"};
 
@@ -113,8 +115,8 @@ void visit_stream(Visitor& v, StreamDesc& stream) {
   v.require("codec", stream.codec == "delta" || stream.codec == "raw" || stream.codec == "tangent",
             "is unknown (known: delta, raw, tangent)");
   v.number("bound_m", stream.bound_m, kStreamBound);
-  v.number("frame_width", stream.frame_width, kFrameSize);
-  v.number("frame_height", stream.frame_height, kFrameSize);
+  v.number("frame_width", stream.frame_width, kFrameWidth);
+  v.number("frame_height", stream.frame_height, kFrameHeight);
   v.number("jpeg_quality", stream.jpeg_quality, kJpegQuality);
   v.number("frame_rate_hz", stream.frame_rate_hz, kFrameRate);
 }

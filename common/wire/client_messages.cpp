@@ -16,6 +16,7 @@ void put(const Hello& hello, v1::ClientMessage& message) {
   out.set_frame_width(hello.frame_width);
   out.set_frame_height(hello.frame_height);
   out.set_acknowledges(hello.acknowledges);
+  out.set_picture_codecs(hello.picture_codecs);
 }
 
 void put(const MotionSamples& motion, v1::ClientMessage& message) {
@@ -103,10 +104,11 @@ Hello take(const v1::Hello& message, FieldCheck& check) {
   hello.frame_width = message.frame_width();
   hello.frame_height = message.frame_height();
   hello.acknowledges = message.acknowledges();
+  hello.picture_codecs = message.picture_codecs();  // bits that this version does not know mean nothing
   check.text("hello.name", hello.name, kMaxNameChars);
   check.count("hello.token", hello.token.size(), kMaxTokenBytes);
-  check.frame_side("hello.frame_width", hello.frame_width);
-  check.frame_side("hello.frame_height", hello.frame_height);
+  check.frame_side("hello.frame_width", hello.frame_width, scene_fields::kFrameWidth);
+  check.frame_side("hello.frame_height", hello.frame_height, scene_fields::kFrameHeight);
   return hello;
 }
 

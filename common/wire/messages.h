@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/codec/picture.h"
 #include "common/math/pose.h"
 #include "common/scene/scene_desc.h"
 
@@ -46,6 +47,7 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   std::string token;                           // empty on loopback
   uint32_t frame_width = 0, frame_height = 0;  // frames mode; 0 = server's choice
   bool acknowledges = false;                   // will send a FrameAck for every media message it can use
+  PictureCodecs picture_codecs = 0;            // what it decodes besides whole JPEG pictures
 };
 struct MotionSamples {  // from a Source
   struct Sample {
@@ -151,6 +153,14 @@ struct ModeChange {                       // what the client gets from the next 
   std::string reason;                     // for a person
   uint32_t frame_width = 0, frame_height = 0;
 };
+struct FrameQuality {      // how pictures are made for this viewer from the next whole one on
+  uint16_t stream_id = 0;  // of the frames it is about
+  uint32_t width = 0, height = 0;
+  double rate_hz = 0.0;  // at most
+  uint32_t quality = 0;  // 1..100, as in JPEG
+  PictureCodec codec = PictureCodec::Jpeg;
+  std::string reason;  // for a person
+};
 struct Goodbye {       // the server closes right after it
   std::string reason;  // one sentence
 };
@@ -171,8 +181,8 @@ struct SessionInfo {
 struct SessionList {                  // answer to an AdminCommand
   std::vector<SessionInfo> sessions;  // at most kMaxListedSessions
 };
-using ServerMessage =
-    std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange, SessionList>;
+using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange,
+                                   SessionList, FrameQuality>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

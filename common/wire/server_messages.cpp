@@ -93,6 +93,17 @@ void put(const ModeChange& change, v1::ServerMessage& message) {
   out.set_frame_height(change.frame_height);
 }
 
+void put(const FrameQuality& quality, v1::ServerMessage& message) {
+  v1::FrameQuality& out = *message.mutable_frame_quality();
+  out.set_stream_id(quality.stream_id);
+  out.set_width(quality.width);
+  out.set_height(quality.height);
+  out.set_rate_hz(quality.rate_hz);
+  out.set_quality(quality.quality);
+  out.set_codec(static_cast<v1::PictureCodec>(quality.codec));
+  out.set_reason(printable(quality.reason, kMaxTextChars));
+}
+
 // ---- protobuf to domain ----
 
 bool is_session_id(const std::string& text) {
@@ -130,8 +141,8 @@ Welcome take(const v1::Welcome& message, FieldCheck& check) {
   check.number("welcome.vertex_count", welcome.vertex_count, scene_fields::kVertexCount);
   check.number("welcome.bound_m", welcome.bound_m, scene_fields::kStreamBound);
   check.number("welcome.step_rate_hz", welcome.step_rate_hz, scene_fields::kStepRate);
-  check.frame_side("welcome.frame_width", welcome.frame_width);
-  check.frame_side("welcome.frame_height", welcome.frame_height);
+  check.frame_side("welcome.frame_width", welcome.frame_width, scene_fields::kFrameWidth);
+  check.frame_side("welcome.frame_height", welcome.frame_height, scene_fields::kFrameHeight);
   return welcome;
 }
 
@@ -208,10 +219,29 @@ SessionList take(const v1::SessionList& message, FieldCheck& check) {
 
 ModeChange take(const v1::ModeChange& message, FieldCheck& check) {
   check.text("mode_change.reason", message.reason(), kMaxTextChars);
-  check.frame_side("mode_change.frame_width", message.frame_width());
-  check.frame_side("mode_change.frame_height", message.frame_height());
+  check.frame_side("mode_change.frame_width", message.frame_width(), scene_fields::kFrameWidth);
+  check.frame_side("mode_change.frame_height", message.frame_height(), scene_fields::kFrameHeight);
   return {check.choice("mode_change.mode", message.mode(), v1::STREAM_MODE_STRANDS, StreamMode::Frames),
           message.reason(), message.frame_width(), message.frame_height()};
+}
+
+FrameQuality take(const v1::FrameQuality& message, FieldCheck& check) {
+  FrameQuality quality;
+  check.count("frame_quality.stream_id", message.stream_id(), UINT16_MAX);
+  check.number("frame_quality.width", message.width(), scene_fields::kFrameWidth);
+  check.number("frame_quality.height", message.height(), scene_fields::kFrameHeight);
+  check.number("frame_quality.rate_hz", message.rate_hz(), scene_fields::kFrameRate);
+  check.number("frame_quality.quality", message.quality(), scene_fields::kJpegQuality);
+  check.text("frame_quality.reason", message.reason(), kMaxTextChars);
+  quality.stream_id = static_cast<uint16_t>(message.stream_id());
+  quality.width = message.width();
+  quality.height = message.height();
+  quality.rate_hz = message.rate_hz();
+  quality.quality = message.quality();
+  quality.codec =
+      check.choice("frame_quality.codec", message.codec(), v1::PICTURE_CODEC_JPEG, PictureCodec::Vp8);
+  quality.reason = message.reason();
+  return quality;
 }
 
 Result<ServerMessage> take(const v1::ServerMessage& message) {
@@ -241,6 +271,9 @@ Result<ServerMessage> take(const v1::ServerMessage& message) {
       break;
     case v1::ServerMessage::kModeChange:
       result = take(message.mode_change(), check);
+      break;
+    case v1::ServerMessage::kFrameQuality:
+      result = take(message.frame_quality(), check);
       break;
     case v1::ServerMessage::KIND_NOT_SET:
       return make_error(ErrorCode::BadInput, "server message is of no kind that protocol {} knows",

@@ -144,8 +144,8 @@ void FieldCheck::measure(const char* field, double value) {
     fail(field, make_error(ErrorCode::BadInput, "is {}, it must be finite and not negative", value));
 }
 
-void FieldCheck::frame_side(const char* field, uint32_t value) {
-  if (value != 0) number(field, value, scene_fields::kFrameSize);
+void FieldCheck::frame_side(const char* field, uint32_t value, const scene_fields::Range& range) {
+  if (value != 0) number(field, value, range);
 }
 
 void FieldCheck::text(const char* field, const std::string& value, size_t limit) {

@@ -41,7 +41,7 @@ class FieldCheck {
   /// A time or rate: finite and not negative.
   void measure(const char* field, double value);
   /// Picture size: 0 or within its range.
-  void frame_side(const char* field, uint32_t value);
+  void frame_side(const char* field, uint32_t value, const scene_fields::Range& range);
   /// Printable text (proto3 has checked that it is UTF-8) of at most `limit` characters.
   void text(const char* field, const std::string& value, size_t limit);
   void count(const char* field, size_t value, size_t limit);

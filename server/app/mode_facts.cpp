@@ -18,7 +18,7 @@ ModeFacts gather_mode_facts(const ModeSources& sources) {
   const FrameCounters& pictures = sources.pictures;
   const bool is_measured = pictures.frames > 0;
   const double guessed_ms = sources.is_software ? kGuessedSoftwareMsPerPixel * pixels : kGuessedHardwareMs;
-  const double one_ms = is_measured ? pictures.paint_median_ms + pictures.jpeg_median_ms : guessed_ms;
+  const double one_ms = is_measured ? pictures.paint_median_ms + pictures.encode_median_ms : guessed_ms;
   facts.paint_ms = one_ms * static_cast<double>(sources.view_count);
   facts.picture_bytes = is_measured
                             ? static_cast<double>(pictures.bytes) / static_cast<double>(pictures.frames)

@@ -71,6 +71,10 @@ class Server::State : public NetHandler {
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_ack(SessionId, const FrameAck&) override {}
   void on_keyframe_request(SessionId, uint16_t stream_id) override { encoder(stream_id).request_keyframe(); }
+  void on_picture_request(SessionId, PictureClass picture_class) override {
+    frames_->request_whole(picture_class);
+  }
+  bool on_picture_step(SessionId session, size_t step, const std::string& reason) override;
   void on_strand_class(SessionId session, uint16_t stream_id) override {
     viewers_.set_strand_class(session, stream_id);
     follow_viewers();
@@ -85,6 +89,8 @@ class Server::State : public NetHandler {
   void on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
   void on_mode(SessionId session, StreamMode mode) override {
     viewers_.set_mode(session, mode, now_ns());
+    if (const auto pictures = viewers_.pictures(session))
+      tell_quality(session, *pictures, "to begin with");
     follow_viewers();
   }
   void on_left(SessionId session) override;
@@ -101,6 +107,7 @@ class Server::State : public NetHandler {
   }
   Welcome make_welcome(const Viewers::Place& place) const;
   void follow_viewers();
+  void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);
   void run_status();
 
   const ServerConfig config_;
@@ -162,8 +169,8 @@ Status Server::State::start() {
 
 void Server::State::start_workers(std::unique_ptr<StrandDecoder> decoder) {
   FrameWorker::Hooks hooks;
-  hooks.sink = [this](uint32_t picture_class, EncodedFramePtr frame) {
-    net_->publish_picture(picture_class, std::move(frame));
+  hooks.sink = [this](uint32_t picture_class, PicturePtr picture) {
+    net_->publish_picture(picture_class, std::move(picture));
   };
   hooks.request_keyframe = [this] {
     const std::lock_guard lock(workers_mutex_);
@@ -177,8 +184,9 @@ void Server::State::start_workers(std::unique_ptr<StrandDecoder> decoder) {
     net_->broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});
   };
   const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset_, config_.scene.look};
-  frames_ = std::make_unique<FrameWorker>(std::move(decoder), config_.make_painter(painter),
-                                          config_.scene.stream.frame_rate_hz, std::move(hooks));
+  frames_ =
+      std::make_unique<FrameWorker>(std::move(decoder), config_.make_painter(painter),
+                                    FrameWorkerConfig{config_.scene.stream.frame_rate_hz}, std::move(hooks));
   (void)encoder(0);
 }
 
@@ -283,8 +291,37 @@ Result<Admission> Server::State::on_hello(SessionId session, const Hello& hello)
   admission.welcome = make_welcome(place);
   if (hello.role != Role::Source && place.mode == StreamMode::Strands) admission.asset = asset_frame_;
   admission.picture_class = place.picture_class;
+  admission.picture_costs = place.picture_costs;
+  admission.picture_step = place.picture_step;
   follow_viewers();
+  if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, "to begin with");
   return admission;
+}
+
+/// Posted behind what is being done, so that a joining session has its Welcome first.
+void Server::State::tell_quality(SessionId session, const Viewers::Pictures& pictures,
+                                 const std::string& reason) {
+  const PictureView& view = pictures.view;
+  FrameQuality quality;
+  quality.stream_id = picture_stream_id(pictures.picture_class);
+  quality.width = view.size.width;
+  quality.height = view.size.height;
+  quality.rate_hz = config_.scene.stream.frame_rate_hz / view.rate_divisor;
+  quality.quality = static_cast<uint32_t>(view.quality);
+  quality.codec = view.codec;
+  quality.reason = reason;
+  net_->send(session, quality);
+}
+
+bool Server::State::on_picture_step(SessionId session, size_t step, const std::string& reason) {
+  const Result<Viewers::Pictures> pictures = viewers_.set_picture_step(session, step);
+  if (!pictures) return false;
+  log_info("net", "session {}: pictures of {} x {}, quality {}; {}", session, pictures->view.size.width,
+           pictures->view.size.height, pictures->view.quality, reason);
+  tell_quality(session, *pictures, reason);
+  net_->set_picture_class(session, pictures->picture_class);
+  frames_->set_views(viewers_.picture_views());
+  return true;
 }
 
 void Server::State::on_camera(SessionId session, const CameraChange& camera) {
@@ -343,7 +380,7 @@ void Server::State::run_status() {
     status.tick = now.sim.tick;
     status.sim_ms = now.sim.step_median_ms;
     status.encode_ms = now.encode.encode_median_ms;
-    status.render_ms = now.frame_viewers > 0 ? now.frames.paint_median_ms + now.frames.jpeg_median_ms : 0.0;
+    status.render_ms = now.frame_viewers > 0 ? now.frames.paint_median_ms + now.frames.encode_median_ms : 0.0;
     status.realtime_factor = now.sim.realtime_factor;
     status.is_paused = now.sim.is_paused;
     status.is_motion_stale = now.sim.is_motion_stale;
@@ -400,7 +437,13 @@ std::string Server::State::metrics() {
   total("encode_delta_bytes_total", now.encode.delta_bytes);
   gauge("encode_median_ms", now.encode.encode_median_ms);
   total("render_frames_total", now.frames.frames);
+  total("render_paints_total", now.frames.paints);
+  total("render_unchanged_total", now.frames.unchanged);
+  total("render_stills_total", now.frames.stills);
+  total("render_wholes_total", now.frames.wholes);
+  total("render_bytes_total", now.frames.bytes);
   gauge("render_median_ms", now.frames.paint_median_ms);
+  gauge("render_encode_median_ms", now.frames.encode_median_ms);
   total("input_accepted_total", now.input.accepted);
   total("input_rejected_total", now.input.rejected());
   gauge("viewers_strands", now.strand_viewers);

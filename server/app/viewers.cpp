@@ -5,6 +5,23 @@
 
 namespace strandcast {
 
+namespace {
+
+/// What a client decodes that moves with the fewest bytes.
+PictureCodec best_codec(PictureCodecs decodable) {
+  for (const PictureCodec codec : {PictureCodec::Vp8, PictureCodec::JpegTiles})
+    if ((decodable & codec_bit(codec)) != 0) return codec;
+  return PictureCodec::Jpeg;
+}
+
+std::vector<double> costs_of(const std::vector<PictureStep>& ladder) {
+  std::vector<double> costs;
+  for (const PictureStep& step : ladder) costs.push_back(step.relative_cost);
+  return costs;
+}
+
+}  // namespace
+
 Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
   Place place;
   Viewer viewer;
@@ -12,7 +29,13 @@ Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
   viewer.wanted = hello.mode;
   place.size = {hello.frame_width > 0 ? hello.frame_width : scene_.stream.frame_width,
                 hello.frame_height > 0 ? hello.frame_height : scene_.stream.frame_height};
-  viewer.view = {scene_.camera, place.size, static_cast<int>(scene_.stream.jpeg_quality)};
+  viewer.size = place.size;
+  viewer.view.camera = scene_.camera;
+  viewer.view.size = place.size;
+  viewer.view.quality = static_cast<int>(scene_.stream.jpeg_quality);
+  viewer.view.codec = best_codec(hello.picture_codecs);
+  viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
+  viewer.step = find_step(viewer.ladder, viewer.view.quality);
   if (hello.role == Role::Source) {
     place.reason = "a source gets no stream";
   } else if (hello.mode == StreamMode::Frames) {
@@ -20,6 +43,8 @@ Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
     place.reason = "frames were asked for";
     RETURN_IF_ERROR(validate(viewer.view));
     ASSIGN_OR_RETURN(place.picture_class, views_.assign(session, viewer.view));
+    place.picture_costs = costs_of(viewer.ladder);
+    place.picture_step = viewer.step;
   } else {
     place.reason = hello.mode == StreamMode::Strands
                        ? "strands were asked for"
@@ -116,6 +141,8 @@ std::optional<ModeSwitch> Viewers::begin_change(SessionId session, const ModeCho
       auto assigned = views_.assign(session, viewer.view);
       usable = assigned ? Status() : assigned.error();
       if (assigned) change.picture_class = *assigned;
+      change.picture_costs = costs_of(viewer.ladder);
+      change.picture_step = viewer.step;
     }
     if (!usable) {
       viewer.policy.note_failure(time_ns);
@@ -150,6 +177,30 @@ void Viewers::set_mode(SessionId session, StreamMode mode, int64_t time_ns) {
   if (mode == StreamMode::Strands) views_.remove(session);
   if (viewer.wanted == StreamMode::Auto) viewer.policy.note_change(time_ns);
   count();
+}
+
+Result<Viewers::Pictures> Viewers::set_picture_step(SessionId session, size_t step) {
+  const auto found = viewers_.find(session);
+  if (found == viewers_.end() || !found->second.gets(StreamMode::Frames) ||
+      step >= found->second.ladder.size())
+    return make_error(ErrorCode::NotFound, "only viewers of frames have a quality of pictures");
+  const auto [width, height] = found->second.size;
+  const PictureStep& wanted = found->second.ladder[step];
+  PictureView view = found->second.view;
+  view.quality = wanted.quality;
+  view.rate_divisor = wanted.rate_divisor;
+  view.size.width = std::max(width / wanted.size_divisor, kMinPictureSide);
+  view.size.height = std::max(height / wanted.size_divisor, kMinPictureSide);
+  ASSIGN_OR_RETURN(const uint32_t picture_class, views_.assign(session, view));
+  found->second.view = view;
+  found->second.step = step;
+  return Pictures{picture_class, view};
+}
+
+std::optional<Viewers::Pictures> Viewers::pictures(SessionId session) const {
+  const auto found = viewers_.find(session);
+  if (found == viewers_.end() || !found->second.gets(StreamMode::Frames)) return std::nullopt;
+  return Pictures{views_.class_of(session), found->second.view};
 }
 
 void Viewers::set_strand_class(SessionId session, uint16_t stream_id) {

@@ -6,12 +6,14 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
 #include "common/wire/messages.h"
 #include "server/app/mode_policy.h"
+#include "server/encode/picture_ladder.h"
 #include "server/encode/picture_views.h"
 #include "server/net/net_server.h"
 
@@ -30,6 +32,14 @@ class Viewers {
     std::string reason;  // of the mode, for a person
     PictureClass picture_class = 0;
     RenderSize size;
+    // As in Admission, of a viewer of frames; it starts with the scene's quality.
+    std::vector<double> picture_costs;
+    size_t picture_step = 0;
+  };
+  /// What a viewer of frames gets.
+  struct Pictures {
+    PictureClass picture_class = 0;
+    PictureView view;
   };
 
   explicit Viewers(const SceneDesc& scene) : scene_(scene) {}
@@ -53,6 +63,12 @@ class Viewers {
   /// The session has got the first frame of this mode.
   void set_mode(SessionId session, StreamMode mode, int64_t time_ns);
 
+  /// Moves the viewer along its ladder. NotFound for a session without pictures, LimitExceeded when too many
+  /// different pictures are drawn; it then keeps what it had.
+  Result<Pictures> set_picture_step(SessionId session, size_t step);
+  /// Nothing for a session without pictures.
+  std::optional<Pictures> pictures(SessionId session) const;
+
   /// The class of its strand frames; it joins with class 0. Ignored when the session is gone.
   void set_strand_class(SessionId session, uint16_t stream_id);
   /// How many watch strands of this class.
@@ -72,6 +88,9 @@ class Viewers {
     int64_t next_since_ns = 0;
     uint16_t strand_class = 0;
     PictureView view;
+    RenderSize size;  // of its pictures, at the first steps of
+    std::vector<PictureStep> ladder;
+    size_t step = 0;
     ViewerReport report;
     ModePolicy policy;
     std::optional<StreamMode> request;  // not yet looked at

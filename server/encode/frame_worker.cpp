@@ -30,10 +30,11 @@ double ms_since(int64_t begin_ns) {
 }  // namespace
 
 FrameWorker::FrameWorker(std::unique_ptr<StrandDecoder> decoder, MakePicturePainter make_painter,
-                         double frame_rate_hz, Hooks hooks)
+                         FrameWorkerConfig config, Hooks hooks)
     : decoder_(std::move(decoder)),
       make_painter_(std::move(make_painter)),
-      frame_interval_ns_(static_cast<int64_t>(kNsPerS / frame_rate_hz)),
+      config_(config),
+      frame_interval_ns_(static_cast<int64_t>(kNsPerS / config.rate_hz)),
       hooks_(std::move(hooks)),
       thread_([this] { run(); }) {}
 
@@ -77,6 +78,15 @@ void FrameWorker::set_views(std::map<uint32_t, PictureView> views) {
   changed_.notify_all();
 }
 
+void FrameWorker::request_whole(uint32_t picture_class) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!can_draw() || !views_.contains(picture_class)) return;
+    wanted_wholes_.insert(picture_class);
+  }
+  changed_.notify_all();
+}
+
 bool FrameWorker::has_views() const {
   const std::lock_guard lock(mutex_);
   return can_draw();
@@ -91,7 +101,7 @@ FrameCounters FrameWorker::counters() const {
   const std::lock_guard lock(mutex_);
   FrameCounters counters = counters_;
   counters.paint_median_ms = paint_timer_.median_ms();
-  counters.jpeg_median_ms = jpeg_timer_.median_ms();
+  counters.encode_median_ms = encode_timer_.median_ms();
   return counters;
 }
 
@@ -109,14 +119,11 @@ void FrameWorker::run() {
     if (!is_active_) begin();
     update_views(job.views);
     decode(job.strand_frames);
+    for (const uint32_t picture_class : job.wholes)
+      if (const auto drawn = drawn_.find(picture_class); drawn != drawn_.end())
+        drawn->second.is_whole_wanted = drawn->second.encoder != nullptr;
     const auto due = next_due();
-    if (!due || due->time_ns > now_ns()) continue;
-    if (const Status drawn = draw(due->picture_class); !drawn) {
-      if (concerns_view_only(drawn.error()))
-        refuse(due->picture_class, drawn.error());
-      else
-        fail(drawn.error());
-    }
+    if (due && due->time_ns <= now_ns()) serve(*due);
   }
   painter_.reset();  // on the thread that owns its context
 }
@@ -124,7 +131,8 @@ void FrameWorker::run() {
 FrameWorker::Job FrameWorker::wait_for_job() {
   std::unique_lock lock(mutex_);
   while (true) {
-    const bool has_news = is_stopping_ || can_draw() != is_active_ || has_new_views_ || !pending_.empty();
+    const bool has_news = is_stopping_ || can_draw() != is_active_ || has_new_views_ || !pending_.empty() ||
+                          !wanted_wholes_.empty();
     const auto due = is_active_ ? next_due() : std::nullopt;
     const int64_t wait_ns = due ? due->time_ns - now_ns() : 1;
     if (has_news || wait_ns <= 0) break;
@@ -135,7 +143,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
   }
   has_new_views_ = false;
   pending_bytes_ = 0;
-  Job job{std::exchange(pending_, {}), {}, is_stopping_};
+  Job job{std::exchange(pending_, {}), {}, std::exchange(wanted_wholes_, {}), is_stopping_};
   if (can_draw()) job.views = views_;
   return job;
 }
@@ -160,6 +168,16 @@ void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
     if (!(drawn.view == view)) {  // another camera: draw the same state again
       drawn.decode_count = 0;
       drawn.is_refused = false;
+      drawn.is_still = false;
+    }
+    const bool is_other_stream =
+        drawn.view.codec != view.codec || drawn.view.size.width != view.size.width ||
+        drawn.view.size.height != view.size.height ||
+        (view.codec == PictureCodec::Vp8 && drawn.view.rate_divisor != view.rate_divisor);
+    if (drawn.encoder != nullptr && is_other_stream) {
+      drawn.last_sequence = drawn.encoder->sequence();
+      drawn.encoder.reset();
+      drawn.is_whole_wanted = false;
     }
     drawn.view = view;
   }
@@ -192,46 +210,130 @@ std::optional<FrameWorker::Due> FrameWorker::next_due() const {
   std::optional<Due> first;
   if (snapshot_ == nullptr) return first;
   for (const auto& [picture_class, drawn] : drawn_) {
-    if (drawn.is_refused || drawn.decode_count == decode_count_) continue;
-    const int64_t due_ns = drawn.sequence == 0 ? 0 : drawn.begin_ns + frame_interval_ns_;
-    if (!first || due_ns < first->time_ns) first = Due{picture_class, due_ns};
+    const auto due = next_due_of(picture_class, drawn);
+    if (due && (!first || due->time_ns < first->time_ns)) first = due;
   }
   return first;
 }
 
-Status FrameWorker::draw(uint32_t picture_class) {
-  Drawn& drawn = drawn_[picture_class];
-  drawn.decode_count = decode_count_;
-  drawn.begin_ns = now_ns();
-  ++drawn.sequence;
-  if (painter_ == nullptr) {
-    ASSIGN_OR_RETURN(painter_, make_painter_());
-  }
-  int64_t begin_ns = now_ns();
-  ASSIGN_OR_RETURN(const Image image, painter_->paint(snapshot_, drawn.view));
-  const double paint_ms = ms_since(begin_ns);
-  begin_ns = now_ns();
-  ASSIGN_OR_RETURN(const auto jpeg, encode_jpeg(image, drawn.view.jpeg_quality));
-  const double jpeg_ms = ms_since(begin_ns);
+std::optional<FrameWorker::Due> FrameWorker::next_due_of(uint32_t picture_class, const Drawn& drawn) const {
+  std::optional<Due> first;
+  if (drawn.is_refused) return first;
+  const auto consider = [&](Task task, int64_t time_ns) {
+    if (!first || time_ns < first->time_ns) first = Due{picture_class, task, time_ns};
+  };
+  if (drawn.decode_count != decode_count_) consider(Task::Paint, paint_due_ns(drawn));
+  if (drawn.encoder == nullptr) return first;
+  if (drawn.is_whole_wanted) consider(Task::Whole, drawn.encoder->whole_due_ns());
+  if (config_.still_periods > 0 && !drawn.is_still)
+    consider(Task::Still, drawn.change_ns + config_.still_periods * frame_interval_ns_);
+  return first;
+}
 
-  FrameHeader header;
-  header.opcode = Opcode::JpegFrame;
-  header.sequence = drawn.sequence;
-  header.sim_time_ns = snapshot_->sim_time_ns;
-  header.send_time_ns = now_ns();
-  EncodedFramePtr frame = make_encoded_frame(header, jpeg);
-  if (frame == nullptr)
-    return make_error(ErrorCode::LimitExceeded, "a picture of {} bytes does not fit into one message",
-                      jpeg.size());
+int64_t FrameWorker::paint_due_ns(const Drawn& drawn) const {
+  return drawn.begin_ns == 0 ? 0 : drawn.begin_ns + drawn.view.rate_divisor * frame_interval_ns_;
+}
+
+void FrameWorker::serve(const Due& due) {
+  if (due.task == Task::Paint) return paint_alike(drawn_[due.picture_class].view);
+  if (const Status done = resend(due); !done) refuse(due.picture_class, done.error());
+}
+
+/// Draws once for all classes that show this and whose turn has come, or almost.
+void FrameWorker::paint_alike(const PictureView& view) {
+  const int64_t begin_ns = now_ns();
+  std::vector<uint32_t> classes;
+  for (auto& [picture_class, drawn] : drawn_) {
+    const bool is_due = !drawn.is_refused && drawn.decode_count != decode_count_ &&
+                        paint_due_ns(drawn) <= begin_ns + frame_interval_ns_ / 2;
+    if (!is_due || !look_alike(drawn.view, view)) continue;
+    drawn.decode_count = decode_count_;
+    drawn.begin_ns = begin_ns;
+    classes.push_back(picture_class);
+  }
+  const auto image = [&]() -> Result<Image> {
+    if (painter_ == nullptr) {
+      ASSIGN_OR_RETURN(painter_, make_painter_());
+    }
+    return painter_->paint(snapshot_, view);
+  }();
+  {
+    const std::lock_guard lock(mutex_);
+    ++counters_.paints;
+    paint_timer_.add_ms(ms_since(begin_ns));
+  }
+  for (const uint32_t picture_class : classes) {
+    if (image) {
+      if (const Status encoded = encode(picture_class, *image); !encoded)
+        refuse(picture_class, encoded.error());
+    } else if (concerns_view_only(image.error())) {
+      refuse(picture_class, image.error());
+    } else if (!failure()) {
+      fail(image.error());
+    }
+  }
+}
+
+PictureStamp FrameWorker::stamp(uint32_t picture_class) const {
+  return {picture_stream_id(picture_class), snapshot_->sim_time_ns, now_ns()};
+}
+
+Status FrameWorker::encode(uint32_t picture_class, const Image& image) {
+  Drawn& drawn = drawn_[picture_class];
+  if (drawn.encoder == nullptr) {
+    const double rate_hz = config_.rate_hz / drawn.view.rate_divisor;
+    ASSIGN_OR_RETURN(drawn.encoder, make_picture_encoder(drawn.view, rate_hz, drawn.last_sequence));
+  }
+  const int64_t begin_ns = now_ns();
+  ASSIGN_OR_RETURN(const PicturePtr picture,
+                   drawn.encoder->encode(image, drawn.view.quality, stamp(picture_class)));
+  if (picture == nullptr) {
+    const std::lock_guard lock(mutex_);
+    ++counters_.unchanged;
+    return {};
+  }
+  drawn.change_ns = now_ns();
+  drawn.is_still = false;
+  if (picture->can_follow(0)) drawn.is_whole_wanted = false;
+  {
+    const std::lock_guard lock(mutex_);
+    encode_timer_.add_ms(ms_since(begin_ns));
+  }
+  give(picture_class, picture);
+  return {};
+}
+
+/// What is shown, once more: whole, or finely.
+Status FrameWorker::resend(const Due& due) {
+  Drawn& drawn = drawn_[due.picture_class];
+  const bool is_still = due.task == Task::Still;
+  (is_still ? drawn.is_still : drawn.is_whole_wanted) = is_still;
+  PictureEncoder& encoder = *drawn.encoder;
+  const uint32_t last_sequence = encoder.sequence();
+  const PictureStamp now = stamp(due.picture_class);
+  ASSIGN_OR_RETURN(const PicturePtr picture, is_still ? encoder.still(now) : encoder.whole(now));
+  if (picture == nullptr) return {};
+  {
+    const std::lock_guard lock(mutex_);
+    ++(is_still ? counters_.stills : counters_.wholes);
+  }
+  if (encoder.sequence() != last_sequence) {
+    give(due.picture_class, picture);
+    // A video keyframe is coarse again.
+    if (!is_still) drawn.is_still = false;
+  } else {
+    hooks_.sink(due.picture_class, picture);
+  }
+  return {};
+}
+
+void FrameWorker::give(uint32_t picture_class, const PicturePtr& picture) {
   {
     const std::lock_guard lock(mutex_);
     ++counters_.frames;
-    counters_.bytes += frame->message.size();
-    paint_timer_.add_ms(paint_ms);
-    jpeg_timer_.add_ms(jpeg_ms);
+    counters_.bytes += picture->message_bytes();
   }
-  hooks_.sink(picture_class, std::move(frame));
-  return {};
+  hooks_.sink(picture_class, picture);
 }
 
 void FrameWorker::refuse(uint32_t picture_class, const Error& error) {

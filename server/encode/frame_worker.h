@@ -1,6 +1,6 @@
 // FrameWorker: a thread that decodes the strand stream as a client would, draws it for the viewers who asked
-// for frames and encodes JPEG. It sleeps while there are none, and nothing waits for it. All functions from
-// any thread.
+// for frames and encodes the pictures: one drawing per camera and size, one encode per picture class. It
+// sleeps while there are none, and nothing waits for it. All functions from any thread.
 #pragma once
 
 #include <condition_variable>
@@ -11,12 +11,14 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "common/base/profile.h"
 #include "common/base/result.h"
 #include "common/codec/frame_header.h"
 #include "common/codec/strand_codec.h"
+#include "server/encode/picture_encoder.h"
 #include "server/encode/picture_painter.h"
 #include "server/encode/picture_views.h"
 
@@ -24,19 +26,31 @@ namespace strandcast {
 
 /// Totals since start; medians cover the last kStageWindow frames.
 struct FrameCounters {
-  uint64_t frames = 0;
-  uint64_t bytes = 0;            // header and payload
+  uint64_t frames = 0;           // encoded
+  uint64_t bytes = 0;            // of those, header and payload
+  uint64_t paints = 0;           // drawings
+  uint64_t unchanged = 0;        // not sent: nothing to be seen had changed
+  uint64_t stills = 0;           // encoded once more, finely, after standing still
+  uint64_t wholes = 0;           // given again, whole, because a viewer asked
   uint64_t decoded = 0;          // strand frames
   uint64_t chain_losses = 0;     // times the decoder had to wait for a keyframe
   double paint_median_ms = 0.0;  // draw and read back
-  double jpeg_median_ms = 0.0;
+  double encode_median_ms = 0.0;
+};
+
+/// A picture in which nothing changed for so many periods is sent once more, finely.
+inline constexpr uint32_t kStillPeriods = 5;
+
+struct FrameWorkerConfig {
+  double rate_hz = 15.0;                   // at most so many frames of each view in a second
+  uint32_t still_periods = kStillPeriods;  // 0 = no stills
 };
 
 class FrameWorker {
  public:
   struct Hooks {
     /// Takes a frame of one picture class (PictureViews), on the worker's thread.
-    std::function<void(uint32_t picture_class, EncodedFramePtr frame)> sink;
+    std::function<void(uint32_t picture_class, PicturePtr picture)> sink;
     /// Asks whoever encodes strands for a keyframe, on any thread.
     std::function<void()> request_keyframe;
     /// Called on the worker's thread when one class cannot be drawn; it is left out until its view changes.
@@ -46,9 +60,9 @@ class FrameWorker {
     std::function<void(const Error& error)> on_failure;
   };
 
-  /// Starts the thread. `frame_rate_hz`: at most so many frames of each view in a second.
-  FrameWorker(std::unique_ptr<StrandDecoder> decoder, MakePicturePainter make_painter, double frame_rate_hz,
-              Hooks hooks);
+  /// Starts the thread.
+  FrameWorker(std::unique_ptr<StrandDecoder> decoder, MakePicturePainter make_painter,
+              FrameWorkerConfig config, Hooks hooks);
   /// Ends the thread after the frame that is being drawn.
   ~FrameWorker();
   FrameWorker(const FrameWorker&) = delete;
@@ -59,6 +73,9 @@ class FrameWorker {
   /// What to draw from now on, by picture class; none: the painter is destroyed and strand frames are not
   /// needed.
   void set_views(std::map<uint32_t, PictureView> views);
+  /// Gives the newest picture of a class again, for viewers that have none; video at the next keyframe that
+  /// may be made. Ignored for unknown classes, and before the first picture.
+  void request_whole(uint32_t picture_class);
   /// True while strand frames must be offered.
   bool has_views() const;
 
@@ -67,22 +84,29 @@ class FrameWorker {
   FrameCounters counters() const;
 
  private:
-  /// One view's progress.
+  /// One class's progress.
   struct Drawn {
     PictureView view;
-    uint64_t decode_count = 0;  // when last drawn, 0 = never with this view
-    int64_t begin_ns = 0;       // when that drawing began
-    uint32_t sequence = 0;
+    std::unique_ptr<PictureEncoder> encoder;  // null until the first picture of this size and codec
+    uint32_t last_sequence = 0;               // of the encoders before it
+    uint64_t decode_count = 0;                // when last drawn, 0 = never with this view
+    int64_t begin_ns = 0;                     // when that drawing began; 0 = never
+    int64_t change_ns = 0;                    // when the picture last changed
+    bool is_still = false;                    // and was sent finely since
+    bool is_whole_wanted = false;
     bool is_refused = false;  // this view cannot be drawn
   };
   /// What other threads left for the worker.
   struct Job {
     std::deque<EncodedFramePtr> strand_frames;
     std::map<uint32_t, PictureView> views;
+    std::set<uint32_t> wholes;
     bool is_stopping = false;
   };
+  enum class Task { Paint, Whole, Still };
   struct Due {
     uint32_t picture_class = 0;
+    Task task = Task::Paint;
     int64_t time_ns = 0;
   };
 
@@ -94,12 +118,20 @@ class FrameWorker {
   void update_views(const std::map<uint32_t, PictureView>& views);
   void decode(const std::deque<EncodedFramePtr>& strand_frames);
   std::optional<Due> next_due() const;
-  Status draw(uint32_t picture_class);
+  std::optional<Due> next_due_of(uint32_t picture_class, const Drawn& drawn) const;
+  int64_t paint_due_ns(const Drawn& drawn) const;
+  void serve(const Due& due);
+  void paint_alike(const PictureView& view);
+  Status encode(uint32_t picture_class, const Image& image);
+  Status resend(const Due& due);
+  PictureStamp stamp(uint32_t picture_class) const;
+  void give(uint32_t picture_class, const PicturePtr& picture);
   void refuse(uint32_t picture_class, const Error& error);
   void fail(const Error& error);
 
   std::unique_ptr<StrandDecoder> decoder_;
   MakePicturePainter make_painter_;
+  const FrameWorkerConfig config_;
   const int64_t frame_interval_ns_;
   Hooks hooks_;
 
@@ -109,11 +141,12 @@ class FrameWorker {
   size_t pending_bytes_ = 0;
   std::map<uint32_t, PictureView> views_;
   bool has_new_views_ = false;
+  std::set<uint32_t> wanted_wholes_;
   bool is_stopping_ = false;
   std::optional<Error> failure_;
   FrameCounters counters_;
   StageTimer paint_timer_;
-  StageTimer jpeg_timer_;
+  StageTimer encode_timer_;
 
   // Of the worker's thread.
   bool is_active_ = false;

@@ -16,18 +16,21 @@ constexpr int64_t kBusyAgeNs = 2'000 * kNsPerMs;
 constexpr int64_t kSettleNs = 500 * kNsPerMs;
 constexpr double kDrainingShare = 0.95;
 
-bool is_large(Opcode opcode) {
-  return opcode == Opcode::Asset || opcode == Opcode::StrandKeyframe;
+/// What takes the place of many frames that build on each other.
+bool is_keyframe(const FrameHeader& header) {
+  const bool is_chained_picture = header.opcode == Opcode::JpegTiles || header.opcode == Opcode::Vp8Frame;
+  return header.opcode == Opcode::StrandKeyframe || (is_chained_picture && header.base_sequence == 0);
 }
 
 }  // namespace
 
 void FlowControl::on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns) {
   if (!has_acks_) return;
-  in_flight_.push_back({header.stream_id, header.sequence, is_large(header.opcode),
-                        header.opcode == Opcode::Asset, in_flight_.empty(), bytes, time_ns});
+  const bool is_asset = header.opcode == Opcode::Asset;
+  in_flight_.push_back({header.stream_id, header.sequence, is_asset || is_keyframe(header), is_asset,
+                        in_flight_.empty(), bytes, time_ns});
   in_flight_bytes_ += bytes;
-  if (header.opcode == Opcode::StrandKeyframe) keyframe_ = in_flight_.back();
+  if (is_keyframe(header)) keyframe_ = in_flight_.back();
 }
 
 void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns) {

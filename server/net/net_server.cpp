@@ -29,6 +29,12 @@ constexpr double kLoadSmoothing = 0.05;
 /// What a class cost longer ago than this is estimated from another one instead.
 constexpr int64_t kLoadAgeNs = 5'000'000'000;
 
+/// The same for pictures, which are fewer.
+constexpr double kPictureSmoothing = 0.15;
+constexpr int64_t kPictureLoadAgeNs = 60'000'000'000;
+constexpr int64_t kLongestPictureIntervalNs = 1'500'000'000;
+constexpr double kShortestPictureIntervalS = 1e-3;
+
 std::string own_host_name() {
   std::array<char, 256> name{};
   return gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : std::string();
@@ -87,6 +93,28 @@ void Context::note_strand_frame(const FrameHeader& header, size_t bytes, int64_t
   load.delta_bytes =
       load.time_ns == 0 ? measured : load.delta_bytes + kLoadSmoothing * (measured - load.delta_bytes);
   load.time_ns = time_ns;
+}
+
+void Context::note_picture(PictureClass picture_class, size_t bytes, int64_t time_ns) {
+  std::erase_if(picture_loads, [&](const auto& entry) {
+    return entry.first != picture_class && time_ns - entry.second.time_ns > kPictureLoadAgeNs;
+  });
+  const auto [entry, is_new] = picture_loads.try_emplace(picture_class);
+  PictureLoad& load = entry->second;
+  const int64_t interval_ns = time_ns - std::exchange(load.time_ns, time_ns);
+  // The first one is whole, and one after a pause says nothing about the rate.
+  if (is_new || interval_ns > kLongestPictureIntervalNs) return;
+  const auto measured_bytes = static_cast<double>(bytes);
+  const double measured_s = static_cast<double>(interval_ns) * 1e-9;
+  const double weight = load.bytes == 0.0 ? 1.0 : kPictureSmoothing;
+  load.bytes += weight * (measured_bytes - load.bytes);
+  load.interval_s += weight * (measured_s - load.interval_s);
+}
+
+double Context::picture_cost(PictureClass picture_class) const {
+  const auto found = picture_loads.find(picture_class);
+  if (found == picture_loads.end() || found->second.bytes == 0.0) return 0.0;
+  return found->second.bytes / std::max(found->second.interval_s, kShortestPictureIntervalS);
 }
 
 std::vector<double> Context::strand_costs() const {
@@ -310,16 +338,19 @@ void NetServer::publish_strands(EncodedFramePtr frame) {
   });
 }
 
-void NetServer::publish_picture(PictureClass picture_class, EncodedFramePtr frame) {
-  state_->post_to_all([picture_class, frame = std::move(frame)](net::Session& session) {
-    session.deliver_picture(picture_class, frame);
+void NetServer::publish_picture(PictureClass picture_class, PicturePtr picture) {
+  net::asio::post(state_->context.io, [state = state_.get(), picture_class, picture = std::move(picture)] {
+    state->context.note_picture(picture_class, picture->message_bytes(), now_ns());
+    const auto sessions = state->context.sessions;
+    for (const auto& [id, session] : sessions) session->deliver_picture(picture_class, picture);
   });
 }
 
 void NetServer::set_picture_class(SessionId session, PictureClass picture_class) {
   net::asio::post(state_->context.io, [state = state_.get(), session, picture_class] {
     const auto found = state->context.sessions.find(session);
-    if (found != state->context.sessions.end()) found->second->set_picture_class(picture_class);
+    if (found != state->context.sessions.end())
+      std::shared_ptr(found->second)->set_picture_class(picture_class);
   });
 }
 

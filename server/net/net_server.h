@@ -13,6 +13,7 @@
 
 #include "common/base/result.h"
 #include "common/codec/frame_header.h"
+#include "common/codec/picture.h"
 #include "common/net/tls_context.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
@@ -48,7 +49,7 @@ struct NetLimits {
   int64_t wrong_token_window_ms = 60'000;
   int64_t wrong_token_block_ms = 60'000;  // nothing is accepted from there
   uint32_t guarded_addresses = 1'024;     // remembered for this at once
-  double viewer_bytes_per_s = 0.0;        // cap of what strands may take for one viewer; 0 = none
+  double viewer_bytes_per_s = 0.0;        // cap of what a stream may take for one viewer; 0 = none
 };
 
 /// LikeAllOthers: behind a proxy or tunnel on this machine, where everybody seems to be local.
@@ -75,6 +76,9 @@ struct Admission {
   Welcome welcome;
   EncodedFramePtr asset;
   PictureClass picture_class = 0;  // of a viewer in frames mode
+  // What each step of its ladder of picture classes costs against the first, best first.
+  std::vector<double> picture_costs;
+  size_t picture_step = 0;  // it starts with this one
 };
 
 /// What one session's link does, for choosing between strands and frames; 0 = unknown.
@@ -91,7 +95,9 @@ struct ModeSwitch {
   ModeChange change;
   EncodedFramePtr asset;           // for strands
   uint16_t strand_class = 0;       // to begin with
-  PictureClass picture_class = 0;  // for frames
+  PictureClass picture_class = 0;  // for frames, as in Admission
+  std::vector<double> picture_costs;
+  size_t picture_step = 0;
 };
 
 /// What the application does with sessions. Called on the network thread: return quickly, never wait.
@@ -112,6 +118,11 @@ class NetHandler {
   /// The session waits for a keyframe of this strand class given to publish_strands(). Repeated until one
   /// comes.
   virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
+  /// The session waits for a whole picture of its class: publish_picture() with the newest one, changed or
+  /// not. Repeated until one comes.
+  virtual void on_picture_request(SessionId, PictureClass /*picture_class*/) {}
+  /// The link of a viewer of frames asks for another step of its ladder; false when it cannot have it.
+  virtual bool on_picture_step(SessionId, size_t /*step*/, const std::string& /*reason*/) { return false; }
   /// The session now gets the frames of this strand class; it starts with the first one.
   virtual void on_strand_class(SessionId, uint16_t /*stream_id*/) {}
   virtual void on_report(SessionId, const ViewerReport&) {}
@@ -145,7 +156,7 @@ struct NetCounters {
   uint64_t frames_dropped = 0;  // media a session was too slow for
   uint64_t chain_losses = 0;    // sessions that had to wait for a keyframe
   uint64_t keyframe_requests = 0;
-  uint64_t class_changes = 0;  // of the strand class of a viewer
+  uint64_t class_changes = 0;  // of the strand class or picture step of a viewer
   uint64_t mode_changes = 0;   // between strands and frames
   uint64_t bytes_sent = 0;     // WebSocket payload
 };
@@ -169,8 +180,9 @@ class NetServer {
   /// Strand frames of one class (stream_id) in the order of their chain. A delta goes to sessions of the
   /// class whose last frame it builds on, a keyframe to those that wait for one.
   void publish_strands(EncodedFramePtr frame);
-  /// The newest picture for the viewers of one class; replaces one not yet being sent.
-  void publish_picture(PictureClass picture_class, EncodedFramePtr frame);
+  /// The newest picture for the viewers of one class; replaces one not yet being sent. Each viewer gets what
+  /// takes it there from the last one it was sent.
+  void publish_picture(PictureClass picture_class, PicturePtr picture);
   void set_picture_class(SessionId session, PictureClass picture_class);
   /// Strands are coded otherwise from now on: tells every viewer of strands and moves those whose class is
   /// gone. `then` runs on the network thread after that, before any frame published later.

@@ -47,13 +47,39 @@ SendQueue::Offer SendQueue::offer_strands(const EncodedFramePtr& frame) {
   return Offer::Queued;
 }
 
-void SendQueue::offer_picture(const EncodedFramePtr& frame) {
-  if (chain_ == Chain::Waiting || (pending_ != nullptr && is_pending_asset_)) {
+void SendQueue::stop_pictures() {
+  if (pending_picture_ != nullptr) ++dropped_frames_;
+  pending_picture_ = nullptr;
+  pictures_ = Pictures::None;
+}
+
+void SendQueue::start_pictures() {
+  if (pending_picture_ != nullptr) ++dropped_frames_;
+  pending_picture_ = nullptr;
+  shown_picture_ = 0;
+  pictures_ = Pictures::Waiting;
+}
+
+SendQueue::Offer SendQueue::offer_picture(const PicturePtr& picture) {
+  if (pictures_ == Pictures::None) return Offer::Ignored;
+  const bool is_known = picture->sequence() == shown_picture_ ||
+                        (pending_picture_ != nullptr && pending_picture_->sequence() == picture->sequence());
+  if (is_known) return Offer::Ignored;
+  if (!picture->can_follow(shown_picture_)) {
+    if (pictures_ == Pictures::Waiting) return Offer::Ignored;
     ++dropped_frames_;
-    return;
+    ++chain_losses_;
+    start_pictures();
+    return Offer::LostChain;
   }
-  if (pending_ != nullptr) drop_pending();
-  pending_ = frame;
+  if (pending_picture_ != nullptr) ++dropped_frames_;
+  pending_picture_ = picture;
+  pictures_ = Pictures::Following;
+  return Offer::Queued;
+}
+
+bool SendQueue::needs_picture() const {
+  return pictures_ == Pictures::Waiting && pending_ == nullptr && !is_writing_media_;
 }
 
 void SendQueue::lose_chain() {
@@ -80,7 +106,14 @@ std::optional<SendQueue::Item> SendQueue::take_next(Media media) {
     control_.pop_front();
     return item;
   }
-  if (pending_ == nullptr || media == Media::Held) return std::nullopt;
+  if (media == Media::Held) return std::nullopt;
+  if (pending_ == nullptr && pending_picture_ != nullptr) {
+    const PicturePtr picture = std::exchange(pending_picture_, nullptr);
+    EncodedFramePtr frame = picture->after(std::exchange(shown_picture_, picture->sequence()));
+    is_writing_media_ = frame != nullptr;
+    return frame != nullptr ? std::optional<Item>(std::move(frame)) : std::nullopt;
+  }
+  if (pending_ == nullptr) return std::nullopt;
   is_writing_media_ = true;
   is_pending_asset_ = false;
   return Item(std::exchange(pending_, nullptr));
@@ -95,6 +128,8 @@ void SendQueue::clear() {
   pending_ = nullptr;
   is_pending_asset_ = false;
   chain_ = Chain::None;
+  pending_picture_ = nullptr;
+  pictures_ = Pictures::None;
 }
 
 void SendQueue::drop_pending() {

@@ -1,6 +1,6 @@
 // SendQueue: what one session sends next. Control messages in a bounded queue ahead of media; one media frame
-// being written and at most one pending; a strand session that missed a delta waits for the next keyframe.
-// Plain logic without I/O or clock, network thread.
+// being written and at most one pending strand frame and one picture; a strand session that missed a delta
+// waits for the next keyframe. Plain logic without I/O or clock, network thread.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "common/codec/frame_header.h"
+#include "common/codec/picture.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {
@@ -33,9 +34,18 @@ class SendQueue {
   Offer offer_strands(const EncodedFramePtr& frame);
   /// No more strand frames, and none that waits. False when the asset waited: it will not be sent.
   bool stop_strands();
-  /// Latest wins; the replaced picture is counted in dropped_frames(). None is taken while a keyframe is
-  /// waited for, which needs an empty pipe.
-  void offer_picture(const EncodedFramePtr& frame);
+  /// From now on the session wants pictures, beginning with a whole one; again when those of another class
+  /// follow or the client lost what it had. Strands go on until stop_strands().
+  void start_pictures();
+  /// No more pictures, and none that waits.
+  void stop_pictures();
+  /// The newest picture wins; the one it replaces is counted in dropped_frames(). LostChain when it needs the
+  /// one before it and that was not sent.
+  Offer offer_picture(const PicturePtr& picture);
+  /// True until a whole picture comes.
+  bool awaits_picture() const { return pictures_ == Pictures::Waiting; }
+  /// True when a whole picture would be queued at once; false while media is still being written.
+  bool needs_picture() const;
   /// The client lost its state: forget the chain.
   void lose_chain();
   /// The frames of another class follow, beginning with a keyframe.
@@ -59,11 +69,15 @@ class SendQueue {
   void drop_pending();
 
   std::deque<ServerMessage> control_;
-  EncodedFramePtr pending_;
+  EncodedFramePtr pending_;  // asset or strands
   bool is_pending_asset_ = false;
   bool is_writing_media_ = false;
   Chain chain_ = Chain::None;
   uint32_t chain_sequence_ = 0;  // last strand frame queued
+  enum class Pictures { None, Waiting, Following };
+  Pictures pictures_ = Pictures::None;
+  PicturePtr pending_picture_;
+  uint32_t shown_picture_ = 0;  // sequence of the last one taken; 0 = none
   uint64_t dropped_frames_ = 0;
   uint64_t chain_losses_ = 0;
 };

@@ -51,17 +51,6 @@ Session::Session(Context& context, SessionId id, NetStream stream, Peer peer)
       rate_(context.config.limits.messages_per_s),
       state_since_ns_(peer_.accepted_ns) {}
 
-template <class Work>
-void Session::guarded(Work&& work) {
-  try {
-    work();
-  } catch (const std::exception& exception) {
-    log_error("net", "session {}: {}", id_, exception.what());
-    if (state_ == State::Closing) return abort();
-    close(CloseCode::Internal, "The server failed to handle this session.");
-  }
-}
-
 void Session::start(http::request<http::empty_body> request, bool has_room) {
   request_ = std::move(request);
   const NetLimits& limits = context_.config.limits;
@@ -165,6 +154,8 @@ void Session::join(const Hello& hello) {
   admission->welcome.role = hello.role;
   mode_ = admission->welcome.mode;
   picture_class_ = admission->picture_class;
+  picture_costs_ = admission->picture_costs;
+  picture_step_ = admission->picture_step;
   has_joined_ = true;
   state_ = State::Joined;
   state_since_ns_ = now_ns();
@@ -176,6 +167,7 @@ void Session::join(const Hello& hello) {
     queue_.set_asset(admission->asset);
     has_asset_ = admission->asset != nullptr;
     if (mode_ == StreamMode::Strands) queue_.start_strands();
+    if (mode_ == StreamMode::Frames) queue_.start_pictures();
   }
   if (hello.role != Role::Source) {
     if (hello.acknowledges) flow_.expect_acks();
@@ -199,6 +191,8 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                         [&](const CameraChange& camera) { handler.on_camera(id_, camera); },
                         [&](const KeyframeRequest&) {
                           queue_.lose_chain();
+                          if (mode_ == StreamMode::Frames || changes_to(StreamMode::Frames))
+                            queue_.start_pictures();
                           flow_.forget_in_flight();
                           account_drops();
                           ask_for_keyframe(arrival_ns);
@@ -284,13 +278,22 @@ void Session::deliver_strands(const EncodedFramePtr& frame) {
   });
 }
 
-void Session::deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame) {
-  if (!watches(picture_class)) return;
+void Session::deliver_picture(PictureClass picture_class, const PicturePtr& picture) {
+  // The keyframe of the strands that follow needs an empty pipe.
+  if (!watches(picture_class) || changes_to(StreamMode::Strands)) return;
   guarded([&] {
-    if (mode_ == StreamMode::Strands) finish_mode_switch();
-    queue_.offer_picture(frame);
+    const int64_t time_ns = now_ns();
+    const uint64_t dropped = queue_.dropped_frames();
+    const SendQueue::Offer offer = queue_.offer_picture(picture);
+    if (offer == SendQueue::Offer::Queued && changes_to(StreamMode::Frames)) {
+      finish_mode_switch();
+    } else if (queue_.dropped_frames() != dropped) {
+      flow_.on_chain_loss(time_ns);
+      adapt_pictures(time_ns);
+    }
     account_drops();
     pump();
+    ask_for_keyframe(time_ns);
   });
 }
 
@@ -302,12 +305,19 @@ void Session::account_drops() {
 }
 
 void Session::ask_for_keyframe(int64_t time_ns) {
-  if (state_ != State::Joined || !queue_.needs_keyframe() || !flow_.may_send(time_ns)) return;
+  // The first picture of a change replaces what waits; other first frames need an empty pipe.
+  const bool is_changing = changes_to(StreamMode::Frames) && queue_.awaits_picture();
+  const bool needs_picture = is_changing || (queue_.needs_picture() && !changes_to(StreamMode::Strands));
+  if (state_ != State::Joined || !(needs_picture || queue_.needs_keyframe())) return;
+  if (!is_changing && !flow_.may_send(time_ns)) return;
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
   if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
-  context_.handler.on_keyframe_request(id_, strand_class_);
+  if (needs_picture)
+    context_.handler.on_picture_request(id_, is_changing ? next_mode_->picture_class : picture_class_);
+  else
+    context_.handler.on_keyframe_request(id_, strand_class_);
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
@@ -317,8 +327,33 @@ void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
   pump();
 }
 
+std::string Session::describe_link(int64_t time_ns) const {
+  return fmt::format("link {:.2f} Mbit/s, {:.0f} ms of data on its way",
+                     flow_.capacity_bytes_per_s(time_ns) * 8e-6,
+                     static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs);
+}
+
+/// Moves to another step of the ladder of pictures when the link says so.
+void Session::adapt_pictures(int64_t time_ns) {
+  if (state_ != State::Joined || mode_ != StreamMode::Frames || !flow_.expects_acks()) return;
+  const double present = context_.picture_cost(picture_class_);
+  if (present <= 0.0 || picture_costs_.empty()) return;
+  std::vector<double> costs;
+  for (const double cost : picture_costs_) costs.push_back(present * cost / picture_costs_[picture_step_]);
+  const double cap = context_.config.limits.viewer_bytes_per_s;
+  const size_t chosen = flow_.choose_class(picture_step_, costs, cap, time_ns);
+  if (chosen == picture_step_) return;
+  const char* why = chosen < picture_step_ ? "the link has room" : "the link or this viewer is too slow";
+  if (!context_.handler.on_picture_step(id_, chosen, fmt::format("{}: {}", why, describe_link(time_ns))))
+    return;
+  picture_step_ = chosen;
+  context_.forget_picture_load(picture_class_);
+  context_.count(&NetCounters::class_changes);
+}
+
 /// Moves to another strand class when the link says so.
 void Session::adapt(int64_t time_ns) {
+  if (mode_ == StreamMode::Frames) return adapt_pictures(time_ns);
   if (state_ != State::Joined || mode_ != StreamMode::Strands || !flow_.expects_acks()) return;
   const std::vector<double> costs = context_.strand_costs();
   if (costs.empty()) return;
@@ -327,11 +362,9 @@ void Session::adapt(int64_t time_ns) {
   if (chosen == strand_class_) return;
   const bool is_better = chosen < strand_class_;
   change_strand_class(chosen);
-  announce_quality(fmt::format("{}: {}; link {:.2f} Mbit/s, {:.0f} ms of data on its way",
+  announce_quality(fmt::format("{}: {}; {}",
                                is_better ? "the link has room" : "the link or this viewer is too slow",
-                               to_string(context_.strand_classes[strand_class_]),
-                               flow_.capacity_bytes_per_s(time_ns) * 8e-6,
-                               static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs));
+                               to_string(context_.strand_classes[strand_class_]), describe_link(time_ns)));
   ask_for_keyframe(time_ns);
 }
 

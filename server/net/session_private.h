@@ -2,12 +2,14 @@
 // alive while an operation is under way. Order of what it sends: Welcome, asset, keyframe, deltas.
 #pragma once
 
+#include <exception>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/base/log.h"
 #include "server/net/access.h"
 #include "server/net/beast_private.h"
 #include "server/net/context_private.h"
@@ -30,7 +32,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void follow_strand_classes(const std::string& reason);
   /// Whether pictures of this class are for this session.
   bool watches(PictureClass picture_class) const;
-  void deliver_picture(PictureClass picture_class, const EncodedFramePtr& frame);
+  void deliver_picture(PictureClass picture_class, const PicturePtr& picture);
+  /// Begins with a whole picture when the class is another one than before.
   void set_picture_class(PictureClass picture_class);
   /// As NetServer::change_mode.
   void change_mode(const ModeSwitch& change);
@@ -70,7 +73,10 @@ class Session : public std::enable_shared_from_this<Session> {
   void change_strand_class(size_t chosen);
   void announce_quality(const std::string& reason);
   void finish_mode_switch();
+  bool changes_to(StreamMode mode) const { return next_mode_ && next_mode_->change.mode == mode; }
   void report_link(int64_t time_ns);
+  void adapt_pictures(int64_t time_ns);
+  std::string describe_link(int64_t time_ns) const;
   void probe(int64_t time_ns);
   void on_control_frame(websocket::frame_type kind);
   bool is_stalled(int64_t time_ns) const;
@@ -87,6 +93,8 @@ class Session : public std::enable_shared_from_this<Session> {
   Hello hello_;
   StreamMode mode_ = StreamMode::Strands;
   PictureClass picture_class_ = 0;
+  size_t picture_step_ = 0;              // of the ladder
+  std::vector<double> picture_costs_;    // of its steps, against the first
   std::optional<ModeSwitch> next_mode_;  // its first frame has not come yet
   bool has_asset_ = false;               // sent, or next in line
   bool has_joined_ = false;
@@ -114,5 +122,17 @@ class Session : public std::enable_shared_from_this<Session> {
   int64_t probe_sent_ns_ = 0;        // the newest WebSocket ping of ours
   bool is_probe_under_way_ = false;  // not yet answered
 };
+
+/// An exception ends this session only.
+template <class Work>
+void Session::guarded(Work&& work) {
+  try {
+    work();
+  } catch (const std::exception& exception) {
+    log_error("net", "session {}: {}", id_, exception.what());
+    if (state_ == State::Closing) return abort();
+    close(CloseCode::Internal, "The server failed to handle this session.");
+  }
+}
 
 }  // namespace strandcast::net

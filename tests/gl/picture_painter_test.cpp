@@ -46,7 +46,7 @@ Snapshot make_state(const SceneAsset& asset, uint64_t tick) {
 PictureView small_view() {
   PictureView view;
   view.size = {160, 90};
-  view.jpeg_quality = 90;
+  view.quality = 90;
   return view;
 }
 
@@ -111,7 +111,10 @@ TEST_F(GlPainting, EveryViewThatIsAcceptedCanBePainted) {
   const auto snapshot = std::make_shared<const Snapshot>(make_state(*asset_, 1));
   std::vector<PictureView> views;
   const auto add = [&](glm::vec3 offset_m, glm::vec3 target_m, float fov_y_rad, RenderSize size) {
-    views.push_back({{offset_m, target_m, fov_y_rad}, size, 80});
+    PictureView view;
+    view.camera = {offset_m, target_m, fov_y_rad};
+    view.size = size;
+    views.push_back(view);
   };
   constexpr RenderSize kSize{160, 90};
   add({0.0f, 0.0f, 1e-3f}, {0.0f, 0.0f, 0.0f}, 3.0f, kSize);   // inside the head
@@ -133,16 +136,16 @@ TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {
   auto encoder = std::move(*make_strand_encoder("delta"));
   encoder->encode(make_state(*asset_, 1));
   std::mutex mutex;
-  std::vector<EncodedFramePtr> pictures;
+  std::vector<PicturePtr> pictures;
   std::atomic<int> requests{0};
   FrameWorker::Hooks hooks;
-  hooks.sink = [&](uint32_t, EncodedFramePtr frame) {
+  hooks.sink = [&](uint32_t, PicturePtr frame) {
     const std::lock_guard lock(mutex);
     pictures.push_back(std::move(frame));
   };
   hooks.request_keyframe = [&] { ++requests; };
   FrameWorker worker(std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count})),
-                     gl_picture_painter(config_), 1000.0, std::move(hooks));
+                     gl_picture_painter(config_), {1000.0}, std::move(hooks));
   worker.set_views({{1, small_view()}});
   ASSERT_TRUE(eventually([&] { return requests > 0; }));
   worker.offer(encoder->encode_for_join(make_state(*asset_, 1)).keyframe);
@@ -152,7 +155,7 @@ TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {
   };
   ASSERT_TRUE(eventually([&] { return has_picture() || worker.failure(); }));
   ASSERT_FALSE(worker.failure()) << worker.failure()->to_string();
-  const auto image = decode_jpeg(std::span(pictures[0]->message).subspan(kFrameHeaderBytes));
+  const auto image = decode_jpeg(std::span(pictures[0]->after(0)->message).subspan(kFrameHeaderBytes));
   ASSERT_TRUE(image) << image.error().to_string();
   ASSERT_EQ(image->width, 160u);
   ASSERT_EQ(image->height, 90u);

@@ -312,8 +312,8 @@ TEST_F(ServerNet, PicturesReachTheirClassOnly) {
   message.mode = StreamMode::Frames;
   auto viewer = join(message);
   auto strands = join();
-  server_->publish_picture(1, media(Opcode::JpegFrame, 1, 0));
-  server_->publish_picture(0, media(Opcode::JpegFrame, 2, 0));
+  server_->publish_picture(1, make_picture(media(Opcode::JpegFrame, 1, 0)));
+  server_->publish_picture(0, make_picture(media(Opcode::JpegFrame, 2, 0)));
   server_->send_to_class(1, Notice{true, "of another class"});
   server_->send_to_class(0, Notice{true, "of this class"});
   const auto picture = viewer->read_media(Opcode::JpegFrame);

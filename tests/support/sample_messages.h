@@ -16,7 +16,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
   }
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
-  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true},
+  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs},
           motion,
           wind,
           camera,
@@ -73,7 +73,8 @@ inline std::vector<ServerMessage> sample_server_messages() {
       StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link"},
       ModeChange{StreamMode::Frames, "the viewer draws 3 pictures per second", 640, 360},
       SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
-                   {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}}};
+                   {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}},
+      FrameQuality{0x8003, 640, 360, 7.5, 50, PictureCodec::JpegTiles, "a slow link"}};
 }
 
 }  // namespace strandcast

@@ -42,6 +42,27 @@ TEST(Mailbox, KeepsEveryStrandFrameInOrderAndOnlyTheNewestPicture) {
   EXPECT_EQ(mailbox.dropped_strand_frames(), 0u);
 }
 
+TEST(Mailbox, PicturesThatBuildOnEachOtherKeepTheirOrderAndTheirBound) {
+  Mailbox mailbox({.strand_frames = 3});
+  const auto chained = [](Opcode opcode, uint32_t sequence) {
+    MediaEvent event = media(opcode, sequence);
+    event.header.base_sequence = sequence - 1;
+    return event;
+  };
+  for (uint32_t i = 1; i <= 3; ++i) {
+    EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, i)), Mailbox::Outcome::Kept);
+    EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, i)), Mailbox::Outcome::Kept) << "counted apart";
+  }
+  EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 4)), Mailbox::Outcome::KeyframeNeeded);
+  EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 5)), Mailbox::Outcome::KeyframeNeeded);
+  EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 1)), Mailbox::Outcome::Kept) << "base 0: a whole one";
+  EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 2)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(mailbox.dropped_strand_frames(), 5u);
+  const auto events = mailbox.take();
+  EXPECT_EQ(sequences(events, Opcode::JpegTiles), (std::vector<uint32_t>{1, 2}));
+  EXPECT_EQ(sequences(events, Opcode::StrandDelta), (std::vector<uint32_t>{1, 2, 3}));
+}
+
 TEST(Mailbox, DropsAllStrandFramesOnOverflowUntilTheNextKeyframe) {
   Mailbox mailbox({.strand_frames = 3});
   EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 1)), Mailbox::Outcome::Kept);

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "common/codec/image_codec.h"
+#include "common/codec/jpeg_tiles.h"
 #include "tests/support/eventually.h"
 
 namespace strandcast {
@@ -35,6 +36,8 @@ struct Studio {
   bool is_held = false;
   bool is_inside = false;
   bool is_failing = false;
+  bool is_dark = false;
+  int paints = 0;
   uint32_t largest_width = 1000;  // of what can be painted
   int painters_made = 0;
   int painters_alive = 0;
@@ -77,7 +80,13 @@ class FakePainter : public PicturePainter {
     const auto [width, height] = view.size;
     if (width > studio_.largest_width)
       return make_error(ErrorCode::LimitExceeded, "the canvas has {} columns", studio_.largest_width);
-    return Image{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height * 4, 255)};
+    ++studio_.paints;
+    // Another state or camera gives another picture, unless the studio is dark.
+    Image image{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height * 4, 255)};
+    const auto level =
+        static_cast<uint8_t>(snapshot->tick * 50 + static_cast<uint64_t>(view.camera.offset_m.x * 90));
+    for (size_t i = 0; i < 64 && !studio_.is_dark; i += 4) image.rgba[i] = level;
+    return image;
   }
 
  private:
@@ -89,11 +98,11 @@ class FrameWork : public testing::Test {
  protected:
   FrameWork() : encoder_(std::move(*make_strand_encoder("delta"))) {}
 
-  std::unique_ptr<FrameWorker> start(double frame_rate_hz) {
+  std::unique_ptr<FrameWorker> start(double rate_hz, uint32_t still_periods = 0) {
     FrameWorker::Hooks hooks;
-    hooks.sink = [this](uint32_t picture_class, EncodedFramePtr frame) {
+    hooks.sink = [this](uint32_t picture_class, PicturePtr picture) {
       const std::lock_guard lock(mutex_);
-      frames_.emplace_back(picture_class, std::move(frame));
+      frames_.emplace_back(picture_class, picture->after(0));
     };
     hooks.request_keyframe = [this] { ++requests_; };
     hooks.on_refused = [this](uint32_t picture_class, const Error&) {
@@ -107,7 +116,7 @@ class FrameWork : public testing::Test {
           if (has_no_gl_) return make_error(ErrorCode::Unavailable, "no OpenGL");
           return std::unique_ptr<PicturePainter>(std::make_unique<FakePainter>(studio_));
         },
-        frame_rate_hz, std::move(hooks));
+        FrameWorkerConfig{rate_hz, still_periods}, std::move(hooks));
   }
   std::vector<std::pair<uint32_t, EncodedFramePtr>> frames() {
     const std::lock_guard lock(mutex_);
@@ -232,7 +241,7 @@ TEST_F(FrameWork, AKeyframeCrowdedOutOfTheQueueIsAskedForAgain) {
   worker->offer(next_delta());
   ASSERT_TRUE(eventually([&] { return requests_ > 0; }));
   studio_.hold(true);
-  views[1].jpeg_quality = 50;
+  views[1].camera.offset_m.y += 0.5f;
   worker->set_views(views);
   ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.is_inside; }); }));
   requests_ = 0;
@@ -316,6 +325,105 @@ TEST_F(FrameWork, AViewThatCannotBeDrawnCostsTheOthersNothing) {
   ASSERT_TRUE(eventually([&] { return frame_count() == 3; })) << "another view of that class may do";
   EXPECT_EQ(frames().back().first, 2u);
   EXPECT_EQ(failures_, 0);
+}
+
+TEST_F(FrameWork, AnUnchangedPictureIsNotSent) {
+  studio_.is_dark = true;
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return worker->counters().unchanged == 1; }));
+  EXPECT_EQ(frame_count(), 1u);
+  EXPECT_EQ(worker->counters().paints, 2u);
+}
+
+TEST_F(FrameWork, WhatStandsStillIsSentOnceMoreFinely) {
+  const auto worker = start(kFastHz, 5);
+  next_delta();
+  auto views = one_view();
+  views[1].codec = PictureCodec::JpegTiles;
+  views[1].quality = 30;
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return worker->counters().stills == 1; }));
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  EXPECT_EQ(static_cast<int>(frames()[1].second->message[kFrameHeaderBytes + kTilesFixedBytes + 2]),
+            kStillQuality);
+  EXPECT_EQ(worker->counters().paints, 1u) << "nothing is drawn for it";
+  give_time_to_misbehave();
+  EXPECT_EQ(frame_count(), 2u);
+  worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return worker->counters().stills == 2; })) << "after every change";
+}
+
+TEST_F(FrameWork, AStillWaitsForItsPeriods) {
+  const auto worker = start(kNeverHz, 5);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  give_time_to_misbehave();
+  EXPECT_EQ(frame_count(), 1u);
+}
+
+TEST_F(FrameWork, ClassesThatLookAlikeAreDrawnOnceAndEncodedOnceEach) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  views[2] = views[1];
+  views[2].quality = 30;
+  views[3] = views[1];
+  views[3].codec = PictureCodec::Vp8;
+  views[4] = views[1];
+  views[4].size = {64, 48};
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 4; }));
+  for (size_t i = 1; i <= 3; ++i) {
+    worker->offer(next_delta());
+    ASSERT_TRUE(eventually([&] { return frame_count() == 4 * (i + 1); }));
+  }
+  EXPECT_EQ(worker->counters().frames, 16u);
+  EXPECT_EQ(worker->counters().paints, 8u);
+}
+
+TEST_F(FrameWork, AWholePictureIsGivenAgainOnRequest) {
+  const auto worker = start(kNeverHz);
+  next_delta();
+  auto views = one_view();
+  views[1].codec = PictureCodec::JpegTiles;
+  worker->set_views(views);
+  worker->request_whole(1);
+  worker->request_whole(99);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  worker->request_whole(1);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  EXPECT_EQ(frames()[1].second->header.sequence, 1u);
+  EXPECT_EQ(worker->counters().frames, 1u) << "nothing is encoded for it";
+  EXPECT_EQ(worker->counters().wholes, 1u);
+  EXPECT_EQ(worker->counters().paints, 1u);
+}
+
+TEST_F(FrameWork, AnotherSizeOrCodecGoesOnWithTheNumbersOfTheClass) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  views[1].codec = PictureCodec::JpegTiles;
+  worker->set_views(views);
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  views[1].size = {64, 48};
+  worker->set_views(views);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
+  views[1].codec = PictureCodec::Vp8;
+  worker->set_views(views);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 3; }));
+  for (uint32_t i = 0; i < 3; ++i) EXPECT_EQ(frames()[i].second->header.sequence, i + 1);
+  EXPECT_EQ(frames()[2].second->header.opcode, Opcode::Vp8Frame);
 }
 
 TEST_F(FrameWork, AFailedDrawingEndsFramesToo) {

@@ -85,6 +85,8 @@ const std::vector<LibraryRule>& library_rules() {
       {"turbojpeg", {"common/codec"}},
       {"png.h", {"common/codec"}},
       {"webp/", {"common/codec"}},
+      {"vpx/", {"common/codec"}},
+      {"libyuv", {"common/codec"}},
       {"GLFW/", {"client/window"}},
       {"imgui", {"client/window"}},
       {"CLI/", kApp},

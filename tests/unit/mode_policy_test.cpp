@@ -225,7 +225,7 @@ TEST(ModeFacts, GuessesUntilSomethingWasMeasured) {
   sources.pictures.frames = 4;
   sources.pictures.bytes = 40'000;
   sources.pictures.paint_median_ms = 30.0;
-  sources.pictures.jpeg_median_ms = 5.0;
+  sources.pictures.encode_median_ms = 5.0;
   known = gather_mode_facts(sources);
   EXPECT_EQ(known.paint_ms, 70.0);
   EXPECT_EQ(known.picture_bytes, 10e3);

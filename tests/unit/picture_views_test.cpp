@@ -23,7 +23,7 @@ TEST(PictureViews, EqualViewsShareAClassAndOthersDoNot) {
   EXPECT_EQ(*a, *b);
   EXPECT_NE(*a, *c);
   PictureView better = view_at(0.0f);
-  better.jpeg_quality = 95;
+  better.quality = 95;
   EXPECT_NE(*views.assign(4, better), *a);
   better.size = {320, 180};
   EXPECT_EQ(views.views().size(), 3u);
@@ -86,8 +86,8 @@ TEST(PictureViews, RefusesViewsThatCannotBeDrawn) {
   ASSERT_TRUE(validate(view_at(0.0f)));
   refuses([](PictureView& view) { view.size.width = 0; }, "0 x 360");
   refuses([](PictureView& view) { view.size.height = 4'000'000'000u; }, "4000000000");
-  refuses([](PictureView& view) { view.jpeg_quality = 0; }, "quality 0");
-  refuses([](PictureView& view) { view.jpeg_quality = 101; }, "quality 101");
+  refuses([](PictureView& view) { view.quality = 0; }, "quality 0");
+  refuses([](PictureView& view) { view.quality = 101; }, "quality 101");
   refuses([](PictureView& view) { view.camera.offset_m.x = std::nanf(""); }, "no usable place");
   refuses([](PictureView& view) { view.camera.target_m.x = std::numeric_limits<float>::infinity(); },
           "no usable");

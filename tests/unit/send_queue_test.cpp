@@ -126,18 +126,68 @@ TEST(SendQueue, ControlIsBoundedAndGoesAheadOfMedia) {
   EXPECT_FALSE(queue.take_next().has_value());
 }
 
+PicturePtr picture(uint32_t sequence, uint32_t base_sequence) {
+  return make_picture(frame(Opcode::Vp8Frame, sequence, base_sequence));
+}
+
+uint32_t taken_picture(SendQueue& queue) {
+  const auto item = queue.take_next();
+  queue.written();
+  return item ? std::get<EncodedFramePtr>(*item)->header.sequence : 0;
+}
+
 TEST(SendQueue, NewestPictureReplacesTheOneNotYetSent) {
   SendQueue queue;
   queue.set_asset(frame(Opcode::Asset, 1, 0));
-  queue.offer_picture(frame(Opcode::JpegFrame, 1, 0));
+  queue.start_pictures();
+  queue.offer_picture(picture(1, 0));
   EXPECT_EQ(taken_opcode(queue), Opcode::Asset) << "a picture never replaces the asset";
-  queue.offer_picture(frame(Opcode::JpegFrame, 2, 0));
-  queue.offer_picture(frame(Opcode::JpegFrame, 3, 0));
   queue.written();
-  const auto item = queue.take_next();
-  ASSERT_TRUE(item.has_value());
-  EXPECT_EQ(std::get<EncodedFramePtr>(*item)->header.sequence, 3u);
+  queue.offer_picture(picture(2, 0));
+  queue.offer_picture(picture(3, 0));
+  EXPECT_EQ(taken_picture(queue), 3u);
   EXPECT_EQ(queue.dropped_frames(), 2u);
+  EXPECT_EQ(queue.offer_picture(picture(3, 0)), SendQueue::Offer::Ignored) << "it was sent";
+}
+
+TEST(SendQueue, PicturesAreForThoseWhoWantThem) {
+  SendQueue queue;
+  EXPECT_FALSE(queue.needs_picture());
+  EXPECT_EQ(queue.offer_picture(picture(1, 0)), SendQueue::Offer::Ignored);
+  queue.start_pictures();
+  EXPECT_TRUE(queue.needs_picture());
+  EXPECT_EQ(queue.offer_picture(picture(5, 4)), SendQueue::Offer::Ignored) << "nothing to build on";
+  EXPECT_EQ(queue.dropped_frames(), 0u);
+  EXPECT_EQ(queue.offer_picture(picture(6, 0)), SendQueue::Offer::Queued);
+  EXPECT_FALSE(queue.needs_picture());
+}
+
+TEST(SendQueue, AVideoPictureWithoutAPlaceCostsTheChain) {
+  SendQueue queue;
+  queue.start_pictures();
+  queue.offer_picture(picture(1, 0));
+  EXPECT_EQ(taken_picture(queue), 1u);
+  EXPECT_EQ(queue.offer_picture(picture(2, 1)), SendQueue::Offer::Queued);
+  EXPECT_EQ(queue.offer_picture(picture(3, 2)), SendQueue::Offer::LostChain) << "2 is still waiting";
+  EXPECT_EQ(queue.chain_losses(), 1u);
+  EXPECT_EQ(queue.dropped_frames(), 2u);
+  EXPECT_TRUE(queue.needs_picture());
+  EXPECT_EQ(queue.offer_picture(picture(4, 3)), SendQueue::Offer::Ignored);
+  EXPECT_EQ(queue.offer_picture(picture(5, 0)), SendQueue::Offer::Queued);
+  EXPECT_EQ(taken_picture(queue), 5u);
+  EXPECT_EQ(queue.offer_picture(picture(6, 5)), SendQueue::Offer::Queued);
+}
+
+TEST(SendQueue, AnotherClassStartsWithAWholePicture) {
+  SendQueue queue;
+  queue.start_pictures();
+  queue.offer_picture(picture(7, 0));
+  EXPECT_EQ(taken_picture(queue), 7u);
+  queue.offer_picture(picture(8, 7));
+  queue.start_pictures();
+  EXPECT_EQ(queue.offer_picture(picture(8, 7)), SendQueue::Offer::Ignored) << "numbers of another class";
+  EXPECT_EQ(queue.offer_picture(picture(7, 0)), SendQueue::Offer::Queued);
+  EXPECT_EQ(taken_picture(queue), 7u);
 }
 
 TEST(SendQueue, PicturesWaitForTheKeyframeOfAChangeToStrands) {

@@ -114,6 +114,47 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   EXPECT_TRUE(viewers.picture_views().empty());
 }
 
+TEST(Viewers, AViewerGetsTheBestCodecItDecodes) {
+  Viewers viewers(built_in_scene());
+  Hello message = hello(Role::Viewer, StreamMode::Frames);
+  const auto codec_for = [&](PictureCodecs decodable) {
+    message.picture_codecs = decodable;
+    EXPECT_TRUE(viewers.add(1, message).ok());
+    return viewers.pictures(1)->view.codec;
+  };
+  EXPECT_EQ(codec_for(0), PictureCodec::Jpeg) << "a client of before";
+  EXPECT_EQ(codec_for(codec_bit(PictureCodec::JpegTiles)), PictureCodec::JpegTiles);
+  EXPECT_EQ(codec_for(kAllPictureCodecs), PictureCodec::Vp8);
+  EXPECT_EQ(codec_for(~kAllPictureCodecs), PictureCodec::Jpeg) << "bits of a later version";
+}
+
+TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
+  Viewers viewers(built_in_scene());
+  const auto first = viewers.add(1, hello(Role::Viewer, StreamMode::Frames, 640, 360));
+  const auto second = viewers.add(2, hello(Role::Viewer, StreamMode::Frames, 640, 360));
+  ASSERT_TRUE(first.ok() && second.ok());
+  ASSERT_EQ(first->picture_class, second->picture_class);
+  EXPECT_EQ(viewers.pictures(1)->view.quality, 80) << "the scene's";
+  const size_t last = first->picture_costs.size() - 1;
+  const auto slow = viewers.set_picture_step(2, last);
+  ASSERT_TRUE(slow.ok());
+  EXPECT_NE(slow->picture_class, first->picture_class);
+  EXPECT_EQ(slow->view.size.width, 320u);
+  EXPECT_EQ(slow->view.rate_divisor, 2u);
+  EXPECT_EQ(slow->view.quality, 30);
+  EXPECT_EQ(viewers.pictures(1)->view.size.width, 640u);
+  CameraDesc camera;
+  camera.offset_m = {0.0f, 0.0f, 2.0f};
+  ASSERT_TRUE(viewers.set_camera(2, camera).ok());
+  EXPECT_EQ(viewers.pictures(2)->view.size.width, 320u) << "the camera is no reason for more";
+  ASSERT_TRUE(viewers.set_camera(2, viewers.pictures(1)->view.camera).ok());
+  const auto back = viewers.set_picture_step(2, first->picture_step);
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(back->picture_class, first->picture_class) << "one encode for both again";
+  EXPECT_FALSE(viewers.set_picture_step(2, last + 1).ok());
+  EXPECT_FALSE(viewers.set_picture_step(3, 0).ok());
+}
+
 TEST(Viewers, RefusesPicturesBeyondTheLimit) {
   Viewers viewers(built_in_scene());
   for (uint32_t i = 0; i < kMaxPictureViews; ++i)

@@ -1,6 +1,7 @@
 // proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
 #include "common/base/file.h"
-#include "common/codec/image_codec.h"
+#include "common/codec/jpeg_tiles.h"
+#include "common/codec/picture.h"
 #include "common/codec/scene_asset.h"
 #include "common/codec/strand_payload.h"
 #include "common/codec/strand_predictor.h"
@@ -51,7 +52,13 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxStrandTimeNs", with_commas(kMaxStrandTimeNs)},
       {"kMaxHeadPositionM", with_commas(static_cast<uint64_t>(kMaxHeadPositionM))},
       {"kRotationTolerance", fmt::format("{}", kRotationTolerance)},
-      {"kMaxImageSide", with_commas(kMaxImageSide)},
+      {"kMinPictureSide", fmt::format("{} x {}", kMinPictureSide, kMinPictureSide)},
+      {"kMaxPictureWidth",
+       fmt::format("{} x {}", with_commas(kMaxPictureWidth), with_commas(kMaxPictureHeight))},
+      {"kTileSide", fmt::format("{} x {}", kTileSide, kTileSide)},
+      {"kTilesFixedBytes", with_commas(kTilesFixedBytes)},
+      {"kTileHeaderBytes", with_commas(kTileHeaderBytes)},
+      {"kPictureStreamBit", fmt::format("0x{:04x}", kPictureStreamBit)},
       {"kStepsPerBound", with_commas(kStepsPerBound)},
       {"kMotionClassCount", fmt::format("`kMotionClassCount` {}", kMotionClassCount)},
       {"kFewMotionClasses", fmt::format("`kFewMotionClasses` {}", kFewMotionClasses)},
@@ -94,8 +101,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
 
 TEST(WireDocument, ListsEveryOpcodeAndCloseCode) {
   const std::string text = document();
-  for (const Opcode opcode :
-       {Opcode::Control, Opcode::Asset, Opcode::StrandKeyframe, Opcode::StrandDelta, Opcode::JpegFrame})
+  for (const Opcode opcode : {Opcode::Control, Opcode::Asset, Opcode::StrandKeyframe, Opcode::StrandDelta,
+                              Opcode::JpegFrame, Opcode::JpegTiles, Opcode::Vp8Frame})
     EXPECT_THAT(text, HasSubstr(fmt::format("| `0x{:02x}` |", static_cast<int>(opcode))));
   for (const CloseCode code : {CloseCode::Normal, CloseCode::GoingAway, CloseCode::BadData, CloseCode::Policy,
                                CloseCode::TooBig, CloseCode::Internal, CloseCode::TryLater,

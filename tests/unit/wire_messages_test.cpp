@@ -61,6 +61,7 @@ TEST(WireMessages, EveryFieldComesBack) {
   EXPECT_EQ(hello.name, "Zoë");
   EXPECT_EQ(hello.token, "secret");
   EXPECT_EQ(hello.frame_width, 640u);
+  EXPECT_EQ(hello.picture_codecs, kAllPictureCodecs);
   EXPECT_EQ(hello.frame_height, 360u);
   EXPECT_TRUE(hello.acknowledges);
   const auto motion = round_trip(sample_of<MotionSamples>(messages));
@@ -160,6 +161,14 @@ TEST(WireMessages, EveryServerFieldComesBack) {
   EXPECT_EQ(sessions[0].sent_bytes, 1ull << 40);
   EXPECT_EQ(sessions[0].queue_delay_ms, 12.5);
   EXPECT_EQ(sessions[0].connected_s, 0.25);
+  const auto pictures = round_trip(FrameQuality{0x8001, 320, 180, 7.5, 30, PictureCodec::Vp8, "slow"});
+  EXPECT_EQ(pictures.stream_id, 0x8001u);
+  EXPECT_EQ(pictures.width, 320u);
+  EXPECT_EQ(pictures.height, 180u);
+  EXPECT_EQ(pictures.rate_hz, 7.5);
+  EXPECT_EQ(pictures.quality, 30u);
+  EXPECT_EQ(pictures.codec, PictureCodec::Vp8);
+  EXPECT_EQ(pictures.reason, "slow");
   EXPECT_EQ(back.quarantined_strands, status.quarantined_strands);
   EXPECT_EQ(back.overstretched_strands, status.overstretched_strands);
   EXPECT_EQ(round_trip(Goodbye{"bye"}).reason, "bye");
@@ -346,6 +355,35 @@ TEST(WireMessages, ModeChangeIsCheckedFieldByField) {
   EXPECT_EQ(place_of({StreamMode::Auto, "", 0, 0}), "mode_change.mode");
   EXPECT_EQ(place_of({StreamMode::Frames, "", 15, 360}), "mode_change.frame_width");
   EXPECT_EQ(place_of({StreamMode::Frames, "", 640, 4097}), "mode_change.frame_height");
+}
+
+TEST(WireMessages, FrameQualityIsCheckedFieldByField) {
+  const FrameQuality good{0x8001, 320, 180, 7.5, 30, PictureCodec::Vp8, "slow"};
+  const auto place_after = [&](auto change) {
+    FrameQuality quality = good;
+    change(quality);
+    return decode_server_message(encode(ServerMessage(quality))).error().place;
+  };
+  EXPECT_EQ(place_after([](FrameQuality& q) { q.width = kMaxPictureWidth + 1; }), "frame_quality.width");
+  EXPECT_EQ(place_after([](FrameQuality& q) { q.height = 0; }), "frame_quality.height");
+  EXPECT_EQ(place_after([](FrameQuality& q) { q.rate_hz = 0.0; }), "frame_quality.rate_hz");
+  EXPECT_EQ(place_after([](FrameQuality& q) { q.quality = 101; }), "frame_quality.quality");
+  EXPECT_EQ(place_after([](FrameQuality& q) { q.codec = static_cast<PictureCodec>(3); }),
+            "frame_quality.codec");
+}
+
+TEST(WireMessages, PictureSizesHaveOneLimit) {
+  Hello hello;
+  hello.frame_width = kMaxPictureWidth;
+  hello.frame_height = kMaxPictureHeight;
+  EXPECT_TRUE(decode_client_message(encode(ClientMessage(hello))));
+  ++hello.frame_width;
+  EXPECT_EQ(decode_client_message(encode(ClientMessage(hello))).error().place, "hello.frame_width");
+  hello.frame_width = kMinPictureSide;
+  ++hello.frame_height;
+  EXPECT_EQ(decode_client_message(encode(ClientMessage(hello))).error().place, "hello.frame_height");
+  hello.frame_height = kMinPictureSide - 1;
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(hello))));
 }
 
 TEST(WireMessages, ClientLimitsAreExact) {

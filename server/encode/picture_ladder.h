@@ -1,0 +1,27 @@
+// The ladder of picture classes for one view: what a viewer on a slower link gets instead. First the quality
+// falls, then the rate, then the size. Pure data, any thread.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/codec/picture.h"
+
+namespace strandcast {
+
+struct PictureStep {
+  int quality = 95;            // 1..100
+  uint32_t rate_divisor = 1;   // of the pictures
+  uint32_t size_divisor = 1;   // of both sides
+  double relative_cost = 1.0;  // bytes per second against the first step
+};
+
+/// Best first; the usual quality is one of them.
+std::vector<PictureStep> make_picture_ladder(PictureCodec codec, int usual_quality);
+/// The first step of this quality.
+size_t find_step(const std::vector<PictureStep>& ladder, int quality);
+
+/// What a video of this quality may take per pixel and picture.
+double video_bits_per_pixel(int quality);
+
+}  // namespace strandcast
