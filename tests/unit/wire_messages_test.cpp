@@ -149,7 +149,7 @@ TEST(WireMessages, EveryServerFieldComesBack) {
   EXPECT_EQ(quality.strand_share, 0.5f);
   EXPECT_EQ(quality.bound_m, 5e-4f);
   EXPECT_EQ(quality.reason, "slow");
-  const auto& listed = std::get<SessionList>(messages[6]).sessions;
+  const auto& listed = std::get<SessionList>(messages[7]).sessions;
   const auto sessions = round_trip(SessionList{listed}).sessions;
   ASSERT_EQ(sessions.size(), 2u);
   EXPECT_EQ(sessions[0].id, 7u);
