@@ -232,7 +232,8 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
   return row;
 }
 
-Result<StreamingReport> measure_streaming(const StreamingOptions& options) {
+Result<StreamingReport> measure_streaming(const StreamingOptions& options,
+                                          const std::function<Status(const StreamingReport&)>& on_recording) {
   ASSIGN_OR_RETURN(const Plan plan, make_plan(options));
   std::unique_ptr<gl::EglContext> context;
   if (options.gl_device != "none") {
@@ -247,7 +248,10 @@ Result<StreamingReport> measure_streaming(const StreamingOptions& options) {
   report.seconds = plan.seconds;
   StreamingRun run(report, context ? &shaders : nullptr, options);
   for (const StreamSize& size : plan.sizes)
-    for (const StreamMotion& motion : plan.motions) RETURN_IF_ERROR(run.add(motion, size));
+    for (const StreamMotion& motion : plan.motions) {
+      RETURN_IF_ERROR(run.add(motion, size));
+      RETURN_IF_ERROR(on_recording(report));
+    }
   return report;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -66,8 +67,10 @@ struct StreamingReport {
   StreamLatency latency;
 };
 
-/// Runs everything; prints progress. BadInput for options that nothing can be run for.
-Result<StreamingReport> measure_streaming(const StreamingOptions& options);
+/// Runs everything; prints progress. `on_recording` gets what is known after each recording: a run of many
+/// minutes that is broken off leaves that. BadInput for options that nothing can be run for.
+Result<StreamingReport> measure_streaming(const StreamingOptions& options,
+                                          const std::function<Status(const StreamingReport&)>& on_recording);
 
 /// One codec on one recording. An error names the codec.
 Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamRecording& recording);

@@ -12,8 +12,8 @@ namespace strandcast {
 Status run_streaming(const StreamingOptions& options) {
   // Before anything is measured for minutes.
   RETURN_IF_ERROR(make_report_folder(options.out));
-  ASSIGN_OR_RETURN(const StreamingReport report, measure_streaming(options));
-  RETURN_IF_ERROR(save_streaming(report, options.out));
+  const auto save = [&](const StreamingReport& report) { return save_streaming(report, options.out); };
+  ASSIGN_OR_RETURN(const StreamingReport report, measure_streaming(options, save));
   fmt::print("{}{}\n{}\n", streaming_summary(report), (options.out / kStreamingCsv).string(),
              (options.out / kStreamingPage).string());
   return {};

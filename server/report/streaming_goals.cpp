@@ -156,8 +156,11 @@ const StreamingRow* best_peer(const StreamingReport& report, const StreamingRow&
 }
 
 std::vector<GoalLine> judge_streaming(const StreamingReport& report) {
-  // With one core only there is no more to see than the work itself.
-  const bool has_cores = report.processors >= kEncodeCores;
+  // On an idle machine the clock says less than the processor time, which all cores share. Where it says
+  // more, other work was in the way, and the processor time is the nearest that is known from above.
+  const auto encode_ms = [](const StreamingRow& row) {
+    return std::min(row.encode_wall_ms, row.encode_cpu_ms);
+  };
   return {
       bound_goal(report),
       class_goal(report, MotionClass::Active, kActiveBits),
@@ -169,11 +172,10 @@ std::vector<GoalLine> judge_streaming(const StreamingReport& report) {
       time_goal(report, fmt::format("decode {} vertices in {:g} ms of one core", kTimedVertices, kDecodeMs),
                 kDecodeMs, [](const StreamingRow& row) { return row.decode_cpu_ms; }),
       time_goal(report,
-                fmt::format("encode them in {:g} ms on {} cores (by the clock on {} here)", kEncodeMs,
-                            kEncodeCores, report.processors),
-                kEncodeMs, [has_cores](const StreamingRow& row) {
-                  return has_cores ? row.encode_wall_ms : row.encode_cpu_ms;
-                })};
+                fmt::format("encode them in {:g} ms on {} cores (by the clock on {} here, or processor time "
+                            "where that is less)",
+                            kEncodeMs, kEncodeCores, report.processors),
+                kEncodeMs, encode_ms)};
 }
 
 }  // namespace strandcast

@@ -43,7 +43,9 @@ class DracoCoder final : public IntegerCoder {
     return std::vector<std::byte>(bytes.begin(), bytes.end());
   }
 
-  Status decode(std::span<const std::byte> bytes, IntegerKind, IntegerPlanes& planes) override {
+  Result<IntegerPlanes> decode(std::span<const std::byte> bytes, uint32_t strand_count,
+                               uint32_t vertex_count) override {
+    IntegerPlanes planes = IntegerPlanes::make(strand_count, vertex_count);
     draco::DecoderBuffer buffer;
     buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     draco::Decoder decoder;
@@ -62,7 +64,7 @@ class DracoCoder final : public IntegerCoder {
         for (size_t axis = 0; axis < 3; ++axis)
           planes.value[axis * planes.plane_size() + vertex * planes.strand_count + strand] = point[axis];
       }
-    return {};
+    return planes;
   }
 };
 

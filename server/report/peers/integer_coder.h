@@ -22,6 +22,10 @@ struct IntegerPlanes {
   uint32_t vertex_count = 0;
   std::vector<int32_t> value;
 
+  /// All zero.
+  static IntegerPlanes make(uint32_t strand_count, uint32_t vertex_count) {
+    return {strand_count, vertex_count, std::vector<int32_t>(size_t{3} * strand_count * vertex_count, 0)};
+  }
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };
 
@@ -29,8 +33,9 @@ class IntegerCoder {
  public:
   virtual ~IntegerCoder() = default;
   virtual Result<std::vector<std::byte>> encode(const IntegerPlanes& planes, IntegerKind kind) = 0;
-  /// `planes` has the sizes that were encoded; its values are replaced.
-  virtual Status decode(std::span<const std::byte> bytes, IntegerKind kind, IntegerPlanes& planes) = 0;
+  /// Planes of the sizes that were encoded.
+  virtual Result<IntegerPlanes> decode(std::span<const std::byte> bytes, uint32_t strand_count,
+                                       uint32_t vertex_count) = 0;
 };
 
 /// 16 bits for each integer, then zstd level 3: what a person would write first. LimitExceeded beyond 16

@@ -13,13 +13,10 @@ namespace {
 class LatticePeer final : public StreamCodec {
  public:
   LatticePeer(const LatticePeerDesc& desc, const StreamShape& shape)
-      : desc_(desc), order_(shape), coder_(desc.make_coder()) {
-    for (IntegerPlanes* planes : {&planes_, &decoded_}) {
-      planes->strand_count = shape.strand_count;
-      planes->vertex_count = shape.vertex_count;
-      planes->value.assign(3 * shape.plane_size(), 0);
-    }
-  }
+      : desc_(desc),
+        order_(shape),
+        coder_(desc.make_coder()),
+        planes_(IntegerPlanes::make(shape.strand_count, shape.vertex_count)) {}
 
   Status take(const StreamFrame& frame) override {
     sorted_m_ = order_.sorted(frame.position_in_head_m);
@@ -45,12 +42,14 @@ class LatticePeer final : public StreamCodec {
   }
 
   Status decode(std::span<const std::byte> message) override {
-    if (desc_.prediction == PeerPrediction::None)
-      return coder_->decode(message, IntegerKind::Positions, decoded_);
     TemporalWeights weights{};
-    if (message.size() < sizeof(weights)) return make_error(ErrorCode::BadInput, "the message is too short");
+    const bool is_temporal = desc_.prediction == PeerPrediction::Temporal;
+    const size_t head_bytes = is_temporal ? sizeof(weights) : 0;
+    if (message.size() < head_bytes) return make_error(ErrorCode::BadInput, "the message is too short");
+    ASSIGN_OR_RETURN(decoded_,
+                     coder_->decode(message.subspan(head_bytes), planes_.strand_count, planes_.vertex_count));
+    if (!is_temporal) return {};
     std::memcpy(weights.data(), message.data(), sizeof(weights));
-    RETURN_IF_ERROR(coder_->decode(message.subspan(sizeof(weights)), decoder_.next_kind(), decoded_));
     decoded_ = decoder_.restored(decoded_, weights);
     decoder_.advance(decoded_);
     return {};

@@ -31,14 +31,15 @@ class MeshoptCoder final : public IntegerCoder {
     return is_narrow ? encode_as<NarrowVertex>(planes) : encode_as<WideVertex>(planes);
   }
 
-  Status decode(std::span<const std::byte> bytes, IntegerKind, IntegerPlanes& planes) override {
+  Result<IntegerPlanes> decode(std::span<const std::byte> bytes, uint32_t strand_count,
+                               uint32_t vertex_count) override {
     if (bytes.size() < sizeof(uint8_t)) return make_error(ErrorCode::BadInput, "the message is empty");
     const std::span<const std::byte> packed = bytes.subspan(1);
     ASSIGN_OR_RETURN(const size_t size, zstd_content_bytes(packed, kMaxEncodedBytes));
     buffer_.resize(size);
     RETURN_IF_ERROR(decompressor_.fill(packed, std::as_writable_bytes(std::span(buffer_))));
-    return bytes[0] == std::byte{sizeof(NarrowVertex)} ? decode_as<NarrowVertex>(planes)
-                                                       : decode_as<WideVertex>(planes);
+    return bytes[0] == std::byte{sizeof(NarrowVertex)} ? decode_as<NarrowVertex>(strand_count, vertex_count)
+                                                       : decode_as<WideVertex>(strand_count, vertex_count);
   }
 
  private:
@@ -65,7 +66,8 @@ class MeshoptCoder final : public IntegerCoder {
   }
 
   template <class Vertex>
-  Status decode_as(IntegerPlanes& planes) {
+  Result<IntegerPlanes> decode_as(uint32_t strand_count, uint32_t vertex_count) {
+    IntegerPlanes planes = IntegerPlanes::make(strand_count, vertex_count);
     std::vector<Vertex> vertices(planes.plane_size());
     if (meshopt_decodeVertexBuffer(vertices.data(), vertices.size(), sizeof(Vertex), buffer_.data(),
                                    buffer_.size()) != 0)
@@ -76,7 +78,7 @@ class MeshoptCoder final : public IntegerCoder {
         for (size_t axis = 0; axis < 3; ++axis)
           planes.value[axis * planes.plane_size() + vertex * planes.strand_count + strand] =
               static_cast<int32_t>(vertices[place].axis[axis]) - kHalf - kSmallHalf;
-    return {};
+    return planes;
   }
 
   ZstdCompressor compressor_;

@@ -22,11 +22,13 @@ class ZstdCoder final : public IntegerCoder {
     return bytes;
   }
 
-  Status decode(std::span<const std::byte> bytes, IntegerKind, IntegerPlanes& planes) override {
+  Result<IntegerPlanes> decode(std::span<const std::byte> bytes, uint32_t strand_count,
+                               uint32_t vertex_count) override {
+    IntegerPlanes planes = IntegerPlanes::make(strand_count, vertex_count);
     decoded_.resize(planes.value.size());
     RETURN_IF_ERROR(decompressor_.fill(bytes, std::as_writable_bytes(std::span(decoded_))));
     for (size_t i = 0; i < decoded_.size(); ++i) planes.value[i] = decoded_[i];
-    return {};
+    return planes;
   }
 
  private:
