@@ -108,31 +108,18 @@ Snapshot without_lattice(const Snapshot& snapshot) {
   return copy;
 }
 
-/// The rounded history as whole numbers: positions and velocities.
+/// The rounded history as whole numbers, and back.
 Planes<int32_t> coarse_positions(const TangentHistory& history) {
   Planes<int32_t> coarse = history.lattice;
   for (auto& plane : coarse)
     for (int32_t& value : plane) value >>= kCoarseLatticeShift;
   return coarse;
 }
-Planes<int32_t> coarse_velocities(const TangentHistory& history) {
-  Planes<int32_t> coarse;
+void set_history(const Planes<int32_t>& coarse, TangentHistory& history) {
   for (size_t axis = 0; axis < 3; ++axis)
-    for (const float value : history.velocity[axis])
-      coarse[axis].push_back(static_cast<int32_t>(value) >> kCoarseVelocityShift);
-  return coarse;
-}
-void set_history(const Planes<int32_t>& position, const Planes<int32_t>& velocity, TangentHistory& history) {
-  const auto raised = [](int32_t value, int shift) {
-    return static_cast<int32_t>(static_cast<uint32_t>(value) << shift);
-  };
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t i = 0; i < position[axis].size(); ++i) {
-      history.lattice[axis][i] = raised(position[axis][i], kCoarseLatticeShift);
-      history.velocity[axis][i] = static_cast<float>(raised(velocity[axis][i], kCoarseVelocityShift));
-    }
-  }
-  history.velocity_before = history.velocity;
+    for (size_t i = 0; i < coarse[axis].size(); ++i)
+      history.lattice[axis][i] =
+          static_cast<int32_t>(static_cast<uint32_t>(coarse[axis][i]) << kCoarseLatticeShift);
 }
 float coarse_unit_m(float quantum_m) {
   return quantum_m * static_cast<float>(1 << kCoarseLatticeShift);
@@ -248,22 +235,18 @@ class TangentEncoder final : public StrandEncoder {
   /// What a late joiner needs of the chain, just made coarse.
   void append_history(std::vector<std::byte>& destination) {
     const Planes<int32_t> position = coarse_positions(chain_.history);
-    const Planes<int32_t> velocity = coarse_velocities(chain_.history);
     const float unit_m = coarse_unit_m(chain_.history.quantum_m);
-    const ShapeWeights edges = fit_shape(layout_, Shape::Edges, position, unit_m);
-    const ShapeWeights values = fit_shape(layout_, Shape::Values, velocity, unit_m);
+    const ShapeWeights weights = fit_shape(layout_, position, unit_m);
     std::vector<std::byte> packed;
     zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, packed);
     destination.reserve(packed.size() + layout_.plane_size());
     ByteWriter writer(destination);
     writer.put(static_cast<uint32_t>(packed.size()));
     writer.put_bytes(packed);
-    writer.put_bytes(std::as_bytes(std::span(&edges, 1)));
-    writer.put_bytes(std::as_bytes(std::span(&values, 1)));
+    writer.put_bytes(std::as_bytes(std::span(&weights, 1)));
     std::vector<ValueWriter> writers(layout_.slice_count());
     for_each_slice(layout_, [&](uint32_t slice) {
-      write_shape(layout_, Shape::Edges, edges, unit_m, slice, position, writers[slice]);
-      write_shape(layout_, Shape::Values, values, unit_m, slice, velocity, writers[slice]);
+      write_shape(layout_, weights, unit_m, slice, position, writers[slice]);
     });
     for (ValueWriter& slice : writers) slice.finish(destination);
   }
@@ -315,10 +298,8 @@ class TangentDecoder final : public StrandDecoder {
     ByteReader body(message.body);
     const auto table_bytes = body.take<uint32_t>();
     const auto packed = body.take_bytes(table_bytes);
-    ShapeWeights edges;
-    ShapeWeights values;
-    take_into(body, edges);
-    take_into(body, values);
+    ShapeWeights weights;
+    take_into(body, weights);
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
                         message.body.size());
@@ -330,17 +311,12 @@ class TangentDecoder final : public StrandDecoder {
     ASSIGN_OR_RETURN(std::span<const std::byte> rest, open_slices(body.rest(), readers));
     const float unit_m = coarse_unit_m(chain.history.quantum_m);
     Planes<int32_t> position;
-    Planes<int32_t> velocity;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      position[axis].assign(layout_.plane_size(), 0);
-      velocity[axis].assign(layout_.plane_size(), 0);
-    }
+    for (auto& plane : position) plane.assign(layout_.plane_size(), 0);
     for_each_slice(layout_, [&](uint32_t slice) {
-      read_shape(layout_, Shape::Edges, edges, unit_m, slice, position, readers[slice]);
-      read_shape(layout_, Shape::Values, values, unit_m, slice, velocity, readers[slice]);
+      read_shape(layout_, weights, unit_m, slice, position, readers[slice]);
     });
     RETURN_IF_ERROR(check_spent(readers));
-    set_history(position, velocity, chain.history);
+    set_history(position, chain.history);
     RETURN_IF_ERROR(read_body(rest, message, chain, snapshot));
     chain_ = std::move(chain);
     return {};

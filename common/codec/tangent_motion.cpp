@@ -400,17 +400,15 @@ void TangentHistory::reset(const TangentLayout& layout) {
 }
 
 void TangentHistory::coarsen() {
-  const auto rounded = [](int32_t value, int shift) {
-    return static_cast<int32_t>(static_cast<uint32_t>(wrapping_sum(value, 1 << (shift - 1)) >> shift)
-                                << shift);
-  };
+  constexpr int32_t kHalf = 1 << (kCoarseLatticeShift - 1);
   for (size_t axis = 0; axis < 3; ++axis) {
-    for (int32_t& value : lattice[axis]) value = rounded(value, kCoarseLatticeShift);
-    for (float& value : velocity[axis])
-      value = static_cast<float>(rounded(nearest(value), kCoarseVelocityShift));
-    velocity_before[axis] = velocity[axis];
-    std::fill(residual[axis].begin(), residual[axis].end(), 0.0f);
-    std::fill(residual_before[axis].begin(), residual_before[axis].end(), 0.0f);
+    for (size_t i = 0; i < lattice[axis].size(); ++i) {
+      const int32_t ahead = wrapping_sum(lattice[axis][i], nearest(velocity[axis][i]));
+      const int32_t steps = wrapping_sum(ahead, kHalf) >> kCoarseLatticeShift;
+      lattice[axis][i] = static_cast<int32_t>(static_cast<uint32_t>(steps) << kCoarseLatticeShift);
+    }
+    for (auto* plane : {&velocity[axis], &velocity_before[axis], &residual[axis], &residual_before[axis]})
+      std::fill(plane->begin(), plane->end(), 0.0f);
   }
 }
 

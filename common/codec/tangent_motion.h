@@ -23,8 +23,7 @@ inline constexpr uint32_t kManyVertices = 16'384;    // this, where eight cost m
 inline constexpr float kMotionWeight = 1.0f / 1024;  // unit of the weights on the wire
 inline constexpr float kLengthWeight = 1.0f / 16;    // unit of the length blend
 inline constexpr int32_t kEscapedLength = 1 << 20;   // in place of a length correction
-inline constexpr int kCoarseLatticeShift = 11;       // a joiner's history is rounded to 8 bounds
-inline constexpr int kCoarseVelocityShift = 10;      // and 4 bounds per frame
+inline constexpr int kCoarseLatticeShift = 10;       // a joiner's history is rounded to 4 bounds
 
 template <class T>
 using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_count x stride)
@@ -41,7 +40,7 @@ struct TangentHistory {
   Planes<float> residual_before;
 
   void reset(const TangentLayout& layout);
-  /// Forgets all but a rounded position and velocity: what a keyframe tells a late joiner.
+  /// Forgets all but where the strands were heading, rounded: what a keyframe tells a late joiner.
   void coarsen();
 };
 

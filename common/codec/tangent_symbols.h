@@ -41,20 +41,19 @@ void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentFra
 void read_symbols(const TangentLayout& layout, uint32_t slice, TangentFrame& frame, const SymbolSizes& then,
                   SymbolSizes& now, TangentTables& tables, ValueReader& reader);
 
-inline constexpr uint32_t kShapeFeatureCount = 10;
+inline constexpr uint32_t kShapeFeatureCount = 13;
 inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest
 using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
-/// Whole numbers along strands, as they are in a keyframe: each vertex less the one before it (positions), or
-/// as it is (velocities), predicted from the strand so far, from neighbours and from the rest shape.
-enum class Shape { Edges, Values };
+// The shape that a keyframe tells: coarse positions, each vertex less the one before it, predicted from the
+// strand so far, from neighbours and from the rest shape.
 
-/// `value`: planes of whole numbers; one of them is `unit_m` long.
-ShapeWeights fit_shape(const TangentLayout& layout, Shape shape, const Planes<int32_t>& value, float unit_m);
-void write_shape(const TangentLayout& layout, Shape shape, const ShapeWeights& weights, float unit_m,
-                 uint32_t slice, const Planes<int32_t>& value, ValueWriter& writer);
-/// The inverse; fills the slice's part of `value`.
-void read_shape(const TangentLayout& layout, Shape shape, const ShapeWeights& weights, float unit_m,
-                uint32_t slice, Planes<int32_t>& value, ValueReader& reader);
+/// `position`: planes of whole numbers; one of them is `unit_m` long.
+ShapeWeights fit_shape(const TangentLayout& layout, const Planes<int32_t>& position, float unit_m);
+void write_shape(const TangentLayout& layout, const ShapeWeights& weights, float unit_m, uint32_t slice,
+                 const Planes<int32_t>& position, ValueWriter& writer);
+/// The inverse; fills the slice's part of `position`.
+void read_shape(const TangentLayout& layout, const ShapeWeights& weights, float unit_m, uint32_t slice,
+                Planes<int32_t>& position, ValueReader& reader);
 
 }  // namespace strandcast

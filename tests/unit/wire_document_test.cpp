@@ -66,7 +66,6 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kBlockSize", with_commas(kBlockSize)},
       {"kEscapedLength", with_commas(kEscapedLength)},
       {"kCoarseLatticeShift", with_commas(kCoarseLatticeShift)},
-      {"kCoarseVelocityShift", with_commas(kCoarseVelocityShift)},
       {"kTangentTableCount", with_commas(kTangentTableCount)},
       {"kLearnShift", fmt::format(">> {} (", kLearnShift)},
       {"kLeastShare", fmt::format("`kLeastShare` {}", kLeastShare)},
