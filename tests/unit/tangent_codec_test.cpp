@@ -36,26 +36,6 @@ double largest_error_m(const std::vector<glm::vec3>& truth, const Snapshot& deco
   return largest;
 }
 
-TEST(TangentCodec, StaysWithinEveryBoundForManyFramesFarFromTheOrigin) {
-  for (const float bound_m : {2e-5f, 5e-5f, 1e-4f, 5e-4f}) {
-    for (const MotionKind kind : {MotionKind::Idle, MotionKind::Active, MotionKind::Extreme}) {
-      HairMotionDesc desc{3, 6, kind};
-      desc.origin_m = {100.0, -3.0, 70.0};
-      HairMotion hair(desc);
-      Chain chain(desc, hair.rest_in_head());
-      double largest_m = 0.0;
-      for (int i = 0; i < 9'000; ++i) {
-        hair.step();
-        const auto decoded = chain.pass(hair.snapshot(lattice_step_m("tangent", bound_m).value()));
-        ASSERT_TRUE(decoded);
-        largest_m = std::max(largest_m, largest_error_m(hair.positions_in_head(), *decoded));
-      }
-      EXPECT_LE(largest_m, static_cast<double>(bound_m));
-      EXPECT_GE(largest_m, 0.9 * static_cast<double>(bound_m)) << "the bound is there to be used";
-    }
-  }
-}
-
 // Vertices that stretch, jump and collapse, where no prediction helps.
 TEST(TangentCodec, StaysWithinTheBoundWhateverHappens) {
   HairMotionDesc desc{40, 12, MotionKind::Active};
