@@ -335,7 +335,7 @@ std::string Session::describe_link(int64_t time_ns) const {
 
 /// Moves to another step of the ladder of pictures when the link says so.
 void Session::adapt_pictures(int64_t time_ns) {
-  if (state_ != State::Joined || mode_ != StreamMode::Frames || !flow_.expects_acks()) return;
+  if (state_ != State::Joined || mode_ != StreamMode::Frames || next_mode_ || !flow_.expects_acks()) return;
   const double present = context_.picture_cost(picture_class_);
   if (present <= 0.0 || picture_costs_.empty()) return;
   std::vector<double> costs;

@@ -190,19 +190,31 @@ TEST(SendQueue, AnotherClassStartsWithAWholePicture) {
   EXPECT_EQ(taken_picture(queue), 7u);
 }
 
-TEST(SendQueue, PicturesWaitForTheKeyframeOfAChangeToStrands) {
+TEST(SendQueue, ThePictureOfAChangeReplacesTheStrandsThatWait) {
   SendQueue queue;
-  queue.offer_picture(frame(Opcode::JpegFrame, 1, 0));
-  queue.set_asset(frame(Opcode::Asset, 1, 0));
   queue.start_strands();
-  queue.offer_picture(frame(Opcode::JpegFrame, 2, 0));
-  EXPECT_EQ(taken_opcode(queue), Opcode::Asset);
-  queue.written();
-  queue.offer_picture(frame(Opcode::JpegFrame, 3, 0));
+  ASSERT_EQ(queue.offer_strands(keyframe(7)), SendQueue::Offer::Queued);
+  queue.start_pictures();
+  EXPECT_TRUE(queue.awaits_picture());
+  EXPECT_FALSE(queue.needs_picture()) << "strands go on until it is here";
+  EXPECT_EQ(queue.offer_picture(picture(3, 0)), SendQueue::Offer::Queued);
+  EXPECT_FALSE(queue.awaits_picture());
+  EXPECT_TRUE(queue.stop_strands());
+  EXPECT_EQ(taken_picture(queue), 3u);
   EXPECT_FALSE(queue.take_next().has_value());
-  EXPECT_TRUE(queue.needs_keyframe()) << "a picture would have kept it away";
+}
+
+TEST(SendQueue, StoppingPicturesDropsTheOneThatWaits) {
+  SendQueue queue;
+  queue.start_pictures();
+  queue.offer_picture(picture(1, 0));
+  queue.start_strands();
   EXPECT_EQ(queue.offer_strands(keyframe(7)), SendQueue::Offer::Queued);
+  queue.stop_pictures();
+  EXPECT_EQ(queue.dropped_frames(), 1u);
   EXPECT_EQ(taken_opcode(queue), Opcode::StrandKeyframe);
+  EXPECT_EQ(queue.offer_picture(picture(2, 0)), SendQueue::Offer::Ignored);
+  EXPECT_FALSE(queue.awaits_picture());
 }
 
 TEST(SendQueue, StoppingStrandsDropsWhatWaitsAndSaysWhetherTheAssetDid) {
@@ -215,8 +227,9 @@ TEST(SendQueue, StoppingStrandsDropsWhatWaitsAndSaysWhetherTheAssetDid) {
   ASSERT_EQ(queue.offer_strands(keyframe(7)), SendQueue::Offer::Queued);
   EXPECT_TRUE(queue.stop_strands());
   EXPECT_EQ(queue.offer_strands(delta(8)), SendQueue::Offer::Ignored);
-  queue.offer_picture(frame(Opcode::JpegFrame, 1, 0));
-  EXPECT_EQ(taken_opcode(queue), Opcode::JpegFrame);
+  queue.start_pictures();
+  queue.offer_picture(picture(1, 0));
+  EXPECT_EQ(taken_picture(queue), 1u);
 }
 
 }  // namespace
