@@ -358,7 +358,7 @@ class ViewerClient::Connection {
     return is_welcome_
                ? Status()
                : make_error(ErrorCode::BadInput, "the server sent a change of mode before its Welcome");
-}
+  }
 
   Status handle_control(FrameQuality& quality) {
     quality.reason = printable(quality.reason);

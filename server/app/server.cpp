@@ -89,8 +89,7 @@ class Server::State : public NetHandler {
   void on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
   void on_mode(SessionId session, StreamMode mode) override {
     viewers_.set_mode(session, mode, now_ns());
-    if (const auto pictures = viewers_.pictures(session))
-      tell_quality(session, *pictures, "to begin with");
+    if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, "to begin with");
     follow_viewers();
   }
   void on_left(SessionId session) override;

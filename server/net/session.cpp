@@ -167,7 +167,11 @@ void Session::join(const Hello& hello) {
     queue_.set_asset(admission->asset);
     has_asset_ = admission->asset != nullptr;
     if (mode_ == StreamMode::Strands) queue_.start_strands();
-    if (mode_ == StreamMode::Frames) queue_.start_pictures();
+    if (mode_ == StreamMode::Frames) {
+      queue_.start_pictures();
+      // The first pictures are too small to show what the link carries.
+      flow_.start_over(now_ns());
+    }
   }
   if (hello.role != Role::Source) {
     if (hello.acknowledges) flow_.expect_acks();

@@ -1,5 +1,5 @@
-// strandcast-report: measures strand models and strand codecs and writes tables, plots and pages that a person can read.
-// Exit code 0 when all was measured and written, 2 for bad input.
+// strandcast-report: measures strand models and strand codecs and writes tables, plots and pages that a
+// person can read. Exit code 0 when all was measured and written, 2 for bad input.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
