@@ -4,7 +4,7 @@
 // frame may be worked on side by side.
 //
 // Prediction: the last decoded position plus a weighted sum of what both sides know (features listed in
-// tangent_motion.cpp), brought to the known length from the decoded vertex before it. Two integers correct it
+// tangent_row.h), brought to the known length from the decoded vertex before it. Two integers correct it
 // in the plane across the segment, a third one, rarely needed, its length. All lengths are in lattice steps.
 #pragma once
 
@@ -61,6 +61,9 @@ struct TangentFrame {
   Planes<int32_t> lattice;
   Planes<float> velocity;
   Planes<float> residual;
+  std::array<Planes<float>, 2>
+      neighbour_sum;         // (stride) of the row at work: what a vertex tells as neighbour
+  std::vector<float> zeros;  // (stride)
 
   void resize(const TangentLayout& layout);
 };

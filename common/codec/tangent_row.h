@@ -1,0 +1,190 @@
+// MotionRow: where the vertices of one row (one vertex index, all strands) are expected, four strands at a
+// time; what encoder and decoder of the "tangent" codec share. Private to common/codec.
+//
+// What a vertex costs: 200 floating-point operations (2 x 3 x 20 of them for the prediction), two divisions
+// and two roots; 110 bytes from and to memory (24 planes, the integers); three symbols, each of which waits
+// for the one before it, about 25 cycles (find 10, table 5, multiply and add 5, refill 5). At 2.45 GHz and
+// four lanes that is 50 cycles of arithmetic, 25 of memory at 10 GB/s and 75 of waiting.
+#pragma once
+
+#include <cstddef>
+
+#include "common/codec/lanes.h"
+#include "common/codec/tangent_motion.h"
+
+namespace strandcast {
+
+static_assert(kBlockSize % kLaneCount == 0);
+
+// Features of a vertex, each a vector; weights are the same for all axes. "then" is the last frame, "before"
+// the one before that; the parent is the vertex nearer to the root.
+//   0 velocity then            1 residual then        2 velocity before      3 residual before
+//   4 parent's velocity now    5 parent's then        6 parent's residual    7 parent's residual before
+//   8 grandparent's now        9 grandparent's then  10 child's velocity    11 child's residual
+//  12 child's velocity before 13 child's residual before
+//  14 neighbour's now         15 neighbour's then    16 neighbour's residual
+//  17 second neighbour's now  18 then                19 residual
+inline constexpr uint32_t kRowFeatureCount = 14;
+inline constexpr uint32_t kNeighbourFeatureCount = 3;
+inline constexpr uint32_t kOwnThen = 0;
+inline constexpr uint32_t kOwnResidual = 1;
+inline constexpr uint32_t kParentNow = 4;
+inline constexpr uint32_t kGrandparentNow = 8;
+
+// The cell of a coded vertex: tangent steps of 1.22 bounds and length steps of 0.8 keep its farthest point
+// within the bound, with room for rounding: sqrt(1 - 1.22^2 / 2) = 0.51 >= 0.8 / 2.
+inline constexpr float kTangentStep = 1.22f * kStepsPerBound;
+inline constexpr float kLengthStep = 0.8f * kStepsPerBound;
+inline constexpr int32_t kEscapeStep = 292;  // 2 (kStepsPerBound - 3) / sqrt(3)
+
+inline constexpr float kTinySquared = 1e-12f;
+inline constexpr float kLargestEdge = 4e6f;     // in steps; rounding by adding needs it
+inline constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23: floats there are whole numbers
+
+/// Nearest whole numbers, ties to even, limited to +-kLargestEdge; -kLargestEdge for NaN.
+STRANDCAST_INLINE IntLanes nearest_lanes(const Lanes& value) {
+  const Lanes low = value > -kLargestEdge ? value : Lanes{} - kLargestEdge;
+  const Lanes within = low < kLargestEdge ? low : Lanes{} + kLargestEdge;
+  return to_integers((within + kRounder) - kRounder);
+}
+
+/// Which weights serve a row. Near the root and at the tip strands move by laws of their own.
+uint32_t motion_class(const TangentLayout& layout, uint32_t v);
+
+/// Rows of floats that features of one axis lie in; absent ones are zeros.
+using FeatureRows = std::array<const float*, kRowFeatureCount>;
+FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
+                         const TangentFrame& frame, size_t axis, uint32_t v);
+
+/// Where the vertices of a block are expected: `length` along `along` from `base`, and two directions across.
+struct Expected {
+  IntLaneVectors base;
+  LaneVectors along;
+  LaneVectors first;
+  LaneVectors second;
+  Lanes length;
+
+  /// Fills the directions across `along`: an orthonormal basis without branches (Duff et al. 2017, Building
+  /// an Orthonormal Basis, Revisited).
+  STRANDCAST_INLINE void find_frames() {
+    const auto& [x, y, z] = along.axis;
+    const Lanes one = Lanes{} + 1.0f;
+    const Lanes sign = z >= 0.0f ? one : -one;
+    const Lanes a = -1.0f / (sign + z);
+    const Lanes b = x * y * a;
+    first.axis[0] = 1.0f + sign * (x * x * a);
+    first.axis[1] = sign * b;
+    first.axis[2] = -sign * x;
+    second.axis[0] = b;
+    second.axis[1] = sign + y * y * a;
+    second.axis[2] = -y;
+  }
+
+  /// Positions, limited to where rounding holds, that the integers tell.
+  STRANDCAST_INLINE IntLaneVectors placed(const IntLanes& a, const IntLanes& b,
+                                          const IntLanes& correction) const {
+    const Lanes across = to_floats(a) * kTangentStep;
+    const Lanes also = to_floats(b) * kTangentStep;
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis)
+      edge.axis[axis] = (along.axis[axis] * length + first.axis[axis] * across) + second.axis[axis] * also;
+    const Lanes squared = dots(edge, edge);
+    const Lanes wanted = length + to_floats(correction) * kLengthStep;
+    const Lanes scale = squared > kTinySquared ? wanted / square_roots(squared) : Lanes{};
+    IntLaneVectors position;
+    for (size_t axis = 0; axis < 3; ++axis)
+      position.axis[axis] = wrapping_sums(base.axis[axis], nearest_lanes(edge.axis[axis] * scale));
+    return position;
+  }
+};
+
+class MotionRow {
+ public:
+  MotionRow(const TangentLayout& layout, const TangentHistory& history, TangentFrame& frame, uint32_t v)
+      : layout_(layout), history_(history), frame_(frame), v_(v) {
+    const auto& given = frame.weights[motion_class(layout, v)];
+    for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
+      weights_[k] = static_cast<float>(given[k]) * kMotionWeight;
+    length_blend_ = static_cast<float>(frame.length_blend) * kLengthWeight;
+    for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
+  }
+
+  /// Of a place in this row, in a plane.
+  size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
+
+  /// Blocks of a slice come in order.
+  STRANDCAST_INLINE void expect(size_t place, Expected& expected) const {
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const int32_t* base = frame_.lattice[axis].data() + at(place) - layout_.stride;
+      expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(base);
+      const IntLanes last = load_lanes(history_.lattice[axis].data() + at(place));
+      edge.axis[axis] = to_floats(wrapping_differences(last, expected.base.axis[axis]));
+    }
+    for (uint32_t k = 0; k < kRowFeatureCount; ++k)
+      for (size_t axis = 0; axis < 3; ++axis)
+        edge.axis[axis] += weights_[k] * load_lanes(features_[axis][k] + place);
+    for (uint32_t which = 0; which < 2; ++which)
+      for (size_t axis = 0; axis < 3; ++axis)
+        edge.axis[axis] +=
+            gather_lanes(frame_.neighbour_sum[which][axis].data(), layout_.neighbour[which].data() + place);
+    const Lanes squared = dots(edge, edge);
+    const Lanes length = square_roots(squared);
+    expected.length = v_ == 0 ? length : known_length(place);
+    const Lanes scale = squared > kTinySquared ? 1.0f / length : Lanes{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const Lanes instead = Lanes{} + (axis == 1 ? 1.0f : 0.0f);  // where there is no direction
+      expected.along.axis[axis] = scale != 0.0f ? edge.axis[axis] * scale : instead;
+    }
+    expected.find_frames();
+  }
+
+  /// Stores positions and what follows from them.
+  STRANDCAST_INLINE void store(const Expected& expected, size_t place, const IntLaneVectors& position) const {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const size_t begin = at(place);
+      const IntLanes& now = position.axis[axis];
+      const IntLanes last = load_lanes(history_.lattice[axis].data() + begin);
+      const Lanes velocity = to_floats(wrapping_differences(now, last));
+      const Lanes edge = to_floats(wrapping_differences(now, expected.base.axis[axis]));
+      store_lanes(now, frame_.lattice[axis].data() + begin);
+      store_lanes(velocity, frame_.velocity[axis].data() + begin);
+      store_lanes(edge - expected.along.axis[axis] * expected.length, frame_.residual[axis].data() + begin);
+      // What later blocks add for this neighbour.
+      const Lanes then = load_lanes(features_[axis][kOwnThen] + place);
+      const Lanes residual = load_lanes(features_[axis][kOwnResidual] + place);
+      for (uint32_t which = 0; which < 2; ++which) {
+        const float* weight = weights_.data() + kRowFeatureCount + kNeighbourFeatureCount * which;
+        store_lanes((weight[0] * velocity + weight[1] * then) + weight[2] * residual,
+                    frame_.neighbour_sum[which][axis].data() + place);
+      }
+    }
+  }
+
+  /// For a vertex that nothing else brings near `target`, and where it then is.
+  Escape make_escape(size_t at, const std::array<int32_t, 3>& target) const;
+  std::array<int32_t, 3> escaped(const Escape& escape) const;
+  TangentFrame& frame() const { return frame_; }
+
+ private:
+  STRANDCAST_INLINE Lanes known_length(size_t place) const {
+    const Lanes rest = load_lanes(layout_.rest_length_m.data() + at(place)) / history_.quantum_m;
+    if (frame_.length_blend == 0) return rest;
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const int32_t* own = history_.lattice[axis].data() + at(place);
+      edge.axis[axis] = to_floats(wrapping_differences(load_lanes(own), load_lanes(own - layout_.stride)));
+    }
+    return rest + length_blend_ * (square_roots(dots(edge, edge)) - rest);
+  }
+
+  const TangentLayout& layout_;
+  const TangentHistory& history_;
+  TangentFrame& frame_;
+  uint32_t v_;
+  std::array<float, kMotionFeatureCount> weights_;
+  float length_blend_;
+  std::array<FeatureRows, 3> features_;
+};
+
+}  // namespace strandcast
