@@ -50,27 +50,35 @@ struct TangentChain {
   }
 };
 
-/// work(slice) for all slices, on as many threads as there are processors when that is worth it.
+/// work(first, count) for all slices, `at_once` of them at a time, on as many threads as there are processors
+/// when that is worth it.
 template <class Work>
-void for_each_slice(const TangentLayout& layout, Work work) {
+void for_each_slice(const TangentLayout& layout, uint32_t at_once, Work work) {
   const uint32_t count = layout.slice_count();
   const bool is_worth_it = layout.plane_size() >= kThreadedVertices;
+  const uint32_t group_count = (count + at_once - 1) / at_once;
   const uint32_t thread_count =
-      is_worth_it ? std::min(count, std::max(1u, std::thread::hardware_concurrency())) : 1;
+      is_worth_it ? std::min(group_count, std::max(1u, std::thread::hardware_concurrency())) : 1;
   std::atomic<uint32_t> next{0};
   const auto run = [&] {
-    for (uint32_t slice = next++; slice < count; slice = next++) work(slice);
+    for (uint32_t group = next++; group < group_count; group = next++)
+      work(group * at_once, std::min(at_once, count - group * at_once));
   };
   std::vector<std::jthread> helpers;
   for (uint32_t i = 1; i < thread_count; ++i) helpers.emplace_back(run);
   run();
 }
+template <class Work>
+void for_each_slice(const TangentLayout& layout, Work work) {
+  for_each_slice(layout, 1, [&](uint32_t slice, uint32_t) { work(slice); });
+}
 
 // What decodes to within the bound of this is still a valid lattice value.
 constexpr int32_t kFarthestTarget = kMaxLattice - 2 * kStepsPerBound;
 
-Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot) {
-  Planes<int32_t> planes;
+/// `planes` lends its memory.
+Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot,
+                          Planes<int32_t> planes = {}) {
   for (size_t axis = 0; axis < 3; ++axis) {
     planes[axis].assign(layout.plane_size(), 0);
     for (size_t v = 0; v < layout.vertex_count; ++v) {
@@ -84,13 +92,15 @@ Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot)
   return planes;
 }
 
-void set_lattice(const TangentLayout& layout, const Planes<int32_t>& planes, Snapshot& snapshot) {
-  snapshot.lattice.resize(3 * snapshot.plane_size());
+/// Of one slice; `snapshot` has room for all.
+void set_lattice(const TangentLayout& layout, const Planes<int32_t>& planes, uint32_t slice,
+                 Snapshot& snapshot) {
+  const size_t end = layout.slice_begin[slice + 1];
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t v = 0; v < layout.vertex_count; ++v) {
       const int32_t* from = planes[axis].data() + v * layout.stride;
       int32_t* to = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
-      for (size_t place = 0; place < layout.stride; ++place)
+      for (size_t place = layout.slice_begin[slice]; place < end; ++place)
         if (layout.strand_at[place] != kNoStrand) to[layout.strand_at[place]] = from[place];
     }
   }
@@ -183,14 +193,20 @@ class TangentEncoder final : public StrandEncoder {
       chain_.coarsen(layout_);
       append_history(joiners_part);
     }
-    const Planes<int32_t> target = planes_of(layout_, snapshot);
-    fit_motion(layout_, chain_.history, target, frame_);
+    target_ = planes_of(layout_, snapshot, std::move(target_));
+    fit_motion(layout_, chain_.history, target_, frame_);
     std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
-    std::vector<ValueWriter> writers(layout_.slice_count());
+    writers_.resize(layout_.slice_count());
+    std::vector<std::vector<std::byte>> slices(layout_.slice_count());
     for (auto& escapes : frame_.escapes) escapes.clear();
+    Snapshot decoded = without_lattice(snapshot);
+    decoded.lattice = std::move(lattice_);
+    decoded.lattice.resize(3 * snapshot.plane_size());
     for_each_slice(layout_, [&](uint32_t slice) {
-      quantise_slice(layout_, chain_.history, target, slice, frame_);
-      write_symbols(layout_, slice, frame_, chain_.sizes, next_sizes_, tables[slice], writers[slice]);
+      quantise_slice(layout_, chain_.history, target_, slice, frame_);
+      write_symbols(layout_, slice, frame_, chain_.sizes, next_sizes_, tables[slice], writers_[slice]);
+      writers_[slice].finish(slices[slice]);
+      set_lattice(layout_, frame_.lattice, slice, decoded);
     });
     chain_.tables = mean_tables(tables);
 
@@ -199,10 +215,8 @@ class TangentEncoder final : public StrandEncoder {
     body.reserve(sizeof(head) + sizeof(frame_.weights) + layout_.plane_size());
     ByteWriter(body).put_bytes(std::as_bytes(std::span(&head, 1)));
     ByteWriter(body).put_bytes(std::as_bytes(std::span(frame_.weights)).first(weight_bytes(layout_)));
-    for (ValueWriter& slice : writers) slice.finish(body);
+    for (const auto& slice : slices) ByteWriter(body).put_bytes(slice);
 
-    Snapshot decoded = without_lattice(snapshot);
-    set_lattice(layout_, frame_.lattice, decoded);
     remember(chain_.history, frame_);
     std::swap(chain_.sizes, next_sizes_);
 
@@ -213,10 +227,12 @@ class TangentEncoder final : public StrandEncoder {
     header.opcode = Opcode::StrandDelta;
     JoinFrames frames;
     frames.frame = make_frame(header, decoded, {}, body);
-    if (!is_coarsened) return frames;
-    header.opcode = Opcode::StrandKeyframe;
-    header.base_sequence = 0;
-    frames.keyframe = make_frame(header, decoded, joiners_part, body);
+    if (is_coarsened) {
+      header.opcode = Opcode::StrandKeyframe;
+      header.base_sequence = 0;
+      frames.keyframe = make_frame(header, decoded, joiners_part, body);
+    }
+    lattice_ = std::move(decoded.lattice);
     return frames;
   }
 
@@ -256,6 +272,10 @@ class TangentEncoder final : public StrandEncoder {
   TangentChain chain_;
   TangentFrame frame_;
   SymbolSizes next_sizes_;
+  // Kept for their memory.
+  Planes<int32_t> target_;
+  std::vector<ValueWriter> writers_;
+  std::vector<int32_t> lattice_;
   ZstdCompressor zstd_;
   uint32_t sequence_ = 0;
   bool has_chain_ = false;
@@ -355,12 +375,18 @@ class TangentDecoder final : public StrandDecoder {
       return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
                         rest.size());
     std::vector<TangentTables> tables(layout_.slice_count(), chain.tables);
-    for_each_slice(layout_, [&](uint32_t slice) {
-      read_symbols(layout_, slice, frame_, chain.sizes, next_sizes_, tables[slice], readers[slice]);
-      place_slice(layout_, chain.history, slice, frame_);
+    snapshot.lattice.resize(3 * snapshot.plane_size());
+    for_each_slice(layout_, kSlicesAtOnce, [&](uint32_t begin, uint32_t count) {
+      std::vector<SliceSymbols> symbols;
+      for (uint32_t slice = begin; slice < begin + count; ++slice)
+        symbols.push_back({slice, tables[slice], readers[slice]});
+      read_symbols(layout_, chain.sizes, frame_, next_sizes_, symbols);
+      for (const SliceSymbols& done : symbols) {
+        place_slice(layout_, chain.history, done.slice, frame_);
+        set_lattice(layout_, frame_.lattice, done.slice, snapshot);
+      }
     });
     RETURN_IF_ERROR(check_spent(readers));
-    set_lattice(layout_, frame_.lattice, snapshot);
     RETURN_IF_ERROR(check_decoded(snapshot, message));
     // Only now, with everything checked, the state moves on.
     chain.tables = mean_tables(tables);

@@ -72,6 +72,24 @@ Escape MotionRow::make_escape(size_t at, const std::array<int32_t, 3>& target) c
   return escape;
 }
 
+void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
+              std::span<float> sum) {
+  constexpr size_t kParts = kBlockSize / kLaneCount;
+  const FeatureRows row = rows;
+  for (size_t i = 0; i < sum.size(); i += kBlockSize) {
+    Lanes block[kParts];
+    for (size_t part = 0; part < kParts; ++part) {
+      const size_t at = i + part * kLaneCount;
+      block[part] =
+          to_floats(wrapping_differences(load_lanes(positions.last + at), load_lanes(positions.base + at)));
+    }
+    for (uint32_t k = 0; k < kRowFeatureCount; ++k)
+      for (size_t part = 0; part < kParts; ++part)
+        block[part] += weights[k] * load_lanes(row[k] + i + part * kLaneCount);
+    for (size_t part = 0; part < kParts; ++part) store_lanes(block[part], sum.data() + i + part * kLaneCount);
+  }
+}
+
 std::array<int32_t, 3> MotionRow::escaped(const Escape& escape) const {
   std::array<int32_t, 3> position;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -112,6 +130,8 @@ void TangentFrame::resize(const TangentLayout& layout) {
     residual[axis].assign(size, 0.0f);
   }
   zeros.assign(layout.stride, 0.0f);
+  zero_lattice.assign(layout.stride, 0);
+  for (auto& row : edge) row.assign(layout.stride, 0.0f);
   for (auto& planes : neighbour_sum)
     for (auto& row : planes) row.assign(layout.stride, 0.0f);
   escapes.assign(layout.slice_count(), {});
@@ -122,6 +142,7 @@ void place_slice(const TangentLayout& layout, const TangentHistory& history, uin
   auto escape = frame.escapes[slice].begin();
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     const MotionRow row(layout, history, frame, v);
+    row.sum_features(slice);
     for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
          place += kLaneCount) {
       Expected expected;

@@ -61,9 +61,11 @@ struct TangentFrame {
   Planes<int32_t> lattice;
   Planes<float> velocity;
   Planes<float> residual;
-  std::array<Planes<float>, 2>
-      neighbour_sum;         // (stride) of the row at work: what a vertex tells as neighbour
-  std::vector<float> zeros;  // (stride)
+  // Of the row at work, each (stride).
+  Planes<float> edge;                          // to the expected position, as far as whole rows tell
+  std::array<Planes<float>, 2> neighbour_sum;  // what a vertex tells as a neighbour
+  std::vector<float> zeros;
+  std::vector<int32_t> zero_lattice;
 
   void resize(const TangentLayout& layout);
 };

@@ -2,6 +2,8 @@
 // every vertex within the bound.
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "common/codec/least_squares.h"
 #include "common/codec/tangent_row.h"
@@ -126,16 +128,26 @@ STRANDCAST_INLINE void quantise_block(const MotionRow& row, const Planes<int32_t
   row.store(expected, place, found.position);
 }
 
-constexpr uint32_t kSampleStrands = 384;
+constexpr size_t kSampleStrands = 384;
+constexpr size_t kRun = 4;      // side by side in memory: one of them alone would fetch as much
 constexpr double kNoise = 8.0;  // steps; a thirtieth of the bound is not worth predicting
+
+/// Strands to fit to: runs at even distances.
+std::vector<uint32_t> sample_places(const TangentLayout& layout) {
+  const size_t step = kRun * std::max<size_t>(1, layout.stride / kSampleStrands);
+  std::vector<uint32_t> places;
+  for (size_t run = step / 2 / kRun * kRun; run < layout.no_neighbour(); run += step)
+    for (size_t i = 0; i < kRun; ++i) places.push_back(static_cast<uint32_t>(run + i));
+  return places;
+}
 
 /// Share of the last decoded length that predicts the next one best, in 1/16.
 uint8_t fit_length_blend(const TangentLayout& layout, const TangentHistory& history,
-                         const Planes<int32_t>& target, uint32_t step) {
+                         const Planes<int32_t>& target, std::span<const uint32_t> sample) {
   double numerator = 0.0;
   double denominator = 0.0;
   for (uint32_t v = 1; v < layout.vertex_count; ++v) {
-    for (size_t place = step / 2; place < layout.no_neighbour(); place += step) {
+    for (const uint32_t place : sample) {
       const size_t at = v * static_cast<size_t>(layout.stride) + place;
       double now = 0.0;
       double then = 0.0;
@@ -159,8 +171,8 @@ uint8_t fit_length_blend(const TangentLayout& layout, const TangentHistory& hist
 
 void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
                 TangentFrame& frame) {
-  const uint32_t step = std::max(1u, layout.stride / kSampleStrands);
-  frame.length_blend = fit_length_blend(layout, history, target, step);
+  const std::vector<uint32_t> sample = sample_places(layout);
+  frame.length_blend = fit_length_blend(layout, history, target, sample);
   std::array<LeastSquares<kMotionFeatureCount>, kMotionClassCount> fits;
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     auto& fit = fits[motion_class(layout, v)];
@@ -170,7 +182,7 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
       const auto now = [&](size_t at) {
         return static_cast<float>(wrapping_difference(target[axis][at], history.lattice[axis][at]));
       };
-      for (size_t place = step / 2; place < layout.no_neighbour(); place += step) {
+      for (const uint32_t place : sample) {
         std::array<float, kMotionFeatureCount> value;
         for (uint32_t k = 0; k < kRowFeatureCount; ++k) value[k] = rows[k][place];
         value[kParentNow] = v >= 1 ? now(begin - layout.stride + place) : 0.0f;
@@ -193,6 +205,7 @@ void quantise_slice(const TangentLayout& layout, const TangentHistory& history, 
                     uint32_t slice, TangentFrame& frame) {
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     const MotionRow row(layout, history, frame, v);
+    row.sum_features(slice);
     for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
          place += kLaneCount) {
       quantise_block(row, target, place, frame.escapes[slice]);

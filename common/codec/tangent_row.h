@@ -7,7 +7,9 @@
 // four lanes that is 50 cycles of arithmetic, 25 of memory at 10 GB/s and 75 of waiting.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <span>
 
 #include "common/codec/lanes.h"
 #include "common/codec/tangent_motion.h"
@@ -55,6 +57,16 @@ uint32_t motion_class(const TangentLayout& layout, uint32_t v);
 using FeatureRows = std::array<const float*, kRowFeatureCount>;
 FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
                          const TangentFrame& frame, size_t axis, uint32_t v);
+
+using FloatWeights = std::array<float, kMotionFeatureCount>;
+struct LastAndBase {
+  const int32_t* last;
+  const int32_t* base;
+};
+/// sum = (last - base) + weighted features, for as many places; whole blocks. A pass of its own: nothing in
+/// it waits for other places, while the rest of a prediction is one long chain for each block.
+void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
+              std::span<float> sum);
 
 /// Where the vertices of a block are expected: `length` along `along` from `base`, and two directions across.
 struct Expected {
@@ -112,22 +124,29 @@ class MotionRow {
   /// Of a place in this row, in a plane.
   size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
 
+  /// The part of the prediction that comes from whole rows, for a slice; before its blocks are expected.
+  void sum_features(uint32_t slice) const {
+    const size_t begin = layout_.slice_begin[slice];
+    const size_t count = layout_.slice_begin[slice + 1] - begin;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      FeatureRows rows = features_[axis];
+      for (const float*& row : rows) row += begin;
+      const int32_t* last = history_.lattice[axis].data() + at(begin);
+      const int32_t* base = v_ == 0 ? frame_.zero_lattice.data() : bases(axis) + begin;
+      sum_rows(rows, weights_, {last, base}, std::span(frame_.edge[axis]).subspan(begin, count));
+    }
+  }
+
   /// Blocks of a slice come in order.
   STRANDCAST_INLINE void expect(size_t place, Expected& expected) const {
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
-      const int32_t* base = frame_.lattice[axis].data() + at(place) - layout_.stride;
-      expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(base);
-      const IntLanes last = load_lanes(history_.lattice[axis].data() + at(place));
-      edge.axis[axis] = to_floats(wrapping_differences(last, expected.base.axis[axis]));
-    }
-    for (uint32_t k = 0; k < kRowFeatureCount; ++k)
-      for (size_t axis = 0; axis < 3; ++axis)
-        edge.axis[axis] += weights_[k] * load_lanes(features_[axis][k] + place);
-    for (uint32_t which = 0; which < 2; ++which)
-      for (size_t axis = 0; axis < 3; ++axis)
+      expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(bases(axis) + place);
+      edge.axis[axis] = load_lanes(frame_.edge[axis].data() + place);
+      for (uint32_t which = 0; which < 2; ++which)
         edge.axis[axis] +=
             gather_lanes(frame_.neighbour_sum[which][axis].data(), layout_.neighbour[which].data() + place);
+    }
     const Lanes squared = dots(edge, edge);
     const Lanes length = square_roots(squared);
     expected.length = v_ == 0 ? length : known_length(place);
@@ -178,11 +197,14 @@ class MotionRow {
     return rest + length_blend_ * (square_roots(dots(edge, edge)) - rest);
   }
 
+  /// Decoded positions of the parents; not for roots.
+  const int32_t* bases(size_t axis) const { return frame_.lattice[axis].data() + at(0) - layout_.stride; }
+
   const TangentLayout& layout_;
   const TangentHistory& history_;
   TangentFrame& frame_;
   uint32_t v_;
-  std::array<float, kMotionFeatureCount> weights_;
+  FloatWeights weights_;
   float length_blend_;
   std::array<FeatureRows, 3> features_;
 };

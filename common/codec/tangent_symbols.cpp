@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "common/base/check.h"
 #include "common/codec/least_squares.h"
@@ -22,13 +23,22 @@ struct Size {
   uint32_t shift;
 };
 
+constexpr uint32_t size_class(uint32_t sum) {
+  const auto width = static_cast<uint32_t>(std::bit_width(sum));
+  return width < 3 ? sum : std::min(4 * (width - 2) + ((sum >> (width - 3)) & 3u), kSizeCount - 1);
+}
+
+/// Of all sums that need no shift.
+constexpr auto kSizeClasses = [] {
+  std::array<uint8_t, 1u << kSizeBits> classes{};
+  for (uint32_t sum = 0; sum < classes.size(); ++sum) classes[sum] = static_cast<uint8_t>(size_class(sum));
+  return classes;
+}();
+
 Size size_of(uint32_t sum) {
-  auto width = static_cast<uint32_t>(std::bit_width(sum));
-  if (width < 3) return {sum, 0};
-  const uint32_t shift = width > kSizeBits ? width - kSizeBits : 0;
-  sum >>= shift;
-  width -= shift;
-  return {std::min(4 * (width - 2) + ((sum >> (width - 3)) & 3u), kSizeCount - 1), shift};
+  if (sum < kSizeClasses.size()) return {kSizeClasses[sum], 0};
+  const uint32_t shift = static_cast<uint32_t>(std::bit_width(sum)) - kSizeBits;
+  return {kSizeClasses[sum >> shift], shift};
 }
 
 uint32_t magnitude(int32_t value) {
@@ -42,6 +52,7 @@ struct WritePort {
   void code(int32_t& value, SymbolTable& table, uint32_t shift) {
     writer.put(fold_sign(value), table, shift);
   }
+  void code_likely_zero(int32_t& value, SymbolTable& table) { code(value, table, 0); }
   void code_escape(std::vector<Escape>::const_iterator& next) {
     for (const int32_t step : next->step) {
       const uint32_t folded = fold_sign(step);
@@ -59,6 +70,9 @@ struct ReadPort {
   ValueReader& reader;
   void code(int32_t& value, SymbolTable& table, uint32_t shift) {
     value = unfold_sign(reader.take(table, shift));
+  }
+  void code_likely_zero(int32_t& value, SymbolTable& table) {
+    value = unfold_sign(reader.take_likely_zero(table));
   }
   std::array<int32_t, 3> take_escape() {
     std::array<int32_t, 3> step;
@@ -80,6 +94,8 @@ struct SizeRows {
   const uint8_t* length_then;
   const uint8_t* length_parent;
   uint8_t* length_now;
+  const uint32_t* neighbour;
+  const uint32_t* second_neighbour;
 
   SizeRows(const TangentLayout& layout, const SymbolSizes& then, SymbolSizes& sizes, uint32_t v,
            const uint16_t* zeros, const uint8_t* zero_bytes) {
@@ -93,10 +109,12 @@ struct SizeRows {
     length_now = sizes.length.data() + begin;
     length_then = then.length.data() + begin;
     length_parent = v >= 1 ? length_now - stride : zero_bytes;
+    neighbour = layout.neighbour[0].data();
+    second_neighbour = layout.neighbour[1].data();
   }
-  uint32_t near(const TangentLayout& layout, size_t place) const {
+  uint32_t near(size_t place) const {
     return 2u * own_then[place] + 2u * parent[place] + grandparent[place] + child_then[place] +
-           2u * now[layout.neighbour[0][place]] + now[layout.neighbour[1][place]];
+           2u * now[neighbour[place]] + now[second_neighbour[place]];
   }
 };
 
@@ -112,7 +130,7 @@ bool code_vertex(uint32_t near, SizeRows& rows, size_t place, int32_t& first, in
   SymbolTable* const firsts = tables.data();
   SymbolTable* const seconds = firsts + kSizeCount;
   SymbolTable* const lengths = seconds + kSizeCount * kFirstSizes;
-  port.code(length, lengths[length_table(near, rows, place)], 0);
+  port.code_likely_zero(length, lengths[length_table(near, rows, place)]);
   if (length == kEscapedLength) {
     first = second = 0;
     rows.now[place] = kEscapeSize;
@@ -130,20 +148,49 @@ bool code_vertex(uint32_t near, SizeRows& rows, size_t place, int32_t& first, in
   return false;
 }
 
-/// visit(row, rows around it, place) for every strand of a slice.
-template <class Visit>
-void for_each_symbol(const TangentLayout& layout, uint32_t slice, const SymbolSizes& then, SymbolSizes& now,
-                     Visit visit) {
-  const std::vector<uint16_t> zeros(layout.stride, 0);
-  const std::vector<uint8_t> zero_bytes(layout.stride, 0);
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    SizeRows rows(layout, then, now, v, zeros.data(), zero_bytes.data());
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1]; ++place) {
-      if (layout.strand_at[place] == kNoStrand) break;
-      visit(v * static_cast<size_t>(layout.stride) + place, rows, place);
-    }
-  }
+/// Strands of a slice; places without one are the last.
+size_t strands_in(const TangentLayout& layout, uint32_t slice) {
+  size_t end = layout.slice_begin[slice + 1];
+  while (end > layout.slice_begin[slice] && layout.strand_at[end - 1] == kNoStrand) --end;
+  return end - layout.slice_begin[slice];
 }
+
+/// What goes through the integers of a slice row by row; coder(at, rows around it, place) does one vertex.
+template <class Coder>
+class SymbolWalk {
+ public:
+  SymbolWalk(const TangentLayout& layout, uint32_t slice, const SymbolSizes& then, SymbolSizes& now,
+             Coder coder)
+      : layout_(layout),
+        begin_(layout.slice_begin[slice]),
+        count_(strands_in(layout, slice)),
+        zeros_(layout.stride, 0),
+        zero_bytes_(layout.stride, 0),
+        then_(then),
+        now_(now),
+        rows_(layout, then, now, 0, zeros_.data(), zero_bytes_.data()),
+        coder_(std::move(coder)) {}
+
+  size_t strand_count() const { return count_; }
+  void begin_row(uint32_t v) {
+    row_ = v * static_cast<size_t>(layout_.stride);
+    rows_ = SizeRows(layout_, then_, now_, v, zeros_.data(), zero_bytes_.data());
+  }
+  /// The strand at position i of the slice.
+  void code(size_t i) { coder_(row_ + begin_ + i, rows_, begin_ + i); }
+
+ private:
+  const TangentLayout& layout_;
+  size_t begin_;
+  size_t count_;
+  std::vector<uint16_t> zeros_;
+  std::vector<uint8_t> zero_bytes_;
+  const SymbolSizes& then_;
+  SymbolSizes& now_;
+  size_t row_ = 0;
+  SizeRows rows_;
+  Coder coder_;
+};
 
 // ---- shapes ----
 
@@ -374,25 +421,46 @@ void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentFra
                    const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer) {
   WritePort port{writer};
   auto escape = frame.escapes[slice].begin();
-  for_each_symbol(layout, slice, then, now, [&](size_t at, SizeRows& rows, size_t place) {
+  SymbolWalk walk(layout, slice, then, now, [&](size_t at, SizeRows& rows, size_t place) {
     int32_t first = frame.first[at];
     int32_t second = frame.second[at];
     int32_t length = frame.length[at];
-    if (code_vertex(rows.near(layout, place), rows, place, first, second, length, tables, port))
+    if (code_vertex(rows.near(place), rows, place, first, second, length, tables, port))
       port.code_escape(escape);
   });
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    walk.begin_row(v);
+    for (size_t i = 0; i < walk.strand_count(); ++i) walk.code(i);
+  }
 }
 
-void read_symbols(const TangentLayout& layout, uint32_t slice, TangentFrame& frame, const SymbolSizes& then,
-                  SymbolSizes& now, TangentTables& tables, ValueReader& reader) {
-  ReadPort port{reader};
-  frame.escapes[slice].clear();
-  for_each_symbol(layout, slice, then, now, [&](size_t at, SizeRows& rows, size_t place) {
-    if (code_vertex(rows.near(layout, place), rows, place, frame.first[at], frame.second[at],
-                    frame.length[at], tables, port) &&
-        !reader.is_short())
-      frame.escapes[slice].push_back({at, port.take_escape()});
-  });
+void read_symbols(const TangentLayout& layout, const SymbolSizes& then, TangentFrame& frame, SymbolSizes& now,
+                  std::span<SliceSymbols> slices) {
+  const auto make_walk = [&](SliceSymbols& symbols) {
+    frame.escapes[symbols.slice].clear();
+    return SymbolWalk(layout, symbols.slice, then, now,
+                      [&, port = ReadPort{symbols.reader}](size_t at, SizeRows& rows, size_t place) mutable {
+                        if (code_vertex(rows.near(place), rows, place, frame.first[at], frame.second[at],
+                                        frame.length[at], symbols.tables, port) &&
+                            !symbols.reader.is_short())
+                          frame.escapes[symbols.slice].push_back({at, port.take_escape()});
+                      });
+  };
+  CHECK(!slices.empty() && slices.size() <= kSlicesAtOnce);
+  auto one = make_walk(slices.front());
+  auto other = make_walk(slices.back());
+  const size_t other_count = slices.size() == 1 ? 0 : other.strand_count();
+  const size_t common = std::min(one.strand_count(), other_count);
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    one.begin_row(v);
+    other.begin_row(v);
+    for (size_t i = 0; i < common; ++i) {
+      one.code(i);
+      other.code(i);
+    }
+    for (size_t i = common; i < one.strand_count(); ++i) one.code(i);
+    for (size_t i = common; i < other_count; ++i) other.code(i);
+  }
 }
 
 ShapeWeights fit_shape(const TangentLayout& layout, const Planes<int32_t>& value, float unit_m) {

@@ -36,10 +36,19 @@ struct SymbolSizes {
 /// filled.
 void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentFrame& frame,
                    const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer);
-/// The inverse, from untrusted bytes: any give some integers; escapes take bytes, so there are no
-/// more than there is room for.
-void read_symbols(const TangentLayout& layout, uint32_t slice, TangentFrame& frame, const SymbolSizes& then,
-                  SymbolSizes& now, TangentTables& tables, ValueReader& reader);
+
+/// A slice to be read.
+struct SliceSymbols {
+  uint32_t slice;
+  TangentTables& tables;
+  ValueReader& reader;
+};
+/// As many are read side by side: a symbol waits for the one before it in its slice, but for no other slice.
+inline constexpr uint32_t kSlicesAtOnce = 2;
+/// The inverse, from untrusted bytes, for one to kSlicesAtOnce slices: any bytes give some integers; escapes
+/// take bytes, so there are no more than there is room for.
+void read_symbols(const TangentLayout& layout, const SymbolSizes& then, TangentFrame& frame, SymbolSizes& now,
+                  std::span<SliceSymbols> slices);
 
 inline constexpr uint32_t kShapeFeatureCount = 13;
 inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest

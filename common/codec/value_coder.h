@@ -163,12 +163,18 @@ class ValueReader {
   uint32_t take(SymbolTable& table, uint32_t shift) {
     const auto place = static_cast<int32_t>(state_ & (kProbabilityOne - 1));
     const uint32_t symbol = find_symbol(table, place);
-    state_ = static_cast<uint32_t>(table.share(symbol)) * (state_ >> kProbabilityBits) +
-             static_cast<uint32_t>(place - table.start[symbol]);
-    if (state_ < kRansLow) state_ = (state_ << 16) | next_word();
-    table.learn(symbol);
+    pass(table, symbol, place);
     const uint32_t value = symbol < kFirstTail ? symbol : take_tail(symbol);
     return shift == 0 ? value : (value << shift) | take_bits(shift);
+  }
+  /// take(table, 0) where 0 is by far the most frequent: a guess of the processor's, instead of a search
+  /// that it must wait for.
+  uint32_t take_likely_zero(SymbolTable& table) {
+    const auto place = static_cast<int32_t>(state_ & (kProbabilityOne - 1));
+    if (place >= table.start[1]) [[unlikely]]
+      return take(table, 0);
+    pass(table, 0, place);
+    return 0;
   }
   uint32_t take_bits(uint32_t count);
   /// True when exactly the bytes of the slice were needed.
@@ -188,6 +194,13 @@ class ValueReader {
     return word;
   }
   uint32_t take_tail(uint32_t symbol);
+  /// Goes on to the state before `symbol`.
+  void pass(SymbolTable& table, uint32_t symbol, int32_t place) {
+    state_ = static_cast<uint32_t>(table.share(symbol)) * (state_ >> kProbabilityBits) +
+             static_cast<uint32_t>(place - table.start[symbol]);
+    if (state_ < kRansLow) state_ = (state_ << 16) | next_word();
+    table.learn(symbol);
+  }
 
   std::span<const std::byte> words_;
   std::span<const std::byte> bits_;

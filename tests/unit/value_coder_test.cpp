@@ -92,6 +92,24 @@ TEST(ValueCoder, ReadsBackValuesOfEverySizeAndShift) {
   }
 }
 
+// Values that are mostly 0 and now and then of any size, read both ways.
+TEST(ValueCoder, TakesALikelyZeroAsItTakesAnyValue) {
+  std::mt19937 random(5);
+  std::vector<uint32_t> values;
+  for (int i = 0; i < 20'000; ++i) values.push_back(random() % 16 == 0 ? random() >> (random() % 32) : 0);
+  ValueWriter writer;
+  SymbolTable table = even_table();
+  for (const uint32_t value : values) writer.put(value, table, 0);
+  std::vector<std::byte> bytes;
+  writer.finish(bytes);
+  ValueReader reader;
+  ASSERT_TRUE(reader.open(bytes));
+  SymbolTable read_table = even_table();
+  for (size_t i = 0; i < values.size(); ++i) ASSERT_EQ(reader.take_likely_zero(read_table), values[i]) << i;
+  EXPECT_TRUE(reader.is_spent());
+  EXPECT_EQ(read_table, table);
+}
+
 TEST(ValueCoder, CostsLittleMoreThanTheEntropyOfItsSource) {
   // Geometric with ratio r has -log2(1 - r) - r / (1 - r) log2(r) bits of entropy.
   constexpr double kRatio = 0.5;
