@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace strandcast {
 namespace {
@@ -10,11 +11,16 @@ constexpr double kNsPerS = 1e9;
 /// Round trips shorter than this differ by scheduling, not by the link.
 constexpr int64_t kLeastTransferNs = kNsPerMs;
 constexpr size_t kMaxBusySamples = 16;
+/// A rate is taken over at least this: frames and acknowledgements come in bunches.
+constexpr int64_t kBusySpanNs = 50 * kNsPerMs;
+/// What takes so long is hardly changed by jitter.
+constexpr int64_t kExactTransferNs = 100 * kNsPerMs;
 constexpr size_t kMinBusySamples = 3;
 constexpr int64_t kBusyAgeNs = 2'000 * kNsPerMs;
 /// A change needs time to show: nothing is decided before.
 constexpr int64_t kSettleNs = 500 * kNsPerMs;
 constexpr double kDrainingShare = 0.95;
+constexpr int64_t kKeyframeSlackNs = kGateDelayNs / 2;
 
 /// What takes the place of many frames that build on each other.
 bool is_keyframe(const FrameHeader& header) {
@@ -78,18 +84,36 @@ int64_t FlowControl::base_ns() const {
 }
 
 void FlowControl::note_capacity(const Frame& frame, int64_t round_trip_ns, int64_t time_ns) {
-  const auto rate = [&](int64_t duration_ns) {
-    return static_cast<double>(frame.bytes) * kNsPerS /
-           static_cast<double>(std::max(duration_ns, kLeastTransferNs));
-  };
-  // A large frame that met nothing on its way shows the rate by how much longer it took than something small.
-  if (frame.is_large && frame.was_alone && !round_trips_.empty())
-    seen_rate_ = {time_ns, rate(round_trip_ns - base_ns())};
-  // This one had reached the bottleneck before the one ahead of it left, so the time between was all its own.
-  const bool was_queued = last_ack_ns_ > 0 && frame.sent_ns + base_ns() <= last_ack_ns_;
-  if (!was_queued) return;
-  busy_rates_.push_back({time_ns, rate(time_ns - last_ack_ns_)});
-  if (busy_rates_.size() > kMaxBusySamples) busy_rates_.pop_front();
+  // A large frame that met nothing on its way shows the rate by how much longer it took than something small;
+  // what else delays it makes the rate seem lower, which matters when it took little time.
+  if (frame.is_large && frame.was_alone && !round_trips_.empty()) {
+    const int64_t duration_ns = std::max(round_trip_ns - base_ns(), kLeastTransferNs);
+    const double rate = static_cast<double>(frame.bytes) * kNsPerS / static_cast<double>(duration_ns);
+    const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
+    if (!is_known || duration_ns >= kExactTransferNs || rate > seen_rate_->value)
+      seen_rate_ = {time_ns, rate};
+  }
+  note_busy_frame(frame, time_ns);
+}
+
+/// Collects frames that had reached the bottleneck before the one ahead of them left: the time between was
+/// all theirs.
+void FlowControl::note_busy_frame(const Frame& frame, int64_t time_ns) {
+  const bool was_queued = last_ack_ns_ > 0 && frame.sent_ns + base_ns() + kLowDelayNs <= last_ack_ns_;
+  if (!was_queued) {
+    busy_bytes_ = 0.0;
+    busy_ns_ = 0;
+    return;
+  }
+  const int64_t since_last_ns = time_ns - last_ack_ns_;
+  // Acknowledgements come in bunches; the end of one is known when the next begins.
+  if (busy_ns_ >= kBusySpanNs && since_last_ns >= kLeastTransferNs) {
+    busy_rates_.push_back({time_ns, std::exchange(busy_bytes_, 0.0) * kNsPerS /
+                                        static_cast<double>(std::exchange(busy_ns_, 0))});
+    if (busy_rates_.size() > kMaxBusySamples) busy_rates_.pop_front();
+  }
+  busy_bytes_ += static_cast<double>(frame.bytes);
+  busy_ns_ += since_last_ns;
 }
 
 void FlowControl::forget_in_flight() {
@@ -120,15 +144,32 @@ int64_t FlowControl::transfer_ns(size_t bytes, int64_t time_ns) const {
   return capacity > 0.0 ? static_cast<int64_t>(static_cast<double>(bytes) / capacity * kNsPerS) : 0;
 }
 
-/// Without it the frames behind a keyframe would be held for being late, and the next keyframe would be due
-/// already.
+/// How long frames may wait behind a keyframe that fills the gate by itself, while its queue drains: they
+/// would be held for being late otherwise, and the next keyframe would be due already.
 int64_t FlowControl::keyframe_allowance_ns(int64_t time_ns) const {
   if (!keyframe_) return 0;
   const int64_t own_ns = transfer_ns(keyframe_->bytes, time_ns);
   const int64_t draining_ns = std::max<int64_t>(time_ns - keyframe_->sent_ns - own_ns, 0);
   if (draining_ns >= kDrainNs) return 0;
   const double left = 1.0 - static_cast<double>(draining_ns) / static_cast<double>(kDrainNs);
-  return static_cast<int64_t>(left * static_cast<double>(std::min(own_ns, kDrainNs)));
+  return static_cast<int64_t>(left * static_cast<double>(std::min(own_ns, kDrainNs) + kKeyframeSlackNs));
+}
+
+/// How long a frame sent now waits until the link is free, by what is on its way; 0 while the capacity is
+/// unknown.
+int64_t FlowControl::expected_wait_ns(int64_t time_ns) const {
+  const double capacity = capacity_bytes_per_s(time_ns);
+  if (capacity <= 0.0) return 0;
+  // The last one acknowledged left the link half a bare round trip after it was its turn and half of one ago.
+  int64_t free_ns = last_ack_ns_ - base_ns();
+  for (const Frame& frame : in_flight_)
+    free_ns = std::max(free_ns, frame.sent_ns) +
+              static_cast<int64_t>(static_cast<double>(frame.bytes) / capacity * kNsPerS);
+  return std::max<int64_t>(free_ns - time_ns, 0);
+}
+
+bool FlowControl::may_start(int64_t time_ns) const {
+  return may_send(time_ns) && (!has_acks_ || expected_wait_ns(time_ns) <= kStartDelayNs);
 }
 
 bool FlowControl::may_send(int64_t time_ns) const {
@@ -139,11 +180,15 @@ bool FlowControl::may_send(int64_t time_ns) const {
   if (oldest.is_asset) return false;
   // Acknowledgements may get lost with a client's queue: it is asked again, slowly, and never given up here.
   if (time_ns - in_flight_.back().sent_ns >= kAskAgainNs) return true;
+  const int64_t allowance_ns = keyframe_allowance_ns(time_ns);
+  if (expected_wait_ns(time_ns) > std::max(kGateQueueNs, allowance_ns)) return false;
   // Behind a keyframe may follow what is cheaper than another keyframe would be.
   if (oldest.is_large && in_flight_bytes_ <= 2 * oldest.bytes) return true;
   if (in_flight_.size() < kFreeFrames) return true;
+  // A try fills the queue for a round trip before that shows.
+  const int64_t gate_ns = is_trying(time_ns) ? kStartDelayNs : kGateDelayNs;
   return time_ns - oldest.sent_ns <=
-         base_ns() + transfer_ns(oldest.bytes, time_ns) + kGateDelayNs + keyframe_allowance_ns(time_ns);
+         base_ns() + transfer_ns(oldest.bytes, time_ns) + std::max(gate_ns, allowance_ns);
 }
 
 bool FlowControl::is_troubled(double cost, int64_t time_ns) const {
@@ -162,7 +207,7 @@ bool FlowControl::is_troubled(double cost, int64_t time_ns) const {
   }
   // A queue that drains is no trouble: a keyframe left it behind.
   return all >= kMinDelaySamples && high == all &&
-         delays_.back().time_ns - delays_.front().time_ns >= kDelayWindowNs / 2 &&
+         delays_.back().time_ns - delays_.front().time_ns >= kDelayWindowNs * 3 / 4 &&
          delays_.back().value > kDrainingShare * delays_.front().value;
 }
 
@@ -186,6 +231,22 @@ void FlowControl::change(size_t from, size_t to, int64_t time_ns) {
   quiet_since_ns_ = time_ns;
 }
 
+/// A better class was tried and did not get through even once: nothing is gained by waiting.
+bool FlowControl::has_failed_try(int64_t time_ns) const {
+  return is_trying(time_ns) && !losses_ns_.empty() && losses_ns_.back() > improved_ns_;
+}
+
+bool FlowControl::is_trying(int64_t time_ns) const {
+  return improved_ns_ != 0 && time_ns - improved_ns_ < kProbationNs;
+}
+
+/// Keeps the candidates for the maximum of the window: each newer one is lower than all before it.
+void FlowControl::note_demand(double cost, int64_t time_ns) {
+  while (!demands_.empty() && demands_.back().value <= cost) demands_.pop_back();
+  demands_.push_back({time_ns, cost});
+  while (demands_.front().time_ns < time_ns - kDemandWindowNs) demands_.pop_front();
+}
+
 size_t FlowControl::choose_class(size_t present, std::span<const double> costs, double cap_bytes_per_s,
                                  int64_t time_ns) {
   if (costs.size() < 2 || (has_acks_ && last_ack_ns_ == 0)) return present;
@@ -201,9 +262,11 @@ size_t FlowControl::choose_class(size_t present, std::span<const double> costs, 
     while (allowed > 0.0 && first + 1 < costs.size() && costs[first] > allowed) ++first;
     return first;
   }
-  if (!has_acks_ || time_ns - quiet_since_ns_ < kSettleNs) return present;
+  note_demand(costs[0], time_ns);
+  const bool has_failed = has_failed_try(time_ns);
+  if (!has_acks_ || (time_ns - quiet_since_ns_ < kSettleNs && !has_failed)) return present;
   const bool is_over_cap = cap_bytes_per_s > 0.0 && costs[present] > cap_bytes_per_s;
-  if (is_over_cap || is_troubled(costs[present], time_ns)) {
+  if (is_over_cap || has_failed || is_troubled(costs[present], time_ns)) {
     if (present + 1 == costs.size()) {
       quiet_since_ns_ = time_ns;  // nothing cheaper; what is better has to wait
       return present;
@@ -221,7 +284,9 @@ size_t FlowControl::choose_class(size_t present, std::span<const double> costs, 
   const int64_t wait_ns = present == 0 || present - 1 > failed_class_ ? kFirstProbeNs : probe_ns_;
   if (has_delay) quiet_since_ns_ = std::max(quiet_since_ns_, time_ns - wait_ns / 2);
   if (present == 0 || has_delay || time_ns - quiet_since_ns_ < wait_ns) return present;
-  if (allowed > 0.0 && costs[present - 1] > allowed) return present;
+  const double most = costs[present - 1] * demands_.front().value / costs[0];
+  if (allowed > 0.0 && (costs[present - 1] > allowed || most > allowed / kUsableShare * kBurstShare))
+    return present;
   change(present, present - 1, time_ns);
   return present - 1;
 }

@@ -15,8 +15,12 @@
 namespace strandcast {
 
 inline constexpr int64_t kNsPerMs = 1'000'000;
-/// Nothing new is sent while the oldest frame on its way is later than the bare link by more than this.
+/// Nothing new is sent while the oldest frame on its way is later than the bare link by more than this,
 inline constexpr int64_t kGateDelayNs = 200 * kNsPerMs;
+/// or while what is on its way keeps the link busy for longer than this: the frame itself takes time as well.
+inline constexpr int64_t kGateQueueNs = 170 * kNsPerMs;
+/// Nor a keyframe while more than this waits ahead of it: it fills the queue by itself.
+inline constexpr int64_t kStartDelayNs = 50 * kNsPerMs;
 /// So many frames may always be on their way: a viewer that draws slowly acknowledges in bursts.
 inline constexpr size_t kFreeFrames = 3;
 inline constexpr size_t kMaxInFlightBytes = 4u << 20;  // but one frame always may
@@ -30,8 +34,11 @@ inline constexpr size_t kMinDelaySamples = 3;
 /// Lost chains that count as trouble when they fall within kLossWindowNs.
 inline constexpr size_t kTroublingLosses = 2;
 inline constexpr int64_t kLossWindowNs = 2'000 * kNsPerMs;
-/// Share of the measured capacity that a class may take.
+/// Share of the measured capacity that a class may take on average, and at most while the strands move
+/// quickly, as they did once in kDemandWindowNs.
 inline constexpr double kUsableShare = 0.85;
+inline constexpr double kBurstShare = 1.4;
+inline constexpr int64_t kDemandWindowNs = 15'000 * kNsPerMs;
 /// Quiet time before a better class is tried; before one that failed it doubles with every try.
 inline constexpr int64_t kFirstProbeNs = 3'000 * kNsPerMs;
 inline constexpr int64_t kLongestProbeNs = 60'000 * kNsPerMs;
@@ -70,6 +77,8 @@ class FlowControl {
 
   /// Whether the next media frame may go to the socket.
   bool may_send(int64_t time_ns) const;
+  /// Whether a keyframe or whole picture may be asked for: it would be on its way at once.
+  bool may_start(int64_t time_ns) const;
 
   /// The class to be in, given the present one and what each costs, bytes/s, best first; at most
   /// `cap_bytes_per_s`, 0 = no cap. Call often. Remembers a change as made.
@@ -103,8 +112,13 @@ class FlowControl {
   void take_sample(const Frame& frame, int64_t time_ns);
   void note_round_trip(int64_t round_trip_ns, int64_t time_ns);
   void note_capacity(const Frame& frame, int64_t round_trip_ns, int64_t time_ns);
+  void note_busy_frame(const Frame& frame, int64_t time_ns);
   int64_t transfer_ns(size_t bytes, int64_t time_ns) const;
   int64_t keyframe_allowance_ns(int64_t time_ns) const;
+  int64_t expected_wait_ns(int64_t time_ns) const;
+  bool is_trying(int64_t time_ns) const;
+  bool has_failed_try(int64_t time_ns) const;
+  void note_demand(double cost, int64_t time_ns);
   bool is_troubled(double cost, int64_t time_ns) const;
   size_t class_below(size_t present, std::span<const double> costs, double allowed) const;
   void change(size_t from, size_t to, int64_t time_ns);
@@ -115,9 +129,12 @@ class FlowControl {
   size_t in_flight_bytes_ = 0;
   int64_t last_ack_ns_ = 0;
   int64_t queue_delay_ns_ = 0;
-  std::deque<Sample> round_trips_;   // increasing minima of the last kBaseWindowNs
-  std::deque<Sample> delays_;        // queue delays of the last kDelayWindowNs
-  std::deque<Sample> busy_rates_;    // bytes/s while the link was the limit
+  std::deque<Sample> round_trips_;  // increasing minima of the last kBaseWindowNs
+  std::deque<Sample> delays_;       // queue delays of the last kDelayWindowNs
+  std::deque<Sample> busy_rates_;   // bytes/s while the link was the limit, of spans of kBusySpanNs
+  double busy_bytes_ = 0.0;         // of the span under way
+  int64_t busy_ns_ = 0;
+  std::deque<Sample> demands_;       // decreasing maxima: what the next better class would have cost
   std::optional<Sample> seen_rate_;  // bytes/s of the newest large frame
   std::optional<Frame> keyframe_;    // the newest one sent
   std::deque<int64_t> losses_ns_;

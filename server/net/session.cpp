@@ -313,7 +313,7 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   const bool is_changing = changes_to(StreamMode::Frames) && queue_.awaits_picture();
   const bool needs_picture = is_changing || (queue_.needs_picture() && !changes_to(StreamMode::Strands));
   if (state_ != State::Joined || !(needs_picture || queue_.needs_keyframe())) return;
-  if (!is_changing && !flow_.may_send(time_ns)) return;
+  if (!is_changing && !flow_.may_start(time_ns)) return;
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
   if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
   keyframe_asked_ns_ = time_ns;

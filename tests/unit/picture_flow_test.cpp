@@ -96,7 +96,7 @@ class Viewer {
     const auto interval_ns = static_cast<int64_t>(1e9 / kRateHz) * ladder_[step].rate_divisor;
     if (time_ns >= made_ns_ + interval_ns) offer(0);
     const bool wants_keyframe = codec_ == PictureCodec::Vp8 && queue_.needs_picture() &&
-                                flow_.may_send(time_ns) && time_ns >= keyframe_ns_ + kKeyframePauseNs;
+                                flow_.may_start(time_ns) && time_ns >= keyframe_ns_ + kKeyframePauseNs;
     if (wants_keyframe) offer(1);
     if (time_ns % (50 * kMs) == 0) adapt();
     pump();

@@ -1,0 +1,82 @@
+// The built-in scene over slow links, on paper (tests/support/simulated_viewer.h): how late frames may be,
+// and how coarse.
+#include "server/net/strand_class.h"
+#include "tests/support/simulated_viewer.h"
+
+namespace strandcast {
+namespace {
+
+using namespace simulated;
+
+constexpr int64_t kLatestNs = 250 * kMs;
+constexpr int64_t kAdaptedNs = 3 * kS;
+
+Viewer viewer_over(double mbit_per_s, int64_t round_trip_ms, int64_t reader_ms) {
+  Viewer viewer({.bytes_per_s = mbit_per_s * 125e3,
+                 .round_trip_ns = round_trip_ms * kMs,
+                 .jitter_ns = 10 * kMs,
+                 .reader_ns = reader_ms * kMs},
+                turning_head());
+  while (viewer.arrivals.empty()) viewer.run(10 * kMs);
+  viewer.run(kAdaptedNs);
+  return viewer;
+}
+
+// Quick turns of the head, tries of better classes and the keyframes that both cost are all in this time.
+TEST(SlowLink, NoFrameIsLaterThanAQuarterOfASecond) {
+  for (const double mbit_per_s : {1.0, 2.0, 3.0, 5.0})
+    for (const int64_t round_trip_ms : {20, 100})
+      for (const int64_t reader_ms : {1, 20}) {
+        SCOPED_TRACE(fmt::format("{} Mbit/s, {} ms, read every {} ms", mbit_per_s, round_trip_ms, reader_ms));
+        Viewer viewer = viewer_over(mbit_per_s, round_trip_ms, reader_ms);
+        const int64_t adapted_ns = viewer.time_ns;
+        viewer.run(40 * kS);
+        EXPECT_LE(viewer.worst_age_ns(adapted_ns), kLatestNs);
+        EXPECT_GE(viewer.rate_hz(adapted_ns), 10.0);
+      }
+}
+
+TEST(SlowLink, StrandsAreNoCoarserThanTheyMustBe) {
+  const auto classes = make_strand_classes(built_in_plan());
+  for (const double mbit_per_s : {2.0, 5.0, 10.0}) {
+    SCOPED_TRACE(mbit_per_s);
+    size_t fitting = 0;
+    while (classes[fitting].relative_cost * turning_head().bytes_per_s > kUsableShare * mbit_per_s * 125e3)
+      ++fitting;
+    Viewer viewer = viewer_over(mbit_per_s, 20, 1);
+    const int64_t adapted_ns = viewer.time_ns;
+    viewer.run(60 * kS);
+    size_t coarser = 0;
+    const auto arrivals = viewer.arrivals_since(adapted_ns);
+    for (const auto& arrival : arrivals) coarser += arrival.stream > fitting ? 1 : 0;
+    // A quick turn may cost a class for the quiet time that a try needs, once in twelve seconds.
+    EXPECT_LE(coarser, arrivals.size() / 2);
+  }
+}
+
+// What came at the end of a try was 412 ms old: its queue was still there when the keyframe of the class
+// below came.
+TEST(SlowLink, KeyframeWaitsForTheQueueToDrain) {
+  FlowControl flow;
+  flow.expect_acks();
+  flow.on_round_trip(20 * kMs, kS);
+  FrameHeader header;
+  header.opcode = Opcode::Asset;
+  header.sequence = 1;
+  flow.on_sent(header, 250'000, kS);
+  flow.on_ack(0, 1, 2 * kS + 20 * kMs);  // so the link carries 250 bytes per ms
+  header.opcode = Opcode::StrandDelta;
+  for (header.sequence = 2; header.sequence < 22; ++header.sequence) flow.on_sent(header, 1'500, 3 * kS);
+  // 30,000 bytes take 120 ms.
+  EXPECT_TRUE(flow.may_send(3 * kS));
+  EXPECT_FALSE(flow.may_start(3 * kS));
+  EXPECT_FALSE(flow.may_start(3 * kS + 119 * kMs - kStartDelayNs));
+  EXPECT_TRUE(flow.may_start(3 * kS + 121 * kMs - kStartDelayNs));
+  // And 60,000 take 240, which is too much for any frame.
+  for (; header.sequence < 42; ++header.sequence) flow.on_sent(header, 1'500, 3 * kS);
+  EXPECT_FALSE(flow.may_send(3 * kS + 239 * kMs - kGateQueueNs));
+  EXPECT_TRUE(flow.may_send(3 * kS + 241 * kMs - kGateQueueNs));
+}
+
+}  // namespace
+}  // namespace strandcast
