@@ -383,7 +383,7 @@ void Server::State::run_status() {
     status.realtime_factor = now.sim.realtime_factor;
     status.is_paused = now.sim.is_paused;
     status.is_motion_stale = now.sim.is_motion_stale;
-    status.viewer_count = now.strand_viewers + now.frame_viewers;
+    status.viewer_count = now.viewers;
     status.rejected_samples = now.input.rejected();
     status.quarantined_strands = now.sim.quarantined;
     status.overstretched_strands = now.sim.overstretched;
@@ -399,6 +399,7 @@ ServerCounters Server::State::counters() const {
   counters.strand_viewers = facts.strand_viewers;
   counters.frame_viewers = facts.frame_viewers;
   counters.input = hub_.counters();
+  counters.viewers = viewers_.viewer_count();
   counters.sim = sim_->stats();
   const std::lock_guard lock(workers_mutex_);
   for (const auto& worker : encoders_)

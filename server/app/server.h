@@ -38,8 +38,9 @@ struct ServerCounters {
   std::vector<StrandEncodeCounters> strand_classes;  // all that were ever needed, by stream_id
   FrameCounters frames;
   InputCounters input;
-  uint32_t strand_viewers = 0;
+  uint32_t strand_viewers = 0;  // one whose mode changes counts here and in frame_viewers
   uint32_t frame_viewers = 0;
+  uint32_t viewers = 0;
 };
 
 class Server {

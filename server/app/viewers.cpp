@@ -229,12 +229,15 @@ RuntimeFacts Viewers::facts() const {
 void Viewers::count() {
   uint32_t strands = 0;
   uint32_t frames = 0;
+  uint32_t all = 0;
   for (const auto& [session, viewer] : viewers_) {
+    all += viewer.role != Role::Source ? 1 : 0;
     strands += viewer.gets(StreamMode::Strands) ? 1 : 0;
     frames += viewer.gets(StreamMode::Frames) ? 1 : 0;
   }
   strand_viewers_ = strands;
   frame_viewers_ = frames;
+  viewer_count_ = all;
 }
 
 }  // namespace strandcast

@@ -78,6 +78,8 @@ class Viewers {
 
   std::map<uint32_t, PictureView> picture_views() const { return views_.views(); }
   RuntimeFacts facts() const;
+  /// All who watch; facts() counts one whose mode changes for both.
+  uint32_t viewer_count() const { return viewer_count_; }
 
  private:
   struct Viewer {
@@ -109,6 +111,7 @@ class Viewers {
   PictureViews views_;
   std::atomic<uint32_t> strand_viewers_{0};
   std::atomic<uint32_t> frame_viewers_{0};
+  std::atomic<uint32_t> viewer_count_{0};
 };
 
 }  // namespace strandcast

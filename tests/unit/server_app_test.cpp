@@ -104,6 +104,7 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   CameraDesc camera;
   camera.offset_m = {0.0f, 0.0f, 2.0f};
   const auto moved = viewers.set_camera(4, camera);
+  EXPECT_EQ(viewers.viewer_count(), 3u) << "a source watches nothing";
   ASSERT_TRUE(moved.ok());
   EXPECT_NE(*moved, first->picture_class);
   const auto kept = viewers.set_camera(1, camera);
@@ -195,6 +196,7 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
 
   // Three more within a second: none is carried out before the second has passed, then the newest.
   viewers.request_mode(1, StreamMode::Strands);
+  EXPECT_EQ(viewers.viewer_count(), 1u) << "and it is one viewer all the time";
   viewers.request_mode(1, StreamMode::Frames);
   viewers.request_mode(1, StreamMode::Strands);
   for (int tick = 1; tick < 4; ++tick)
