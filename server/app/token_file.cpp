@@ -104,6 +104,9 @@ Result<std::vector<AccessToken>> parse_tokens(const std::string& text) {
     AccessToken token{second, Grant::AllButAdmin};
     const auto named = std::find_if(kNamedGrants.begin(), kNamedGrants.end(),
                                     [&](Grant grant) { return first == to_string(grant); });
+    if (second.empty() && named != kNamedGrants.end())
+      return make_error(ErrorCode::BadInput, "line {} has the role '{}', but no token after it", number,
+                        to_string(*named));
     if (second.empty()) {
       token.secret = first;
     } else if (named != kNamedGrants.end() && third.empty()) {
@@ -116,6 +119,9 @@ Result<std::vector<AccessToken>> parse_tokens(const std::string& text) {
     if (token.secret.size() > kMaxTokenBytes)
       return make_error(ErrorCode::LimitExceeded, "the token in line {} has more than {} bytes", number,
                         kMaxTokenBytes);
+    if (token.secret.size() < kMinTokenCharacters)
+      return make_error(ErrorCode::BadInput, "the token in line {} has {} characters, it needs at least {}",
+                        number, token.secret.size(), kMinTokenCharacters);
     const bool is_twice = std::any_of(tokens.begin(), tokens.end(),
                                       [&](const AccessToken& other) { return other.secret == token.secret; });
     if (is_twice)

@@ -28,10 +28,10 @@ Status check_listening(bool is_trusted, const std::string& address, const std::v
                       "listening on '{}' needs a token (--token-file); without one only loopback is served",
                       address);
   for (const AccessToken& token : tokens)
-    if (token.secret.size() < kMinRemoteTokenCharacters)
+    if (token.secret.size() < kMinTokenCharacters)
       return make_error(ErrorCode::Unauthorized,
                         "a token for {} has {} characters, but listening on '{}' needs at least {}",
-                        to_string(token.grant), token.secret.size(), address, kMinRemoteTokenCharacters);
+                        to_string(token.grant), token.secret.size(), address, kMinTokenCharacters);
   return {};
 }
 

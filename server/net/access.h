@@ -12,7 +12,7 @@
 
 namespace strandcast {
 
-/// Refuses to listen where others can reach us without tokens of at least kMinRemoteTokenCharacters.
+/// Refuses to listen where others can reach us without tokens of at least kMinTokenCharacters.
 /// `is_trusted`: on loopback, and loopback is trusted.
 Status check_listening(bool is_trusted, const std::string& address, const std::vector<AccessToken>& tokens);
 

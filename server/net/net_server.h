@@ -25,7 +25,6 @@ namespace strandcast {
 inline constexpr uint32_t kMaxSessions = 256;
 static_assert(kMaxSessions <= kMaxListedSessions);
 inline constexpr uint32_t kMaxSessionsPerAddress = 64;
-inline constexpr size_t kMinRemoteTokenCharacters = 16;
 
 using SessionId = uint64_t;     // never reused by one server
 using PictureClass = uint32_t;  // viewers of one class get the same rendered frames

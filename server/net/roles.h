@@ -11,6 +11,8 @@
 
 namespace strandcast {
 
+inline constexpr size_t kMinTokenCharacters = 16;
+
 /// What a token is good for. AllButAdmin: a token file of the plain form, one token and no role.
 enum class Grant { Viewer, Controller, Source, AllButAdmin, Admin };
 

@@ -204,8 +204,8 @@ void add_texts(const SeedFolder& seeds) {
             "groom.file.path=a.tfx\ngroom.file.up_axis=Z\n");
   seeds.add("token_file", "roles",
             "\1secret-of-steering\n# made\nviewer secret-of-viewing\ncontroller secret-of-steering\n"
-            "source secret-of-feeding\nadmin secret-of-all\n");
-  seeds.add("token_file", "plain", "\2secret-of-all\nsecret-of-all\n");
+            "source secret-of-feeding\nadmin secret-of-everything\n");
+  seeds.add("token_file", "plain", "\2secret-of-everything\nsecret-of-everything\n");
   seeds.add("address", "ipv4", "127.0.0.1:7878");
   seeds.add("address", "ipv6", "[::1]:80");
   seeds.add("address", "name", "hair.example");

@@ -16,12 +16,12 @@ TEST(Access, BeyondLoopbackNeedsALongToken) {
     return std::vector<AccessToken>{admin, {std::string(characters, 'v'), Grant::Viewer}};
   };
   EXPECT_TRUE(check_listening(true, "127.0.0.1", {}).ok());
-  EXPECT_TRUE(check_listening(false, "0.0.0.0", with(kMinRemoteTokenCharacters)).ok());
+  EXPECT_TRUE(check_listening(false, "0.0.0.0", with(kMinTokenCharacters)).ok());
   const Status without = check_listening(false, "0.0.0.0", {});
   ASSERT_FALSE(without.ok());
   EXPECT_NE(without.error().message.find("0.0.0.0"), std::string::npos);
   EXPECT_NE(without.error().message.find("--token-file"), std::string::npos);
-  const Status is_short = check_listening(false, "0.0.0.0", with(kMinRemoteTokenCharacters - 1));
+  const Status is_short = check_listening(false, "0.0.0.0", with(kMinTokenCharacters - 1));
   ASSERT_FALSE(is_short.ok());
   EXPECT_EQ(is_short.error().message.find("vvv"), std::string::npos) << "a token is never printed";
 }

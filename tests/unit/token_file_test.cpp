@@ -101,5 +101,27 @@ TEST_F(TokenFiles, BrokenOnesAreRefusedWithoutShowingTheirContent) {
   EXPECT_FALSE(open_token_file(folder_.path() / "no" / "such"));
 }
 
+TEST_F(TokenFiles, ARoleIsNoToken) {
+  for (const char* role : {"viewer", "controller", "source", "admin"}) {
+    const auto opened = open_with(fmt::format("\n{}\n", role));
+    ASSERT_FALSE(opened) << role;
+    EXPECT_THAT(opened.error().to_string(),
+                HasSubstr(fmt::format("line 2 has the role '{}', but no token after it", role)));
+  }
+  for (const char* text :
+       {"viewer viewer\n", "viewer = viewer\n", "viewer = 0123456789abcdef\n", "viewer=viewer\n"})
+    EXPECT_FALSE(open_with(text)) << text;
+}
+
+TEST_F(TokenFiles, ShortTokensAreRefusedWithTheirLength) {
+  for (const std::string role : {"", "viewer ", "admin "}) {
+    const auto opened = open_with(role + std::string(kMinTokenCharacters - 1, 'x') + "\n");
+    ASSERT_FALSE(opened) << role;
+    EXPECT_THAT(opened.error().to_string(),
+                HasSubstr("the token in line 1 has 15 characters, it needs at least 16"));
+    EXPECT_TRUE(open_with(role + std::string(kMinTokenCharacters, 'x') + "\n")) << role;
+  }
+}
+
 }  // namespace
 }  // namespace strandcast
