@@ -110,6 +110,7 @@ struct StreamDesc {
   uint32_t frame_width = 640, frame_height = 360;
   uint32_t jpeg_quality = 80;
   double frame_rate_hz = 15.0;  // rendered frames, at most
+  double strand_rate_hz = 0.0;  // states of strands, at most; 0 = every step
 
   bool operator==(const StreamDesc&) const = default;
 };

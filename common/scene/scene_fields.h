@@ -57,6 +57,7 @@ inline constexpr Range kFrameWidth{kMinPictureSide, kMaxPictureWidth, "pixels"};
 inline constexpr Range kFrameHeight{kMinPictureSide, kMaxPictureHeight, "pixels"};
 inline constexpr Range kJpegQuality{1, 100, ""};
 inline constexpr Range kFrameRate{0.1, 240.0, "Hz"};
+inline constexpr Range kStrandRate{0.0, 1000.0, "Hz"};  // 0 = every step
 
 template <class Visitor>
 void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& groom) {
@@ -119,6 +120,7 @@ void visit_stream(Visitor& v, StreamDesc& stream) {
   v.number("frame_height", stream.frame_height, kFrameHeight);
   v.number("jpeg_quality", stream.jpeg_quality, kJpegQuality);
   v.number("frame_rate_hz", stream.frame_rate_hz, kFrameRate);
+  v.number("strand_rate_hz", stream.strand_rate_hz, kStrandRate);
 }
 
 /// Shows every field of `scene` to the visitor, in the order of scene.proto.

@@ -11,7 +11,8 @@ namespace strandcast {
 
 const std::vector<std::string>& live_fields() {
   static const std::vector<std::string> kFields = {
-      "solver", "substeps", "gravity_mps2", "colliders", "has_auto_collider", "wind", "stream.bound_m"};
+      "solver", "substeps",       "gravity_mps2",         "colliders", "has_auto_collider",
+      "wind",   "stream.bound_m", "stream.strand_rate_hz"};
   return kFields;
 }
 

@@ -210,7 +210,8 @@ StrandEncodeWorker& Server::State::encoder(uint16_t stream_id) {
 }
 
 std::vector<StrandClass> Server::State::classes_of(const StreamDesc& stream) const {
-  return make_strand_classes({config_.scene.step_rate_hz, 0.0, stream.bound_m, asset_->strand_count});
+  return make_strand_classes(
+      {config_.scene.step_rate_hz, stream.strand_rate_hz, stream.bound_m, asset_->strand_count});
 }
 
 StrandEncodeConfig Server::State::encode_config(uint16_t stream_id) const {
@@ -398,8 +399,8 @@ ServerCounters Server::State::counters() const {
   const RuntimeFacts facts = viewers_.facts();
   counters.strand_viewers = facts.strand_viewers;
   counters.frame_viewers = facts.frame_viewers;
-  counters.input = hub_.counters();
   counters.viewers = viewers_.viewer_count();
+  counters.input = hub_.counters();
   counters.sim = sim_->stats();
   const std::lock_guard lock(workers_mutex_);
   for (const auto& worker : encoders_)

@@ -342,6 +342,51 @@ TEST_F(EndToEnd, TheBoundChangesWhileViewersWatch) {
   EXPECT_EQ(viewer->replay().stats().keyframe_requests, 0u) << "the keyframe came by itself";
 }
 
+/// How many states in a row are each of another group of `group` steps than the one before.
+size_t longest_run_of_groups(const States& states, uint64_t group) {
+  size_t run = 0, longest = 0;
+  for (auto state = states.begin(); state != states.end(); ++state) {
+    const bool is_other = state == states.begin() || state->first / group != std::prev(state)->first / group;
+    run = is_other ? run + 1 : 0;
+    longest = std::max(longest, run);
+  }
+  return longest;
+}
+
+// Likewise the rate, which needs no keyframe: states are left out and the chain goes on.
+TEST_F(EndToEnd, TheRateChangesWhileViewersWatch) {
+  start_feeding();
+  auto viewer = join();
+  ASSERT_TRUE(viewer);
+  States states;
+  record(*viewer, states);
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= 5; }));
+  CtlTarget target;
+  target.connect = fmt::format("127.0.0.1:{}", server_->port());
+  const double step_rate_hz = viewer->welcome().step_rate_hz;
+  for (const uint32_t divisor : {3u, 6u, 1u}) {
+    const uint64_t changes = viewer->quality_changes();
+    const std::string rate = fmt::format("stream.strand_rate_hz={}", step_rate_hz / divisor);
+    EXPECT_EQ(run_command(target, SetParameter{rate}), kDoneExit) << rate;
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality_changes() > changes; }));
+    EXPECT_EQ(viewer->quality().rate_divisor, divisor);
+    EXPECT_THAT(viewer->quality().reason, HasSubstr("changed"));
+    // One state of each group of so many steps. Keyframes for those who join, and states that were waited for
+    // too long, come besides.
+    states.clear();
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return longest_run_of_groups(states, divisor) >= 8; }))
+        << rate;
+    expect_within_bound(states, observer_.published(), viewer->welcome().bound_m);
+    auto late = join();
+    ASSERT_TRUE(late);
+    ASSERT_TRUE(pump_until({viewer.get(), late.get()}, [&] {
+      return divisor == 1 || late->quality().rate_divisor == divisor;
+    })) << "who joins later is told as well";
+  }
+  EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u) << viewer->replay().stats().last_error;
+  EXPECT_EQ(viewer->replay().stats().keyframe_requests, 0u);
+}
+
 TEST_F(EndToEnd, TheCheckCommandComparesTwoViewers) {
   const auto check = check_stream(client_config(), 40, kDeadlineS);
   ASSERT_TRUE(check) << check.error().to_string();

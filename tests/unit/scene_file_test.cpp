@@ -64,7 +64,8 @@ SceneDesc unusual_scene() {
               .frame_width = 320,
               .frame_height = 200,
               .jpeg_quality = 33,
-              .frame_rate_hz = 7.5};
+              .frame_rate_hz = 7.5,
+              .strand_rate_hz = 30.0};
   return s;
 }
 
@@ -194,7 +195,7 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_EQ(error_of("", {"stream.bound=1"}),
             "--set stream.bound=1: stream has no field \"bound\" (known: codec, bound_m, frame_width, "
             "frame_height, "
-            "jpeg_quality, frame_rate_hz)");
+            "jpeg_quality, frame_rate_hz, strand_rate_hz)");
   EXPECT_THAT(error_of("", {"bogus=1"}), HasSubstr("a scene has no field \"bogus\" (known: name, groom,"));
   EXPECT_THAT(error_of("", {"substeps"}), HasSubstr("expected path=value"));
   EXPECT_THAT(error_of("", {"=1"}), HasSubstr("expected path=value"));

@@ -28,6 +28,11 @@ TEST(SceneChange, ChangesLiveFieldsOnly) {
   const auto coarser = change_scene(scene, "stream.bound_m=0.0002");
   ASSERT_TRUE(coarser.ok()) << coarser.error().to_string();
   EXPECT_EQ(coarser->stream.bound_m, 0.0002f);
+  const auto rarer = change_scene(scene, "stream.strand_rate_hz=20");
+  ASSERT_TRUE(rarer.ok()) << rarer.error().to_string();
+  EXPECT_EQ(rarer->stream.strand_rate_hz, 20.0);
+  for (const char* wrong : {"stream.strand_rate_hz=-1", "stream.strand_rate_hz=1000.5"})
+    EXPECT_THAT(error_of(change_scene(scene, wrong)), HasSubstr("0 .. 1000")) << wrong;
   EXPECT_THAT(error_of(change_scene(scene, "stream.codec=raw")), HasSubstr("'stream.codec' cannot change"));
   EXPECT_THAT(error_of(change_scene(scene, "")), HasSubstr("known: solver"));
 }
@@ -99,12 +104,12 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   EXPECT_EQ(first->picture_class, second->picture_class);
   EXPECT_EQ(viewers.facts().strand_viewers, 1u);
   EXPECT_EQ(viewers.facts().frame_viewers, 2u);
+  EXPECT_EQ(viewers.viewer_count(), 3u) << "a source watches nothing";
   EXPECT_EQ(viewers.picture_views().size(), 1u);
 
   CameraDesc camera;
   camera.offset_m = {0.0f, 0.0f, 2.0f};
   const auto moved = viewers.set_camera(4, camera);
-  EXPECT_EQ(viewers.viewer_count(), 3u) << "a source watches nothing";
   ASSERT_TRUE(moved.ok());
   EXPECT_NE(*moved, first->picture_class);
   const auto kept = viewers.set_camera(1, camera);
@@ -191,12 +196,12 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
   EXPECT_NE(change->picture_class, 0u);
   EXPECT_EQ(viewers.facts().strand_viewers, 1u) << "strands go on until the first picture";
   EXPECT_EQ(viewers.facts().frame_viewers, 1u);
+  EXPECT_EQ(viewers.viewer_count(), 1u) << "and it is one viewer all the time";
   viewers.set_mode(1, StreamMode::Frames, time_ns);
   EXPECT_EQ(viewers.facts().strand_viewers, 0u);
 
   // Three more within a second: none is carried out before the second has passed, then the newest.
   viewers.request_mode(1, StreamMode::Strands);
-  EXPECT_EQ(viewers.viewer_count(), 1u) << "and it is one viewer all the time";
   viewers.request_mode(1, StreamMode::Frames);
   viewers.request_mode(1, StreamMode::Strands);
   for (int tick = 1; tick < 4; ++tick)
