@@ -287,6 +287,8 @@ class ViewerClient::Connection {
     if (bytes.empty()) return make_error(ErrorCode::BadInput, "the server sent an empty message");
     if (static_cast<Opcode>(bytes[0]) == Opcode::Control) {
       ASSIGN_OR_RETURN(ServerMessage message, decode_server_message(bytes));
+      if (!is_welcome_ && !may_come_first(message))
+        return make_error(ErrorCode::BadInput, "the server sent something else before its Welcome");
       return std::visit([this](auto& part) { return handle_control(part); }, message);
     }
     ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(bytes));
@@ -294,6 +296,12 @@ class ViewerClient::Connection {
     MediaEvent event{header, {bytes.begin(), bytes.end()}, now_ns()};
     if (mailbox_.push(std::move(event)) == Mailbox::Outcome::KeyframeNeeded) request_keyframe();
     return {};
+  }
+
+  /// A Pong that answers no ping of ours is ignored at any time.
+  static bool may_come_first(const ServerMessage& message) {
+    return std::holds_alternative<Welcome>(message) || std::holds_alternative<Goodbye>(message) ||
+           std::holds_alternative<Pong>(message);
   }
 
   Status handle_control(Welcome& welcome) {
@@ -332,47 +340,38 @@ class ViewerClient::Connection {
   }
 
   Status handle_control(ServerStatus& status) {
-    if (is_welcome_) mailbox_.push(status);
-    return is_welcome_ ? Status()
-                       : make_error(ErrorCode::BadInput, "the server sent a status before its Welcome");
+    mailbox_.push(status);
+    return {};
   }
 
   Status handle_control(StreamQuality& quality) {
     quality.reason = printable(quality.reason);
-    if (is_welcome_) mailbox_.push(quality);
-    return is_welcome_
-               ? Status()
-               : make_error(ErrorCode::BadInput, "the server sent a stream quality before its Welcome");
+    mailbox_.push(quality);
+    return {};
   }
 
   Status handle_control(SessionList& list) {
     for (SessionInfo& session : list.sessions) session.name = printable(session.name);
-    if (is_welcome_) mailbox_.push(list);
-    return is_welcome_ ? Status()
-                       : make_error(ErrorCode::BadInput, "the server sent a session list before its Welcome");
+    mailbox_.push(list);
+    return {};
   }
 
   Status handle_control(ModeChange& change) {
     change.reason = printable(change.reason);
-    if (is_welcome_) mailbox_.push(change);
-    return is_welcome_
-               ? Status()
-               : make_error(ErrorCode::BadInput, "the server sent a change of mode before its Welcome");
+    mailbox_.push(change);
+    return {};
   }
 
   Status handle_control(FrameQuality& quality) {
     quality.reason = printable(quality.reason);
-    if (is_welcome_) mailbox_.push(quality);
-    return is_welcome_
-               ? Status()
-               : make_error(ErrorCode::BadInput, "the server sent a frame quality before its Welcome");
+    mailbox_.push(quality);
+    return {};
   }
 
   Status handle_control(Notice& notice) {
     notice.text = printable(notice.text);
-    if (is_welcome_) mailbox_.push(std::move(notice));
-    return is_welcome_ ? Status()
-                       : make_error(ErrorCode::BadInput, "the server sent a notice before its Welcome");
+    mailbox_.push(std::move(notice));
+    return {};
   }
 
   // ---- writing ----

@@ -7,6 +7,7 @@
 #include "client/net/viewer_client.h"
 #include "common/wire/close_code.h"
 #include "tests/support/fake_server.h"
+#include "tests/support/sample_messages.h"
 
 namespace strandcast {
 namespace {
@@ -179,6 +180,24 @@ TEST(ClientConnect, SendsItsHelloWithTheToken) {
   EXPECT_EQ(hello->role, Role::Source);
   EXPECT_EQ(hello->mode, StreamMode::Frames);
   EXPECT_EQ(hello->frame_width, 320u);
+}
+
+TEST(ClientHostile, ControlMessagesBeforeTheWelcomeAreRefused) {
+  size_t refused = 0;
+  for (const ServerMessage& message : sample_server_messages()) {
+    if (std::holds_alternative<Welcome>(message) || std::holds_alternative<Goodbye>(message) ||
+        std::holds_alternative<Pong>(message))
+      continue;
+    const Error error = refusal([&](FakePeer& peer) {
+      peer.upgrade();
+      peer.send(message);
+      peer.read_to_end();
+    });
+    EXPECT_EQ(error.code, ErrorCode::BadInput) << error.to_string();
+    EXPECT_THAT(error.message, HasSubstr("before its Welcome"));
+    ++refused;
+  }
+  EXPECT_EQ(refused, 6u) << "status, stream quality, mode change, frame quality, session list, notice";
 }
 
 TEST(ClientHostile, MediaBeforeTheWelcomeIsRefused) {
