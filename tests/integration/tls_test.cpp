@@ -1,6 +1,11 @@
 // TLS on the server's only port, with the product's own client and with raw ones.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "client/net/http_get.h"
 #include "client/net/reconnect_policy.h"
@@ -8,9 +13,33 @@
 #include "tests/support/server_net_fixture.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificate.h"
+#include "tests/tools/load_viewers.h"
 
 namespace strandcast {
 namespace {
+
+/// What OpenSSL gives as the reason why a client that knows this version of TLS only, and every cipher, gets
+/// no connection; 0 when it gets one.
+int reason_of_refusal(uint16_t port, int version) {
+  const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_client_method()),
+                                                                  SSL_CTX_free);
+  SSL_CTX_set_security_level(context.get(), 0);
+  EXPECT_EQ(SSL_CTX_set_cipher_list(context.get(), "ALL:@SECLEVEL=0"), 1);
+  EXPECT_EQ(SSL_CTX_set_min_proto_version(context.get(), version), 1);
+  EXPECT_EQ(SSL_CTX_set_max_proto_version(context.get(), version), 1);
+  const int descriptor = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  const std::unique_ptr<SSL, decltype(&SSL_free)> connection(SSL_new(context.get()), SSL_free);
+  SSL_set_fd(connection.get(), descriptor);
+  ERR_clear_error();
+  const int reason = SSL_connect(connection.get()) == 1 ? 0 : ERR_GET_REASON(ERR_peek_error());
+  close(descriptor);
+  return reason;
+}
 
 using test::CertificatePlan;
 using test::eventually;
@@ -191,6 +220,40 @@ TEST_F(Tls, BrokenAndUnfinishedHandshakesEndThatConnectionOnly) {
   EXPECT_TRUE(eventually([&] { return server_->counters().timeouts == 2; }));
   healthy->send(Ping{1});
   EXPECT_TRUE(healthy->read_control<Pong>());
+}
+
+TEST_F(Tls, OldVersionsAreRefused) {
+  start(with_certificate());
+  auto healthy = join();
+  for (const int version : {TLS1_VERSION, TLS1_1_VERSION})
+    EXPECT_EQ(reason_of_refusal(server_->port(), version), SSL_R_TLSV1_ALERT_PROTOCOL_VERSION) << version;
+  EXPECT_TRUE(eventually([&] { return server_->counters().refused_tls == 2; }));
+  for (const int version : {TLS1_2_VERSION, TLS1_3_VERSION})
+    EXPECT_EQ(reason_of_refusal(server_->port(), version), 0) << version;
+  healthy->send(Ping{1});
+  EXPECT_TRUE(healthy->read_control<Pong>()) << "the others are served on";
+}
+
+TEST_F(Tls, ManyViewersOfTheLoadProgramComeOverIt) {
+  app_.asset_bytes = 300'000;  // many records
+  start(far_away(with_certificate()));
+  app_.publish_next();
+  load::LoadViewers viewers({"127.0.0.1", server_->port(), kToken, load::Encryption{files_.certificate}});
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(viewers.join({}).ok());
+  for (int i = 0; i < 1'000 && viewers.watching_count() < 4; ++i) {
+    app_.publish_next();
+    viewers.run_for(10);
+  }
+  EXPECT_EQ(viewers.watching_count(), 4u);
+  EXPECT_EQ(viewers.measures().joined, 4u);
+  EXPECT_EQ(viewers.measures().chain_errors, 0u);
+  const load::LoadConfig distrusting{"127.0.0.1", server_->port(), kToken,
+                                     load::Encryption{make_certificate(folder_.path(), "other").certificate}};
+  load::LoadViewers others(distrusting);
+  ASSERT_TRUE(others.join({}).ok());
+  for (int i = 0; i < 1'000 && others.open_count() > 0; ++i) others.run_for(10);
+  EXPECT_EQ(others.open_count(), 0u) << "a certificate of nobody known";
+  EXPECT_EQ(others.measures().joined, 0u);
 }
 
 TEST_F(Tls, ANewCertificateIsTakenWithoutARestart) {

@@ -21,6 +21,8 @@ struct CommandLine {
   std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
   std::string token;
   std::filesystem::path token_file;
+  bool is_tls = false;
+  std::filesystem::path tls_authorities;
   uint32_t viewers = 16, frame_viewers = 0, silent_viewers = 0, stalled_viewers = 0;
   double seconds = 10.0, warm_up_s = 2.0;
   int64_t churn_ms = 0;
@@ -28,9 +30,12 @@ struct CommandLine {
 };
 
 void declare(CLI::App& app, CommandLine& line) {
-  app.add_option("--connect", line.connect, "HOST:PORT of the server, numeric")->capture_default_str();
+  app.add_option("--connect", line.connect, "HOST:PORT of the server, numeric; wss://HOST:PORT for TLS")
+      ->capture_default_str();
   app.add_option("--token", line.token, kTokenHelp)->envname(kTokenVariable);
   app.add_option("--token-file", line.token_file, "File with the token");
+  app.add_flag("--tls", line.is_tls, "Encrypt the connections, as an address with wss:// does");
+  app.add_option("--tls-ca", line.tls_authorities, kTlsAuthoritiesHelp);
   app.add_option("--viewers", line.viewers, "Viewers of strands that acknowledge")->capture_default_str();
   app.add_option("--frame-viewers", line.frame_viewers, "Viewers of the server's pictures besides");
   app.add_option("--silent-viewers", line.silent_viewers,
@@ -72,8 +77,8 @@ void print(const char* key, double value) {
 }
 
 /// The server's own counters, "strandcast_" replaced by "server_".
-void print_metrics(const Address& address) {
-  const auto answer = http_get(address, "/metrics", std::chrono::seconds(5));
+void print_metrics(const Address& address, const HttpAccess& access) {
+  const auto answer = http_get(address, "/metrics", std::chrono::seconds(5), access);
   if (!answer) return;
   constexpr std::string_view kPrefix = "strandcast_";
   std::istringstream lines(answer->body);
@@ -122,15 +127,15 @@ Status join_all(LoadViewers& viewers, const CommandLine& line) {
 }
 
 Status run(CommandLine line) {
-  ASSIGN_OR_RETURN(const Address address, parse_address(line.connect));
-  if (address.is_tls)
-    return make_error(ErrorCode::Unsupported,
-                      "strandcast-load speaks no TLS: connect to the server on its own machine");
+  ASSIGN_OR_RETURN(Address address, parse_address(line.connect));
+  address.is_tls = address.is_tls || line.is_tls || !line.tls_authorities.empty();
   if (!line.token_file.empty()) {
     ASSIGN_OR_RETURN(line.token, load_token(line.token_file, Role::Viewer));
   }
   const std::atomic<bool>& stop = catch_stop_signals();
-  LoadViewers viewers({address.host, address.port, line.token});
+  std::optional<Encryption> encryption;
+  if (address.is_tls) encryption = Encryption{line.tls_authorities};
+  LoadViewers viewers({address.host, address.port, line.token, encryption});
   RETURN_IF_ERROR(join_all(viewers, line));
   viewers.run_for(static_cast<int64_t>(line.warm_up_s * 1e3));
   if (viewers.measures().joined == 0)
@@ -165,7 +170,7 @@ Status run(CommandLine line) {
     print("server_descriptors_most", static_cast<double>(most.descriptors));
     print("server_descriptors_last", static_cast<double>(last.descriptors));
   }
-  print_metrics(address);
+  print_metrics(address, {line.tls_authorities, line.token});
   return {};
 }
 

@@ -3,6 +3,8 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/tcp.h>
+#include <openssl/ssl.h>
+#include <openssl/x509v3.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -10,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <map>
 #include <span>
@@ -44,9 +47,28 @@ void append_frame(std::vector<std::byte>& out, uint8_t opcode, std::span<const s
   out.insert(out.end(), payload.begin(), payload.end());
 }
 
+using TlsSettings = std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)>;
+using TlsConnection = std::unique_ptr<SSL, decltype(&SSL_free)>;
+
+Result<TlsSettings> make_settings(const Encryption& encryption) {
+  std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes without MSG_NOSIGNAL
+  TlsSettings settings(SSL_CTX_new(TLS_client_method()), SSL_CTX_free);
+  const std::string file = encryption.authorities.string();
+  const int trusted = file.empty() ? SSL_CTX_set_default_verify_paths(settings.get())
+                                   : SSL_CTX_load_verify_locations(settings.get(), file.c_str(), nullptr);
+  if (trusted != 1)
+    return at(file, make_error(ErrorCode::BadInput, "cannot use these certificate authorities"));
+  SSL_CTX_set_min_proto_version(settings.get(), TLS1_2_VERSION);
+  SSL_CTX_set_verify(settings.get(), SSL_VERIFY_PEER, nullptr);
+  SSL_CTX_set_mode(settings.get(), SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
+  return settings;
+}
+
 struct Viewer {
   ViewerPlan plan;
   int descriptor = -1;
+  TlsConnection tls{nullptr, SSL_free};
+  bool needs_input_to_write = false;  // the TLS handshake does
   bool is_upgraded = false;
   bool has_welcome = false;
   bool is_over = false;
@@ -90,6 +112,12 @@ class LoadViewers::State {
       return make_error(ErrorCode::BadInput, "'{}' is no numeric IPv4 address", config_.host);
     }
     ::connect(viewer.descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address);
+    if (config_.encryption) {
+      if (const Status begun = begin_tls(viewer); !begun) {
+        close(viewer.descriptor);
+        return begun.error();
+      }
+    }
     const std::string request = fmt::format(
         "GET /v1 HTTP/1.1\r\nHost: {}:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Key: c3RyYW5kY2FzdC1sb2FkIQ==\r\nSec-WebSocket-Version: 13\r\n"
@@ -131,7 +159,8 @@ class LoadViewers::State {
     std::vector<uint64_t> numbers;
     for (const auto& [number, viewer] : viewers_) {
       const bool wants_read = viewer.plan.reads || !viewer.has_welcome;
-      const int events = (wants_read ? POLLIN : 0) | (viewer.unsent.empty() ? 0 : POLLOUT);
+      const bool wants_write = !viewer.unsent.empty() && !viewer.needs_input_to_write;
+      const int events = (wants_read ? POLLIN : 0) | (wants_write ? POLLOUT : 0);
       waits.push_back({events == 0 ? -1 : viewer.descriptor, static_cast<short>(events), 0});
       numbers.push_back(number);
     }
@@ -163,20 +192,63 @@ class LoadViewers::State {
     ++measures_.close_codes[close_code];
   }
 
+  Status begin_tls(Viewer& viewer) {
+    if (settings_ == nullptr) {
+      ASSIGN_OR_RETURN(settings_, make_settings(*config_.encryption));
+    }
+    viewer.tls.reset(SSL_new(settings_.get()));
+    X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(viewer.tls.get()), config_.host.c_str());
+    SSL_set_fd(viewer.tls.get(), viewer.descriptor);
+    SSL_set_connect_state(viewer.tls.get());
+    return {};
+  }
+
+  /// Bytes taken by the socket; 0: none now, negative: the connection is broken.
+  static ssize_t send_some(Viewer& viewer) {
+    if (viewer.tls == nullptr) {
+      const ssize_t size = send(viewer.descriptor, viewer.unsent.data(), viewer.unsent.size(), MSG_NOSIGNAL);
+      return size < 0 && (errno == EAGAIN || errno == ENOTCONN) ? 0 : size;
+    }
+    const int size =
+        SSL_write(viewer.tls.get(), viewer.unsent.data(), static_cast<int>(viewer.unsent.size()));
+    const int why = SSL_get_error(viewer.tls.get(), size);
+    viewer.needs_input_to_write = size <= 0 && why == SSL_ERROR_WANT_READ;
+    if (size > 0) return size;
+    const bool is_too_early = why == SSL_ERROR_SYSCALL && errno == ENOTCONN;
+    return why == SSL_ERROR_WANT_READ || why == SSL_ERROR_WANT_WRITE || is_too_early ? 0 : -1;
+  }
+
+  /// Bytes in the buffer; 0: none now, negative: the connection is over.
+  ssize_t receive_some(Viewer& viewer) {
+    if (viewer.tls == nullptr) {
+      const ssize_t size = recv(viewer.descriptor, buffer_.data(), buffer_.size(), 0);
+      if (size < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
+      return size == 0 ? -1 : size;
+    }
+    viewer.needs_input_to_write = false;
+    const int size = SSL_read(viewer.tls.get(), buffer_.data(), static_cast<int>(buffer_.size()));
+    if (size > 0) return size;
+    const int why = SSL_get_error(viewer.tls.get(), size);
+    return why == SSL_ERROR_WANT_READ || why == SSL_ERROR_WANT_WRITE ? 0 : -1;
+  }
+
   void write(Viewer& viewer) {
     if (viewer.unsent.empty()) return;
-    const ssize_t size = send(viewer.descriptor, viewer.unsent.data(), viewer.unsent.size(), MSG_NOSIGNAL);
-    if (size < 0 && errno != EAGAIN && errno != ENOTCONN) return end(viewer, 0);
-    if (size > 0) viewer.unsent.erase(viewer.unsent.begin(), viewer.unsent.begin() + size);
+    const ssize_t size = send_some(viewer);
+    if (size < 0) return end(viewer, 0);
+    viewer.unsent.erase(viewer.unsent.begin(), viewer.unsent.begin() + size);
   }
 
   void read(Viewer& viewer) {
-    const ssize_t size = recv(viewer.descriptor, buffer_.data(), buffer_.size(), 0);
-    if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
-    if (size <= 0) return end(viewer, 0);
-    std::span<const std::byte> bytes = std::span(buffer_).first(static_cast<size_t>(size));
-    if (!viewer.is_upgraded) bytes = take_http(viewer, bytes);
-    while (!bytes.empty() && !viewer.is_over) bytes = take_frame(viewer, bytes);
+    do {
+      const ssize_t size = receive_some(viewer);
+      if (size == 0) return;
+      if (size < 0) return end(viewer, 0);
+      std::span<const std::byte> bytes = std::span(buffer_).first(static_cast<size_t>(size));
+      if (!viewer.is_upgraded) bytes = take_http(viewer, bytes);
+      while (!bytes.empty() && !viewer.is_over) bytes = take_frame(viewer, bytes);
+      // What TLS has decrypted already makes no socket readable.
+    } while (!viewer.is_over && viewer.tls != nullptr && SSL_pending(viewer.tls.get()) > 0);
   }
 
   /// Consumes the answer to the upgrade; what follows it is WebSocket.
@@ -328,6 +400,7 @@ class LoadViewers::State {
   }
 
   const LoadConfig config_;
+  TlsSettings settings_{nullptr, SSL_CTX_free};  // when the first viewer needs it
   uint64_t last_number_ = 0;
   int64_t pinged_ns_ = 0;
   std::array<std::byte, kReadBytes> buffer_{};

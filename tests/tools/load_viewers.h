@@ -4,8 +4,10 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,10 +23,16 @@ struct ViewerPlan {
   bool reads = true;  // false: joins, then takes nothing any more
 };
 
+/// TLS; the server's certificate must be signed by these authorities (PEM; empty: the system's) for the host.
+struct Encryption {
+  std::filesystem::path authorities;
+};
+
 struct LoadConfig {
   std::string host = "127.0.0.1";  // numeric
   uint16_t port = 0;
   std::string token;
+  std::optional<Encryption> encryption = std::nullopt;
 };
 
 /// Totals since the start or the last reset_measures(); the vectors hold one value per frame.
@@ -51,7 +59,8 @@ class LoadViewers {
   LoadViewers(const LoadViewers&) = delete;
   LoadViewers& operator=(const LoadViewers&) = delete;
 
-  /// Starts to connect one more; its number. Unavailable when there are no file descriptors left.
+  /// Starts to connect one more; its number. Unavailable when there are no file descriptors left, BadInput
+  /// when the authorities cannot be read.
   Result<uint64_t> join(const ViewerPlan& plan);
   /// Closes the connection of a viewer; `is_rude`: with a TCP reset.
   void leave(uint64_t viewer, bool is_rude);
