@@ -18,15 +18,25 @@ using SnapshotPtr = std::shared_ptr<const Snapshot>;
 constexpr float kBoundM = 1e-4f;
 constexpr size_t kFrames = 8;
 constexpr size_t kJoinFrame = 3;  // late joiners get a keyframe of this state
-constexpr int kMostSteps = 24;
-constexpr int kMostSlicedSteps = 4;  // of the large hair
 constexpr size_t kPayloadLengthAt = 12;
 constexpr size_t kStateHashAt = kFrameHeaderBytes + 88;
 
+/// The steps bound what an input costs. Slices need 1024 strands; such an input takes as long as ten others,
+/// so few have any.
 struct HairSize {
   uint32_t strands, vertices;
+  int most_steps;
 };
-constexpr std::array<HairSize, 4> kSizes = {{{5, 4}, {1, 2}, {40, 6}, {1024, 2}}};  // the last one has slices
+constexpr std::array<HairSize, 8> kSizes = {
+    {{5, 4, 16}, {1, 2, 24}, {40, 6, 4}, {1024, 2, 3}, {8, 3, 16}, {3, 9, 8}, {20, 2, 12}, {9, 4, 12}}};
+
+constexpr size_t kSliced = 3;
+constexpr uint8_t kNotSliced = 0xc0;  // settings
+
+size_t size_index(uint8_t settings) {
+  const size_t index = (settings >> 1) % kSizes.size();
+  return index == kSliced && (settings & kNotSliced) != 0 ? 0 : index;
+}
 
 /// What a good server sends, and what it decodes to.
 struct HonestChain {
@@ -38,7 +48,7 @@ struct HonestChain {
 };
 
 HonestChain make_chain(const std::string& codec, uint8_t settings) {
-  const HairSize size = kSizes[(settings >> 1) % kSizes.size()];
+  const HairSize size = kSizes[size_index(settings)];
   HairMotion hair({size.strands, size.vertices, MotionKind::Active});
   HonestChain chain;
   chain.limits = {size.strands, size.vertices};
@@ -67,7 +77,7 @@ HonestChain make_chain(const std::string& codec, uint8_t settings) {
 
 const HonestChain& chain_of(const std::string& codec, uint8_t settings) {
   static std::map<std::pair<std::string, int>, HonestChain> chains;
-  const int key = settings % (2 * static_cast<int>(kSizes.size()));
+  const int key = static_cast<int>(2 * size_index(settings)) + settings % 2;
   const auto known = chains.find({codec, key});
   if (known != chains.end()) return known->second;
   return chains.emplace(std::pair(codec, key), make_chain(codec, static_cast<uint8_t>(key))).first->second;
@@ -182,9 +192,8 @@ class Game {
 int fuzz_strand_chain(const std::string& codec, const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   const auto settings = input.take<uint8_t>();
-  const bool is_sliced = (settings >> 1) % kSizes.size() == kSizes.size() - 1;
   Game game(codec, settings);
-  for (int i = 0; i < (is_sliced ? kMostSlicedSteps : kMostSteps) && !input.is_empty(); ++i) {
+  for (int i = 0; i < kSizes[size_index(settings)].most_steps && !input.is_empty(); ++i) {
     const auto step = static_cast<ChainStep>(input.take<uint8_t>() % kChainStepKinds);
     if (step == ChainStep::Honest) {
       game.honest();

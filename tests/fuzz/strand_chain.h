@@ -10,7 +10,8 @@ namespace strandcast {
 
 // The input: a byte of settings, then steps of a byte for the kind, a byte of flags and a piece (u16 length
 // and bytes).
-inline constexpr uint8_t kWithRestShape = 1;  // settings; bits 1 and 2 choose the size of the hair
+// Settings: bits 1 to 3 choose the size of the hair, bits 6 and 7 are 0 where it has slices.
+inline constexpr uint8_t kWithRestShape = 1;
 
 enum class ChainStep : uint8_t {
   Honest,   // the chain's next frame, or a keyframe when the decoder has left the chain; no piece is read

@@ -7,14 +7,19 @@
 #include "common/base/check.h"
 #include "common/base/file.h"
 #include "common/codec/image_codec.h"
+#include "common/codec/jpeg_tiles.h"
+#include "common/codec/picture.h"
 #include "common/codec/residual_coder.h"
 #include "common/codec/strand_payload.h"
 #include "common/codec/value_coder.h"
+#include "common/codec/vp8_codec.h"
 #include "common/scene/scene_file.h"
+#include "tests/fuzz/picture_chain.h"
 #include "tests/fuzz/strand_chain.h"
 #include "tests/support/hair_motion.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_messages.h"
+#include "tests/support/test_pictures.h"
 
 namespace strandcast {
 namespace {
@@ -139,6 +144,84 @@ void add_chains(const SeedFolder& seeds) {
   }
 }
 
+Bytes picture_step(PictureStep step, uint8_t flags) {
+  return packed(static_cast<uint8_t>(step), flags);
+}
+Bytes picture_step(PictureStep step, uint8_t flags, const Bytes& piece) {
+  return joined({picture_step(step, flags), packed(static_cast<uint16_t>(piece.size())), piece});
+}
+
+/// Two payloads of a codec: a whole picture, and a change of it.
+struct PicturePair {
+  Bytes whole, change;
+};
+
+PicturePair make_pictures(PictureCodec codec) {
+  constexpr uint32_t kWidth = 70, kHeight = 20;
+  const Image first = test::waving_lines(kWidth, kHeight, 0.0);
+  const Image second = test::waving_lines(kWidth, kHeight, 0.3);
+  if (codec == PictureCodec::Jpeg) return {encode_jpeg(first, 30).value(), encode_jpeg(second, 95).value()};
+  if (codec == PictureCodec::JpegTiles) {
+    auto encoder = TileEncoder::make().value();
+    const CodedTile left = encoder.encode(first, 0, 30, TileChroma::Halved).value();
+    const CodedTile right = encoder.encode(first, 1, 95, TileChroma::Full).value();
+    const PlacedTile all[] = {{0, &left}, {1, &right}};
+    return {pack_tiles(kWidth, kHeight, all), pack_tiles(kWidth, kHeight, std::span(all).last(1))};
+  }
+  auto encoder = Vp8Encoder::make({kWidth, kHeight, 30.0, 2e5}).value();
+  const auto code = [&](const Image& image, Vp8Encoder::Rate rate) {
+    return encoder.encode(image, Vp8Encoder::Frame::Delta, rate).value();
+  };
+  const Bytes whole = code(first, Vp8Encoder::Rate::Target);
+  return {whole, code(second, Vp8Encoder::Rate::Finest)};
+}
+
+/// For each codec: honest pictures with lost and damaged ones between them, and real payloads in other
+/// places.
+void add_pictures(const SeedFolder& seeds) {
+  const Bytes honest = picture_step(PictureStep::Honest, 0);
+  const Bytes lost = picture_step(PictureStep::Lost, 0);
+  for (const PictureCodec codec : {PictureCodec::Jpeg, PictureCodec::JpegTiles, PictureCodec::Vp8}) {
+    const auto index = static_cast<uint8_t>(codec);
+    const std::string name = to_string(codec);
+    const PicturePair pair = make_pictures(codec);
+    const auto payload = [&](uint8_t flags, const Bytes& bytes) {
+      return picture_step(PictureStep::Payload, static_cast<uint8_t>(flags | index << kOpcodeShift), bytes);
+    };
+    const Bytes cut(pair.whole.begin(), pair.whole.begin() + static_cast<ptrdiff_t>(pair.whole.size() / 2));
+    Bytes wrong = pair.whole;
+    for (size_t i = 12; i < wrong.size(); i += 40) wrong[i] ^= std::byte{0x41};
+    for (uint8_t size = 0; size < kPictureSizes; ++size) {
+      const Bytes chain =
+          picture_step(PictureStep::Other, static_cast<uint8_t>(index * kPictureSizes + size));
+      const Bytes patch = packed(uint16_t{kFrameHeaderBytes + 1}, uint8_t{3},
+                                 uint16_t{kFrameHeaderBytes + 30}, uint8_t{0x55});
+      const Bytes splice = joined({packed(uint16_t{kFrameHeaderBytes + 20}), cut});
+      seeds.add(
+          "picture_chain", fmt::format("damaged_{}_{}", name, size),
+          joined({chain, honest, honest, picture_step(PictureStep::Patched, kThenDelta, patch), honest, lost,
+                  honest, honest, picture_step(PictureStep::Spliced, kFixPayload | kThenDelta, splice),
+                  honest, lost, lost, honest}));
+    }
+    seeds.add(
+        "picture_chain", "payloads_" + name,
+        joined({honest, payload(kAsWhole, pair.whole), payload(0, pair.change), honest,
+                payload(kAsWhole | kThenDelta, pair.change), payload(kAsWhole, cut), payload(0, pair.change),
+                payload(kAsWhole, wrong), payload(kAsWhole, pair.whole), honest}));
+    // Under the header of another codec.
+    seeds.add("picture_chain", "mistaken_" + name,
+              picture_step(PictureStep::Payload,
+                           static_cast<uint8_t>(kAsWhole | (index + 1) % 3 << kOpcodeShift), pair.whole));
+    FrameHeader header;
+    header.opcode = Opcode::Vp8Frame;
+    header.sequence = 7;
+    seeds.add(
+        "picture_chain", "message_" + name,
+        joined({picture_step(PictureStep::Whole, kThenDelta, make_encoded_frame(header, pair.whole)->message),
+                honest}));
+  }
+}
+
 void add_grooms(const SeedFolder& seeds) {
   constexpr uint32_t kStrands = 2, kVertices = 3;
   Bytes points;
@@ -226,6 +309,7 @@ int main(int argument_count, char** arguments) {
   add_messages(seeds);
   add_blocks(seeds);
   add_chains(seeds);
+  add_pictures(seeds);
   add_grooms(seeds);
   add_texts(seeds);
   return 0;
