@@ -1,7 +1,5 @@
 #include "common/codec/vp8_codec.h"
 
-#include <libyuv/convert.h>
-#include <libyuv/convert_argb.h>
 #include <vpx/vp8cx.h>
 #include <vpx/vp8dx.h>
 #include <vpx/vpx_decoder.h>
@@ -13,11 +11,11 @@
 
 #include "common/codec/image_check.h"
 #include "common/codec/picture.h"
+#include "common/codec/yuv_planes.h"
 
 namespace strandcast {
 namespace {
 
-constexpr size_t kChannels = 4;
 constexpr int kCpuUsed = -12;             // negative: a fixed speed, not one that follows the load
 constexpr uint32_t kFinestQuantizer = 4;  // of 0..63
 constexpr uint32_t kCoarsestQuantizer = 63;
@@ -43,6 +41,12 @@ using CodecPtr = std::unique_ptr<vpx_codec_ctx_t, EndCodec>;
 struct FreePlanes {
   void operator()(vpx_image_t* planes) const { vpx_img_free(planes); }
 };
+
+YuvPlanes planes_of(const vpx_image_t& image) {
+  return {{image.planes[VPX_PLANE_Y], image.stride[VPX_PLANE_Y]},
+          {image.planes[VPX_PLANE_U], image.stride[VPX_PLANE_U]},
+          {image.planes[VPX_PLANE_V], image.stride[VPX_PLANE_V]}};
+}
 
 unsigned kilobits(double bits_per_s) {
   return static_cast<unsigned>(std::lround(std::clamp(bits_per_s, kMinBitsPerS, kMaxBitsPerS) / 1e3));
@@ -129,10 +133,7 @@ Result<std::vector<std::byte>> Vp8Encoder::encode(const Image& image, Frame fram
     return make_error(ErrorCode::BadInput, "a picture of {} x {} for a VP8 stream of {} x {}", image.width,
                       image.height, state.config.g_w, state.config.g_h);
   vpx_image_t& planes = *state.planes;
-  // In memory R, G, B, A; libyuv names formats by their words.
-  libyuv::ABGRToI420(image.rgba.data(), static_cast<int>(image.width * kChannels), planes.planes[0],
-                     planes.stride[0], planes.planes[1], planes.stride[1], planes.planes[2], planes.stride[2],
-                     static_cast<int>(image.width), static_cast<int>(image.height));
+  fill_planes(image, planes_of(planes));
   if (rate != state.rate || state.has_new_config) {
     state.config.rc_max_quantizer = rate == Rate::Finest ? kFinestQuantizer : kCoarsestQuantizer;
     if (vpx_codec_enc_config_set(state.codec.get(), &state.config) != VPX_CODEC_OK)
@@ -222,10 +223,7 @@ Result<Image> Vp8Decoder::decode(std::span<const std::byte> frame) {
       planes->d_h != height)
     return make_error(ErrorCode::BadInput, "a VP8 frame of {} bytes gives no picture of {} x {}",
                       frame.size(), width, height);
-  Image image{width, height, std::vector<uint8_t>(size_t{width} * height * kChannels)};
-  libyuv::I420ToABGR(planes->planes[0], planes->stride[0], planes->planes[1], planes->stride[1],
-                     planes->planes[2], planes->stride[2], image.rgba.data(),
-                     static_cast<int>(width * kChannels), static_cast<int>(width), static_cast<int>(height));
+  Image image = make_image(planes_of(*planes), width, height);
   state.width = width;
   state.height = height;
   return image;

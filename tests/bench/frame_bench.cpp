@@ -1,15 +1,20 @@
-// Prints CSV: bytes, milliseconds and PSNR of every picture codec and quality on the built-in scene, drawn as
-// the server draws it: in motion, and idle (head and wind at rest, the hair swinging out).
+// Prints CSV: bytes, milliseconds of processor time and PSNR of every picture codec and quality on the
+// built-in scene, drawn as the server draws it: in motion, and idle (head and wind at rest, the hair swinging
+// out).
 //   frame_bench [--pictures N] [--size WxH] [--png DIR]     DIR: the last decoded picture of each mode
+//   frame_bench --match yes     instead: bits per pixel with which video in motion looks like tiles of a
+//   quality,
+//                               at the size and at half of it
 #include <fmt/format.h>
+#include <time.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
 
-#include "common/base/profile.h"
 #include "common/codec/picture_decoder.h"
 #include "common/codec/strand_codec.h"
 #include "common/gl/egl_context.h"
@@ -31,6 +36,7 @@ struct Options {
   size_t pictures = 30;
   RenderSize size{640, 360};
   std::filesystem::path png;
+  bool is_matching = false;
 };
 
 struct Mode {
@@ -52,10 +58,13 @@ Result<Options> parse(int argc, char** argv) {
       options.pictures = static_cast<size_t>(std::max(2, std::atoi(value.c_str())));
     } else if (word == "--png") {
       options.png = value;
+    } else if (word == "--match") {
+      options.is_matching = value == "yes";
     } else if (word != "--size" ||
                std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2) {
       return make_error(ErrorCode::BadInput,
-                        "unknown option {} {} (known: --pictures N --size WxH --png DIR)", word, value);
+                        "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes)", word,
+                        value);
     }
   }
   return options;
@@ -92,8 +101,11 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-double ms_since(int64_t begin_ns) {
-  return static_cast<double>(now_ns() - begin_ns) * 1e-6;
+/// Processor time of this thread, on which all codecs run: others on the machine do not count.
+double busy_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) * 1e-6;
 }
 
 /// One picture as a viewer that misses nothing gets it.
@@ -104,12 +116,101 @@ struct Viewer {
 
   Result<size_t> take(const Picture& picture) {
     const EncodedFramePtr frame = picture.after(std::exchange(shown, picture.sequence()));
-    const int64_t begin_ns = now_ns();
+    const double begin_ms = busy_ms();
     RETURN_IF_ERROR(decoder.decode(frame->header, std::span(frame->message).subspan(kFrameHeaderBytes)));
-    decode_ms.push_back(ms_since(begin_ns));
+    decode_ms.push_back(busy_ms() - begin_ms);
     return frame->message.size();
   }
 };
+
+/// Half the size both ways, each pixel the mean of four: what a renderer with four samples draws.
+Image halved(const Image& image) {
+  Image half{image.width / 2, image.height / 2, {}};
+  half.rgba.resize(size_t{half.width} * half.height * 4);
+  const auto at = [&](size_t x, size_t y, size_t channel) {
+    return static_cast<int>(image.rgba[(y * image.width + x) * 4 + channel]);
+  };
+  for (size_t y = 0; y < half.height; ++y)
+    for (size_t x = 0; x < half.width; ++x)
+      for (size_t c = 0; c < 4; ++c)
+        half.rgba[(y * half.width + x) * 4 + c] =
+            static_cast<uint8_t>((at(2 * x, 2 * y, c) + at(2 * x + 1, 2 * y, c) + at(2 * x, 2 * y + 1, c) +
+                                  at(2 * x + 1, 2 * y + 1, c) + 2) /
+                                 4);
+  return half;
+}
+
+struct Outcome {
+  double bits_per_pixel = 0.0;  // of the pictures after the first
+  double psnr_db = 0.0;
+};
+
+Outcome mean(const std::vector<Image>& images, size_t bytes, double psnr_sum) {
+  const auto later = static_cast<double>(images.size() - 1);
+  const double pixels = static_cast<double>(images[0].width) * images[0].height;
+  return {8.0 * static_cast<double>(bytes) / later / pixels, psnr_sum / later};
+}
+
+Result<Outcome> run_tiles(const std::vector<Image>& images, int quality) {
+  PictureView view;
+  view.size = {images[0].width, images[0].height};
+  view.codec = PictureCodec::JpegTiles;
+  ASSIGN_OR_RETURN(const auto encoder, make_picture_encoder(view, kPictureRateHz, 0));
+  Viewer viewer;
+  size_t bytes = 0;
+  double psnr_sum = 0.0;
+  for (const Image& image : images) {
+    const bool is_first = viewer.shown == 0;
+    ASSIGN_OR_RETURN(const PicturePtr picture, encoder->encode(image, quality, {}));
+    if (picture != nullptr) {
+      ASSIGN_OR_RETURN(const size_t taken, viewer.take(*picture));
+      bytes += is_first ? 0 : taken;
+    }
+    psnr_sum += is_first ? 0.0 : test::psnr(image, *viewer.decoder.image());
+  }
+  return mean(images, bytes, psnr_sum);
+}
+
+Result<Outcome> run_vp8(const std::vector<Image>& images, double bits_per_pixel) {
+  const auto [width, height] = std::pair(images[0].width, images[0].height);
+  ASSIGN_OR_RETURN(auto encoder, Vp8Encoder::make({width, height, kPictureRateHz,
+                                                   bits_per_pixel * width * height * kPictureRateHz}));
+  ASSIGN_OR_RETURN(auto decoder, Vp8Decoder::make());
+  size_t bytes = 0;
+  double psnr_sum = 0.0;
+  for (size_t i = 0; i < images.size(); ++i) {
+    ASSIGN_OR_RETURN(const auto frame,
+                     encoder.encode(images[i], Vp8Encoder::Frame::Delta, Vp8Encoder::Rate::Target));
+    ASSIGN_OR_RETURN(const Image back, decoder.decode(frame));
+    bytes += i == 0 ? 0 : frame.size();
+    psnr_sum += i == 0 ? 0.0 : test::psnr(images[i], back);
+  }
+  return mean(images, bytes, psnr_sum);
+}
+
+/// The bits per pixel to ask for, by halving the interval; its upper end when no rate is as good.
+Status match(const Sequence& moving) {
+  fmt::print("size,quality,tiles_bits_per_pixel,tiles_psnr_db,vp8_target,vp8_bits_per_pixel,vp8_psnr_db\n");
+  std::vector<Image> halves;
+  for (const Image& image : moving.images) halves.push_back(halved(image));
+  for (const std::vector<Image>* images : {&moving.images, static_cast<const std::vector<Image>*>(&halves)})
+    for (const int quality : {95, 90, 80, 50, 30, 10, 1}) {
+      ASSIGN_OR_RETURN(const Outcome tiles, run_tiles(*images, quality));
+      double low = 0.005, high = 4.0;
+      constexpr int kHalvings = 12;
+      for (int i = 0; i < kHalvings; ++i) {
+        const double middle = std::sqrt(low * high);
+        ASSIGN_OR_RETURN(const Outcome video, run_vp8(*images, middle));
+        (video.psnr_db < tiles.psnr_db ? low : high) = middle;
+      }
+      ASSIGN_OR_RETURN(const Outcome video, run_vp8(*images, high));
+      fmt::print("{}x{},{},{:.3f},{:.2f},{:.3f},{:.3f},{:.2f}\n", images->front().width,
+                 images->front().height, quality, tiles.bits_per_pixel, tiles.psnr_db, high,
+                 video.bits_per_pixel, video.psnr_db);
+      std::fflush(stdout);
+    }
+  return {};
+}
 
 Status measure(const Options& options, const Sequence& sequence, const Mode& mode) {
   PictureView view;
@@ -122,9 +223,9 @@ Status measure(const Options& options, const Sequence& sequence, const Mode& mod
   size_t first_bytes = 0, bytes = 0, sent = 0;
   double psnr = 0.0;
   for (size_t i = 0; i < sequence.images.size(); ++i) {
-    const int64_t begin_ns = now_ns();
+    const double begin_ms = busy_ms();
     ASSIGN_OR_RETURN(const PicturePtr picture, encoder->encode(sequence.images[i], mode.quality, {}));
-    if (i > 0) encode_ms.push_back(ms_since(begin_ns));
+    if (i > 0) encode_ms.push_back(busy_ms() - begin_ms);
     if (picture != nullptr) {
       ASSIGN_OR_RETURN(const size_t taken, viewer.take(*picture));
       (i == 0 ? first_bytes : bytes) += taken;
@@ -155,6 +256,7 @@ Status run(int argc, char** argv) {
   ASSIGN_OR_RETURN(const Options options, parse(argc, argv));
   if (!options.png.empty()) std::filesystem::create_directories(options.png);
   ASSIGN_OR_RETURN(const auto sequences, draw(options));
+  if (options.is_matching) return match(sequences.front());
   fmt::print(
       "sequence,codec,quality,size,first_bytes,bytes_per_picture,sent,encode_ms,decode_ms,psnr_db,still_"
       "bytes,"
