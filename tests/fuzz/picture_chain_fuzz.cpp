@@ -136,6 +136,8 @@ class Game {
     is_following_ = false;
     if (decoded) {
       check_valid();
+      const bool is_whole = header->base_sequence == 0;
+      CHECK(header->opcode != Opcode::Vp8Frame || read_vp8_info(payload)->is_keyframe == is_whole);
       sequence_ = header->sequence;
       stream_id_ = header->stream_id;
       return;
