@@ -261,7 +261,8 @@ class ViewerClient::Connection {
         goodbye_.empty() ? printable(std::string_view(close.reason.data(), close.reason.size())) : goodbye_;
     if (failure == websocket::error::closed) return error_from_close(close.code, reason);
     if (!goodbye_.empty()) return error_from_close(0, reason);
-    if (failure == beast::error::timeout)
+    // Beast tells one of what was under way that the time is over, maybe its own ping, and aborts the others.
+    if (failure == beast::error::timeout || failure == asio::error::operation_aborted)
       return make_error(ErrorCode::Timeout, "nothing received for {} ms", config_.idle_timeout.count());
     if (failure == websocket::error::message_too_big || failure == websocket::error::buffer_overflow)
       return make_error(ErrorCode::BadInput, "the server sent a message of more than {} bytes",
