@@ -1,5 +1,8 @@
 #include "tests/support/fake_server.h"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -11,6 +14,7 @@
 #include <list>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 namespace strandcast::test {
 namespace {
@@ -31,9 +35,19 @@ struct FakeServerShared {
 };
 
 struct FakePeer::State {
-  State(tcp::socket socket, FakeServerShared& server) : ws(std::move(socket)), shared(server) {}
+  State(tcp::socket socket, FakeServerShared& server)
+      : ws(std::move(socket)), shared(server), waker(dup(ws.next_layer().native_handle())) {}
+  ~State() { forget_waker(); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  void forget_waker() {
+    if (waker >= 0) ::close(std::exchange(waker, -1));
+  }
+
   websocket::stream<tcp::socket> ws;
   FakeServerShared& shared;
+  // The socket under a name of its own, by which another thread ends the script's reads; under shared.mutex.
+  int waker;
   beast::flat_buffer buffer;
 };
 
@@ -113,6 +127,10 @@ void FakePeer::close(uint16_t code, const std::string& reason) {
 }
 
 void FakePeer::reset() {
+  {
+    const std::lock_guard lock(state_.shared.mutex);
+    state_.forget_waker();  // a socket is reset when its last name is closed
+  }
   error_code ignored;
   state_.ws.next_layer().set_option(asio::socket_base::linger(true, 0), ignored);
   state_.ws.next_layer().close(ignored);
@@ -143,9 +161,9 @@ struct FakeServer::State {
     {
       const std::lock_guard lock(shared.mutex);
       shared.is_over = true;
-      error_code ignored;
       // shutdown wakes the blocking calls of other threads; close alone would not.
-      for (auto& peer : peers) peer.ws.next_layer().shutdown(tcp::socket::shutdown_both, ignored);
+      for (auto& peer : peers)
+        if (peer.waker >= 0) ::shutdown(peer.waker, SHUT_RDWR);
     }
     shared.ended.notify_all();
     error_code ignored;
