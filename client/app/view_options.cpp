@@ -97,8 +97,9 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--mode", raw.mode,
                  "strands: drawn here; frames: the server's pictures; auto: whichever is better now")
       ->capture_default_str();
-  app.add_option("--pictures", raw.pictures, "In frames mode: jpeg, tiles, vp8 or any (the server chooses)")
-      ->check(CLI::IsMember({"jpeg", "tiles", "vp8", "any"}))
+  app.add_option("--pictures", raw.pictures,
+                 "In frames mode: jpeg, tiles, vp8, h264 or any (the server chooses)")
+      ->check(CLI::IsMember({"jpeg", "tiles", "vp8", "h264", "any"}))
       ->capture_default_str();
   app.add_option("--token-file", raw.token_file,
                  "File with the token: the token alone, or lines 'role token'");
@@ -142,8 +143,12 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     ASSIGN_OR_RETURN(options.token, load_token(raw.token_file, role_of(options)));
   }
   if (raw.seconds > 0.0) options.seconds = raw.seconds;
-  for (const PictureCodec codec : {PictureCodec::Jpeg, PictureCodec::JpegTiles, PictureCodec::Vp8})
+  for (const PictureCodec codec : kPictureCodecs)
     if (raw.pictures == to_string(codec)) options.picture_codecs = codec_bit(codec);
+  if ((options.picture_codecs & decodable_picture_codecs()) == 0)
+    return make_error(ErrorCode::Unsupported,
+                      "this build cannot show --pictures {} (README.md says how to build it in)",
+                      raw.pictures);
   if (raw.playout == "smooth") options.playout = Playout::Smooth;
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,

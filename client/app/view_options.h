@@ -17,7 +17,7 @@ struct ViewOptions {
   StreamMode mode = StreamMode::Auto;
   Playout playout = Playout::LowLatency;
   std::filesystem::path tls_authorities;
-  PictureCodecs picture_codecs = kAllPictureCodecs;  // in frames mode
+  PictureCodecs picture_codecs = decodable_picture_codecs();  // in frames mode
   std::string token;
   RenderSize size{960, 540};
   bool is_headless = false;

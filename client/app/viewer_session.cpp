@@ -21,7 +21,8 @@ bool is_blank(const Image& image) {
 Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& config) {
   ClientConfig acknowledging = config;
   acknowledging.hello.acknowledges = true;
-  if (acknowledging.hello.picture_codecs == 0) acknowledging.hello.picture_codecs = kAllPictureCodecs;
+  if (acknowledging.hello.picture_codecs == 0)
+    acknowledging.hello.picture_codecs = decodable_picture_codecs();
   ASSIGN_OR_RETURN(auto client, ViewerClient::connect(acknowledging));
   std::unique_ptr<ViewerSession> session(new ViewerSession(std::move(client)));
   ViewerClient* requester = session->client_.get();
@@ -118,6 +119,7 @@ Status ViewerSession::handle(MediaEvent& event) {
     case Opcode::JpegFrame:
     case Opcode::JpegTiles:
     case Opcode::Vp8Frame:
+    case Opcode::H264Frame:
       take_picture(event);
       return {};
     case Opcode::Control:

@@ -11,11 +11,6 @@ bool is_strand_frame(Opcode opcode) {
   return opcode == Opcode::StrandKeyframe || opcode == Opcode::StrandDelta;
 }
 
-/// Pictures that may build on the one before.
-bool is_chained_picture(Opcode opcode) {
-  return opcode == Opcode::JpegTiles || opcode == Opcode::Vp8Frame;
-}
-
 bool stands_alone(const FrameHeader& header) {
   return is_chained_picture(header.opcode) ? header.base_sequence == 0
                                            : header.opcode == Opcode::StrandKeyframe;

@@ -17,6 +17,7 @@ bool is_media(Opcode opcode) {
     case Opcode::JpegFrame:
     case Opcode::JpegTiles:
     case Opcode::Vp8Frame:
+    case Opcode::H264Frame:
       return true;
     case Opcode::Control:
       return false;

@@ -20,7 +20,13 @@ enum class Opcode : uint8_t {
   JpegFrame = 0x30,  // one whole picture
   JpegTiles = 0x31,  // the tiles that changed, or all
   Vp8Frame = 0x32,
+  H264Frame = 0x33,
 };
+
+/// Pictures that may build on the one before.
+constexpr bool is_chained_picture(Opcode opcode) {
+  return opcode == Opcode::JpegTiles || opcode == Opcode::Vp8Frame || opcode == Opcode::H264Frame;
+}
 
 inline constexpr size_t kFrameHeaderBytes = 32;
 /// Set in the stream_id of pictures, so that none is a strand stream's.

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "common/codec/h264_codec.h"
+
 namespace strandcast {
 namespace {
 
@@ -22,6 +24,14 @@ class OneMessage : public Picture {
 
 }  // namespace
 
+PictureCodecs decodable_picture_codecs() {
+  return has_h264_decoder() ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
+}
+
+PictureCodecs encodable_picture_codecs() {
+  return has_h264_encoder() ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
+}
+
 const char* to_string(PictureCodec codec) {
   switch (codec) {
     case PictureCodec::Jpeg:
@@ -30,6 +40,8 @@ const char* to_string(PictureCodec codec) {
       return "tiles";
     case PictureCodec::Vp8:
       return "vp8";
+    case PictureCodec::H264:
+      return "h264";
   }
   return "unknown";
 }

@@ -2,6 +2,7 @@
 // ones. Immutable, any thread.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -11,7 +12,14 @@
 
 namespace strandcast {
 
-enum class PictureCodec : uint8_t { Jpeg, JpegTiles, Vp8 };
+enum class PictureCodec : uint8_t { Jpeg, JpegTiles, Vp8, H264 };
+inline constexpr std::array kPictureCodecs = {PictureCodec::Jpeg, PictureCodec::JpegTiles, PictureCodec::Vp8,
+                                              PictureCodec::H264};
+
+/// Whether pictures are coded as changes of the one before alone, at a given rate of bits.
+constexpr bool is_video(PictureCodec codec) {
+  return codec == PictureCodec::Vp8 || codec == PictureCodec::H264;
+}
 
 /// A set of codecs: bit (1 << codec). Whole JPEG pictures every client decodes, its bit says nothing.
 using PictureCodecs = uint32_t;
@@ -19,9 +27,13 @@ constexpr PictureCodecs codec_bit(PictureCodec codec) {
   return 1u << static_cast<uint32_t>(codec);
 }
 inline constexpr PictureCodecs kAllPictureCodecs =
-    codec_bit(PictureCodec::Jpeg) | codec_bit(PictureCodec::JpegTiles) | codec_bit(PictureCodec::Vp8);
+    codec_bit(PictureCodec::Jpeg) | codec_bit(PictureCodec::JpegTiles) | codec_bit(PictureCodec::Vp8) |
+    codec_bit(PictureCodec::H264);
+/// Those that this build decodes, and encodes on this machine.
+PictureCodecs decodable_picture_codecs();
+PictureCodecs encodable_picture_codecs();
 
-/// "jpeg", "tiles" or "vp8".
+/// "jpeg", "tiles", "vp8" or "h264".
 const char* to_string(PictureCodec codec);
 
 class Picture {

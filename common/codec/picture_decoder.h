@@ -6,6 +6,7 @@
 #include <span>
 
 #include "common/base/result.h"
+#include "common/codec/h264_codec.h"
 #include "common/codec/jpeg_tiles.h"
 #include "common/codec/picture.h"
 #include "common/codec/vp8_codec.h"
@@ -14,8 +15,9 @@ namespace strandcast {
 
 class PictureDecoder {
  public:
-  /// Opcode JpegFrame, JpegTiles or Vp8Frame. BadInput and LimitExceeded for damage, Unavailable when the
-  /// picture it continues was missed. After any error a whole picture has to be asked for.
+  /// Opcode JpegFrame, JpegTiles, Vp8Frame or H264Frame, where the build has it. BadInput and LimitExceeded
+  /// for damage, Unavailable when the picture it continues was missed. After any error a whole picture has to
+  /// be asked for.
   Status decode(const FrameHeader& header, std::span<const std::byte> payload);
 
   /// Null before the first picture.
@@ -30,13 +32,15 @@ class PictureDecoder {
   Status check_base(const FrameHeader& header);
   Status decode_whole(std::span<const std::byte> payload);
   Status decode_tiles(const FrameHeader& header, std::span<const std::byte> payload);
-  Status decode_video(const FrameHeader& header, std::span<const std::byte> payload);
+  Status decode_vp8(const FrameHeader& header, std::span<const std::byte> payload);
+  Status decode_h264(const FrameHeader& header, std::span<const std::byte> payload);
 
   Image image_;
   bool has_image_ = false;
   std::optional<Place> place_;  // nothing: only a whole picture helps
   TileDecoder tiles_;
-  std::optional<Vp8Decoder> video_;
+  std::optional<Vp8Decoder> vp8_;
+  std::optional<H264Decoder> h264_;
 };
 
 }  // namespace strandcast

@@ -239,7 +239,7 @@ FrameQuality take(const v1::FrameQuality& message, FieldCheck& check) {
   quality.rate_hz = message.rate_hz();
   quality.quality = message.quality();
   quality.codec =
-      check.choice("frame_quality.codec", message.codec(), v1::PICTURE_CODEC_JPEG, PictureCodec::Vp8);
+      check.choice("frame_quality.codec", message.codec(), v1::PICTURE_CODEC_JPEG, PictureCodec::H264);
   quality.reason = message.reason();
   return quality;
 }

@@ -7,10 +7,16 @@ namespace strandcast {
 
 namespace {
 
-/// What a client decodes that moves with the fewest bytes.
-PictureCodec best_codec(PictureCodecs decodable) {
-  for (const PictureCodec codec : {PictureCodec::Vp8, PictureCodec::JpegTiles})
-    if ((decodable & codec_bit(codec)) != 0) return codec;
+/// H.264 has even sizes only, and the ladder halves them.
+constexpr uint32_t kH264SizeStep = 4;
+
+/// What a client decodes and this server encodes that moves with the fewest bytes.
+PictureCodec best_codec(PictureCodecs decodable, const RenderSize& size) {
+  PictureCodecs usable = decodable & encodable_picture_codecs();
+  if (size.width % kH264SizeStep != 0 || size.height % kH264SizeStep != 0)
+    usable &= ~codec_bit(PictureCodec::H264);
+  for (const PictureCodec codec : {PictureCodec::H264, PictureCodec::Vp8, PictureCodec::JpegTiles})
+    if ((usable & codec_bit(codec)) != 0) return codec;
   return PictureCodec::Jpeg;
 }
 
@@ -33,7 +39,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
   viewer.view.camera = scene_.camera;
   viewer.view.size = place.size;
   viewer.view.quality = static_cast<int>(scene_.stream.jpeg_quality);
-  viewer.view.codec = best_codec(hello.picture_codecs);
+  viewer.view.codec = best_codec(hello.picture_codecs, place.size);
   viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
   viewer.step = find_step(viewer.ladder, viewer.view.quality);
   if (hello.role == Role::Source) {

@@ -170,10 +170,9 @@ void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
       drawn.is_refused = false;
       drawn.is_still = false;
     }
-    const bool is_other_stream =
-        drawn.view.codec != view.codec || drawn.view.size.width != view.size.width ||
-        drawn.view.size.height != view.size.height ||
-        (view.codec == PictureCodec::Vp8 && drawn.view.rate_divisor != view.rate_divisor);
+    const bool is_other_stream = drawn.view.codec != view.codec || drawn.view.size.width != view.size.width ||
+                                 drawn.view.size.height != view.size.height ||
+                                 (is_video(view.codec) && drawn.view.rate_divisor != view.rate_divisor);
     if (drawn.encoder != nullptr && is_other_stream) {
       drawn.last_sequence = drawn.encoder->sequence();
       drawn.encoder.reset();

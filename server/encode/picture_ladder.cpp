@@ -39,7 +39,7 @@ double jpeg_bits_per_pixel(int quality) {
 }
 
 double bits_per_pixel(PictureCodec codec, int quality) {
-  return codec == PictureCodec::Vp8 ? video_bits_per_pixel(quality) : jpeg_bits_per_pixel(quality);
+  return is_video(codec) ? video_bits_per_pixel(quality) : jpeg_bits_per_pixel(quality);
 }
 
 }  // namespace

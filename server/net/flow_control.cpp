@@ -24,8 +24,8 @@ constexpr int64_t kKeyframeSlackNs = kGateDelayNs / 2;
 
 /// What takes the place of many frames that build on each other.
 bool is_keyframe(const FrameHeader& header) {
-  const bool is_chained_picture = header.opcode == Opcode::JpegTiles || header.opcode == Opcode::Vp8Frame;
-  return header.opcode == Opcode::StrandKeyframe || (is_chained_picture && header.base_sequence == 0);
+  return header.opcode == Opcode::StrandKeyframe ||
+         (is_chained_picture(header.opcode) && header.base_sequence == 0);
 }
 
 }  // namespace

@@ -130,7 +130,12 @@ TEST(Viewers, AViewerGetsTheBestCodecItDecodes) {
   };
   EXPECT_EQ(codec_for(0), PictureCodec::Jpeg) << "a client of before";
   EXPECT_EQ(codec_for(codec_bit(PictureCodec::JpegTiles)), PictureCodec::JpegTiles);
-  EXPECT_EQ(codec_for(kAllPictureCodecs), PictureCodec::Vp8);
+  EXPECT_EQ(codec_for(kAllPictureCodecs & ~codec_bit(PictureCodec::H264)), PictureCodec::Vp8);
+  const bool has_h264 = (encodable_picture_codecs() & codec_bit(PictureCodec::H264)) != 0;
+  EXPECT_EQ(codec_for(kAllPictureCodecs), has_h264 ? PictureCodec::H264 : PictureCodec::Vp8);
+  EXPECT_EQ(codec_for(codec_bit(PictureCodec::H264)), has_h264 ? PictureCodec::H264 : PictureCodec::Jpeg);
+  message.frame_width = 642;
+  EXPECT_EQ(codec_for(kAllPictureCodecs), PictureCodec::Vp8) << "half of it would be odd";
   EXPECT_EQ(codec_for(~kAllPictureCodecs), PictureCodec::Jpeg) << "bits of a later version";
 }
 

@@ -157,7 +157,7 @@ TEST(FrameHeader, RefusesWrongLengthsAndOpcodes) {
     auto message = frame->message;
     message[0] = static_cast<std::byte>(opcode);
     const bool is_known =
-        opcode == 0x10 || opcode == 0x20 || opcode == 0x21 || (opcode >= 0x30 && opcode <= 0x32);
+        opcode == 0x10 || opcode == 0x20 || opcode == 0x21 || (opcode >= 0x30 && opcode <= 0x33);
     EXPECT_EQ(unpack_frame_header(message).ok(), is_known) << opcode;
   }
 }

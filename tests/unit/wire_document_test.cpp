@@ -1,5 +1,6 @@
 // proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
 #include "common/base/file.h"
+#include "common/codec/h264_header.h"
 #include "common/codec/jpeg_tiles.h"
 #include "common/codec/picture.h"
 #include "common/codec/scene_asset.h"
@@ -55,6 +56,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMinPictureSide", fmt::format("{} x {}", kMinPictureSide, kMinPictureSide)},
       {"kMaxPictureWidth",
        fmt::format("{} x {}", with_commas(kMaxPictureWidth), with_commas(kMaxPictureHeight))},
+      {"kMaxH264Units", with_commas(kMaxH264Units)},
+      {"kMaxVideoReferences", with_commas(kMaxVideoReferences)},
       {"kTileSide", fmt::format("{} x {}", kTileSide, kTileSide)},
       {"kTilesFixedBytes", with_commas(kTilesFixedBytes)},
       {"kTileHeaderBytes", with_commas(kTileHeaderBytes)},
@@ -101,7 +104,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
 TEST(WireDocument, ListsEveryOpcodeAndCloseCode) {
   const std::string text = document();
   for (const Opcode opcode : {Opcode::Control, Opcode::Asset, Opcode::StrandKeyframe, Opcode::StrandDelta,
-                              Opcode::JpegFrame, Opcode::JpegTiles, Opcode::Vp8Frame})
+                              Opcode::JpegFrame, Opcode::JpegTiles, Opcode::Vp8Frame, Opcode::H264Frame})
     EXPECT_THAT(text, HasSubstr(fmt::format("| `0x{:02x}` |", static_cast<int>(opcode))));
   for (const CloseCode code : {CloseCode::Normal, CloseCode::GoingAway, CloseCode::BadData, CloseCode::Policy,
                                CloseCode::TooBig, CloseCode::Internal, CloseCode::TryLater,

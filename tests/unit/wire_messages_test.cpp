@@ -368,7 +368,7 @@ TEST(WireMessages, FrameQualityIsCheckedFieldByField) {
   EXPECT_EQ(place_after([](FrameQuality& q) { q.height = 0; }), "frame_quality.height");
   EXPECT_EQ(place_after([](FrameQuality& q) { q.rate_hz = 0.0; }), "frame_quality.rate_hz");
   EXPECT_EQ(place_after([](FrameQuality& q) { q.quality = 101; }), "frame_quality.quality");
-  EXPECT_EQ(place_after([](FrameQuality& q) { q.codec = static_cast<PictureCodec>(3); }),
+  EXPECT_EQ(place_after([](FrameQuality& q) { q.codec = static_cast<PictureCodec>(4); }),
             "frame_quality.codec");
 }
 
