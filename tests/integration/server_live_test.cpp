@@ -171,24 +171,25 @@ TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {
   StrandClient early = join();
   EXPECT_EQ(early.welcome.strand_count, kStrands);
   EXPECT_EQ(early.welcome.vertex_count, kVertices);
-  std::map<uint64_t, uint64_t> hash_at_tick;
-  for (int i = 0; i < 20; ++i) {
-    const auto snapshot = early.next();
-    ASSERT_NE(snapshot, nullptr);
-    hash_at_tick[snapshot->tick] = state_hash(*snapshot);
-  }
+  for (int i = 0; i < 20; ++i) ASSERT_NE(early.next(), nullptr);
   StrandClient late = join();
+  // Either may be ahead of the other.
+  std::map<uint64_t, uint64_t> early_hash;
+  std::map<uint64_t, uint64_t> late_hash;
   uint32_t shared_count = 0;
-  for (int i = 0; i < 400 && shared_count < 20; ++i) {
-    const auto of_early = early.next();
-    const auto of_late = late.next();
-    ASSERT_TRUE(of_early != nullptr && of_late != nullptr);
-    hash_at_tick[of_early->tick] = state_hash(*of_early);
-    if (of_late->tick > of_early->tick) continue;
-    const auto same = hash_at_tick.find(of_late->tick);
-    if (same == hash_at_tick.end()) continue;
-    EXPECT_EQ(same->second, state_hash(*of_late)) << "step " << of_late->tick;
+  const auto remember = [&](StrandClient& client, std::map<uint64_t, uint64_t>& own,
+                            const std::map<uint64_t, uint64_t>& others) {
+    const auto snapshot = client.next();
+    ASSERT_NE(snapshot, nullptr);
+    own[snapshot->tick] = state_hash(*snapshot);
+    const auto same = others.find(snapshot->tick);
+    if (same == others.end()) return;
+    EXPECT_EQ(same->second, state_hash(*snapshot)) << "step " << snapshot->tick;
     ++shared_count;
+  };
+  for (int i = 0; i < 400 && shared_count < 20; ++i) {
+    ASSERT_NO_FATAL_FAILURE(remember(early, early_hash, late_hash));
+    ASSERT_NO_FATAL_FAILURE(remember(late, late_hash, early_hash));
   }
   EXPECT_EQ(shared_count, 20u);
 }
