@@ -15,7 +15,8 @@ ViewOptions read(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "strandcast-view");
   const auto line = read_view_command_line(static_cast<int>(arguments.size()), arguments.data());
   EXPECT_TRUE(line.options.has_value());
-  return line.options.value_or(ViewOptions{});
+  if (!line.options) return {};
+  return *line.options;
 }
 
 TEST(ViewOptions, AskForNoMoreThanTheyNeed) {
