@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/codec/picture.h"
+#include "common/codec/image_check.h"
 
 namespace strandcast {
 namespace {
@@ -86,7 +86,7 @@ Status check_counting(BitReader& reader) {
 }
 
 /// 7.3.2.1.1, up to the size.
-Result<H264FrameInfo> read_fields(BitReader& reader) {
+Result<VideoFrameInfo> read_fields(BitReader& reader) {
   const uint32_t profile = reader.take(8);
   (void)reader.take(16);       // constraints and level
   (void)reader.take_number();  // its number
@@ -107,16 +107,13 @@ Result<H264FrameInfo> read_fields(BitReader& reader) {
                         cut_right, 2 * above, cut_below);
   }
   const uint64_t width = columns * kMacroblock - cut_right, height = rows * kMacroblock - cut_below;
-  if (width < kMinPictureSide || height < kMinPictureSide || width > kMaxPictureWidth ||
-      height > kMaxPictureHeight)
-    return make_error(ErrorCode::LimitExceeded, "an H.264 picture of {} x {}, allowed are {} to {} x {}",
-                      width, height, kMinPictureSide, kMaxPictureWidth, kMaxPictureHeight);
-  return H264FrameInfo{true, static_cast<uint32_t>(width), static_cast<uint32_t>(height)};
+  RETURN_IF_ERROR(check_picture_size(width, height));
+  return VideoFrameInfo{true, static_cast<uint32_t>(width), static_cast<uint32_t>(height)};
 }
 
-Result<H264FrameInfo> read_sequence(std::span<const std::byte> unit) {
+Result<VideoFrameInfo> read_sequence(std::span<const std::byte> unit) {
   BitReader reader(unit);
-  Result<H264FrameInfo> info = read_fields(reader);
+  Result<VideoFrameInfo> info = read_fields(reader);
   if (!reader.ok())  // then zeros have been judged
     return make_error(ErrorCode::BadInput, "H.264 sequence parameters of {} bytes end early", unit.size());
   return info;
@@ -132,7 +129,7 @@ size_t find_start(std::span<const std::byte> bytes, size_t from) {
 /// What has been seen of a frame.
 struct Seen {
   size_t units = 0, slices = 0, key_slices = 0, pictures = 0;
-  std::optional<H264FrameInfo> sequence;
+  std::optional<VideoFrameInfo> sequence;
 };
 
 Status take_unit(std::span<const std::byte> unit, Seen& seen) {
@@ -165,7 +162,7 @@ Status take_unit(std::span<const std::byte> unit, Seen& seen) {
 
 }  // namespace
 
-Result<H264FrameInfo> read_h264_info(std::span<const std::byte> frame) {
+Result<VideoFrameInfo> read_h264_info(std::span<const std::byte> frame) {
   Seen seen;
   size_t start = find_start(frame, 0);
   if (std::any_of(frame.begin(), frame.begin() + static_cast<std::ptrdiff_t>(start),
@@ -183,7 +180,7 @@ Result<H264FrameInfo> read_h264_info(std::span<const std::byte> frame) {
   if (!is_key && !is_delta)
     return make_error(ErrorCode::BadInput, "an H.264 frame of {} key slices and {} others is neither",
                       seen.key_slices, seen.slices);
-  return is_key ? *seen.sequence : H264FrameInfo{};
+  return is_key ? *seen.sequence : VideoFrameInfo{};
 }
 
 }  // namespace strandcast

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/base/result.h"
+#include "common/codec/video_codec.h"
 
 namespace strandcast {
 
@@ -14,13 +14,9 @@ namespace strandcast {
 inline constexpr uint32_t kMaxVideoReferences = 4;
 inline constexpr size_t kMaxH264Units = 64;
 
-struct H264FrameInfo {
-  bool is_keyframe = false;
-  uint32_t width = 0, height = 0;  // of a keyframe, else 0
-};
 /// Untrusted input: units behind start codes (ITU-T H.264, annex B). BadInput for what is no frame of that
 /// form, Unsupported for interlaced pictures, colours not at half the size or more than 8 bits, LimitExceeded
 /// for sizes and counts beyond the limits.
-Result<H264FrameInfo> read_h264_info(std::span<const std::byte> frame);
+Result<VideoFrameInfo> read_h264_info(std::span<const std::byte> frame);
 
 }  // namespace strandcast

@@ -7,6 +7,7 @@
 
 #include "common/base/file.h"
 #include "common/codec/image_check.h"
+#include "common/scene/picture_size.h"
 
 namespace strandcast {
 namespace {
@@ -49,6 +50,14 @@ Status check_image_size(uint64_t width, uint64_t height) {
     return make_error(ErrorCode::LimitExceeded, "image of {} x {} pixels, the limit is {} a side", width,
                       height, kMaxImageSide);
   return {};
+}
+
+Status check_picture_size(uint64_t width, uint64_t height) {
+  if (width >= kMinPictureSide && height >= kMinPictureSide && width <= kMaxPictureWidth &&
+      height <= kMaxPictureHeight)
+    return {};
+  return make_error(ErrorCode::LimitExceeded, "a picture of {} x {}, allowed are {} to {} x {}", width,
+                    height, kMinPictureSide, kMaxPictureWidth, kMaxPictureHeight);
 }
 
 Result<std::vector<std::byte>> encode_jpeg(const Image& image, int quality) {

@@ -212,10 +212,7 @@ Status TileDecoder::decode(std::span<const std::byte> payload, Scope scope, Imag
   const uint32_t count = reader.take<uint16_t>();
   (void)reader.take<uint16_t>();
   if (!reader.ok()) return make_error(ErrorCode::BadInput, "picture tiles end in their header");
-  if (width < kMinPictureSide || height < kMinPictureSide || width > kMaxPictureWidth ||
-      height > kMaxPictureHeight)
-    return make_error(ErrorCode::LimitExceeded, "tiles of a picture of {} x {}, allowed are {} to {} x {}",
-                      width, height, kMinPictureSide, kMaxPictureWidth, kMaxPictureHeight);
+  RETURN_IF_ERROR(check_picture_size(width, height));
   const uint32_t all = tiles_along(width) * tiles_along(height);
   if (scope == Scope::Changes && (width != canvas.width || height != canvas.height))
     return make_error(ErrorCode::BadInput, "changes for a picture of {} x {}, shown is one of {} x {}", width,

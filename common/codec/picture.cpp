@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "common/codec/h264_codec.h"
+#include "common/codec/video_codec.h"
 
 namespace strandcast {
 namespace {
@@ -25,11 +25,13 @@ class OneMessage : public Picture {
 }  // namespace
 
 PictureCodecs decodable_picture_codecs() {
-  return has_h264_decoder() ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
+  static const bool has_h264 = make_video_decoder(PictureCodec::H264).ok();
+  return has_h264 ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
 }
 
 PictureCodecs encodable_picture_codecs() {
-  return has_h264_encoder() ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
+  static const bool has_h264 = make_video_encoder(PictureCodec::H264, {640, 360}).ok();
+  return has_h264 ? kAllPictureCodecs : kAllPictureCodecs & ~codec_bit(PictureCodec::H264);
 }
 
 const char* to_string(PictureCodec codec) {

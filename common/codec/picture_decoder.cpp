@@ -3,16 +3,6 @@
 #include <utility>
 
 namespace strandcast {
-namespace {
-
-Status check_kind(const FrameHeader& header, bool is_keyframe) {
-  if (is_keyframe == (header.base_sequence == 0)) return {};
-  return make_error(ErrorCode::BadInput, "a video {} with base {}", is_keyframe ? "keyframe" : "delta frame",
-                    header.base_sequence);
-}
-
-}  // namespace
-
 Status PictureDecoder::decode(const FrameHeader& header, std::span<const std::byte> payload) {
   RETURN_IF_ERROR(check_base(header));
   place_.reset();
@@ -24,10 +14,10 @@ Status PictureDecoder::decode(const FrameHeader& header, std::span<const std::by
       RETURN_IF_ERROR(decode_tiles(header, payload));
       break;
     case Opcode::Vp8Frame:
-      RETURN_IF_ERROR(decode_vp8(header, payload));
+      RETURN_IF_ERROR(decode_video(PictureCodec::Vp8, header, payload));
       break;
     case Opcode::H264Frame:
-      RETURN_IF_ERROR(decode_h264(header, payload));
+      RETURN_IF_ERROR(decode_video(PictureCodec::H264, header, payload));
       break;
     default:
       return make_error(ErrorCode::BadInput, "opcode 0x{:02x} is no picture",
@@ -57,23 +47,16 @@ Status PictureDecoder::decode_tiles(const FrameHeader& header, std::span<const s
   return tiles_.decode(payload, is_whole ? TileDecoder::Scope::Whole : TileDecoder::Scope::Changes, image_);
 }
 
-Status PictureDecoder::decode_vp8(const FrameHeader& header, std::span<const std::byte> payload) {
-  ASSIGN_OR_RETURN(const Vp8FrameInfo info, read_vp8_info(payload));
-  RETURN_IF_ERROR(check_kind(header, info.is_keyframe));
-  if (!vp8_) {
-    ASSIGN_OR_RETURN(vp8_, Vp8Decoder::make());
+Status PictureDecoder::decode_video(PictureCodec codec, const FrameHeader& header,
+                                    std::span<const std::byte> payload) {
+  if (video_ == nullptr || video_->codec() != codec) {
+    ASSIGN_OR_RETURN(video_, make_video_decoder(codec));
   }
-  ASSIGN_OR_RETURN(image_, vp8_->decode(payload));
-  return {};
-}
-
-Status PictureDecoder::decode_h264(const FrameHeader& header, std::span<const std::byte> payload) {
-  if (!h264_) {
-    ASSIGN_OR_RETURN(h264_, H264Decoder::make());
-  }
-  ASSIGN_OR_RETURN(const H264FrameInfo info, read_h264_info(payload));
-  RETURN_IF_ERROR(check_kind(header, info.is_keyframe));
-  ASSIGN_OR_RETURN(image_, h264_->decode(payload));
+  ASSIGN_OR_RETURN(const VideoFrameInfo info, read_video_info(codec, payload));
+  if (info.is_keyframe != (header.base_sequence == 0))
+    return make_error(ErrorCode::BadInput, "a video {} with base {}",
+                      info.is_keyframe ? "keyframe" : "delta frame", header.base_sequence);
+  ASSIGN_OR_RETURN(image_, video_->decode(payload));
   return {};
 }
 

@@ -2,14 +2,14 @@
 // message that cannot be used leaves the picture as it was. One thread.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 
 #include "common/base/result.h"
-#include "common/codec/h264_codec.h"
 #include "common/codec/jpeg_tiles.h"
 #include "common/codec/picture.h"
-#include "common/codec/vp8_codec.h"
+#include "common/codec/video_codec.h"
 
 namespace strandcast {
 
@@ -32,15 +32,13 @@ class PictureDecoder {
   Status check_base(const FrameHeader& header);
   Status decode_whole(std::span<const std::byte> payload);
   Status decode_tiles(const FrameHeader& header, std::span<const std::byte> payload);
-  Status decode_vp8(const FrameHeader& header, std::span<const std::byte> payload);
-  Status decode_h264(const FrameHeader& header, std::span<const std::byte> payload);
+  Status decode_video(PictureCodec codec, const FrameHeader& header, std::span<const std::byte> payload);
 
   Image image_;
   bool has_image_ = false;
   std::optional<Place> place_;  // nothing: only a whole picture helps
   TileDecoder tiles_;
-  std::optional<Vp8Decoder> vp8_;
-  std::optional<H264Decoder> h264_;
+  std::unique_ptr<VideoDecoder> video_;  // of the codec that came last; null before the first
 };
 
 }  // namespace strandcast

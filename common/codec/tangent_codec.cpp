@@ -18,7 +18,7 @@
 namespace strandcast {
 namespace {
 
-constexpr uint8_t kTangentCodecNumber = 3;
+constexpr uint8_t kTangentCodecNumber = 4;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kCoarseHistoryFlag = 1;
 constexpr size_t kThreadedVertices = 40'000;  // fewer are coded on the calling thread
@@ -44,8 +44,8 @@ struct TangentChain {
     sizes.reset(layout);
     tables = make_first_tables();
   }
-  void coarsen(const TangentLayout& layout) {
-    history.coarsen();
+  void coarsen(const TangentLayout& layout, const Pose& pose) {
+    history.coarsen(pose);
     sizes.reset(layout);
   }
 };
@@ -190,10 +190,11 @@ class TangentEncoder final : public StrandEncoder {
     const bool is_coarsened = history == History::Coarsened;
     std::vector<std::byte> joiners_part;
     if (is_coarsened) {
-      chain_.coarsen(layout_);
+      chain_.coarsen(layout_, snapshot.world_from_head);
       append_history(joiners_part);
     }
     target_ = planes_of(layout_, snapshot, std::move(target_));
+    frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     fit_motion(layout_, chain_.history, target_, frame_);
     std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
     writers_.resize(layout_.slice_count());
@@ -337,6 +338,7 @@ class TangentDecoder final : public StrandDecoder {
     });
     RETURN_IF_ERROR(check_spent(readers));
     set_history(position, chain.history);
+    chain.history.head.pose = snapshot.world_from_head;
     RETURN_IF_ERROR(read_body(rest, message, chain, snapshot));
     chain_ = std::move(chain);
     return {};
@@ -349,7 +351,7 @@ class TangentDecoder final : public StrandDecoder {
     const bool is_coarsened = !message.body.empty() && message.body[0] == std::byte{kCoarseHistoryFlag};
     if (!is_coarsened) return read_body(message.body, message, chain_, snapshot);
     TangentChain chain = chain_;
-    chain.coarsen(layout_);
+    chain.coarsen(layout_, snapshot.world_from_head);
     RETURN_IF_ERROR(read_body(message.body, message, chain, snapshot));
     chain_ = std::move(chain);
     return {};
@@ -368,6 +370,7 @@ class TangentDecoder final : public StrandDecoder {
       return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
                         kCoarseHistoryFlag);
     frame_.length_blend = head.length_blend;
+    frame_.head = chain.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     std::memcpy(frame_.weights.data(), weights.data(), weights.size());
     std::vector<ValueReader> readers(layout_.slice_count());
     ASSIGN_OR_RETURN(const auto rest, open_slices(body.rest(), readers));

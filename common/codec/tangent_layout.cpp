@@ -95,6 +95,7 @@ TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
   layout.slice_begin.push_back(static_cast<uint32_t>(layout.strand_at.size()));
   layout.strand_at.insert(layout.strand_at.end(), kBlockSize, kNoStrand);
   layout.stride = static_cast<uint32_t>(layout.strand_at.size());
+  for (const uint32_t strand : layout.strand_at) layout.presence.push_back(strand == kNoStrand ? 0.0f : 1.0f);
   find_neighbours(layout, rest_in_head_m);
 
   layout.rest_length_m.assign(layout.plane_size(), 0.0f);

@@ -23,6 +23,7 @@ struct TangentLayout {
   uint32_t vertex_count = 0;
   uint32_t stride = 0;                             // places, the block of zeros included
   std::vector<uint32_t> strand_at;                 // (stride) place -> strand, or kNoStrand
+  std::vector<float> presence;                     // (stride) 1, or 0 where there is no strand
   std::vector<uint32_t> slice_begin;               // (slice_count + 1) first place of each slice
   std::array<std::vector<uint32_t>, 2> neighbour;  // (stride) a place in an earlier block of the slice
   std::vector<float> rest_length_m;                // (vertex_count x stride) of the segment before

@@ -42,23 +42,28 @@ FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& hist
   const float* before = history.velocity_before[axis].data() + begin;
   const float* residual = history.residual[axis].data() + begin;
   const float* residual_before = history.residual_before[axis].data() + begin;
+  const float* drift = history.drift[axis].data() + begin;
   const bool has_parent = v >= 1;
   const bool has_grandparent = v >= 2;
+  const bool has_great_grandparent = v >= 3;
   const bool has_child = v + 1 < layout.vertex_count;
+  const bool has_grandchild = v + 2 < layout.vertex_count;
   return {then,
           residual,
           before,
           residual_before,
+          drift,
           has_parent ? now - stride : zeros,
           has_parent ? then - stride : zeros,
-          has_parent ? residual - stride : zeros,
           has_parent ? residual_before - stride : zeros,
           has_grandparent ? now - 2 * stride : zeros,
           has_grandparent ? then - 2 * stride : zeros,
+          has_great_grandparent ? now - 3 * stride : zeros,
           has_child ? then + stride : zeros,
           has_child ? residual + stride : zeros,
           has_child ? before + stride : zeros,
-          has_child ? residual_before + stride : zeros};
+          has_child ? residual_before + stride : zeros,
+          has_grandchild ? then + 2 * stride : zeros};
 }
 
 Escape MotionRow::make_escape(size_t at, const std::array<int32_t, 3>& target) const {
@@ -102,12 +107,12 @@ std::array<int32_t, 3> MotionRow::escaped(const Escape& escape) const {
 void TangentHistory::reset(const TangentLayout& layout) {
   for (size_t axis = 0; axis < 3; ++axis) {
     lattice[axis].assign(layout.plane_size(), 0);
-    for (auto* plane : {&velocity[axis], &velocity_before[axis], &residual[axis], &residual_before[axis]})
-      plane->assign(layout.plane_size(), 0.0f);
+    for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
+      (*planes)[axis].assign(layout.plane_size(), 0.0f);
   }
 }
 
-void TangentHistory::coarsen() {
+void TangentHistory::coarsen(const Pose& pose) {
   constexpr int32_t kHalf = 1 << (kCoarseLatticeShift - 1);
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t i = 0; i < lattice[axis].size(); ++i) {
@@ -115,9 +120,10 @@ void TangentHistory::coarsen() {
       const int32_t steps = wrapping_sum(ahead, kHalf) >> kCoarseLatticeShift;
       lattice[axis][i] = static_cast<int32_t>(static_cast<uint32_t>(steps) << kCoarseLatticeShift);
     }
-    for (auto* plane : {&velocity[axis], &velocity_before[axis], &residual[axis], &residual_before[axis]})
-      std::fill(plane->begin(), plane->end(), 0.0f);
+    for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
+      std::fill((*planes)[axis].begin(), (*planes)[axis].end(), 0.0f);
   }
+  head = {pose, {}};
 }
 
 void TangentFrame::resize(const TangentLayout& layout) {
@@ -128,6 +134,7 @@ void TangentFrame::resize(const TangentLayout& layout) {
     lattice[axis].assign(size, 0);
     velocity[axis].assign(size, 0.0f);
     residual[axis].assign(size, 0.0f);
+    drift[axis].assign(size, 0.0f);
   }
   zeros.assign(layout.stride, 0.0f);
   zero_lattice.assign(layout.stride, 0);
@@ -161,11 +168,13 @@ void place_slice(const TangentLayout& layout, const TangentHistory& history, uin
 }
 
 void remember(TangentHistory& history, TangentFrame& frame) {
+  history.head = frame.head;
   std::swap(history.lattice, frame.lattice);
   std::swap(history.velocity_before, history.velocity);
   std::swap(history.velocity, frame.velocity);
   std::swap(history.residual_before, history.residual);
   std::swap(history.residual, frame.residual);
+  std::swap(history.drift, frame.drift);
 }
 
 }  // namespace strandcast

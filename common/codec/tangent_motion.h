@@ -11,16 +11,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/codec/tangent_head.h"
 #include "common/codec/tangent_layout.h"
 
 namespace strandcast {
 
 inline constexpr int32_t kStepsPerBound = 256;  // lattice steps in the announced bound
-inline constexpr uint32_t kMotionFeatureCount = 20;
+inline constexpr uint32_t kMotionFeatureCount = 28;
 inline constexpr uint32_t kMotionClassCount = 8;     // of rows that share weights
 inline constexpr uint32_t kFewMotionClasses = 3;     // as many of them when there are fewer vertices than
 inline constexpr uint32_t kManyVertices = 16'384;    // this, where eight cost more than they save
 inline constexpr float kMotionWeight = 1.0f / 1024;  // unit of the weights on the wire
+inline constexpr float kDriftShare = 0.85f;          // of the drift that is left one frame later
 inline constexpr float kLengthWeight = 1.0f / 16;    // unit of the length blend
 inline constexpr int32_t kEscapedLength = 1 << 20;   // in place of a length correction
 inline constexpr int kCoarseLatticeShift = 10;       // a joiner's history is rounded to 4 bounds
@@ -33,15 +35,18 @@ using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMoti
 /// What both sides remember of the frames so far.
 struct TangentHistory {
   float quantum_m = 0.0f;
+  HeadMotion head;
   Planes<int32_t> lattice;
   Planes<float> velocity;  // since the frame before
   Planes<float> velocity_before;
   Planes<float> residual;  // decoded less predicted position
   Planes<float> residual_before;
+  Planes<float> drift;  // sum of all velocities, older ones fading: where strands swing back from
 
   void reset(const TangentLayout& layout);
-  /// Forgets all but where the strands were heading, rounded: what a keyframe tells a late joiner.
-  void coarsen();
+  /// Forgets all but where the strands were heading, rounded: what a keyframe tells a late joiner, who knows
+  /// no pose before this one.
+  void coarsen(const Pose& pose);
 };
 
 /// An escaped vertex: position less the last one, in steps of the coarse cubic lattice.
@@ -52,6 +57,7 @@ struct Escape {
 
 /// One frame, coded after a history.
 struct TangentFrame {
+  HeadMotion head;
   MotionWeights weights{};
   uint8_t length_blend = 0;    // of the last decoded length against the rest length, in 1/16
   std::vector<int32_t> first;  // (vertex_count x stride) first coordinate across the segment
@@ -61,6 +67,7 @@ struct TangentFrame {
   Planes<int32_t> lattice;
   Planes<float> velocity;
   Planes<float> residual;
+  Planes<float> drift;
   // Of the row at work, each (stride).
   Planes<float> edge;                          // to the expected position, as far as whole rows tell
   std::array<Planes<float>, 2> neighbour_sum;  // what a vertex tells as a neighbour

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/codec/least_squares.h"
@@ -137,9 +138,74 @@ std::vector<uint32_t> sample_places(const TangentLayout& layout) {
   const size_t step = kRun * std::max<size_t>(1, layout.stride / kSampleStrands);
   std::vector<uint32_t> places;
   for (size_t run = step / 2 / kRun * kRun; run < layout.no_neighbour(); run += step)
-    for (size_t i = 0; i < kRun; ++i) places.push_back(static_cast<uint32_t>(run + i));
+    for (size_t place = run; place < run + kRun; ++place)
+      if (layout.strand_at[place] != kNoStrand) places.push_back(static_cast<uint32_t>(place));
   return places;
 }
+
+/// The vertices of a row as samples: like MotionRow, but with `target` in place of what is yet to be decoded.
+class SampleRow {
+ public:
+  SampleRow(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
+            const TangentFrame& frame, uint32_t v)
+      : layout_(layout), history_(history), target_(target), frame_(frame), v_(v) {
+    for (size_t axis = 0; axis < 3; ++axis) rows_[axis] = feature_rows(layout, history, frame, axis, v);
+  }
+
+  size_t at(size_t place) const { return v_ * size_t{layout_.stride} + place; }
+
+  float now(size_t axis, size_t at) const {
+    return static_cast<float>(wrapping_difference(target_[axis][at], history_.lattice[axis][at]));
+  }
+
+  std::array<float, kMotionFeatureCount> features(size_t axis, size_t place) const {
+    const FeatureRows& rows = rows_[axis];
+    std::array<float, kMotionFeatureCount> value;
+    for (uint32_t k = 0; k < kRowFeatureCount; ++k) value[k] = rows[k][place];
+    value[kParentNow] = ancestor_now(axis, 1, place);
+    value[kGrandparentNow] = ancestor_now(axis, 2, place);
+    value[kGreatGrandparentNow] = ancestor_now(axis, 3, place);
+    const auto [neighbour, second] = std::pair(layout_.neighbour[0][place], layout_.neighbour[1][place]);
+    value[kNeighbourFeature] = now(axis, at(neighbour));
+    value[kNeighbourFeature + 1] = rows[kOwnThen][neighbour];
+    value[kNeighbourFeature + 2] = rows[kOwnResidual][neighbour];
+    value[kNeighbourFeature + 3] = ancestor_now(axis, 1, neighbour);
+    value[kSecondNeighbourFeature] = now(axis, at(second));
+    value[kSecondNeighbourFeature + 1] = ancestor_now(axis, 1, second);
+    for (uint32_t k = 0; k < kHeadStepCount; ++k) {
+      const auto& step = frame_.head.step[k].row[axis];
+      double change = step[3];
+      for (size_t i = 0; i < 3; ++i) change += step[i] * history_.lattice[i][at(place)];
+      value[kHeadFeature + k] = static_cast<float>(change);
+    }
+    return value;
+  }
+
+  /// Vertices that were predicted badly would rule the sums, though they need few bits more than others.
+  float trust(size_t place) const {
+    constexpr float kTypical = 600.0f;  // steps
+    float squares = 0.0f;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float own = rows_[axis][kOwnResidual][place];
+      const float child = rows_[axis][kChildResidual][place];
+      squares += own * own + child * child;
+    }
+    return 1.0f / std::sqrt(1.0f + squares / (kTypical * kTypical));
+  }
+
+ private:
+  float ancestor_now(size_t axis, uint32_t generations, size_t place) const {
+    if (v_ < generations) return 0.0f;
+    return now(axis, at(place) - generations * size_t{layout_.stride});
+  }
+
+  const TangentLayout& layout_;
+  const TangentHistory& history_;
+  const Planes<int32_t>& target_;
+  const TangentFrame& frame_;
+  uint32_t v_;
+  std::array<FeatureRows, 3> rows_;
+};
 
 /// Share of the last decoded length that predicts the next one best, in 1/16.
 uint8_t fit_length_blend(const TangentLayout& layout, const TangentHistory& history,
@@ -176,27 +242,16 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
   std::array<LeastSquares<kMotionFeatureCount>, kMotionClassCount> fits;
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     auto& fit = fits[motion_class(layout, v)];
-    const size_t begin = v * static_cast<size_t>(layout.stride);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const FeatureRows rows = feature_rows(layout, history, frame, axis, v);
-      const auto now = [&](size_t at) {
-        return static_cast<float>(wrapping_difference(target[axis][at], history.lattice[axis][at]));
-      };
-      for (const uint32_t place : sample) {
-        std::array<float, kMotionFeatureCount> value;
-        for (uint32_t k = 0; k < kRowFeatureCount; ++k) value[k] = rows[k][place];
-        value[kParentNow] = v >= 1 ? now(begin - layout.stride + place) : 0.0f;
-        value[kGrandparentNow] = v >= 2 ? now(begin - 2 * size_t{layout.stride} + place) : 0.0f;
-        uint32_t k = kRowFeatureCount;
-        for (const auto& neighbour : layout.neighbour) {
-          value[k++] = now(begin + neighbour[place]);
-          value[k++] = rows[kOwnThen][neighbour[place]];
-          value[k++] = rows[kOwnResidual][neighbour[place]];
-        }
-        fit.add(value, now(begin + place));
+    const SampleRow row(layout, history, target, frame, v);
+    for (const uint32_t place : sample) {
+      const float trust = row.trust(place);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        std::array<float, kMotionFeatureCount> value = row.features(axis, place);
+        for (float& one : value) one *= trust;
+        fit.add(value, trust * row.now(axis, row.at(place)));
       }
-      fit.flush();
     }
+    fit.flush();
   }
   for (uint32_t c = 0; c < kMotionClassCount; ++c) frame.weights[c] = fits[c].weights(kMotionWeight, kNoise);
 }

@@ -1,10 +1,10 @@
 // MotionRow: where the vertices of one row (one vertex index, all strands) are expected, four strands at a
 // time; what encoder and decoder of the "tangent" codec share. Private to common/codec.
 //
-// What a vertex costs: 200 floating-point operations (2 x 3 x 20 of them for the prediction), two divisions
-// and two roots; 110 bytes from and to memory (24 planes, the integers); three symbols, each of which waits
+// What a vertex costs: 240 floating-point operations (2 x 3 x 25 of them for the prediction), two divisions
+// and two roots; 135 bytes from and to memory (30 planes, the integers); three symbols, each of which waits
 // for the one before it, about 25 cycles (find 10, table 5, multiply and add 5, refill 5). At 2.45 GHz and
-// four lanes that is 50 cycles of arithmetic, 25 of memory at 10 GB/s and 75 of waiting.
+// four lanes that is 60 cycles of arithmetic, 33 of memory at 10 GB/s and 75 of waiting.
 #pragma once
 
 #include <array>
@@ -21,22 +21,30 @@ static_assert(kBlockSize % kLaneCount == 0);
 // Features of a vertex, each a vector; weights are the same for all axes. "then" is the last frame, "before"
 // the one before that; the parent is the vertex nearer to the root.
 //   0 velocity then            1 residual then        2 velocity before      3 residual before
-//   4 parent's velocity now    5 parent's then        6 parent's residual    7 parent's residual before
-//   8 grandparent's now        9 grandparent's then  10 child's velocity    11 child's residual
-//  12 child's velocity before 13 child's residual before
-//  14 neighbour's now         15 neighbour's then    16 neighbour's residual
-//  17 second neighbour's now  18 then                19 residual
-inline constexpr uint32_t kRowFeatureCount = 14;
-inline constexpr uint32_t kNeighbourFeatureCount = 3;
+//   4 drift                    5 parent's now         6 parent's then        7 parent's residual before
+//   8 grandparent's now        9 grandparent's then  10 great-grandparent's now
+//  11 child's velocity        12 child's residual    13 child's before      14 child's residual before
+//  15 grandchild's velocity
+//  16 neighbour's now         17 neighbour's then    18 neighbour's residual
+//  19 neighbour's parent's now                       20 second neighbour's now  21 its parent's now
+//  22 to 27 the last steps of the head at the last position, newest first
+inline constexpr uint32_t kRowFeatureCount = 16;
+inline constexpr uint32_t kNeighbourFeature = kRowFeatureCount;
+inline constexpr uint32_t kSecondNeighbourFeature = kNeighbourFeature + 4;
+inline constexpr uint32_t kHeadFeature = kSecondNeighbourFeature + 2;
 inline constexpr uint32_t kOwnThen = 0;
 inline constexpr uint32_t kOwnResidual = 1;
-inline constexpr uint32_t kParentNow = 4;
+inline constexpr uint32_t kOwnDrift = 4;
+inline constexpr uint32_t kParentNow = 5;
 inline constexpr uint32_t kGrandparentNow = 8;
+inline constexpr uint32_t kGreatGrandparentNow = 10;
+inline constexpr uint32_t kChildResidual = 12;
+static_assert(kHeadFeature + kHeadStepCount == kMotionFeatureCount);
 
-// The cell of a coded vertex: tangent steps of 1.22 bounds and length steps of 0.8 keep its farthest point
-// within the bound, with room for rounding: sqrt(1 - 1.22^2 / 2) = 0.51 >= 0.8 / 2.
-inline constexpr float kTangentStep = 1.22f * kStepsPerBound;
-inline constexpr float kLengthStep = 0.8f * kStepsPerBound;
+// The cell of a coded vertex: tangent steps of 1.32 bounds and length steps of 0.65 keep its farthest point
+// within the bound, with room for rounding: sqrt(1 - 1.32^2 / 2) = 0.36 >= 0.65 / 2.
+inline constexpr float kTangentStep = 1.32f * kStepsPerBound;
+inline constexpr float kLengthStep = 0.65f * kStepsPerBound;
 inline constexpr int32_t kEscapeStep = 292;  // 2 (kStepsPerBound - 3) / sqrt(3)
 
 inline constexpr float kTinySquared = 1e-12f;
@@ -117,6 +125,13 @@ class MotionRow {
     const auto& given = frame.weights[motion_class(layout, v)];
     for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
       weights_[k] = static_cast<float>(given[k]) * kMotionWeight;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t i = 0; i < head_[axis].size(); ++i) {
+        head_[axis][i] = 0.0f;
+        for (size_t k = 0; k < kHeadStepCount; ++k)
+          head_[axis][i] += static_cast<float>(frame.head.step[k].row[axis][i]) * weights_[kHeadFeature + k];
+      }
+    }
     length_blend_ = static_cast<float>(frame.length_blend) * kLengthWeight;
     for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
   }
@@ -139,10 +154,16 @@ class MotionRow {
 
   /// Blocks of a slice come in order.
   STRANDCAST_INLINE void expect(size_t place, Expected& expected) const {
+    LaneVectors last;
+    for (size_t axis = 0; axis < 3; ++axis)
+      last.axis[axis] = to_floats(load_lanes(history_.lattice[axis].data() + at(place)));
+    const Lanes presence = load_lanes(layout_.presence.data() + place);
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
       expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(bases(axis) + place);
-      edge.axis[axis] = load_lanes(frame_.edge[axis].data() + place);
+      const auto& head = head_[axis];
+      const Lanes turned = (head[0] * last.axis[0] + head[1] * last.axis[1]) + head[2] * last.axis[2];
+      edge.axis[axis] = load_lanes(frame_.edge[axis].data() + place) + (turned + head[3] * presence);
       for (uint32_t which = 0; which < 2; ++which)
         edge.axis[axis] +=
             gather_lanes(frame_.neighbour_sum[which][axis].data(), layout_.neighbour[which].data() + place);
@@ -169,14 +190,17 @@ class MotionRow {
       store_lanes(now, frame_.lattice[axis].data() + begin);
       store_lanes(velocity, frame_.velocity[axis].data() + begin);
       store_lanes(edge - expected.along.axis[axis] * expected.length, frame_.residual[axis].data() + begin);
+      const Lanes drift = load_lanes(features_[axis][kOwnDrift] + place);
+      store_lanes(kDriftShare * drift + velocity, frame_.drift[axis].data() + begin);
       // What later blocks add for this neighbour.
       const Lanes then = load_lanes(features_[axis][kOwnThen] + place);
       const Lanes residual = load_lanes(features_[axis][kOwnResidual] + place);
-      for (uint32_t which = 0; which < 2; ++which) {
-        const float* weight = weights_.data() + kRowFeatureCount + kNeighbourFeatureCount * which;
-        store_lanes((weight[0] * velocity + weight[1] * then) + weight[2] * residual,
-                    frame_.neighbour_sum[which][axis].data() + place);
-      }
+      const Lanes parent = load_lanes(features_[axis][kParentNow] + place);
+      const float* weight = weights_.data() + kNeighbourFeature;
+      store_lanes(((weight[0] * velocity + weight[1] * then) + weight[2] * residual) + weight[3] * parent,
+                  frame_.neighbour_sum[0][axis].data() + place);
+      weight = weights_.data() + kSecondNeighbourFeature;
+      store_lanes(weight[0] * velocity + weight[1] * parent, frame_.neighbour_sum[1][axis].data() + place);
     }
   }
 
@@ -205,6 +229,7 @@ class MotionRow {
   TangentFrame& frame_;
   uint32_t v_;
   FloatWeights weights_;
+  std::array<std::array<float, 4>, 3> head_;  // the head's steps, weighted
   float length_blend_;
   std::array<FeatureRows, 3> features_;
 };

@@ -5,9 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/codec/h264_codec.h"
 #include "common/codec/jpeg_tiles.h"
-#include "common/codec/vp8_codec.h"
+#include "common/codec/video_codec.h"
 #include "server/encode/picture_ladder.h"
 
 namespace strandcast {
@@ -184,79 +183,53 @@ double video_bits_per_s(uint32_t width, uint32_t height, double rate_hz, int qua
   return static_cast<double>(width) * height * rate_hz * video_bits_per_pixel(quality);
 }
 
-struct Vp8 {
-  using Encoder = Vp8Encoder;
-  using Config = Vp8Config;
-  static constexpr Opcode kOpcode = Opcode::Vp8Frame;
-  static Result<Vp8FrameInfo> read_info(std::span<const std::byte> frame) { return read_vp8_info(frame); }
-};
-
-struct H264 {
-  using Encoder = H264Encoder;
-  using Config = H264Config;
-  static constexpr Opcode kOpcode = Opcode::H264Frame;
-  static Result<H264FrameInfo> read_info(std::span<const std::byte> frame) { return read_h264_info(frame); }
-};
-
-/// Codec: Vp8 or H264.
-template <class Codec>
-class VideoEncoder : public PictureEncoder {
-  using Encoder = typename Codec::Encoder;
-
+/// One chain for the class, at a given rate of bits.
+class ChainEncoder : public PictureEncoder {
  public:
-  VideoEncoder(Encoder encoder, double rate_hz, uint32_t last_sequence)
-      : encoder_(std::move(encoder)), rate_hz_(rate_hz), sequence_(last_sequence) {}
+  ChainEncoder(std::unique_ptr<VideoEncoder> video, PictureCodec codec, double rate_hz,
+               uint32_t last_sequence)
+      : video_(std::move(video)), codec_(codec), rate_hz_(rate_hz), sequence_(last_sequence) {}
 
   Result<PicturePtr> encode(const Image& image, int quality, const PictureStamp& stamp) override {
     if (image == image_) return PicturePtr();
-    encoder_.set_bits_per_s(video_bits_per_s(image.width, image.height, rate_hz_, quality));
-    const auto kind = image_.rgba.empty() ? Encoder::Frame::Keyframe : Encoder::Frame::Delta;
+    video_->set_bits_per_s(video_bits_per_s(image.width, image.height, rate_hz_, quality));
+    const VideoFrame kind = image_.rgba.empty() ? VideoFrame::Keyframe : VideoFrame::Delta;
     image_ = image;
     is_still_ = false;
-    return code(kind, Encoder::Rate::Target, stamp);
+    return code(kind, VideoRate::Target, stamp);
   }
   Result<PicturePtr> whole(const PictureStamp& stamp) override {
     is_still_ = false;
-    return code(Encoder::Frame::Keyframe, Encoder::Rate::Target, stamp);
+    return code(VideoFrame::Keyframe, VideoRate::Target, stamp);
   }
   int64_t whole_due_ns() const override { return keyframe_ns_ + kKeyframePauseNs; }
   Result<PicturePtr> still(const PictureStamp& stamp) override {
     if (is_still_) return PicturePtr();
     is_still_ = true;
-    return code(Encoder::Frame::Delta, Encoder::Rate::Finest, stamp);
+    return code(VideoFrame::Delta, VideoRate::Finest, stamp);
   }
   uint32_t sequence() const override { return sequence_; }
 
  private:
-  Result<PicturePtr> code(Encoder::Frame kind, Encoder::Rate rate, const PictureStamp& stamp) {
-    ASSIGN_OR_RETURN(const auto bytes, encoder_.encode(image_, kind, rate));
-    ASSIGN_OR_RETURN(const auto info, Codec::read_info(bytes));
+  Result<PicturePtr> code(VideoFrame kind, VideoRate rate, const PictureStamp& stamp) {
+    ASSIGN_OR_RETURN(const auto bytes, video_->encode(image_, kind, rate));
+    ASSIGN_OR_RETURN(const VideoFrameInfo info, read_video_info(codec_, bytes));
     const uint32_t base = info.is_keyframe ? 0 : sequence_;
     ASSIGN_OR_RETURN(PicturePtr picture,
-                     one_message(make_header(Codec::kOpcode, sequence_ + 1, base, stamp), bytes));
+                     one_message(make_header(opcode_of(codec_), sequence_ + 1, base, stamp), bytes));
     if (info.is_keyframe) keyframe_ns_ = stamp.time_ns;
     ++sequence_;
     return picture;
   }
 
-  Encoder encoder_;
+  const std::unique_ptr<VideoEncoder> video_;
+  const PictureCodec codec_;
   const double rate_hz_;
   Image image_;
   bool is_still_ = false;
   int64_t keyframe_ns_ = -kKeyframePauseNs;
   uint32_t sequence_;
 };
-
-template <class Codec>
-Result<std::unique_ptr<PictureEncoder>> make_video_encoder(const PictureView& view, double rate_hz,
-                                                           uint32_t last_sequence) {
-  const auto [width, height] = view.size;
-  const typename Codec::Config config{width, height, rate_hz,
-                                      video_bits_per_s(width, height, rate_hz, view.quality)};
-  ASSIGN_OR_RETURN(auto encoder, Codec::Encoder::make(config));
-  return std::unique_ptr<PictureEncoder>(
-      std::make_unique<VideoEncoder<Codec>>(std::move(encoder), rate_hz, last_sequence));
-}
 
 }  // namespace
 
@@ -273,9 +246,13 @@ Result<std::unique_ptr<PictureEncoder>> make_picture_encoder(const PictureView& 
       break;
     }
     case PictureCodec::Vp8:
-      return make_video_encoder<Vp8>(view, rate_hz, last_sequence);
-    case PictureCodec::H264:
-      return make_video_encoder<H264>(view, rate_hz, last_sequence);
+    case PictureCodec::H264: {
+      const auto [width, height] = view.size;
+      const double bits_per_s = video_bits_per_s(width, height, rate_hz, view.quality);
+      ASSIGN_OR_RETURN(auto video, make_video_encoder(view.codec, {width, height, rate_hz, bits_per_s}));
+      made = std::make_unique<ChainEncoder>(std::move(video), view.codec, rate_hz, last_sequence);
+      break;
+    }
   }
   return made;
 }

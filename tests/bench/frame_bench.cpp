@@ -2,7 +2,7 @@
 // built-in scene, drawn as the server draws it: in motion, and idle (head and wind at rest, the hair swinging
 // out).
 //   frame_bench [--pictures N] [--size WxH] [--png DIR]     DIR: the last decoded picture of each mode
-//   frame_bench --match yes     instead: bits per pixel with which VP8 in motion looks like tiles of a
+//   frame_bench --match yes     instead: bits per pixel with which video in motion looks like tiles of a
 //                               quality, at the size and at half of it
 #include <fmt/format.h>
 #include <time.h>
@@ -170,17 +170,17 @@ Result<Outcome> run_tiles(const std::vector<Image>& images, int quality) {
   return mean(images, bytes, psnr_sum);
 }
 
-Result<Outcome> run_vp8(const std::vector<Image>& images, double bits_per_pixel) {
+Result<Outcome> run_video(PictureCodec codec, const std::vector<Image>& images, double bits_per_pixel) {
   const auto [width, height] = std::pair(images[0].width, images[0].height);
-  ASSIGN_OR_RETURN(auto encoder, Vp8Encoder::make({width, height, kPictureRateHz,
-                                                   bits_per_pixel * width * height * kPictureRateHz}));
-  ASSIGN_OR_RETURN(auto decoder, Vp8Decoder::make());
+  ASSIGN_OR_RETURN(const auto encoder,
+                   make_video_encoder(codec, {width, height, kPictureRateHz,
+                                              bits_per_pixel * width * height * kPictureRateHz}));
+  ASSIGN_OR_RETURN(const auto decoder, make_video_decoder(codec));
   size_t bytes = 0;
   double psnr_sum = 0.0;
   for (size_t i = 0; i < images.size(); ++i) {
-    ASSIGN_OR_RETURN(const auto frame,
-                     encoder.encode(images[i], Vp8Encoder::Frame::Delta, Vp8Encoder::Rate::Target));
-    ASSIGN_OR_RETURN(const Image back, decoder.decode(frame));
+    ASSIGN_OR_RETURN(const auto frame, encoder->encode(images[i], VideoFrame::Delta, VideoRate::Target));
+    ASSIGN_OR_RETURN(const Image back, decoder->decode(frame));
     bytes += i == 0 ? 0 : frame.size();
     psnr_sum += i == 0 ? 0.0 : test::psnr(images[i], back);
   }
@@ -188,26 +188,33 @@ Result<Outcome> run_vp8(const std::vector<Image>& images, double bits_per_pixel)
 }
 
 /// The bits per pixel to ask for, by halving the interval; its upper end when no rate is as good.
+Status match_one(PictureCodec codec, const std::vector<Image>& images, int quality) {
+  ASSIGN_OR_RETURN(const Outcome tiles, run_tiles(images, quality));
+  double low = 0.005, high = 4.0;
+  constexpr int kHalvings = 12;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = std::sqrt(low * high);
+    ASSIGN_OR_RETURN(const Outcome video, run_video(codec, images, middle));
+    (video.psnr_db < tiles.psnr_db ? low : high) = middle;
+  }
+  ASSIGN_OR_RETURN(const Outcome video, run_video(codec, images, high));
+  fmt::print("{},{}x{},{},{:.3f},{:.2f},{:.3f},{:.3f},{:.2f}\n", to_string(codec), images[0].width,
+             images[0].height, quality, tiles.bits_per_pixel, tiles.psnr_db, high, video.bits_per_pixel,
+             video.psnr_db);
+  std::fflush(stdout);
+  return {};
+}
+
 Status match(const Sequence& moving) {
-  fmt::print("size,quality,tiles_bits_per_pixel,tiles_psnr_db,vp8_target,vp8_bits_per_pixel,vp8_psnr_db\n");
+  fmt::print("codec,size,quality,tiles_bits_per_pixel,tiles_psnr_db,target,bits_per_pixel,psnr_db\n");
   std::vector<Image> halves;
   for (const Image& image : moving.images) halves.push_back(halved(image));
-  for (const std::vector<Image>* images : {&moving.images, static_cast<const std::vector<Image>*>(&halves)})
-    for (const int quality : {95, 90, 80, 50, 30, 10, 1}) {
-      ASSIGN_OR_RETURN(const Outcome tiles, run_tiles(*images, quality));
-      double low = 0.005, high = 4.0;
-      constexpr int kHalvings = 12;
-      for (int i = 0; i < kHalvings; ++i) {
-        const double middle = std::sqrt(low * high);
-        ASSIGN_OR_RETURN(const Outcome video, run_vp8(*images, middle));
-        (video.psnr_db < tiles.psnr_db ? low : high) = middle;
-      }
-      ASSIGN_OR_RETURN(const Outcome video, run_vp8(*images, high));
-      fmt::print("{}x{},{},{:.3f},{:.2f},{:.3f},{:.3f},{:.2f}\n", images->front().width,
-                 images->front().height, quality, tiles.bits_per_pixel, tiles.psnr_db, high,
-                 video.bits_per_pixel, video.psnr_db);
-      std::fflush(stdout);
-    }
+  for (const PictureCodec codec : kPictureCodecs) {
+    if (!is_video(codec) || (encodable_picture_codecs() & codec_bit(codec)) == 0) continue;
+    for (const auto* images : {&moving.images, static_cast<const std::vector<Image>*>(&halves)})
+      for (const int quality : {95, 90, 80, 50, 30, 10, 1})
+        RETURN_IF_ERROR(match_one(codec, *images, quality));
+  }
   return {};
 }
 

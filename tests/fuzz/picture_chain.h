@@ -24,6 +24,6 @@ inline constexpr uint8_t kFixPayload = 2;  // payload_bytes is corrected to what
 inline constexpr uint8_t kThenDelta = 4;   // after a refusal the next honest change is tried, and must fail
 inline constexpr int kOpcodeShift = 4;     // from here on: opcode of the valid header, counted from JpegFrame
 
-inline constexpr int kPictureSizes = 3;  // chain = codec * kPictureSizes + size
+inline constexpr int kPictureSizes = 3;  // chain = codec * kPictureSizes + size; H.264 where the build has it
 
 }  // namespace strandcast

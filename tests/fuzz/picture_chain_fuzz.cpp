@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include "common/base/check.h"
@@ -43,15 +44,11 @@ std::vector<std::byte> tiles_of(const Image& image, uint32_t first) {
   return pack_tiles(image.width, image.height, placed);
 }
 
-Opcode opcode_of(PictureCodec codec) {
-  return static_cast<Opcode>(static_cast<int>(Opcode::JpegFrame) + static_cast<int>(codec));
-}
-
 Chain make_chain(PictureCodec codec, ImageLimit size, uint16_t number) {
   Chain chain;
   PictureDecoder decoder;
-  auto video = Vp8Encoder::make({size.width, size.height, 30.0, 1e6});
-  CHECK(video.ok());
+  std::unique_ptr<VideoEncoder> video;
+  if (is_video(codec)) video = make_video_encoder(codec, {size.width, size.height, 30.0, 1e6}).value();
   for (size_t i = 0; i < kPictures; ++i) {
     const bool is_whole = i == 0 || i == kSecondWhole || codec == PictureCodec::Jpeg;
     const Image image = test::waving_lines(size.width, size.height, 0.4 * static_cast<double>(i));
@@ -59,10 +56,8 @@ Chain make_chain(PictureCodec codec, ImageLimit size, uint16_t number) {
     if (codec == PictureCodec::Jpeg) payload = encode_jpeg(image, kQuality).value();
     if (codec == PictureCodec::JpegTiles)
       payload = tiles_of(image, is_whole ? 0 : tiles_along(size.width) * tiles_along(size.height) / 2);
-    if (codec == PictureCodec::Vp8)
-      payload = video
-                    ->encode(image, is_whole ? Vp8Encoder::Frame::Keyframe : Vp8Encoder::Frame::Delta,
-                             Vp8Encoder::Rate::Target)
+    if (video != nullptr)
+      payload = video->encode(image, is_whole ? VideoFrame::Keyframe : VideoFrame::Delta, VideoRate::Target)
                     .value();
     FrameHeader header;
     header.opcode = opcode_of(codec);
@@ -76,21 +71,30 @@ Chain make_chain(PictureCodec codec, ImageLimit size, uint16_t number) {
   return chain;
 }
 
+/// Without frames where this build has no encoder for them.
 const std::vector<Chain>& chains() {
   static const std::vector<Chain> made = [] {
     std::vector<Chain> all;
-    for (const PictureCodec codec : {PictureCodec::Jpeg, PictureCodec::JpegTiles, PictureCodec::Vp8})
-      for (const ImageLimit size : kSizes)
-        all.push_back(make_chain(codec, size, static_cast<uint16_t>(all.size())));
+    for (const PictureCodec codec : kPictureCodecs)
+      for (const ImageLimit size : kSizes) {
+        const bool is_here = (encodable_picture_codecs() & codec_bit(codec)) != 0;
+        all.push_back(is_here ? make_chain(codec, size, static_cast<uint16_t>(all.size())) : Chain{});
+      }
     return all;
   }();
   return made;
 }
 
+std::optional<PictureCodec> video_codec_of(Opcode opcode) {
+  for (const PictureCodec codec : kPictureCodecs)
+    if (is_video(codec) && opcode_of(codec) == opcode) return codec;
+  return std::nullopt;
+}
+
 /// Of the picture that a payload announces, as far as that is known without decoding it.
 uint64_t announced_pixels(Opcode opcode, std::span<const std::byte> payload) {
-  if (opcode == Opcode::Vp8Frame) {
-    const auto info = read_vp8_info(payload);
+  if (const auto codec = video_codec_of(opcode)) {
+    const auto info = read_video_info(*codec, payload);
     return info ? uint64_t{info->width} * info->height : 0;
   }
   FuzzInput input(payload);
@@ -101,7 +105,9 @@ uint64_t announced_pixels(Opcode opcode, std::span<const std::byte> payload) {
 class Game {
  public:
   void choose(uint8_t number) {
-    chain_ = &chains()[number % chains().size()];
+    const Chain& chosen = chains()[number % chains().size()];
+    if (chosen.frame.empty()) return;
+    chain_ = &chosen;
     next_ = 0;
     is_following_ = false;
   }
@@ -137,7 +143,8 @@ class Game {
     if (decoded) {
       check_valid();
       const bool is_whole = header->base_sequence == 0;
-      CHECK(header->opcode != Opcode::Vp8Frame || read_vp8_info(payload)->is_keyframe == is_whole);
+      const auto codec = video_codec_of(header->opcode);
+      CHECK(!codec || read_video_info(*codec, payload)->is_keyframe == is_whole);
       sequence_ = header->sequence;
       stream_id_ = header->stream_id;
       return;

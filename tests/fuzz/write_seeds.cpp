@@ -12,7 +12,7 @@
 #include "common/codec/residual_coder.h"
 #include "common/codec/strand_payload.h"
 #include "common/codec/value_coder.h"
-#include "common/codec/vp8_codec.h"
+#include "common/codec/video_codec.h"
 #include "common/scene/scene_file.h"
 #include "tests/fuzz/picture_chain.h"
 #include "tests/fuzz/strand_chain.h"
@@ -168,12 +168,12 @@ PicturePair make_pictures(PictureCodec codec) {
     const PlacedTile all[] = {{0, &left}, {1, &right}};
     return {pack_tiles(kWidth, kHeight, all), pack_tiles(kWidth, kHeight, std::span(all).last(1))};
   }
-  auto encoder = Vp8Encoder::make({kWidth, kHeight, 30.0, 2e5}).value();
-  const auto code = [&](const Image& image, Vp8Encoder::Rate rate) {
-    return encoder.encode(image, Vp8Encoder::Frame::Delta, rate).value();
+  const auto encoder = make_video_encoder(codec, {kWidth, kHeight, 30.0, 2e5}).value();
+  const auto code = [&](const Image& image) {
+    return encoder->encode(image, VideoFrame::Delta, VideoRate::Target).value();
   };
-  const Bytes whole = code(first, Vp8Encoder::Rate::Target);
-  return {whole, code(second, Vp8Encoder::Rate::Finest)};
+  const Bytes whole = code(first);
+  return {whole, code(second)};
 }
 
 /// For each codec: honest pictures with lost and damaged ones between them, and real payloads in other
@@ -181,7 +181,8 @@ PicturePair make_pictures(PictureCodec codec) {
 void add_pictures(const SeedFolder& seeds) {
   const Bytes honest = picture_step(PictureStep::Honest, 0);
   const Bytes lost = picture_step(PictureStep::Lost, 0);
-  for (const PictureCodec codec : {PictureCodec::Jpeg, PictureCodec::JpegTiles, PictureCodec::Vp8}) {
+  for (const PictureCodec codec : kPictureCodecs) {
+    if ((encodable_picture_codecs() & codec_bit(codec)) == 0) continue;
     const auto index = static_cast<uint8_t>(codec);
     const std::string name = to_string(codec);
     const PicturePair pair = make_pictures(codec);

@@ -10,20 +10,14 @@ namespace {
 
 constexpr int64_t kSecondNs = 1'000'000'000;
 
-TEST(Access, BeyondLoopbackNeedsALongToken) {
-  const AccessToken admin{std::string(32, 'a'), Grant::Admin};
-  const auto with = [&](size_t characters) {
-    return std::vector<AccessToken>{admin, {std::string(characters, 'v'), Grant::Viewer}};
-  };
+TEST(Access, BeyondLoopbackNeedsAToken) {
   EXPECT_TRUE(check_listening(true, "127.0.0.1", {}).ok());
-  EXPECT_TRUE(check_listening(false, "0.0.0.0", with(kMinTokenCharacters)).ok());
+  EXPECT_TRUE(check_listening(false, "0.0.0.0", {{std::string(32, 'v'), Grant::Viewer}}).ok());
   const Status without = check_listening(false, "0.0.0.0", {});
   ASSERT_FALSE(without.ok());
+  EXPECT_EQ(without.error().code, ErrorCode::Unauthorized);
   EXPECT_NE(without.error().message.find("0.0.0.0"), std::string::npos);
   EXPECT_NE(without.error().message.find("--token-file"), std::string::npos);
-  const Status is_short = check_listening(false, "0.0.0.0", with(kMinTokenCharacters - 1));
-  ASSERT_FALSE(is_short.ok());
-  EXPECT_EQ(is_short.error().message.find("vvv"), std::string::npos) << "a token is never printed";
 }
 
 TEST(Access, HostNameIsSplitFromThePort) {

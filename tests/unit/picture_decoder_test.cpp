@@ -61,11 +61,10 @@ TEST_F(Decoding, AfterDamageOnlyAWholePictureHelps) {
 }
 
 TEST_F(Decoding, CodecsMayFollowEachOther) {
-  auto encoder = Vp8Encoder::make({kWidth, kHeight, 30.0, 1e6});
+  const auto encoder = make_video_encoder(PictureCodec::Vp8, {kWidth, kHeight, 30.0, 1e6});
   ASSERT_TRUE(encoder);
   const auto code = [&](double phase) {
-    return *encoder->encode(waving_lines(kWidth, kHeight, phase), Vp8Encoder::Frame::Delta,
-                            Vp8Encoder::Rate::Target);
+    return *(*encoder)->encode(waving_lines(kWidth, kHeight, phase), VideoFrame::Delta, VideoRate::Target);
   };
   ASSERT_TRUE(decoder_.decode(header(Opcode::JpegTiles, 1, 0), whole_));
   const auto key = code(0.0), delta = code(0.1);

@@ -80,6 +80,33 @@ TEST(TilesEncoder, OnlyTilesThatChangedAreSent) {
   EXPECT_LT(frame->message.size(), whole_bytes / 4);
 }
 
+TEST(TilesEncoder, EveryTileThatChangedIsSent) {
+  const auto encoder = make(PictureCodec::JpegTiles);
+  Watcher watcher;
+  Image image = test::in_grey(waving_lines(kWidth, kHeight, 0.0));
+  ASSERT_TRUE(watcher.take(**encoder->encode(image, 80, kStamp)));
+  const uint32_t columns = tiles_along(kWidth), all = columns * tiles_along(kHeight);
+  const auto fill = [&](uint32_t tile, uint8_t level) {
+    const uint32_t left = tile % columns * kTileSide, top = tile / columns * kTileSide;
+    for (uint32_t y = top; y < std::min(top + kTileSide, kHeight); ++y)
+      for (uint32_t x = left; x < std::min(left + kTileSide, kWidth); ++x)
+        std::fill_n(image.rgba.begin() + static_cast<ptrdiff_t>((size_t{y} * kWidth + x) * 4), 3, level);
+  };
+  // Every set of two of the tiles, each with a level of its own.
+  for (uint32_t first = 0; first < all; ++first)
+    for (uint32_t second = first + 1; second < all; ++second) {
+      fill(first, static_cast<uint8_t>(40 + 17 * second % 200));
+      fill(second, static_cast<uint8_t>(45 + 23 * first % 200));
+      const auto picture = *encoder->encode(image, 80, kStamp);
+      ASSERT_NE(picture, nullptr);
+      ASSERT_TRUE(watcher.take(*picture));
+      for (const uint32_t tile : {first, second}) {
+        const size_t corner = size_t{tile / columns * kTileSide} * kWidth + tile % columns * kTileSide;
+        EXPECT_NEAR(watcher.decoder.image()->rgba[corner * 4], image.rgba[corner * 4], 4) << "tile " << tile;
+      }
+    }
+}
+
 TEST(TilesEncoder, EveryCanvasIsTheServersAfterAnyDrops) {
   const auto encoder = make(PictureCodec::JpegTiles);
   Watcher diligent;  // gets everything

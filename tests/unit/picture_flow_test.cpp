@@ -17,8 +17,9 @@ constexpr int64_t kMs = 1'000'000;
 constexpr int64_t kS = 1'000 * kMs;
 constexpr double kRateHz = 15.0;
 constexpr int kUsualQuality = 80;
-constexpr size_t kBestBytes = 40'000;  // of a picture of 640 x 360 in motion, quality 95
-constexpr double kWholeFactor = 1.5;   // all tiles against those that changed; a video keyframe needs more
+constexpr size_t kBestBytes = 40'000;    // of a picture of 640 x 360 in motion, quality 95
+constexpr int64_t kPingIntervalNs = kS;  // as a session asks for the bare round trip
+constexpr double kWholeFactor = 1.5;     // all tiles against those that changed; a video keyframe needs more
 
 /// A picture without pixels: of a given size, and like tiles or like video.
 class PaperPicture : public Picture {
@@ -81,6 +82,7 @@ class Viewer {
   size_t step = 0;
   size_t changes = 0;
   size_t keyframes = 0;
+  double most_capacity_bytes_per_s = 0.0;  // that was believed
 
  private:
   struct Arrival {
@@ -99,7 +101,20 @@ class Viewer {
                                 flow_.may_start(time_ns) && time_ns >= keyframe_ns_ + kKeyframePauseNs;
     if (wants_keyframe) offer(1);
     if (time_ns % (50 * kMs) == 0) adapt();
+    ping();
+    most_capacity_bytes_per_s = std::max(most_capacity_bytes_per_s, flow_.capacity_bytes_per_s(time_ns));
     pump();
+  }
+
+  /// Waits behind what is on its way, as all that goes over a reliable link.
+  void ping() {
+    if (pong_ns_ != 0 && time_ns >= pong_ns_) {
+      flow_.on_round_trip(pong_ns_ - ping_ns_, time_ns);
+      pong_ns_ = 0;
+    }
+    if (pong_ns_ != 0 || time_ns < ping_ns_ + kPingIntervalNs) return;
+    ping_ns_ = time_ns;
+    pong_ns_ = std::max(free_ns_, time_ns) + round_trip_ns_;
   }
 
   double cost(size_t of_step) const {
@@ -166,6 +181,7 @@ class Viewer {
   std::deque<Arrival> arrivals_;
   std::map<uint32_t, int64_t> made_of_;
   int64_t made_ns_ = 0, free_ns_ = 0, keyframe_ns_ = -kS;
+  int64_t ping_ns_ = 0, pong_ns_ = 0;  // pong 0: none is under way
   uint32_t sequence_ = 0;
 };
 
@@ -194,6 +210,7 @@ TEST(PictureFlow, ASlowLinkSettlesWithinThreeSecondsAndStays) {
       EXPECT_LE(viewer.changes, 12u) << what;
       EXPECT_GE(viewer.rate_hz(from_ns), 5.0) << what;
       EXPECT_LE(viewer.worst_age_ns(from_ns), 700 * kMs) << what;
+      EXPECT_LE(viewer.most_capacity_bytes_per_s, 1.1 * mbit * kMbit) << what << ": more than there is";
     }
 }
 

@@ -11,15 +11,35 @@ using namespace simulated;
 constexpr int64_t kLatestNs = 250 * kMs;
 constexpr int64_t kAdaptedNs = 3 * kS;
 
-Viewer viewer_over(double mbit_per_s, int64_t round_trip_ms, int64_t reader_ms) {
+Viewer viewer_over(double mbit_per_s, int64_t round_trip_ms, int64_t reader_ms,
+                   Content content = turning_head()) {
   Viewer viewer({.bytes_per_s = mbit_per_s * 125e3,
                  .round_trip_ns = round_trip_ms * kMs,
                  .jitter_ns = 10 * kMs,
                  .reader_ns = reader_ms * kMs},
-                turning_head());
+                std::move(content));
   while (viewer.arrivals.empty()) viewer.run(10 * kMs);
   viewer.run(kAdaptedNs);
   return viewer;
+}
+
+// Three seconds after the first frame the class is found, and nothing that the hair does changes it any more.
+TEST(SlowLink, TheClassIsSettledWithinThreeSecondsAndStays) {
+  const std::vector<Content> contents = {Content{}, turning_head()};
+  for (size_t content = 0; content < contents.size(); ++content)
+    for (const double mbit_per_s : {1.0, 1.5, 2.0, 3.0, 5.0, 10.0})
+      for (const int64_t round_trip_ms : {20, 100, 300})
+        for (const int64_t reader_ms : {1, 20, 40}) {
+          SCOPED_TRACE(fmt::format("content {}, {} Mbit/s, {} ms, read every {} ms", content, mbit_per_s,
+                                   round_trip_ms, reader_ms));
+          Viewer viewer = viewer_over(mbit_per_s, round_trip_ms, reader_ms, contents[content]);
+          const int64_t adapted_ns = viewer.time_ns;
+          const size_t changes = viewer.changes;
+          viewer.run(20 * kS - kAdaptedNs);
+          EXPECT_EQ(viewer.changes, changes);
+          EXPECT_GE(viewer.rate_hz(adapted_ns), 10.0);
+          EXPECT_LE(viewer.worst_age_ns(adapted_ns), kLatestNs);
+        }
 }
 
 // Quick turns of the head, tries of better classes and the keyframes that both cost are all in this time.
@@ -76,6 +96,29 @@ TEST(SlowLink, KeyframeWaitsForTheQueueToDrain) {
   for (; header.sequence < 42; ++header.sequence) flow.on_sent(header, 1'500, 3 * kS);
   EXPECT_FALSE(flow.may_send(3 * kS + 239 * kMs - kGateQueueNs));
   EXPECT_TRUE(flow.may_send(3 * kS + 241 * kMs - kGateQueueNs));
+}
+
+// A client that happened to look at once, or late, would make the link seem fast, or slow, for half a minute.
+TEST(SlowLink, AShortKeyframeSaysNothingAgainstTheAsset) {
+  FlowControl flow;
+  flow.expect_acks();
+  constexpr int64_t kRoundTripNs = 20 * kMs;
+  flow.on_round_trip(kRoundTripNs, kS);
+  int64_t time_ns = kS;
+  FrameHeader header;
+  const auto deliver = [&](Opcode opcode, size_t bytes, int64_t transfer_ns) {
+    header.opcode = opcode;
+    ++header.sequence;
+    flow.on_sent(header, bytes, time_ns);
+    time_ns += kRoundTripNs + transfer_ns;
+    flow.on_ack(0, header.sequence, time_ns);
+    return flow.capacity_bytes_per_s(time_ns);
+  };
+  EXPECT_DOUBLE_EQ(deliver(Opcode::Asset, 250'000, kS), 250'000.0);
+  EXPECT_DOUBLE_EQ(deliver(Opcode::StrandKeyframe, 5'000, 12 * kMs), 250'000.0) << "20 ms are due";
+  EXPECT_DOUBLE_EQ(deliver(Opcode::StrandKeyframe, 5'000, 60 * kMs), 250'000.0);
+  EXPECT_GT(deliver(Opcode::StrandKeyframe, 50'000, 20 * kMs), 1'000'000.0) << "200 ms were due";
+  EXPECT_LT(deliver(Opcode::StrandKeyframe, 50'000, 500 * kMs), 110'000.0) << "20 to 50 were due";
 }
 
 }  // namespace

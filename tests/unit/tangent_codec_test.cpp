@@ -4,6 +4,7 @@
 
 #include "common/base/hash.h"
 #include "common/codec/strand_codec.h"
+#include "common/codec/tangent_head.h"
 #include "common/codec/tangent_layout.h"
 #include "tests/support/hair_motion.h"
 
@@ -164,6 +165,71 @@ TEST(TangentCodec, AJoinCostsTheOthersAFewFrames) {
             0.6 * static_cast<double>(frames.keyframe->message.size()));
   for (int i = 0; i < 4; ++i) next_bytes();
   EXPECT_LT(next_bytes(), 1.25 * before);
+}
+
+Pose jittered_pose(uint32_t salt) {
+  const auto random = [salt](uint32_t k) { return 2.0 * unit_float(mix_u32(7u * salt + k)) - 1.0; };
+  Pose pose;
+  pose.position_m = 0.002 * glm::dvec3(random(0), random(1), random(2));
+  pose.rotation = glm::angleAxis(0.02 * random(3), glm::normalize(glm::dvec3(random(4), random(5), 1.5)));
+  return pose;
+}
+
+glm::dvec3 to_head(const Pose& world_from_head, const glm::dvec3& point) {
+  return glm::conjugate(world_from_head.rotation) * (point - world_from_head.position_m);
+}
+
+TEST(TangentHead, StepsMovePointsThatRestInTheWorld) {
+  constexpr float kStepM = 4e-7f;
+  HeadMotion head;
+  head.pose = jittered_pose(0);
+  for (uint32_t frame = 1; frame < 10; ++frame) {
+    head = head.followed_by(jittered_pose(frame), kStepM);
+    for (uint32_t age = 0; age < kHeadStepCount; ++age) {
+      const glm::dvec3 point(0.1, -0.2, 0.05 * frame);
+      const bool is_known = age < frame;
+      const glm::dvec3 then = is_known ? to_head(jittered_pose(frame - age - 1), point) : glm::dvec3(0.0);
+      const glm::dvec3 now = is_known ? to_head(jittered_pose(frame - age), point) : glm::dvec3(0.0);
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto& row = head.step[age].row[static_cast<size_t>(axis)];
+        const double change = (row[0] * then.x + row[1] * then.y) + row[2] * then.z + row[3] * kStepM;
+        EXPECT_NEAR(change, now[axis] - then[axis], 1e-9) << "frame " << frame << ", step " << age;
+      }
+    }
+  }
+  // A head that stays has steps of nothing at all, however long its quaternion is.
+  Pose longer = jittered_pose(1);
+  longer.rotation *= 1.0004;
+  head = HeadMotion{longer, {}}.followed_by(longer, kStepM);
+  for (const auto& row : head.step[0].row)
+    for (const double coefficient : row) EXPECT_EQ(coefficient, 0.0);
+}
+
+// Hair that rests in the world while the head trembles under it: all its motion in head space is foretold.
+TEST(TangentCodec, PosesOfTheHeadForetellWhatLagsBehindIt) {
+  const HairMotion hair({1200, 16, MotionKind::Still});
+  const auto bits_of = [&](bool has_poses) {
+    auto encoder = std::move(*make_strand_encoder("tangent"));
+    encoder->set_rest_shape(hair.rest_in_head());
+    size_t bytes = 0;
+    for (uint32_t frame = 0; frame < 12; ++frame) {
+      const Pose pose = jittered_pose(frame);
+      std::vector<glm::vec3> points;
+      for (const glm::vec3& point : hair.rest_in_head()) points.emplace_back(to_head(pose, point));
+      QuantiseInput input;
+      input.strand_count = 1200;
+      input.vertex_count = 16;
+      input.quantum_m = lattice_step_m("tangent", kBoundM).value();
+      input.position_in_head_m = points;
+      if (has_poses) input.world_from_head = pose;
+      const EncodedFramePtr message = encoder->encode(quantise(input).snapshot);
+      if (frame >= 4) bytes += message->message.size();
+    }
+    return 8.0 * static_cast<double>(bytes) / (8.0 * static_cast<double>(hair.plane_size()));
+  };
+  const double with_poses = bits_of(true);
+  const double without_poses = bits_of(false);
+  EXPECT_LT(with_poses, 0.7 * without_poses);
 }
 
 TEST(TangentLayout, EveryStrandHasOnePlaceAndNeighboursComeBefore) {

@@ -66,6 +66,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMotionClassCount", fmt::format("`kMotionClassCount` {}", kMotionClassCount)},
       {"kFewMotionClasses", fmt::format("`kFewMotionClasses` {}", kFewMotionClasses)},
       {"kManyVertices", with_commas(kManyVertices)},
+      {"kHeadStepCount", fmt::format("`kHeadStepCount` {}", kHeadStepCount)},
+      {"kDriftShare", fmt::format("{} x the drift", kDriftShare)},
       {"kBlockSize", with_commas(kBlockSize)},
       {"kEscapedLength", with_commas(kEscapedLength)},
       {"kCoarseLatticeShift", with_commas(kCoarseLatticeShift)},

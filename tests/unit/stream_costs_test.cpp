@@ -1,0 +1,72 @@
+// What classes of strands and pictures are said to cost, against frames of known size and time.
+#include "server/net/stream_costs.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int64_t kSecondNs = 1'000'000'000;
+constexpr int64_t kStepNs = kSecondNs / 60;
+
+FrameHeader frame_of(uint16_t stream_id, Opcode opcode = Opcode::StrandDelta) {
+  FrameHeader header;
+  header.opcode = opcode;
+  header.stream_id = stream_id;
+  return header;
+}
+
+StrandCosts costs_of_built_in() {
+  return StrandCosts(make_strand_classes({60.0, 0.0, 1e-4f, 2'000}));
+}
+
+TEST(StrandCosts, UnmeasuredClassesFollowFromTheOneThatWas) {
+  StrandCosts costs = costs_of_built_in();
+  EXPECT_TRUE(costs.bytes_per_s().empty()) << "nothing is known yet";
+  costs.note_frame(frame_of(1, Opcode::StrandKeyframe), 1'000'000, kSecondNs);
+  EXPECT_TRUE(costs.bytes_per_s().empty()) << "a keyframe says nothing about deltas";
+  costs.note_frame(frame_of(static_cast<uint16_t>(costs.classes().size())), 1'000'000, kSecondNs);
+  EXPECT_TRUE(costs.bytes_per_s().empty()) << "of no class";
+  costs.note_frame(frame_of(1), 5'000, kSecondNs);
+  const std::vector<double> found = costs.bytes_per_s();
+  ASSERT_EQ(found.size(), costs.classes().size());
+  const StrandClass& measured = costs.classes()[1];
+  EXPECT_DOUBLE_EQ(found[1], 5'000 * measured.frame_rate_hz);
+  for (size_t i = 0; i < found.size(); ++i)
+    EXPECT_NEAR(found[i] / found[1], costs.classes()[i].relative_cost / measured.relative_cost, 1e-9) << i;
+}
+
+TEST(StrandCosts, WhatIsMeasuredCountsUntilItIsOld) {
+  StrandCosts costs = costs_of_built_in();
+  costs.note_frame(frame_of(0), 10'000, kSecondNs);
+  costs.note_frame(frame_of(2), 1'000, kSecondNs + kStepNs);
+  EXPECT_DOUBLE_EQ(costs.bytes_per_s()[0], 10'000 * costs.classes()[0].frame_rate_hz);
+  costs.note_frame(frame_of(2), 1'000, 10 * kSecondNs);
+  EXPECT_NEAR(costs.bytes_per_s()[0],
+              1'000 * costs.classes()[2].frame_rate_hz / costs.classes()[2].relative_cost, 1e-6);
+}
+
+TEST(StrandCosts, AChangeShowsWithinASecond) {
+  StrandCosts costs = costs_of_built_in();
+  costs.note_frame(frame_of(0), 10'000, kSecondNs);
+  for (int i = 1; i <= 60; ++i) costs.note_frame(frame_of(0), 20'000, kSecondNs + i * kStepNs);
+  EXPECT_NEAR(costs.bytes_per_s()[0], 20'000 * 60.0, 0.05 * 20'000 * 60.0);
+}
+
+TEST(PictureCosts, AreBytesTimesRateWhileThePictureChanges) {
+  PictureCosts costs;
+  EXPECT_EQ(costs.bytes_per_s(7), 0.0);
+  costs.note_picture(7, 500'000, kSecondNs);
+  EXPECT_EQ(costs.bytes_per_s(7), 0.0) << "the first one is whole";
+  for (int i = 1; i <= 5; ++i) costs.note_picture(7, 8'000, kSecondNs + i * kSecondNs / 20);
+  EXPECT_NEAR(costs.bytes_per_s(7), 8'000 * 20.0, 1.0);
+  costs.note_picture(7, 8'000, 30 * kSecondNs);
+  EXPECT_NEAR(costs.bytes_per_s(7), 8'000 * 20.0, 1.0) << "a pause is no lower rate";
+  costs.note_picture(8, 1'000, 100 * kSecondNs);
+  EXPECT_EQ(costs.bytes_per_s(7), 0.0) << "forgotten after a minute";
+  costs.note_picture(8, 1'000, 100 * kSecondNs + kSecondNs / 10);
+  EXPECT_GT(costs.bytes_per_s(8), 0.0);
+  costs.forget(8);
+  EXPECT_EQ(costs.bytes_per_s(8), 0.0);
+}
+
+}  // namespace
+}  // namespace strandcast
