@@ -12,8 +12,8 @@
 
 namespace strandcast {
 
-/// Refuses to listen where others can reach us without tokens of at least kMinTokenCharacters.
-/// `is_trusted`: on loopback, and loopback is trusted.
+/// Refuses to listen without a token where others can reach us. `is_trusted`: on loopback, and loopback is
+/// trusted.
 Status check_listening(bool is_trusted, const std::string& address, const std::vector<AccessToken>& tokens);
 
 /// Host header without its port, lower case, IPv6 without brackets; empty when malformed.

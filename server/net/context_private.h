@@ -12,6 +12,7 @@
 #include "server/net/address_guard.h"
 #include "server/net/net_server.h"
 #include "server/net/send_queue.h"
+#include "server/net/stream_costs.h"
 
 namespace strandcast::net {
 
@@ -63,23 +64,11 @@ struct Context {
   bool kick(SessionId id);
   /// Publishes the number of open and joined sessions.
   void update_session_counts();
-  /// Learns what a class costs from its frames.
-  void note_strand_frame(const FrameHeader& header, size_t bytes, int64_t time_ns);
-  /// Likewise for a picture class; forgets classes that have given nothing for long.
-  void note_picture(PictureClass picture_class, size_t bytes, int64_t time_ns);
-  /// The class is made otherwise from now on.
-  void forget_picture_load(PictureClass picture_class) { picture_loads.erase(picture_class); }
-  /// Bytes per second of a picture class while it changes; 0 = not known yet.
-  double picture_cost(PictureClass picture_class) const;
-  /// Bytes per second of every strand class, as measured, or estimated from the one measured last; empty at
-  /// first.
-  std::vector<double> strand_costs() const;
-  /// What was measured of the old classes is forgotten.
-  void set_strand_classes(std::vector<StrandClass> classes);
 
   const NetConfig config;
   NetHandler& handler;
-  std::vector<StrandClass> strand_classes;
+  StrandCosts strands;
+  PictureCosts pictures;
   boost::asio::io_context io{1};
   std::map<SessionId, std::shared_ptr<Session>> sessions;
   std::set<std::shared_ptr<Connection>> connections;
@@ -89,17 +78,6 @@ struct Context {
   TlsContextPtr tls;  // null: no TLS
 
  private:
-  struct ClassLoad {
-    double delta_bytes = 0.0;  // smoothed
-    int64_t time_ns = 0;       // of the newest delta; 0 = none yet
-  };
-  std::vector<ClassLoad> class_loads;
-  struct PictureLoad {
-    double bytes = 0.0;       // smoothed, of one picture; 0 = one came at most
-    double interval_s = 0.0;  // smoothed, between two
-    int64_t time_ns = 0;      // of the newest
-  };
-  std::map<PictureClass, PictureLoad> picture_loads;
   mutable std::mutex mutex;
   NetCounters counters;
 };

@@ -13,8 +13,9 @@ constexpr int64_t kLeastTransferNs = kNsPerMs;
 constexpr size_t kMaxBusySamples = 16;
 /// A rate is taken over at least this: frames and acknowledgements come in bunches.
 constexpr int64_t kBusySpanNs = 50 * kNsPerMs;
-/// What takes so long is hardly changed by jitter.
-constexpr int64_t kExactTransferNs = 100 * kNsPerMs;
+/// A round trip differs by so much for other reasons than the rate: jitter, or a client that looks only now
+/// and then.
+constexpr int64_t kJitterNs = 50 * kNsPerMs;
 constexpr size_t kMinBusySamples = 3;
 constexpr int64_t kBusyAgeNs = 2'000 * kNsPerMs;
 /// A change needs time to show: nothing is decided before.
@@ -26,6 +27,12 @@ constexpr int64_t kKeyframeSlackNs = kGateDelayNs / 2;
 bool is_keyframe(const FrameHeader& header) {
   return header.opcode == Opcode::StrandKeyframe ||
          (is_chained_picture(header.opcode) && header.base_sequence == 0);
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 }  // namespace
@@ -48,6 +55,10 @@ void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns)
   const Frame frame = *acked;
   for (auto skipped = in_flight_.begin(); skipped <= acked; ++skipped) in_flight_bytes_ -= skipped->bytes;
   in_flight_.erase(in_flight_.begin(), acked + 1);
+  if (time_ns - bunch_ns_ >= kLeastTransferNs) {
+    before_bunch_ns_ = last_ack_ns_;
+    bunch_ns_ = time_ns;
+  }
   take_sample(frame, time_ns);
   last_ack_ns_ = time_ns;
 }
@@ -84,22 +95,23 @@ int64_t FlowControl::base_ns() const {
 }
 
 void FlowControl::note_capacity(const Frame& frame, int64_t round_trip_ns, int64_t time_ns) {
-  // A large frame that met nothing on its way shows the rate by how much longer it took than something small;
-  // what else delays it makes the rate seem lower, which matters when it took little time.
+  // A large frame that met nothing on its way shows the rate by how much longer it took than something small.
+  // One that took about as long as expected shows nothing new, least of all a short one.
   if (frame.is_large && frame.was_alone && !round_trips_.empty()) {
     const int64_t duration_ns = std::max(round_trip_ns - base_ns(), kLeastTransferNs);
-    const double rate = static_cast<double>(frame.bytes) * kNsPerS / static_cast<double>(duration_ns);
     const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
-    if (!is_known || duration_ns >= kExactTransferNs || rate > seen_rate_->value)
-      seen_rate_ = {time_ns, rate};
+    const auto bytes = static_cast<double>(frame.bytes);
+    const int64_t expected_ns = is_known ? static_cast<int64_t>(bytes / seen_rate_->value * kNsPerS) : 0;
+    if (!is_known || std::abs(duration_ns - expected_ns) > kJitterNs)
+      seen_rate_ = {time_ns, bytes * kNsPerS / static_cast<double>(duration_ns)};
   }
   note_busy_frame(frame, time_ns);
 }
 
-/// Collects frames that had reached the bottleneck before the one ahead of them left: the time between was
-/// all theirs.
+/// Collects frames that should have been here when the client looked last, and were not: since then the link
+/// was busy with them.
 void FlowControl::note_busy_frame(const Frame& frame, int64_t time_ns) {
-  const bool was_queued = last_ack_ns_ > 0 && frame.sent_ns + base_ns() + kLowDelayNs <= last_ack_ns_;
+  const bool was_queued = before_bunch_ns_ > 0 && frame.sent_ns + base_ns() + kLowDelayNs <= before_bunch_ns_;
   if (!was_queued) {
     busy_bytes_ = 0.0;
     busy_ns_ = 0;
@@ -111,6 +123,8 @@ void FlowControl::note_busy_frame(const Frame& frame, int64_t time_ns) {
     busy_rates_.push_back({time_ns, std::exchange(busy_bytes_, 0.0) * kNsPerS /
                                         static_cast<double>(std::exchange(busy_ns_, 0))});
     if (busy_rates_.size() > kMaxBusySamples) busy_rates_.pop_front();
+    // Remembered, so that what cannot fit is not tried again soon.
+    if (const double rate = busy_bytes_per_s(time_ns); rate > 0.0) seen_rate_ = {time_ns, rate};
   }
   busy_bytes_ += static_cast<double>(frame.bytes);
   busy_ns_ += since_last_ns;
@@ -121,15 +135,17 @@ void FlowControl::forget_in_flight() {
   in_flight_bytes_ = 0;
 }
 
-double FlowControl::capacity_bytes_per_s(int64_t time_ns) const {
-  // The median: a freeze makes one long interval and many of nearly nothing, a slow link makes all alike.
+/// What the link carried while it was the limit; 0 when it has not been of late.
+double FlowControl::busy_bytes_per_s(int64_t time_ns) const {
   std::vector<double> rates;
   for (const Sample& sample : busy_rates_)
     if (sample.time_ns >= time_ns - kBusyAgeNs) rates.push_back(sample.value);
-  if (rates.size() >= kMinBusySamples) {
-    std::nth_element(rates.begin(), rates.begin() + static_cast<ptrdiff_t>(rates.size() / 2), rates.end());
-    return rates[rates.size() / 2];
-  }
+  // A freeze makes one long interval and many of nearly nothing, a slow link makes all alike.
+  return rates.size() >= kMinBusySamples ? median(std::move(rates)) : 0.0;
+}
+
+double FlowControl::capacity_bytes_per_s(int64_t time_ns) const {
+  if (const double rate = busy_bytes_per_s(time_ns); rate > 0.0) return rate;
   const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
   return is_known ? seen_rate_->value : 0.0;
 }
@@ -191,14 +207,13 @@ bool FlowControl::may_send(int64_t time_ns) const {
          base_ns() + transfer_ns(oldest.bytes, time_ns) + std::max(gate_ns, allowance_ns);
 }
 
-bool FlowControl::is_troubled(double cost, int64_t time_ns) const {
+/// One loss is no trouble: quick hair takes more than the class usually does, for a moment.
+bool FlowControl::is_troubled(int64_t time_ns) const {
   const auto recent_losses =
       static_cast<size_t>(std::count_if(losses_ns_.begin(), losses_ns_.end(), [&](int64_t lost_ns) {
         return lost_ns > std::max(quiet_since_ns_, time_ns - kLossWindowNs);
       }));
   if (recent_losses >= kTroublingLosses) return true;
-  const double capacity = capacity_bytes_per_s(time_ns);
-  if (recent_losses > 0 && capacity > 0.0 && capacity < cost) return true;
   size_t high = 0, all = 0;
   for (const Sample& sample : delays_) {
     if (sample.time_ns <= quiet_since_ns_) continue;
@@ -247,6 +262,13 @@ void FlowControl::note_demand(double cost, int64_t time_ns) {
   while (demands_.front().time_ns < time_ns - kDemandWindowNs) demands_.pop_front();
 }
 
+/// Frames usually wait; that a client looks for them only now and then does not count.
+bool FlowControl::has_standing_delay() const {
+  std::vector<double> delays;
+  for (const Sample& sample : delays_) delays.push_back(sample.value);
+  return !delays.empty() && median(std::move(delays)) > static_cast<double>(kLowDelayNs);
+}
+
 size_t FlowControl::choose_class(size_t present, std::span<const double> costs, double cap_bytes_per_s,
                                  int64_t time_ns) {
   if (costs.size() < 2 || (has_acks_ && last_ack_ns_ == 0)) return present;
@@ -266,20 +288,16 @@ size_t FlowControl::choose_class(size_t present, std::span<const double> costs, 
   const bool has_failed = has_failed_try(time_ns);
   if (!has_acks_ || (time_ns - quiet_since_ns_ < kSettleNs && !has_failed)) return present;
   const bool is_over_cap = cap_bytes_per_s > 0.0 && costs[present] > cap_bytes_per_s;
-  if (is_over_cap || has_failed || is_troubled(costs[present], time_ns)) {
+  if (is_over_cap || has_failed || is_troubled(time_ns)) {
     if (present + 1 == costs.size()) {
       quiet_since_ns_ = time_ns;  // nothing cheaper; what is better has to wait
       return present;
     }
-    // Remembered, so that what cannot fit is not tried again at once.
-    if (capacity > 0.0) seen_rate_ = {time_ns, capacity};
     const size_t chosen = class_below(present, costs, allowed);
     change(present, chosen, time_ns);
     return chosen;
   }
-  const bool has_delay = std::any_of(delays_.begin(), delays_.end(), [](const Sample& sample) {
-    return sample.value > static_cast<double>(kLowDelayNs);
-  });
+  const bool has_delay = has_standing_delay();
   // Back to where it went well the way is short; what failed is tried more and more rarely.
   const int64_t wait_ns = present == 0 || present - 1 > failed_class_ ? kFirstProbeNs : probe_ns_;
   if (has_delay) quiet_since_ns_ = std::max(quiet_since_ns_, time_ns - wait_ns / 2);

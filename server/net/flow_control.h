@@ -113,13 +113,15 @@ class FlowControl {
   void note_round_trip(int64_t round_trip_ns, int64_t time_ns);
   void note_capacity(const Frame& frame, int64_t round_trip_ns, int64_t time_ns);
   void note_busy_frame(const Frame& frame, int64_t time_ns);
+  double busy_bytes_per_s(int64_t time_ns) const;
   int64_t transfer_ns(size_t bytes, int64_t time_ns) const;
   int64_t keyframe_allowance_ns(int64_t time_ns) const;
   int64_t expected_wait_ns(int64_t time_ns) const;
   bool is_trying(int64_t time_ns) const;
   bool has_failed_try(int64_t time_ns) const;
   void note_demand(double cost, int64_t time_ns);
-  bool is_troubled(double cost, int64_t time_ns) const;
+  bool is_troubled(int64_t time_ns) const;
+  bool has_standing_delay() const;
   size_t class_below(size_t present, std::span<const double> costs, double allowed) const;
   void change(size_t from, size_t to, int64_t time_ns);
 
@@ -128,6 +130,9 @@ class FlowControl {
   std::deque<Frame> in_flight_;  // oldest first
   size_t in_flight_bytes_ = 0;
   int64_t last_ack_ns_ = 0;
+  // Acknowledgements come in bunches, as the client looks.
+  int64_t bunch_ns_ = 0;         // the first one of the newest bunch
+  int64_t before_bunch_ns_ = 0;  // the last one before it
   int64_t queue_delay_ns_ = 0;
   std::deque<Sample> round_trips_;  // increasing minima of the last kBaseWindowNs
   std::deque<Sample> delays_;       // queue delays of the last kDelayWindowNs

@@ -24,16 +24,6 @@ constexpr auto kSweepInterval = std::chrono::milliseconds(50);
 /// Pause after a failed accept (no file descriptors left): the others are served meanwhile.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 constexpr int kListenBacklog = 128;
-/// Weight of the newest frame in what a strand class costs: a change shows within half a second.
-constexpr double kLoadSmoothing = 0.05;
-/// What a class cost longer ago than this is estimated from another one instead.
-constexpr int64_t kLoadAgeNs = 5'000'000'000;
-
-/// The same for pictures, which are fewer.
-constexpr double kPictureSmoothing = 0.15;
-constexpr int64_t kPictureLoadAgeNs = 60'000'000'000;
-constexpr int64_t kLongestPictureIntervalNs = 1'500'000'000;
-constexpr double kShortestPictureIntervalS = 1e-3;
 
 std::string own_host_name() {
   std::array<char, 256> name{};
@@ -41,106 +31,6 @@ std::string own_host_name() {
 }
 
 }  // namespace
-
-Context::Context(const NetConfig& net_config, NetHandler& net_handler)
-    : config(net_config),
-      handler(net_handler),
-      strand_classes(net_config.strand_classes),
-      guard({net_config.limits.connections_per_s, net_config.limits.wrong_tokens,
-             net_config.limits.wrong_token_window_ms * kNsPerMs,
-             net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}) {}
-
-bool Context::has_room(const std::string& peer_key) const {
-  size_t all = 0;
-  size_t of_peer = 0;
-  for (const auto& [id, session] : sessions) {
-    if (session->state() == Session::State::Closing) continue;
-    ++all;
-    if (session->peer().key == peer_key) ++of_peer;
-  }
-  return all < config.limits.sessions && of_peer < config.limits.sessions_per_address;
-}
-
-SessionList Context::list_sessions(int64_t time_ns) const {
-  SessionList list;
-  for (const auto& [id, session] : sessions)
-    if (session->state() == Session::State::Joined && list.sessions.size() < kMaxListedSessions)
-      list.sessions.push_back(session->info(time_ns));
-  return list;
-}
-
-bool Context::kick(SessionId id) {
-  const auto found = sessions.find(id);
-  if (found == sessions.end() || found->second->state() != Session::State::Joined) return false;
-  std::shared_ptr(found->second)->close(CloseCode::Kicked, "An admin ended this session.");
-  return true;
-}
-
-void Context::update_session_counts() {
-  uint64_t joined = 0;
-  for (const auto& [id, session] : sessions)
-    if (session->state() == Session::State::Joined) ++joined;
-  const std::lock_guard lock(mutex);
-  counters.open_sessions = sessions.size();
-  counters.joined_sessions = joined;
-}
-
-void Context::note_strand_frame(const FrameHeader& header, size_t bytes, int64_t time_ns) {
-  if (header.opcode != Opcode::StrandDelta || header.stream_id >= strand_classes.size()) return;
-  class_loads.resize(strand_classes.size());
-  ClassLoad& load = class_loads[header.stream_id];
-  const auto measured = static_cast<double>(bytes);
-  load.delta_bytes =
-      load.time_ns == 0 ? measured : load.delta_bytes + kLoadSmoothing * (measured - load.delta_bytes);
-  load.time_ns = time_ns;
-}
-
-void Context::note_picture(PictureClass picture_class, size_t bytes, int64_t time_ns) {
-  std::erase_if(picture_loads, [&](const auto& entry) {
-    return entry.first != picture_class && time_ns - entry.second.time_ns > kPictureLoadAgeNs;
-  });
-  const auto [entry, is_new] = picture_loads.try_emplace(picture_class);
-  PictureLoad& load = entry->second;
-  const int64_t interval_ns = time_ns - std::exchange(load.time_ns, time_ns);
-  // The first one is whole, and one after a pause says nothing about the rate.
-  if (is_new || interval_ns > kLongestPictureIntervalNs) return;
-  const auto measured_bytes = static_cast<double>(bytes);
-  const double measured_s = static_cast<double>(interval_ns) * 1e-9;
-  const double weight = load.bytes == 0.0 ? 1.0 : kPictureSmoothing;
-  load.bytes += weight * (measured_bytes - load.bytes);
-  load.interval_s += weight * (measured_s - load.interval_s);
-}
-
-double Context::picture_cost(PictureClass picture_class) const {
-  const auto found = picture_loads.find(picture_class);
-  if (found == picture_loads.end() || found->second.bytes == 0.0) return 0.0;
-  return found->second.bytes / std::max(found->second.interval_s, kShortestPictureIntervalS);
-}
-
-std::vector<double> Context::strand_costs() const {
-  const auto newest =
-      std::max_element(class_loads.begin(), class_loads.end(),
-                       [](const ClassLoad& a, const ClassLoad& b) { return a.time_ns < b.time_ns; });
-  if (newest == class_loads.end() || newest->time_ns == 0) return {};
-  const auto& classes = strand_classes;
-  const auto reference = static_cast<size_t>(newest - class_loads.begin());
-  const double full =
-      newest->delta_bytes * classes[reference].frame_rate_hz / classes[reference].relative_cost;
-  std::vector<double> costs;
-  for (size_t i = 0; i < classes.size(); ++i) {
-    const bool is_fresh =
-        class_loads[i].time_ns > newest->time_ns - kLoadAgeNs && class_loads[i].time_ns != 0;
-    costs.push_back(is_fresh ? class_loads[i].delta_bytes * classes[i].frame_rate_hz
-                             : full * classes[i].relative_cost);
-  }
-  return costs;
-}
-
-void Context::set_strand_classes(std::vector<StrandClass> classes) {
-  strand_classes = std::move(classes);
-  class_loads.clear();
-}
-
 }  // namespace net
 
 using net::beast::error_code;
@@ -158,7 +48,11 @@ struct NetServer::State {
   void end_if_done(int64_t time_ns);
   void run();
   template <class Work>
+  void for_all(Work work);
+  template <class Work>
   void post_to_all(Work work);
+  template <class Work>
+  void post_to(SessionId session, Work work);
 
   net::Context context;
   net::tcp::acceptor acceptor;
@@ -252,8 +146,7 @@ void NetServer::State::sweep() {
     const int64_t time_ns = now_ns();
     const auto connections = context.connections;  // a deadline may remove one
     for (const auto& connection : connections) connection->check_deadline(time_ns);
-    const auto sessions = context.sessions;
-    for (const auto& [id, session] : sessions) session->check_deadlines(time_ns);
+    for_all([time_ns](net::Session& session) { session.check_deadlines(time_ns); });
     if (context.is_stopping) end_if_done(time_ns);
     sweep();
   });
@@ -266,14 +159,12 @@ void NetServer::State::begin_stop() {
   stop_deadline_ns = now_ns() + context.config.limits.close_ms * 1'000'000;
   const auto connections = context.connections;
   for (const auto& connection : connections) connection->abort();
-  const auto sessions = context.sessions;
-  for (const auto& [id, session] : sessions) session->close(CloseCode::GoingAway, "The server is stopping.");
+  for_all([](net::Session& session) { session.close(CloseCode::GoingAway, "The server is stopping."); });
 }
 
 void NetServer::State::end_if_done(int64_t time_ns) {
   if (!context.sessions.empty() && time_ns < stop_deadline_ns) return;
-  const auto sessions = context.sessions;
-  for (const auto& [id, session] : sessions) session->abort();
+  for_all([](net::Session& session) { session.abort(); });
   context.io.stop();
 }
 
@@ -287,11 +178,25 @@ void NetServer::State::run() {
   }
 }
 
+/// Over a copy: the work may end sessions.
+template <class Work>
+void NetServer::State::for_all(Work work) {
+  const auto sessions = context.sessions;
+  for (const auto& [id, session] : sessions) work(*session);
+}
+
 template <class Work>
 void NetServer::State::post_to_all(Work work) {
-  net::asio::post(context.io, [this, work = std::move(work)] {
-    const auto sessions = context.sessions;
-    for (const auto& [id, session] : sessions) work(*session);
+  net::asio::post(context.io, [this, work = std::move(work)] { for_all(work); });
+}
+
+/// Nothing when the session is gone by then.
+template <class Work>
+void NetServer::State::post_to(SessionId session, Work work) {
+  net::asio::post(context.io, [this, session, work = std::move(work)] {
+    const auto found = context.sessions.find(session);
+    // A copy of the pointer: a full queue ends the session under our feet.
+    if (found != context.sessions.end()) work(*std::shared_ptr(found->second));
   });
 }
 
@@ -332,26 +237,20 @@ uint16_t NetServer::port() const {
 
 void NetServer::publish_strands(EncodedFramePtr frame) {
   net::asio::post(state_->context.io, [state = state_.get(), frame = std::move(frame)] {
-    state->context.note_strand_frame(frame->header, frame->message.size(), now_ns());
-    const auto sessions = state->context.sessions;
-    for (const auto& [id, session] : sessions) session->deliver_strands(frame);
+    state->context.strands.note_frame(frame->header, frame->message.size(), now_ns());
+    state->for_all([&](net::Session& session) { session.deliver_strands(frame); });
   });
 }
 
 void NetServer::publish_picture(PictureClass picture_class, PicturePtr picture) {
   net::asio::post(state_->context.io, [state = state_.get(), picture_class, picture = std::move(picture)] {
-    state->context.note_picture(picture_class, picture->message_bytes(), now_ns());
-    const auto sessions = state->context.sessions;
-    for (const auto& [id, session] : sessions) session->deliver_picture(picture_class, picture);
+    state->context.pictures.note_picture(picture_class, picture->message_bytes(), now_ns());
+    state->for_all([&](net::Session& session) { session.deliver_picture(picture_class, picture); });
   });
 }
 
 void NetServer::set_picture_class(SessionId session, PictureClass picture_class) {
-  net::asio::post(state_->context.io, [state = state_.get(), session, picture_class] {
-    const auto found = state->context.sessions.find(session);
-    if (found != state->context.sessions.end())
-      std::shared_ptr(found->second)->set_picture_class(picture_class);
-  });
+  state_->post_to(session, [picture_class](net::Session& one) { one.set_picture_class(picture_class); });
 }
 
 void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string reason,
@@ -359,19 +258,14 @@ void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string
   CHECK(!classes.empty());
   net::asio::post(state_->context.io, [state = state_.get(), classes = std::move(classes),
                                        reason = std::move(reason), then = std::move(then)] {
-    state->context.set_strand_classes(classes);
-    const auto sessions = state->context.sessions;
-    for (const auto& [id, session] : sessions) session->follow_strand_classes(reason);
+    state->context.strands = StrandCosts(classes);  // what was measured of the old ones is forgotten
+    state->for_all([&](net::Session& session) { session.follow_strand_classes(reason); });
     then();
   });
 }
 
 void NetServer::change_mode(SessionId session, ModeSwitch change) {
-  net::asio::post(state_->context.io, [state = state_.get(), session, change = std::move(change)] {
-    const auto found = state->context.sessions.find(session);
-    // A copy of the pointer: a full queue ends the session under our feet.
-    if (found != state->context.sessions.end()) std::shared_ptr(found->second)->change_mode(change);
-  });
+  state_->post_to(session, [change = std::move(change)](net::Session& one) { one.change_mode(change); });
 }
 
 void NetServer::broadcast(ServerMessage message) {
@@ -385,11 +279,7 @@ void NetServer::send_to_class(PictureClass picture_class, ServerMessage message)
 }
 
 void NetServer::send(SessionId session, ServerMessage message) {
-  net::asio::post(state_->context.io, [state = state_.get(), session, message = std::move(message)] {
-    const auto found = state->context.sessions.find(session);
-    // A copy of the pointer: a full queue ends the session under our feet.
-    if (found != state->context.sessions.end()) std::shared_ptr(found->second)->send(message);
-  });
+  state_->post_to(session, [message = std::move(message)](net::Session& one) { one.send(message); });
 }
 
 NetCounters NetServer::counters() const {

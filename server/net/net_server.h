@@ -19,6 +19,7 @@
 #include "common/wire/messages.h"
 #include "server/net/roles.h"
 #include "server/net/strand_class.h"
+#include "server/net/stream_costs.h"
 
 namespace strandcast {
 
@@ -26,8 +27,7 @@ inline constexpr uint32_t kMaxSessions = 256;
 static_assert(kMaxSessions <= kMaxListedSessions);
 inline constexpr uint32_t kMaxSessionsPerAddress = 64;
 
-using SessionId = uint64_t;     // never reused by one server
-using PictureClass = uint32_t;  // viewers of one class get the same rendered frames
+using SessionId = uint64_t;  // never reused by one server
 
 /// Limits of one session; tests shorten the times.
 struct NetLimits {

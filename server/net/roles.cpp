@@ -1,16 +1,8 @@
 #include "server/net/roles.h"
 
+#include "server/net/overloaded_private.h"
+
 namespace strandcast {
-namespace {
-
-template <class... Ts>
-struct Overloaded : Ts... {
-  using Ts::operator()...;
-};
-template <class... Ts>
-Overloaded(Ts...) -> Overloaded<Ts...>;  // Clang 14 needs it said
-
-}  // namespace
 
 bool may_be(Grant grant, Role role) {
   switch (grant) {

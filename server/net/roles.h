@@ -11,7 +11,7 @@
 
 namespace strandcast {
 
-inline constexpr size_t kMinTokenCharacters = 16;
+inline constexpr size_t kMinTokenCharacters = 16;  // held to where tokens are read
 
 /// What a token is good for. AllButAdmin: a token file of the plain form, one token and no role.
 enum class Grant { Viewer, Controller, Source, AllButAdmin, Admin };

@@ -44,7 +44,7 @@ void Session::change_mode(const ModeSwitch& change) {
       queue_.start_pictures();
     } else {
       strand_class_ =
-          static_cast<uint16_t>(std::min<size_t>(change.strand_class, context_.strand_classes.size() - 1));
+          static_cast<uint16_t>(std::min<size_t>(change.strand_class, context_.strands.classes().size() - 1));
       context_.handler.on_strand_class(id_, strand_class_);
       if (!std::exchange(has_asset_, true)) queue_.set_asset(change.asset);
       queue_.start_strands();
@@ -74,21 +74,7 @@ void Session::finish_mode_switch() {
   context_.handler.on_mode(id_, mode_);
   queue_control(next.change);
   if (mode_ == StreamMode::Frames || state_ != State::Joined) return;
-  announce_quality(to_string(context_.strand_classes[strand_class_]));
-}
-
-void Session::report_link(int64_t time_ns) {
-  if (hello_.role == Role::Source ||
-      time_ns - link_reported_ns_ < context_.config.limits.link_interval_ms * kNsPerMs)
-    return;
-  link_reported_ns_ = time_ns;
-  LinkState link;
-  link.mode = mode_;
-  link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
-  link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
-  link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
-  link.strand_bytes_per_s = context_.strand_costs();
-  context_.handler.on_link(id_, link, time_ns);
+  announce_quality(to_string(context_.strands.classes()[strand_class_]));
 }
 
 }  // namespace strandcast::net

@@ -59,6 +59,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_read(const beast::error_code& error);
   void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
   void join(const Hello& hello);
+  void begin_media(const Hello& hello, const EncodedFramePtr& asset);
+  void start_again(int64_t time_ns);
   void dispatch(const ClientMessage& message, int64_t arrival_ns);
   void obey(const AdminCommand& command, int64_t time_ns);
   void reject(CloseCode code, const std::string& reason);

@@ -1,0 +1,180 @@
+// The part of Session that takes frames for its viewer and fits them to the link: acknowledgements,
+// keyframes, strand classes and the ladder of pictures.
+#include <algorithm>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/base/profile.h"
+#include "server/net/session_private.h"
+
+namespace strandcast::net {
+
+void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
+  queue_.set_asset(asset);
+  has_asset_ = asset != nullptr;
+  if (mode_ == StreamMode::Strands) queue_.start_strands();
+  if (mode_ == StreamMode::Frames) {
+    queue_.start_pictures();
+    // The first pictures are too small to show what the link carries.
+    flow_.start_over(now_ns());
+  }
+  if (hello.acknowledges) flow_.expect_acks();
+  flow_.remember_capacity_for(context_.config.limits.link_memory_ms * kNsPerMs);
+  socket_.control_callback(
+      [this](websocket::frame_type kind, beast::string_view) { on_control_frame(kind); });
+  probe(now_ns());
+}
+
+/// The client lost what it had.
+void Session::start_again(int64_t time_ns) {
+  queue_.lose_chain();
+  if (mode_ == StreamMode::Frames || changes_to(StreamMode::Frames)) queue_.start_pictures();
+  flow_.forget_in_flight();
+  account_drops();
+  ask_for_keyframe(time_ns);
+}
+
+void Session::deliver_strands(const EncodedFramePtr& frame) {
+  if (state_ != State::Joined || frame->header.stream_id != strand_class_) return;
+  guarded([&] {
+    const int64_t time_ns = now_ns();
+    const SendQueue::Offer offer = queue_.offer_strands(frame);
+    if (offer == SendQueue::Offer::LostChain) {
+      flow_.on_chain_loss(time_ns);
+      adapt(time_ns);
+    }
+    if (offer == SendQueue::Offer::Queued) finish_mode_switch();
+    account_drops();
+    pump();
+  });
+}
+
+void Session::deliver_picture(PictureClass picture_class, const PicturePtr& picture) {
+  // The keyframe of the strands that follow needs an empty pipe.
+  if (!watches(picture_class) || changes_to(StreamMode::Strands)) return;
+  guarded([&] {
+    const int64_t time_ns = now_ns();
+    const uint64_t dropped = queue_.dropped_frames();
+    const SendQueue::Offer offer = queue_.offer_picture(picture);
+    if (offer == SendQueue::Offer::Queued && changes_to(StreamMode::Frames)) {
+      finish_mode_switch();
+    } else if (queue_.dropped_frames() != dropped) {
+      flow_.on_chain_loss(time_ns);
+      adapt_pictures(time_ns);
+    }
+    account_drops();
+    pump();
+    ask_for_keyframe(time_ns);
+  });
+}
+
+void Session::account_drops() {
+  context_.count(&NetCounters::frames_dropped,
+                 queue_.dropped_frames() - std::exchange(counted_drops_, queue_.dropped_frames()));
+  context_.count(&NetCounters::chain_losses,
+                 queue_.chain_losses() - std::exchange(counted_losses_, queue_.chain_losses()));
+}
+
+void Session::ask_for_keyframe(int64_t time_ns) {
+  // The first picture of a change replaces what waits; other first frames need an empty pipe.
+  const bool is_changing = changes_to(StreamMode::Frames) && queue_.awaits_picture();
+  const bool needs_picture = is_changing || (queue_.needs_picture() && !changes_to(StreamMode::Strands));
+  if (state_ != State::Joined || !(needs_picture || queue_.needs_keyframe())) return;
+  if (!is_changing && !flow_.may_start(time_ns)) return;
+  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
+  if (keyframe_asked_ns_ != 0 && time_ns - keyframe_asked_ns_ < interval_ns) return;
+  keyframe_asked_ns_ = time_ns;
+  context_.count(&NetCounters::keyframe_requests);
+  if (needs_picture)
+    context_.handler.on_picture_request(id_, is_changing ? next_mode_->picture_class : picture_class_);
+  else
+    context_.handler.on_keyframe_request(id_, strand_class_);
+}
+
+void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
+  flow_.on_ack(ack.stream_id, ack.sequence, time_ns);
+  adapt(time_ns);
+  ask_for_keyframe(time_ns);
+  pump();
+}
+
+std::string Session::describe_link(int64_t time_ns) const {
+  return fmt::format("link {:.2f} Mbit/s, {:.0f} ms of data on its way",
+                     flow_.capacity_bytes_per_s(time_ns) * 8e-6,
+                     static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs);
+}
+
+/// Moves to another step of the ladder of pictures when the link says so.
+void Session::adapt_pictures(int64_t time_ns) {
+  if (state_ != State::Joined || mode_ != StreamMode::Frames || next_mode_ || !flow_.expects_acks()) return;
+  const double present = context_.pictures.bytes_per_s(picture_class_);
+  if (present <= 0.0 || picture_costs_.empty()) return;
+  std::vector<double> costs;
+  for (const double cost : picture_costs_) costs.push_back(present * cost / picture_costs_[picture_step_]);
+  const double cap = context_.config.limits.viewer_bytes_per_s;
+  const size_t chosen = flow_.choose_class(picture_step_, costs, cap, time_ns);
+  if (chosen == picture_step_) return;
+  const char* why = chosen < picture_step_ ? "the link has room" : "the link or this viewer is too slow";
+  if (!context_.handler.on_picture_step(id_, chosen, fmt::format("{}: {}", why, describe_link(time_ns))))
+    return;
+  picture_step_ = chosen;
+  context_.pictures.forget(picture_class_);
+  context_.count(&NetCounters::class_changes);
+}
+
+/// Moves to another strand class when the link says so.
+void Session::adapt(int64_t time_ns) {
+  if (mode_ == StreamMode::Frames) return adapt_pictures(time_ns);
+  if (state_ != State::Joined || mode_ != StreamMode::Strands || !flow_.expects_acks()) return;
+  const std::vector<double> costs = context_.strands.bytes_per_s();
+  if (costs.empty()) return;
+  const double cap = context_.config.limits.viewer_bytes_per_s;
+  const size_t chosen = flow_.choose_class(strand_class_, costs, cap, time_ns);
+  if (chosen == strand_class_) return;
+  const bool is_better = chosen < strand_class_;
+  change_strand_class(chosen);
+  announce_quality(fmt::format("{}: {}; {}",
+                               is_better ? "the link has room" : "the link or this viewer is too slow",
+                               to_string(context_.strands.classes()[strand_class_]), describe_link(time_ns)));
+  ask_for_keyframe(time_ns);
+}
+
+void Session::change_strand_class(size_t chosen) {
+  strand_class_ = static_cast<uint16_t>(chosen);
+  context_.count(&NetCounters::class_changes);
+  queue_.restart_strands();
+  context_.handler.on_strand_class(id_, strand_class_);
+}
+
+void Session::announce_quality(const std::string& reason) {
+  log_info("net", "session {}: {}", id_, reason);
+  const StrandClass& now = context_.strands.classes()[strand_class_];
+  queue_control(StreamQuality{strand_class_, now.rate_divisor, now.strand_share, now.bound_m, reason});
+}
+
+void Session::follow_strand_classes(const std::string& reason) {
+  const bool is_concerned = mode_ == StreamMode::Strands || changes_to(StreamMode::Strands);
+  if (state_ != State::Joined || !is_concerned || hello_.role == Role::Source) return;
+  guarded([&] {
+    const size_t last = context_.strands.classes().size() - 1;
+    if (strand_class_ > last) change_strand_class(last);
+    announce_quality(fmt::format("{}: {}", reason, to_string(context_.strands.classes()[strand_class_])));
+    ask_for_keyframe(now_ns());
+  });
+}
+
+void Session::report_link(int64_t time_ns) {
+  if (hello_.role == Role::Source ||
+      time_ns - link_reported_ns_ < context_.config.limits.link_interval_ms * kNsPerMs)
+    return;
+  link_reported_ns_ = time_ns;
+  LinkState link;
+  link.mode = mode_;
+  link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
+  link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
+  link.strand_bytes_per_s = context_.strands.bytes_per_s();
+  context_.handler.on_link(id_, link, time_ns);
+}
+
+}  // namespace strandcast::net

@@ -1,0 +1,141 @@
+// The part of Session that understands its client: Hello lets it in, and what comes later goes to the
+// application when its role may send it.
+#include <type_traits>
+#include <utility>
+
+#include "common/base/log.h"
+#include "common/base/profile.h"
+#include "server/net/overloaded_private.h"
+#include "server/net/session_private.h"
+
+namespace strandcast::net {
+namespace {
+
+CloseCode close_code_for(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::LimitExceeded:
+      return CloseCode::Full;
+    case ErrorCode::Unauthorized:
+      return CloseCode::Unauthorized;
+    default:
+      return CloseCode::Policy;
+  }
+}
+
+const char* message_name(const ClientMessage& message) {
+  constexpr const char* kNames[] = {"Hello",           "MotionSamples", "WindSamples", "CameraChange",
+                                    "KeyframeRequest", "FrameAck",      "Ping",        "ControlCommand",
+                                    "SetParameter",    "ViewerReport",  "ModeRequest", "AdminCommand"};
+  static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
+  return kNames[message.index()];
+}
+
+}  // namespace
+
+void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
+  if (socket_.got_text()) return reject(CloseCode::BadData, "Text messages are not part of the protocol.");
+  const Result<ClientMessage> message = decode_client_message(bytes);
+  if (!message) return reject(CloseCode::BadData, message.error().to_string());
+  if (state_ == State::AwaitHello) {
+    const Hello* hello = std::get_if<Hello>(&*message);
+    if (hello == nullptr)
+      return reject(CloseCode::Policy,
+                    fmt::format("The first message must be Hello, not {}.", message_name(*message)));
+    return join(*hello);
+  }
+  if (!may_send(hello_.role, *message))
+    return reject(CloseCode::Policy,
+                  fmt::format("A {} may not send {}{}.", to_string(hello_.role), message_name(*message),
+                              std::holds_alternative<Hello>(*message) ? " twice" : ""));
+  dispatch(*message, arrival_ns);
+}
+
+void Session::join(const Hello& hello) {
+  if (const Status allowed = check_role(context_.config.tokens, hello); !allowed) {
+    context_.count(&NetCounters::refused_token);
+    if (allowed.error().code == ErrorCode::Unauthorized && !peer_.is_trusted)
+      context_.guard.on_wrong_token(peer_.key, now_ns());
+    log_warn("net", "session {} from {} as {}: {}", id_, peer_.address, to_string(hello.role),
+             allowed.error().to_string());
+    return close(close_code_for(allowed.error()), allowed.error().to_string());
+  }
+  Result<Admission> admission = context_.handler.on_hello(id_, hello);
+  if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
+  hello_ = hello;
+  hello_.token.clear();
+  admission->welcome.role = hello.role;
+  mode_ = admission->welcome.mode;
+  picture_class_ = admission->picture_class;
+  picture_costs_ = admission->picture_costs;
+  picture_step_ = admission->picture_step;
+  has_joined_ = true;
+  state_ = State::Joined;
+  state_since_ns_ = now_ns();
+  context_.update_session_counts();
+  log_info("net", "session {} from {} joined: {} '{}', {}", id_, peer_.address, to_string(hello.role),
+           hello.name, to_string(mode_));
+  // Everything is set before anything is written, and strands start only behind the asset.
+  if (hello.role != Role::Source) begin_media(hello, admission->asset);
+  queue_control(std::move(admission->welcome));
+  // The Welcome says nothing about a rate below that of the simulation.
+  if (mode_ == StreamMode::Strands && flow_.expects_acks() && context_.strands.classes()[0].rate_divisor > 1)
+    announce_quality("the stream is set so");
+  ask_for_keyframe(now_ns());
+}
+
+void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
+  NetHandler& handler = context_.handler;
+  std::visit(Overloaded{[](const Hello&) {},
+                        [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
+                        [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
+                        [&](const CameraChange& camera) { handler.on_camera(id_, camera); },
+                        [&](const KeyframeRequest&) { start_again(arrival_ns); },
+                        [&](const FrameAck& ack) {
+                          on_ack(ack, arrival_ns);
+                          handler.on_ack(id_, ack);
+                        },
+                        [&](const Ping& ping) {
+                          queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
+                        },
+                        [&](const ControlCommand& command) { handler.on_command(id_, command); },
+                        [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
+                        [&](const ViewerReport& report) { handler.on_report(id_, report); },
+                        [&](const ModeRequest& request) { handler.on_mode_request(id_, request); },
+                        [&](const AdminCommand& command) { obey(command, arrival_ns); }},
+             message);
+}
+
+void Session::obey(const AdminCommand& command, int64_t time_ns) {
+  if (command.action == AdminAction::ListSessions) return queue_control(context_.list_sessions(time_ns));
+  log_info("net", "session {} from {}: an admin {}", id_, peer_.address,
+           command.action == AdminAction::Kick ? fmt::format("ends session {}", command.session)
+                                               : "ends the server");
+  if (command.action == AdminAction::ShutDown) {
+    queue_control(Notice{false, "The server is stopping."});
+    return context_.handler.on_shut_down(id_);
+  }
+  const bool is_known = context_.kick(command.session);
+  if (state_ != State::Joined) return;  // it was this one
+  queue_control(is_known ? Notice{false, fmt::format("Session {} was ended.", command.session)}
+                         : Notice{true, fmt::format("There is no session {}.", command.session)});
+}
+
+SessionInfo Session::info(int64_t time_ns) const {
+  SessionInfo info;
+  info.id = id_;
+  info.name = hello_.name;
+  info.address = peer_.address;
+  info.role = hello_.role;
+  info.mode = mode_;
+  info.sent_bytes = sent_bytes_;
+  info.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  info.connected_s = static_cast<double>(time_ns - state_since_ns_) * 1e-9;
+  return info;
+}
+
+void Session::reject(CloseCode code, const std::string& reason) {
+  context_.count(&NetCounters::bad_messages);
+  log_warn("net", "session {} from {}: {}", id_, peer_.address, reason);
+  close(code, reason);
+}
+}  // namespace strandcast::net

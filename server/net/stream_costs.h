@@ -1,0 +1,55 @@
+// What each strand class and each picture class takes of a link, learned from the frames as they come. Plain
+// logic on given times; network thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "common/codec/frame_header.h"
+#include "server/net/strand_class.h"
+
+namespace strandcast {
+
+using PictureClass = uint32_t;  // viewers of one class get the same rendered frames
+
+class StrandCosts {
+ public:
+  explicit StrandCosts(std::vector<StrandClass> classes);
+
+  /// Best first; index = stream_id.
+  const std::vector<StrandClass>& classes() const { return classes_; }
+  /// Keyframes and frames of no class are left out.
+  void note_frame(const FrameHeader& header, size_t bytes, int64_t time_ns);
+  /// Of every class, as measured, or estimated from the one measured last; empty at first.
+  std::vector<double> bytes_per_s() const;
+
+ private:
+  struct Load {
+    double delta_bytes = 0.0;  // smoothed
+    int64_t time_ns = 0;       // of the newest delta; 0 = none yet
+  };
+  std::vector<StrandClass> classes_;
+  std::vector<Load> loads_;  // one per class
+};
+
+class PictureCosts {
+ public:
+  /// Classes that have given nothing for long are forgotten.
+  void note_picture(PictureClass picture_class, size_t bytes, int64_t time_ns);
+  /// The class is made otherwise from now on.
+  void forget(PictureClass picture_class) { loads_.erase(picture_class); }
+  /// While the picture changes; 0 = not known yet.
+  double bytes_per_s(PictureClass picture_class) const;
+
+ private:
+  struct Load {
+    double bytes = 0.0;       // smoothed, of one picture; 0 = one came at most
+    double interval_s = 0.0;  // smoothed, between two
+    int64_t time_ns = 0;      // of the newest
+  };
+  std::map<PictureClass, Load> loads_;
+};
+
+}  // namespace strandcast
