@@ -7,7 +7,7 @@
 #include <boost/beast/http.hpp>
 #include <optional>
 
-#include "client/net/tls_error_private.h"
+#include "client/net/connection_error_private.h"
 #include "common/net/net_stream_private.h"
 
 namespace strandcast {

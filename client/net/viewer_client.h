@@ -13,6 +13,7 @@
 
 #include "client/net/address.h"
 #include "client/net/mailbox.h"
+#include "client/net/outbox.h"
 #include "common/base/result.h"
 #include "common/wire/clock_offset.h"
 #include "common/wire/messages.h"
@@ -30,8 +31,6 @@ struct ClientConfig {
   MailboxLimits mailbox;
 };
 
-inline constexpr size_t kMaxSendQueueMessages = 1024;
-inline constexpr size_t kMaxSendQueueBytes = 1u << 20;
 inline constexpr int kQuickPings = 10;  // clock probes right after the Welcome
 inline constexpr std::chrono::milliseconds kQuickPingInterval{20};
 inline constexpr std::chrono::milliseconds kPingInterval{1000};
@@ -64,8 +63,8 @@ class ViewerClient {
   /// As poll(), waiting up to `timeout` for the first event.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
 
-  /// Queues a message. LimitExceeded when the queue is full (the message is dropped), Unavailable when the
-  /// connection is over. Any thread.
+  /// Puts a message into the outbox. LimitExceeded when that is full (the message is dropped), Unavailable
+  /// when the connection is over. Any thread.
   Status send(const ClientMessage& message);
   /// Asks for a keyframe, at most once in kKeyframeRequestInterval; extra calls do nothing. Any thread.
   void request_keyframe();

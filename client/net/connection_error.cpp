@@ -1,0 +1,51 @@
+#include <algorithm>
+
+#include "client/net/connection_error_private.h"
+
+namespace strandcast {
+namespace {
+
+ErrorCode code_for(unsigned http_status) {
+  switch (http_status) {
+    case 401:
+    case 403:
+      return ErrorCode::Unauthorized;
+    case 426:
+      return ErrorCode::Unsupported;
+    case 429:
+    case 503:
+      return ErrorCode::LimitExceeded;
+    default:
+      return ErrorCode::BadInput;
+  }
+}
+
+}  // namespace
+
+std::string one_line(std::string_view text) {
+  constexpr size_t kMaxShown = 200;
+  std::string shown(text.substr(0, kMaxShown));
+  std::replace_if(
+      shown.begin(), shown.end(), [](char c) { return c < ' ' || c > '~'; }, ' ');
+  return shown;
+}
+
+Error error_from_tls(const net::NetStream& stream, const net::NetStream::error_code& failure) {
+  const std::string trouble = stream.certificate_trouble();
+  if (!trouble.empty())
+    return make_error(ErrorCode::Unauthorized,
+                      "the server's certificate is not trusted: {} (--tls-ca FILE names its authority)",
+                      trouble);
+  if (net::NetStream::is_tls_error(failure))
+    return make_error(ErrorCode::Unsupported, "no TLS with this server: {}", failure.message());
+  return make_error(ErrorCode::Unavailable, "connection lost during the TLS handshake: {}",
+                    failure.message());
+}
+
+Error error_from_http(unsigned status, std::string_view reason, std::string_view body) {
+  const std::string shown_body = one_line(body);
+  return make_error(code_for(status), "the server refused the connection: HTTP {} {}{}{}", status,
+                    one_line(reason), shown_body.empty() ? "" : ": ", shown_body);
+}
+
+}  // namespace strandcast
