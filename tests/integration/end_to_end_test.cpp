@@ -11,17 +11,15 @@
 #include <thread>
 #include <utility>
 
-#include "client/app/ctl_commands.h"
 #include "client/app/feed.h"
 #include "client/app/headless_view.h"
 #include "client/app/stream_check.h"
-#include "client/app/viewer_session.h"
 #include "common/base/file.h"
 #include "common/gl/egl_context.h"
 #include "common/motion/motion_clip.h"
 #include "common/render/renderer.h"
-#include "server/app/server.h"
 #include "tests/support/raw_client.h"
+#include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast {
@@ -84,17 +82,13 @@ class ObservedPainter : public PicturePainter {
   Observer& observer_;
 };
 
-class EndToEnd : public testing::Test {
+class EndToEnd : public test::ServerFixture {
  protected:
   void SetUp() override {
     ServerConfig config;
-    config.scene = built_in_scene();
-    auto& groom = std::get<ProceduralGroomDesc>(config.scene.groom);
-    groom.strand_count = kStrands;
-    groom.vertex_count = kVertices;
+    config.scene = test::small_scene(kStrands, kVertices);
     config.scene.stream.frame_width = 96;
     config.scene.stream.frame_height = 64;
-    config.net.port = 0;
     config.on_publish = [this](const auto& snapshot) { observer_.saw(*snapshot); };
     config.make_painter = [this](GlPainterConfig painter) -> MakePicturePainter {
       return [this,
@@ -103,32 +97,17 @@ class EndToEnd : public testing::Test {
         return std::unique_ptr<PicturePainter>(std::make_unique<ObservedPainter>(std::move(made), observer_));
       };
     };
-    auto server = Server::start(config);
-    ASSERT_TRUE(server) << server.error().to_string();
-    server_ = std::move(server).value();
+    (void)start(std::move(config));
   }
 
   void TearDown() override {
     stop_feeding_ = true;
     if (feeder_.joinable()) feeder_.join();
-    if (server_ == nullptr) return;
-    EXPECT_FALSE(server_->failure());
-    server_->stop();
-  }
-
-  ClientConfig client_config(StreamMode mode = StreamMode::Strands, Role role = Role::Viewer) const {
-    ClientConfig config;
-    config.address = {"127.0.0.1", server_->port()};
-    config.hello.role = role;
-    config.hello.mode = mode;
-    config.hello.name = "test";
-    return config;
+    ServerFixture::TearDown();
   }
 
   std::unique_ptr<ViewerSession> join(StreamMode mode = StreamMode::Strands, Role role = Role::Viewer) {
-    auto session = ViewerSession::open(client_config(mode, role));
-    EXPECT_TRUE(session) << session.error().to_string();
-    return session ? std::move(session).value() : nullptr;
+    return open(client_config(mode, role));
   }
 
   /// The built-in head motion, over the network, until the test ends.
@@ -143,23 +122,7 @@ class EndToEnd : public testing::Test {
     });
   }
 
-  /// Pumps the sessions in turn until the condition holds.
-  template <class Condition>
-  [[nodiscard]] bool pump_until(const std::vector<ViewerSession*>& sessions, Condition condition) {
-    const int64_t begin_ns = now_ns();
-    while (!condition()) {
-      for (ViewerSession* session : sessions)
-        if (const auto pumped = session->pump(milliseconds(5)); !pumped) {
-          ADD_FAILURE() << pumped.error().to_string();
-          return false;
-        }
-      if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kDeadlineS) return false;
-    }
-    return true;
-  }
-
   Observer observer_;
-  std::unique_ptr<Server> server_;
   std::atomic<bool> stop_feeding_{false};
   std::thread feeder_;
 };
@@ -294,39 +257,55 @@ TEST_F(EndToEnd, AControllerPausesStepsAndIsToldWhatIsWrong) {
   ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().newest()->tick != tick; }));
   EXPECT_EQ(viewer->replay().newest()->tick, tick + 1);
 
-  CtlTarget target;
-  target.connect = fmt::format("127.0.0.1:{}", server_->port());
+  const CtlTarget target = ctl_target();
   EXPECT_EQ(run_command(target, ControlCommand{Command::Resume}), kDoneExit);
   EXPECT_EQ(run_command(target, SetParameter{"solver.name=spaghetti"}), kRefusedExit);
   EXPECT_EQ(run_health(target), kDoneExit);
   ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->replay().newest()->tick > tick + 5; }));
 }
 
+/// One viewer of strands that move, while somebody sets the stream.
+class StreamSettings : public EndToEnd {
+ protected:
+  void SetUp() override {
+    EndToEnd::SetUp();
+    if (server_ == nullptr) return;
+    start_feeding();
+    viewer_ = join();
+    ASSERT_TRUE(viewer_);
+    record(*viewer_, states_);
+    ASSERT_TRUE(pump_until([&] { return states_.size() >= 5; }));
+  }
+  template <class Condition>
+  [[nodiscard]] bool pump_until(Condition condition) {
+    return ServerFixture::pump_until({viewer_.get()}, condition);
+  }
+  /// The command waits for its answer, which needs nobody to pump this viewer; then the viewer is told.
+  void set(const std::string& assignment) {
+    const uint64_t changes = viewer_->quality_changes();
+    ASSERT_EQ(run_command(ctl_target(), SetParameter{assignment}), kDoneExit) << assignment;
+    ASSERT_TRUE(pump_until([&] { return viewer_->quality_changes() > changes; })) << assignment;
+    EXPECT_THAT(viewer_->quality().reason, HasSubstr("changed"));
+  }
+  void expect_one_chain() const {
+    EXPECT_EQ(viewer_->replay().stats().rejected_frames, 0u) << viewer_->replay().stats().last_error;
+    EXPECT_EQ(viewer_->replay().stats().keyframe_requests, 0u) << "a keyframe comes by itself";
+  }
+
+  std::unique_ptr<ViewerSession> viewer_;
+  States states_;
+};
+
 // The bound on a running server: announced, then a keyframe on the new lattice, and everybody goes on.
-TEST_F(EndToEnd, TheBoundChangesWhileViewersWatch) {
-  start_feeding();
-  auto viewer = join();
-  ASSERT_TRUE(viewer);
-  States states;
-  record(*viewer, states);
-  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= 5; }));
-  CtlTarget target;
-  target.connect = fmt::format("127.0.0.1:{}", server_->port());
-  const auto change = [&](const std::string& assignment) {
-    // The command waits for its answer, which needs nobody to pump this viewer.
-    EXPECT_EQ(run_command(target, SetParameter{assignment}), kDoneExit) << assignment;
-  };
+TEST_F(StreamSettings, TheBoundChangesWhileViewersWatch) {
   for (const float bound_m : {4e-4f, 2e-5f, 1e-4f}) {
-    const uint64_t changes = viewer->quality_changes();
-    change(fmt::format("stream.bound_m={}", bound_m));
-    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality_changes() > changes; }));
-    EXPECT_EQ(viewer->quality().bound_m, bound_m);
-    EXPECT_THAT(viewer->quality().reason, HasSubstr("changed"));
-    const float quantum_m = lattice_step_m(viewer->welcome().codec, bound_m).value();
+    ASSERT_NO_FATAL_FAILURE(set(fmt::format("stream.bound_m={}", bound_m)));
+    EXPECT_EQ(viewer_->quality().bound_m, bound_m);
+    const float quantum_m = lattice_step_m(viewer_->welcome().codec, bound_m).value();
     States changed;
-    ASSERT_TRUE(pump_until({viewer.get()}, [&] {
+    ASSERT_TRUE(pump_until([&] {
       changed.clear();
-      for (const auto& item : states)
+      for (const auto& item : states_)
         if (item.second->quantum_m == quantum_m) changed.insert(item);
       return changed.size() >= 20;
     }));
@@ -336,10 +315,9 @@ TEST_F(EndToEnd, TheBoundChangesWhileViewersWatch) {
     auto late = join();
     ASSERT_TRUE(late);
     EXPECT_EQ(late->welcome().bound_m, bound_m);
-    states.clear();
+    states_.clear();
   }
-  EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u) << viewer->replay().stats().last_error;
-  EXPECT_EQ(viewer->replay().stats().keyframe_requests, 0u) << "the keyframe came by itself";
+  expect_one_chain();
 }
 
 /// How many states in a row are each of another group of `group` steps than the one before.
@@ -354,37 +332,23 @@ size_t longest_run_of_groups(const States& states, uint64_t group) {
 }
 
 // Likewise the rate, which needs no keyframe: states are left out and the chain goes on.
-TEST_F(EndToEnd, TheRateChangesWhileViewersWatch) {
-  start_feeding();
-  auto viewer = join();
-  ASSERT_TRUE(viewer);
-  States states;
-  record(*viewer, states);
-  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= 5; }));
-  CtlTarget target;
-  target.connect = fmt::format("127.0.0.1:{}", server_->port());
-  const double step_rate_hz = viewer->welcome().step_rate_hz;
+TEST_F(StreamSettings, TheRateChangesWhileViewersWatch) {
+  const double step_rate_hz = viewer_->welcome().step_rate_hz;
   for (const uint32_t divisor : {3u, 6u, 1u}) {
-    const uint64_t changes = viewer->quality_changes();
-    const std::string rate = fmt::format("stream.strand_rate_hz={}", step_rate_hz / divisor);
-    EXPECT_EQ(run_command(target, SetParameter{rate}), kDoneExit) << rate;
-    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality_changes() > changes; }));
-    EXPECT_EQ(viewer->quality().rate_divisor, divisor);
-    EXPECT_THAT(viewer->quality().reason, HasSubstr("changed"));
+    ASSERT_NO_FATAL_FAILURE(set(fmt::format("stream.strand_rate_hz={}", step_rate_hz / divisor)));
+    EXPECT_EQ(viewer_->quality().rate_divisor, divisor);
     // One state of each group of so many steps. Keyframes for those who join, and states that were waited for
     // too long, come besides.
-    states.clear();
-    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return longest_run_of_groups(states, divisor) >= 8; }))
-        << rate;
-    expect_within_bound(states, observer_.published(), viewer->welcome().bound_m);
+    states_.clear();
+    ASSERT_TRUE(pump_until([&] { return longest_run_of_groups(states_, divisor) >= 8; })) << divisor;
+    expect_within_bound(states_, observer_.published(), viewer_->welcome().bound_m);
     auto late = join();
     ASSERT_TRUE(late);
-    ASSERT_TRUE(pump_until({viewer.get(), late.get()}, [&] {
+    ASSERT_TRUE(ServerFixture::pump_until({viewer_.get(), late.get()}, [&] {
       return divisor == 1 || late->quality().rate_divisor == divisor;
     })) << "who joins later is told as well";
   }
-  EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u) << viewer->replay().stats().last_error;
-  EXPECT_EQ(viewer->replay().stats().keyframe_requests, 0u);
+  expect_one_chain();
 }
 
 TEST_F(EndToEnd, TheCheckCommandComparesTwoViewers) {

@@ -6,17 +6,14 @@
 
 #include <atomic>
 
-#include "client/app/viewer_session.h"
 #include "common/base/profile.h"
-#include "server/app/server.h"
-#include "tests/support/eventually.h"
 #include "tests/support/raw_client.h"
+#include "tests/support/server_fixture.h"
 #include "tests/tools/chaos_relay.h"
 
 namespace strandcast {
 namespace {
 
-using std::chrono::milliseconds;
 using test::RawClient;
 using testing::HasSubstr;
 
@@ -43,45 +40,26 @@ MakePicturePainter broken_painter(const GlPainterConfig&) {
   };
 }
 
-class ModeSwitching : public testing::Test {
+class ModeSwitching : public test::ServerFixture {
  protected:
-  void start(uint32_t strand_count = 150, uint32_t vertex_count = 8,
-             std::function<MakePicturePainter(GlPainterConfig)> painter = pattern_painter) {
+  [[nodiscard]] bool start(SceneDesc scene = test::bald_scene(),
+                           std::function<MakePicturePainter(GlPainterConfig)> painter = pattern_painter) {
     ServerConfig config;
-    config.scene = built_in_scene();
-    ProceduralGroomDesc groom;
-    groom.strand_count = strand_count;
-    groom.vertex_count = vertex_count;
-    config.scene.groom = groom;
-    config.scene.head.is_visible = false;
+    config.scene = std::move(scene);
     config.scene.stream.frame_width = 32;
     config.scene.stream.frame_height = 24;
-    config.net.port = 0;
     config.net.limits.link_memory_ms = 4'000;
     config.make_painter = std::move(painter);
-    auto server = Server::start(config);
-    if (!server.ok() && server.error().code == ErrorCode::Unavailable)
-      GTEST_SKIP() << "needs OpenGL 4.5: " << server.error().to_string();
-    ASSERT_TRUE(server.ok()) << server.error().to_string();
-    server_ = std::move(*server);
+    return ServerFixture::start(std::move(config));
   }
   void join(StreamMode mode, uint16_t port = 0) {
-    ClientConfig config;
-    config.address = {"127.0.0.1", port != 0 ? port : server_->port()};
-    config.hello.mode = mode;
-    auto session = ViewerSession::open(config);
-    ASSERT_TRUE(session) << session.error().to_string();
-    viewer_ = std::move(*session);
+    viewer_ = open(client_config(mode, Role::Viewer, port));
+    ASSERT_NE(viewer_, nullptr);
     ASSERT_TRUE(pump_until([&] { return viewer_->has_picture(); }));
   }
   template <class Condition>
   bool pump_until(Condition condition) {
-    return eventually([&] {
-             const Status pumped = viewer_->pump(milliseconds(10));
-             if (!pumped) ADD_FAILURE() << pumped.error().to_string();
-             return !pumped || condition();
-           }) &&
-           !HasFailure();
+    return ServerFixture::pump_until({viewer_.get()}, condition);
   }
   /// Until the viewer shows this mode and has decoded ten more frames.
   bool pump_to(StreamMode mode) {
@@ -94,13 +72,11 @@ class ModeSwitching : public testing::Test {
     EXPECT_EQ(viewer_->picture_stats().rejected_frames, 0u);
   }
 
-  std::unique_ptr<Server> server_;
   std::unique_ptr<ViewerSession> viewer_;
 };
 
 TEST_F(ModeSwitching, APersonSwitchesThereAndBackWithoutABlankFrame) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
   for (int round = 0; round < 2; ++round) {
     viewer_->request_mode(StreamMode::Frames);
@@ -120,8 +96,7 @@ TEST_F(ModeSwitching, APersonSwitchesThereAndBackWithoutABlankFrame) {
 }
 
 TEST_F(ModeSwitching, WhoBeganWithFramesGetsTheAssetBeforeStrands) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Frames));
   EXPECT_EQ(viewer_->asset(), nullptr);
   viewer_->request_mode(StreamMode::Strands);
@@ -132,8 +107,7 @@ TEST_F(ModeSwitching, WhoBeganWithFramesGetsTheAssetBeforeStrands) {
 }
 
 TEST_F(ModeSwitching, FramesThatCannotBeDrawnAreRefusedAndStrandsGoOn) {
-  ASSERT_NO_FATAL_FAILURE(start(150, 8, broken_painter));
-  if (server_ == nullptr) return;
+  if (!start(test::bald_scene(), broken_painter)) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
   viewer_->request_mode(StreamMode::Frames);
   ASSERT_TRUE(pump_until([&] {
@@ -145,8 +119,7 @@ TEST_F(ModeSwitching, FramesThatCannotBeDrawnAreRefusedAndStrandsGoOn) {
 }
 
 TEST_F(ModeSwitching, AFloodOfRequestsCausesOneChangeASecondAtMost) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
   const int64_t begin_ns = now_ns();
   for (int i = 0; i < 400; ++i)
@@ -158,8 +131,7 @@ TEST_F(ModeSwitching, AFloodOfRequestsCausesOneChangeASecondAtMost) {
 }
 
 TEST_F(ModeSwitching, ASourceHasNoMode) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   for (const ClientMessage& message : {ClientMessage(ModeRequest{}), ClientMessage(ViewerReport{})}) {
     RawClient source(server_->port());
     ASSERT_TRUE(source.handshake());
@@ -173,8 +145,7 @@ TEST_F(ModeSwitching, ASourceHasNoMode) {
 }
 
 TEST_F(ModeSwitching, AutoFollowsHowFastTheViewerDraws) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Auto));
   EXPECT_EQ(viewer_->mode(), StreamMode::Strands) << "until something speaks against it";
   ASSERT_TRUE(viewer_->client().send(ViewerReport{2.0, 500.0, 0.0, 2.0, DrawingDevice::Software}));
@@ -187,8 +158,7 @@ TEST_F(ModeSwitching, AutoFollowsHowFastTheViewerDraws) {
 }
 
 TEST_F(ModeSwitching, AutoGivesFramesToWhoCannotDrawStrands) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Auto));
   ASSERT_TRUE(viewer_->client().send(ViewerReport{0.0, 0.0, 0.0, 0.0, DrawingDevice::None}));
   ASSERT_TRUE(pump_to(StreamMode::Frames));
@@ -198,8 +168,7 @@ TEST_F(ModeSwitching, AutoGivesFramesToWhoCannotDrawStrands) {
 
 TEST_F(ModeSwitching, AutoTakesFramesOnALinkTooSlowForStrandsAndComesBack) {
   constexpr uint32_t kStrands = 240;  // long ones: no class can leave out more than half of so few
-  ASSERT_NO_FATAL_FAILURE(start(kStrands, 64));
-  if (server_ == nullptr) return;
+  if (!start(test::bald_scene(kStrands, 64))) return;
   chaos::RelayConfig relay;
   relay.to_port = server_->port();
   auto link = chaos::ChaosRelay::start(relay);

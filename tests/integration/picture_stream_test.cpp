@@ -3,76 +3,50 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/app/viewer_session.h"
-#include "server/app/server.h"
-#include "tests/support/eventually.h"
-#include "tests/support/raw_client.h"
+#include "tests/support/server_fixture.h"
+#include "tests/support/test_pictures.h"
 #include "tests/tools/chaos_relay.h"
 
 namespace strandcast {
 namespace {
 
-using test::RawClient;
-
-SceneDesc small_scene() {
-  SceneDesc scene = built_in_scene();
-  ProceduralGroomDesc groom;
-  groom.strand_count = 150;
-  groom.vertex_count = 8;
-  scene.groom = groom;
-  scene.head.is_visible = false;
+SceneDesc windy_scene(RenderSize size = {160, 120}) {
+  SceneDesc scene = test::bald_scene();
   scene.wind.mean_mps = {3.0f, 0.0f, 1.0f};
   scene.wind.gust_intensity = 0.4f;
-  scene.stream.frame_width = 160;
-  scene.stream.frame_height = 120;
+  scene.stream.frame_width = size.width;
+  scene.stream.frame_height = size.height;
   scene.stream.frame_rate_hz = 30.0;
   return scene;
 }
 
-class PictureStream : public testing::Test {
- protected:
-  void start(const SceneDesc& scene = small_scene()) {
-    ServerConfig config;
-    config.scene = scene;
-    config.net.port = 0;
-    auto server = Server::start(config);
-    if (!server.ok() && server.error().code == ErrorCode::Unavailable)
-      GTEST_SKIP() << "needs OpenGL 4.5: " << server.error().to_string();
-    ASSERT_TRUE(server.ok()) << server.error().to_string();
-    server_ = std::move(*server);
+/// Lines that wave from state to state, which cost little to draw: many pictures come on a busy machine too.
+class LinesPainter : public PicturePainter {
+ public:
+  Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
+    return test::waving_lines(view.size.width, view.size.height, 0.1 * static_cast<double>(snapshot->tick));
   }
-  std::unique_ptr<ViewerSession> join(PictureCodec codec, uint16_t port = 0) {
-    ClientConfig config;
-    config.address = {"127.0.0.1", port != 0 ? port : server_->port()};
-    config.hello.mode = StreamMode::Frames;
-    config.hello.picture_codecs = codec_bit(codec);
-    auto session = ViewerSession::open(config);
-    EXPECT_TRUE(session.ok()) << session.error().to_string();
-    return session.ok() ? std::move(*session) : nullptr;
-  }
-  template <class Condition>
-  bool pump_until(const std::vector<ViewerSession*>& sessions, Condition condition) {
-    return eventually([&] {
-      for (ViewerSession* session : sessions) EXPECT_TRUE(session->pump(std::chrono::milliseconds(2)).ok());
-      return condition();
-    });
-  }
-  void command(Command what) {
-    RawClient controller(server_->port());
-    ASSERT_TRUE(controller.handshake());
-    Hello hello;
-    hello.role = Role::Controller;
-    controller.send(hello);
-    controller.send(ControlCommand{what});
-    ASSERT_TRUE(controller.read_control<Notice>().has_value());
-  }
+};
+MakePicturePainter lines_painter(const GlPainterConfig&) {
+  return []() -> Result<std::unique_ptr<PicturePainter>> {
+    return std::unique_ptr<PicturePainter>(std::make_unique<LinesPainter>());
+  };
+}
 
-  std::unique_ptr<Server> server_;
+class PictureStream : public test::ServerFixture {
+ protected:
+  using ServerFixture::start;
+  [[nodiscard]] bool start() { return start(windy_scene()); }
+  std::unique_ptr<ViewerSession> join(PictureCodec codec, uint16_t port = 0) {
+    ClientConfig config = client_config(StreamMode::Frames, Role::Viewer, port);
+    config.hello.picture_codecs = codec_bit(codec);
+    return open(config);
+  }
+  void command(Command what) { ASSERT_EQ(run_command(ctl_target(), ControlCommand{what}), kDoneExit); }
 };
 
 TEST_F(PictureStream, EveryCodecIsGivenToWhoDecodesIt) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   for (const PictureCodec codec : kPictureCodecs) {
     if ((encodable_picture_codecs() & codec_bit(codec)) == 0) continue;
     const auto viewer = join(codec);
@@ -89,8 +63,7 @@ TEST_F(PictureStream, EveryCodecIsGivenToWhoDecodesIt) {
 }
 
 TEST_F(PictureStream, ManyViewersOfOneClassCostOneEncodePerPicture) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   std::vector<std::unique_ptr<ViewerSession>> viewers;
   std::vector<ViewerSession*> sessions;
   for (int i = 0; i < 6; ++i) {
@@ -115,8 +88,7 @@ TEST_F(PictureStream, ManyViewersOfOneClassCostOneEncodePerPicture) {
 }
 
 TEST_F(PictureStream, TwoCodecsOfOneViewAreDrawnOnce) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   const auto tiles = join(PictureCodec::JpegTiles);
   const auto video = join(PictureCodec::Vp8);
   ASSERT_TRUE(tiles && video);
@@ -127,8 +99,7 @@ TEST_F(PictureStream, TwoCodecsOfOneViewAreDrawnOnce) {
 }
 
 TEST_F(PictureStream, WhoJoinsWhenNothingMovesGetsThePictureAndItsStill) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   for (const PictureCodec codec : kPictureCodecs) {
     if ((encodable_picture_codecs() & codec_bit(codec)) == 0) continue;
     const auto early = join(codec);
@@ -149,8 +120,7 @@ TEST_F(PictureStream, WhoJoinsWhenNothingMovesGetsThePictureAndItsStill) {
 }
 
 TEST_F(PictureStream, NothingIsSentWhileNothingMoves) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   const auto viewer = join(PictureCodec::JpegTiles);
   ASSERT_NE(viewer, nullptr);
   ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->image_count() >= 3; }));
@@ -162,8 +132,7 @@ TEST_F(PictureStream, NothingIsSentWhileNothingMoves) {
 }
 
 TEST_F(PictureStream, ARequestBringsAWholePictureToWhoAskedOnly) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   const auto asks = join(PictureCodec::JpegTiles);
   const auto other = join(PictureCodec::JpegTiles);
   ASSERT_TRUE(asks && other);
@@ -178,11 +147,11 @@ TEST_F(PictureStream, ARequestBringsAWholePictureToWhoAskedOnly) {
 }
 
 TEST_F(PictureStream, ASlowLinkStepsDownTheLadderAndTheOthersDoNot) {
-  SceneDesc scene = small_scene();
-  scene.stream.frame_width = 480;
-  scene.stream.frame_height = 360;
-  ASSERT_NO_FATAL_FAILURE(start(scene));
-  if (server_ == nullptr) return;
+  ServerConfig server;
+  server.scene = windy_scene({480, 360});
+  server.make_painter = lines_painter;
+  const auto usual_quality = server.scene.stream.jpeg_quality;
+  if (!start(std::move(server))) return;
   chaos::RelayConfig config;
   config.to_port = server_->port();
   config.down.bytes_per_s = 20'000;
@@ -196,9 +165,9 @@ TEST_F(PictureStream, ASlowLinkStepsDownTheLadderAndTheOthersDoNot) {
       return session.frame_quality() ? session.frame_quality()->quality : 0;
     };
     ASSERT_TRUE(pump_until({good.get(), slow.get()}, [&] {
-      return quality(*slow) != 0 && quality(*slow) < scene.stream.jpeg_quality;
+      return quality(*slow) != 0 && quality(*slow) < usual_quality;
     })) << to_string(codec);
-    EXPECT_GE(quality(*good), scene.stream.jpeg_quality);
+    EXPECT_GE(quality(*good), usual_quality);
     EXPECT_EQ(good->picture_stats().rejected_frames, 0u);
     const uint64_t shown = slow->image_count();
     ASSERT_TRUE(pump_until({good.get(), slow.get()}, [&] { return slow->image_count() > shown + 3; }));

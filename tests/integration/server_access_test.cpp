@@ -8,7 +8,6 @@ namespace strandcast {
 namespace {
 
 using test::code;
-using test::eventually;
 using test::RawClient;
 
 const std::vector<AccessToken> kTokens = {{"viewer-token-0000", Grant::Viewer},

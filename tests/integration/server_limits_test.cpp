@@ -6,7 +6,6 @@ namespace strandcast {
 namespace {
 
 using test::code;
-using test::eventually;
 using test::RawClient;
 
 constexpr const char* kToken = "0123456789abcdef";
@@ -104,6 +103,39 @@ TEST_F(ServerLimits, ConnectionsInAll) {
   start(config);
   expect_connection_limit(port(), 1 + 64);
   EXPECT_EQ(server_->counters().refused_full, 1u);
+}
+
+TEST_F(ServerLimits, SilenceEndsASession) {
+  NetConfig config;
+  config.limits.idle_ms = 300;
+  start(config);
+  auto talks = join(hello(Role::Source));
+  // The server looks after a source by pings only, which this one does not answer: it never reads.
+  auto silent = join(hello(Role::Source));
+  EXPECT_TRUE(eventually([&] {
+    talks->send(Ping{1});
+    EXPECT_TRUE(talks->read_control<Pong>());
+    return server_->counters().open_sessions == 1;
+  }));
+  talks->send(Ping{1});
+  EXPECT_TRUE(talks->read_control<Pong>()) << "whoever says something stays";
+}
+
+// What SECURITY.md promises; the other tests shorten these.
+TEST(NetLimitsByDefault, AreAsPromised) {
+  const NetLimits limits;
+  EXPECT_EQ(limits.handshake_ms, 5'000);
+  EXPECT_LE(limits.idle_ms, 15'000) << "a dead peer is seen in 15 s";
+  EXPECT_EQ(limits.stalled_ms, 4'500) << "a stalled viewer is dropped within 5 s, sweeps included";
+  EXPECT_LT(limits.close_ms, 5'000) << "the server ends within 5 s";
+  EXPECT_EQ(limits.sessions, 256u);
+  EXPECT_EQ(limits.sessions_per_address, 64u);
+  EXPECT_EQ(limits.messages_per_s, 1'000.0);
+  EXPECT_EQ(limits.connections_per_s, 10.0);
+  EXPECT_EQ(limits.wrong_tokens, 5u);
+  EXPECT_EQ(limits.wrong_token_window_ms, 60'000);
+  EXPECT_EQ(limits.wrong_token_block_ms, 60'000);
+  EXPECT_EQ(limits.guarded_addresses, 1'024u);
 }
 
 TEST_F(ServerLimits, ConnectionsPerSecond) {

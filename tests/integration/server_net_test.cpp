@@ -15,7 +15,6 @@ namespace strandcast {
 namespace {
 
 using test::code;
-using test::eventually;
 using test::FakeApp;
 using test::media;
 using test::RawClient;

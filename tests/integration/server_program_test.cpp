@@ -11,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tests/support/eventually.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -115,7 +116,7 @@ TEST_F(ServerProgram, ServesUntilTerminated) {
                                "groom.procedural.strand_count=50", "--log-level", "off"});
   int status = 0;
   bool has_ended = false;
-  const bool is_ready = test::eventually([&] {
+  const bool is_ready = eventually([&] {
     has_ended = waitpid(process, &status, WNOHANG) == process;
     return has_ended || std::filesystem::exists(port_path);
   });

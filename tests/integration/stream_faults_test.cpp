@@ -9,8 +9,7 @@
 
 #include "client/app/live_connection.h"
 #include "common/codec/strand_prefix.h"
-#include "server/app/server.h"
-#include "tests/support/eventually.h"
+#include "tests/support/server_fixture.h"
 #include "tests/tools/chaos_relay.h"
 #include "tests/tools/load_viewers.h"
 
@@ -23,18 +22,6 @@ using chaos::LinkPlan;
 using chaos::RelayConfig;
 using load::LoadViewers;
 
-SceneDesc scene_of(uint32_t strand_count, uint32_t vertex_count) {
-  SceneDesc scene = built_in_scene();
-  ProceduralGroomDesc groom;
-  groom.strand_count = strand_count;
-  groom.vertex_count = vertex_count;
-  scene.head.is_visible = false;  // no mesh: the asset stays small against the stream
-  scene.groom = groom;
-  return scene;
-}
-SceneDesc small_scene() {
-  return scene_of(150, 8);
-}
 /// Simulation statistics are as old as this many steps.
 constexpr uint64_t kStatsSteps = 8;
 
@@ -46,19 +33,15 @@ size_t open_descriptors() {
   return count;
 }
 
-class StreamFaults : public testing::Test {
+class StreamFaults : public test::ServerFixture {
  protected:
-  void start(NetLimits limits = {}, const SceneDesc& scene = small_scene()) {
+  [[nodiscard]] bool start(NetLimits limits = {}, SceneDesc scene = test::bald_scene()) {
     ServerConfig config;
-    config.scene = scene;
-    config.net.port = 0;
+    config.scene = std::move(scene);
     config.net.limits = limits;
-    auto server = Server::start(config);
-    if (!server.ok() && server.error().code == ErrorCode::Unavailable)
-      GTEST_SKIP() << "needs OpenGL 4.5: " << server.error().to_string();
-    ASSERT_TRUE(server.ok()) << server.error().to_string();
-    server_ = std::move(*server);
+    if (!ServerFixture::start(std::move(config))) return false;
     viewers_ = std::make_unique<LoadViewers>(load::LoadConfig{"127.0.0.1", server_->port(), {}});
+    return true;
   }
   std::unique_ptr<ChaosRelay> relay(const LinkPlan& up, const LinkPlan& down) {
     RelayConfig config;
@@ -97,13 +80,11 @@ class StreamFaults : public testing::Test {
     return static_cast<double>(encode.delta_bytes) / static_cast<double>(encode.encodes) * 60.0;
   }
 
-  std::unique_ptr<Server> server_;
   std::unique_ptr<LoadViewers> viewers_;
 };
 
 TEST_F(StreamFaults, ResetsAtEveryPlaceLeaveNothingBehind) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   watch();
   const size_t descriptors = open_descriptors();
   // In bytes: the HTTP answer, the Welcome, the asset, the first keyframe, the stream; and upwards request,
@@ -129,8 +110,7 @@ TEST_F(StreamFaults, ResetsAtEveryPlaceLeaveNothingBehind) {
 TEST_F(StreamFaults, StalledViewersAreDroppedAndCounted) {
   NetLimits limits;
   limits.stalled_ms = 1'500;
-  ASSERT_NO_FATAL_FAILURE(start(limits));
-  if (server_ == nullptr) return;
+  if (!start(limits)) return;
   watch();
   LoadViewers stalled({"127.0.0.1", server_->port(), {}});
   ASSERT_TRUE(stalled.join({StreamMode::Strands, true, false}).ok());
@@ -144,8 +124,7 @@ TEST_F(StreamFaults, StalledViewersAreDroppedAndCounted) {
 
 TEST_F(StreamFaults, SlowLinkGetsACheaperClassThatOthersDoNotNotice) {
   // Large enough that the stream, not the asset, is what the link has to carry.
-  ASSERT_NO_FATAL_FAILURE(start({}, scene_of(600, 16)));
-  if (server_ == nullptr) return;
+  if (!start({}, test::bald_scene(600, 16))) return;
   watch();
   const double full = full_bytes_per_s();
   for (const double share : {0.25}) {
@@ -188,8 +167,7 @@ TEST_F(StreamFaults, SlowLinkGetsACheaperClassThatOthersDoNotNotice) {
 // The first thing that a slow link costs is strands: announced, and completed in the picture.
 TEST_F(StreamFaults, SlowLinkGetsFewerStrandsFirst) {
   constexpr uint32_t kStrands = 1'000;
-  ASSERT_NO_FATAL_FAILURE(start({}, scene_of(kStrands, 12)));
-  if (server_ == nullptr) return;
+  if (!start({}, test::bald_scene(kStrands, 12))) return;
   watch();
   LinkPlan slow;
   slow.bytes_per_s = static_cast<uint64_t>(0.45 * full_bytes_per_s());
@@ -231,8 +209,7 @@ TEST_F(StreamFaults, SlowLinkGetsFewerStrandsFirst) {
 }
 
 TEST_F(StreamFaults, OneEncodeServesEveryViewer) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   for (int i = 0; i < 24; ++i) ASSERT_TRUE(viewers_->join({}).ok());
   ASSERT_TRUE(run_until(*viewers_, [&] { return viewers_->watching_count() == 24; }));
   const ServerCounters before = server_->counters();
@@ -247,8 +224,7 @@ TEST_F(StreamFaults, OneEncodeServesEveryViewer) {
 }
 
 TEST_F(StreamFaults, DelayAloneCostsNoFrames) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   for (const int64_t round_trip_ms : {20, 300}) {
     LinkPlan plan;
     plan.delay_us = round_trip_ms * 500;
@@ -267,8 +243,7 @@ TEST_F(StreamFaults, DelayAloneCostsNoFrames) {
 }
 
 TEST_F(StreamFaults, FreezesAreCaughtUpFromTheNewestState) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   watch();
   LinkPlan freezing;
   freezing.freeze_every_us = 1'000'000;
@@ -277,9 +252,12 @@ TEST_F(StreamFaults, FreezesAreCaughtUpFromTheNewestState) {
   LoadViewers victim({"127.0.0.1", link->port(), {}});
   ASSERT_TRUE(victim.join({}).ok());
   ASSERT_TRUE(run_until(victim, [&] { return victim.measures().frames > 10; }));
+  const uint64_t encodes = server_->counters().encode.encodes;
   const uint64_t frames = victim.measures().frames;
   victim.run_for(3'000);
-  EXPECT_GE(victim.measures().frames - frames, 60u) << "180 steps, of which a fifth lay in freezes";
+  const uint64_t made = server_->counters().encode.encodes - encodes;
+  EXPECT_GT(made, 0u);
+  EXPECT_GE(3 * (victim.measures().frames - frames), made) << "a fifth of the time lay in freezes";
   EXPECT_EQ(victim.measures().chain_errors, 0u);
   EXPECT_EQ(victim.measures().ended, 0u);
   expect_undisturbed();
@@ -289,8 +267,7 @@ TEST_F(StreamFaults, HalfOpenPeersAreNoticedOnBothSides) {
   NetLimits limits;
   limits.idle_ms = 1'500;
   limits.stalled_ms = 1'500;
-  ASSERT_NO_FATAL_FAILURE(start(limits));
-  if (server_ == nullptr) return;
+  if (!start(limits)) return;
   const auto link = relay({}, {});
   ClientConfig config;
   config.address.port = link->port();
@@ -307,8 +284,7 @@ TEST_F(StreamFaults, HalfOpenPeersAreNoticedOnBothSides) {
 }
 
 TEST_F(StreamFaults, CorruptedBytesEndConnectionsAndNothingElse) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   watch();
   LinkPlan wrong;
   wrong.corrupt_per_byte = 1e-4;
@@ -340,8 +316,7 @@ TEST_F(StreamFaults, CorruptedBytesEndConnectionsAndNothingElse) {
 }
 
 TEST_F(StreamFaults, ViewersThatComeAndGoLeaveNoDescriptors) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   watch();
   const size_t descriptors = open_descriptors();
   LoadViewers crowd({"127.0.0.1", server_->port(), {}});
@@ -357,8 +332,7 @@ TEST_F(StreamFaults, ViewersThatComeAndGoLeaveNoDescriptors) {
 }
 
 TEST_F(StreamFaults, AViewerComesBackAfterResetsAndStopsWhenItMust) {
-  ASSERT_NO_FATAL_FAILURE(start());
-  if (server_ == nullptr) return;
+  if (!start()) return;
   const auto link = relay({}, {});
   ClientConfig config;
   config.address.port = link->port();
@@ -369,7 +343,7 @@ TEST_F(StreamFaults, AViewerComesBackAfterResetsAndStopsWhenItMust) {
   EXPECT_FALSE((*live)->final_error());
   // Another server stands there now, and it wants a token: no loop, the reason stays.
   ServerConfig strict;
-  strict.scene = small_scene();
+  strict.scene = test::bald_scene();
   strict.net.port = 0;
   strict.net.tokens = {{"0123456789abcdef", Grant::AllButAdmin}};
   auto other = Server::start(strict);

@@ -10,6 +10,7 @@
 #include "client/net/http_get.h"
 #include "client/net/reconnect_policy.h"
 #include "client/net/viewer_client.h"
+#include "common/net/tls_private.h"
 #include "tests/support/server_net_fixture.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificate.h"
@@ -41,8 +42,46 @@ int reason_of_refusal(uint16_t port, int version) {
   return reason;
 }
 
+using SslContext = std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)>;
+
+/// Takes away what OpenSSL itself has against old versions: its security level, and ciphers that they lack.
+void allow_all(SSL_CTX* context) {
+  SSL_CTX_set_security_level(context, 0);
+  EXPECT_EQ(SSL_CTX_set_cipher_list(context, "ALL:@SECLEVEL=0"), 1);
+}
+
+/// A side that speaks this version of TLS only.
+SslContext only_version(int version, const TlsFiles& files) {
+  SslContext context(SSL_CTX_new(TLS_method()), SSL_CTX_free);
+  allow_all(context.get());
+  EXPECT_EQ(SSL_CTX_set_min_proto_version(context.get(), version), 1);
+  EXPECT_EQ(SSL_CTX_set_max_proto_version(context.get(), version), 1);
+  EXPECT_EQ(SSL_CTX_use_certificate_file(context.get(), files.certificate.c_str(), SSL_FILETYPE_PEM), 1);
+  EXPECT_EQ(SSL_CTX_use_PrivateKey_file(context.get(), files.key.c_str(), SSL_FILETYPE_PEM), 1);
+  return context;
+}
+
+/// A handshake in memory.
+bool can_shake_hands(SSL_CTX* server, SSL_CTX* client) {
+  const std::unique_ptr<SSL, decltype(&SSL_free)> accepts(SSL_new(server), SSL_free);
+  const std::unique_ptr<SSL, decltype(&SSL_free)> connects(SSL_new(client), SSL_free);
+  BIO* to_client = nullptr;
+  BIO* to_server = nullptr;
+  EXPECT_EQ(BIO_new_bio_pair(&to_client, 0, &to_server, 0), 1);
+  SSL_set_bio(accepts.get(), to_client, to_client);
+  SSL_set_bio(connects.get(), to_server, to_server);
+  SSL_set_accept_state(accepts.get());
+  SSL_set_connect_state(connects.get());
+  constexpr int kTurns = 10;
+  bool is_accepted = false, is_connected = false;
+  for (int i = 0; i < kTurns && !(is_accepted && is_connected); ++i) {
+    is_connected = SSL_do_handshake(connects.get()) == 1;
+    is_accepted = SSL_do_handshake(accepts.get()) == 1;
+  }
+  return is_accepted && is_connected;
+}
+
 using test::CertificatePlan;
-using test::eventually;
 using test::make_certificate;
 using test::RawClient;
 using testing::HasSubstr;
@@ -290,6 +329,22 @@ TEST_F(Tls, StopSaysGoodbyeOverIt) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) end = closed->error;
   ASSERT_TRUE(end);
   EXPECT_THAT(end->to_string(), HasSubstr("stopping"));
+}
+
+TEST(TlsContexts, RefuseOldVersionsEvenWhereOpenSslAllowsThem) {
+  const TemporaryFolder folder;
+  const TlsFiles files = make_certificate(folder.path(), "server");
+  const auto server = make_server_tls(files);
+  const auto client = make_client_tls(files.certificate);
+  ASSERT_TRUE(server.ok() && client.ok());
+  for (const TlsContextPtr& ours : {*server, *client}) allow_all(ours->ssl.native_handle());
+  for (const int version : {TLS1_VERSION, TLS1_1_VERSION, TLS1_2_VERSION, TLS1_3_VERSION}) {
+    const SslContext other = only_version(version, files);
+    EXPECT_TRUE(can_shake_hands(other.get(), other.get())) << version << " as such";
+    const bool is_new = version >= TLS1_2_VERSION;
+    EXPECT_EQ(can_shake_hands((*server)->ssl.native_handle(), other.get()), is_new) << version;
+    EXPECT_EQ(can_shake_hands(other.get(), (*client)->ssl.native_handle()), is_new) << version;
+  }
 }
 
 TEST(TlsFilesOfServer, AreReadWithCare) {

@@ -7,7 +7,6 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
-#include <thread>
 
 namespace strandcast::test {
 namespace {
@@ -158,10 +157,6 @@ std::string http_get(uint16_t port, const std::string& path, const std::string& 
   RawClient client(port);
   client.send_raw("GET " + path + " HTTP/1.1\r\nHost: " + (host.empty() ? "127.0.0.1" : host) + "\r\n\r\n");
   return client.read_raw_to_end();
-}
-
-void sleep_ms(int duration_ms) {
-  std::this_thread::sleep_for(std::chrono::milliseconds(duration_ms));
 }
 
 }  // namespace strandcast::test

@@ -84,18 +84,4 @@ class RawClient {
 /// GET `path` with this Host; the whole answer as text.
 std::string http_get(uint16_t port, const std::string& path, const std::string& host = {});
 
-/// Calls `condition` until it is true; false after a generous time.
-template <class Condition>
-bool eventually(Condition condition);
-void sleep_ms(int duration_ms);
-template <class Condition>
-bool eventually(Condition condition) {
-  constexpr int kAttempts = 3'000;
-  for (int i = 0; i < kAttempts; ++i) {
-    if (condition()) return true;
-    sleep_ms(10);
-  }
-  return false;
-}
-
 }  // namespace strandcast::test

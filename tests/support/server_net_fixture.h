@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/net/net_server.h"
+#include "tests/support/eventually.h"
 #include "tests/support/raw_client.h"
 
 namespace strandcast::test {

@@ -149,7 +149,22 @@ class Viewer {
       if (step_ % divisor == 0) offer(Opcode::StrandDelta);
     }
     if (time_ns % (50 * kMs) == 0) adapt();
+    probe();
     pump();
+  }
+
+  /// What Session's probe does: a ping a second, which waits in the queue like everything else.
+  void probe() {
+    if (pong_ns_ > 0 && time_ns >= pong_ns_ && !link.is_frozen(time_ns)) {
+      flow.on_round_trip(time_ns - pinged_ns_, time_ns);
+      pong_ns_ = 0;
+    }
+    if (pong_ns_ != 0 || time_ns - pinged_ns_ < kS) return;
+    pinged_ns_ = time_ns;
+    pong_ns_ = std::max(free_ns_, time_ns) + link.round_trip_ns + late_ns();
+  }
+  int64_t late_ns() {
+    return static_cast<int64_t>(unit_float(mix_u32(++random_)) * static_cast<double>(link.jitter_ns));
   }
 
   void offer(Opcode opcode) {
@@ -194,9 +209,7 @@ class Viewer {
       queue.written();
       free_ns_ = std::max(free_ns_, time_ns) +
                  static_cast<int64_t>(static_cast<double>(sent->message.size()) / link.bytes_per_s * 1e9);
-      const double late = unit_float(mix_u32(++random_));
-      const int64_t ack_ns =
-          free_ns_ + link.round_trip_ns + static_cast<int64_t>(late * static_cast<double>(link.jitter_ns));
+      const int64_t ack_ns = free_ns_ + link.round_trip_ns + late_ns();
       on_its_way_.push_back({sent, std::max(ack_ns, on_its_way_.empty() ? 0 : on_its_way_.back().ack_ns)});
     }
   }
@@ -218,7 +231,7 @@ class Viewer {
   int64_t looked_ns_ = 0;
   std::deque<OnItsWay> on_its_way_;
   std::map<const EncodedFrame*, int64_t> made_ns_;
-  int64_t next_step_ns_ = 0, free_ns_ = 0, keyframe_asked_ns_ = -kS;
+  int64_t pinged_ns_ = 0, pong_ns_ = 0, next_step_ns_ = 0, free_ns_ = 0, keyframe_asked_ns_ = -kS;
   uint64_t step_ = 0;
   uint32_t sequence_ = 0, random_ = 0;
 };
