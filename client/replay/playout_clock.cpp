@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "common/base/quantile.h"
+
 namespace strandcast {
 namespace {
 
@@ -50,14 +52,11 @@ void PlayoutClock::fit() {
     const double ds = static_cast<double>(sample.sim_time_ns - first.sim_time_ns) - mean_sim_ns_;
     lateness_ns.push_back(std::max(0.0, dr - ds * client_per_sim));
   }
-  const auto rank = static_cast<size_t>(kLatenessQuantile * (count - 1.0));
-  std::nth_element(lateness_ns.begin(), lateness_ns.begin() + static_cast<ptrdiff_t>(rank),
-                   lateness_ns.end());
+  const double late_ns = quantile(std::move(lateness_ns), kLatenessQuantile);
   const double frame_ns = std::min(
       static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0) * client_per_sim,
       static_cast<double>(kPlayoutGapNs));
-  delay_ns_ =
-      static_cast<int64_t>(frame_ns) + std::min(static_cast<int64_t>(lateness_ns[rank]), kMaxPlayoutDelayNs);
+  delay_ns_ = static_cast<int64_t>(frame_ns) + std::min(static_cast<int64_t>(late_ns), kMaxPlayoutDelayNs);
 }
 
 int64_t PlayoutClock::sim_time_at(int64_t client_time_ns) const {

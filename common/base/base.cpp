@@ -1,6 +1,5 @@
 #include <sys/stat.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +12,7 @@
 #include "common/base/hash.h"
 #include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/base/quantile.h"
 #include "common/base/result.h"
 
 namespace strandcast {
@@ -115,11 +115,7 @@ void StageTimer::add_ms(double value_ms) {
 }
 
 double StageTimer::quantile_ms(double quantile) const {
-  if (window_ms_.empty()) return 0.0;
-  std::vector<double> sorted = window_ms_;
-  const auto index = static_cast<size_t>(quantile * static_cast<double>(sorted.size() - 1) + 0.5);
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(index), sorted.end());
-  return sorted[index];
+  return strandcast::quantile(window_ms_, quantile);
 }
 
 }  // namespace strandcast

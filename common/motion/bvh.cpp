@@ -7,6 +7,7 @@
 
 #include "common/base/check.h"
 #include "common/base/file.h"
+#include "common/base/quantile.h"
 #include "common/motion/text_cursor.h"
 
 namespace strandcast {
@@ -313,8 +314,7 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
   for (size_t i = 1; i < poses.size(); ++i)
     steps.push_back(glm::distance(poses[i - 1].position_m, poses[i].position_m));
   const double first = steps.front();
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  return first > kTPoseStepRatio * steps[steps.size() / 2];
+  return first > kTPoseStepRatio * median(std::move(steps));
 }
 
 /// From the file's axes and units to world axes and metres.

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "common/base/quantile.h"
+
 namespace strandcast {
 namespace {
 
@@ -61,8 +63,7 @@ std::vector<float> scalp_cover(const SceneAsset& asset, float reach_m) {
   const uint32_t step = asset.strand_count / kMedianSamples + 1;
   for (uint32_t i = 0; i < asset.strand_count; i += step)
     around.push_back(grid.weight_at(asset.rest_position_m[i]));
-  std::nth_element(around.begin(), around.begin() + around.size() / 2, around.end());
-  const float full = kFullShare * around[around.size() / 2];
+  const float full = kFullShare * median(std::move(around));
   for (size_t i = 0; i < cover.size(); ++i)
     cover[i] = std::min(1.0f, grid.weight_at(asset.head.position_m[i]) / full);
   return cover;

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/base/profile.h"
+#include "common/base/quantile.h"
 #include "common/codec/strand_codec.h"
 
 namespace strandcast {
@@ -171,12 +172,11 @@ Result<StreamLatency> measure_latency(const StreamRecording& recording, const st
     stages.end_frame();
     sizes.push_back(static_cast<double>(received.size()));
   }
-  std::nth_element(sizes.begin(), sizes.begin() + static_cast<ptrdiff_t>(sizes.size() / 2), sizes.end());
   return StreamLatency{recording.motion_name,
                        {shape.strand_count, shape.vertex_count},
                        codec,
                        bound_m,
-                       sizes[sizes.size() / 2],
+                       median(sizes),
                        stages.stages(),
                        stages.total()};
 }

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <string>
 
+#include "common/base/quantile.h"
 #include "common/codec/picture_decoder.h"
 #include "common/codec/strand_codec.h"
 #include "common/gl/egl_context.h"
@@ -92,12 +93,6 @@ Result<std::vector<Sequence>> draw(const Options& options) {
   for (int step = 0; step < kIdleSteps; ++step) (void)run.next();
   ASSIGN_OR_RETURN(Sequence idle, take("idle"));
   return std::vector<Sequence>{std::move(moving), std::move(idle)};
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 /// Processor time of this thread, on which all codecs run: others on the machine do not count.

@@ -10,6 +10,7 @@
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
 #include "common/base/profile.h"
+#include "common/base/quantile.h"
 #include "tests/tools/load_viewers.h"
 
 namespace {

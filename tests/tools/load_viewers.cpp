@@ -255,11 +255,4 @@ void LoadViewers::reset_measures() {
   state_->measures_ = std::move(fresh);
 }
 
-float quantile(std::vector<float> values, double share) {
-  if (values.empty()) return 0.0f;
-  const auto rank = static_cast<ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<size_t>(rank)];
-}
-
 }  // namespace strandcast::load

@@ -80,7 +80,4 @@ class LoadViewers {
   std::unique_ptr<State> state_;
 };
 
-/// The value below which this share of `values` lies; 0 when empty.
-float quantile(std::vector<float> values, double share);
-
 }  // namespace strandcast::load

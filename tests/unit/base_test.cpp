@@ -1,10 +1,12 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <numeric>
 
 #include "common/base/file.h"
 #include "common/base/hash.h"
 #include "common/base/profile.h"
+#include "common/base/quantile.h"
 #include "common/base/result.h"
 
 namespace strandcast {
@@ -71,6 +73,17 @@ TEST(StageTimer, GivesQuantilesOfTheWindow) {
   EXPECT_EQ(timer.quantile_ms(1.0), 101.0);
   for (int i = 0; i < kStageWindow; ++i) timer.add_ms(5.0);
   EXPECT_EQ(timer.quantile_ms(1.0), 5.0);
+}
+
+TEST(Quantile, IsTheValueOfTheNearestRank) {
+  EXPECT_EQ(median(std::vector<double>{}), 0.0);
+  EXPECT_EQ(median(std::vector<double>{7.0}), 7.0);
+  EXPECT_EQ(median(std::vector<int>{5, 1, 3}), 3);
+  EXPECT_EQ(median(std::vector<int>{4, 1, 3, 2}), 3) << "the upper of the two in the middle";
+  std::vector<int> hundred_and_one(101);
+  std::iota(hundred_and_one.rbegin(), hundred_and_one.rend(), 0);
+  for (const int percent : {0, 1, 50, 99, 100})
+    EXPECT_EQ(quantile(hundred_and_one, percent / 100.0), percent);
 }
 
 }  // namespace
