@@ -1,5 +1,7 @@
+#include <linux/sockios.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
+#include <sys/ioctl.h>
 
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/post.hpp>
@@ -47,6 +49,10 @@ NetStream::Socket& NetStream::socket() {
 }
 bool NetStream::is_tls() const {
   return state_->tls.has_value();
+}
+size_t NetStream::untaken_bytes() {
+  int bytes = 0;
+  return ioctl(state_->socket.native_handle(), SIOCOUTQ, &bytes) == 0 ? static_cast<size_t>(bytes) : 0;
 }
 void NetStream::close() {
   error_code ignored;

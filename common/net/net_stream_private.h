@@ -33,6 +33,8 @@ class NetStream {
   executor_type get_executor();
   Socket& socket();
   bool is_tls() const;
+  /// What was written and the other side's kernel has not taken yet; its getting less shows a link at work.
+  size_t untaken_bytes();
   /// Closes at once.
   void close();
 

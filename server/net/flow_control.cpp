@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/base/quantile.h"
+
 namespace strandcast {
 namespace {
 
@@ -29,12 +31,6 @@ bool is_keyframe(const FrameHeader& header) {
          (is_chained_picture(header.opcode) && header.base_sequence == 0);
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 void FlowControl::on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns) {
@@ -44,6 +40,13 @@ void FlowControl::on_sent(const FrameHeader& header, size_t bytes, int64_t time_
                         in_flight_.empty(), bytes, time_ns});
   in_flight_bytes_ += bytes;
   if (is_keyframe(header)) keyframe_ = in_flight_.back();
+}
+
+void FlowControl::on_written(const FrameHeader& header, int64_t time_ns) {
+  // What follows is no sign of life: a kernel takes it in for a client that sleeps.
+  if (!in_flight_.empty() && in_flight_.front().stream_id == header.stream_id &&
+      in_flight_.front().sequence == header.sequence)
+    written_ns_ = time_ns;
 }
 
 void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns) {
@@ -160,6 +163,13 @@ int64_t FlowControl::transfer_ns(size_t bytes, int64_t time_ns) const {
   return capacity > 0.0 ? static_cast<int64_t>(static_cast<double>(bytes) / capacity * kNsPerS) : 0;
 }
 
+int64_t FlowControl::oldest_due_ns(int64_t time_ns) const {
+  if (in_flight_.empty()) return 0;
+  const Frame& oldest = in_flight_.front();
+  return std::max({oldest.sent_ns, last_ack_ns_, written_ns_}) + base_ns() +
+         std::min(transfer_ns(oldest.bytes, time_ns), kLongestTransferNs);
+}
+
 /// How long frames may wait behind a keyframe that fills the gate by itself, while its queue drains: they
 /// would be held for being late otherwise, and the next keyframe would be due already.
 int64_t FlowControl::keyframe_allowance_ns(int64_t time_ns) const {
@@ -192,8 +202,8 @@ bool FlowControl::may_send(int64_t time_ns) const {
   if (!has_acks_ || in_flight_.empty()) return true;
   if (in_flight_bytes_ >= kMaxInFlightBytes || in_flight_.size() >= kMaxInFlightFrames) return false;
   const Frame& oldest = in_flight_.front();
-  // What the link can do shows when the asset has arrived; the first keyframe waits for that.
-  if (oldest.is_asset) return false;
+  // What the link can do shows when the asset or the first picture has arrived; all else waits for that.
+  if (oldest.is_asset || (last_ack_ns_ == 0 && in_flight_bytes_ >= kFirstBytes)) return false;
   // Acknowledgements may get lost with a client's queue: it is asked again, slowly, and never given up here.
   if (time_ns - in_flight_.back().sent_ns >= kAskAgainNs) return true;
   const int64_t allowance_ns = keyframe_allowance_ns(time_ns);

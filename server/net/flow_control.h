@@ -21,6 +21,9 @@ inline constexpr int64_t kGateDelayNs = 200 * kNsPerMs;
 inline constexpr int64_t kGateQueueNs = 170 * kNsPerMs;
 /// Nor a keyframe while more than this waits ahead of it: it fills the queue by itself.
 inline constexpr int64_t kStartDelayNs = 50 * kNsPerMs;
+/// Before the first acknowledgement nothing is known of a link: it gets one frame, and no more when it is
+/// this large. Three times what TCP itself begins with (RFC 6928).
+inline constexpr size_t kFirstBytes = 44u << 10;
 /// So many frames may always be on their way: a viewer that draws slowly acknowledges in bursts.
 inline constexpr size_t kFreeFrames = 3;
 inline constexpr size_t kMaxInFlightBytes = 4u << 20;  // but one frame always may
@@ -49,6 +52,8 @@ inline constexpr int64_t kCapacityAgeNs = 30'000 * kNsPerMs;
 /// What a keyframe puts into the queue may take so long to drain; the frames behind it are late by no fault
 /// of theirs.
 inline constexpr int64_t kDrainNs = 3'000 * kNsPerMs;
+/// No frame is expected to take longer, however slow the link seemed.
+inline constexpr int64_t kLongestTransferNs = 30'000 * kNsPerMs;
 /// Without any acknowledgement one more frame is sent this often.
 inline constexpr int64_t kAskAgainNs = 1'000 * kNsPerMs;
 inline constexpr int64_t kBaseWindowNs = 10'000 * kNsPerMs;  // of the shortest round trip
@@ -66,6 +71,8 @@ class FlowControl {
 
   /// A media frame goes to the socket.
   void on_sent(const FrameHeader& header, size_t bytes, int64_t time_ns);
+  /// The link has taken a part of this frame.
+  void on_written(const FrameHeader& header, int64_t time_ns);
   /// Acknowledges this frame and all before it. Numbers that are not on their way are ignored.
   void on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns);
   /// A round trip of something small.
@@ -91,8 +98,9 @@ class FlowControl {
   /// Bytes/s; 0 while unknown: the link has not been the limit.
   double capacity_bytes_per_s(int64_t time_ns) const;
   size_t in_flight_bytes() const { return in_flight_bytes_; }
-  /// Since when the oldest frame waits for its acknowledgement; 0 = none waits.
-  int64_t oldest_sent_ns() const { return in_flight_.empty() ? 0 : in_flight_.front().sent_ns; }
+  /// When the acknowledgement of the oldest frame should be here, by what the link has shown and how far that
+  /// frame has got: on a slow link it may take seconds. 0 = none waits.
+  int64_t oldest_due_ns(int64_t time_ns) const;
 
  private:
   struct Frame {
@@ -130,6 +138,7 @@ class FlowControl {
   std::deque<Frame> in_flight_;  // oldest first
   size_t in_flight_bytes_ = 0;
   int64_t last_ack_ns_ = 0;
+  int64_t written_ns_ = 0;  // the link took a part of what was the oldest frame then
   // Acknowledgements come in bunches, as the client looks.
   int64_t bunch_ns_ = 0;         // the first one of the newest bunch
   int64_t before_bunch_ns_ = 0;  // the last one before it

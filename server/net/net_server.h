@@ -35,8 +35,8 @@ struct NetLimits {
   uint32_t sessions_per_address = kMaxSessionsPerAddress;
   int64_t handshake_ms = 5'000;  // TCP accept to Hello, or to the end of another HTTP request
   int64_t idle_ms = 15'000;      // nothing received, pings included
-  int64_t stalled_ms = 4'500;    // no progress of one write, or a viewer's silence while an answer is due
-  int64_t unused_ms = 30'000;    // frames wait for acknowledgement, although the client sends other things
+  int64_t stalled_ms = 4'500;    // no progress of one write, or a viewer's silence once an answer is due
+  int64_t unused_ms = 30'000;    // an acknowledgement is due, although the client sends other things
   int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
   int64_t link_interval_ms = 250;      // between two looks at a link for the choice of its mode

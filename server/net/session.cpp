@@ -133,11 +133,13 @@ bool Session::is_stalled(int64_t time_ns) const {
   const auto is_past = [&](int64_t since_ns, int64_t limit_ms) {
     return time_ns - since_ns >= limit_ms * kNsPerMs;
   };
-  if (is_writing_ && is_past(write_since_ns_, limits.stalled_ms)) return true;
-  const int64_t oldest_ns = flow_.oldest_sent_ns();
-  if (oldest_ns != 0 && is_past(std::max(oldest_ns, received_ns_), limits.stalled_ms)) return true;
-  if (oldest_ns != 0 && is_past(oldest_ns, limits.unused_ms)) return true;
-  return is_probe_under_way_ && is_past(std::max(probe_sent_ns_, received_ns_), limits.stalled_ms);
+  if (is_writing_ && is_past(progress_ns_, limits.stalled_ms)) return true;
+  const int64_t due_ns = flow_.oldest_due_ns(time_ns);
+  if (due_ns != 0 && is_past(due_ns, limits.unused_ms)) return true;
+  // What is on its way holds up the answer to a probe as well.
+  const int64_t heard_ns = std::max({due_ns, received_ns_, is_writing_ ? progress_ns_ : 0});
+  if (due_ns != 0 && is_past(heard_ns, limits.stalled_ms)) return true;
+  return is_probe_under_way_ && is_past(std::max(probe_sent_ns_, heard_ns), limits.stalled_ms);
 }
 
 void Session::pump() {
@@ -164,13 +166,18 @@ void Session::pump() {
 }
 
 void Session::write_chunk() {
-  write_since_ns_ = now_ns();
+  note_progress(now_ns());
   const size_t byte_count = std::min(unwritten_.size(), kWriteChunkBytes);
   const bool is_last = byte_count == unwritten_.size();
   socket_.async_write_some(is_last, asio::buffer(unwritten_.data(), byte_count),
                            [self = shared_from_this()](const beast::error_code& error, size_t written_count) {
                              self->guarded([&] { self->on_written(error, written_count); });
                            });
+}
+
+void Session::note_progress(int64_t time_ns) {
+  progress_ns_ = time_ns;
+  if (media_ != nullptr) flow_.on_written(media_->header, time_ns);
 }
 
 void Session::on_written(const beast::error_code& error, size_t byte_count) {
@@ -220,6 +227,9 @@ void Session::check_deadlines(int64_t time_ns) {
     context_.count(&NetCounters::timeouts);
     return close(CloseCode::Policy, fmt::format("No Hello within {} ms.", limits.handshake_ms));
   }
+  // A write ends when the kernel has room for all of it, which on a slow link takes long.
+  const size_t untaken_bytes = is_writing_ ? socket_.next_layer().untaken_bytes() : 0;
+  if (untaken_bytes < std::exchange(untaken_bytes_, untaken_bytes)) note_progress(time_ns);
   if (is_stalled(time_ns)) {
     context_.count(&NetCounters::stalled);
     log_warn("net", "session {} from {}: takes nothing for {} ms, dropped", id_, peer_.address,

@@ -138,4 +138,5 @@ void Session::reject(CloseCode code, const std::string& reason) {
   log_warn("net", "session {} from {}: {}", id_, peer_.address, reason);
   close(code, reason);
 }
+
 }  // namespace strandcast::net

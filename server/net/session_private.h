@@ -68,6 +68,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void pump();
   void write_chunk();
   void on_written(const beast::error_code& error, size_t byte_count);
+  void note_progress(int64_t time_ns);
   void start_close();
   void ask_for_keyframe(int64_t time_ns);
   void on_ack(const FrameAck& ack, int64_t time_ns);
@@ -117,7 +118,8 @@ class Session : public std::enable_shared_from_this<Session> {
   bool is_close_started_ = false;
   CloseCode close_code_ = CloseCode::Normal;
   int64_t state_since_ns_ = 0;
-  int64_t write_since_ns_ = 0;
+  int64_t progress_ns_ = 0;   // of the write under way
+  size_t untaken_bytes_ = 0;  // when it was looked at last
   int64_t keyframe_asked_ns_ = 0;
   int64_t link_reported_ns_ = 0;
   int64_t received_ns_ = 0;          // the newest message

@@ -130,7 +130,7 @@ class SessionGame {
     CHECK(flow_.in_flight_bytes() <= kMaxInFlightBytes + kLargestFrame);
     CHECK(flow_.queue_delay_ns() >= 0 && flow_.base_ns() >= 0);
     CHECK(std::isfinite(flow_.capacity_bytes_per_s(time_ns_)));
-    CHECK(flow_.oldest_sent_ns() <= time_ns_);
+    CHECK(flow_.oldest_due_ns(time_ns_) <= time_ns_ + flow_.base_ns() + kLongestTransferNs);
     CHECK(control_count_ <= kMaxQueuedControl);
   }
 

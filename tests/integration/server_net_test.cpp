@@ -270,6 +270,24 @@ TEST_F(ServerNet, StalledReaderIsDroppedAndCounted) {
   EXPECT_TRUE(eventually([&] { return server_->counters().open_sessions == 0; }));
 }
 
+// What the kernel holds of a write has to shrink by half before the next part fits.
+TEST_F(ServerNet, ASlowReaderIsNotAStalledOne) {
+  app_.asset_bytes = 4'000'000;
+  NetConfig config;
+  config.limits.stalled_ms = 1'500;
+  start(config);
+  for (const bool acknowledges : {true, false}) {
+    Hello slow = hello();
+    slow.acknowledges = acknowledges;
+    const auto client = join(slow, 4'096);
+    for (int i = 0; i < 90; ++i) {
+      ASSERT_TRUE(client->read_raw(1'500)) << "after " << i << " parts";
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+  EXPECT_EQ(server_->counters().stalled, 0u);
+}
+
 TEST_F(ServerNet, UnreadControlMessagesCloseTheSession) {
   app_.asset_bytes = 8'000'000;  // the first write never ends, so control messages pile up behind it
   start();

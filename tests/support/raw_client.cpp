@@ -98,6 +98,12 @@ void RawClient::send_raw(const std::string& bytes) {
       [&](auto handler) { asio::async_write(state_->socket.next_layer(), asio::buffer(bytes), handler); });
 }
 
+bool RawClient::read_raw(size_t byte_count) {
+  std::vector<std::byte> bytes(byte_count);
+  return !state_->wait(
+      [&](auto handler) { asio::async_read(state_->socket.next_layer(), asio::buffer(bytes), handler); });
+}
+
 std::string RawClient::read_raw_to_end() {
   std::string text;
   state_->wait([&](auto handler) {

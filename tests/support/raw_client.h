@@ -47,6 +47,8 @@ class RawClient {
   void send_text(const std::string& text);
   /// Bytes below WebSocket.
   void send_raw(const std::string& bytes);
+  /// So many bytes below WebSocket; false when the connection ends before.
+  bool read_raw(size_t byte_count);
   /// Everything until the server closes, below WebSocket.
   std::string read_raw_to_end();
 

@@ -97,7 +97,7 @@ TEST(FlowControl, StalledViewerGetsNothingButAKnockNowAndThen) {
   const size_t held = viewer.flow.in_flight_bytes();
   viewer.run(5 * kS);
   EXPECT_LE(viewer.flow.in_flight_bytes(), held + 6 * kKeyframeBytes);
-  EXPECT_NE(viewer.flow.oldest_sent_ns(), 0);
+  EXPECT_NE(viewer.flow.oldest_due_ns(viewer.time_ns), 0);
   viewer.reads = true;
   viewer.run(2 * kS);
   const int64_t from_ns = viewer.time_ns;
@@ -155,7 +155,55 @@ TEST(FlowControl, WithoutAcknowledgementsNothingIsHeld) {
     EXPECT_TRUE(flow.may_send(i));
   }
   EXPECT_EQ(flow.in_flight_bytes(), 0u);
-  EXPECT_EQ(flow.oldest_sent_ns(), 0);
+  EXPECT_EQ(flow.oldest_due_ns(1'000), 0);
+}
+
+TEST(FlowControl, ALinkIsNotFloodedBeforeItsFirstAcknowledgement) {
+  for (const size_t bytes : {size_t{4} << 10, kFirstBytes, 2 * kFirstBytes}) {
+    FlowControl flow;
+    flow.expect_acks();
+    FrameHeader header;
+    header.opcode = Opcode::JpegTiles;
+    int64_t time_ns = kS;
+    for (; flow.may_send(time_ns) && header.sequence < 1'000; time_ns += kMs) {
+      ++header.sequence;
+      flow.on_sent(header, bytes, time_ns);
+    }
+    EXPECT_EQ(flow.in_flight_bytes(), std::max(kFirstBytes, bytes));
+    EXPECT_FALSE(flow.may_send(time_ns + 10 * kS));
+    flow.on_ack(header.stream_id, header.sequence, time_ns + 10 * kS);
+    EXPECT_TRUE(flow.may_send(time_ns + 10 * kS));
+  }
+}
+
+TEST(FlowControl, AnAcknowledgementIsDueWhenTheLinkCanHaveCarriedItsFrame) {
+  FlowControl flow;
+  flow.expect_acks();
+  flow.on_round_trip(20 * kMs, 1 * kS);
+  FrameHeader asset;
+  asset.opcode = Opcode::Asset;
+  asset.sequence = 1;
+  flow.on_sent(asset, 20'000, 1 * kS);
+  EXPECT_EQ(flow.oldest_due_ns(2 * kS), 1 * kS + 20 * kMs) << "nothing is known of the rate";
+  flow.on_written(asset, 3 * kS);
+  EXPECT_EQ(flow.oldest_due_ns(3 * kS), 3 * kS + 20 * kMs) << "it gets on";
+
+  flow.on_ack(asset.stream_id, asset.sequence, 3 * kS + 20 * kMs);  // 20 kB in 2 s
+  FrameHeader first = asset, second = asset;
+  first.opcode = second.opcode = Opcode::StrandKeyframe;
+  first.sequence = 2;
+  second.sequence = 3;
+  flow.on_sent(first, 50'000, 4 * kS);
+  EXPECT_NEAR(static_cast<double>(flow.oldest_due_ns(4 * kS)), 9.02 * kS, 1.0 * kMs);
+  flow.on_sent(second, 50'000, 5 * kS);
+  flow.on_written(second, 6 * kS);
+  EXPECT_NEAR(static_cast<double>(flow.oldest_due_ns(6 * kS)), 9.02 * kS, 1.0 * kMs)
+      << "what follows may lie in a kernel's buffer, of a client that sleeps";
+
+  flow.on_ack(second.stream_id, second.sequence, 14 * kS);
+  second.sequence = 4;
+  flow.on_sent(second, 60'000'000, 20 * kS);
+  EXPECT_EQ(flow.oldest_due_ns(20 * kS), 20 * kS + flow.base_ns() + kLongestTransferNs) << "but not for ever";
 }
 
 TEST(FlowControl, UnknownAndRepeatedAcknowledgementsChangeNothing) {
