@@ -45,6 +45,9 @@ STRANDCAST_INLINE void store_lanes(const IntLanes& lanes, int32_t* to) {
 STRANDCAST_INLINE Lanes gather_lanes(const float* from, const uint32_t* index) {
   return Lanes{from[index[0]], from[index[1]], from[index[2]], from[index[3]]};
 }
+STRANDCAST_INLINE IntLanes gather_lanes(const int32_t* from, const uint32_t* index) {
+  return IntLanes{from[index[0]], from[index[1]], from[index[2]], from[index[3]]};
+}
 
 STRANDCAST_INLINE Lanes square_roots(const Lanes& value) {
   Lanes root;

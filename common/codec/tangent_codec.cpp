@@ -18,12 +18,13 @@
 namespace strandcast {
 namespace {
 
-constexpr uint8_t kTangentCodecNumber = 4;
+constexpr uint8_t kTangentCodecNumber = 5;
 constexpr int kTableLevel = 3;
-constexpr uint8_t kCoarseHistoryFlag = 1;
+constexpr uint8_t kAnchorFlag = 1;
 constexpr size_t kThreadedVertices = 40'000;  // fewer are coded on the calling thread
 
-/// In front of the slices, as it is on the wire; followed by the weights of each class.
+/// Of a delta, as it is on the wire; followed by the weights of each class, those of the shape when it is an
+/// anchor, and the slices.
 struct BodyHead {
   uint8_t flags = 0;
   uint8_t length_blend = 0;
@@ -44,8 +45,9 @@ struct TangentChain {
     sizes.reset(layout);
     tables = make_first_tables();
   }
-  void coarsen(const TangentLayout& layout, const Pose& pose) {
-    history.coarsen(pose);
+  /// After an anchor: what a joiner knows, and no more. The tables stay.
+  void forget_motion(const TangentLayout& layout) {
+    history.forget_motion();
     sizes.reset(layout);
   }
 };
@@ -118,23 +120,6 @@ Snapshot without_lattice(const Snapshot& snapshot) {
   return copy;
 }
 
-/// The rounded history as whole numbers, and back.
-Planes<int32_t> coarse_positions(const TangentHistory& history) {
-  Planes<int32_t> coarse = history.lattice;
-  for (auto& plane : coarse)
-    for (int32_t& value : plane) value >>= kCoarseLatticeShift;
-  return coarse;
-}
-void set_history(const Planes<int32_t>& coarse, TangentHistory& history) {
-  for (size_t axis = 0; axis < 3; ++axis)
-    for (size_t i = 0; i < coarse[axis].size(); ++i)
-      history.lattice[axis][i] =
-          static_cast<int32_t>(static_cast<uint32_t>(coarse[axis][i]) << kCoarseLatticeShift);
-}
-float coarse_unit_m(float quantum_m) {
-  return quantum_m * static_cast<float>(1 << kCoarseLatticeShift);
-}
-
 class TangentEncoder final : public StrandEncoder {
  public:
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
@@ -143,7 +128,7 @@ class TangentEncoder final : public StrandEncoder {
   }
 
   EncodedFramePtr encode(const Snapshot& snapshot) override {
-    return continues(snapshot) ? checked(encode_delta(snapshot, History::Kept).frame) : start(snapshot);
+    return continues(snapshot) ? checked(encode_delta(snapshot)) : start(snapshot);
   }
 
   JoinFrames encode_for_join(const Snapshot& snapshot) override {
@@ -151,13 +136,13 @@ class TangentEncoder final : public StrandEncoder {
       const EncodedFramePtr keyframe = start(snapshot);
       return {keyframe, keyframe};
     }
-    JoinFrames frames = encode_delta(snapshot, History::Coarsened);
+    JoinFrames frames = encode_anchor(snapshot);
     checked(frames.frame);
     return frames;
   }
 
  private:
-  enum class History { Kept, Coarsened };
+  using Slices = std::vector<std::vector<std::byte>>;
 
   bool continues(const Snapshot& snapshot) const {
     return has_chain_ && snapshot.strand_count == layout_.strand_count &&
@@ -173,11 +158,14 @@ class TangentEncoder final : public StrandEncoder {
         has_rest ? std::span<const glm::vec3>(rest_in_head_m_) : std::span<const glm::vec3>());
     chain_.reset(layout_);
     chain_.history.quantum_m = snapshot.quantum_m;
+    // As if the strands had always been where they are: the first frame is an anchor that nobody follows.
     chain_.history.lattice = planes_of(layout_, snapshot);
+    chain_.history.head.pose = snapshot.world_from_head;
     frame_.resize(layout_);
     next_sizes_.reset(layout_);
+    no_sizes_.reset(layout_);
     has_chain_ = true;
-    return checked(encode_delta(snapshot, History::Coarsened).keyframe);
+    return checked(encode_anchor(snapshot).keyframe);
   }
 
   /// Too large a frame ends the chain.
@@ -186,86 +174,106 @@ class TangentEncoder final : public StrandEncoder {
     return frame;
   }
 
-  JoinFrames encode_delta(const Snapshot& snapshot, History history) {
-    const bool is_coarsened = history == History::Coarsened;
-    std::vector<std::byte> joiners_part;
-    if (is_coarsened) {
-      chain_.coarsen(layout_, snapshot.world_from_head);
-      append_history(joiners_part);
-    }
+  /// What every frame begins with; gives the snapshot that will be what it decodes to.
+  Snapshot begin(const Snapshot& snapshot) {
     target_ = planes_of(layout_, snapshot, std::move(target_));
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     fit_motion(layout_, chain_.history, target_, frame_);
-    std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
     writers_.resize(layout_.slice_count());
-    std::vector<std::vector<std::byte>> slices(layout_.slice_count());
-    for (auto& escapes : frame_.escapes) escapes.clear();
     Snapshot decoded = without_lattice(snapshot);
     decoded.lattice = std::move(lattice_);
     decoded.lattice.resize(3 * snapshot.plane_size());
+    return decoded;
+  }
+
+  EncodedFramePtr encode_delta(const Snapshot& snapshot) {
+    Snapshot decoded = begin(snapshot);
+    for (auto& escapes : frame_.codes.escapes) escapes.clear();
+    std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
+    Slices slices(layout_.slice_count());
     for_each_slice(layout_, [&](uint32_t slice) {
       quantise_slice(layout_, chain_.history, target_, slice, frame_);
-      write_symbols(layout_, slice, frame_, chain_.sizes, next_sizes_, tables[slice], writers_[slice]);
+      write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables[slice], writers_[slice]);
       writers_[slice].finish(slices[slice]);
       set_lattice(layout_, frame_.lattice, slice, decoded);
     });
     chain_.tables = mean_tables(tables);
-
-    const BodyHead head{is_coarsened ? kCoarseHistoryFlag : uint8_t{0}, frame_.length_blend};
-    std::vector<std::byte> body;
-    body.reserve(sizeof(head) + sizeof(frame_.weights) + layout_.plane_size());
-    ByteWriter(body).put_bytes(std::as_bytes(std::span(&head, 1)));
-    ByteWriter(body).put_bytes(std::as_bytes(std::span(frame_.weights)).first(weight_bytes(layout_)));
-    for (const auto& slice : slices) ByteWriter(body).put_bytes(slice);
-
     remember(chain_.history, frame_);
     std::swap(chain_.sizes, next_sizes_);
+    const EncodedFramePtr frame = make_delta(snapshot, decoded, 0, slices);
+    lattice_ = std::move(decoded.lattice);
+    return frame;
+  }
 
-    FrameHeader header;
-    header.base_sequence = sequence_++;
-    header.sequence = sequence_;
-    header.sim_time_ns = snapshot.sim_time_ns;
-    header.opcode = Opcode::StrandDelta;
+  JoinFrames encode_anchor(const Snapshot& snapshot) {
+    Snapshot decoded = begin(snapshot);
+    frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_);
+    for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
+    Slices slices(layout_.slice_count());
+    Slices shape_slices(layout_.slice_count());
+    for_each_slice(layout_, [&](uint32_t slice) {
+      quantise_anchor(layout_, chain_.history, target_, slice, frame_);
+      TangentTables tables = chain_.tables;
+      write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]);
+      writers_[slice].finish(slices[slice]);
+      tables = chain_.tables;
+      write_symbols(layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]);
+      writers_[slice].finish(shape_slices[slice]);
+      set_lattice(layout_, frame_.lattice, slice, decoded);
+    });
+    remember(chain_.history, frame_);
+    chain_.forget_motion(layout_);
     JoinFrames frames;
-    frames.frame = make_frame(header, decoded, {}, body);
-    if (is_coarsened) {
-      header.opcode = Opcode::StrandKeyframe;
-      header.base_sequence = 0;
-      frames.keyframe = make_frame(header, decoded, joiners_part, body);
-    }
+    frames.frame = make_delta(snapshot, decoded, kAnchorFlag, slices);
+    frames.keyframe = make_keyframe(snapshot, decoded, shape_slices);
     lattice_ = std::move(decoded.lattice);
     return frames;
   }
 
-  static EncodedFramePtr make_frame(const FrameHeader& header, const Snapshot& decoded,
-                                    std::span<const std::byte> joiners_part,
-                                    std::span<const std::byte> body) {
-    std::vector<std::byte> payload;
-    payload.reserve(kStrandFixedBytes + joiners_part.size() + body.size());
-    append_fixed_part(decoded, kTangentCodecNumber, payload);
-    ByteWriter writer(payload);
-    writer.put_bytes(joiners_part);
-    writer.put_bytes(body);
-    return make_encoded_frame(header, payload);
+  /// Of the next frame of the chain, with a body for everybody who follows.
+  EncodedFramePtr make_delta(const Snapshot& snapshot, const Snapshot& decoded, uint8_t flags,
+                             const Slices& slices) {
+    const BodyHead head{flags, frame_.length_blend};
+    std::vector<std::byte> body;
+    body.reserve(sizeof(head) + sizeof(frame_.weights) + sizeof(frame_.shape_weights) + layout_.plane_size());
+    ByteWriter writer(body);
+    writer.put_bytes(std::as_bytes(std::span(&head, 1)));
+    writer.put_bytes(std::as_bytes(std::span(frame_.weights)).first(weight_bytes(layout_)));
+    if ((flags & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
+    for (const auto& slice : slices) writer.put_bytes(slice);
+    FrameHeader header;
+    header.opcode = Opcode::StrandDelta;
+    header.base_sequence = sequence_++;
+    header.sequence = sequence_;
+    header.sim_time_ns = snapshot.sim_time_ns;
+    return make_frame(header, decoded, body);
   }
 
-  /// What a late joiner needs of the chain, just made coarse.
-  void append_history(std::vector<std::byte>& destination) {
-    const Planes<int32_t> position = coarse_positions(chain_.history);
-    const float unit_m = coarse_unit_m(chain_.history.quantum_m);
-    const ShapeWeights weights = fit_shape(layout_, position, unit_m);
+  /// Of the same frame, for a joiner.
+  EncodedFramePtr make_keyframe(const Snapshot& snapshot, const Snapshot& decoded, const Slices& slices) {
     std::vector<std::byte> packed;
     zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, packed);
-    destination.reserve(packed.size() + layout_.plane_size());
-    ByteWriter writer(destination);
+    std::vector<std::byte> body;
+    body.reserve(packed.size() + 2 * layout_.plane_size());
+    ByteWriter writer(body);
     writer.put(static_cast<uint32_t>(packed.size()));
     writer.put_bytes(packed);
-    writer.put_bytes(std::as_bytes(std::span(&weights, 1)));
-    std::vector<ValueWriter> writers(layout_.slice_count());
-    for_each_slice(layout_, [&](uint32_t slice) {
-      write_shape(layout_, weights, unit_m, slice, position, writers[slice]);
-    });
-    for (ValueWriter& slice : writers) slice.finish(destination);
+    writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
+    for (const auto& slice : slices) writer.put_bytes(slice);
+    FrameHeader header;
+    header.opcode = Opcode::StrandKeyframe;
+    header.sequence = sequence_;
+    header.sim_time_ns = snapshot.sim_time_ns;
+    return make_frame(header, decoded, body);
+  }
+
+  static EncodedFramePtr make_frame(const FrameHeader& header, const Snapshot& decoded,
+                                    std::span<const std::byte> body) {
+    std::vector<std::byte> payload;
+    payload.reserve(kStrandFixedBytes + body.size());
+    append_fixed_part(decoded, kTangentCodecNumber, payload);
+    ByteWriter(payload).put_bytes(body);
+    return make_encoded_frame(header, payload);
   }
 
   std::vector<glm::vec3> rest_in_head_m_;
@@ -273,6 +281,7 @@ class TangentEncoder final : public StrandEncoder {
   TangentChain chain_;
   TangentFrame frame_;
   SymbolSizes next_sizes_;
+  SymbolSizes no_sizes_;
   // Kept for their memory.
   Planes<int32_t> target_;
   std::vector<ValueWriter> writers_;
@@ -309,6 +318,7 @@ class TangentDecoder final : public StrandDecoder {
     layout_ = make_tangent_layout(limits_.strand_count, limits_.vertex_count, rest_in_head_m);
     frame_.resize(layout_);
     next_sizes_.reset(layout_);
+    no_sizes_.reset(layout_);
     sequence_ = 0;
   }
 
@@ -319,27 +329,22 @@ class TangentDecoder final : public StrandDecoder {
     ByteReader body(message.body);
     const auto table_bytes = body.take<uint32_t>();
     const auto packed = body.take_bytes(table_bytes);
-    ShapeWeights weights;
-    take_into(body, weights);
+    take_into(body, frame_.shape_weights);
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
                         message.body.size());
     if (auto filled = zstd_.fill(packed, std::as_writable_bytes(std::span(chain.tables))); !filled)
       return at("symbol tables", filled.error());
     RETURN_IF_ERROR(check_tables(chain.tables));
-
-    std::vector<ValueReader> readers(layout_.slice_count());
-    ASSIGN_OR_RETURN(std::span<const std::byte> rest, open_slices(body.rest(), readers));
-    const float unit_m = coarse_unit_m(chain.history.quantum_m);
-    Planes<int32_t> position;
-    for (auto& plane : position) plane.assign(layout_.plane_size(), 0);
-    for_each_slice(layout_, [&](uint32_t slice) {
-      read_shape(layout_, weights, unit_m, slice, position, readers[slice]);
-    });
-    RETURN_IF_ERROR(check_spent(readers));
-    set_history(position, chain.history);
-    chain.history.head.pose = snapshot.world_from_head;
-    RETURN_IF_ERROR(read_body(rest, message, chain, snapshot));
+    TangentTables tables = chain.tables;
+    RETURN_IF_ERROR(
+        read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, snapshot,
+                    [&](uint32_t slice) { place_shape(layout_, chain.history.quantum_m, slice, frame_); }));
+    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    // Only now, with everything checked, the state moves on.
+    frame_.head = {snapshot.world_from_head, {}};
+    remember(chain.history, frame_);
+    chain.forget_motion(layout_);
     chain_ = std::move(chain);
     return {};
   }
@@ -348,53 +353,62 @@ class TangentDecoder final : public StrandDecoder {
     if (message.fixed.quantum_m != chain_.history.quantum_m)
       return make_error(ErrorCode::BadInput, "lattice step changes from {} to {} m within a chain",
                         chain_.history.quantum_m, message.fixed.quantum_m);
-    const bool is_coarsened = !message.body.empty() && message.body[0] == std::byte{kCoarseHistoryFlag};
-    if (!is_coarsened) return read_body(message.body, message, chain_, snapshot);
-    TangentChain chain = chain_;
-    chain.coarsen(layout_, snapshot.world_from_head);
-    RETURN_IF_ERROR(read_body(message.body, message, chain, snapshot));
-    chain_ = std::move(chain);
+    ByteReader body(message.body);
+    BodyHead head;
+    take_into(body, head);
+    const bool is_anchor = head.flags == kAnchorFlag;
+    const auto weights = body.take_bytes(weight_bytes(layout_));
+    if (is_anchor) take_into(body, frame_.shape_weights);
+    if (!body.ok())
+      return make_error(ErrorCode::BadInput, "{} bytes have no room for the weights", message.body.size());
+    if (head.flags > kAnchorFlag)
+      return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
+                        kAnchorFlag);
+    frame_.length_blend = head.length_blend;
+    frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
+    std::memcpy(frame_.weights.data(), weights.data(), weights.size());
+    TangentTables tables = chain_.tables;
+    RETURN_IF_ERROR(
+        read_slices(body.rest(), tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {
+          const auto place = is_anchor ? place_anchor : place_slice;
+          place(layout_, chain_.history, slice, frame_);
+        }));
+    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    // Only now, with everything checked, the state moves on.
+    remember(chain_.history, frame_);
+    if (is_anchor) {
+      chain_.forget_motion(layout_);
+    } else {
+      chain_.tables = tables;
+      std::swap(chain_.sizes, next_sizes_);
+    }
     return {};
   }
 
-  /// Decodes the frame that follows `chain` and, when all of it is right, moves the chain on.
-  Status read_body(std::span<const std::byte> source, const StrandMessage& message, TangentChain& chain,
-                   Snapshot& snapshot) {
-    ByteReader body(source);
-    BodyHead head;
-    take_into(body, head);
-    const auto weights = body.take_bytes(weight_bytes(layout_));
-    if (!body.ok())
-      return make_error(ErrorCode::BadInput, "{} bytes have no room for the weights", source.size());
-    if (head.flags > kCoarseHistoryFlag)
-      return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
-                        kCoarseHistoryFlag);
-    frame_.length_blend = head.length_blend;
-    frame_.head = chain.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
-    std::memcpy(frame_.weights.data(), weights.data(), weights.size());
+  /// Reads `codes` of all slices, to the last byte; place(slice) finds their positions. `tables` become those
+  /// that the slices end with.
+  template <class Place>
+  Status read_slices(std::span<const std::byte> source, TangentTables& tables, const SymbolSizes& sizes,
+                     TangentCodes& codes, Snapshot& snapshot, Place place) {
     std::vector<ValueReader> readers(layout_.slice_count());
-    ASSIGN_OR_RETURN(const auto rest, open_slices(body.rest(), readers));
+    ASSIGN_OR_RETURN(const auto rest, open_slices(source, readers));
     if (!rest.empty())
       return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
                         rest.size());
-    std::vector<TangentTables> tables(layout_.slice_count(), chain.tables);
+    std::vector<TangentTables> learnt(layout_.slice_count(), tables);
     snapshot.lattice.resize(3 * snapshot.plane_size());
     for_each_slice(layout_, kSlicesAtOnce, [&](uint32_t begin, uint32_t count) {
       std::vector<SliceSymbols> symbols;
       for (uint32_t slice = begin; slice < begin + count; ++slice)
-        symbols.push_back({slice, tables[slice], readers[slice]});
-      read_symbols(layout_, chain.sizes, frame_, next_sizes_, symbols);
+        symbols.push_back({slice, learnt[slice], readers[slice]});
+      read_symbols(layout_, sizes, codes, next_sizes_, symbols);
       for (const SliceSymbols& done : symbols) {
-        place_slice(layout_, chain.history, done.slice, frame_);
+        place(done.slice);
         set_lattice(layout_, frame_.lattice, done.slice, snapshot);
       }
     });
     RETURN_IF_ERROR(check_spent(readers));
-    RETURN_IF_ERROR(check_decoded(snapshot, message));
-    // Only now, with everything checked, the state moves on.
-    chain.tables = mean_tables(tables);
-    remember(chain.history, frame_);
-    std::swap(chain.sizes, next_sizes_);
+    tables = mean_tables(learnt);
     return {};
   }
 
@@ -433,6 +447,7 @@ class TangentDecoder final : public StrandDecoder {
   TangentChain chain_;
   TangentFrame frame_;
   SymbolSizes next_sizes_;
+  SymbolSizes no_sizes_;
   ZstdDecompressor zstd_;
   uint32_t sequence_ = 0;
 };

@@ -101,6 +101,11 @@ TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
   layout.rest_length_m.assign(layout.plane_size(), 0.0f);
   for (auto& edge : layout.rest_edge_m) edge.assign(layout.plane_size(), 0.0f);
   if (rest_in_head_m.empty()) return layout;
+  for (size_t place = 0; place < layout.stride; ++place) {
+    if (layout.strand_at[place] == kNoStrand) continue;
+    const glm::vec3 root = rest_in_head_m[layout.strand_at[place]];
+    for (int axis = 0; axis < 3; ++axis) layout.rest_edge_m[static_cast<size_t>(axis)][place] = root[axis];
+  }
   for (size_t v = 1; v < vertex_count; ++v) {
     for (size_t place = 0; place < layout.stride; ++place) {
       const uint32_t strand = layout.strand_at[place];

@@ -27,7 +27,7 @@ struct TangentLayout {
   std::vector<uint32_t> slice_begin;               // (slice_count + 1) first place of each slice
   std::array<std::vector<uint32_t>, 2> neighbour;  // (stride) a place in an earlier block of the slice
   std::vector<float> rest_length_m;                // (vertex_count x stride) of the segment before
-  std::array<std::vector<float>, 3> rest_edge_m;   // (vertex_count x stride) from the vertex before
+  std::array<std::vector<float>, 3> rest_edge_m;   // (vertex_count x stride) from the vertex before; roots
 
   uint32_t slice_count() const { return static_cast<uint32_t>(slice_begin.size()) - 1; }
   uint32_t no_neighbour() const { return stride - kBlockSize; }

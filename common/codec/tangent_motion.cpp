@@ -3,21 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/codec/tangent_row.h"
+#include "common/codec/tangent_shape.h"
 #include "common/codec/wrapping.h"
 
 namespace strandcast {
-namespace {
-
-/// Nearest whole number, ties to even, limited to +-kLargestEdge; -kLargestEdge for NaN.
-int32_t nearest(float value) {
-  const float low = value > -kLargestEdge ? value : -kLargestEdge;
-  const float within = low < kLargestEdge ? low : kLargestEdge;
-  return static_cast<int32_t>((within + kRounder) - kRounder);
-}
-
-}  // namespace
-
 uint32_t motion_class_count(const TangentLayout& layout) {
   const size_t vertices = size_t{layout.strand_count} * layout.vertex_count;
   return vertices < kManyVertices ? kFewMotionClasses : kMotionClassCount;
@@ -66,17 +55,6 @@ FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& hist
           has_grandchild ? then + 2 * stride : zeros};
 }
 
-Escape MotionRow::make_escape(size_t at, const std::array<int32_t, 3>& target) const {
-  Escape escape;
-  escape.at = at;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const int64_t way = int64_t{target[axis]} - history_.lattice[axis][at];
-    const int64_t half = way < 0 ? -kEscapeStep / 2 : kEscapeStep / 2;
-    escape.step[axis] = static_cast<int32_t>((way + half) / kEscapeStep);
-  }
-  return escape;
-}
-
 void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
               std::span<float> sum) {
   constexpr size_t kParts = kBlockSize / kLaneCount;
@@ -95,11 +73,22 @@ void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAn
   }
 }
 
-std::array<int32_t, 3> MotionRow::escaped(const Escape& escape) const {
-  std::array<int32_t, 3> position;
+Escape make_escape(size_t at, const Lattice& target, const Lattice& from) {
+  Escape escape;
+  escape.at = at;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const int64_t way = int64_t{target[axis]} - from[axis];
+    const int64_t half = way < 0 ? -kEscapeStep / 2 : kEscapeStep / 2;
+    escape.step[axis] = static_cast<int32_t>((way + half) / kEscapeStep);
+  }
+  return escape;
+}
+
+Lattice escaped(const Escape& escape, const Lattice& from) {
+  Lattice position;
   for (size_t axis = 0; axis < 3; ++axis) {
     const uint32_t moved = static_cast<uint32_t>(escape.step[axis]) * uint32_t{kEscapeStep};
-    position[axis] = wrapping_sum(history_.lattice[axis][escape.at], static_cast<int32_t>(moved));
+    position[axis] = wrapping_sum(from[axis], static_cast<int32_t>(moved));
   }
   return position;
 }
@@ -112,24 +101,22 @@ void TangentHistory::reset(const TangentLayout& layout) {
   }
 }
 
-void TangentHistory::coarsen(const Pose& pose) {
-  constexpr int32_t kHalf = 1 << (kCoarseLatticeShift - 1);
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t i = 0; i < lattice[axis].size(); ++i) {
-      const int32_t ahead = wrapping_sum(lattice[axis][i], nearest(velocity[axis][i]));
-      const int32_t steps = wrapping_sum(ahead, kHalf) >> kCoarseLatticeShift;
-      lattice[axis][i] = static_cast<int32_t>(static_cast<uint32_t>(steps) << kCoarseLatticeShift);
-    }
-    for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
-      std::fill((*planes)[axis].begin(), (*planes)[axis].end(), 0.0f);
-  }
-  head = {pose, {}};
+void TangentHistory::forget_motion() {
+  for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
+    for (auto& plane : *planes) std::fill(plane.begin(), plane.end(), 0.0f);
+  head = {head.pose, {}};
+}
+
+void TangentCodes::resize(const TangentLayout& layout) {
+  // Zeros, as places without a strand must hold them also after a chain with another layout.
+  for (auto* values : {&first, &second, &length}) values->assign(layout.plane_size(), 0);
+  escapes.assign(layout.slice_count(), {});
 }
 
 void TangentFrame::resize(const TangentLayout& layout) {
   const size_t size = layout.plane_size();
-  // Zeros, as places without a strand must hold them also after a chain with another layout.
-  for (auto* values : {&first, &second, &length}) values->assign(size, 0);
+  codes.resize(layout);
+  shape_codes.resize(layout);
   for (size_t axis = 0; axis < 3; ++axis) {
     lattice[axis].assign(size, 0);
     velocity[axis].assign(size, 0.0f);
@@ -141,12 +128,41 @@ void TangentFrame::resize(const TangentLayout& layout) {
   for (auto& row : edge) row.assign(layout.stride, 0.0f);
   for (auto& planes : neighbour_sum)
     for (auto& row : planes) row.assign(layout.stride, 0.0f);
-  escapes.assign(layout.slice_count(), {});
 }
+
+namespace {
+
+CodeLanes load_codes(const TangentCodes& codes, size_t at) {
+  return {load_lanes(codes.first.data() + at), load_lanes(codes.second.data() + at),
+          load_lanes(codes.length.data() + at)};
+}
+
+/// Goes through the escapes of a slice with its blocks.
+class EscapeWalk {
+ public:
+  explicit EscapeWalk(const std::vector<Escape>& escapes) : next_(escapes.begin()), end_(escapes.end()) {}
+
+  /// Puts the escaped vertices of the block that begins at `at` where they belong; from(lane) is where their
+  /// escapes count from.
+  template <class From>
+  void place(size_t at, IntLaneVectors& position, From from) {
+    for (; next_ != end_ && next_->at < at + kLaneCount; ++next_) {
+      const size_t lane = next_->at - at;
+      const Lattice point = escaped(*next_, from(lane));
+      for (size_t axis = 0; axis < 3; ++axis) position.axis[axis][lane] = point[axis];
+    }
+  }
+
+ private:
+  std::vector<Escape>::const_iterator next_;
+  std::vector<Escape>::const_iterator end_;
+};
+
+}  // namespace
 
 void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
                  TangentFrame& frame) {
-  auto escape = frame.escapes[slice].begin();
+  EscapeWalk escapes(frame.codes.escapes[slice]);
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     const MotionRow row(layout, history, frame, v);
     row.sum_features(slice);
@@ -155,14 +171,46 @@ void place_slice(const TangentLayout& layout, const TangentHistory& history, uin
       Expected expected;
       row.expect(place, expected);
       const size_t at = row.at(place);
-      IntLaneVectors position =
-          expected.placed(load_lanes(frame.first.data() + at), load_lanes(frame.second.data() + at),
-                          load_lanes(frame.length.data() + at));
-      for (; escape != frame.escapes[slice].end() && escape->at < at + kLaneCount; ++escape) {
-        const auto point = row.escaped(*escape);
-        for (size_t axis = 0; axis < 3; ++axis) position.axis[axis][escape->at - at] = point[axis];
-      }
+      IntLaneVectors position = expected.placed(load_codes(frame.codes, at));
+      escapes.place(at, position, [&](size_t lane) { return row.last(at + lane); });
       row.store(expected, place, position);
+    }
+  }
+}
+
+void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                  TangentFrame& frame) {
+  EscapeWalk escapes(frame.codes.escapes[slice]);
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const MotionRow row(layout, history, frame, v);
+    const ShapeRow shape(layout, history.quantum_m, frame.lattice, v);
+    row.sum_features(slice);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      Expected moved;
+      row.expect(place, moved);
+      const Expected expected = shape.expect(place, frame.shape_weights);
+      const size_t at = row.at(place);
+      IntLaneVectors position =
+          expected.placed(sum_of(expected.codes_of(moved), load_codes(frame.codes, at)));
+      escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
+      row.store(moved, place, position);
+    }
+  }
+}
+
+void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame) {
+  EscapeWalk escapes(frame.shape_codes.escapes[slice]);
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const ShapeRow shape(layout, quantum_m, frame.lattice, v);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      const Expected expected = shape.expect(place, frame.shape_weights);
+      const size_t at = shape.at(place);
+      IntLaneVectors position = expected.placed(load_codes(frame.shape_codes, at));
+      escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
+      for (size_t axis = 0; axis < 3; ++axis)
+        store_lanes(position.axis[axis], frame.lattice[axis].data() + at);
     }
   }
 }

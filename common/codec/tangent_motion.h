@@ -25,12 +25,15 @@ inline constexpr float kMotionWeight = 1.0f / 1024;  // unit of the weights on t
 inline constexpr float kDriftShare = 0.85f;          // of the drift that is left one frame later
 inline constexpr float kLengthWeight = 1.0f / 16;    // unit of the length blend
 inline constexpr int32_t kEscapedLength = 1 << 20;   // in place of a length correction
-inline constexpr int kCoarseLatticeShift = 10;       // a joiner's history is rounded to 4 bounds
+inline constexpr uint32_t kShapeFeatureCount = 16;
+inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest
 
 template <class T>
 using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_count x stride)
 
 using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMotionClassCount>;
+
+using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
 /// What both sides remember of the frames so far.
 struct TangentHistory {
@@ -44,26 +47,39 @@ struct TangentHistory {
   Planes<float> drift;  // sum of all velocities, older ones fading: where strands swing back from
 
   void reset(const TangentLayout& layout);
-  /// Forgets all but where the strands were heading, rounded: what a keyframe tells a late joiner, who knows
-  /// no pose before this one.
-  void coarsen(const Pose& pose);
+  /// Forgets all but where the strands are and the pose: what a keyframe tells a late joiner.
+  void forget_motion();
 };
 
-/// An escaped vertex: position less the last one, in steps of the coarse cubic lattice.
+/// An escaped vertex: position less the last one (of an anchor: less its parent's), in steps of a cubic
+/// lattice.
 struct Escape {
   size_t at = 0;  // place in a plane
   std::array<int32_t, 3> step{};
 };
 
-/// One frame, coded after a history.
-struct TangentFrame {
-  HeadMotion head;
-  MotionWeights weights{};
-  uint8_t length_blend = 0;    // of the last decoded length against the rest length, in 1/16
+/// The integers of one frame.
+struct TangentCodes {
   std::vector<int32_t> first;  // (vertex_count x stride) first coordinate across the segment
   std::vector<int32_t> second;
   std::vector<int32_t> length;               // correction along the segment, or kEscapedLength
   std::vector<std::vector<Escape>> escapes;  // of each slice, in coding order
+
+  void resize(const TangentLayout& layout);
+};
+
+/// One frame, coded after a history.
+///
+/// An *anchor* is a frame that can also be told without a history: its integers count from where the shape of
+/// the strands lets expect a vertex. Who has the history is told how far they are from those that the motion
+/// lets expect.
+struct TangentFrame {
+  HeadMotion head;
+  MotionWeights weights{};
+  uint8_t length_blend = 0;  // of the last decoded length against the rest length, in 1/16
+  TangentCodes codes;
+  ShapeWeights shape_weights{};  // of an anchor
+  TangentCodes shape_codes;      // of an anchor, for who has no history
   Planes<int32_t> lattice;
   Planes<float> velocity;
   Planes<float> residual;
@@ -85,14 +101,23 @@ uint32_t motion_class_count(const TangentLayout& layout);
 void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
                 TangentFrame& frame);
 
+/// Weights that suit the shape of `target` best.
+ShapeWeights fit_shape(const TangentLayout& layout, float quantum_m, const Planes<int32_t>& target);
+
 /// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
-/// decode to.
+/// decode to. Of an anchor it fills both kinds of integers.
 void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
                     uint32_t slice, TangentFrame& frame);
+void quantise_anchor(const TangentLayout& layout, const TangentHistory& history,
+                     const Planes<int32_t>& target, uint32_t slice, TangentFrame& frame);
 
 /// Decoder: positions, velocities and residuals of a slice from its integers.
 void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
                  TangentFrame& frame);
+void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                  TangentFrame& frame);
+/// Decoder: positions of a slice of an anchor from the integers for who has no history.
+void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame);
 
 /// The frame becomes history.
 void remember(TangentHistory& history, TangentFrame& frame);

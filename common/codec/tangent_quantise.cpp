@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/codec/least_squares.h"
-#include "common/codec/tangent_row.h"
+#include "common/codec/tangent_shape.h"
 #include "common/codec/wrapping.h"
 
 namespace strandcast {
@@ -16,29 +16,35 @@ namespace {
 // What is left of the bound when positions were rounded to the lattice (sqrt(3) / 2) and to floats before.
 constexpr int32_t kReach = kStepsPerBound - 3;
 
-/// The cheapest integers that put vertices within reach of their targets. Cheap are small ones: a dead zone
-/// as wide as the bound allows.
+/// The cheapest integers that put vertices within reach of their targets. Cheap are those near `origin`: a
+/// dead zone as wide as the bound allows.
 struct Found {
   const Expected& expected;
   const IntLaneVectors& target;
+  CodeLanes origin{};
   IntLanes is_open{};  // worth trying
   IntLanes is_found{};
-  IntLanes first{};
-  IntLanes second{};
-  IntLanes length{};
+  CodeLanes codes{};
   IntLaneVectors position{};
 
+  /// How far the integers are from the origin, unless escaped.
+  STRANDCAST_INLINE CodeLanes apart() const {
+    return {is_found ? wrapping_differences(codes.first, origin.first) : codes.first,
+            is_found ? wrapping_differences(codes.second, origin.second) : codes.second,
+            is_found ? wrapping_differences(codes.length, origin.length) : codes.length};
+  }
+
   /// Takes these integers for open lanes in which they reach the target.
-  STRANDCAST_INLINE void consider(const IntLanes& a, const IntLanes& b, const IntLanes& correction) {
-    const IntLaneVectors reached = expected.placed(a, b, correction);
+  STRANDCAST_INLINE void consider(const CodeLanes& tried) {
+    const IntLaneVectors reached = expected.placed(tried);
     LaneVectors away;
     for (size_t axis = 0; axis < 3; ++axis)
       away.axis[axis] = to_floats(wrapping_differences(reached.axis[axis], target.axis[axis]));
     // Exact: squares this small are whole numbers below 2^24, and larger ones stay larger.
     const IntLanes is_taken = is_open & (dots(away, away) <= static_cast<float>(kReach * kReach));
-    first = is_taken ? a : first;
-    second = is_taken ? b : second;
-    length = is_taken ? correction : length;
+    codes.first = is_taken ? tried.first : codes.first;
+    codes.second = is_taken ? tried.second : codes.second;
+    codes.length = is_taken ? tried.length : codes.length;
     for (size_t axis = 0; axis < 3; ++axis)
       position.axis[axis] = is_taken ? reached.axis[axis] : position.axis[axis];
     is_found |= is_taken;
@@ -46,7 +52,7 @@ struct Found {
   }
 };
 
-/// Coordinates across the segment, whole numbers around them: towards zero, and away from it.
+/// Coordinates across the segment, whole numbers around them: towards the origin, and away from it.
 struct Corners {
   IntLanes low_a;
   IntLanes low_b;
@@ -54,79 +60,73 @@ struct Corners {
   IntLanes high_b;
   IntLanes is_a_farther;
 
-  STRANDCAST_INLINE Corners(const Lanes& a, const Lanes& b) {
+  STRANDCAST_INLINE Corners(const Expected::Coordinates& of, const CodeLanes& origin) {
     const IntLanes one = IntLanes{} + 1;
-    low_a = to_integers(a);
-    low_b = to_integers(b);
+    const Lanes a = of.first - to_floats(origin.first);
+    const Lanes b = of.second - to_floats(origin.second);
+    const IntLanes whole_a = to_integers(a);
+    const IntLanes whole_b = to_integers(b);
+    low_a = wrapping_sums(origin.first, whole_a);
+    low_b = wrapping_sums(origin.second, whole_b);
     high_a = wrapping_sums(low_a, a < 0.0f ? -one : one);
     high_b = wrapping_sums(low_b, b < 0.0f ? -one : one);
-    is_a_farther = sizes_of(a - to_floats(low_a)) > sizes_of(b - to_floats(low_b));
+    is_a_farther = sizes_of(a - to_floats(whole_a)) > sizes_of(b - to_floats(whole_b));
   }
 
-  /// Towards zero first: the corner of the cell nearest to the expectation, then its sides, then opposite.
+  /// Towards the origin first: the corner of the cell nearest to it, then its sides, then opposite.
   STRANDCAST_INLINE void try_with(const IntLanes& correction, Found& found) const {
-    found.consider(low_a, low_b, correction);
+    found.consider({low_a, low_b, correction});
     if (!is_any(found.is_open)) return;
-    found.consider(is_a_farther ? high_a : low_a, is_a_farther ? low_b : high_b, correction);
+    found.consider({is_a_farther ? high_a : low_a, is_a_farther ? low_b : high_b, correction});
     if (!is_any(found.is_open)) return;
-    found.consider(is_a_farther ? low_a : high_a, is_a_farther ? high_b : low_b, correction);
+    found.consider({is_a_farther ? low_a : high_a, is_a_farther ? high_b : low_b, correction});
     if (!is_any(found.is_open)) return;
-    found.consider(high_a, high_b, correction);
+    found.consider({high_a, high_b, correction});
   }
 };
 
 STRANDCAST_INLINE void find_codes(Found& found) {
-  const Expected& expected = found.expected;
   LaneVectors edge;
   for (size_t axis = 0; axis < 3; ++axis)
-    edge.axis[axis] = to_floats(wrapping_differences(found.target.axis[axis], expected.base.axis[axis]));
-  const Lanes along = dots(edge, expected.along);
-  const Lanes length = square_roots(dots(edge, edge));
-  const Lanes beyond = (length - expected.length) / kLengthStep;
-  // Seen from the vertex before, coordinates where the direction to the target meets the tangent plane.
-  constexpr float kSteepest = 0.2f;
-  const Lanes scale = length > 0.0f ? expected.length / along / kTangentStep : Lanes{};
-  const Lanes a = dots(edge, expected.first) * scale;
-  const Lanes b = dots(edge, expected.second) * scale;
-  constexpr float kFarthest = 1e5f;
-  const IntLanes is_steep = (length > 0.0f) & ~(along > kSteepest * length);
-  const IntLanes is_possible =
-      ~is_steep & (sizes_of(a) < kFarthest) & (sizes_of(b) < kFarthest) & (sizes_of(beyond) < kFarthest);
-  const Corners corners(a, b);
+    edge.axis[axis] =
+        to_floats(wrapping_differences(found.target.axis[axis], found.expected.base.axis[axis]));
+  const Expected::Coordinates of = found.expected.coordinates(edge);
+  const Corners corners(of, found.origin);
   constexpr float kAsIs = 1.3f;  // length steps that the cell may do without a correction
-  const IntLanes rounded = nearest_lanes(beyond);
-  const IntLanes is_near = sizes_of(beyond) <= kAsIs;
-  found.is_open = is_possible;
-  corners.try_with(is_near ? IntLanes{} : rounded, found);
-  found.is_open &= is_near & (rounded != 0);
+  const IntLanes rounded = nearest_lanes(of.length);
+  const IntLanes is_near = sizes_of(of.length - to_floats(found.origin.length)) <= kAsIs;
+  found.is_open = of.is_possible;
+  corners.try_with(is_near ? found.origin.length : rounded, found);
+  found.is_open &= is_near & (rounded != found.origin.length);
   if (is_any(found.is_open)) corners.try_with(rounded, found);
 }
 
-STRANDCAST_INLINE void quantise_block(const MotionRow& row, const Planes<int32_t>& target, size_t place,
-                                      std::vector<Escape>& escapes) {
-  Expected expected;
-  row.expect(place, expected);
-  const size_t at = row.at(place);
-  IntLaneVectors wanted;
-  for (size_t axis = 0; axis < 3; ++axis) wanted.axis[axis] = load_lanes(target[axis].data() + at);
-  Found found{expected, wanted};
-  find_codes(found);
-  if (is_any(~found.is_found)) {
-    for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
-      if (found.is_found[lane] != 0) continue;
-      escapes.push_back(
-          row.make_escape(at + lane, {target[0][at + lane], target[1][at + lane], target[2][at + lane]}));
-      found.first[lane] = 0;
-      found.second[lane] = 0;
-      found.length[lane] = kEscapedLength;
-      const auto point = row.escaped(escapes.back());
-      for (size_t axis = 0; axis < 3; ++axis) found.position.axis[axis][lane] = point[axis];
-    }
+/// Escapes the vertices of the block that begins at `at` for which nothing was found; from(lane) is where
+/// their escapes count from.
+template <class From>
+STRANDCAST_INLINE void escape_others(Found& found, size_t at, std::vector<Escape>& escapes, From from) {
+  if (!is_any(~found.is_found)) return;
+  for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
+    if (found.is_found[lane] != 0) continue;
+    escapes.push_back(make_escape(at + lane, lane_of(found.target, lane), from(lane)));
+    found.codes.first[lane] = 0;
+    found.codes.second[lane] = 0;
+    found.codes.length[lane] = kEscapedLength;
+    const Lattice point = escaped(escapes.back(), from(lane));
+    for (size_t axis = 0; axis < 3; ++axis) found.position.axis[axis][lane] = point[axis];
   }
-  store_lanes(found.first, row.frame().first.data() + at);
-  store_lanes(found.second, row.frame().second.data() + at);
-  store_lanes(found.length, row.frame().length.data() + at);
-  row.store(expected, place, found.position);
+}
+
+STRANDCAST_INLINE IntLaneVectors load_vectors(const Planes<int32_t>& planes, size_t at) {
+  IntLaneVectors vectors;
+  for (size_t axis = 0; axis < 3; ++axis) vectors.axis[axis] = load_lanes(planes[axis].data() + at);
+  return vectors;
+}
+
+STRANDCAST_INLINE void store_codes(const CodeLanes& codes, TangentCodes& to, size_t at) {
+  store_lanes(codes.first, to.first.data() + at);
+  store_lanes(codes.second, to.second.data() + at);
+  store_lanes(codes.length, to.length.data() + at);
 }
 
 constexpr size_t kSampleStrands = 384;
@@ -263,9 +263,43 @@ void quantise_slice(const TangentLayout& layout, const TangentHistory& history, 
     row.sum_features(slice);
     for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
          place += kLaneCount) {
-      quantise_block(row, target, place, frame.escapes[slice]);
+      Expected expected;
+      row.expect(place, expected);
+      const size_t at = row.at(place);
+      const IntLaneVectors wanted = load_vectors(target, at);
+      Found found{expected, wanted};
+      find_codes(found);
+      escape_others(found, at, frame.codes.escapes[slice],
+                    [&](uint32_t lane) { return row.last(at + lane); });
+      store_codes(found.codes, frame.codes, at);
+      row.store(expected, place, found.position);
     }
   }
+}
+
+void quantise_anchor(const TangentLayout& layout, const TangentHistory& history,
+                     const Planes<int32_t>& target, uint32_t slice, TangentFrame& frame) {
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const MotionRow row(layout, history, frame, v);
+    const ShapeRow shape(layout, history.quantum_m, frame.lattice, v);
+    row.sum_features(slice);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      Expected moved;
+      row.expect(place, moved);
+      const Expected expected = shape.expect(place, frame.shape_weights);
+      const size_t at = row.at(place);
+      const IntLaneVectors wanted = load_vectors(target, at);
+      Found found{expected, wanted, expected.codes_of(moved)};
+      find_codes(found);
+      escape_others(found, at, frame.shape_codes.escapes[slice],
+                    [&](uint32_t lane) { return lane_of(expected.base, lane); });
+      store_codes(found.codes, frame.shape_codes, at);
+      store_codes(found.apart(), frame.codes, at);
+      row.store(moved, place, found.position);
+    }
+  }
+  frame.codes.escapes[slice] = frame.shape_codes.escapes[slice];
 }
 
 }  // namespace strandcast

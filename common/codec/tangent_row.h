@@ -76,6 +76,26 @@ struct LastAndBase {
 void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
               std::span<float> sum);
 
+/// The integers of a block.
+struct CodeLanes {
+  IntLanes first{};
+  IntLanes second{};
+  IntLanes length{};
+};
+
+STRANDCAST_INLINE CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
+  return {wrapping_sums(a.first, b.first), wrapping_sums(a.second, b.second),
+          wrapping_sums(a.length, b.length)};
+}
+
+/// Escaped vertices.
+using Lattice = std::array<int32_t, 3>;
+Escape make_escape(size_t at, const Lattice& target, const Lattice& from);
+Lattice escaped(const Escape& escape, const Lattice& from);
+inline Lattice lane_of(const IntLaneVectors& vectors, size_t lane) {
+  return {vectors.axis[0][lane], vectors.axis[1][lane], vectors.axis[2][lane]};
+}
+
 /// Where the vertices of a block are expected: `length` along `along` from `base`, and two directions across.
 struct Expected {
   IntLaneVectors base;
@@ -83,6 +103,18 @@ struct Expected {
   LaneVectors first;
   LaneVectors second;
   Lanes length;
+
+  /// Along `edge` and as long.
+  STRANDCAST_INLINE void aim(const LaneVectors& edge) {
+    const Lanes squared = dots(edge, edge);
+    length = square_roots(squared);
+    const Lanes scale = squared > kTinySquared ? 1.0f / length : Lanes{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const Lanes instead = Lanes{} + (axis == 1 ? 1.0f : 0.0f);  // where there is no direction
+      along.axis[axis] = scale != 0.0f ? edge.axis[axis] * scale : instead;
+    }
+    find_frames();
+  }
 
   /// Fills the directions across `along`: an orthonormal basis without branches (Duff et al. 2017, Building
   /// an Orthonormal Basis, Revisited).
@@ -100,16 +132,50 @@ struct Expected {
     second.axis[2] = -y;
   }
 
+  /// What would be the integers of an edge, were they not whole; false where they cannot tell it.
+  struct Coordinates {
+    Lanes first;
+    Lanes second;
+    Lanes length;
+    IntLanes is_possible;
+  };
+  STRANDCAST_INLINE Coordinates coordinates(const LaneVectors& edge) const {
+    constexpr float kSteepest = 0.2f;
+    constexpr float kFarthest = 1e5f;
+    const Lanes beside = dots(edge, along);
+    const Lanes size = square_roots(dots(edge, edge));
+    // Seen from the vertex before, where the direction of the edge meets the tangent plane.
+    const Lanes scale = size > 0.0f ? length / beside / kTangentStep : Lanes{};
+    Coordinates of;
+    of.first = dots(edge, first) * scale;
+    of.second = dots(edge, second) * scale;
+    of.length = (size - length) / kLengthStep;
+    const IntLanes is_steep = (size > 0.0f) & ~(beside > kSteepest * size);
+    of.is_possible = ~is_steep & (sizes_of(of.first) < kFarthest) & (sizes_of(of.second) < kFarthest) &
+                     (sizes_of(of.length) < kFarthest);
+    return of;
+  }
+  /// The integers that come nearest to what `other` expects from the same base.
+  STRANDCAST_INLINE CodeLanes codes_of(const Expected& other) const {
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis) edge.axis[axis] = other.along.axis[axis] * other.length;
+    const Coordinates of = coordinates(edge);
+    CodeLanes codes;
+    codes.first = of.is_possible ? nearest_lanes(of.first) : IntLanes{};
+    codes.second = of.is_possible ? nearest_lanes(of.second) : IntLanes{};
+    codes.length = of.is_possible ? nearest_lanes(of.length) : IntLanes{};
+    return codes;
+  }
+
   /// Positions, limited to where rounding holds, that the integers tell.
-  STRANDCAST_INLINE IntLaneVectors placed(const IntLanes& a, const IntLanes& b,
-                                          const IntLanes& correction) const {
-    const Lanes across = to_floats(a) * kTangentStep;
-    const Lanes also = to_floats(b) * kTangentStep;
+  STRANDCAST_INLINE IntLaneVectors placed(const CodeLanes& codes) const {
+    const Lanes across = to_floats(codes.first) * kTangentStep;
+    const Lanes also = to_floats(codes.second) * kTangentStep;
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis)
       edge.axis[axis] = (along.axis[axis] * length + first.axis[axis] * across) + second.axis[axis] * also;
     const Lanes squared = dots(edge, edge);
-    const Lanes wanted = length + to_floats(correction) * kLengthStep;
+    const Lanes wanted = length + to_floats(codes.length) * kLengthStep;
     const Lanes scale = squared > kTinySquared ? wanted / square_roots(squared) : Lanes{};
     IntLaneVectors position;
     for (size_t axis = 0; axis < 3; ++axis)
@@ -168,15 +234,8 @@ class MotionRow {
         edge.axis[axis] +=
             gather_lanes(frame_.neighbour_sum[which][axis].data(), layout_.neighbour[which].data() + place);
     }
-    const Lanes squared = dots(edge, edge);
-    const Lanes length = square_roots(squared);
-    expected.length = v_ == 0 ? length : known_length(place);
-    const Lanes scale = squared > kTinySquared ? 1.0f / length : Lanes{};
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const Lanes instead = Lanes{} + (axis == 1 ? 1.0f : 0.0f);  // where there is no direction
-      expected.along.axis[axis] = scale != 0.0f ? edge.axis[axis] * scale : instead;
-    }
-    expected.find_frames();
+    expected.aim(edge);
+    if (v_ != 0) expected.length = known_length(place);
   }
 
   /// Stores positions and what follows from them.
@@ -204,9 +263,10 @@ class MotionRow {
     }
   }
 
-  /// For a vertex that nothing else brings near `target`, and where it then is.
-  Escape make_escape(size_t at, const std::array<int32_t, 3>& target) const;
-  std::array<int32_t, 3> escaped(const Escape& escape) const;
+  /// Of a vertex of the row: its last position, which escapes count from.
+  Lattice last(size_t at) const {
+    return {history_.lattice[0][at], history_.lattice[1][at], history_.lattice[2][at]};
+  }
   TangentFrame& frame() const { return frame_; }
 
  private:

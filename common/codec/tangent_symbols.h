@@ -1,6 +1,6 @@
-// Entropy coding of the "tangent" codec: the integers of a frame and the rounded history of a keyframe, with
-// tables chosen by the integers coded near by. No floats decide about a table, so this pass needs nothing of
-// the geometry. Private to common/codec. Functions touch only their own slice of the arrays.
+// Entropy coding of the "tangent" codec: the integers of a frame, with tables chosen by the integers coded
+// near by. No floats decide about a table, so this pass needs nothing of the geometry. Private to
+// common/codec. Functions touch only their own slice of the arrays.
 #pragma once
 
 #include <cstdint>
@@ -32,9 +32,8 @@ struct SymbolSizes {
   void reset(const TangentLayout& layout);
 };
 
-/// Writes a slice's integers and escapes of `frame`; `then` are the sizes of the frame before, `now` is
-/// filled.
-void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentFrame& frame,
+/// Writes a slice's integers and escapes; `then` are the sizes of the frame before, `now` is filled.
+void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentCodes& codes,
                    const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer);
 
 /// A slice to be read.
@@ -47,22 +46,7 @@ struct SliceSymbols {
 inline constexpr uint32_t kSlicesAtOnce = 2;
 /// The inverse, from untrusted bytes, for one to kSlicesAtOnce slices: any bytes give some integers; escapes
 /// take bytes, so there are no more than there is room for.
-void read_symbols(const TangentLayout& layout, const SymbolSizes& then, TangentFrame& frame, SymbolSizes& now,
+void read_symbols(const TangentLayout& layout, const SymbolSizes& then, TangentCodes& codes, SymbolSizes& now,
                   std::span<SliceSymbols> slices);
-
-inline constexpr uint32_t kShapeFeatureCount = 13;
-inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest
-using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
-
-// The shape that a keyframe tells: coarse positions, each vertex less the one before it, predicted from the
-// strand so far, from neighbours and from the rest shape.
-
-/// `position`: planes of whole numbers; one of them is `unit_m` long.
-ShapeWeights fit_shape(const TangentLayout& layout, const Planes<int32_t>& position, float unit_m);
-void write_shape(const TangentLayout& layout, const ShapeWeights& weights, float unit_m, uint32_t slice,
-                 const Planes<int32_t>& position, ValueWriter& writer);
-/// The inverse; fills the slice's part of `position`.
-void read_shape(const TangentLayout& layout, const ShapeWeights& weights, float unit_m, uint32_t slice,
-                Planes<int32_t>& position, ValueReader& reader);
 
 }  // namespace strandcast

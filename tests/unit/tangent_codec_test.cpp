@@ -4,6 +4,7 @@
 
 #include "common/base/hash.h"
 #include "common/codec/strand_codec.h"
+#include "common/codec/strand_payload.h"
 #include "common/codec/tangent_head.h"
 #include "common/codec/tangent_layout.h"
 #include "tests/support/hair_motion.h"
@@ -146,7 +147,8 @@ TEST(TangentCodec, NeedsFarFewerBitsThanTheExactLattice) {
   EXPECT_LT(rate_of("tangent", MotionKind::Extreme).delta_bits, 6.0);
 }
 
-// After somebody joined, the others' next frame costs more, and soon it is as before.
+// A frame that somebody joins with costs the others as much as any; the motion that all forget then costs a
+// few frames.
 TEST(TangentCodec, AJoinCostsTheOthersAFewFrames) {
   HairMotionDesc desc{1200, 16, MotionKind::Active};
   HairMotion hair(desc);
@@ -160,11 +162,37 @@ TEST(TangentCodec, AJoinCostsTheOthersAFewFrames) {
   const double before = next_bytes();
   hair.step();
   const JoinFrames frames = chain.encoder->encode_for_join(hair.snapshot(quantum_m));
-  EXPECT_LT(static_cast<double>(frames.frame->message.size()), 3.5 * before);
+  EXPECT_LT(static_cast<double>(frames.frame->message.size()), 1.25 * before);
   EXPECT_LT(static_cast<double>(frames.frame->message.size()),
             0.6 * static_cast<double>(frames.keyframe->message.size()));
-  for (int i = 0; i < 4; ++i) next_bytes();
+  EXPECT_LT(next_bytes(), 2.5 * before);
+  for (int i = 0; i < 3; ++i) next_bytes();
   EXPECT_LT(next_bytes(), 1.25 * before);
+}
+
+/// Bits per vertex of the first keyframe of hair, after `steps` of its motion, beyond the tables.
+double shape_bits(HairMotion& hair, int steps, std::span<const glm::vec3> rest) {
+  for (int i = 0; i < steps; ++i) hair.step();
+  auto encoder = std::move(*make_strand_encoder("tangent"));
+  encoder->set_rest_shape(rest);
+  const auto first = encoder->encode(hair.snapshot(lattice_step_m("tangent", kBoundM).value()));
+  const std::vector<std::byte>& bytes = first->message;
+  uint32_t table_bytes = 0;
+  std::memcpy(&table_bytes, bytes.data() + kFrameHeaderBytes + kStrandFixedBytes, sizeof(table_bytes));
+  return 8.0 * static_cast<double>(bytes.size() - table_bytes) / static_cast<double>(hair.plane_size());
+}
+
+// Hair at rest has the shape that both sides know; hair in motion is told by neighbours and by its own edges.
+TEST(TangentCodec, KeyframesTellOnlyWhatTheShapeDoesNot) {
+  HairMotion still({1200, 16, MotionKind::Still});
+  HairMotion moving({1200, 16, MotionKind::Active});
+  const double still_bits = shape_bits(still, 0, still.rest_in_head());
+  const double moving_bits = shape_bits(moving, 60, moving.rest_in_head());
+  const double unknown_bits = shape_bits(moving, 0, {});
+  // Three symbols, nearly always 0 or 1, in tables that begin with two bits for a 0.
+  EXPECT_LT(still_bits, 3.5);
+  EXPECT_LT(still_bits, 0.5 * moving_bits);
+  EXPECT_LT(moving_bits, 0.6 * unknown_bits);
 }
 
 Pose jittered_pose(uint32_t salt) {
