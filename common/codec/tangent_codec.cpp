@@ -367,6 +367,7 @@ class TangentDecoder final : public StrandDecoder {
     frame_.length_blend = head.length_blend;
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     std::memcpy(frame_.weights.data(), weights.data(), weights.size());
+    frame_.apply_weights();
     TangentTables tables = chain_.tables;
     RETURN_IF_ERROR(
         read_slices(body.rest(), tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {

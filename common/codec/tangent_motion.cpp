@@ -23,36 +23,17 @@ uint32_t motion_class(const TangentLayout& layout, uint32_t v) {
 
 FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
                          const TangentFrame& frame, size_t axis, uint32_t v) {
-  const size_t stride = layout.stride;
-  const size_t begin = v * stride;
-  const float* zeros = frame.zeros.data();
-  const float* now = frame.velocity[axis].data() + begin;
-  const float* then = history.velocity[axis].data() + begin;
-  const float* before = history.velocity_before[axis].data() + begin;
-  const float* residual = history.residual[axis].data() + begin;
-  const float* residual_before = history.residual_before[axis].data() + begin;
-  const float* drift = history.drift[axis].data() + begin;
-  const bool has_parent = v >= 1;
-  const bool has_grandparent = v >= 2;
-  const bool has_great_grandparent = v >= 3;
-  const bool has_child = v + 1 < layout.vertex_count;
-  const bool has_grandchild = v + 2 < layout.vertex_count;
-  return {then,
-          residual,
-          before,
-          residual_before,
-          drift,
-          has_parent ? now - stride : zeros,
-          has_parent ? then - stride : zeros,
-          has_parent ? residual_before - stride : zeros,
-          has_grandparent ? now - 2 * stride : zeros,
-          has_grandparent ? then - 2 * stride : zeros,
-          has_great_grandparent ? now - 3 * stride : zeros,
-          has_child ? then + stride : zeros,
-          has_child ? residual + stride : zeros,
-          has_child ? before + stride : zeros,
-          has_child ? residual_before + stride : zeros,
-          has_grandchild ? then + 2 * stride : zeros};
+  const std::array planes = {&frame.velocity,   &history.velocity,        &history.velocity_before,
+                             &history.residual, &history.residual_before, &history.drift};
+  FeatureRows rows;
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const MotionFeature& feature = kMotionFeatures[k];
+    const int64_t vertex = int64_t{v} + feature.tipward;
+    const bool is_there = vertex >= 0 && vertex < int64_t{layout.vertex_count};
+    const float* plane = (*planes[static_cast<size_t>(feature.quantity)])[axis].data();
+    rows[k] = is_there ? plane + static_cast<size_t>(vertex) * layout.stride : frame.zeros.data();
+  }
+  return rows;
 }
 
 void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
@@ -128,6 +109,21 @@ void TangentFrame::resize(const TangentLayout& layout) {
   for (auto& row : edge) row.assign(layout.stride, 0.0f);
   for (auto& planes : neighbour_sum)
     for (auto& row : planes) row.assign(layout.stride, 0.0f);
+}
+
+void TangentFrame::apply_weights() {
+  for (size_t c = 0; c < motion.size(); ++c) {
+    MotionClass& by = motion[c];
+    for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
+      by.weights[k] = static_cast<float>(weights[c][k]) * kMotionWeight;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t i = 0; i < by.head[axis].size(); ++i) {
+        float& sum = by.head[axis][i] = 0.0f;
+        for (size_t k = 0; k < kHeadStepCount; ++k)
+          sum += static_cast<float>(head.step[k].row[axis][i]) * by.weights[kHeadFeature + k];
+      }
+    }
+  }
 }
 
 namespace {

@@ -33,6 +33,13 @@ using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_cou
 
 using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMotionClassCount>;
 
+using FloatWeights = std::array<float, kMotionFeatureCount>;
+/// The weights of a class as they are used.
+struct MotionClass {
+  FloatWeights weights{};
+  std::array<std::array<float, 4>, 3> head{};  // the steps of the head, weighted
+};
+
 using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
 /// What both sides remember of the frames so far.
@@ -76,6 +83,7 @@ struct TangentCodes {
 struct TangentFrame {
   HeadMotion head;
   MotionWeights weights{};
+  std::array<MotionClass, kMotionClassCount> motion;  // by apply_weights
   uint8_t length_blend = 0;  // of the last decoded length against the rest length, in 1/16
   TangentCodes codes;
   ShapeWeights shape_weights{};  // of an anchor
@@ -91,6 +99,8 @@ struct TangentFrame {
   std::vector<int32_t> zero_lattice;
 
   void resize(const TangentLayout& layout);
+  /// Once `head` and `weights` are those of the frame.
+  void apply_weights();
 };
 
 /// How many classes of weights a frame of this groom has.

@@ -154,24 +154,21 @@ class SampleRow {
 
   size_t at(size_t place) const { return v_ * size_t{layout_.stride} + place; }
 
-  float now(size_t axis, size_t at) const {
+  /// What is to become the change of position of the vertex so far from this row.
+  float now(size_t axis, size_t place, int tipward) const {
+    if (tipward < 0 && v_ < static_cast<uint32_t>(-tipward)) return 0.0f;
+    const size_t at = (v_ - static_cast<uint32_t>(-tipward)) * size_t{layout_.stride} + place;
     return static_cast<float>(wrapping_difference(target_[axis][at], history_.lattice[axis][at]));
   }
 
   std::array<float, kMotionFeatureCount> features(size_t axis, size_t place) const {
-    const FeatureRows& rows = rows_[axis];
     std::array<float, kMotionFeatureCount> value;
-    for (uint32_t k = 0; k < kRowFeatureCount; ++k) value[k] = rows[k][place];
-    value[kParentNow] = ancestor_now(axis, 1, place);
-    value[kGrandparentNow] = ancestor_now(axis, 2, place);
-    value[kGreatGrandparentNow] = ancestor_now(axis, 3, place);
-    const auto [neighbour, second] = std::pair(layout_.neighbour[0][place], layout_.neighbour[1][place]);
-    value[kNeighbourFeature] = now(axis, at(neighbour));
-    value[kNeighbourFeature + 1] = rows[kOwnThen][neighbour];
-    value[kNeighbourFeature + 2] = rows[kOwnResidual][neighbour];
-    value[kNeighbourFeature + 3] = ancestor_now(axis, 1, neighbour);
-    value[kSecondNeighbourFeature] = now(axis, at(second));
-    value[kSecondNeighbourFeature + 1] = ancestor_now(axis, 1, second);
+    for (size_t k = 0; k < kMotionFeatures.size(); ++k) {
+      const MotionFeature& feature = kMotionFeatures[k];
+      const size_t at_place = place_of(feature.strand, place);
+      const bool is_now = feature.quantity == MotionQuantity::Now;
+      value[k] = is_now ? now(axis, at_place, feature.tipward) : rows_[axis][k][at_place];
+    }
     for (uint32_t k = 0; k < kHeadStepCount; ++k) {
       const auto& step = frame_.head.step[k].row[axis];
       double change = step[3];
@@ -186,17 +183,18 @@ class SampleRow {
     constexpr float kTypical = 600.0f;  // steps
     float squares = 0.0f;
     for (size_t axis = 0; axis < 3; ++axis) {
-      const float own = rows_[axis][kOwnResidual][place];
-      const float child = rows_[axis][kChildResidual][place];
+      const float own = history_.residual[axis][at(place)];
+      const float child =
+          v_ + 1 < layout_.vertex_count ? history_.residual[axis][at(place) + layout_.stride] : 0.0f;
       squares += own * own + child * child;
     }
     return 1.0f / std::sqrt(1.0f + squares / (kTypical * kTypical));
   }
 
  private:
-  float ancestor_now(size_t axis, uint32_t generations, size_t place) const {
-    if (v_ < generations) return 0.0f;
-    return now(axis, at(place) - generations * size_t{layout_.stride});
+  size_t place_of(MotionStrand strand, size_t place) const {
+    if (strand == MotionStrand::Own) return place;
+    return layout_.neighbour[strand == MotionStrand::Neighbour ? 0 : 1][place];
   }
 
   const TangentLayout& layout_;
@@ -248,12 +246,13 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
       for (size_t axis = 0; axis < 3; ++axis) {
         std::array<float, kMotionFeatureCount> value = row.features(axis, place);
         for (float& one : value) one *= trust;
-        fit.add(value, trust * row.now(axis, row.at(place)));
+        fit.add(value, trust * row.now(axis, place, 0));
       }
     }
     fit.flush();
   }
   for (uint32_t c = 0; c < kMotionClassCount; ++c) frame.weights[c] = fits[c].weights(kMotionWeight, kNoise);
+  frame.apply_weights();
 }
 
 void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,

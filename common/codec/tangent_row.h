@@ -7,6 +7,7 @@
 // four lanes that is 60 cycles of arithmetic, 33 of memory at 10 GB/s and 75 of waiting.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -18,28 +19,63 @@ namespace strandcast {
 
 static_assert(kBlockSize % kLaneCount == 0);
 
-// Features of a vertex, each a vector; weights are the same for all axes. "then" is the last frame, "before"
-// the one before that; the parent is the vertex nearer to the root.
-//   0 velocity then            1 residual then        2 velocity before      3 residual before
-//   4 drift                    5 parent's now         6 parent's then        7 parent's residual before
-//   8 grandparent's now        9 grandparent's then  10 great-grandparent's now
-//  11 child's velocity        12 child's residual    13 child's before      14 child's residual before
-//  15 grandchild's velocity
-//  16 neighbour's now         17 neighbour's then    18 neighbour's residual
-//  19 neighbour's parent's now                       20 second neighbour's now  21 its parent's now
-//  22 to 27 the last steps of the head at the last position, newest first
-inline constexpr uint32_t kRowFeatureCount = 16;
-inline constexpr uint32_t kNeighbourFeature = kRowFeatureCount;
-inline constexpr uint32_t kSecondNeighbourFeature = kNeighbourFeature + 4;
-inline constexpr uint32_t kHeadFeature = kSecondNeighbourFeature + 2;
-inline constexpr uint32_t kOwnThen = 0;
-inline constexpr uint32_t kOwnResidual = 1;
-inline constexpr uint32_t kOwnDrift = 4;
-inline constexpr uint32_t kParentNow = 5;
-inline constexpr uint32_t kGrandparentNow = 8;
-inline constexpr uint32_t kGreatGrandparentNow = 10;
-inline constexpr uint32_t kChildResidual = 12;
+/// What a feature is a value of; "then" is the last frame, "before" the one before that.
+enum class MotionQuantity : uint8_t {
+  Now,  // change of position in this frame
+  Then,
+  Before,
+  ResidualThen,
+  ResidualBefore,
+  DriftThen
+};
+enum class MotionStrand : uint8_t { Own, Neighbour, SecondNeighbour };
+
+/// A vector, whose weight is the same for all axes; nothing where there is no such vertex.
+struct MotionFeature {
+  MotionQuantity quantity;
+  int8_t tipward = 0;  // vertices from the own one towards the tip: the parent has -1
+  MotionStrand strand = MotionStrand::Own;
+};
+
+// In the order of their weights; behind them the last steps of the head at the last position, newest first.
+inline constexpr std::array kMotionFeatures = {
+    MotionFeature{MotionQuantity::Then},
+    MotionFeature{MotionQuantity::ResidualThen},
+    MotionFeature{MotionQuantity::Before},
+    MotionFeature{MotionQuantity::ResidualBefore},
+    MotionFeature{MotionQuantity::DriftThen},
+    MotionFeature{MotionQuantity::Now, -1},
+    MotionFeature{MotionQuantity::Then, -1},
+    MotionFeature{MotionQuantity::ResidualBefore, -1},
+    MotionFeature{MotionQuantity::Now, -2},
+    MotionFeature{MotionQuantity::Then, -2},
+    MotionFeature{MotionQuantity::Now, -3},
+    MotionFeature{MotionQuantity::Then, 1},
+    MotionFeature{MotionQuantity::ResidualThen, 1},
+    MotionFeature{MotionQuantity::Before, 1},
+    MotionFeature{MotionQuantity::ResidualBefore, 1},
+    MotionFeature{MotionQuantity::Then, 2},
+    MotionFeature{MotionQuantity::Now, 0, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::Then, 0, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::ResidualThen, 0, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::Now, -1, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::Now, 0, MotionStrand::SecondNeighbour},
+    MotionFeature{MotionQuantity::Now, -1, MotionStrand::SecondNeighbour},
+};
+
+constexpr uint32_t first_feature_of(MotionStrand strand) {
+  uint32_t k = 0;
+  while (k < kMotionFeatures.size() && kMotionFeatures[k].strand < strand) ++k;
+  return k;
+}
+inline constexpr uint32_t kRowFeatureCount = first_feature_of(MotionStrand::Neighbour);
+inline constexpr uint32_t kHeadFeature = kMotionFeatures.size();
 static_assert(kHeadFeature + kHeadStepCount == kMotionFeatureCount);
+// What is not decoded yet predicts nothing.
+static_assert(std::all_of(kMotionFeatures.begin(), kMotionFeatures.end(), [](const MotionFeature& feature) {
+  return feature.quantity != MotionQuantity::Now ||
+         feature.tipward < (feature.strand == MotionStrand::Own ? 0 : 1);
+}));
 
 // The cell of a coded vertex: tangent steps of 1.32 bounds and length steps of 0.65 keep its farthest point
 // within the bound, with room for rounding: sqrt(1 - 1.32^2 / 2) = 0.36 >= 0.65 / 2.
@@ -61,12 +97,12 @@ STRANDCAST_INLINE IntLanes nearest_lanes(const Lanes& value) {
 /// Which weights serve a row. Near the root and at the tip strands move by laws of their own.
 uint32_t motion_class(const TangentLayout& layout, uint32_t v);
 
-/// Rows of floats that features of one axis lie in; absent ones are zeros.
-using FeatureRows = std::array<const float*, kRowFeatureCount>;
+/// Rows of floats that features of one axis lie in, those of neighbours at the neighbour's place; absent ones
+/// are zeros. What is "now" of the own row is there once its block is stored.
+using FeatureRows = std::array<const float*, kHeadFeature>;
 FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
                          const TangentFrame& frame, size_t axis, uint32_t v);
 
-using FloatWeights = std::array<float, kMotionFeatureCount>;
 struct LastAndBase {
   const int32_t* last;
   const int32_t* base;
@@ -187,17 +223,7 @@ struct Expected {
 class MotionRow {
  public:
   MotionRow(const TangentLayout& layout, const TangentHistory& history, TangentFrame& frame, uint32_t v)
-      : layout_(layout), history_(history), frame_(frame), v_(v) {
-    const auto& given = frame.weights[motion_class(layout, v)];
-    for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
-      weights_[k] = static_cast<float>(given[k]) * kMotionWeight;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      for (size_t i = 0; i < head_[axis].size(); ++i) {
-        head_[axis][i] = 0.0f;
-        for (size_t k = 0; k < kHeadStepCount; ++k)
-          head_[axis][i] += static_cast<float>(frame.head.step[k].row[axis][i]) * weights_[kHeadFeature + k];
-      }
-    }
+      : layout_(layout), history_(history), frame_(frame), v_(v), by_(frame.motion[motion_class(layout, v)]) {
     length_blend_ = static_cast<float>(frame.length_blend) * kLengthWeight;
     for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
   }
@@ -214,7 +240,7 @@ class MotionRow {
       for (const float*& row : rows) row += begin;
       const int32_t* last = history_.lattice[axis].data() + at(begin);
       const int32_t* base = v_ == 0 ? frame_.zero_lattice.data() : bases(axis) + begin;
-      sum_rows(rows, weights_, {last, base}, std::span(frame_.edge[axis]).subspan(begin, count));
+      sum_rows(rows, by_.weights, {last, base}, std::span(frame_.edge[axis]).subspan(begin, count));
     }
   }
 
@@ -227,7 +253,7 @@ class MotionRow {
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
       expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(bases(axis) + place);
-      const auto& head = head_[axis];
+      const auto& head = by_.head[axis];
       const Lanes turned = (head[0] * last.axis[0] + head[1] * last.axis[1]) + head[2] * last.axis[2];
       edge.axis[axis] = load_lanes(frame_.edge[axis].data() + place) + (turned + head[3] * presence);
       for (uint32_t which = 0; which < 2; ++which)
@@ -249,17 +275,11 @@ class MotionRow {
       store_lanes(now, frame_.lattice[axis].data() + begin);
       store_lanes(velocity, frame_.velocity[axis].data() + begin);
       store_lanes(edge - expected.along.axis[axis] * expected.length, frame_.residual[axis].data() + begin);
-      const Lanes drift = load_lanes(features_[axis][kOwnDrift] + place);
+      const Lanes drift = load_lanes(history_.drift[axis].data() + begin);
       store_lanes(kDriftShare * drift + velocity, frame_.drift[axis].data() + begin);
       // What later blocks add for this neighbour.
-      const Lanes then = load_lanes(features_[axis][kOwnThen] + place);
-      const Lanes residual = load_lanes(features_[axis][kOwnResidual] + place);
-      const Lanes parent = load_lanes(features_[axis][kParentNow] + place);
-      const float* weight = weights_.data() + kNeighbourFeature;
-      store_lanes(((weight[0] * velocity + weight[1] * then) + weight[2] * residual) + weight[3] * parent,
-                  frame_.neighbour_sum[0][axis].data() + place);
-      weight = weights_.data() + kSecondNeighbourFeature;
-      store_lanes(weight[0] * velocity + weight[1] * parent, frame_.neighbour_sum[1][axis].data() + place);
+      store_neighbour_sum<MotionStrand::Neighbour>(axis, place);
+      store_neighbour_sum<MotionStrand::SecondNeighbour>(axis, place);
     }
   }
 
@@ -270,6 +290,15 @@ class MotionRow {
   TangentFrame& frame() const { return frame_; }
 
  private:
+  template <MotionStrand strand>
+  STRANDCAST_INLINE void store_neighbour_sum(size_t axis, size_t place) const {
+    constexpr uint32_t kFirst = first_feature_of(strand);
+    Lanes sum = by_.weights[kFirst] * load_lanes(features_[axis][kFirst] + place);
+    for (uint32_t k = kFirst + 1; k < kHeadFeature && kMotionFeatures[k].strand == strand; ++k)
+      sum += by_.weights[k] * load_lanes(features_[axis][k] + place);
+    constexpr size_t kWhich = strand == MotionStrand::Neighbour ? 0 : 1;
+    store_lanes(sum, frame_.neighbour_sum[kWhich][axis].data() + place);
+  }
   STRANDCAST_INLINE Lanes known_length(size_t place) const {
     const Lanes rest = load_lanes(layout_.rest_length_m.data() + at(place)) / history_.quantum_m;
     if (frame_.length_blend == 0) return rest;
@@ -288,8 +317,7 @@ class MotionRow {
   const TangentHistory& history_;
   TangentFrame& frame_;
   uint32_t v_;
-  FloatWeights weights_;
-  std::array<std::array<float, 4>, 3> head_;  // the head's steps, weighted
+  MotionClass by_;
   float length_blend_;
   std::array<FeatureRows, 3> features_;
 };
