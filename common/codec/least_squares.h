@@ -17,7 +17,7 @@ using Gram = std::array<std::array<double, kCount + 1>, kCount + 1>;
 /// `floor` on the diagonal.
 template <uint32_t kCount>
 std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor, double unit) {
-  constexpr double kRidge = 1e-4;
+  constexpr double kRidge = 1e-6;
   std::array<std::array<double, kCount>, kCount> factor{};
   std::array<double, kCount> solution{};
   for (uint32_t i = 0; i < kCount; ++i) {
@@ -42,15 +42,15 @@ std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor
   return weights;
 }
 
-/// Collects samples (features, wanted value); features that hardly move get weights near 0. Sums of a batch
+/// Collects samples (features, wanted value, by how much it counts). Sums of a batch
 /// are floats, those of all batches doubles.
 template <uint32_t kCount>
 class LeastSquares {
  public:
-  void add(const std::array<float, kCount>& value, float wanted) {
-    for (uint32_t k = 0; k < kCount; ++k) lanes_[k][filled_] = value[k];
-    lanes_[kCount][filled_] = wanted;
-    ++count_;
+  void add(const std::array<float, kCount>& value, float wanted, float trust) {
+    for (uint32_t k = 0; k < kCount; ++k) lanes_[k][filled_] = trust * value[k];
+    lanes_[kCount][filled_] = trust * wanted;
+    trust_ += static_cast<double>(trust * trust);
     if (++filled_ == kLanes) flush();
   }
 
@@ -69,18 +69,20 @@ class LeastSquares {
     }
   }
 
-  /// In units of `unit`. Features are taken to be off by `noise`: what moves less predicts nothing.
-  std::array<int16_t, kCount> weights(double unit, double noise) const {
+  /// In units of `unit`. Features will be off by `noise` when they are used: what moves less predicts
+  /// nothing.
+  std::array<int16_t, kCount> weights(double unit, const std::array<double, kCount>& noise) const {
     constexpr double kLeast = 1e-9;
-    const double floor = std::max(noise * noise * static_cast<double>(count_), kLeast);
-    return solve_weights<kCount>(gram_, floor, unit);
+    Gram<kCount> blurred = gram_;
+    for (uint32_t k = 0; k < kCount; ++k) blurred[k][k] += noise[k] * noise[k] * trust_;
+    return solve_weights<kCount>(blurred, kLeast, unit);
   }
 
  private:
   static constexpr uint32_t kLanes = 64;
   std::array<std::array<float, kLanes>, kCount + 1> lanes_{};
   uint32_t filled_ = 0;
-  uint64_t count_ = 0;
+  double trust_ = 0.0;  // sum of squares
   Gram<kCount> gram_{};
 };
 

@@ -3,14 +3,13 @@
 // segment, chosen as cheap as the announced bound allows. Every decoded vertex lies within that bound.
 // Layout in proto/WIRE.md.
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
-#include <thread>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/codec/byte_io.h"
+#include "common/codec/side_by_side.h"
 #include "common/codec/strand_payload.h"
 #include "common/codec/tangent_symbols.h"
 #include "common/codec/zstd_block.h"
@@ -21,18 +20,13 @@ namespace {
 constexpr uint8_t kTangentCodecNumber = 5;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
-constexpr size_t kThreadedVertices = 40'000;  // fewer are coded on the calling thread
 
-/// Of a delta, as it is on the wire; followed by the weights of each class, those of the shape when it is an
-/// anchor, and the slices.
+/// Of a delta, as it is on the wire; followed by the weights of the shape when it is an anchor, those of
+/// the motion, and the slices.
 struct BodyHead {
   uint8_t flags = 0;
   uint8_t length_blend = 0;
 };
-
-size_t weight_bytes(const TangentLayout& layout) {
-  return motion_class_count(layout) * sizeof(MotionWeights::value_type);
-}
 
 /// What a stream remembers on both sides.
 struct TangentChain {
@@ -52,23 +46,12 @@ struct TangentChain {
   }
 };
 
-/// work(first, count) for all slices, `at_once` of them at a time, on as many threads as there are processors
-/// when that is worth it.
+/// work(first, count) for all slices, `at_once` of them at a time.
 template <class Work>
 void for_each_slice(const TangentLayout& layout, uint32_t at_once, Work work) {
   const uint32_t count = layout.slice_count();
-  const bool is_worth_it = layout.plane_size() >= kThreadedVertices;
-  const uint32_t group_count = (count + at_once - 1) / at_once;
-  const uint32_t thread_count =
-      is_worth_it ? std::min(group_count, std::max(1u, std::thread::hardware_concurrency())) : 1;
-  std::atomic<uint32_t> next{0};
-  const auto run = [&] {
-    for (uint32_t group = next++; group < group_count; group = next++)
-      work(group * at_once, std::min(at_once, count - group * at_once));
-  };
-  std::vector<std::jthread> helpers;
-  for (uint32_t i = 1; i < thread_count; ++i) helpers.emplace_back(run);
-  run();
+  for_each_part((count + at_once - 1) / at_once, threads_for(layout),
+                [&](uint32_t group) { work(group * at_once, std::min(at_once, count - group * at_once)); });
 }
 template <class Work>
 void for_each_slice(const TangentLayout& layout, Work work) {
@@ -238,8 +221,10 @@ class TangentEncoder final : public StrandEncoder {
     body.reserve(sizeof(head) + sizeof(frame_.weights) + sizeof(frame_.shape_weights) + layout_.plane_size());
     ByteWriter writer(body);
     writer.put_bytes(std::as_bytes(std::span(&head, 1)));
-    writer.put_bytes(std::as_bytes(std::span(frame_.weights)).first(weight_bytes(layout_)));
     if ((flags & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
+    ValueWriter weights;
+    write_weights(motion_class_count(layout_), frame_.weights, weights);
+    weights.finish(body);
     for (const auto& slice : slices) writer.put_bytes(slice);
     FrameHeader header;
     header.opcode = Opcode::StrandDelta;
@@ -357,23 +342,26 @@ class TangentDecoder final : public StrandDecoder {
     BodyHead head;
     take_into(body, head);
     const bool is_anchor = head.flags == kAnchorFlag;
-    const auto weights = body.take_bytes(weight_bytes(layout_));
     if (is_anchor) take_into(body, frame_.shape_weights);
     if (!body.ok())
-      return make_error(ErrorCode::BadInput, "{} bytes have no room for the weights", message.body.size());
+      return make_error(ErrorCode::BadInput, "{} bytes have no room for what a delta begins with",
+                        message.body.size());
     if (head.flags > kAnchorFlag)
       return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
                         kAnchorFlag);
     frame_.length_blend = head.length_blend;
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
-    std::memcpy(frame_.weights.data(), weights.data(), weights.size());
+    ValueReader weights;
+    ASSIGN_OR_RETURN(const auto slices, weights.open(body.rest()));
+    read_weights(motion_class_count(layout_), frame_.weights, weights);
+    if (!weights.is_spent())
+      return make_error(ErrorCode::BadInput, "the weights do not end where their symbols end");
     frame_.apply_weights();
     TangentTables tables = chain_.tables;
-    RETURN_IF_ERROR(
-        read_slices(body.rest(), tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {
-          const auto place = is_anchor ? place_anchor : place_slice;
-          place(layout_, chain_.history, slice, frame_);
-        }));
+    RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {
+      const auto place = is_anchor ? place_anchor : place_slice;
+      place(layout_, chain_.history, slice, frame_);
+    }));
     RETURN_IF_ERROR(check_decoded(snapshot, message));
     // Only now, with everything checked, the state moves on.
     remember(chain_.history, frame_);

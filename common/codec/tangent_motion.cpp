@@ -7,18 +7,23 @@
 #include "common/codec/wrapping.h"
 
 namespace strandcast {
+Threads threads_for(const TangentLayout& layout) {
+  constexpr size_t kManyEnough = 40'000;  // vertices
+  return layout.plane_size() >= kManyEnough ? Threads::All : Threads::One;
+}
+
 uint32_t motion_class_count(const TangentLayout& layout) {
   const size_t vertices = size_t{layout.strand_count} * layout.vertex_count;
-  return vertices < kManyVertices ? kFewMotionClasses : kMotionClassCount;
+  if (vertices < kManyVertices) return kFewMotionClasses;
+  return std::min(kMotionClassCount, layout.vertex_count);
 }
 
 uint32_t motion_class(const TangentLayout& layout, uint32_t v) {
+  const uint32_t last = std::max(layout.vertex_count, 2u) - 1;
+  if (size_t{layout.strand_count} * layout.vertex_count >= kManyVertices)
+    return v * (motion_class_count(layout) - 1) / last;
   if (v < 2) return 0;
-  if (v + 1 == layout.vertex_count) return 1;
-  if (motion_class_count(layout) == kFewMotionClasses) return 2;
-  if (v + 2 == layout.vertex_count) return 3;
-  if (v < 5) return v + 2;
-  return 2 * v < layout.vertex_count ? 2 : 7;
+  return v == last ? 1 : 2;
 }
 
 FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,

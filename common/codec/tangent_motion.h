@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/codec/side_by_side.h"
 #include "common/codec/tangent_head.h"
 #include "common/codec/tangent_layout.h"
 
@@ -18,13 +19,14 @@ namespace strandcast {
 
 inline constexpr int32_t kStepsPerBound = 256;  // lattice steps in the announced bound
 inline constexpr uint32_t kMotionFeatureCount = 28;
-inline constexpr uint32_t kMotionClassCount = 8;     // of rows that share weights
+inline constexpr uint32_t kMotionClassCount = 16;    // of rows that share weights, at most
 inline constexpr uint32_t kFewMotionClasses = 3;     // as many of them when there are fewer vertices than
-inline constexpr uint32_t kManyVertices = 16'384;    // this, where eight cost more than they save
-inline constexpr float kMotionWeight = 1.0f / 1024;  // unit of the weights on the wire
-inline constexpr float kDriftShare = 0.85f;          // of the drift that is left one frame later
-inline constexpr float kLengthWeight = 1.0f / 16;    // unit of the length blend
-inline constexpr int32_t kEscapedLength = 1 << 20;   // in place of a length correction
+inline constexpr uint32_t kManyVertices = 16'384;    // this, where more cost more than they save
+inline constexpr float kMotionWeight = 1.0f / 4096;  // unit of the weights on the wire
+inline constexpr float kShapeWeight = 1.0f / 1024;
+inline constexpr float kDriftShare = 0.85f;         // of the drift that is left one frame later
+inline constexpr float kLengthWeight = 1.0f / 16;   // unit of the length blend
+inline constexpr int32_t kEscapedLength = 1 << 20;  // in place of a length correction
 inline constexpr uint32_t kShapeFeatureCount = 16;
 inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest
 
@@ -102,6 +104,9 @@ struct TangentFrame {
   /// Once `head` and `weights` are those of the frame.
   void apply_weights();
 };
+
+/// Smaller grooms are coded on the calling thread.
+Threads threads_for(const TangentLayout& layout);
 
 /// How many classes of weights a frame of this groom has.
 uint32_t motion_class_count(const TangentLayout& layout);

@@ -129,9 +129,12 @@ STRANDCAST_INLINE void store_codes(const CodeLanes& codes, TangentCodes& to, siz
   store_lanes(codes.length, to.length.data() + at);
 }
 
-constexpr size_t kSampleStrands = 384;
+constexpr size_t kSampleStrands = 768;
 constexpr size_t kRun = 4;      // side by side in memory: one of them alone would fetch as much
 constexpr double kNoise = 8.0;  // steps; a thirtieth of the bound is not worth predicting
+// Samples are made of true positions. What is decoded in their place lies 0.63 bounds beside them along two
+// axes of three: 93 steps for each, of which a part is shared with the wanted position.
+constexpr double kNoiseNow = 80.0;
 
 /// Strands to fit to: runs at even distances.
 std::vector<uint32_t> sample_places(const TangentLayout& layout) {
@@ -205,6 +208,24 @@ class SampleRow {
   std::array<FeatureRows, 3> rows_;
 };
 
+std::array<double, kMotionFeatureCount> feature_noise() {
+  std::array<double, kMotionFeatureCount> noise;
+  noise.fill(kNoise);
+  for (size_t k = 0; k < kMotionFeatures.size(); ++k)
+    if (kMotionFeatures[k].quantity == MotionQuantity::Now) noise[k] = kNoiseNow;
+  return noise;
+}
+
+void add_row(const SampleRow& row, std::span<const uint32_t> sample, LeastSquares<kMotionFeatureCount>& fit) {
+  for (const uint32_t place : sample) {
+    const float trust = row.trust(place);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      fit.add(row.features(axis, place), row.now(axis, place, 0), trust);
+    }
+  }
+  fit.flush();
+}
+
 /// Share of the last decoded length that predicts the next one best, in 1/16.
 uint8_t fit_length_blend(const TangentLayout& layout, const TangentHistory& history,
                          const Planes<int32_t>& target, std::span<const uint32_t> sample) {
@@ -237,21 +258,12 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
                 TangentFrame& frame) {
   const std::vector<uint32_t> sample = sample_places(layout);
   frame.length_blend = fit_length_blend(layout, history, target, sample);
-  std::array<LeastSquares<kMotionFeatureCount>, kMotionClassCount> fits;
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    auto& fit = fits[motion_class(layout, v)];
-    const SampleRow row(layout, history, target, frame, v);
-    for (const uint32_t place : sample) {
-      const float trust = row.trust(place);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        std::array<float, kMotionFeatureCount> value = row.features(axis, place);
-        for (float& one : value) one *= trust;
-        fit.add(value, trust * row.now(axis, place, 0));
-      }
-    }
-    fit.flush();
-  }
-  for (uint32_t c = 0; c < kMotionClassCount; ++c) frame.weights[c] = fits[c].weights(kMotionWeight, kNoise);
+  for_each_part(motion_class_count(layout), threads_for(layout), [&](uint32_t c) {
+    LeastSquares<kMotionFeatureCount> fit;
+    for (uint32_t v = 0; v < layout.vertex_count; ++v)
+      if (motion_class(layout, v) == c) add_row({layout, history, target, frame, v}, sample, fit);
+    frame.weights[c] = fit.weights(kMotionWeight, feature_noise());
+  });
   frame.apply_weights();
 }
 

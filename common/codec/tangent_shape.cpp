@@ -116,7 +116,7 @@ Expected ShapeRow::expect(size_t place, const ShapeWeights& weights) const {
   LaneVectors edge{};
   for (uint32_t k = 0; k < kShapeFeatureCount; ++k)
     for (size_t axis = 0; axis < 3; ++axis)
-      edge.axis[axis] += static_cast<float>(weight[k]) * kMotionWeight * value[k].axis[axis];
+      edge.axis[axis] += static_cast<float>(weight[k]) * kShapeWeight * value[k].axis[axis];
   Expected expected;
   expected.base = base(place);
   expected.aim(edge);
@@ -141,14 +141,16 @@ ShapeWeights fit_shape(const TangentLayout& layout, float quantum_m, const Plane
         for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
           std::array<float, kShapeFeatureCount> sample;
           for (uint32_t k = 0; k < kShapeFeatureCount; ++k) sample[k] = value[k].axis[axis][lane];
-          fit.add(sample, wanted[lane]);
+          fit.add(sample, wanted[lane], 1.0f);
         }
       }
     }
     fit.flush();
   }
+  std::array<double, kShapeFeatureCount> noise;
+  noise.fill(kNoise);
   ShapeWeights weights;
-  for (uint32_t c = 0; c < kShapeClassCount; ++c) weights[c] = fits[c].weights(kMotionWeight, kNoise);
+  for (uint32_t c = 0; c < kShapeClassCount; ++c) weights[c] = fits[c].weights(kShapeWeight, noise);
   return weights;
 }
 

@@ -202,7 +202,45 @@ SymbolTable first_table() {
   return table;
 }
 
+/// code(difference to the class before, table, shift) -> that difference, for all weights.
+template <class Code>
+void code_weights(uint32_t class_count, MotionWeights& weights, Code code) {
+  constexpr uint32_t kLargest = UINT16_MAX;
+  SymbolTable table = first_table();
+  std::array<uint32_t, kMotionFeatureCount + 1> size{};  // of the differences of a class, and one more
+  MotionWeights::value_type before{};
+  for (uint32_t c = 0; c < class_count; ++c) {
+    uint32_t left = 0;
+    for (uint32_t k = 0; k < kMotionFeatureCount; ++k) {
+      // Four times what is likely, from the weight before and the same ones of the class before.
+      const uint32_t near = c == 0 ? 4 * left : left + 2 * size[k] + size[k + 1];
+      const auto width = static_cast<uint32_t>(std::bit_width(near / 2));
+      const int32_t difference = code(weights[c][k] - before[k], table, width < 2 ? 0 : width - 2);
+      weights[c][k] =
+          static_cast<int16_t>(static_cast<uint32_t>(int32_t{before[k]}) + static_cast<uint32_t>(difference));
+      left = std::min(magnitude(difference), kLargest);
+      size[k] = left;
+    }
+    before = weights[c];
+  }
+}
+
 }  // namespace
+
+void write_weights(uint32_t class_count, const MotionWeights& weights, ValueWriter& writer) {
+  MotionWeights copy = weights;
+  code_weights(class_count, copy, [&](int32_t difference, SymbolTable& table, uint32_t shift) {
+    writer.put(fold_sign(difference), table, shift);
+    return difference;
+  });
+}
+
+void read_weights(uint32_t class_count, MotionWeights& weights, ValueReader& reader) {
+  weights = {};
+  code_weights(class_count, weights, [&](int32_t, SymbolTable& table, uint32_t shift) {
+    return unfold_sign(reader.take(table, shift));
+  });
+}
 
 TangentTables make_first_tables() {
   TangentTables tables;

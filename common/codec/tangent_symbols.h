@@ -32,6 +32,11 @@ struct SymbolSizes {
   void reset(const TangentLayout& layout);
 };
 
+/// Weights of the first classes, each told by how far it is from that of the class before.
+void write_weights(uint32_t class_count, const MotionWeights& weights, ValueWriter& writer);
+/// The inverse, from untrusted bytes: any bytes give some weights.
+void read_weights(uint32_t class_count, MotionWeights& weights, ValueReader& reader);
+
 /// Writes a slice's integers and escapes; `then` are the sizes of the frame before, `now` is filled.
 void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentCodes& codes,
                    const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer);

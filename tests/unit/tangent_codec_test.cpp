@@ -1,12 +1,15 @@
 // What the "tangent" codec promises beyond what every codec does: the bound, whatever moves; the bits it is
 // made for; the same bytes and states on every path.
+#include <random>
 #include <set>
 
 #include "common/base/hash.h"
+#include "common/codec/least_squares.h"
 #include "common/codec/strand_codec.h"
 #include "common/codec/strand_payload.h"
 #include "common/codec/tangent_head.h"
 #include "common/codec/tangent_layout.h"
+#include "common/codec/tangent_symbols.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {
@@ -193,6 +196,47 @@ TEST(TangentCodec, KeyframesTellOnlyWhatTheShapeDoesNot) {
   EXPECT_LT(still_bits, 3.5);
   EXPECT_LT(still_bits, 0.5 * moving_bits);
   EXPECT_LT(moving_bits, 0.6 * unknown_bits);
+}
+
+TEST(TangentWeights, ComeBackWhateverTheyAre) {
+  std::mt19937 random(5);
+  for (const uint32_t class_count : {1u, kFewMotionClasses, kMotionClassCount}) {
+    for (const int32_t largest : {0, 3, 2'000, INT16_MAX}) {
+      MotionWeights weights{};
+      for (uint32_t c = 0; c < class_count; ++c)
+        for (int16_t& weight : weights[c])
+          weight = static_cast<int16_t>(
+              static_cast<int32_t>(random() % (2 * static_cast<uint32_t>(largest) + 1)) - largest);
+      if (largest == INT16_MAX) weights[0] = {INT16_MIN, INT16_MAX, INT16_MIN, 0, INT16_MAX};
+      ValueWriter writer;
+      write_weights(class_count, weights, writer);
+      std::vector<std::byte> bytes;
+      writer.finish(bytes);
+      ValueReader reader;
+      ASSERT_TRUE(reader.open(bytes));
+      MotionWeights read;
+      for (auto& row : read) row.fill(77);
+      read_weights(class_count, read, reader);
+      EXPECT_TRUE(reader.is_spent());
+      EXPECT_TRUE(read == weights);
+    }
+  }
+}
+
+// Of y = x with x = +-100 known to within 50 when it counts, 100^2 / (100^2 + 50^2) is the best weight,
+// whatever all samples count.
+TEST(LeastSquares, TrustsFeaturesAsFarAsTheyAreExact) {
+  for (const float trust : {1.0f, 0.25f}) {
+    LeastSquares<2> fit;
+    for (int i = 0; i < 1000; ++i) {
+      const float x = i % 2 == 0 ? 100.0f : -100.0f;
+      fit.add({x, i % 4 < 2 ? 100.0f : -100.0f}, x, trust);
+    }
+    fit.flush();
+    EXPECT_NEAR(fit.weights(1e-4, {50.0, 0.0})[0], 8'000, 1);
+    EXPECT_NEAR(fit.weights(1e-4, {0.0, 50.0})[0], 10'000, 1);
+    EXPECT_NEAR(fit.weights(1e-4, {50.0, 0.0})[1], 0, 1);
+  }
 }
 
 Pose jittered_pose(uint32_t salt) {

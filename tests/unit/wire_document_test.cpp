@@ -96,7 +96,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
   EXPECT_THAT(text, HasSubstr(fmt::format("<= {} bytes of printable", with_commas(kMaxAssignmentBytes))));
   EXPECT_THAT(text, HasSubstr(fmt::format("at most {} characters", with_commas(kMaxTextChars))));
   EXPECT_THAT(text, HasSubstr(fmt::format("{} x {} weights of i16", kRowClassCount, kFeatureCount)));
-  EXPECT_THAT(text, HasSubstr(fmt::format("classes x {} weights of i16, in units", kMotionFeatureCount)));
+  EXPECT_THAT(text, HasSubstr(fmt::format("classes x {} weights, in units of 1/{}", kMotionFeatureCount,
+                                          with_commas(static_cast<uint64_t>(1.0f / kMotionWeight)))));
   EXPECT_THAT(text,
               HasSubstr(fmt::format("{} x {} weights of i16 for", kShapeClassCount, kShapeFeatureCount)));
   EXPECT_THAT(text, HasSubstr(fmt::format("symbols 0 to {} themselves", kFirstTail - 1)));
