@@ -64,7 +64,9 @@ class LeastSquares {
         std::array<float, 8> sum{};
         for (uint32_t i = 0; i < kLanes; i += 8)
           for (uint32_t lane = 0; lane < 8; ++lane) sum[lane] += lanes_[a][i + lane] * lanes_[b][i + lane];
-        for (const float part : sum) gram_[b][a] += static_cast<double>(part);
+        for (uint32_t half = 4; half > 0; half /= 2)
+          for (uint32_t lane = 0; lane < half; ++lane) sum[lane] += sum[lane + half];
+        gram_[b][a] += static_cast<double>(sum[0]);
       }
     }
   }
@@ -79,7 +81,7 @@ class LeastSquares {
   }
 
  private:
-  static constexpr uint32_t kLanes = 64;
+  static constexpr uint32_t kLanes = 128;
   std::array<std::array<float, kLanes>, kCount + 1> lanes_{};
   uint32_t filled_ = 0;
   double trust_ = 0.0;  // sum of squares

@@ -166,12 +166,7 @@ class SampleRow {
 
   std::array<float, kMotionFeatureCount> features(size_t axis, size_t place) const {
     std::array<float, kMotionFeatureCount> value;
-    for (size_t k = 0; k < kMotionFeatures.size(); ++k) {
-      const MotionFeature& feature = kMotionFeatures[k];
-      const size_t at_place = place_of(feature.strand, place);
-      const bool is_now = feature.quantity == MotionQuantity::Now;
-      value[k] = is_now ? now(axis, at_place, feature.tipward) : rows_[axis][k][at_place];
-    }
+    set_features(value, axis, place, std::make_index_sequence<kMotionFeatures.size()>());
     for (uint32_t k = 0; k < kHeadStepCount; ++k) {
       const auto& step = frame_.head.step[k].row[axis];
       double change = step[3];
@@ -195,6 +190,19 @@ class SampleRow {
   }
 
  private:
+  // The table is read while compiling: one load and no branch for each feature.
+  template <size_t... k>
+  void set_features(std::array<float, kMotionFeatureCount>& value, size_t axis, size_t place,
+                    std::index_sequence<k...>) const {
+    ((value[k] = feature<kMotionFeatures[k].quantity, kMotionFeatures[k].tipward>(
+          axis, k, place_of(kMotionFeatures[k].strand, place))),
+     ...);
+  }
+  template <MotionQuantity quantity, int tipward>
+  float feature(size_t axis, size_t k, size_t place) const {
+    if constexpr (quantity == MotionQuantity::Now) return now(axis, place, tipward);
+    return rows_[axis][k][place];
+  }
   size_t place_of(MotionStrand strand, size_t place) const {
     if (strand == MotionStrand::Own) return place;
     return layout_.neighbour[strand == MotionStrand::Neighbour ? 0 : 1][place];
