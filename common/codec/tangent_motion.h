@@ -28,7 +28,7 @@ inline constexpr float kDriftShare = 0.85f;         // of the drift that is left
 inline constexpr float kLengthWeight = 1.0f / 16;   // unit of the length blend
 inline constexpr int32_t kEscapedLength = 1 << 20;  // in place of a length correction
 inline constexpr uint32_t kShapeFeatureCount = 16;
-inline constexpr uint32_t kShapeClassCount = 3;  // roots; first segments; the rest
+inline constexpr uint32_t kShapeClassCount = 16;  // roots; first segments; and so on; the rest
 
 template <class T>
 using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_count x stride)

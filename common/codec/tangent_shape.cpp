@@ -85,15 +85,15 @@ ShapeFeatures ShapeRow::features(size_t place) const {
   for (uint32_t lane = 0; lane < kLaneCount; ++lane) own[lane] = static_cast<uint32_t>(place) + lane;
   ShapeFeatures value{};
   value[0] = edges.rest(own.data(), v_);
-  if (v_ >= 1) {
+  // Edges only: a root's position would be a thousand times their size, and its weight too coarse.
+  if (v_ >= 2) {
     value[1] = edges.now(own.data(), v_ - 1);
     value[3] = edges.rest(own.data(), v_ - 1);
-  }
-  if (v_ >= 2) {
-    value[2] = edges.now(own.data(), v_ - 2);
     value[10] = turned(value[0], value[3], value[1]);
-    const LaneVectors like = turned(value[3], edges.rest(own.data(), v_ - 2), value[2]);
-    if (v_ >= 3) value[13] = difference(value[1], like);
+  }
+  if (v_ >= 3) {
+    value[2] = edges.now(own.data(), v_ - 2);
+    value[13] = difference(value[1], turned(value[3], edges.rest(own.data(), v_ - 2), value[2]));
   }
   for (uint32_t which = 0; which < 2; ++which) {
     const uint32_t* other = layout_.neighbour[which].data() + place;
@@ -101,11 +101,11 @@ ShapeFeatures ShapeRow::features(size_t place) const {
     const LaneVectors rest = edges.rest(other, v_);
     value[4 + 3 * which] = now;
     value[6 + 3 * which] = rest;
-    if (v_ == 0) continue;
+    if (v_ >= 1) value[11 + which] = turned(value[0], rest, now);
+    if (v_ < 2) continue;
     const LaneVectors parent = edges.now(other, v_ - 1);
     value[5 + 3 * which] = parent;
-    value[11 + which] = turned(value[0], rest, now);
-    if (v_ >= 2) value[14 + which] = difference(now, turned(rest, edges.rest(other, v_ - 1), parent));
+    value[14 + which] = difference(now, turned(rest, edges.rest(other, v_ - 1), parent));
   }
   return value;
 }
@@ -125,32 +125,42 @@ Expected ShapeRow::expect(size_t place, const ShapeWeights& weights) const {
   return expected;
 }
 
+namespace {
+
+void add_block(const ShapeRow& row, const Planes<int32_t>& target, size_t place,
+               LeastSquares<kShapeFeatureCount>& fit) {
+  const ShapeFeatures value = row.features(place);
+  const IntLaneVectors base = row.base(place);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const IntLanes end = load_lanes(target[axis].data() + row.at(place));
+    const Lanes wanted = to_floats(wrapping_differences(end, base.axis[axis]));
+    for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
+      std::array<float, kShapeFeatureCount> sample;
+      for (uint32_t k = 0; k < kShapeFeatureCount; ++k) sample[k] = value[k].axis[axis][lane];
+      fit.add(sample, wanted[lane], 1.0f);
+    }
+  }
+}
+
+}  // namespace
+
 ShapeWeights fit_shape(const TangentLayout& layout, float quantum_m, const Planes<int32_t>& target) {
   constexpr size_t kStep = 4 * kLaneCount;
   constexpr double kNoise = 150.0;  // steps: what edges are off by
-  std::array<LeastSquares<kShapeFeatureCount>, kShapeClassCount> fits;
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    auto& fit = fits[shape_class(v)];
-    const ShapeRow row(layout, quantum_m, target, v);
-    for (size_t place = 0; place < layout.no_neighbour(); place += kStep) {
-      const ShapeFeatures value = row.features(place);
-      const IntLaneVectors base = row.base(place);
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const Lanes wanted =
-            to_floats(wrapping_differences(load_lanes(target[axis].data() + row.at(place)), base.axis[axis]));
-        for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
-          std::array<float, kShapeFeatureCount> sample;
-          for (uint32_t k = 0; k < kShapeFeatureCount; ++k) sample[k] = value[k].axis[axis][lane];
-          fit.add(sample, wanted[lane], 1.0f);
-        }
-      }
-    }
-    fit.flush();
-  }
   std::array<double, kShapeFeatureCount> noise;
   noise.fill(kNoise);
   ShapeWeights weights;
-  for (uint32_t c = 0; c < kShapeClassCount; ++c) weights[c] = fits[c].weights(kShapeWeight, noise);
+  for_each_part(kShapeClassCount, threads_for(layout), [&](uint32_t c) {
+    LeastSquares<kShapeFeatureCount> fit;
+    for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+      if (shape_class(v) != c) continue;
+      const ShapeRow row(layout, quantum_m, target, v);
+      for (size_t place = 0; place < layout.no_neighbour(); place += kStep)
+        add_block(row, target, place, fit);
+    }
+    fit.flush();
+    weights[c] = fit.weights(kShapeWeight, noise);
+  });
   return weights;
 }
 

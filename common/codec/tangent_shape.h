@@ -7,9 +7,10 @@
 
 namespace strandcast {
 
-// Features of a vertex, each a vector: an edge (the position, for roots) or what follows from edges. A bend
-// is an edge less what it would be had it turned from its rest edge like its parent; an edge x *turned* by
-// another one is x after the smallest rotation that takes that one's rest edge to its direction.
+// Features of a vertex, each a vector: an edge (for a root its position, which tells nothing to others) or
+// what follows from edges. A bend is an edge less what it would be had it turned from its rest edge like its
+// parent; an edge x *turned* by another one is x after the smallest rotation that takes that one's rest edge
+// to its direction.
 //   0 rest             1 parent            2 grandparent      3 parent's rest
 //   4 neighbour        5 its parent        6 its rest         7 to 9 second neighbour likewise
 //  10 rest turned by the parent           11 by the neighbour                 12 by the second neighbour
