@@ -178,7 +178,7 @@ class SampleRow {
 
   /// Vertices that were predicted badly would rule the sums, though they need few bits more than others.
   float trust(size_t place) const {
-    constexpr float kTypical = 600.0f;  // steps
+    constexpr float kTypical = 300.0f;  // steps
     float squares = 0.0f;
     for (size_t axis = 0; axis < 3; ++axis) {
       const float own = history_.residual[axis][at(place)];
