@@ -209,7 +209,11 @@ TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {
   auto strands = join();
   auto frames = join(StreamMode::Frames);
   ASSERT_TRUE(strands && frames);
-  strands->set_snapshot_listener([&](const auto& snapshot) { decoded[snapshot->tick] = snapshot; });
+  // Pictures show what the first class decodes to; on a busy machine a viewer may get another one for a
+  // while.
+  strands->set_snapshot_listener([&](const auto& snapshot) {
+    if (strands->quality().stream_id == 0) decoded[snapshot->tick] = snapshot;
+  });
   const auto common_pictures = [&] {
     std::vector<Painted> common;
     for (Painted& painted : observer_.painted())
