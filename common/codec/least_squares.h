@@ -42,8 +42,8 @@ std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor
   return weights;
 }
 
-/// Collects samples (features, wanted value, by how much it counts). Sums of a batch
-/// are floats, those of all batches doubles.
+/// Collects samples (features, wanted value, by how much it counts). Sums of a batch are floats, those of all
+/// batches doubles.
 template <uint32_t kCount>
 class LeastSquares {
  public:

@@ -63,7 +63,7 @@ std::vector<Bytes> control_samples() {
   return samples;
 }
 
-/// To both directions: what is good for one is strange to the other.
+/// To both directions: what is good for one is strange to the other. The targets CHECK what they decode.
 void feed_control(const Bytes& bytes) {
   feed(fuzz_client_message, bytes);
   feed(fuzz_server_message, bytes);
