@@ -7,8 +7,9 @@
 #include <ctime>
 
 #include "common/base/file.h"
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/groom/groom_asset.h"
+#include "common/log/log.h"
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
 #include "server/app/options.h"

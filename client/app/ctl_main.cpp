@@ -7,7 +7,7 @@
 #include "client/app/feed.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace {
 

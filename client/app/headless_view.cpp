@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "client/app/live_connection.h"
-#include "common/base/log.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {

@@ -3,7 +3,7 @@
 #include <thread>
 #include <utility>
 
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 

@@ -7,7 +7,7 @@
 #include "client/app/view_options.h"
 #include "client/app/view_report.h"
 #include "client/app/windowed_view.h"
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace {
 

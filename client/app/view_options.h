@@ -6,9 +6,9 @@
 #include <string>
 
 #include "client/net/viewer_client.h"
-#include "client/replay/strand_replay.h"
 #include "common/base/result.h"
 #include "common/render/renderer.h"
+#include "common/replay/strand_replay.h"
 
 namespace strandcast {
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {
@@ -26,7 +26,9 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
   ASSIGN_OR_RETURN(auto client, ViewerClient::connect(acknowledging));
   std::unique_ptr<ViewerSession> session(new ViewerSession(std::move(client)));
   ViewerClient* requester = session->client_.get();
-  auto replay = StrandReplay::make(session->welcome(), [requester] { requester->request_keyframe(); });
+  const Welcome& welcome = session->welcome();
+  auto replay = StrandReplay::make(welcome.codec, {welcome.strand_count, welcome.vertex_count},
+                                   [requester] { requester->request_keyframe(); });
   if (!replay) return at(config.address.to_string(), replay.error());
   session->replay_ = std::move(replay).value();
   session->opened_ns_ = now_ns();

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "client/net/viewer_client.h"
-#include "client/replay/strand_replay.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
-#include "common/codec/picture_decoder.h"
-#include "common/codec/scene_asset.h"
+#include "common/pictures/picture_decoder.h"
+#include "common/replay/strand_replay.h"
+#include "common/strands/scene_asset.h"
 
 namespace strandcast {
 

@@ -14,7 +14,7 @@
 
 #include "client/app/live_connection.h"
 #include "client/app/view_report.h"
-#include "client/replay/snapshot_timeline.h"
+#include "common/replay/snapshot_timeline.h"
 
 namespace strandcast {
 

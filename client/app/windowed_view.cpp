@@ -6,9 +6,9 @@
 #include "client/app/viewer_thread.h"
 #include "client/window/orbit_camera.h"
 #include "client/window/window.h"
-#include "common/base/log.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {

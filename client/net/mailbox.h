@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {

@@ -15,7 +15,7 @@
 #include "client/net/mailbox.h"
 #include "client/net/outbox.h"
 #include "common/base/result.h"
-#include "common/wire/clock_offset.h"
+#include "common/replay/clock_offset.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {

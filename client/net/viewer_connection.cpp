@@ -7,8 +7,8 @@
 #include "client/net/connection_error_private.h"
 #include "client/net/reconnect_policy.h"
 #include "client/net/viewer_connection_private.h"
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "client/window/hud_panel.h"
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "client/window/hud.h"
 #include "common/base/result.h"
-#include "common/codec/image_codec.h"
+#include "common/pictures/image_codec.h"
 #include "common/render/renderer.h"
 
 namespace strandcast {

@@ -5,12 +5,9 @@
 #include <cstring>
 #include <fstream>
 
-#include <spdlog/sinks/stdout_color_sinks.h>
-
 #include "common/base/check.h"
 #include "common/base/file.h"
 #include "common/base/hash.h"
-#include "common/base/log.h"
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
 #include "common/base/result.h"
@@ -42,17 +39,6 @@ const char* to_string(ErrorCode code) {
 void check_failed(const char* condition, const char* file, int line) {
   std::fprintf(stderr, "%s:%d: broken invariant: %s\n", file, line, condition);
   std::abort();
-}
-
-bool init_log(const std::string& level) {
-  const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
-  if (parsed == spdlog::level::off && level != "off") return false;
-  auto logger = spdlog::get("strandcast");
-  if (!logger) logger = spdlog::stderr_color_mt("strandcast");
-  logger->set_level(parsed);
-  logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");
-  spdlog::set_default_logger(logger);
-  return true;
 }
 
 uint64_t hash_bytes(std::span<const std::byte> bytes, uint64_t seed) {

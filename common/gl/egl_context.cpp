@@ -10,7 +10,7 @@
 #include <optional>
 #include <string_view>
 
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace strandcast::gl {
 namespace {

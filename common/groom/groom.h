@@ -9,15 +9,13 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_limits.h"
 
 namespace strandcast {
 
-// Limits of every groom, wherever it comes from; checked before anything is allocated.
-inline constexpr uint32_t kMaxStrandCount = 200'000;
-inline constexpr uint32_t kMinVertexCount = 2;            // per strand
-inline constexpr uint32_t kMaxVertexCount = 64;           // per strand, after resampling
+// Limits of groom files, besides those of all strands; checked before anything is allocated.
 inline constexpr uint32_t kMaxSourceVertexCount = 4'096;  // per strand in a file, before resampling
-inline constexpr uint64_t kMaxGroomVertices = 16'000'000;
 inline constexpr uint64_t kMaxGroomFileBytes = 512ull << 20;
 
 /// Which vertices follow the head exactly; the rest is simulated.
@@ -44,11 +42,6 @@ struct Groom {
 /// Checks sizes, limits, coordinates within kMaxGroomExtentM, that every strand has >= 2 vertices and that
 /// vertex 0 of every strand is pinned. BadInput or LimitExceeded name the strand and vertex.
 Status validate(const Groom& groom);
-
-inline constexpr float kMaxGroomExtentM = 100.0f;  // |coordinate| in head space
-
-/// Three key strands between which followers are interpolated.
-using RootTriangle = glm::uvec3;
 
 /// Triangles of neighbouring roots (at most about 2 per strand), deterministic. Strands without a triangle
 /// are still drawn as themselves.

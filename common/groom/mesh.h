@@ -9,19 +9,11 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/strands/scene_asset.h"
 
 namespace strandcast {
 
-inline constexpr uint32_t kMaxMeshTriangles = 500'000;
 inline constexpr uint64_t kMaxMeshFileBytes = 64ull << 20;
-
-struct Mesh {
-  std::vector<glm::vec3> position_m;  // (vertex_count) head space
-  std::vector<glm::vec3> normal;      // (vertex_count) unit, outwards
-  std::vector<glm::uvec3> triangle;   // (triangle_count) counter-clockwise seen from outside
-};
-
-inline constexpr float kMaxMeshExtentM = 100.0f;  // |coordinate| in head space
 
 /// Wavefront OBJ: v, vn and f (polygons are fanned); normals are computed when absent, averaged when a vertex
 /// has several. Coordinates are multiplied by unit_m. Other statements are skipped. BadInput names file and

@@ -5,8 +5,8 @@
 
 #include "common/base/hash.h"
 #include "common/groom/hair_style.h"
-#include "common/groom/point_tree.h"
 #include "common/groom/scalp_roots.h"
+#include "common/math/point_tree.h"
 
 namespace strandcast {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "common/base/hash.h"
 #include "common/groom/groom.h"
-#include "common/groom/point_tree.h"
 #include "common/groom/progressive_order.h"
+#include "common/math/point_tree.h"
 
 namespace strandcast {
 namespace {

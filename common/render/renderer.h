@@ -9,27 +9,17 @@
 #include <memory>
 #include <vector>
 
+#include "common/base/picture_size.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
-#include "common/codec/image_codec.h"
-#include "common/codec/scene_asset.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
+#include "common/pictures/image_codec.h"
 #include "common/scene/scene_desc.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_picture.h"
 
 namespace strandcast {
-
-/// What to draw: strands in head space as a viewer has them after decoding (and blending).
-struct StrandPicture {
-  Pose world_from_head;
-  std::vector<glm::vec3>
-      position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
-};
-
-struct RenderSize {
-  uint32_t width = 640;
-  uint32_t height = 360;
-};
 
 /// Milliseconds of the last draw, by pass.
 struct RenderProfile {

@@ -5,8 +5,8 @@
 
 #include <limits>
 
+#include "common/base/picture_size.h"
 #include "common/groom/procedural.h"
-#include "common/scene/picture_size.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast::scene_fields {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/codec/picture.h"
 #include "common/math/pose.h"
+#include "common/pictures/picture.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast {

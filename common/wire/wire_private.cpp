@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "strandcast/v1/scene.pb.h"
 
 namespace strandcast {

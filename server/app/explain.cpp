@@ -3,10 +3,11 @@
 #include <chrono>
 
 #include "common/base/profile.h"
-#include "common/codec/scene_asset.h"
-#include "common/codec/strand_codec.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
+#include "common/groom/groom_asset.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_codec.h"
 #include "server/app/pass_table.h"
 #include "server/app/scene_change.h"
 #include "server/publish/publisher.h"

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "common/codec/scene_asset.h"
 #include "common/scene/features.h"
+#include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
 
 namespace strandcast {

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "common/codec/scene_asset.h"
 #include "common/gl/pass_plan.h"
 #include "common/scene/features.h"
+#include "common/strands/scene_asset.h"
 
 namespace strandcast {
 

@@ -9,8 +9,9 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/log.h"
-#include "common/codec/scene_asset.h"
+#include "common/groom/groom_asset.h"
+#include "common/log/log.h"
+#include "common/strands/scene_asset.h"
 #include "server/app/mode_facts.h"
 #include "server/app/scene_change.h"
 #include "server/app/viewers.h"

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/log.h"
-#include "common/codec/strand_codec.h"
+#include "common/log/log.h"
+#include "common/strands/strand_codec.h"
 #include "server/app/scene_change.h"
 
 namespace strandcast {

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <utility>
 
-#include "common/base/log.h"
+#include "common/log/log.h"
 
 namespace strandcast {
 namespace {

@@ -16,8 +16,8 @@
 
 #include "common/base/profile.h"
 #include "common/base/result.h"
-#include "common/codec/frame_header.h"
-#include "common/codec/strand_codec.h"
+#include "common/strands/frame_header.h"
+#include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "server/encode/picture_painter.h"
 #include "server/encode/picture_views.h"

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/codec/jpeg_tiles.h"
-#include "common/codec/video_codec.h"
+#include "common/pictures/jpeg_tiles.h"
+#include "common/pictures/video_codec.h"
 #include "server/encode/picture_ladder.h"
 
 namespace strandcast {

@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "common/base/result.h"
-#include "common/codec/image_codec.h"
-#include "common/codec/picture.h"
+#include "common/pictures/image_codec.h"
+#include "common/pictures/picture.h"
 #include "server/encode/picture_views.h"
 
 namespace strandcast {

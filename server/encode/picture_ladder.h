@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/codec/picture.h"
+#include "common/pictures/picture.h"
 
 namespace strandcast {
 

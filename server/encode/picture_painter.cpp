@@ -2,9 +2,9 @@
 
 #include <utility>
 
-#include "common/base/log.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
+#include "common/log/log.h"
 #include "common/render/renderer.h"
 
 namespace strandcast {

@@ -8,10 +8,10 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "common/codec/image_codec.h"
-#include "common/codec/scene_asset.h"
-#include "common/codec/snapshot.h"
+#include "common/pictures/image_codec.h"
 #include "common/scene/scene_desc.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/snapshot.h"
 #include "server/encode/picture_views.h"
 
 namespace strandcast {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/codec/picture.h"
+#include "common/pictures/picture.h"
 #include "common/render/renderer.h"
 #include "common/scene/scene_desc.h"
 

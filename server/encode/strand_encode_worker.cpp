@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
-#include "common/base/log.h"
-#include "common/codec/strand_prefix.h"
+#include "common/log/log.h"
+#include "common/strands/strand_prefix.h"
 
 namespace strandcast {
 namespace {

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "common/base/profile.h"
-#include "common/codec/frame_header.h"
-#include "common/codec/strand_codec.h"
+#include "common/strands/frame_header.h"
+#include "common/strands/strand_codec.h"
 #include "server/publish/snapshot_slot.h"
 
 namespace strandcast {

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/log/log.h"
 #include "server/net/access.h"
 #include "server/net/metrics.h"
 #include "server/net/session_private.h"

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 
 namespace strandcast {
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/log/log.h"
 #include "server/net/access.h"
 #include "server/net/connection_private.h"
 #include "server/net/session_private.h"

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/codec/frame_header.h"
-#include "common/codec/picture.h"
 #include "common/net/tls_context.h"
+#include "common/pictures/picture.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
 #include "server/net/roles.h"

@@ -8,8 +8,8 @@
 #include <optional>
 #include <variant>
 
-#include "common/codec/frame_header.h"
-#include "common/codec/picture.h"
+#include "common/pictures/picture.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {

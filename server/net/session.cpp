@@ -4,8 +4,8 @@
 #include <exception>
 #include <utility>
 
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/log/log.h"
 
 namespace strandcast::net {
 namespace {

@@ -3,8 +3,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/log/log.h"
 #include "server/net/overloaded_private.h"
 #include "server/net/session_private.h"
 

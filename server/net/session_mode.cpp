@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/log.h"
 #include "common/base/profile.h"
+#include "common/log/log.h"
 #include "server/net/session_private.h"
 
 namespace strandcast::net {

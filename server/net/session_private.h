@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/log.h"
+#include "common/log/log.h"
 #include "server/net/access.h"
 #include "server/net/beast_private.h"
 #include "server/net/context_private.h"

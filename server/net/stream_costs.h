@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "server/net/strand_class.h"
 
 namespace strandcast {

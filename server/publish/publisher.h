@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "common/base/profile.h"
-#include "common/codec/snapshot.h"
 #include "common/groom/groom.h"
+#include "common/strands/snapshot.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {

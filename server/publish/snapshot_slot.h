@@ -9,7 +9,7 @@
 #include <mutex>
 #include <utility>
 
-#include "common/codec/snapshot.h"
+#include "common/strands/snapshot.h"
 
 namespace strandcast {
 

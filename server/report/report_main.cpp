@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "common/base/log.h"
+#include "common/log/log.h"
 #include "server/report/report_commands.h"
 
 namespace strandcast {

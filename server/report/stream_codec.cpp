@@ -3,14 +3,14 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/codec/strand_codec.h"
+#include "common/strands/strand_codec.h"
 
 namespace strandcast {
 namespace {
 
 constexpr double kFrameNs = 1e9 / 60.0;
 
-/// A strand codec of common/codec, used as server and viewer use it.
+/// A strand codec of common/strands, used as server and viewer use it.
 class OwnCodec final : public StreamCodec {
  public:
   static Result<std::unique_ptr<StreamCodec>> make(const std::string& name, float bound_m,

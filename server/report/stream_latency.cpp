@@ -12,7 +12,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
-#include "common/codec/strand_codec.h"
+#include "common/strands/strand_codec.h"
 
 namespace strandcast {
 namespace {

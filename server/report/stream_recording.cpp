@@ -6,7 +6,8 @@
 #include <cmath>
 
 #include "common/base/profile.h"
-#include "common/codec/scene_asset.h"
+#include "common/groom/groom_asset.h"
+#include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/solver_registry.h"

@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "common/base/profile.h"
-#include "common/codec/strand_codec.h"
+#include "common/strands/strand_codec.h"
 #include "tests/bench/codec_motions.h"
 
 namespace strandcast {

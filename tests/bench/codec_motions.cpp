@@ -4,10 +4,11 @@
 #include <memory>
 #include <variant>
 
-#include "common/codec/scene_asset.h"
-#include "common/codec/strand_codec.h"
+#include "common/groom/groom_asset.h"
 #include "common/motion/bvh.h"
 #include "common/scene/features.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_codec.h"
 #include "server/publish/publisher.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"

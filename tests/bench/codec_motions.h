@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/codec/snapshot.h"
+#include "common/strands/snapshot.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {

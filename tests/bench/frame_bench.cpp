@@ -15,10 +15,10 @@
 #include <string>
 
 #include "common/base/quantile.h"
-#include "common/codec/picture_decoder.h"
-#include "common/codec/strand_codec.h"
 #include "common/gl/egl_context.h"
+#include "common/pictures/picture_decoder.h"
 #include "common/render/renderer.h"
+#include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "tests/bench/scene_run.h"
 #include "tests/support/test_pictures.h"

@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "common/base/check.h"
-#include "common/codec/scene_asset.h"
+#include "common/groom/groom_asset.h"
 #include "common/motion/motion_clip.h"
 #include "common/scene/features.h"
+#include "common/strands/scene_asset.h"
 #include "server/publish/publisher.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "common/base/check.h"
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,6 +1,6 @@
 // libFuzzer entry: a JPEG picture, its size checked before anything is allocated.
 #include "common/base/check.h"
-#include "common/codec/image_codec.h"
+#include "common/pictures/image_codec.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/base/check.h"
-#include "common/codec/picture_decoder.h"
+#include "common/pictures/picture_decoder.h"
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/support/test_pictures.h"
 

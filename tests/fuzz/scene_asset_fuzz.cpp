@@ -1,7 +1,7 @@
 // libFuzzer entry: the payload of an Asset message, and what a viewer does with a small one.
 #include "common/base/check.h"
-#include "common/codec/scene_asset.h"
-#include "common/codec/strand_codec.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_codec.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

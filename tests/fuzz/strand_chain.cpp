@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/codec/strand_payload.h"
+#include "common/strands/strand_payload.h"
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/support/hair_motion.h"
 

@@ -4,8 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include "client/replay/strand_replay.h"
 #include "common/base/check.h"
+#include "common/replay/strand_replay.h"
+#include "common/strands/strand_limits.h"
 #include "tests/fuzz/fuzz_input.h"
 
 namespace {
@@ -21,11 +22,7 @@ constexpr uint32_t kVertices = 2;
 class ReplayGame {
  public:
   ReplayGame() {
-    Welcome welcome;
-    welcome.codec = "raw";
-    welcome.strand_count = kStrands;
-    welcome.vertex_count = kVertices;
-    replay_ = std::move(StrandReplay::make(welcome, [this] { ++requests_; })).value();
+    replay_ = std::move(StrandReplay::make("raw", {kStrands, kVertices}, [this] { ++requests_; })).value();
     encoder_ = std::move(make_strand_encoder("raw")).value();
   }
 

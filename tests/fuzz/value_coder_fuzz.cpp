@@ -1,7 +1,7 @@
 // libFuzzer entry: the rANS coder of strand values. The same bytes are taken as a hostile slice to read, and
 // as values to write and read back.
 #include "common/base/check.h"
-#include "common/codec/value_coder.h"
+#include "common/strands/value_coder.h"
 #include "tests/fuzz/fuzz_input.h"
 
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "common/base/check.h"
-#include "common/codec/residual_coder.h"
-#include "common/codec/zstd_block.h"
+#include "common/strands/residual_coder.h"
+#include "common/strands/zstd_block.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -6,9 +6,10 @@
 #include <atomic>
 #include <mutex>
 
-#include "common/codec/strand_codec.h"
+#include "common/groom/groom_asset.h"
 #include "common/groom/procedural.h"
 #include "common/render/renderer.h"
+#include "common/strands/strand_codec.h"
 #include "server/encode/frame_worker.h"
 #include "tests/support/eventually.h"
 #include "tests/support/gl_fixture.h"

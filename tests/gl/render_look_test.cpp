@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/groom/groom_asset.h"
 #include "common/groom/mesh.h"
 #include "common/groom/procedural.h"
 #include "common/render/renderer.h"

@@ -10,9 +10,9 @@
 #include <optional>
 #include <thread>
 
-#include "common/codec/image_codec.h"
-#include "common/codec/scene_asset.h"
-#include "common/codec/strand_codec.h"
+#include "common/pictures/image_codec.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_codec.h"
 #include "server/app/sim_loop.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"

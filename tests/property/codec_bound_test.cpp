@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "common/codec/strand_codec.h"
+#include "common/strands/strand_codec.h"
 #include "server/sim/solver_registry.h"
 #include "tests/bench/codec_motions.h"
 

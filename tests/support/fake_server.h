@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 
 namespace strandcast::test {

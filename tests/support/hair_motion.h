@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "common/codec/snapshot.h"
+#include "common/strands/snapshot.h"
 
 namespace strandcast {
 

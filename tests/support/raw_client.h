@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
 

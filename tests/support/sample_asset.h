@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "common/codec/scene_asset.h"
+#include "common/strands/scene_asset.h"
 
 namespace strandcast {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "common/codec/image_codec.h"
+#include "common/pictures/image_codec.h"
 
 namespace strandcast::test {
 

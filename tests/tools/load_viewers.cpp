@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "tests/tools/load_socket.h"
 #include "tests/tools/web_socket_reader.h"
 

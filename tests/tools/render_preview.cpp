@@ -11,11 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "common/codec/image_codec.h"
-#include "common/codec/scene_asset.h"
 #include "common/gl/egl_context.h"
+#include "common/groom/groom_asset.h"
+#include "common/pictures/image_codec.h"
 #include "common/render/renderer.h"
 #include "common/scene/scene_file.h"
+#include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
 
 namespace strandcast {

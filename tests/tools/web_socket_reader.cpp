@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "common/codec/frame_header.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 
 namespace strandcast::load {

@@ -5,8 +5,8 @@
 #include <set>
 #include <thread>
 
-#include "common/codec/image_codec.h"
-#include "common/codec/jpeg_tiles.h"
+#include "common/pictures/image_codec.h"
+#include "common/pictures/jpeg_tiles.h"
 #include "tests/support/eventually.h"
 
 namespace strandcast {

@@ -6,10 +6,10 @@
 #include <set>
 
 #include "common/base/hash.h"
-#include "common/groom/point_tree.h"
 #include "common/groom/procedural.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
+#include "common/math/point_tree.h"
 #include "tests/support/groom_files.h"
 
 namespace strandcast {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "common/groom/point_tree.h"
 #include "common/groom/procedural.h"
 #include "common/groom/scalp_roots.h"
+#include "common/math/point_tree.h"
 
 namespace strandcast {
 namespace {

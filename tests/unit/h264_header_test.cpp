@@ -1,7 +1,7 @@
 // What is read of an H.264 frame before it is decoded, in every build.
-#include "common/codec/h264_header.h"
+#include "common/pictures/h264_header.h"
 
-#include "common/codec/picture_decoder.h"
+#include "common/pictures/picture_decoder.h"
 
 namespace strandcast {
 namespace {

@@ -4,7 +4,7 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 }
 
-#include "common/codec/video_codec.h"
+#include "common/pictures/video_codec.h"
 
 namespace strandcast {
 namespace {

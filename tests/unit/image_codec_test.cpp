@@ -1,4 +1,4 @@
-#include "common/codec/image_codec.h"
+#include "common/pictures/image_codec.h"
 
 #include <unistd.h>
 #include <webp/mux.h>

@@ -1,9 +1,9 @@
-#include "common/codec/jpeg_tiles.h"
+#include "common/pictures/jpeg_tiles.h"
 
 #include <algorithm>
 #include <array>
 
-#include "common/codec/picture.h"
+#include "common/pictures/picture.h"
 #include "tests/support/test_pictures.h"
 
 namespace strandcast {

@@ -22,19 +22,27 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
     return names;
   };
   static const std::set<std::string> kMath = with({"common/math"}, kBase);
-  static const std::set<std::string> kScene = with({"common/scene", "common/motion", "common/groom"}, kMath);
-  static const std::set<std::string> kCodec = with({"common/codec"}, kScene);
-  static const std::set<std::string> kWire = with({"common/wire"}, kCodec);
-  static const std::set<std::string> kGl = with({"common/gl", "shaders/shared"}, kBase);
-  static const std::set<std::string> kRender = with(with({"common/render"}, kGl), kCodec);
-  static const std::set<std::string> kAll = with(kRender, kWire);
+  static const std::set<std::string> kStrands = with({"common/strands"}, kMath);
+  static const std::set<std::string> kReplay = with({"common/replay"}, kStrands);
+  static const std::set<std::string> kPictures = with({"common/pictures"}, kStrands);
+  static const std::set<std::string> kScene =
+      with({"common/scene", "common/motion", "common/groom"}, kStrands);
+  static const std::set<std::string> kStreams = with(with(kScene, kPictures), {"common/log"});
+  static const std::set<std::string> kWire = with({"common/wire"}, kStreams);
+  static const std::set<std::string> kGl = with({"common/gl", "shaders/shared", "common/log"}, kBase);
+  static const std::set<std::string> kRender = with(with({"common/render"}, kGl), kStreams);
+  static const std::set<std::string> kAll = with(with(kRender, kWire), kReplay);
   static const std::map<std::string, std::set<std::string>> kAllowed = {
       {"common/base", {}},
+      {"common/log", kBase},
       {"common/math", kBase},
+      // The core: a viewer in a browser, a relay or a fuzzer links these and nothing else of ours.
+      {"common/strands", kMath},
+      {"common/replay", kStrands},
+      {"common/pictures", kPictures},
       {"common/motion", kMath},
-      {"common/groom", kMath},
+      {"common/groom", kStrands},
       {"common/scene", kScene},
-      {"common/codec", kCodec},
       {"common/wire", kWire},
       {"common/net", kBase},
       {"common/gl", kGl},
@@ -42,7 +50,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"server/input", kWire},
       {"server/sim", with(kGl, kScene)},
       {"server/scene", with(with({"server/input", "server/sim"}, kGl), kScene)},
-      {"server/publish", with(with({"server/sim"}, kGl), kCodec)},
+      {"server/publish", with(with({"server/sim"}, kGl), kScene)},
       {"server/encode", with({"server/publish"}, kRender)},
       {"server/net", with({"server/input", "common/net"}, kWire)},
       {"server/app",
@@ -51,10 +59,9 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"server/report",
        with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode"}, kAll)},
       {"server", with({"server/app"}, kAll)},
-      {"client/net", with({"common/net"}, kWire)},
-      {"client/replay", kAll},
-      {"client/window", with({"client/replay"}, kAll)},
-      {"client/app", with({"client/net", "client/replay", "client/window"}, kAll)},
+      {"client/net", with({"common/net", "common/replay"}, kWire)},
+      {"client/window", kAll},
+      {"client/app", with({"client/net", "client/window"}, kAll)},
       {"client", with({"client/app"}, kAll)},
   };
   return kAllowed;
@@ -81,13 +88,14 @@ const std::vector<LibraryRule>& library_rules() {
       {"epoxy/", kGl},
       {"EGL/", kGl},
       {"GL/", kGl},
-      {"zstd", {"common/codec"}},
-      {"turbojpeg", {"common/codec"}},
-      {"png.h", {"common/codec"}},
-      {"webp/", {"common/codec"}},
-      {"vpx/", {"common/codec"}, {".cpp"}},
-      {"libav", {"common/codec"}, {".cpp"}},
-      {"libyuv", {"common/codec"}},
+      {"zstd", {"common/strands"}},
+      {"spdlog", {"common/log"}},
+      {"turbojpeg", {"common/pictures"}},
+      {"png.h", {"common/pictures"}},
+      {"webp/", {"common/pictures"}},
+      {"vpx/", {"common/pictures"}, {".cpp"}},
+      {"libav", {"common/pictures"}, {".cpp"}},
+      {"libyuv", {"common/pictures"}},
       {"GLFW/", {"client/window"}},
       {"imgui", {"client/window"}},
       {"CLI/", kApp},
@@ -183,15 +191,19 @@ TEST(Layering, FindsEveryKindOfWrongInclude) {
       {"common/base/file.cpp", "#include \"common/math/pose.h\""},
       {"common/motion/clip.cpp", "#include \"common/groom/groom.h\""},
       {"common/groom/groom.cpp", "#include \"common/scene/scene_desc.h\""},
-      {"common/scene/features.cpp", "#include \"common/codec/snapshot.h\""},
-      {"common/codec/delta.cpp", "#include \"common/wire/messages.h\""},
+      {"common/strands/snapshot.h", "#include \"common/scene/scene_desc.h\""},
+      {"common/strands/snapshot.cpp", "#include \"common/log/log.h\""},
+      {"common/replay/snapshot_timeline.h", "#include \"common/render/renderer.h\""},
+      {"common/replay/strand_replay.cpp", "#include \"common/wire/messages.h\""},
+      {"common/replay/strand_replay.cpp", "#include <spdlog/spdlog.h>"},
+      {"common/strands/delta.cpp", "#include \"common/wire/messages.h\""},
       {"common/gl/program.cpp", "#include \"common/render/renderer.h\""},
       {"common/gl/program.cpp", "#include \"common/scene/scene_desc.h\""},
-      {"common/codec/delta.cpp", "#include \"common/gl/objects.h\""},
+      {"common/strands/delta.cpp", "#include \"common/gl/objects.h\""},
       {"common/render/renderer.cpp", "#include \"server/sim/solver.h\""},
       {"client/app/app.cpp", "#include \"server/net/access.h\""},
       {"server/app/app.cpp", "#include \"server/report/svg_plot.h\""},
-      {"server/app/app.cpp", "#include \"client/replay/strand_replay.h\""},
+      {"server/net/server.cpp", "#include \"common/replay/strand_replay.h\""},
       {"server/sim/solver.cpp", "#include \"server/scene/stage.h\""},
       {"server/net/server.cpp", "#include \"server/sim/solver.h\""},
       {"common/scene/scene_file.h", "#include <google/protobuf/message.h>"},
@@ -200,13 +212,13 @@ TEST(Layering, FindsEveryKindOfWrongInclude) {
       {"server/net/server.h", "#include <boost/asio.hpp>"},
       {"common/wire/framing.cpp", "#include <boost/asio.hpp>"},
       {"server/app/app.cpp", "#include \"server/net/beast_private.h\""},
-      {"common/codec/delta.cpp", "#include <epoxy/gl.h>"},
+      {"common/strands/delta.cpp", "#include <epoxy/gl.h>"},
       {"server/encode/frame_worker.cpp", "#include <epoxy/gl.h>"},
       {"server/net/server.cpp", "#include <zstd.h>"},
-      {"common/codec/video_codec.h", "#include <vpx/vpx_encoder.h>"},
-      {"common/codec/video_codec.h", "#include <libavcodec/avcodec.h>"},
+      {"common/pictures/video_codec.h", "#include <vpx/vpx_encoder.h>"},
+      {"common/pictures/video_codec.h", "#include <libavcodec/avcodec.h>"},
       {"server/encode/picture_encoder.cpp", "#include <libavcodec/avcodec.h>"},
-      {"client/replay/strand_replay.cpp", "#include <GLFW/glfw3.h>"},
+      {"common/replay/strand_replay.cpp", "#include <GLFW/glfw3.h>"},
       {"common/base/log.cpp", "#include \"log.h\""},
       {"server/unheard_of/x.cpp", "#include \"common/base/log.h\""},
   };
@@ -216,7 +228,7 @@ TEST(Layering, FindsEveryKindOfWrongInclude) {
 
 TEST(Layering, LeavesRightIncludesAlone) {
   const std::vector<std::pair<std::string, std::string>> right = {
-      {"common/render/renderer.cpp", "#include \"common/codec/snapshot.h\""},
+      {"common/render/renderer.cpp", "#include \"common/strands/snapshot.h\""},
       {"common/gl/program.cpp", "#include <epoxy/gl.h>"},
       {"common/scene/scene_file.cpp", "#include \"strandcast/v1/scene.pb.h\""},
       {"server/net/beast_private.h", "#include <boost/beast.hpp>"},
@@ -224,7 +236,7 @@ TEST(Layering, LeavesRightIncludesAlone) {
       {"server/sim/solvers/dftl/dftl.cpp", "#include \"shaders/shared/bindings.h\""},
       {"server/encode/frame_worker.cpp", "#include \"server/publish/snapshot_slot.h\""},
       {"server/main.cpp", "#include \"server/app/app.h\""},
-      {"client/replay/strand_replay.cpp", "#include <vector>"},
+      {"common/replay/strand_replay.cpp", "#include <vector>"},
   };
   for (const auto& [path, line] : right) EXPECT_THAT(check_file(path, line + "\n"), IsEmpty());
 }

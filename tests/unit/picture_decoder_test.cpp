@@ -1,4 +1,4 @@
-#include "common/codec/picture_decoder.h"
+#include "common/pictures/picture_decoder.h"
 
 #include "tests/support/test_pictures.h"
 

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "common/codec/picture_decoder.h"
+#include "common/pictures/picture_decoder.h"
 #include "server/encode/picture_ladder.h"
 #include "tests/support/test_pictures.h"
 

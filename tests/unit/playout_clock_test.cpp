@@ -1,4 +1,4 @@
-#include "client/replay/playout_clock.h"
+#include "common/replay/playout_clock.h"
 
 #include <cmath>
 

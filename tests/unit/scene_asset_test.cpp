@@ -1,4 +1,5 @@
-#include "common/codec/scene_asset.h"
+#include "common/strands/scene_asset.h"
+#include "common/groom/groom_asset.h"
 
 #include <limits>
 

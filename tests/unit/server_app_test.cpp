@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
 #include "server/app/options.h"

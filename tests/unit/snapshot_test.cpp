@@ -2,8 +2,8 @@
 #include <limits>
 #include <random>
 
-#include "common/codec/frame_header.h"
-#include "common/codec/snapshot.h"
+#include "common/strands/frame_header.h"
+#include "common/strands/snapshot.h"
 
 namespace strandcast {
 namespace {

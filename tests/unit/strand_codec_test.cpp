@@ -1,15 +1,17 @@
-#include "common/codec/strand_codec.h"
+#include "common/strands/strand_codec.h"
 
 #include <random>
 #include <set>
 
-#include "common/codec/strand_payload.h"
-#include "common/codec/strand_predictor.h"
-#include "common/codec/tangent_motion.h"
+#include "common/strands/strand_payload.h"
+#include "common/strands/strand_predictor.h"
+#include "common/strands/tangent/motion.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {
 namespace {
+
+using namespace tangent;
 
 constexpr float kBoundM = 1e-4f;
 constexpr const char* kRoundingCodec = "tangent";  // all others give back the lattice they are given

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "common/base/profile.h"
-#include "common/codec/strand_prefix.h"
+#include "common/strands/strand_prefix.h"
 #include "tests/support/eventually.h"
 
 namespace strandcast {

@@ -1,9 +1,9 @@
-#include "client/replay/strand_fill.h"
+#include "common/replay/strand_fill.h"
 
 #include <map>
 
-#include "client/replay/strand_replay.h"
-#include "common/codec/strand_prefix.h"
+#include "common/replay/strand_replay.h"
+#include "common/strands/strand_prefix.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {
@@ -111,12 +111,8 @@ TEST_F(Fill, WithoutARestShapeOnlyWhatWasSentIsThere) {
 
 /// A server that changes to fewer strands and back, and a viewer that draws at times between its states.
 TEST_F(Fill, PicturesKeepAllStrandsWhileTheStreamChanges) {
-  Welcome welcome;
-  welcome.codec = "tangent";
-  welcome.strand_count = kStrands;
-  welcome.vertex_count = kVertices;
   for (const Playout playout : {Playout::LowLatency, Playout::Smooth}) {
-    auto replay = std::move(*StrandReplay::make(welcome, {}));
+    auto replay = std::move(*StrandReplay::make("tangent", {kStrands, kVertices}, {}));
     replay->set_rest_shape(rest_);
     replay->set_playout(playout);
     std::map<uint16_t, std::unique_ptr<StrandEncoder>> encoders;

@@ -1,10 +1,10 @@
 // Streams of the first strands only: what they decode to, that one decoder follows a stream that changes its
 // number of strands, and that no number it is told makes it trust more than it should.
-#include "common/codec/strand_prefix.h"
+#include "common/strands/strand_prefix.h"
 
 #include <cstring>
 
-#include "common/codec/strand_codec.h"
+#include "common/strands/strand_codec.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {

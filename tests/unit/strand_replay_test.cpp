@@ -1,4 +1,4 @@
-#include "client/replay/strand_replay.h"
+#include "common/replay/strand_replay.h"
 
 #include "tests/support/hair_motion.h"
 
@@ -11,19 +11,13 @@ constexpr float kQuantumM = 1e-4f;
 constexpr int64_t kStepNs = 16'666'667;
 constexpr int64_t kMs = 1'000'000;
 
-Welcome make_welcome() {
-  Welcome welcome;
-  welcome.codec = "delta";
-  welcome.strand_count = kStrands;
-  welcome.vertex_count = kVertices;
-  return welcome;
-}
+constexpr StrandStreamLimits kLimits{kStrands, kVertices};
 
 /// A server's strand stream and the replay that follows it, without a network.
 class StrandReplayTest : public testing::Test {
  protected:
   void SetUp() override {
-    auto replay = StrandReplay::make(make_welcome(), [this] { ++requests_; });
+    auto replay = StrandReplay::make("delta", kLimits, [this] { ++requests_; });
     ASSERT_TRUE(replay) << replay.error().to_string();
     replay_ = std::move(replay).value();
     auto encoder = make_strand_encoder("delta");
@@ -105,9 +99,7 @@ TEST_F(StrandReplayTest, AMalformedFrameChangesNothing) {
 }
 
 TEST_F(StrandReplayTest, RefusesAnUnknownCodec) {
-  Welcome welcome = make_welcome();
-  welcome.codec = "magic";
-  const auto replay = StrandReplay::make(welcome, {});
+  const auto replay = StrandReplay::make("magic", kLimits, {});
   ASSERT_FALSE(replay);
   EXPECT_EQ(replay.error().code, ErrorCode::NotFound);
 }

@@ -4,16 +4,18 @@
 #include <set>
 
 #include "common/base/hash.h"
-#include "common/codec/least_squares.h"
-#include "common/codec/strand_codec.h"
-#include "common/codec/strand_payload.h"
-#include "common/codec/tangent_head.h"
-#include "common/codec/tangent_layout.h"
-#include "common/codec/tangent_symbols.h"
+#include "common/strands/least_squares.h"
+#include "common/strands/strand_codec.h"
+#include "common/strands/strand_payload.h"
+#include "common/strands/tangent/head.h"
+#include "common/strands/tangent/layout.h"
+#include "common/strands/tangent/symbols.h"
 #include "tests/support/hair_motion.h"
 
 namespace strandcast {
 namespace {
+
+using namespace tangent;
 
 constexpr float kBoundM = 1e-4f;
 

@@ -1,4 +1,4 @@
-#include "common/codec/value_coder.h"
+#include "common/strands/value_coder.h"
 
 #include <cmath>
 #include <random>

@@ -1,8 +1,8 @@
 // Both video codecs, by the same tests: an encoder that is asked for pictures of hair, and a decoder that is
 // given what it made, whole, late or damaged.
-#include "common/codec/video_codec.h"
+#include "common/pictures/video_codec.h"
 
-#include "common/codec/picture_decoder.h"
+#include "common/pictures/picture_decoder.h"
 #include "tests/support/test_pictures.h"
 
 namespace strandcast {

@@ -1,18 +1,20 @@
 // proto/WIRE.md is a promise to people who write other clients: its numbers must be those of the code.
 #include "common/base/file.h"
-#include "common/codec/h264_header.h"
-#include "common/codec/jpeg_tiles.h"
-#include "common/codec/picture.h"
-#include "common/codec/scene_asset.h"
-#include "common/codec/strand_payload.h"
-#include "common/codec/strand_predictor.h"
-#include "common/codec/tangent_symbols.h"
-#include "common/wire/clock_offset.h"
+#include "common/pictures/h264_header.h"
+#include "common/pictures/jpeg_tiles.h"
+#include "common/pictures/picture.h"
+#include "common/replay/clock_offset.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_payload.h"
+#include "common/strands/strand_predictor.h"
+#include "common/strands/tangent/symbols.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {
 namespace {
+
+using namespace tangent;
 
 using testing::HasSubstr;
 

@@ -2,8 +2,8 @@
 #include <limits>
 #include <random>
 
-#include "common/codec/frame_header.h"
-#include "common/wire/clock_offset.h"
+#include "common/replay/clock_offset.h"
+#include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 #include "tests/support/sample_messages.h"
 

@@ -1,4 +1,4 @@
-#include "common/codec/yuv_planes.h"
+#include "common/pictures/yuv_planes.h"
 
 #include <algorithm>
 #include <array>

@@ -7,11 +7,11 @@
 #include <map>
 #include <random>
 
-#include "common/codec/byte_io.h"
-#include "common/codec/image_codec.h"
-#include "common/codec/strand_payload.h"
-#include "common/codec/tangent_symbols.h"
-#include "common/codec/zstd_block.h"
+#include "common/pictures/image_codec.h"
+#include "common/strands/byte_io.h"
+#include "common/strands/strand_payload.h"
+#include "common/strands/tangent/symbols.h"
+#include "common/strands/zstd_block.h"
 #include "common/wire/messages.h"
 #include "tests/fuzz/fuzz_targets.h"
 #include "tests/fuzz/strand_chain.h"
@@ -21,6 +21,8 @@
 
 namespace strandcast {
 namespace {
+
+using namespace tangent;
 
 using Bytes = std::vector<std::byte>;
 using Entry = int (*)(const uint8_t*, size_t);

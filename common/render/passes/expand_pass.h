@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/codec/scene_asset.h"
 #include "common/gl/objects.h"
 #include "common/gl/program.h"
+#include "common/strands/scene_asset.h"
 
 namespace strandcast {
 

@@ -6,9 +6,9 @@
 #include <glm/glm.hpp>
 
 #include "common/base/result.h"
-#include "common/codec/image_codec.h"
 #include "common/gl/objects.h"
 #include "common/gl/program.h"
+#include "common/pictures/image_codec.h"
 
 namespace strandcast {
 

@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "common/base/check.h"
-#include "common/codec/morton.h"
+#include "common/strands/morton.h"
 
 namespace strandcast {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "common/codec/zstd_block.h"
+#include "common/strands/zstd_block.h"
 #include "server/report/peers/integer_coder.h"
 
 namespace strandcast {

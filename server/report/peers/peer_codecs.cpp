@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "common/codec/snapshot.h"
+#include "common/strands/snapshot.h"
 
 namespace strandcast {
 namespace {

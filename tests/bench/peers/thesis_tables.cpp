@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "common/base/profile.h"
-#include "common/codec/scene_asset.h"
 #include "common/gl/egl_context.h"
+#include "common/groom/groom_asset.h"
 #include "common/groom/groom_file.h"
 #include "common/render/renderer.h"
 #include "common/scene/scene_file.h"
+#include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
 #include "tests/bench/peers/naive_strands.h"
 #include "tests/bench/peers/row_bench.h"

@@ -1,0 +1,14 @@
+// Checks shared by the picture writers and readers. Private to common/pictures.
+#pragma once
+
+#include "common/pictures/image_codec.h"
+
+namespace strandcast {
+
+/// BadInput for empty pictures and sizes that disagree, LimitExceeded above kMaxImageSide.
+Status check_image(const Image& image);
+Status check_image_size(uint64_t width, uint64_t height);
+/// LimitExceeded outside the sizes of picture_size.h.
+Status check_picture_size(uint64_t width, uint64_t height);
+
+}  // namespace strandcast

@@ -1,0 +1,28 @@
+// Pictures as the planes that video codecs take: BT.601 in studio range, colours at half the size both ways.
+// Private to common/pictures; pure functions, any thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "common/pictures/image_codec.h"
+
+namespace strandcast {
+
+struct YuvPlane {
+  uint8_t* data = nullptr;
+  ptrdiff_t stride_bytes = 0;
+};
+/// Each colour plane has (width + 1) / 2 x (height + 1) / 2 samples.
+struct YuvPlanes {
+  YuvPlane luma, blue, red;
+};
+
+/// Rounds to the nearest, colours after taking the mean of their four pixels; libyuv rounds colours down,
+/// which tints every picture green by a level.
+void fill_planes(const Image& image, const YuvPlanes& planes);
+
+/// Of the first width x height pixels of the planes.
+Image make_image(const YuvPlanes& planes, uint32_t width, uint32_t height);
+
+}  // namespace strandcast

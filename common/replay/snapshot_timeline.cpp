@@ -1,0 +1,77 @@
+#include "common/replay/snapshot_timeline.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace strandcast {
+
+StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill) {
+  return StrandPicture{snapshot.world_from_head, fill.positions(snapshot)};
+}
+
+StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend) {
+  if (blend <= 0.0) return from;
+  // Without a rest shape a change to fewer strands leaves nothing to blend.
+  if (blend >= 1.0 || from.position_m.size() != to.position_m.size()) return to;
+  from.world_from_head = interpolate(from.world_from_head, to.world_from_head, blend);
+  const auto weight = static_cast<float>(blend);
+  for (size_t i = 0; i < to.position_m.size(); ++i)
+    from.position_m[i] += weight * (to.position_m[i] - from.position_m[i]);
+  return from;
+}
+
+void SnapshotTimeline::add(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns,
+                           Continuity continuity) {
+  // A keyframe on request repeats the state that is already here.
+  if (!snapshots_.empty() && snapshot->sim_time_ns == snapshots_.back()->sim_time_ns) {
+    snapshots_.back() = std::move(snapshot);
+    return;
+  }
+  // The first keyframe of another stream may be of a state that the old stream has passed: what is shown
+  // stays.
+  if (continuity == Continuity::OtherStream && !snapshots_.empty()) {
+    const int64_t behind_ns = snapshots_.back()->sim_time_ns - snapshot->sim_time_ns;
+    if (behind_ns > 0 && behind_ns < kStreamOverlapNs) return;
+  }
+  clock_.add(receive_time_ns, snapshot->sim_time_ns);
+  // A reset server starts at zero again: blending across it would sweep the hair through the head.
+  const bool goes_back = !snapshots_.empty() && snapshot->sim_time_ns < snapshots_.back()->sim_time_ns;
+  if (goes_back) {
+    snapshots_.clear();
+    ++restarts_;
+  }
+  snapshots_.push_back(std::move(snapshot));
+  const size_t kept = playout_ == Playout::Smooth ? kKeptSnapshots : 1;
+  while (snapshots_.size() > kept) snapshots_.pop_front();
+}
+
+std::shared_ptr<const Snapshot> SnapshotTimeline::newest() const {
+  return snapshots_.empty() ? nullptr : snapshots_.back();
+}
+
+std::optional<StrandPicture> TimelinePlayer::picture_at(const SnapshotTimeline& timeline,
+                                                        int64_t client_time_ns) {
+  const auto& snapshots = timeline.snapshots();
+  if (std::exchange(restarts_, timeline.restarts()) != timeline.restarts()) cursor_ = {};
+  if (snapshots.empty()) return std::nullopt;
+  if (timeline.playout() == Playout::LowLatency || snapshots.size() < 2 || !timeline.clock().has_value())
+    return picture_of(*snapshots.back(), fill_);
+
+  // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
+  const int64_t wanted_ns =
+      std::min(timeline.clock().sim_time_at(client_time_ns), snapshots.back()->sim_time_ns);
+  const int64_t sim_time_ns = cursor_.advance(client_time_ns, wanted_ns);
+  const auto later = std::find_if(snapshots.begin(), snapshots.end(), [sim_time_ns](const auto& snapshot) {
+    return snapshot->sim_time_ns > sim_time_ns;
+  });
+  if (later == snapshots.end()) return picture_of(*snapshots.back(), fill_);
+  if (later == snapshots.begin()) return picture_of(**later, fill_);
+  const Snapshot& from = **std::prev(later);
+  const Snapshot& to = **later;
+  const auto span_ns = static_cast<double>(to.sim_time_ns - from.sim_time_ns);
+  // Both have all strands, also when the stream has changed to one with fewer in between.
+  return blend(picture_of(from, fill_), picture_of(to, fill_),
+               static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
+}
+
+}  // namespace strandcast

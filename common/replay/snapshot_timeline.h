@@ -1,0 +1,75 @@
+// SnapshotTimeline: the newest decoded states and the clock that says which moment to show. Copies are cheap,
+// because states are shared and never change: the receiving thread keeps one, a drawing thread works on a
+// copy. Pure logic.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "common/replay/playout_clock.h"
+#include "common/replay/strand_fill.h"
+#include "common/strands/snapshot.h"
+#include "common/strands/strand_picture.h"
+
+namespace strandcast {
+
+enum class Playout {
+  LowLatency,  // the newest snapshot as it is: the same picture the server would draw
+  Smooth,      // interpolated between snapshots, behind by an adaptive delay
+};
+
+/// Whether a state comes from the stream of the ones before.
+enum class Continuity { SameStream, OtherStream };
+
+/// Smooth playout at 60 Hz is at most 100 ms behind, and as much again after a burst.
+inline constexpr size_t kKeptSnapshots = 16;
+/// A keyframe of another stream may repeat a state this much older than the newest one.
+inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
+
+class SnapshotTimeline {
+ public:
+  void set_playout(Playout playout) { playout_ = playout; }
+  Playout playout() const { return playout_; }
+
+  /// A state received at `receive_time_ns` on the client's clock.
+  void add(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns, Continuity continuity);
+
+  /// Null before the first.
+  std::shared_ptr<const Snapshot> newest() const;
+  const std::deque<std::shared_ptr<const Snapshot>>& snapshots() const { return snapshots_; }
+  const PlayoutClock& clock() const { return clock_; }
+  /// How often time has run backwards: the server was reset.
+  uint64_t restarts() const { return restarts_; }
+
+ private:
+  Playout playout_ = Playout::LowLatency;
+  PlayoutClock clock_;
+  std::deque<std::shared_ptr<const Snapshot>> snapshots_;  // oldest first
+  uint64_t restarts_ = 0;
+};
+
+/// Walks through timelines, each newer than the last, without jumping back. One thread.
+class TimelinePlayer {
+ public:
+  /// For states without all strands, made from the asset's rest shape.
+  void set_fill(StrandFill fill) { fill_ = std::move(fill); }
+  /// What to draw at client time `client_time_ns`; nothing while the timeline is empty.
+  std::optional<StrandPicture> picture_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
+
+ private:
+  StrandFill fill_;
+  PlayoutCursor cursor_;
+  uint64_t restarts_ = 0;
+};
+
+/// Strands between two pictures of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
+/// space, so a turning head carries the hair round instead of cutting through it.
+StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend);
+
+/// The picture of one snapshot, as the server draws it when the snapshot has all strands.
+StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill);
+
+}  // namespace strandcast

@@ -1,0 +1,43 @@
+// StrandFill: the strands that a stream for a slow link leaves out. Each goes with its three nearest strands
+// that were sent: every segment moves as theirs, keeps its rest length and half of what sets its rest shape
+// apart. No network, no GL; one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "common/strands/snapshot.h"
+
+namespace strandcast {
+
+class StrandFill {
+ public:
+  /// Without a rest shape nothing can be filled in.
+  StrandFill() = default;
+  /// `rest_in_head_m`: of all strands, (vertex_count x strand_count), strand fastest.
+  StrandFill(std::span<const glm::vec3> rest_in_head_m, uint32_t vertex_count);
+
+  /// Head-space positions of all strands, (vertex_count x strand_count), strand fastest: those of the
+  /// snapshot as they are, the others filled in. Just the snapshot's when it has all strands or nothing is
+  /// known of others.
+  std::vector<glm::vec3> positions(const Snapshot& snapshot);
+
+ private:
+  static constexpr uint32_t kGuides = 3;
+  struct Guides {
+    std::array<uint32_t, kGuides> strand{};
+    std::array<float, kGuides> weight{};  // sum 1
+  };
+  void choose_guides(uint32_t sent_count);
+
+  uint32_t strand_count_ = 0;
+  uint32_t vertex_count_ = 0;
+  std::vector<glm::vec3> rest_in_head_m_;
+  uint32_t sent_count_ = 0;     // for which the guides were chosen
+  std::vector<Guides> guides_;  // of strands sent_count_ to strand_count_ - 1
+};
+
+}  // namespace strandcast

@@ -1,0 +1,105 @@
+#include "common/replay/strand_replay.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace strandcast {
+
+Result<std::unique_ptr<StrandReplay>> StrandReplay::make(const std::string& codec,
+                                                         const StrandStreamLimits& limits,
+                                                         KeyframeRequester request_keyframe) {
+  ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(codec, limits));
+  return std::unique_ptr<StrandReplay>(
+      new StrandReplay(std::move(decoder), limits, std::move(request_keyframe)));
+}
+
+StrandReplay::StrandReplay(std::unique_ptr<StrandDecoder> decoder, const StrandStreamLimits& limits,
+                           KeyframeRequester request_keyframe)
+    : decoder_(std::move(decoder)),
+      strand_count_(limits.strand_count),
+      vertex_count_(limits.vertex_count),
+      request_keyframe_(std::move(request_keyframe)) {}
+
+void StrandReplay::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
+  decoder_->set_rest_shape(rest_in_head_m);
+  const bool fits = rest_in_head_m.size() == size_t{strand_count_} * vertex_count_;
+  player_.set_fill(fits ? StrandFill(rest_in_head_m, vertex_count_) : StrandFill());
+}
+
+std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte> message,
+                                                      int64_t receive_time_ns, const ClockOffset& clock) {
+  ++stats_.received_frames;
+  stats_.received_bytes += message.size();
+  const auto header = unpack_frame_header(message);
+  if (!header) {
+    reject(header.error(), receive_time_ns);
+    return nullptr;
+  }
+  if (const Status status = check_stream(*header); !status) {
+    reject(status.error(), receive_time_ns);
+    return nullptr;
+  }
+  const bool is_other_stream = last_sequence_ != 0 && header->stream_id != stream_id_;
+  if (is_other_stream) last_sequence_ = 0;
+  note_sequence(*header);
+
+  const int64_t begin_ns = now_ns();
+  auto decoded = decoder_->decode(message);
+  if (!decoded) {
+    reject(decoded.error(), receive_time_ns);
+    return nullptr;
+  }
+  std::shared_ptr<const Snapshot> snapshot = std::move(decoded).value();
+  const int64_t decoded_ns = now_ns();
+  decode_timer_.add_ms(static_cast<double>(decoded_ns - begin_ns) * 1e-6);
+  ++stats_.decoded_frames;
+  stream_id_ = header->stream_id;
+  if (header->opcode == Opcode::StrandKeyframe) ++stats_.keyframes;
+  newest_send_time_ns_ = header->send_time_ns;
+
+  // Only the first state with a new motion sample counts: the same sample in later states is not late, it is
+  // held.
+  const int64_t motion_time_ns = snapshot->motion_time_ns;
+  if (motion_time_ns != 0 && motion_time_ns != last_motion_time_ns_ && clock.has_value()) {
+    // Waiting in the mailbox is part of the way, so the clock is read now and not at the frame's arrival.
+    const int64_t latency_ns = clock.to_server_ns(decoded_ns) - motion_time_ns;
+    if (last_motion_time_ns_ != 0) motion_latency_timer_.add_ms(static_cast<double>(latency_ns) * 1e-6);
+    last_motion_time_ns_ = motion_time_ns;
+  }
+  timeline_.add(snapshot, receive_time_ns,
+                is_other_stream ? Continuity::OtherStream : Continuity::SameStream);
+  return snapshot;
+}
+
+/// Every stream counts its frames by itself: the same number in another one is another state.
+Status StrandReplay::check_stream(const FrameHeader& header) const {
+  if (header.stream_id == stream_id_ || header.opcode == Opcode::StrandKeyframe) return {};
+  return make_error(ErrorCode::Unavailable, "delta {} is of stream {}, the newest keyframe of stream {}",
+                    header.sequence, header.stream_id, stream_id_);
+}
+
+void StrandReplay::note_sequence(const FrameHeader& header) {
+  // A keyframe for a late joiner repeats the number of the chain's present state, so equal is no gap.
+  if (last_sequence_ != 0 && header.sequence > last_sequence_ + 1) {
+    ++stats_.gaps;
+    stats_.missed_frames += header.sequence - last_sequence_ - 1;
+  }
+  last_sequence_ = header.sequence;
+}
+
+void StrandReplay::reject(const Error& error, int64_t receive_time_ns) {
+  ++stats_.rejected_frames;
+  stats_.last_error = error.to_string();
+  if (last_keyframe_request_ns_ && receive_time_ns - *last_keyframe_request_ns_ < kReplayKeyframeRequestNs)
+    return;
+  last_keyframe_request_ns_ = receive_time_ns;
+  ++stats_.keyframe_requests;
+  if (request_keyframe_) request_keyframe_();
+}
+
+double StrandReplay::state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const {
+  if (timeline_.newest() == nullptr || newest_send_time_ns_ == 0 || !clock.has_value()) return 0.0;
+  return static_cast<double>(clock.to_server_ns(client_time_ns) - newest_send_time_ns_) * 1e-6;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,102 @@
+// StrandReplay: received strand frames -> what to draw now. Decodes, keeps the newest snapshots, blends
+// between them, asks for keyframes and measures. A viewer never simulates: between snapshots it only
+// interpolates. One thread; no network, no GL.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "common/base/profile.h"
+#include "common/base/result.h"
+#include "common/replay/clock_offset.h"
+#include "common/replay/snapshot_timeline.h"
+#include "common/strands/snapshot.h"
+#include "common/strands/strand_codec.h"
+
+namespace strandcast {
+
+struct ReplayStats {
+  uint64_t decoded_frames = 0;
+  uint64_t keyframes = 0;
+  uint64_t received_frames = 0;
+  uint64_t received_bytes = 0;
+  uint64_t rejected_frames = 0;  // malformed, or their base was missing
+  uint64_t gaps = 0;             // places where the sequence jumped
+  uint64_t missed_frames = 0;    // frames the server numbered and this client never saw
+  uint64_t keyframe_requests = 0;
+  std::string last_error;  // of the newest rejected frame
+};
+
+/// Asks the server for a keyframe; called at most once in kKeyframeRequestInterval.
+using KeyframeRequester = std::function<void()>;
+
+class StrandReplay {
+ public:
+  /// Of a stream as its Welcome announces it. NotFound or BadInput when this program cannot decode it.
+  static Result<std::unique_ptr<StrandReplay>> make(const std::string& codec,
+                                                    const StrandStreamLimits& limits,
+                                                    KeyframeRequester request_keyframe);
+
+  /// Decodes one strand frame (header + payload), received at `receive_time_ns` on the client's clock. A
+  /// frame that cannot be used is counted, asks for a keyframe and returns null. `clock` may have no value
+  /// yet.
+  std::shared_ptr<const Snapshot> receive(std::span<const std::byte> message, int64_t receive_time_ns,
+                                          const ClockOffset& clock);
+
+  /// Other frames were sent instead for a while: the next keyframe continues nothing that could be missing.
+  void forget_sequence() { last_sequence_ = 0; }
+
+  /// The asset's rest shape; comes before the first strand frame.
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
+
+  void set_playout(Playout playout) { timeline_.set_playout(playout); }
+  Playout playout() const { return timeline_.playout(); }
+
+  /// Newest snapshot, null before the first keyframe.
+  std::shared_ptr<const Snapshot> newest() const { return timeline_.newest(); }
+  /// The newest states, for a drawing thread to copy.
+  const SnapshotTimeline& timeline() const { return timeline_; }
+  /// What to draw at client time `client_time_ns`; nothing before the first keyframe.
+  std::optional<StrandPicture> picture_at(int64_t client_time_ns) {
+    return player_.picture_at(timeline_, client_time_ns);
+  }
+  /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
+  double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;
+
+  const ReplayStats& stats() const { return stats_; }
+  const StageTimer& decode_timer() const { return decode_timer_; }
+  /// From the arrival of a motion sample at the server to the decoded state that contains it, ms.
+  const StageTimer& motion_latency_timer() const { return motion_latency_timer_; }
+  /// How far smooth playout stays behind, ms.
+  double playout_delay_ms() const { return static_cast<double>(timeline_.clock().delay_ns()) * 1e-6; }
+
+ private:
+  StrandReplay(std::unique_ptr<StrandDecoder> decoder, const StrandStreamLimits& limits,
+               KeyframeRequester request_keyframe);
+  void reject(const Error& error, int64_t receive_time_ns);
+  void note_sequence(const FrameHeader& header);
+  Status check_stream(const FrameHeader& header) const;
+
+  std::unique_ptr<StrandDecoder> decoder_;
+  const uint32_t strand_count_;
+  const uint32_t vertex_count_;
+  KeyframeRequester request_keyframe_;
+  SnapshotTimeline timeline_;
+  TimelinePlayer player_;
+  ReplayStats stats_;
+  StageTimer decode_timer_;
+  StageTimer motion_latency_timer_;
+  uint16_t stream_id_ = 0;  // of the newest keyframe
+  uint32_t last_sequence_ = 0;
+  int64_t last_motion_time_ns_ = 0;
+  int64_t newest_send_time_ns_ = 0;
+  std::optional<int64_t> last_keyframe_request_ns_;
+};
+
+inline constexpr int64_t kReplayKeyframeRequestNs = 1'000'000'000;
+}  // namespace strandcast

@@ -1,0 +1,36 @@
+// Entropy coding of signed integers that are mostly small: zig-zag, four byte planes, zstd. No shape, no
+// state between calls. One object per thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/strands/zstd_block.h"
+
+namespace strandcast {
+
+class PlaneEncoder {
+ public:
+  /// Appends a u32 length and one zstd frame.
+  void append(std::span<const int32_t> values, int level, std::vector<std::byte>& destination);
+
+ private:
+  ZstdCompressor zstd_;
+  std::vector<std::byte> planes_;
+};
+
+class PlaneDecoder {
+ public:
+  /// Reads what append wrote from the front of untrusted `source` into `values` (size known beforehand) and
+  /// gives the bytes behind it. BadInput otherwise.
+  Result<std::span<const std::byte>> fill(std::span<const std::byte> source, std::span<int32_t> values);
+
+ private:
+  ZstdDecompressor zstd_;
+  std::vector<std::byte> planes_;
+};
+
+}  // namespace strandcast

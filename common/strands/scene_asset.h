@@ -1,0 +1,45 @@
+// SceneAsset: what a viewer needs once: strand topology, rest shape, follower triangles and the head mesh.
+// Encoded as a packed byte layout under zstd (proto/WIRE.md). Decoding input is untrusted.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/strands/strand_limits.h"
+
+namespace strandcast {
+
+inline constexpr uint32_t kMaxTrianglesPerStrand = 4;
+inline constexpr uint32_t kMaxMeshVertices = 3 * kMaxMeshTriangles;
+
+/// Three key strands between which followers are interpolated.
+using RootTriangle = glm::uvec3;
+
+/// A triangle mesh: the head that is drawn under the hair, or the scalp that it grows on.
+struct Mesh {
+  std::vector<glm::vec3> position_m;  // (vertex_count) head space
+  std::vector<glm::vec3> normal;      // (vertex_count) unit, outwards
+  std::vector<glm::uvec3> triangle;   // (triangle_count) counter-clockwise seen from outside
+};
+
+struct SceneAsset {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;  // per strand
+  std::vector<glm::vec3>
+      rest_position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
+  std::vector<RootTriangle> triangle;  // key strands between which followers are drawn
+  Mesh head;                           // may be empty
+};
+
+/// Payload of an Asset message.
+std::vector<std::byte> encode_scene_asset(const SceneAsset& asset);
+
+/// Untrusted input. BadInput or LimitExceeded: every number is checked to be finite, every index against its
+/// array.
+Result<SceneAsset> decode_scene_asset(std::span<const std::byte> payload);
+
+}  // namespace strandcast

@@ -1,0 +1,131 @@
+#include "common/strands/strand_payload.h"
+
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/strands/byte_io.h"
+
+namespace strandcast {
+namespace {
+
+Status check_pose(const StrandFixedPart& fixed) {
+  const glm::dvec3& position = fixed.world_from_head.position_m;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(position[axis]) <= kMaxHeadPositionM))  // also when not a number
+      return make_error(ErrorCode::BadInput, "the head of tick {} lies at {} m, allowed is +-{}", fixed.tick,
+                        position[axis], kMaxHeadPositionM);
+  }
+  const double length = glm::length(fixed.world_from_head.rotation);
+  if (!(std::abs(length - 1.0) <= kRotationTolerance))
+    return make_error(ErrorCode::BadInput, "the head's rotation of tick {} has the length {}, it must be 1",
+                      fixed.tick, length);
+  return {};
+}
+
+}  // namespace
+
+void append_fixed_part(const Snapshot& snapshot, uint8_t codec_number, std::vector<std::byte>& payload) {
+  const size_t begin = payload.size();
+  const Pose& pose = snapshot.world_from_head;
+  ByteWriter writer(payload);
+  writer.put(codec_number);
+  for (int i = 0; i < 3; ++i) writer.put(uint8_t{0});
+  writer.put(snapshot.quantum_m);
+  writer.put(snapshot.strand_count);
+  writer.put(snapshot.vertex_count);
+  writer.put(snapshot.tick);
+  writer.put(snapshot.motion_time_ns);
+  for (int axis = 0; axis < 3; ++axis) writer.put(pose.position_m[axis]);
+  writer.put(pose.rotation.w);
+  writer.put(pose.rotation.x);
+  writer.put(pose.rotation.y);
+  writer.put(pose.rotation.z);
+  writer.put(state_hash(snapshot));
+  CHECK(payload.size() - begin == kStrandFixedBytes);
+}
+
+Result<StrandMessage> read_strand_message(std::span<const std::byte> message, uint8_t codec_number,
+                                          const StrandStreamLimits& limits) {
+  StrandMessage result;
+  ASSIGN_OR_RETURN(result.header, unpack_frame_header(message));
+  if (result.header.opcode != Opcode::StrandKeyframe && result.header.opcode != Opcode::StrandDelta)
+    return make_error(ErrorCode::BadInput, "opcode 0x{:02x} is no strand message",
+                      static_cast<uint8_t>(result.header.opcode));
+  if (result.header.sequence == 0)
+    return make_error(ErrorCode::BadInput, "strand message has sequence number 0, they count from 1");
+
+  ByteReader reader(message.subspan(kFrameHeaderBytes));
+  StrandFixedPart& fixed = result.fixed;
+  const auto codec = reader.take<uint8_t>();
+  reader.take_bytes(3);
+  fixed.quantum_m = reader.take<float>();
+  fixed.strand_count = reader.take<uint32_t>();
+  fixed.vertex_count = reader.take<uint32_t>();
+  fixed.tick = reader.take<uint64_t>();
+  fixed.motion_time_ns = reader.take<int64_t>();
+  for (int axis = 0; axis < 3; ++axis) fixed.world_from_head.position_m[axis] = reader.take<double>();
+  fixed.world_from_head.rotation.w = reader.take<double>();
+  fixed.world_from_head.rotation.x = reader.take<double>();
+  fixed.world_from_head.rotation.y = reader.take<double>();
+  fixed.world_from_head.rotation.z = reader.take<double>();
+  fixed.state_hash = reader.take<uint64_t>();
+  if (!reader.ok())
+    return make_error(ErrorCode::BadInput, "strand payload has {} bytes, its fixed part alone has {}",
+                      result.header.payload_bytes, kStrandFixedBytes);
+  if (codec != codec_number)
+    return make_error(ErrorCode::BadInput, "strand payload is of codec {}, this stream uses {}", codec,
+                      codec_number);
+  if (fixed.strand_count != limits.strand_count || fixed.vertex_count != limits.vertex_count)
+    return make_error(ErrorCode::BadInput,
+                      "strand payload has {} x {} vertices, the stream was announced with {} x {}",
+                      fixed.strand_count, fixed.vertex_count, limits.strand_count, limits.vertex_count);
+  if (!(fixed.quantum_m > 0.0f && fixed.quantum_m <= kMaxQuantumM))
+    return make_error(ErrorCode::BadInput, "lattice step {} m is not in (0, {}]", fixed.quantum_m,
+                      kMaxQuantumM);
+  RETURN_IF_ERROR(check_pose(fixed));
+  for (const int64_t time_ns :
+       {result.header.sim_time_ns, result.header.send_time_ns, fixed.motion_time_ns}) {
+    if (time_ns < -kMaxStrandTimeNs || time_ns > kMaxStrandTimeNs)
+      return make_error(ErrorCode::BadInput, "tick {} has the time {} ns, allowed is +-{}", fixed.tick,
+                        time_ns, kMaxStrandTimeNs);
+  }
+  result.body = reader.rest();
+  return result;
+}
+
+Snapshot make_snapshot(const StrandMessage& message) {
+  Snapshot snapshot;
+  snapshot.tick = message.fixed.tick;
+  snapshot.sim_time_ns = message.header.sim_time_ns;
+  snapshot.motion_time_ns = message.fixed.motion_time_ns;
+  snapshot.world_from_head = message.fixed.world_from_head;
+  snapshot.strand_count = message.fixed.strand_count;
+  snapshot.vertex_count = message.fixed.vertex_count;
+  snapshot.quantum_m = message.fixed.quantum_m;
+  return snapshot;
+}
+
+Status check_decoded(const Snapshot& snapshot, const StrandMessage& message) {
+  bool is_inside = true;
+  for (const int32_t value : snapshot.lattice) is_inside &= value > -kMaxLattice && value < kMaxLattice;
+  if (!is_inside)
+    return make_error(ErrorCode::BadInput, "tick {} holds a lattice value outside +-{}", snapshot.tick,
+                      kMaxLattice - 1);
+  if (const uint64_t hash = state_hash(snapshot); hash != message.fixed.state_hash)
+    return make_error(ErrorCode::BadInput, "tick {} decodes to state {:016x}, the server announced {:016x}",
+                      snapshot.tick, hash, message.fixed.state_hash);
+  return {};
+}
+
+Status check_chain(const FrameHeader& header, uint32_t last_sequence) {
+  if (header.opcode == Opcode::StrandKeyframe) return {};
+  if (last_sequence == 0)
+    return make_error(ErrorCode::Unavailable, "delta {} needs frame {}, but no keyframe has come yet",
+                      header.sequence, header.base_sequence);
+  if (header.base_sequence != last_sequence)
+    return make_error(ErrorCode::Unavailable, "delta {} needs frame {}, the last one decoded is {}",
+                      header.sequence, header.base_sequence, last_sequence);
+  return {};
+}
+
+}  // namespace strandcast

@@ -1,0 +1,18 @@
+// StrandPicture: strands as they are drawn.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+/// What to draw: strands in head space as a viewer has them after decoding (and blending).
+struct StrandPicture {
+  Pose world_from_head;
+  std::vector<glm::vec3>
+      position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
+};
+
+}  // namespace strandcast

@@ -1,0 +1,458 @@
+// The "tangent" codec: made for strands. Positions are predicted from the motion of the strand and of its
+// neighbours and from the known length of each segment; what is coded are two small integers across the
+// segment, chosen as cheap as the announced bound allows. Every decoded vertex lies within that bound.
+// Layout in proto/WIRE.md.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/strands/byte_io.h"
+#include "common/strands/side_by_side.h"
+#include "common/strands/strand_payload.h"
+#include "common/strands/tangent/symbols.h"
+#include "common/strands/zstd_block.h"
+
+namespace strandcast::tangent {
+namespace {
+
+constexpr uint8_t kTangentCodecNumber = 5;
+constexpr int kTableLevel = 3;
+constexpr uint8_t kAnchorFlag = 1;
+
+/// Of a delta, as it is on the wire; followed by the weights of the shape when it is an anchor, those of
+/// the motion, and the slices.
+struct BodyHead {
+  uint8_t flags = 0;
+  uint8_t length_blend = 0;
+};
+
+/// What a stream remembers on both sides.
+struct TangentChain {
+  TangentHistory history;
+  SymbolSizes sizes;
+  TangentTables tables = make_first_tables();
+
+  void reset(const TangentLayout& layout) {
+    history.reset(layout);
+    sizes.reset(layout);
+    tables = make_first_tables();
+  }
+  /// After an anchor: what a joiner knows, and no more. The tables stay.
+  void forget_motion(const TangentLayout& layout) {
+    history.forget_motion();
+    sizes.reset(layout);
+  }
+};
+
+/// work(first, count) for all slices, `at_once` of them at a time.
+template <class Work>
+void for_each_slice(const TangentLayout& layout, uint32_t at_once, Work work) {
+  const uint32_t count = layout.slice_count();
+  for_each_part((count + at_once - 1) / at_once, threads_for(layout),
+                [&](uint32_t group) { work(group * at_once, std::min(at_once, count - group * at_once)); });
+}
+template <class Work>
+void for_each_slice(const TangentLayout& layout, Work work) {
+  for_each_slice(layout, 1, [&](uint32_t slice, uint32_t) { work(slice); });
+}
+
+// What decodes to within the bound of this is still a valid lattice value.
+constexpr int32_t kFarthestTarget = kMaxLattice - 2 * kStepsPerBound;
+
+/// `planes` lends its memory.
+Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot,
+                          Planes<int32_t> planes = {}) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    planes[axis].assign(layout.plane_size(), 0);
+    for (size_t v = 0; v < layout.vertex_count; ++v) {
+      const int32_t* from = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
+      int32_t* to = planes[axis].data() + v * layout.stride;
+      for (size_t place = 0; place < layout.stride; ++place)
+        if (layout.strand_at[place] != kNoStrand)
+          to[place] = std::clamp(from[layout.strand_at[place]], -kFarthestTarget, kFarthestTarget);
+    }
+  }
+  return planes;
+}
+
+/// Of one slice; `snapshot` has room for all.
+void set_lattice(const TangentLayout& layout, const Planes<int32_t>& planes, uint32_t slice,
+                 Snapshot& snapshot) {
+  const size_t end = layout.slice_begin[slice + 1];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (size_t v = 0; v < layout.vertex_count; ++v) {
+      const int32_t* from = planes[axis].data() + v * layout.stride;
+      int32_t* to = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
+      for (size_t place = layout.slice_begin[slice]; place < end; ++place)
+        if (layout.strand_at[place] != kNoStrand) to[layout.strand_at[place]] = from[place];
+    }
+  }
+}
+
+Snapshot without_lattice(const Snapshot& snapshot) {
+  Snapshot copy;
+  copy.tick = snapshot.tick;
+  copy.sim_time_ns = snapshot.sim_time_ns;
+  copy.motion_time_ns = snapshot.motion_time_ns;
+  copy.world_from_head = snapshot.world_from_head;
+  copy.strand_count = snapshot.strand_count;
+  copy.vertex_count = snapshot.vertex_count;
+  copy.quantum_m = snapshot.quantum_m;
+  return copy;
+}
+
+class TangentEncoder final : public StrandEncoder {
+ public:
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
+    rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
+    has_chain_ = false;
+  }
+
+  EncodedFramePtr encode(const Snapshot& snapshot) override {
+    return continues(snapshot) ? checked(encode_delta(snapshot)) : start(snapshot);
+  }
+
+  JoinFrames encode_for_join(const Snapshot& snapshot) override {
+    if (!continues(snapshot)) {
+      const EncodedFramePtr keyframe = start(snapshot);
+      return {keyframe, keyframe};
+    }
+    JoinFrames frames = encode_anchor(snapshot);
+    checked(frames.frame);
+    return frames;
+  }
+
+ private:
+  using Slices = std::vector<std::vector<std::byte>>;
+
+  bool continues(const Snapshot& snapshot) const {
+    return has_chain_ && snapshot.strand_count == layout_.strand_count &&
+           snapshot.vertex_count == layout_.vertex_count && snapshot.quantum_m == chain_.history.quantum_m;
+  }
+
+  EncodedFramePtr start(const Snapshot& snapshot) {
+    CHECK(snapshot.strand_count > 0 && snapshot.vertex_count > 0 && snapshot.quantum_m > 0.0f);
+    CHECK(snapshot.lattice.size() == 3 * snapshot.plane_size());
+    const bool has_rest = rest_in_head_m_.size() == snapshot.plane_size();
+    layout_ = make_tangent_layout(
+        snapshot.strand_count, snapshot.vertex_count,
+        has_rest ? std::span<const glm::vec3>(rest_in_head_m_) : std::span<const glm::vec3>());
+    chain_.reset(layout_);
+    chain_.history.quantum_m = snapshot.quantum_m;
+    // As if the strands had always been where they are: the first frame is an anchor that nobody follows.
+    chain_.history.lattice = planes_of(layout_, snapshot);
+    chain_.history.head.pose = snapshot.world_from_head;
+    frame_.resize(layout_);
+    next_sizes_.reset(layout_);
+    no_sizes_.reset(layout_);
+    has_chain_ = true;
+    return checked(encode_anchor(snapshot).keyframe);
+  }
+
+  /// Too large a frame ends the chain.
+  EncodedFramePtr checked(EncodedFramePtr frame) {
+    if (frame == nullptr) has_chain_ = false;
+    return frame;
+  }
+
+  /// What every frame begins with; gives the snapshot that will be what it decodes to.
+  Snapshot begin(const Snapshot& snapshot) {
+    target_ = planes_of(layout_, snapshot, std::move(target_));
+    frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
+    fit_motion(layout_, chain_.history, target_, frame_);
+    writers_.resize(layout_.slice_count());
+    Snapshot decoded = without_lattice(snapshot);
+    decoded.lattice = std::move(lattice_);
+    decoded.lattice.resize(3 * snapshot.plane_size());
+    return decoded;
+  }
+
+  EncodedFramePtr encode_delta(const Snapshot& snapshot) {
+    Snapshot decoded = begin(snapshot);
+    for (auto& escapes : frame_.codes.escapes) escapes.clear();
+    std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
+    Slices slices(layout_.slice_count());
+    for_each_slice(layout_, [&](uint32_t slice) {
+      quantise_slice(layout_, chain_.history, target_, slice, frame_);
+      write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables[slice], writers_[slice]);
+      writers_[slice].finish(slices[slice]);
+      set_lattice(layout_, frame_.lattice, slice, decoded);
+    });
+    chain_.tables = mean_tables(tables);
+    remember(chain_.history, frame_);
+    std::swap(chain_.sizes, next_sizes_);
+    const EncodedFramePtr frame = make_delta(snapshot, decoded, 0, slices);
+    lattice_ = std::move(decoded.lattice);
+    return frame;
+  }
+
+  JoinFrames encode_anchor(const Snapshot& snapshot) {
+    Snapshot decoded = begin(snapshot);
+    frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_);
+    for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
+    Slices slices(layout_.slice_count());
+    Slices shape_slices(layout_.slice_count());
+    for_each_slice(layout_, [&](uint32_t slice) {
+      quantise_anchor(layout_, chain_.history, target_, slice, frame_);
+      TangentTables tables = chain_.tables;
+      write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]);
+      writers_[slice].finish(slices[slice]);
+      tables = chain_.tables;
+      write_symbols(layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]);
+      writers_[slice].finish(shape_slices[slice]);
+      set_lattice(layout_, frame_.lattice, slice, decoded);
+    });
+    remember(chain_.history, frame_);
+    chain_.forget_motion(layout_);
+    JoinFrames frames;
+    frames.frame = make_delta(snapshot, decoded, kAnchorFlag, slices);
+    frames.keyframe = make_keyframe(snapshot, decoded, shape_slices);
+    lattice_ = std::move(decoded.lattice);
+    return frames;
+  }
+
+  /// Of the next frame of the chain, with a body for everybody who follows.
+  EncodedFramePtr make_delta(const Snapshot& snapshot, const Snapshot& decoded, uint8_t flags,
+                             const Slices& slices) {
+    const BodyHead head{flags, frame_.length_blend};
+    std::vector<std::byte> body;
+    body.reserve(sizeof(head) + sizeof(frame_.weights) + sizeof(frame_.shape_weights) + layout_.plane_size());
+    ByteWriter writer(body);
+    writer.put_bytes(std::as_bytes(std::span(&head, 1)));
+    if ((flags & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
+    ValueWriter weights;
+    write_weights(motion_class_count(layout_), frame_.weights, weights);
+    weights.finish(body);
+    for (const auto& slice : slices) writer.put_bytes(slice);
+    FrameHeader header;
+    header.opcode = Opcode::StrandDelta;
+    header.base_sequence = sequence_++;
+    header.sequence = sequence_;
+    header.sim_time_ns = snapshot.sim_time_ns;
+    return make_frame(header, decoded, body);
+  }
+
+  /// Of the same frame, for a joiner.
+  EncodedFramePtr make_keyframe(const Snapshot& snapshot, const Snapshot& decoded, const Slices& slices) {
+    std::vector<std::byte> packed;
+    zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, packed);
+    std::vector<std::byte> body;
+    body.reserve(packed.size() + 2 * layout_.plane_size());
+    ByteWriter writer(body);
+    writer.put(static_cast<uint32_t>(packed.size()));
+    writer.put_bytes(packed);
+    writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
+    for (const auto& slice : slices) writer.put_bytes(slice);
+    FrameHeader header;
+    header.opcode = Opcode::StrandKeyframe;
+    header.sequence = sequence_;
+    header.sim_time_ns = snapshot.sim_time_ns;
+    return make_frame(header, decoded, body);
+  }
+
+  static EncodedFramePtr make_frame(const FrameHeader& header, const Snapshot& decoded,
+                                    std::span<const std::byte> body) {
+    std::vector<std::byte> payload;
+    payload.reserve(kStrandFixedBytes + body.size());
+    append_fixed_part(decoded, kTangentCodecNumber, payload);
+    ByteWriter(payload).put_bytes(body);
+    return make_encoded_frame(header, payload);
+  }
+
+  std::vector<glm::vec3> rest_in_head_m_;
+  TangentLayout layout_;
+  TangentChain chain_;
+  TangentFrame frame_;
+  SymbolSizes next_sizes_;
+  SymbolSizes no_sizes_;
+  // Kept for their memory.
+  Planes<int32_t> target_;
+  std::vector<ValueWriter> writers_;
+  std::vector<int32_t> lattice_;
+  ZstdCompressor zstd_;
+  uint32_t sequence_ = 0;
+  bool has_chain_ = false;
+};
+
+class TangentDecoder final : public StrandDecoder {
+ public:
+  explicit TangentDecoder(const StrandStreamLimits& limits) : limits_(limits) {}
+
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
+    const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
+    make_layout(fits ? rest_in_head_m : std::span<const glm::vec3>());
+  }
+
+  Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> bytes) override {
+    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, kTangentCodecNumber, limits_));
+    RETURN_IF_ERROR(check_chain(message.header, sequence_));
+    if (layout_.strand_count == 0) make_layout({});
+    auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
+    if (message.header.opcode == Opcode::StrandKeyframe)
+      RETURN_IF_ERROR(read_keyframe(message, *snapshot));
+    else
+      RETURN_IF_ERROR(read_delta(message, *snapshot));
+    sequence_ = message.header.sequence;
+    return std::shared_ptr<const Snapshot>(std::move(snapshot));
+  }
+
+ private:
+  void make_layout(std::span<const glm::vec3> rest_in_head_m) {
+    layout_ = make_tangent_layout(limits_.strand_count, limits_.vertex_count, rest_in_head_m);
+    frame_.resize(layout_);
+    next_sizes_.reset(layout_);
+    no_sizes_.reset(layout_);
+    sequence_ = 0;
+  }
+
+  Status read_keyframe(const StrandMessage& message, Snapshot& snapshot) {
+    TangentChain chain;
+    chain.reset(layout_);
+    chain.history.quantum_m = message.fixed.quantum_m;
+    ByteReader body(message.body);
+    const auto table_bytes = body.take<uint32_t>();
+    const auto packed = body.take_bytes(table_bytes);
+    take_into(body, frame_.shape_weights);
+    if (!body.ok())
+      return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
+                        message.body.size());
+    if (auto filled = zstd_.fill(packed, std::as_writable_bytes(std::span(chain.tables))); !filled)
+      return at("symbol tables", filled.error());
+    RETURN_IF_ERROR(check_tables(chain.tables));
+    TangentTables tables = chain.tables;
+    RETURN_IF_ERROR(
+        read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, snapshot,
+                    [&](uint32_t slice) { place_shape(layout_, chain.history.quantum_m, slice, frame_); }));
+    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    // Only now, with everything checked, the state moves on.
+    frame_.head = {snapshot.world_from_head, {}};
+    remember(chain.history, frame_);
+    chain.forget_motion(layout_);
+    chain_ = std::move(chain);
+    return {};
+  }
+
+  Status read_delta(const StrandMessage& message, Snapshot& snapshot) {
+    if (message.fixed.quantum_m != chain_.history.quantum_m)
+      return make_error(ErrorCode::BadInput, "lattice step changes from {} to {} m within a chain",
+                        chain_.history.quantum_m, message.fixed.quantum_m);
+    ByteReader body(message.body);
+    BodyHead head;
+    take_into(body, head);
+    const bool is_anchor = head.flags == kAnchorFlag;
+    if (is_anchor) take_into(body, frame_.shape_weights);
+    if (!body.ok())
+      return make_error(ErrorCode::BadInput, "{} bytes have no room for what a delta begins with",
+                        message.body.size());
+    if (head.flags > kAnchorFlag)
+      return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
+                        kAnchorFlag);
+    frame_.length_blend = head.length_blend;
+    frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
+    ValueReader weights;
+    ASSIGN_OR_RETURN(const auto slices, weights.open(body.rest()));
+    read_weights(motion_class_count(layout_), frame_.weights, weights);
+    if (!weights.is_spent())
+      return make_error(ErrorCode::BadInput, "the weights do not end where their symbols end");
+    frame_.apply_weights();
+    TangentTables tables = chain_.tables;
+    RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {
+      const auto place = is_anchor ? place_anchor : place_slice;
+      place(layout_, chain_.history, slice, frame_);
+    }));
+    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    // Only now, with everything checked, the state moves on.
+    remember(chain_.history, frame_);
+    if (is_anchor) {
+      chain_.forget_motion(layout_);
+    } else {
+      chain_.tables = tables;
+      std::swap(chain_.sizes, next_sizes_);
+    }
+    return {};
+  }
+
+  /// Reads `codes` of all slices, to the last byte; place(slice) finds their positions. `tables` become those
+  /// that the slices end with.
+  template <class Place>
+  Status read_slices(std::span<const std::byte> source, TangentTables& tables, const SymbolSizes& sizes,
+                     TangentCodes& codes, Snapshot& snapshot, Place place) {
+    std::vector<ValueReader> readers(layout_.slice_count());
+    ASSIGN_OR_RETURN(const auto rest, open_slices(source, readers));
+    if (!rest.empty())
+      return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
+                        rest.size());
+    std::vector<TangentTables> learnt(layout_.slice_count(), tables);
+    snapshot.lattice.resize(3 * snapshot.plane_size());
+    for_each_slice(layout_, kSlicesAtOnce, [&](uint32_t begin, uint32_t count) {
+      std::vector<SliceSymbols> symbols;
+      for (uint32_t slice = begin; slice < begin + count; ++slice)
+        symbols.push_back({slice, learnt[slice], readers[slice]});
+      read_symbols(layout_, sizes, codes, next_sizes_, symbols);
+      for (const SliceSymbols& done : symbols) {
+        place(done.slice);
+        set_lattice(layout_, frame_.lattice, done.slice, snapshot);
+      }
+    });
+    RETURN_IF_ERROR(check_spent(readers));
+    tables = mean_tables(learnt);
+    return {};
+  }
+
+  static Result<std::span<const std::byte>> open_slices(std::span<const std::byte> rest,
+                                                        std::vector<ValueReader>& readers) {
+    for (ValueReader& reader : readers) {
+      ASSIGN_OR_RETURN(rest, reader.open(rest));
+    }
+    return rest;
+  }
+
+  static Status check_spent(const std::vector<ValueReader>& readers) {
+    for (size_t slice = 0; slice < readers.size(); ++slice)
+      if (!readers[slice].is_spent())
+        return make_error(ErrorCode::BadInput, "slice {} does not end where its symbols end", slice);
+    return {};
+  }
+
+  static Status check_tables(const TangentTables& tables) {
+    for (size_t i = 0; i < tables.size(); ++i) {
+      bool is_rising = tables[i].start[0] == 0;
+      for (uint32_t k = 0; k < kSymbolCount; ++k) is_rising &= tables[i].share(k) > 0;
+      if (!is_rising) return make_error(ErrorCode::BadInput, "symbol table {} does not rise from 0", i);
+    }
+    return {};
+  }
+
+  template <class T>
+  static void take_into(ByteReader& reader, T& value) {
+    const auto bytes = reader.take_bytes(sizeof(T));
+    if (bytes.size() == sizeof(T)) std::memcpy(&value, bytes.data(), sizeof(T));
+  }
+
+  StrandStreamLimits limits_;
+  TangentLayout layout_;
+  TangentChain chain_;
+  TangentFrame frame_;
+  SymbolSizes next_sizes_;
+  SymbolSizes no_sizes_;
+  ZstdDecompressor zstd_;
+  uint32_t sequence_ = 0;
+};
+
+}  // namespace
+
+float lattice_step_m(float bound_m) {
+  CHECK(bound_m >= kMinBoundM);
+  return std::nextafter(bound_m / static_cast<float>(kStepsPerBound), 0.0f);
+}
+
+std::unique_ptr<StrandEncoder> make_encoder() {
+  return std::make_unique<TangentEncoder>();
+}
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits) {
+  return std::make_unique<TangentDecoder>(limits);
+}
+
+}  // namespace strandcast::tangent

@@ -1,0 +1,15 @@
+// The codec "tangent" as rows of the codec table need it (common/strands/strand_codec.h).
+#pragma once
+
+#include <memory>
+
+#include "common/strands/strand_codec.h"
+
+namespace strandcast::tangent {
+
+std::unique_ptr<StrandEncoder> make_encoder();
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits);
+/// As lattice_step_m() of strand_codec.h.
+float lattice_step_m(float bound_m);
+
+}  // namespace strandcast::tangent

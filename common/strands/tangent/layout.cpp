@@ -1,0 +1,123 @@
+#include "common/strands/tangent/layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "common/base/check.h"
+#include "common/strands/morton.h"
+
+namespace strandcast::tangent {
+namespace {
+
+constexpr uint32_t kThinnings = 8;          // the coarsest level has one strand in so many
+constexpr uint32_t kStrandsPerSlice = 128;  // fewer than kThinnings times that: a single slice
+constexpr uint32_t kWindow = 64;            // places before a block that are searched for neighbours
+constexpr double kCells = 1024.0;           // of the curve, along each axis
+
+/// Strands in the order of a Morton curve through their roots.
+std::vector<uint32_t> curve_order(uint32_t strand_count, std::span<const glm::vec3> rest_in_head_m) {
+  std::vector<uint32_t> order(strand_count);
+  std::iota(order.begin(), order.end(), 0u);
+  if (rest_in_head_m.empty()) return order;
+  const auto roots = rest_in_head_m.first(strand_count);
+  glm::dvec3 low(roots[0]);
+  glm::dvec3 high(roots[0]);
+  for (const glm::vec3& root : roots) {
+    low = glm::min(low, glm::dvec3(root));
+    high = glm::max(high, glm::dvec3(root));
+  }
+  const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z, 1e-9});
+  std::vector<uint32_t> code(strand_count);
+  for (uint32_t s = 0; s < strand_count; ++s) {
+    const glm::dvec3 cell = (glm::dvec3(roots[s]) - low) * ((kCells - 1.0) / extent);
+    for (int axis = 0; axis < 3; ++axis) code[s] |= morton_bits(static_cast<uint32_t>(cell[axis])) << axis;
+  }
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
+  return order;
+}
+
+/// The slice of the strand at position `i` on the curve: level 0 holds every eighth, level 1 those halfway
+/// between, and so on; each level is cut along the curve into slices of an eighth of all strands.
+uint32_t slice_of(uint32_t i, uint32_t strand_count) {
+  const uint64_t eighth = uint64_t{i} * kThinnings / strand_count;  // along the curve
+  if (i % 8 == 0) return 0;
+  if (i % 8 == 4) return 1;
+  if (i % 4 == 2) return 2 + static_cast<uint32_t>(eighth / 4);
+  return 4 + static_cast<uint32_t>(eighth / 2);
+}
+
+void find_neighbours(TangentLayout& layout, std::span<const glm::vec3> rest_in_head_m) {
+  for (auto& neighbour : layout.neighbour) neighbour.assign(layout.stride, layout.no_neighbour());
+  if (rest_in_head_m.empty()) return;
+  for (uint32_t slice = 0; slice < layout.slice_count(); ++slice) {
+    const uint32_t begin = layout.slice_begin[slice];
+    for (uint32_t place = begin; place < layout.slice_begin[slice + 1]; ++place) {
+      if (layout.strand_at[place] == kNoStrand) continue;
+      const glm::vec3 root = rest_in_head_m[layout.strand_at[place]];
+      const uint32_t end = place / kBlockSize * kBlockSize;
+      std::array<float, 2> nearest = {INFINITY, INFINITY};
+      for (uint32_t other = std::max(begin, end > kWindow ? end - kWindow : 0u); other < end; ++other) {
+        const glm::vec3 away = rest_in_head_m[layout.strand_at[other]] - root;
+        const float squared = (away.x * away.x + away.y * away.y) + away.z * away.z;
+        if (squared < nearest[0]) {
+          nearest = {squared, nearest[0]};
+          layout.neighbour[1][place] = layout.neighbour[0][place];
+          layout.neighbour[0][place] = other;
+        } else if (squared < nearest[1]) {
+          nearest[1] = squared;
+          layout.neighbour[1][place] = other;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
+                                  std::span<const glm::vec3> rest_in_head_m) {
+  CHECK(rest_in_head_m.empty() || rest_in_head_m.size() == size_t{strand_count} * vertex_count);
+  const std::vector<uint32_t> order = curve_order(strand_count, rest_in_head_m);
+  const bool is_sliced = strand_count >= kThinnings * kStrandsPerSlice;
+  std::vector<std::vector<uint32_t>> slices(is_sliced ? kThinnings : 1);
+  for (uint32_t i = 0; i < strand_count; ++i)
+    slices[is_sliced ? slice_of(i, strand_count) : 0].push_back(order[i]);
+
+  TangentLayout layout;
+  layout.strand_count = strand_count;
+  layout.vertex_count = vertex_count;
+  for (const auto& slice : slices) {
+    layout.slice_begin.push_back(static_cast<uint32_t>(layout.strand_at.size()));
+    layout.strand_at.insert(layout.strand_at.end(), slice.begin(), slice.end());
+    while (layout.strand_at.size() % kBlockSize != 0) layout.strand_at.push_back(kNoStrand);
+  }
+  layout.slice_begin.push_back(static_cast<uint32_t>(layout.strand_at.size()));
+  layout.strand_at.insert(layout.strand_at.end(), kBlockSize, kNoStrand);
+  layout.stride = static_cast<uint32_t>(layout.strand_at.size());
+  for (const uint32_t strand : layout.strand_at) layout.presence.push_back(strand == kNoStrand ? 0.0f : 1.0f);
+  find_neighbours(layout, rest_in_head_m);
+
+  layout.rest_length_m.assign(layout.plane_size(), 0.0f);
+  for (auto& edge : layout.rest_edge_m) edge.assign(layout.plane_size(), 0.0f);
+  if (rest_in_head_m.empty()) return layout;
+  for (size_t place = 0; place < layout.stride; ++place) {
+    if (layout.strand_at[place] == kNoStrand) continue;
+    const glm::vec3 root = rest_in_head_m[layout.strand_at[place]];
+    for (int axis = 0; axis < 3; ++axis) layout.rest_edge_m[static_cast<size_t>(axis)][place] = root[axis];
+  }
+  for (size_t v = 1; v < vertex_count; ++v) {
+    for (size_t place = 0; place < layout.stride; ++place) {
+      const uint32_t strand = layout.strand_at[place];
+      if (strand == kNoStrand) continue;
+      const glm::vec3 edge =
+          rest_in_head_m[v * strand_count + strand] - rest_in_head_m[(v - 1) * strand_count + strand];
+      const size_t at = v * layout.stride + place;
+      for (int axis = 0; axis < 3; ++axis) layout.rest_edge_m[static_cast<size_t>(axis)][at] = edge[axis];
+      layout.rest_length_m[at] = std::sqrt((edge.x * edge.x + edge.y * edge.y) + edge.z * edge.z);
+    }
+  }
+  return layout;
+}
+
+}  // namespace strandcast::tangent

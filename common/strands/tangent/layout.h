@@ -1,0 +1,45 @@
+// TangentLayout: what the "tangent" codec knows of a groom before the first frame, computed alike on both
+// sides from the rest shape: the order in which strands are coded, the slices, who is whose neighbour, and
+// rest lengths. Private to common/strands/tangent.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+namespace strandcast::tangent {
+
+/// Places are worked on in blocks of this many, side by side in vector registers.
+inline constexpr uint32_t kBlockSize = 8;
+inline constexpr uint32_t kNoStrand = UINT32_MAX;
+
+/// Strands in coding order. A place is a position in that order; slices begin at whole blocks, so some places
+/// at a slice's end hold no strand. The last block of all, `no_neighbour()`, holds zeros in every array.
+struct TangentLayout {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  uint32_t stride = 0;                             // places, the block of zeros included
+  std::vector<uint32_t> strand_at;                 // (stride) place -> strand, or kNoStrand
+  std::vector<float> presence;                     // (stride) 1, or 0 where there is no strand
+  std::vector<uint32_t> slice_begin;               // (slice_count + 1) first place of each slice
+  std::array<std::vector<uint32_t>, 2> neighbour;  // (stride) a place in an earlier block of the slice
+  std::vector<float> rest_length_m;                // (vertex_count x stride) of the segment before
+  std::array<std::vector<float>, 3> rest_edge_m;   // (vertex_count x stride) from the vertex before; roots
+
+  uint32_t slice_count() const { return static_cast<uint32_t>(slice_begin.size()) - 1; }
+  uint32_t no_neighbour() const { return stride - kBlockSize; }
+  size_t plane_size() const { return static_cast<size_t>(vertex_count) * stride; }
+};
+
+/// `rest_in_head_m`: (vertex_count x strand_count), strand fastest, or empty: strands then have no known
+/// lengths and no neighbours.
+///
+/// Slices hold every 8th strand along a curve through the roots, then those halfway between, and so on, so
+/// that the first n slices are an even thinning of the groom.
+TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
+                                  std::span<const glm::vec3> rest_in_head_m);
+
+}  // namespace strandcast::tangent

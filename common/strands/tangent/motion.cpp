@@ -1,0 +1,229 @@
+#include "common/strands/tangent/motion.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/strands/tangent/shape.h"
+#include "common/strands/wrapping.h"
+
+namespace strandcast::tangent {
+Threads threads_for(const TangentLayout& layout) {
+  constexpr size_t kManyEnough = 40'000;  // vertices
+  return layout.plane_size() >= kManyEnough ? Threads::All : Threads::One;
+}
+
+uint32_t motion_class_count(const TangentLayout& layout) {
+  const size_t vertices = size_t{layout.strand_count} * layout.vertex_count;
+  if (vertices < kManyVertices) return kFewMotionClasses;
+  return std::min(kMotionClassCount, layout.vertex_count);
+}
+
+uint32_t motion_class(const TangentLayout& layout, uint32_t v) {
+  const uint32_t last = std::max(layout.vertex_count, 2u) - 1;
+  if (size_t{layout.strand_count} * layout.vertex_count >= kManyVertices)
+    return v * (motion_class_count(layout) - 1) / last;
+  if (v < 2) return 0;
+  return v == last ? 1 : 2;
+}
+
+FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
+                         const TangentFrame& frame, size_t axis, uint32_t v) {
+  const std::array planes = {&frame.velocity,   &history.velocity,        &history.velocity_before,
+                             &history.residual, &history.residual_before, &history.drift};
+  FeatureRows rows;
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const MotionFeature& feature = kMotionFeatures[k];
+    const int64_t vertex = int64_t{v} + feature.tipward;
+    const bool is_there = vertex >= 0 && vertex < int64_t{layout.vertex_count};
+    const float* plane = (*planes[static_cast<size_t>(feature.quantity)])[axis].data();
+    rows[k] = is_there ? plane + static_cast<size_t>(vertex) * layout.stride : frame.zeros.data();
+  }
+  return rows;
+}
+
+void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
+              std::span<float> sum) {
+  constexpr size_t kParts = kBlockSize / kLaneCount;
+  const FeatureRows row = rows;
+  for (size_t i = 0; i < sum.size(); i += kBlockSize) {
+    Lanes block[kParts];
+    for (size_t part = 0; part < kParts; ++part) {
+      const size_t at = i + part * kLaneCount;
+      block[part] =
+          to_floats(wrapping_differences(load_lanes(positions.last + at), load_lanes(positions.base + at)));
+    }
+    for (uint32_t k = 0; k < kRowFeatureCount; ++k)
+      for (size_t part = 0; part < kParts; ++part)
+        block[part] += weights[k] * load_lanes(row[k] + i + part * kLaneCount);
+    for (size_t part = 0; part < kParts; ++part) store_lanes(block[part], sum.data() + i + part * kLaneCount);
+  }
+}
+
+Escape make_escape(size_t at, const Lattice& target, const Lattice& from) {
+  Escape escape;
+  escape.at = at;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const int64_t way = int64_t{target[axis]} - from[axis];
+    const int64_t half = way < 0 ? -kEscapeStep / 2 : kEscapeStep / 2;
+    escape.step[axis] = static_cast<int32_t>((way + half) / kEscapeStep);
+  }
+  return escape;
+}
+
+Lattice escaped(const Escape& escape, const Lattice& from) {
+  Lattice position;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const uint32_t moved = static_cast<uint32_t>(escape.step[axis]) * uint32_t{kEscapeStep};
+    position[axis] = wrapping_sum(from[axis], static_cast<int32_t>(moved));
+  }
+  return position;
+}
+
+void TangentHistory::reset(const TangentLayout& layout) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    lattice[axis].assign(layout.plane_size(), 0);
+    for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
+      (*planes)[axis].assign(layout.plane_size(), 0.0f);
+  }
+}
+
+void TangentHistory::forget_motion() {
+  for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
+    for (auto& plane : *planes) std::fill(plane.begin(), plane.end(), 0.0f);
+  head = {head.pose, {}};
+}
+
+void TangentCodes::resize(const TangentLayout& layout) {
+  // Zeros, as places without a strand must hold them also after a chain with another layout.
+  for (auto* values : {&first, &second, &length}) values->assign(layout.plane_size(), 0);
+  escapes.assign(layout.slice_count(), {});
+}
+
+void TangentFrame::resize(const TangentLayout& layout) {
+  const size_t size = layout.plane_size();
+  codes.resize(layout);
+  shape_codes.resize(layout);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    lattice[axis].assign(size, 0);
+    velocity[axis].assign(size, 0.0f);
+    residual[axis].assign(size, 0.0f);
+    drift[axis].assign(size, 0.0f);
+  }
+  zeros.assign(layout.stride, 0.0f);
+  zero_lattice.assign(layout.stride, 0);
+  for (auto& row : edge) row.assign(layout.stride, 0.0f);
+  for (auto& planes : neighbour_sum)
+    for (auto& row : planes) row.assign(layout.stride, 0.0f);
+}
+
+void TangentFrame::apply_weights() {
+  for (size_t c = 0; c < motion.size(); ++c) {
+    MotionClass& by = motion[c];
+    for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
+      by.weights[k] = static_cast<float>(weights[c][k]) * kMotionWeight;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (size_t i = 0; i < by.head[axis].size(); ++i) {
+        float& sum = by.head[axis][i] = 0.0f;
+        for (size_t k = 0; k < kHeadStepCount; ++k)
+          sum += static_cast<float>(head.step[k].row[axis][i]) * by.weights[kHeadFeature + k];
+      }
+    }
+  }
+}
+
+namespace {
+
+CodeLanes load_codes(const TangentCodes& codes, size_t at) {
+  return {load_lanes(codes.first.data() + at), load_lanes(codes.second.data() + at),
+          load_lanes(codes.length.data() + at)};
+}
+
+/// Goes through the escapes of a slice with its blocks.
+class EscapeWalk {
+ public:
+  explicit EscapeWalk(const std::vector<Escape>& escapes) : next_(escapes.begin()), end_(escapes.end()) {}
+
+  /// Puts the escaped vertices of the block that begins at `at` where they belong; from(lane) is where their
+  /// escapes count from.
+  template <class From>
+  void place(size_t at, IntLaneVectors& position, From from) {
+    for (; next_ != end_ && next_->at < at + kLaneCount; ++next_) {
+      const size_t lane = next_->at - at;
+      const Lattice point = escaped(*next_, from(lane));
+      for (size_t axis = 0; axis < 3; ++axis) position.axis[axis][lane] = point[axis];
+    }
+  }
+
+ private:
+  std::vector<Escape>::const_iterator next_;
+  std::vector<Escape>::const_iterator end_;
+};
+
+}  // namespace
+
+void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                 TangentFrame& frame) {
+  EscapeWalk escapes(frame.codes.escapes[slice]);
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const MotionRow row(layout, history, frame, v);
+    row.sum_features(slice);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      Expected expected;
+      row.expect(place, expected);
+      const size_t at = row.at(place);
+      IntLaneVectors position = expected.placed(load_codes(frame.codes, at));
+      escapes.place(at, position, [&](size_t lane) { return row.last(at + lane); });
+      row.store(expected, place, position);
+    }
+  }
+}
+
+void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                  TangentFrame& frame) {
+  EscapeWalk escapes(frame.codes.escapes[slice]);
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const MotionRow row(layout, history, frame, v);
+    const ShapeRow shape(layout, history.quantum_m, frame.lattice, v);
+    row.sum_features(slice);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      Expected moved;
+      row.expect(place, moved);
+      const Expected expected = shape.expect(place, frame.shape_weights);
+      const size_t at = row.at(place);
+      IntLaneVectors position =
+          expected.placed(sum_of(expected.codes_of(moved), load_codes(frame.codes, at)));
+      escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
+      row.store(moved, place, position);
+    }
+  }
+}
+
+void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame) {
+  EscapeWalk escapes(frame.shape_codes.escapes[slice]);
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const ShapeRow shape(layout, quantum_m, frame.lattice, v);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      const Expected expected = shape.expect(place, frame.shape_weights);
+      const size_t at = shape.at(place);
+      IntLaneVectors position = expected.placed(load_codes(frame.shape_codes, at));
+      escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
+      for (size_t axis = 0; axis < 3; ++axis)
+        store_lanes(position.axis[axis], frame.lattice[axis].data() + at);
+    }
+  }
+}
+
+void remember(TangentHistory& history, TangentFrame& frame) {
+  history.head = frame.head;
+  std::swap(history.lattice, frame.lattice);
+  std::swap(history.velocity_before, history.velocity);
+  std::swap(history.velocity, frame.velocity);
+  std::swap(history.residual_before, history.residual);
+  std::swap(history.residual, frame.residual);
+  std::swap(history.drift, frame.drift);
+}
+
+}  // namespace strandcast::tangent

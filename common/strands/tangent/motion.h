@@ -1,0 +1,140 @@
+// Geometry of the "tangent" codec: where a vertex is expected, and the integers that tell how far it is from
+// there. Both sides compute the same floats: only + - * / and square roots in a fixed order, without
+// contraction. Private to common/strands/tangent. Functions touch only their own slice of the arrays, so
+// slices of one frame may be worked on side by side.
+//
+// Prediction: the last decoded position plus a weighted sum of what both sides know (features listed in
+// tangent_row.h), brought to the known length from the decoded vertex before it. Two integers correct it
+// in the plane across the segment, a third one, rarely needed, its length. All lengths are in lattice steps.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/strands/side_by_side.h"
+#include "common/strands/tangent/head.h"
+#include "common/strands/tangent/layout.h"
+
+namespace strandcast::tangent {
+
+inline constexpr int32_t kStepsPerBound = 256;  // lattice steps in the announced bound
+inline constexpr uint32_t kMotionFeatureCount = 28;
+inline constexpr uint32_t kMotionClassCount = 16;    // of rows that share weights, at most
+inline constexpr uint32_t kFewMotionClasses = 3;     // as many of them when there are fewer vertices than
+inline constexpr uint32_t kManyVertices = 16'384;    // this, where more cost more than they save
+inline constexpr float kMotionWeight = 1.0f / 4096;  // unit of the weights on the wire
+inline constexpr float kShapeWeight = 1.0f / 1024;
+inline constexpr float kDriftShare = 0.85f;         // of the drift that is left one frame later
+inline constexpr float kLengthWeight = 1.0f / 16;   // unit of the length blend
+inline constexpr int32_t kEscapedLength = 1 << 20;  // in place of a length correction
+inline constexpr uint32_t kShapeFeatureCount = 16;
+inline constexpr uint32_t kShapeClassCount = 16;  // roots; first segments; and so on; the rest
+
+template <class T>
+using Planes = std::array<std::vector<T>, 3>;  // one for each axis, (vertex_count x stride)
+
+using MotionWeights = std::array<std::array<int16_t, kMotionFeatureCount>, kMotionClassCount>;
+
+using FloatWeights = std::array<float, kMotionFeatureCount>;
+/// The weights of a class as they are used.
+struct MotionClass {
+  FloatWeights weights{};
+  std::array<std::array<float, 4>, 3> head{};  // the steps of the head, weighted
+};
+
+using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
+
+/// What both sides remember of the frames so far.
+struct TangentHistory {
+  float quantum_m = 0.0f;
+  HeadMotion head;
+  Planes<int32_t> lattice;
+  Planes<float> velocity;  // since the frame before
+  Planes<float> velocity_before;
+  Planes<float> residual;  // decoded less predicted position
+  Planes<float> residual_before;
+  Planes<float> drift;  // sum of all velocities, older ones fading: where strands swing back from
+
+  void reset(const TangentLayout& layout);
+  /// Forgets all but where the strands are and the pose: what a keyframe tells a late joiner.
+  void forget_motion();
+};
+
+/// An escaped vertex: position less the last one (of an anchor: less its parent's), in steps of a cubic
+/// lattice.
+struct Escape {
+  size_t at = 0;  // place in a plane
+  std::array<int32_t, 3> step{};
+};
+
+/// The integers of one frame.
+struct TangentCodes {
+  std::vector<int32_t> first;  // (vertex_count x stride) first coordinate across the segment
+  std::vector<int32_t> second;
+  std::vector<int32_t> length;               // correction along the segment, or kEscapedLength
+  std::vector<std::vector<Escape>> escapes;  // of each slice, in coding order
+
+  void resize(const TangentLayout& layout);
+};
+
+/// One frame, coded after a history.
+///
+/// An *anchor* is a frame that can also be told without a history: its integers count from where the shape of
+/// the strands lets expect a vertex. Who has the history is told how far they are from those that the motion
+/// lets expect.
+struct TangentFrame {
+  HeadMotion head;
+  MotionWeights weights{};
+  std::array<MotionClass, kMotionClassCount> motion;  // by apply_weights
+  uint8_t length_blend = 0;  // of the last decoded length against the rest length, in 1/16
+  TangentCodes codes;
+  ShapeWeights shape_weights{};  // of an anchor
+  TangentCodes shape_codes;      // of an anchor, for who has no history
+  Planes<int32_t> lattice;
+  Planes<float> velocity;
+  Planes<float> residual;
+  Planes<float> drift;
+  // Of the row at work, each (stride).
+  Planes<float> edge;                          // to the expected position, as far as whole rows tell
+  std::array<Planes<float>, 2> neighbour_sum;  // what a vertex tells as a neighbour
+  std::vector<float> zeros;
+  std::vector<int32_t> zero_lattice;
+
+  void resize(const TangentLayout& layout);
+  /// Once `head` and `weights` are those of the frame.
+  void apply_weights();
+};
+
+/// Smaller grooms are coded on the calling thread.
+Threads threads_for(const TangentLayout& layout);
+
+/// How many classes of weights a frame of this groom has.
+uint32_t motion_class_count(const TangentLayout& layout);
+
+/// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
+/// sample of strands.
+void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
+                TangentFrame& frame);
+
+/// Weights that suit the shape of `target` best.
+ShapeWeights fit_shape(const TangentLayout& layout, float quantum_m, const Planes<int32_t>& target);
+
+/// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
+/// decode to. Of an anchor it fills both kinds of integers.
+void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
+                    uint32_t slice, TangentFrame& frame);
+void quantise_anchor(const TangentLayout& layout, const TangentHistory& history,
+                     const Planes<int32_t>& target, uint32_t slice, TangentFrame& frame);
+
+/// Decoder: positions, velocities and residuals of a slice from its integers.
+void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                 TangentFrame& frame);
+void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
+                  TangentFrame& frame);
+/// Decoder: positions of a slice of an anchor from the integers for who has no history.
+void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame);
+
+/// The frame becomes history.
+void remember(TangentHistory& history, TangentFrame& frame);
+
+}  // namespace strandcast::tangent

@@ -1,0 +1,325 @@
+// MotionRow: where the vertices of one row (one vertex index, all strands) are expected, four strands at a
+// time; what encoder and decoder of the "tangent" codec share. Private to common/strands/tangent.
+//
+// What a vertex costs: 240 floating-point operations (2 x 3 x 25 of them for the prediction), two divisions
+// and two roots; 135 bytes from and to memory (30 planes, the integers); three symbols, each of which waits
+// for the one before it, about 25 cycles (find 10, table 5, multiply and add 5, refill 5). At 2.45 GHz and
+// four lanes that is 60 cycles of arithmetic, 33 of memory at 10 GB/s and 75 of waiting.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "common/strands/lanes.h"
+#include "common/strands/tangent/motion.h"
+
+namespace strandcast::tangent {
+
+static_assert(kBlockSize % kLaneCount == 0);
+
+/// What a feature is a value of; "then" is the last frame, "before" the one before that.
+enum class MotionQuantity : uint8_t {
+  Now,  // change of position in this frame
+  Then,
+  Before,
+  ResidualThen,
+  ResidualBefore,
+  DriftThen
+};
+enum class MotionStrand : uint8_t { Own, Neighbour, SecondNeighbour };
+
+/// A vector, whose weight is the same for all axes; nothing where there is no such vertex.
+struct MotionFeature {
+  MotionQuantity quantity;
+  int8_t tipward = 0;  // vertices from the own one towards the tip: the parent has -1
+  MotionStrand strand = MotionStrand::Own;
+};
+
+// In the order of their weights; behind them the last steps of the head at the last position, newest first.
+inline constexpr std::array kMotionFeatures = {
+    MotionFeature{MotionQuantity::Then},
+    MotionFeature{MotionQuantity::ResidualThen},
+    MotionFeature{MotionQuantity::Before},
+    MotionFeature{MotionQuantity::ResidualBefore},
+    MotionFeature{MotionQuantity::DriftThen},
+    MotionFeature{MotionQuantity::Now, -1},
+    MotionFeature{MotionQuantity::Then, -1},
+    MotionFeature{MotionQuantity::ResidualBefore, -1},
+    MotionFeature{MotionQuantity::Now, -2},
+    MotionFeature{MotionQuantity::Then, -2},
+    MotionFeature{MotionQuantity::Now, -3},
+    MotionFeature{MotionQuantity::Then, 1},
+    MotionFeature{MotionQuantity::ResidualThen, 1},
+    MotionFeature{MotionQuantity::Before, 1},
+    MotionFeature{MotionQuantity::ResidualBefore, 1},
+    MotionFeature{MotionQuantity::Then, 2},
+    MotionFeature{MotionQuantity::Now, 0, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::Then, 0, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::ResidualThen, 0, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::Now, -1, MotionStrand::Neighbour},
+    MotionFeature{MotionQuantity::Now, 0, MotionStrand::SecondNeighbour},
+    MotionFeature{MotionQuantity::Now, -1, MotionStrand::SecondNeighbour},
+};
+
+constexpr uint32_t first_feature_of(MotionStrand strand) {
+  uint32_t k = 0;
+  while (k < kMotionFeatures.size() && kMotionFeatures[k].strand < strand) ++k;
+  return k;
+}
+inline constexpr uint32_t kRowFeatureCount = first_feature_of(MotionStrand::Neighbour);
+inline constexpr uint32_t kHeadFeature = kMotionFeatures.size();
+static_assert(kHeadFeature + kHeadStepCount == kMotionFeatureCount);
+// What is not decoded yet predicts nothing.
+static_assert(std::all_of(kMotionFeatures.begin(), kMotionFeatures.end(), [](const MotionFeature& feature) {
+  return feature.quantity != MotionQuantity::Now ||
+         feature.tipward < (feature.strand == MotionStrand::Own ? 0 : 1);
+}));
+
+// The cell of a coded vertex: tangent steps of 1.32 bounds and length steps of 0.65 keep its farthest point
+// within the bound, with room for rounding: sqrt(1 - 1.32^2 / 2) = 0.36 >= 0.65 / 2.
+inline constexpr float kTangentStep = 1.32f * kStepsPerBound;
+inline constexpr float kLengthStep = 0.65f * kStepsPerBound;
+inline constexpr int32_t kEscapeStep = 292;  // 2 (kStepsPerBound - 3) / sqrt(3)
+
+inline constexpr float kTinySquared = 1e-12f;
+inline constexpr float kLargestEdge = 4e6f;     // in steps; rounding by adding needs it
+inline constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23: floats there are whole numbers
+
+/// Nearest whole numbers, ties to even, limited to +-kLargestEdge; -kLargestEdge for NaN.
+STRANDCAST_INLINE IntLanes nearest_lanes(const Lanes& value) {
+  const Lanes low = value > -kLargestEdge ? value : Lanes{} - kLargestEdge;
+  const Lanes within = low < kLargestEdge ? low : Lanes{} + kLargestEdge;
+  return to_integers((within + kRounder) - kRounder);
+}
+
+/// Which weights serve a row. Near the root and at the tip strands move by laws of their own.
+uint32_t motion_class(const TangentLayout& layout, uint32_t v);
+
+/// Rows of floats that features of one axis lie in, those of neighbours at the neighbour's place; absent ones
+/// are zeros. What is "now" of the own row is there once its block is stored.
+using FeatureRows = std::array<const float*, kHeadFeature>;
+FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
+                         const TangentFrame& frame, size_t axis, uint32_t v);
+
+struct LastAndBase {
+  const int32_t* last;
+  const int32_t* base;
+};
+/// sum = (last - base) + weighted features, for as many places; whole blocks. A pass of its own: nothing in
+/// it waits for other places, while the rest of a prediction is one long chain for each block.
+void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
+              std::span<float> sum);
+
+/// The integers of a block.
+struct CodeLanes {
+  IntLanes first{};
+  IntLanes second{};
+  IntLanes length{};
+};
+
+STRANDCAST_INLINE CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
+  return {wrapping_sums(a.first, b.first), wrapping_sums(a.second, b.second),
+          wrapping_sums(a.length, b.length)};
+}
+
+/// Escaped vertices.
+using Lattice = std::array<int32_t, 3>;
+Escape make_escape(size_t at, const Lattice& target, const Lattice& from);
+Lattice escaped(const Escape& escape, const Lattice& from);
+inline Lattice lane_of(const IntLaneVectors& vectors, size_t lane) {
+  return {vectors.axis[0][lane], vectors.axis[1][lane], vectors.axis[2][lane]};
+}
+
+/// Where the vertices of a block are expected: `length` along `along` from `base`, and two directions across.
+struct Expected {
+  IntLaneVectors base;
+  LaneVectors along;
+  LaneVectors first;
+  LaneVectors second;
+  Lanes length;
+
+  /// Along `edge` and as long.
+  STRANDCAST_INLINE void aim(const LaneVectors& edge) {
+    const Lanes squared = dots(edge, edge);
+    length = square_roots(squared);
+    const Lanes scale = squared > kTinySquared ? 1.0f / length : Lanes{};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const Lanes instead = Lanes{} + (axis == 1 ? 1.0f : 0.0f);  // where there is no direction
+      along.axis[axis] = scale != 0.0f ? edge.axis[axis] * scale : instead;
+    }
+    find_frames();
+  }
+
+  /// Fills the directions across `along`: an orthonormal basis without branches (Duff et al. 2017, Building
+  /// an Orthonormal Basis, Revisited).
+  STRANDCAST_INLINE void find_frames() {
+    const auto& [x, y, z] = along.axis;
+    const Lanes one = Lanes{} + 1.0f;
+    const Lanes sign = z >= 0.0f ? one : -one;
+    const Lanes a = -1.0f / (sign + z);
+    const Lanes b = x * y * a;
+    first.axis[0] = 1.0f + sign * (x * x * a);
+    first.axis[1] = sign * b;
+    first.axis[2] = -sign * x;
+    second.axis[0] = b;
+    second.axis[1] = sign + y * y * a;
+    second.axis[2] = -y;
+  }
+
+  /// What would be the integers of an edge, were they not whole; false where they cannot tell it.
+  struct Coordinates {
+    Lanes first;
+    Lanes second;
+    Lanes length;
+    IntLanes is_possible;
+  };
+  STRANDCAST_INLINE Coordinates coordinates(const LaneVectors& edge) const {
+    constexpr float kSteepest = 0.2f;
+    constexpr float kFarthest = 1e5f;
+    const Lanes beside = dots(edge, along);
+    const Lanes size = square_roots(dots(edge, edge));
+    // Seen from the vertex before, where the direction of the edge meets the tangent plane.
+    const Lanes scale = size > 0.0f ? length / beside / kTangentStep : Lanes{};
+    Coordinates of;
+    of.first = dots(edge, first) * scale;
+    of.second = dots(edge, second) * scale;
+    of.length = (size - length) / kLengthStep;
+    const IntLanes is_steep = (size > 0.0f) & ~(beside > kSteepest * size);
+    of.is_possible = ~is_steep & (sizes_of(of.first) < kFarthest) & (sizes_of(of.second) < kFarthest) &
+                     (sizes_of(of.length) < kFarthest);
+    return of;
+  }
+  /// The integers that come nearest to what `other` expects from the same base.
+  STRANDCAST_INLINE CodeLanes codes_of(const Expected& other) const {
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis) edge.axis[axis] = other.along.axis[axis] * other.length;
+    const Coordinates of = coordinates(edge);
+    CodeLanes codes;
+    codes.first = of.is_possible ? nearest_lanes(of.first) : IntLanes{};
+    codes.second = of.is_possible ? nearest_lanes(of.second) : IntLanes{};
+    codes.length = of.is_possible ? nearest_lanes(of.length) : IntLanes{};
+    return codes;
+  }
+
+  /// Positions, limited to where rounding holds, that the integers tell.
+  STRANDCAST_INLINE IntLaneVectors placed(const CodeLanes& codes) const {
+    const Lanes across = to_floats(codes.first) * kTangentStep;
+    const Lanes also = to_floats(codes.second) * kTangentStep;
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis)
+      edge.axis[axis] = (along.axis[axis] * length + first.axis[axis] * across) + second.axis[axis] * also;
+    const Lanes squared = dots(edge, edge);
+    const Lanes wanted = length + to_floats(codes.length) * kLengthStep;
+    const Lanes scale = squared > kTinySquared ? wanted / square_roots(squared) : Lanes{};
+    IntLaneVectors position;
+    for (size_t axis = 0; axis < 3; ++axis)
+      position.axis[axis] = wrapping_sums(base.axis[axis], nearest_lanes(edge.axis[axis] * scale));
+    return position;
+  }
+};
+
+class MotionRow {
+ public:
+  MotionRow(const TangentLayout& layout, const TangentHistory& history, TangentFrame& frame, uint32_t v)
+      : layout_(layout), history_(history), frame_(frame), v_(v), by_(frame.motion[motion_class(layout, v)]) {
+    length_blend_ = static_cast<float>(frame.length_blend) * kLengthWeight;
+    for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
+  }
+
+  /// Of a place in this row, in a plane.
+  size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
+
+  /// The part of the prediction that comes from whole rows, for a slice; before its blocks are expected.
+  void sum_features(uint32_t slice) const {
+    const size_t begin = layout_.slice_begin[slice];
+    const size_t count = layout_.slice_begin[slice + 1] - begin;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      FeatureRows rows = features_[axis];
+      for (const float*& row : rows) row += begin;
+      const int32_t* last = history_.lattice[axis].data() + at(begin);
+      const int32_t* base = v_ == 0 ? frame_.zero_lattice.data() : bases(axis) + begin;
+      sum_rows(rows, by_.weights, {last, base}, std::span(frame_.edge[axis]).subspan(begin, count));
+    }
+  }
+
+  /// Blocks of a slice come in order.
+  STRANDCAST_INLINE void expect(size_t place, Expected& expected) const {
+    LaneVectors last;
+    for (size_t axis = 0; axis < 3; ++axis)
+      last.axis[axis] = to_floats(load_lanes(history_.lattice[axis].data() + at(place)));
+    const Lanes presence = load_lanes(layout_.presence.data() + place);
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(bases(axis) + place);
+      const auto& head = by_.head[axis];
+      const Lanes turned = (head[0] * last.axis[0] + head[1] * last.axis[1]) + head[2] * last.axis[2];
+      edge.axis[axis] = load_lanes(frame_.edge[axis].data() + place) + (turned + head[3] * presence);
+      for (uint32_t which = 0; which < 2; ++which)
+        edge.axis[axis] +=
+            gather_lanes(frame_.neighbour_sum[which][axis].data(), layout_.neighbour[which].data() + place);
+    }
+    expected.aim(edge);
+    if (v_ != 0) expected.length = known_length(place);
+  }
+
+  /// Stores positions and what follows from them.
+  STRANDCAST_INLINE void store(const Expected& expected, size_t place, const IntLaneVectors& position) const {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const size_t begin = at(place);
+      const IntLanes& now = position.axis[axis];
+      const IntLanes last = load_lanes(history_.lattice[axis].data() + begin);
+      const Lanes velocity = to_floats(wrapping_differences(now, last));
+      const Lanes edge = to_floats(wrapping_differences(now, expected.base.axis[axis]));
+      store_lanes(now, frame_.lattice[axis].data() + begin);
+      store_lanes(velocity, frame_.velocity[axis].data() + begin);
+      store_lanes(edge - expected.along.axis[axis] * expected.length, frame_.residual[axis].data() + begin);
+      const Lanes drift = load_lanes(history_.drift[axis].data() + begin);
+      store_lanes(kDriftShare * drift + velocity, frame_.drift[axis].data() + begin);
+      // What later blocks add for this neighbour.
+      store_neighbour_sum<MotionStrand::Neighbour>(axis, place);
+      store_neighbour_sum<MotionStrand::SecondNeighbour>(axis, place);
+    }
+  }
+
+  /// Of a vertex of the row: its last position, which escapes count from.
+  Lattice last(size_t at) const {
+    return {history_.lattice[0][at], history_.lattice[1][at], history_.lattice[2][at]};
+  }
+  TangentFrame& frame() const { return frame_; }
+
+ private:
+  template <MotionStrand strand>
+  STRANDCAST_INLINE void store_neighbour_sum(size_t axis, size_t place) const {
+    constexpr uint32_t kFirst = first_feature_of(strand);
+    Lanes sum = by_.weights[kFirst] * load_lanes(features_[axis][kFirst] + place);
+    for (uint32_t k = kFirst + 1; k < kHeadFeature && kMotionFeatures[k].strand == strand; ++k)
+      sum += by_.weights[k] * load_lanes(features_[axis][k] + place);
+    constexpr size_t kWhich = strand == MotionStrand::Neighbour ? 0 : 1;
+    store_lanes(sum, frame_.neighbour_sum[kWhich][axis].data() + place);
+  }
+  STRANDCAST_INLINE Lanes known_length(size_t place) const {
+    const Lanes rest = load_lanes(layout_.rest_length_m.data() + at(place)) / history_.quantum_m;
+    if (frame_.length_blend == 0) return rest;
+    LaneVectors edge;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const int32_t* own = history_.lattice[axis].data() + at(place);
+      edge.axis[axis] = to_floats(wrapping_differences(load_lanes(own), load_lanes(own - layout_.stride)));
+    }
+    return rest + length_blend_ * (square_roots(dots(edge, edge)) - rest);
+  }
+
+  /// Decoded positions of the parents; not for roots.
+  const int32_t* bases(size_t axis) const { return frame_.lattice[axis].data() + at(0) - layout_.stride; }
+
+  const TangentLayout& layout_;
+  const TangentHistory& history_;
+  TangentFrame& frame_;
+  uint32_t v_;
+  MotionClass by_;
+  float length_blend_;
+  std::array<FeatureRows, 3> features_;
+};
+
+}  // namespace strandcast::tangent
