@@ -13,7 +13,7 @@
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
 #include "server/app/options.h"
-#include "server/app/token_file.h"
+#include "server/net/token_file.h"
 
 namespace strandcast {
 namespace {

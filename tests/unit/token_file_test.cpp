@@ -1,5 +1,5 @@
 // The server's token file: made once with fresh tokens, private, and read with care.
-#include "server/app/token_file.h"
+#include "server/net/token_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
