@@ -58,7 +58,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
             kAll)},
       {"server/report",
        with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode"}, kAll)},
-      {"server", with({"server/app"}, kAll)},
+      {"server", with({"server/app", "server/net"}, kAll)},
       {"client/net", with({"common/net", "common/replay"}, kWire)},
       {"client/window", kAll},
       {"client/app", with({"client/net", "client/window"}, kAll)},
