@@ -1,6 +1,6 @@
-#include <algorithm>
-
 #include "client/net/connection_error_private.h"
+
+#include "common/base/text.h"
 
 namespace strandcast {
 namespace {
@@ -23,11 +23,8 @@ ErrorCode code_for(unsigned http_status) {
 }  // namespace
 
 std::string one_line(std::string_view text) {
-  constexpr size_t kMaxShown = 200;
-  std::string shown(text.substr(0, kMaxShown));
-  std::replace_if(
-      shown.begin(), shown.end(), [](char c) { return c < ' ' || c > '~'; }, ' ');
-  return shown;
+  constexpr size_t kMaxShownChars = 200;
+  return one_line(text, kMaxShownChars);
 }
 
 Error error_from_tls(const net::NetStream& stream, const net::NetStream::error_code& failure) {

@@ -9,7 +9,7 @@
 
 namespace strandcast {
 
-/// Foreign text for one line of output: printable ASCII only, and short.
+/// Foreign text for one line of output, at most 200 characters of it.
 std::string one_line(std::string_view text);
 
 /// Unauthorized when the certificate is not to be trusted, Unsupported when the other side speaks no TLS of

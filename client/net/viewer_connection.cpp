@@ -46,7 +46,10 @@ void clean(Notice& notice) {
   notice.text = one_line(notice.text);
 }
 void clean(SessionList& list) {
-  for (SessionInfo& session : list.sessions) session.name = one_line(session.name);
+  for (SessionInfo& session : list.sessions) {
+    session.name = one_line(session.name);
+    session.address = one_line(session.address);
+  }
 }
 template <class WithReason>
 void clean(WithReason& change) {

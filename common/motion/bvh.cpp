@@ -73,7 +73,7 @@ class HierarchyParser {
   Error unexpected(std::string_view word, const char* expected) const {
     if (word.empty())
       return cursor_.fail(ErrorCode::BadInput, "the file ends where {} is expected", expected);
-    return cursor_.fail(ErrorCode::BadInput, "found \"{}\" where {} is expected", printable(word), expected);
+    return cursor_.fail(ErrorCode::BadInput, "found \"{}\" where {} is expected", shown(word), expected);
   }
 
   /// Name and opening brace. The name is the rest of the line: it may hold blanks.
@@ -144,7 +144,7 @@ class HierarchyParser {
   Status parse_channels(uint32_t joint_index) {
     Joint& joint = skeleton_.joints[joint_index];
     if (!joint.channels.empty())
-      return cursor_.fail(ErrorCode::BadInput, "a second CHANNELS for joint {}", printable(joint.name));
+      return cursor_.fail(ErrorCode::BadInput, "a second CHANNELS for joint {}", shown(joint.name));
     const auto word = cursor_.next_token();
     const auto count = parse_number(word);
     if (!count || *count < 0 || *count > kMaxJointChannels || *count != std::floor(*count))
@@ -183,9 +183,9 @@ Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) 
   }
   std::string known;
   for (size_t i = 0; i < std::min(skeleton.joints.size(), kMaxListedJoints); ++i)
-    known += fmt::format("{}{}", i ? ", " : "", printable(skeleton.joints[i].name));
+    known += fmt::format("{}{}", i ? ", " : "", shown(skeleton.joints[i].name));
   return make_error(ErrorCode::NotFound, "no joint named {} (known: {}{})",
-                    wanted.empty() ? "Head or head" : printable(wanted), known,
+                    wanted.empty() ? "Head or head" : shown(wanted), known,
                     skeleton.joints.size() > kMaxListedJoints ? ", ..." : "");
 }
 
@@ -274,8 +274,8 @@ Result<MotionHeader> parse_motion_header(TextCursor& cursor, uint32_t channel_co
   const auto word = cursor.next_token();
   const auto frame_s = parse_number(word);
   if (!frame_s || *frame_s < kMinFrameTimeS || *frame_s > kMaxFrameTimeS)
-    return cursor.fail(ErrorCode::BadInput, "frame time is \"{}\", it must be within {} .. {} s",
-                       printable(word), kMinFrameTimeS, kMaxFrameTimeS);
+    return cursor.fail(ErrorCode::BadInput, "frame time is \"{}\", it must be within {} .. {} s", shown(word),
+                       kMinFrameTimeS, kMaxFrameTimeS);
   header.frame_s = *frame_s;
   // Each value takes a digit and a separator: a file too short for its own frame count must not size a
   // buffer.
@@ -297,7 +297,7 @@ Status parse_row(TextCursor& cursor, uint32_t frame, std::span<double> row) {
     const auto value = parse_number(word);
     if (!value || std::abs(*value) > kMaxChannelValue)
       return cursor.fail(ErrorCode::BadInput, "value {} of frame {} is \"{}\", not a number within 1e9", i,
-                         frame, printable(word));
+                         frame, shown(word));
     row[i] = *value;
   }
   if (!trim(rest).empty())

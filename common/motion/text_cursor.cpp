@@ -4,10 +4,12 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/base/text.h"
+
 namespace strandcast {
 namespace {
 
-constexpr size_t kMaxShownBytes = 40;
+constexpr size_t kMaxShownChars = 40;
 
 bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
@@ -39,11 +41,9 @@ std::string_view trim(std::string_view text) {
   return text;
 }
 
-std::string printable(std::string_view token) {
-  std::string shown(token.substr(0, kMaxShownBytes));
-  for (char& c : shown)
-    if (c < 0x20 || c > 0x7e) c = '?';
-  return token.size() > kMaxShownBytes ? shown + "..." : shown;
+std::string shown(std::string_view token) {
+  const std::string text = one_line(token, kMaxShownChars);
+  return one_line(token, kMaxShownChars + 1) == text ? text : text + "...";
 }
 
 std::string_view take_token(std::string_view& line) {

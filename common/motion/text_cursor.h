@@ -20,8 +20,8 @@ bool equals_ignoring_case(std::string_view a, std::string_view b);
 /// Text without blanks (space, tab, CR) at both ends.
 std::string_view trim(std::string_view text);
 
-/// A token as shown in an error: at most 40 bytes, unprintable bytes as '?'.
-std::string printable(std::string_view token);
+/// A token as shown in an error: its first 40 characters, fit for one line.
+std::string shown(std::string_view token);
 
 class TextCursor {
  public:

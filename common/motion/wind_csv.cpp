@@ -67,8 +67,7 @@ Result<Columns> parse_header(const TextCursor& cursor, std::string_view line) {
   }
   if (!time)
     return cursor.fail(ErrorCode::BadInput,
-                       "the header has no time column (known: t_s, time_s, logger_ms): \"{}\"",
-                       printable(line));
+                       "the header has no time column (known: t_s, time_s, logger_ms): \"{}\"", shown(line));
   columns.time = *time;
   auto velocity = find_columns(names, {"x_mps", "y_mps", "z_mps"});
   if (!velocity) {
@@ -78,7 +77,7 @@ Result<Columns> parse_header(const TextCursor& cursor, std::string_view line) {
   if (!velocity)
     return cursor.fail(ErrorCode::BadInput,
                        "the header has no velocity columns (known: x_mps, y_mps, z_mps or u, v, w): \"{}\"",
-                       printable(line));
+                       shown(line));
   columns.velocity = *velocity;
   return columns;
 }
@@ -87,7 +86,7 @@ Result<double> parse_cell(const TextCursor& cursor, std::string_view cell, size_
   const auto value = parse_number(cell);
   if (!value || std::abs(*value) > limit)
     return cursor.fail(ErrorCode::BadInput, "column {} is \"{}\", not a number within {:g}", column + 1,
-                       printable(cell), limit);
+                       shown(cell), limit);
   return *value;
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/base/file.h"
+#include "common/base/text.h"
 #include "common/scene/scene_fields.h"
 #include "common/scene/scene_override.h"
 #include "strandcast/v1/scene.pb.h"
@@ -36,29 +37,6 @@ struct Source {
   std::string place;
   const std::vector<std::string>* overrides = nullptr;
 };
-
-bool is_printable_utf8(const std::string& text) {
-  for (size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    if (lead < 0x20 || lead == 0x7f) return false;
-    const size_t length = lead < 0x80           ? 1
-                          : (lead >> 5) == 0x6  ? 2
-                          : (lead >> 4) == 0xe  ? 3
-                          : (lead >> 3) == 0x1e ? 4
-                                                : 0;
-    if (length == 0 || i + length > text.size()) return false;
-    uint32_t code = length == 1 ? lead : lead & (0x7fu >> length);
-    for (size_t k = 1; k < length; ++k) {
-      const auto next = static_cast<unsigned char>(text[i + k]);
-      if ((next >> 6) != 0x2) return false;
-      code = code << 6 | (next & 0x3fu);
-    }
-    constexpr uint32_t kSmallest[] = {0, 0, 0x80, 0x800, 0x10000};
-    if (code < kSmallest[length] || code > 0x10ffff || (code >= 0xd800 && code <= 0xdfff)) return false;
-    i += length;
-  }
-  return true;
-}
 
 /// Copies a parsed message into a SceneDesc and checks every value that was given; keeps the first error.
 class Reader {
@@ -97,7 +75,7 @@ class Reader {
     const auto& field = field_of(*message_, name);
     if (!has(name)) return;
     const std::string given = message_->GetReflection()->GetString(*message_, &field);
-    if (given.empty() || given.size() > limit_bytes || !is_printable_utf8(given))
+    if (given.empty() || given.size() > limit_bytes || !is_printable(given))
       return fail(name, fmt::format("must be 1 .. {} bytes of printable text", limit_bytes));
     value = given;
   }
@@ -105,7 +83,7 @@ class Reader {
     const auto& field = field_of(*message_, name);
     if (!has(name)) return;
     const std::string given = message_->GetReflection()->GetString(*message_, &field);
-    if (given.size() > scene_fields::kMaxPathBytes || !is_printable_utf8(given))
+    if (given.size() > scene_fields::kMaxPathBytes || !is_printable(given))
       return fail(name,
                   fmt::format("must be at most {} bytes of printable text", scene_fields::kMaxPathBytes));
     value = given;
@@ -125,7 +103,7 @@ class Reader {
       const auto& entry = reflection->GetRepeatedMessage(*message_, &field, i);
       const std::string key = entry.GetReflection()->GetString(entry, field.message_type()->map_key());
       const double number = entry.GetReflection()->GetDouble(entry, field.message_type()->map_value());
-      if (key.empty() || key.size() > scene_fields::kMaxNameBytes || !is_printable_utf8(key))
+      if (key.empty() || key.size() > scene_fields::kMaxNameBytes || !is_printable(key))
         return fail(name, "has a name that is empty, too long or not printable");
       if (!std::isfinite(number))
         return fail(name, fmt::format("gives {} the value {}, which is not finite", key, number));

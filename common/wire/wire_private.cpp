@@ -23,27 +23,6 @@ bool is_continuation(unsigned char byte) {
   return (byte & 0xc0) == 0x80;
 }
 
-/// Bytes of the UTF-8 character at `index`, 0 when there is none.
-size_t utf8_length(const std::string& text, size_t index) {
-  const auto byte_at = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char lead = byte_at(index);
-  const size_t length = lead < 0x80   ? 1
-                        : lead < 0xc2 ? 0
-                        : lead < 0xe0 ? 2
-                        : lead < 0xf0 ? 3
-                        : lead < 0xf5 ? 4
-                                      : 0;
-  if (length == 0 || index + length > text.size()) return 0;
-  for (size_t i = 1; i < length; ++i)
-    if (!is_continuation(byte_at(index + i))) return 0;
-  if (length == 1) return 1;
-  const unsigned char second = byte_at(index + 1);
-  // Overlong forms, surrogates and numbers beyond Unicode.
-  if ((lead == 0xe0 && second < 0xa0) || (lead == 0xed && second > 0x9f)) return 0;
-  if ((lead == 0xf0 && second < 0x90) || (lead == 0xf4 && second > 0x8f)) return 0;
-  return length;
-}
-
 template <class Message>
 void put_vector(const glm::vec3& value, Message& message) {
   message.set_x(value.x);
@@ -96,22 +75,6 @@ Status parse_control(std::span<const std::byte> bytes, google::protobuf::Message
   if (!message.ParseFromCodedStream(&stream) || !stream.ConsumedEntireMessage())
     return make_error(ErrorCode::BadInput, "control message of {} bytes is not valid protobuf", bytes.size());
   return {};
-}
-
-std::string printable(const std::string& text, size_t limit) {
-  std::string result;
-  size_t chars = 0;
-  for (size_t i = 0; i < text.size() && chars < limit; ++chars) {
-    const size_t length = utf8_length(text, i);
-    if (length == 0)
-      result += '?';
-    else if (length == 1 && is_control_character(static_cast<unsigned char>(text[i])))
-      result += ' ';
-    else
-      result.append(text, i, length);
-    i += std::max<size_t>(length, 1);
-  }
-  return result;
 }
 
 void FieldCheck::fail(const char* field, Error error) {

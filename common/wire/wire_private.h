@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/text.h"
 #include "common/scene/scene_fields.h"
 #include "common/wire/messages.h"
 
@@ -25,9 +26,6 @@ std::vector<std::byte> pack_control(const google::protobuf::MessageLite& message
 
 /// Checks length and opcode, then parses; `message` is valid only after success.
 Status parse_control(std::span<const std::byte> bytes, google::protobuf::MessageLite& message);
-
-/// `text` as printable UTF-8 of at most `limit` characters.
-std::string printable(const std::string& text, size_t limit);
 
 /// Keeps the first field that is wrong.
 class FieldCheck {
