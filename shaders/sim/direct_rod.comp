@@ -12,17 +12,17 @@ struct Edge {
   vec3 direction;
   vec3 axis;
   vec4 rate;
-  float length;
+  float length_m;
   float tension;
 };
 
 // Inertia of the edge, half at either end, and its tension.
 void add_edge(Rod rod, Edge edge, float excess, vec3 force0, vec3 force1, float end_length, inout Row row0,
               inout Row row1) {
-  add_inertia(rod, 0.5 * edge.length, force0, row0);
-  add_inertia(rod, 0.5 * edge.length + end_length, force1, row1);
-  const float per_length = rod.penalty / edge.length;
-  const float transverse = max(edge.tension, 0.0) / edge.length;
+  add_inertia(rod, 0.5 * edge.length_m, force0, row0);
+  add_inertia(rod, 0.5 * edge.length_m + end_length, force1, row1);
+  const float per_length = rod.penalty / edge.length_m;
+  const float transverse = max(edge.tension, 0.0) / edge.length_m;
   const Unknown pull = of_position((edge.tension + per_length * excess) * edge.direction);
   const mat3 along = outerProduct((per_length - transverse) * edge.direction, edge.direction);
   const Block stiffness = of_positions(scaled(transverse) + along);
@@ -33,26 +33,26 @@ void add_edge(Rod rod, Edge edge, float excess, vec3 force0, vec3 force1, float 
   row0.next -= stiffness;
 #if HAS_TWIST
   const float rate = rod.now * rod.inverse_h;
-  row1.diagonal[3].w += u_spin_inertia / edge.length * rate * rate;
+  row1.diagonal[3].w += u_spin_inertia / edge.length_m * rate * rate;
 #endif
 }
 
 // The joint before an edge; `edge` is a clamp behind a pinned tip.
 void add_joint_between(Rod rod, uint vertex, Edge before, Edge edge, vec3 joint_tangent, inout Row row0,
                        inout Row row1, inout Row row2) {
-  float per_length = 2.0 / (before.length + edge.length);
+  float per_length = 2.0 / (before.length_m + edge.length_m);
   float bending = u_stiffness * per_length;
-  Side start = edge_side(before.direction, before.axis, joint_tangent, 1.0, before.rate, before.length);
-  Side end = edge_side(edge.direction, edge.axis, joint_tangent, -1.0, edge.rate, edge.length);
+  Side start = edge_side(before.direction, before.axis, joint_tangent, 1.0, before.rate, before.length_m);
+  Side end = edge_side(edge.direction, edge.axis, joint_tangent, -1.0, edge.rate, edge.length_m);
   if (vertex == rod.first) {
     start = clamp_side(rod.clamp_direction, rod.clamp_axis);
-    bending = clamp_stiffness(edge.tension, edge.length);
+    bending = clamp_stiffness(edge.tension, edge.length_m);
   }
 #if HAS_PINNED_TAIL
   if (vertex > rod.tail) {
     end = clamp_side(rod.tail_direction, rod.tail_axis);
-    per_length = 2.0 / before.length;
-    bending = clamp_stiffness(before.tension, before.length);
+    per_length = 2.0 / before.length_m;
+    bending = clamp_stiffness(before.tension, before.length_m);
   }
 #endif
   add_joint(rod, start, end, bending, u_twist_stiffness * per_length, row0, row1, row2);
@@ -95,7 +95,7 @@ void forward(Rod rod, uint solve) {
       const vec3 way = iterate.xyz - unrestored;
       Edge edge;
       edge.direction = edge_direction(rod, way, at, edge_rest.w, before.direction);
-      edge.length = soft_length(rod, edge_rest.w);
+      edge.length_m = soft_length(rod, edge_rest.w);
       edge.tension = iterate.w;
       unrestored = iterate.xyz;
       float excess = 0.0;
@@ -122,7 +122,7 @@ void forward(Rod rod, uint solve) {
       }
       store_scratch(rod, kPlaneAxis, i, axis);
       edge.axis = axis.xyz;
-      edge.rate.w = edge.length * (rod.now * axis.w - rod.before * stored.w) * rod.inverse_h;
+      edge.rate.w = edge.length_m * (rod.now * axis.w - rod.before * stored.w) * rod.inverse_h;
 #else
       // Carried along the strand.
       edge.axis = carried_axis(before.axis, before.direction, edge.direction);

@@ -28,7 +28,7 @@ struct Side {
   vec3 tangent;      // where the frame carries the rest tangent of the joint
   vec3 axis;         // of the frame, carried to the tangent
   vec4 rate;         // of the edge, m/s; w = of its spin, times its length
-  float length;      // 0 = a clamp
+  float length_m;    // 0 = a clamp
   float is_clamp;    // 1 = turns with the head
 };
 
@@ -49,7 +49,7 @@ Side edge_side(vec3 direction, vec3 axis, vec3 joint_tangent, float sign, vec4 r
 // frame by t x e / length without spin, and the tangent v by t x e x v = e (t.v) - t (e.v); twist turns about
 // `mean`.
 mat4 response(Side side, vec3 mean, float bend_scale, float twist_scale) {
-  const float per_length = side.length > 0.0 ? 1.0 / side.length : 0.0;
+  const float per_length = side.length_m > 0.0 ? 1.0 / side.length_m : 0.0;
   const vec3 t = side.direction;
   const float bend = bend_scale * per_length;
   const float twist = twist_scale * per_length;
@@ -130,8 +130,8 @@ void add_joint(Rod rod, Side before_side, Side after_side, float bending, float 
   float weight = bending * angle_per_sine(min(0.25 * dot(d, d), kMaxHalfSineSquared));
   const float along = dot(before, rest);
   const vec3 side = rest - along * before;
-  const float to_before = before_side.length > 0.0 ? 1.0 / before_side.length : 0.0;
-  const float to_after = after_side.length > 0.0 ? 1.0 / after_side.length : 0.0;
+  const float to_before = before_side.length_m > 0.0 ? 1.0 / before_side.length_m : 0.0;
+  const float to_after = after_side.length_m > 0.0 ? 1.0 / after_side.length_m : 0.0;
 
   const vec3 moved_before =
       (before_side.rate.xyz - before * dot(before, before_side.rate.xyz)) * to_before;
