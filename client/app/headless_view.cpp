@@ -173,7 +173,7 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
 
   const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(picture_of(snapshot, fill), scene.welcome.camera, size));
+    RETURN_IF_ERROR(renderer->draw(posed_strands_of(snapshot, fill), scene.welcome.camera, size));
     Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
     render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     return image;

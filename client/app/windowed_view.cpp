@@ -209,8 +209,8 @@ class WindowedView {
   }
 
   Status draw_strands(const DrawnView& view, const std::shared_ptr<const Snapshot>& newest) {
-    const auto picture = player_.picture_at(state_->timeline, now_ns());
-    RETURN_IF_ERROR(renderer_->draw(*picture, view.camera, view.size));
+    const auto strands = player_.strands_at(state_->timeline, now_ns());
+    RETURN_IF_ERROR(renderer_->draw(*strands, view.camera, view.size));
     const RenderProfile& profile = renderer_->profile();
     const double draw_ms = profile.expand_ms + profile.strands_ms + profile.head_ms + profile.resolve_ms;
     render_timer_.add_ms(draw_ms);

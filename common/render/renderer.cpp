@@ -114,7 +114,7 @@ class GlRenderer final : public Renderer {
       : timer_(device), detail_(device.is_software ? kSoftwareDetail : kHardwareDetail), look_(look) {}
 
   Status load(const gl::ShaderLibrary& shaders, const SceneAsset& asset);
-  Status draw(const StrandPicture& picture, const CameraDesc& camera, RenderSize size) override;
+  Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size) override;
   Image read_image() override { return target_.read_image(); }
   void blit_to(uint32_t target, RenderSize target_size) override {
     target_.blit_to(target, {target_size.width, target_size.height});
@@ -122,7 +122,7 @@ class GlRenderer final : public Renderer {
   const RenderProfile& profile() const override { return profile_; }
 
  private:
-  void update_light(const StrandPicture& picture, const View& view);
+  void update_light(const PosedStrands& strands, const View& view);
   void draw_strands(const View& view);
   ExpandLevel choose_level(const View& view) const;
   template <class Work>
@@ -204,13 +204,13 @@ Status GlRenderer::load(const gl::ShaderLibrary& shaders, const SceneAsset& asse
   return {};
 }
 
-void GlRenderer::update_light(const StrandPicture& picture, const View& view) {
-  const glm::mat3 head_from_world(glm::transpose(glm::mat3_cast(picture.world_from_head.rotation)));
+void GlRenderer::update_light(const PosedStrands& strands, const View& view) {
+  const glm::mat3 head_from_world(glm::transpose(glm::mat3_cast(strands.world_from_head.rotation)));
   const float length = glm::length(look_.light_direction);
   const glm::vec3 to_light_in_world =
       length > 0.0f ? -look_.light_direction / length : glm::vec3(0.0f, 1.0f, 0.0f);
   const glm::vec3 to_light = glm::normalize(head_from_world * to_light_in_world);
-  light_volume_.build(picture.position_m, to_light);
+  light_volume_.build(strands.position_m, to_light);
   light_.upload(light_volume_);
   light_.set_light(look_, view, to_light);
 }
@@ -251,21 +251,21 @@ void GlRenderer::draw_strands(const View& view) {
   }
 }
 
-Status GlRenderer::draw(const StrandPicture& picture, const CameraDesc& camera, RenderSize size) {
-  if (picture.position_m.size() != position_count_)
-    return make_error(ErrorCode::BadInput, "picture has {} vertices but the scene has {}",
-                      picture.position_m.size(), position_count_);
+Status GlRenderer::draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size) {
+  if (strands.position_m.size() != position_count_)
+    return make_error(ErrorCode::BadInput, "the strands have {} vertices but the scene has {}",
+                      strands.position_m.size(), position_count_);
   if (size.width > kMaxImageSide || size.height > kMaxImageSide)
     return make_error(ErrorCode::LimitExceeded, "a picture of {} x {} pixels exceeds {} per side", size.width,
                       size.height, kMaxImageSide);
   const glm::uvec2 pixels(size.width, size.height);
   ASSIGN_OR_RETURN(const View view,
-                   make_view(camera, picture.world_from_head.rotation, pixels * kSamplesPerSide));
+                   make_view(camera, strands.world_from_head.rotation, pixels * kSamplesPerSide));
   profile_ = RenderProfile{};
   RETURN_IF_ERROR(target_.resize(pixels));
   profile_.expand_ms += timed_ms([&] {
-    update_light(picture, view);
-    if (plan_.runs("expand")) expand_.upload(picture.position_m);
+    update_light(strands, view);
+    if (plan_.runs("expand")) expand_.upload(strands.position_m);
   });
   target_.begin_scene();
   if (plan_.runs("head")) profile_.head_ms = timed_ms([&] { head_.run(view, look_, light_); });

@@ -1,8 +1,8 @@
-// The one renderer, used by the server's frame stream and by every client: expands key strands and followers
-// by tessellation (isolines, cubic Hermite along the strand, barycentric between three key strands), draws
-// camera-facing quads with Kajiya-Kay diffuse and Sadeghi specular lobes, and the head. Same inputs on one
-// driver give the same pixels. Needs a current GL 4.5 core context; all calls from its thread. Does not
-// simulate, decode or do I/O.
+// The one renderer, used by the server's picture stream and by every client: expands key strands and
+// followers by tessellation (isolines, cubic Hermite along the strand, barycentric between three key
+// strands), draws camera-facing quads with Kajiya-Kay diffuse and Sadeghi specular lobes, and the head. Same
+// inputs on one driver give the same pixels. Needs a current GL 4.5 core context; all calls from its thread.
+// Does not simulate, decode or do I/O.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,8 +16,8 @@
 #include "common/gl/program.h"
 #include "common/pictures/image_codec.h"
 #include "common/scene/scene_desc.h"
+#include "common/strands/posed_strands.h"
 #include "common/strands/scene_asset.h"
-#include "common/strands/strand_picture.h"
 
 namespace strandcast {
 
@@ -42,7 +42,7 @@ class Renderer {
   /// Draws into an internal target of the given size with 2 x 2 samples per pixel, resolved to sRGB. Strands
   /// far thinner than a pixel are replaced by fewer and wider ones. BadInput or LimitExceeded for impossible
   /// input.
-  virtual Status draw(const StrandPicture& picture, const CameraDesc& camera, RenderSize size) = 0;
+  virtual Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size) = 0;
   /// Pixels of the last draw, top row first.
   virtual Image read_image() = 0;
   /// Copies the last draw to the framebuffer object `target` (0 = window), scaled to its size.

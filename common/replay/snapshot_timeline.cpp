@@ -5,11 +5,11 @@
 
 namespace strandcast {
 
-StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill) {
-  return StrandPicture{snapshot.world_from_head, fill.positions(snapshot)};
+PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill) {
+  return PosedStrands{snapshot.world_from_head, fill.positions(snapshot)};
 }
 
-StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend) {
+PosedStrands blend(PosedStrands from, const PosedStrands& to, double blend) {
   if (blend <= 0.0) return from;
   // Without a rest shape a change to fewer strands leaves nothing to blend.
   if (blend >= 1.0 || from.position_m.size() != to.position_m.size()) return to;
@@ -49,13 +49,13 @@ std::shared_ptr<const Snapshot> SnapshotTimeline::newest() const {
   return snapshots_.empty() ? nullptr : snapshots_.back();
 }
 
-std::optional<StrandPicture> TimelinePlayer::picture_at(const SnapshotTimeline& timeline,
-                                                        int64_t client_time_ns) {
+std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& timeline,
+                                                       int64_t client_time_ns) {
   const auto& snapshots = timeline.snapshots();
   if (std::exchange(restarts_, timeline.restarts()) != timeline.restarts()) cursor_ = {};
   if (snapshots.empty()) return std::nullopt;
   if (timeline.playout() == Playout::LowLatency || snapshots.size() < 2 || !timeline.clock().has_value())
-    return picture_of(*snapshots.back(), fill_);
+    return posed_strands_of(*snapshots.back(), fill_);
 
   // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
   const int64_t wanted_ns =
@@ -64,13 +64,13 @@ std::optional<StrandPicture> TimelinePlayer::picture_at(const SnapshotTimeline& 
   const auto later = std::find_if(snapshots.begin(), snapshots.end(), [sim_time_ns](const auto& snapshot) {
     return snapshot->sim_time_ns > sim_time_ns;
   });
-  if (later == snapshots.end()) return picture_of(*snapshots.back(), fill_);
-  if (later == snapshots.begin()) return picture_of(**later, fill_);
+  if (later == snapshots.end()) return posed_strands_of(*snapshots.back(), fill_);
+  if (later == snapshots.begin()) return posed_strands_of(**later, fill_);
   const Snapshot& from = **std::prev(later);
   const Snapshot& to = **later;
   const auto span_ns = static_cast<double>(to.sim_time_ns - from.sim_time_ns);
   // Both have all strands, also when the stream has changed to one with fewer in between.
-  return blend(picture_of(from, fill_), picture_of(to, fill_),
+  return blend(posed_strands_of(from, fill_), posed_strands_of(to, fill_),
                static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
 }
 

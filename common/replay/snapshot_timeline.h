@@ -11,13 +11,13 @@
 
 #include "common/replay/playout_clock.h"
 #include "common/replay/strand_fill.h"
+#include "common/strands/posed_strands.h"
 #include "common/strands/snapshot.h"
-#include "common/strands/strand_picture.h"
 
 namespace strandcast {
 
 enum class Playout {
-  LowLatency,  // the newest snapshot as it is: the same picture the server would draw
+  LowLatency,  // the newest snapshot as it is: the same state the server would draw
   Smooth,      // interpolated between snapshots, behind by an adaptive delay
 };
 
@@ -57,7 +57,7 @@ class TimelinePlayer {
   /// For states without all strands, made from the asset's rest shape.
   void set_fill(StrandFill fill) { fill_ = std::move(fill); }
   /// What to draw at client time `client_time_ns`; nothing while the timeline is empty.
-  std::optional<StrandPicture> picture_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
+  std::optional<PosedStrands> strands_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
 
  private:
   StrandFill fill_;
@@ -65,11 +65,11 @@ class TimelinePlayer {
   uint64_t restarts_ = 0;
 };
 
-/// Strands between two pictures of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions blend in head
-/// space, so a turning head carries the hair round instead of cutting through it.
-StrandPicture blend(StrandPicture from, const StrandPicture& to, double blend);
+/// Strands between those of two states of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions
+/// blend in head space, so a turning head carries the hair round instead of cutting through it.
+PosedStrands blend(PosedStrands from, const PosedStrands& to, double blend);
 
-/// The picture of one snapshot, as the server draws it when the snapshot has all strands.
-StrandPicture picture_of(const Snapshot& snapshot, StrandFill& fill);
+/// The strands of one snapshot, as the server draws them when it has all.
+PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill);
 
 }  // namespace strandcast

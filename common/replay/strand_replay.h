@@ -62,8 +62,8 @@ class StrandReplay {
   /// The newest states, for a drawing thread to copy.
   const SnapshotTimeline& timeline() const { return timeline_; }
   /// What to draw at client time `client_time_ns`; nothing before the first keyframe.
-  std::optional<StrandPicture> picture_at(int64_t client_time_ns) {
-    return player_.picture_at(timeline_, client_time_ns);
+  std::optional<PosedStrands> strands_at(int64_t client_time_ns) {
+    return player_.strands_at(timeline_, client_time_ns);
   }
   /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
   double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;

@@ -22,18 +22,18 @@ class GlPicturePainter : public PicturePainter {
   Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     // Several views of one snapshot share its positions.
     if (painted_ != snapshot) {
-      picture_ = {snapshot->world_from_head, positions_in_head(*snapshot)};
+      strands_ = {snapshot->world_from_head, positions_in_head(*snapshot)};
       painted_ = snapshot;
     }
-    RETURN_IF_ERROR(renderer_->draw(picture_, view.camera, view.size));
+    RETURN_IF_ERROR(renderer_->draw(strands_, view.camera, view.size));
     return renderer_->read_image();
   }
 
  private:
   std::unique_ptr<gl::EglContext> context_;  // outlives the renderer's GL objects
   std::unique_ptr<Renderer> renderer_;
-  StrandPicture picture_;
-  std::shared_ptr<const Snapshot> painted_;  // what picture_ shows
+  PosedStrands strands_;
+  std::shared_ptr<const Snapshot> painted_;  // whose strands these are
 };
 
 }  // namespace

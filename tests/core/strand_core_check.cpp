@@ -35,11 +35,11 @@ int count_wrong_frames(const std::string& codec) {
     const Snapshot sent = hair.snapshot(*quantum_m);
     const EncodedFramePtr frame = (*encoder)->encode(sent);
     const auto received = (*replay)->receive(frame->message, i * kStepNs, ClockOffset());
-    const auto picture = (*replay)->picture_at(i * kStepNs);
-    bool is_right = received != nullptr && picture && picture->position_m.size() == sent.plane_size();
+    const auto strands = (*replay)->strands_at(i * kStepNs);
+    bool is_right = received != nullptr && strands && strands->position_m.size() == sent.plane_size();
     const std::vector<glm::vec3> sent_m = positions_in_head(sent);
     for (size_t k = 0; is_right && k < sent_m.size(); ++k)
-      is_right = glm::distance(sent_m[k], picture->position_m[k]) <= kBoundM;
+      is_right = glm::distance(sent_m[k], strands->position_m[k]) <= kBoundM;
     wrong += is_right ? 0 : 1;
   }
   return wrong;

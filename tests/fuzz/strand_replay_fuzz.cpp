@@ -39,7 +39,7 @@ class ReplayGame {
         break;
       }
       case Step::Picture:
-        check_picture();
+        check_strands();
         break;
       case Step::Playout: {
         const auto what = input.take<uint8_t>();
@@ -53,15 +53,15 @@ class ReplayGame {
     }
   }
 
-  void check_picture() {
+  void check_strands() {
     CHECK(std::isfinite(replay_->state_age_ms(now_ns_, clock_)) && replay_->playout_delay_ms() >= 0.0);
-    const auto picture = replay_->picture_at(now_ns_);
-    CHECK(picture.has_value() == (replay_->newest() != nullptr));
-    if (!picture) return;
-    CHECK(is_finite(picture->world_from_head));
-    CHECK(picture->position_m.size() % kVertices == 0 && !picture->position_m.empty());
-    CHECK(picture->position_m.size() <= size_t{kStrands} * kVertices);
-    for (const glm::vec3& point : picture->position_m)
+    const auto strands = replay_->strands_at(now_ns_);
+    CHECK(strands.has_value() == (replay_->newest() != nullptr));
+    if (!strands) return;
+    CHECK(is_finite(strands->world_from_head));
+    CHECK(strands->position_m.size() % kVertices == 0 && !strands->position_m.empty());
+    CHECK(strands->position_m.size() <= size_t{kStrands} * kVertices);
+    for (const glm::vec3& point : strands->position_m)
       CHECK(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z));
   }
 
@@ -118,6 +118,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const auto kind = static_cast<Step>(input.take<uint8_t>() % kStepKinds);
     game.step(kind, input);
   }
-  game.check_picture();
+  game.check_strands();
   return 0;
 }

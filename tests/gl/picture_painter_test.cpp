@@ -80,8 +80,8 @@ TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
   ASSERT_TRUE(context_->make_current());
   for (const EncodedFramePtr& frame : frames) {
     const auto snapshot = *client_decoder->decode(frame->message);
-    const StrandPicture picture{snapshot->world_from_head, positions_in_head(*snapshot)};
-    ASSERT_TRUE((*renderer)->draw(picture, small_view().camera, small_view().size));
+    const PosedStrands strands{snapshot->world_from_head, positions_in_head(*snapshot)};
+    ASSERT_TRUE((*renderer)->draw(strands, small_view().camera, small_view().size));
     drawn.push_back((*renderer)->read_image());
   }
   for (size_t i = 0; i < painted.size(); ++i) EXPECT_TRUE(painted[i] == drawn[i]) << "frame " << i;

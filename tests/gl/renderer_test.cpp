@@ -80,9 +80,9 @@ class RendererTest : public GlTest {
     return std::move(*made);
   }
 
-  Image draw(Renderer& renderer, const StrandPicture& picture, const CameraDesc& camera,
+  Image draw(Renderer& renderer, const PosedStrands& strands, const CameraDesc& camera,
              RenderSize size = kSmall) {
-    const Status status = renderer.draw(picture, camera, size);
+    const Status status = renderer.draw(strands, camera, size);
     EXPECT_TRUE(status) << status.error().to_string();
     return renderer.read_image();
   }
@@ -143,10 +143,10 @@ TEST_F(RendererTest, TwoContextsGiveTheSameBytes) {
   asset.head = octahedron(0.08f);
   const auto first = make_renderer(asset);
   ASSERT_TRUE(first);
-  StrandPicture picture{{}, asset.rest_position_m};
-  picture.world_from_head.rotation = glm::angleAxis(0.4, glm::normalize(glm::dvec3(0.1, 1.0, 0.2)));
-  const Image a = draw(*first, picture, front_camera());
-  EXPECT_EQ(draw(*first, picture, front_camera()), a);
+  PosedStrands strands{{}, asset.rest_position_m};
+  strands.world_from_head.rotation = glm::angleAxis(0.4, glm::normalize(glm::dvec3(0.1, 1.0, 0.2)));
+  const Image a = draw(*first, strands, front_camera());
+  EXPECT_EQ(draw(*first, strands, front_camera()), a);
 
   const auto other_context = gl::EglContext::make("auto");
   ASSERT_TRUE(other_context);
@@ -155,7 +155,7 @@ TEST_F(RendererTest, TwoContextsGiveTheSameBytes) {
     ASSERT_TRUE(second);
     // What was drawn before leaves nothing behind.
     draw(*second, {{}, asset.rest_position_m}, front_camera(), {64, 200});
-    EXPECT_EQ(draw(*second, picture, front_camera()), a);
+    EXPECT_EQ(draw(*second, strands, front_camera()), a);
   }
   ASSERT_TRUE(context_->make_current());
 }
@@ -164,10 +164,10 @@ TEST_F(RendererTest, ThePictureDoesNotDependOnWhereInTheWorldTheHeadIs) {
   const SceneAsset asset = curtain(40, 6);
   const auto renderer = make_renderer(asset);
   ASSERT_TRUE(renderer);
-  StrandPicture picture{{}, asset.rest_position_m};
-  const Image here = draw(*renderer, picture, front_camera());
-  picture.world_from_head.position_m = {1.0e6, -3.0e5, 777.7};
-  EXPECT_EQ(draw(*renderer, picture, front_camera()), here);
+  PosedStrands strands{{}, asset.rest_position_m};
+  const Image here = draw(*renderer, strands, front_camera());
+  strands.world_from_head.position_m = {1.0e6, -3.0e5, 777.7};
+  EXPECT_EQ(draw(*renderer, strands, front_camera()), here);
 }
 
 TEST_F(RendererTest, AHalfTurnShowsTheOtherSide) {
@@ -178,10 +178,10 @@ TEST_F(RendererTest, AHalfTurnShowsTheOtherSide) {
   look.strand_radius_m = 0.01f;
   const auto renderer = make_renderer(asset, look);
   ASSERT_TRUE(renderer);
-  StrandPicture picture{{}, asset.rest_position_m};
-  const Image before = draw(*renderer, picture, front_camera());
-  picture.world_from_head.rotation = glm::angleAxis(glm::pi<double>(), glm::dvec3(0, 1, 0));
-  const Image after = draw(*renderer, picture, front_camera());
+  PosedStrands strands{{}, asset.rest_position_m};
+  const Image before = draw(*renderer, strands, front_camera());
+  strands.world_from_head.rotation = glm::angleAxis(glm::pi<double>(), glm::dvec3(0, 1, 0));
+  const Image after = draw(*renderer, strands, front_camera());
   const Image empty = draw_at_rest(empty_asset(), look);
   const auto differs = [&](const Image& image, uint32_t x) {
     return std::abs(luminance(image, x, 45) - luminance(empty, x, 45)) > 0.02;
@@ -269,14 +269,14 @@ TEST_F(RendererTest, WrongSizesAreErrorsInWords) {
   const SceneAsset asset = curtain(10, 6);
   const auto renderer = make_renderer(asset);
   ASSERT_TRUE(renderer);
-  StrandPicture picture{{}, asset.rest_position_m};
-  picture.position_m.pop_back();
-  const Status too_few = renderer->draw(picture, front_camera(), kSmall);
+  PosedStrands strands{{}, asset.rest_position_m};
+  strands.position_m.pop_back();
+  const Status too_few = renderer->draw(strands, front_camera(), kSmall);
   ASSERT_FALSE(too_few);
   EXPECT_NE(too_few.error().message.find("59"), std::string::npos);
-  picture.position_m = asset.rest_position_m;
-  EXPECT_FALSE(renderer->draw(picture, front_camera(), {0, 90}));
-  EXPECT_FALSE(renderer->draw(picture, front_camera(), {9000, 90}));
+  strands.position_m = asset.rest_position_m;
+  EXPECT_FALSE(renderer->draw(strands, front_camera(), {0, 90}));
+  EXPECT_FALSE(renderer->draw(strands, front_camera(), {9000, 90}));
 
   SceneAsset bad = asset;
   bad.triangle.emplace_back(0, 1, 10);

@@ -232,7 +232,7 @@ TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {
   std::vector<Image> drawn;
   for (const Painted& server : common_pictures()) {
     const RenderSize size{welcome.frame_width, welcome.frame_height};
-    ASSERT_TRUE((*renderer)->draw(picture_of(*decoded.at(server.tick), fill), welcome.camera, size));
+    ASSERT_TRUE((*renderer)->draw(posed_strands_of(*decoded.at(server.tick), fill), welcome.camera, size));
     const Image client = (*renderer)->read_image();
     ASSERT_EQ(client.width, server.image.width);
     ASSERT_EQ(client.height, server.image.height);

@@ -184,8 +184,8 @@ TEST_F(StreamFaults, SlowLinkGetsFewerStrandsFirst) {
     // Every state has passed its hash. Whatever was sent, what is drawn has all strands.
     strand_count = snapshot->strand_count;
     thinned += strand_count < kStrands ? 1 : 0;
-    const auto picture = viewer.replay().picture_at(now_ns());
-    wrong += !picture || picture->position_m.size() != viewer.asset()->rest_position_m.size() ? 1 : 0;
+    const auto strands = viewer.replay().strands_at(now_ns());
+    wrong += !strands || strands->position_m.size() != viewer.asset()->rest_position_m.size() ? 1 : 0;
   });
   const auto pump = [&] {
     EXPECT_TRUE(viewer.pump(std::chrono::milliseconds(5)));

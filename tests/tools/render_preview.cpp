@@ -76,16 +76,16 @@ Status run(int argc, char** argv) {
   ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
   ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, scene.look));
 
-  StrandPicture picture;
-  picture.position_m = asset.rest_position_m;
-  picture.world_from_head.rotation =
+  PosedStrands strands;
+  strands.position_m = asset.rest_position_m;
+  strands.world_from_head.rotation =
       glm::angleAxis(glm::radians(options.turn_degrees), glm::dvec3(0.0, 1.0, 0.0));
   std::vector<double> frame_ms;
   std::clock_t cpu_begin = 0;
   for (int i = 0; i < options.repeat; ++i) {
     if (i <= 1) cpu_begin = std::clock();  // the first frame compiles
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(picture, scene.camera, options.size));
+    RETURN_IF_ERROR(renderer->draw(strands, scene.camera, options.size));
     const Image image = renderer->read_image();
     frame_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     if (i == 0) RETURN_IF_ERROR(save_png(options.out, image));

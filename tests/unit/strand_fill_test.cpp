@@ -132,9 +132,9 @@ TEST_F(Fill, PicturesKeepAllStrandsWhileTheStreamChanges) {
       const Snapshot truth = hair.snapshot(quantum_m);
       const auto frame = encoder->encode(stream_id == 0 ? truth : prefix_of(truth, kStrands / 4));
       ASSERT_TRUE(replay->receive(with_send_time(*frame, stream_id, 1)->message, i * kStepNs, {}));
-      const auto picture = replay->picture_at(i * kStepNs + kStepNs / 3);
-      ASSERT_TRUE(picture);
-      const std::vector<glm::vec3>& shown = picture->position_m;
+      const auto strands = replay->strands_at(i * kStepNs + kStepNs / 3);
+      ASSERT_TRUE(strands);
+      const std::vector<glm::vec3>& shown = strands->position_m;
       ASSERT_EQ(shown.size(), rest_.size()) << "never fewer strands, frame " << i;
       const std::vector<glm::vec3> true_m = hair.positions_in_head();
       for (size_t k = 0; k < shown.size(); ++k) {

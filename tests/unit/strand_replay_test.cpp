@@ -63,13 +63,13 @@ TEST_F(StrandReplayTest, DecodesTheServersStateBitForBit) {
 }
 
 TEST_F(StrandReplayTest, LowLatencyShowsTheNewestStateExactly) {
-  EXPECT_FALSE(replay_->picture_at(0));
+  EXPECT_FALSE(replay_->strands_at(0));
   EXPECT_EQ(replay_->newest(), nullptr);
   for (int i = 0; i < 5; ++i) receive(next(), i * kStepNs);
-  const auto picture = replay_->picture_at(4 * kStepNs + 3 * kMs);
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->position_m, positions_in_head(truth_));
-  EXPECT_EQ(picture->world_from_head, truth_.world_from_head);
+  const auto strands = replay_->strands_at(4 * kStepNs + 3 * kMs);
+  ASSERT_TRUE(strands);
+  EXPECT_EQ(strands->position_m, positions_in_head(truth_));
+  EXPECT_EQ(strands->world_from_head, truth_.world_from_head);
 }
 
 TEST_F(StrandReplayTest, ALostFrameIsAGapAndAsksOnceASecond) {
@@ -118,12 +118,12 @@ TEST_F(StrandReplayTest, SmoothPlayoutMovesEvenlyBetweenStates) {
   double last = -1.0;
   int between = 0;
   for (int64_t t_ns = 39 * kStepNs; t_ns < 42 * kStepNs; t_ns += kMs) {
-    const auto picture = replay_->picture_at(t_ns);
-    ASSERT_TRUE(picture);
+    const auto strands = replay_->strands_at(t_ns);
+    ASSERT_TRUE(strands);
     // Where the head is on its way from the last state but one to the newest, as a fraction.
     const auto way = newest.world_from_head.position_m - before.world_from_head.position_m;
     const double fraction =
-        glm::dot(picture->world_from_head.position_m - before.world_from_head.position_m, way) /
+        glm::dot(strands->world_from_head.position_m - before.world_from_head.position_m, way) /
         glm::dot(way, way);
     EXPECT_GE(fraction, last - 1e-9) << "never backwards";
     EXPECT_LE(fraction, 1.0 + 1e-9) << "never beyond what was received";
@@ -140,9 +140,9 @@ TEST_F(StrandReplayTest, AResetServerIsNotBlendedInto) {
   for (int i = 0; i < 10; ++i) receive(next(), i * kStepNs);
   hair_ = HairMotion({.strand_count = kStrands, .vertex_count = kVertices});
   receive(next(), 10 * kStepNs);
-  const auto picture = replay_->picture_at(10 * kStepNs);
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->position_m, positions_in_head(truth_));
+  const auto strands = replay_->strands_at(10 * kStepNs);
+  ASSERT_TRUE(strands);
+  EXPECT_EQ(strands->position_m, positions_in_head(truth_));
 }
 
 TEST_F(StrandReplayTest, AnotherStreamStartsWithItsKeyframeAndNeverStepsBack) {
@@ -198,8 +198,8 @@ TEST(Blend, MeetsBothEndsExactlyAndIsLinearBetween) {
   hair.step();
   const Snapshot to = hair.snapshot(kQuantumM);
   StrandFill fill;
-  const StrandPicture first = picture_of(from, fill);
-  const StrandPicture last = picture_of(to, fill);
+  const PosedStrands first = posed_strands_of(from, fill);
+  const PosedStrands last = posed_strands_of(to, fill);
   EXPECT_EQ(blend(first, last, 0.0).position_m, positions_in_head(from));
   EXPECT_EQ(blend(first, last, 1.0).position_m, positions_in_head(to));
   EXPECT_EQ(blend(first, last, 1.0).world_from_head, to.world_from_head);

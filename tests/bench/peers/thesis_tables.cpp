@@ -125,12 +125,12 @@ Result<double> draw_ms(const ThesisOptions& options, const gl::ShaderLibrary& sh
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(scene));
   const SceneAsset asset = make_scene_asset(content.groom, std::move(content.head));
   ASSIGN_OR_RETURN(const auto renderer, Renderer::make(shaders, options.device, asset, scene.look));
-  StrandPicture picture;
-  picture.position_m = asset.rest_position_m;
+  PosedStrands strands;
+  strands.position_m = asset.rest_position_m;
   std::vector<double> samples_ms;
   for (int i = 0; i < kPictures; ++i) {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(picture, scene.camera, RenderSize{}));
+    RETURN_IF_ERROR(renderer->draw(strands, scene.camera, RenderSize{}));
     glFinish();
     if (i > 0) samples_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
   }

@@ -1,4 +1,4 @@
-// StrandPicture: strands as they are drawn.
+// PosedStrands: strands as they are drawn, with the head that they stand on.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -9,7 +9,7 @@
 namespace strandcast {
 
 /// What to draw: strands in head space as a viewer has them after decoding (and blending).
-struct StrandPicture {
+struct PosedStrands {
   Pose world_from_head;
   std::vector<glm::vec3>
       position_m;  // (vertex_count x strand_count) vertex-major, strand fastest, head space
