@@ -17,7 +17,8 @@ bool is_finite(const glm::vec3& v) {
 
 }  // namespace
 
-Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_head, glm::uvec2 target_px) {
+Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_head_rotation,
+                       glm::uvec2 target_px) {
   const double distance_m = glm::length(glm::dvec3(camera.offset_m));
   if (!is_finite(camera.offset_m) || !is_finite(camera.target_m) || !(distance_m > 0.0))
     return make_error(ErrorCode::BadInput,
@@ -39,7 +40,7 @@ Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_he
   const glm::dmat4 clip_from_eye =
       glm::perspective(static_cast<double>(camera.fov_y_rad), aspect, near_m, distance_m + kFarM);
   const glm::dmat4 eye_from_world = glm::lookAt(eye, target, screen_up);
-  const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(world_from_head));
+  const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(world_from_head_rotation));
 
   View view;
   view.clip_from_head =

@@ -23,6 +23,7 @@ struct View {
 
 /// The camera follows the head's position, not its rotation. BadInput for a camera that is not finite, sits
 /// on its target or has a field of view outside (0, pi).
-Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_head, glm::uvec2 target_px);
+Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_head_rotation,
+                       glm::uvec2 target_px);
 
 }  // namespace strandcast

@@ -153,11 +153,11 @@ void Publisher::find_overstretched_strands(int64_t sim_time_ns) {
 }
 
 void Publisher::put_to_rest(uint32_t strand_index, const PublishInput& input) {
-  const glm::dmat3 world_from_head = glm::mat3_cast(input.world_from_head.rotation);
+  const glm::dmat3 world_from_head_rotation = glm::mat3_cast(input.world_from_head.rotation);
   const glm::vec3 head_velocity_mps(input.head_velocity_mps);
   for (uint32_t vertex = 0; vertex < vertex_count_; ++vertex) {
     const size_t i = static_cast<size_t>(vertex) * strand_count_ + strand_index;
-    state_.position_m[i] = glm::vec3(world_from_head * glm::dvec3(rest_position_m_[i]));
+    state_.position_m[i] = glm::vec3(world_from_head_rotation * glm::dvec3(rest_position_m_[i]));
     state_.velocity_mps[i] = is_usable_velocity(head_velocity_mps) ? head_velocity_mps : glm::vec3(0.0f);
   }
 }

@@ -46,7 +46,7 @@ double upper_band_acceleration_mps2(const std::vector<glm::dvec3>& position_m, d
   return std::sqrt(power / (static_cast<double>(count) * window_power));
 }
 
-StabilityObserver::StabilityObserver(const StabilityTrial& trial, const glm::dquat& world_from_head)
+StabilityObserver::StabilityObserver(const StabilityTrial& trial, const glm::dquat& world_from_head_rotation)
     : trial_(trial),
       strand_count_(trial.groom->strand_count()),
       vertex_count_(trial.groom->uniform_vertex_count()) {
@@ -75,7 +75,7 @@ StabilityObserver::StabilityObserver(const StabilityTrial& trial, const glm::dqu
   }
   jitter_m_.resize(size);
   previous_m_.resize(size);
-  for (size_t i = 0; i < size; ++i) previous_m_[i] = world_from_head * rest_m_[i];
+  for (size_t i = 0; i < size; ++i) previous_m_[i] = world_from_head_rotation * rest_m_[i];
 }
 
 void StabilityObserver::keep(const SolverState& state) {
@@ -152,15 +152,15 @@ double StabilityObserver::jitter_mps2() const {
   return largest;
 }
 
-double StabilityObserver::style_distance_m(const glm::dquat& world_from_head) const {
+double StabilityObserver::style_distance_m(const glm::dquat& world_from_head_rotation) const {
   double largest = 0.0;
   for (size_t i = 0; i < rest_m_.size(); ++i)
-    largest = std::max(largest, glm::distance(previous_m_[i], world_from_head * rest_m_[i]));
+    largest = std::max(largest, glm::distance(previous_m_[i], world_from_head_rotation * rest_m_[i]));
   return largest;
 }
 
 std::array<double, kStabilityMeasureCount> StabilityObserver::values(
-    const glm::dquat& world_from_head) const {
+    const glm::dquat& world_from_head_rotation) const {
   const auto unless_broken = [this](double value) { return broken_steps_ > 0 ? kInfinity : value; };
   const bool moves_still = moved_until_s_ > 0.0 && moved_until_s_ >= ended_s_ - trial_.moving_s;
   return {static_cast<double>(broken_steps_),
@@ -169,7 +169,7 @@ std::array<double, kStabilityMeasureCount> StabilityObserver::values(
           unless_broken(largest_growth_),
           unless_broken(moves_still ? kInfinity : moved_until_s_),
           unless_broken(jitter_mps2()),
-          unless_broken(style_distance_m(world_from_head))};
+          unless_broken(style_distance_m(world_from_head_rotation))};
 }
 
 }  // namespace strandcast

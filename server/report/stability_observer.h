@@ -24,7 +24,7 @@ double upper_band_acceleration_mps2(const std::vector<glm::dvec3>& position_m, d
 
 class StabilityObserver {
  public:
-  StabilityObserver(const StabilityTrial& trial, const glm::dquat& world_from_head);
+  StabilityObserver(const StabilityTrial& trial, const glm::dquat& world_from_head_rotation);
 
   /// The state that the run starts from.
   void begin(const SolverState& state);
@@ -34,7 +34,7 @@ class StabilityObserver {
   void skip_to(const SolverState& state);
 
   /// By StabilityMeasure; all are computed, whether the trial asks for them or not.
-  std::array<double, kStabilityMeasureCount> values(const glm::dquat& world_from_head) const;
+  std::array<double, kStabilityMeasureCount> values(const glm::dquat& world_from_head_rotation) const;
 
  private:
   size_t index(uint32_t vertex, uint32_t strand) const {
@@ -45,7 +45,7 @@ class StabilityObserver {
   void measure_motion(const SolverState& state, const StepInput& input, double time_s);
   void sample_jitter(const SolverState& state, double time_s);
   double jitter_mps2() const;
-  double style_distance_m(const glm::dquat& world_from_head) const;
+  double style_distance_m(const glm::dquat& world_from_head_rotation) const;
 
   const StabilityTrial& trial_;
   uint32_t strand_count_ = 0;

@@ -74,14 +74,15 @@ class Quarantine : public GlTest {
     }
   }
 
-  void expect_poisoned_at_rest(Solver& solver, const glm::dquat& world_from_head,
+  void expect_poisoned_at_rest(Solver& solver, const glm::dquat& world_from_head_rotation,
                                const std::string& name) const {
     SolverState state;
     solver.read(state);
     for (uint32_t vertex = 0; vertex < groom_.uniform_vertex_count(); ++vertex) {
       const size_t i = static_cast<size_t>(vertex) * groom_.strand_count() + kPoisoned;
       const glm::dvec3 rest(groom_.rest_position_m[groom_.offset[kPoisoned] + vertex]);
-      EXPECT_LT(glm::distance(glm::dvec3(state.position_m[i]), world_from_head * rest), 1e-6) << name;
+      EXPECT_LT(glm::distance(glm::dvec3(state.position_m[i]), world_from_head_rotation * rest), 1e-6)
+          << name;
       EXPECT_EQ(state.velocity_mps[i], glm::vec3(0.0f)) << name;
     }
   }

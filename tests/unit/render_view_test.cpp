@@ -17,8 +17,8 @@ CameraDesc camera_at(const glm::vec3& offset_m, const glm::vec3& target_m) {
 }
 
 // Pixel, from the bottom left, of a point given relative to the head joint along the world's axes.
-glm::dvec2 pixel_of(const View& view, const glm::dquat& world_from_head, const glm::dvec3& point_m) {
-  const glm::vec3 in_head(glm::inverse(world_from_head) * point_m);
+glm::dvec2 pixel_of(const View& view, const glm::dquat& world_from_head_rotation, const glm::dvec3& point_m) {
+  const glm::vec3 in_head(glm::inverse(world_from_head_rotation) * point_m);
   const glm::vec4 clip = view.clip_from_head * glm::vec4(in_head, 1.0f);
   return (glm::dvec2(clip) / static_cast<double>(clip.w) * 0.5 + 0.5) * glm::dvec2(view.target_px);
 }
