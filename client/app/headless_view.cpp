@@ -193,9 +193,9 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
 
 }  // namespace
 
-ClipSampler::ClipSampler(double frames_per_s, double duration_s)
-    : period_ns_(1e9 / frames_per_s),
-      wanted_(static_cast<size_t>(std::max(1.0, std::round(frames_per_s * duration_s)))) {}
+ClipSampler::ClipSampler(double pictures_per_s, double duration_s)
+    : period_ns_(1e9 / pictures_per_s),
+      wanted_(static_cast<size_t>(std::max(1.0, std::round(pictures_per_s * duration_s)))) {}
 
 bool ClipSampler::wants(int64_t sim_time_ns) {
   if (is_full()) return false;

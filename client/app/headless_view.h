@@ -17,7 +17,7 @@ namespace strandcast {
 /// Picks snapshots (or pictures) at an even rate of simulated time.
 class ClipSampler {
  public:
-  ClipSampler(double frames_per_s, double duration_s);
+  ClipSampler(double pictures_per_s, double duration_s);
   /// True when the state of this simulation time belongs into the clip.
   bool wants(int64_t sim_time_ns);
   bool is_full() const { return taken_ >= wanted_; }

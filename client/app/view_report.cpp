@@ -64,7 +64,7 @@ ViewReport make_report(ViewerSession& session) {
   out.word("mode", to_string(session.mode()));
   out.word("mode_reason", session.mode_reason());
   out.count("mode_changes", session.mode_changes());
-  out.count("blank_frames", session.blank_frames());
+  out.count("blank_pictures", session.blank_pictures());
   out.word("scene", welcome.scene_name);
   const FrameQuality quality = session.frame_quality().value_or(FrameQuality{});
   out.word("codec", is_frames ? to_string(quality.codec) : welcome.codec);
@@ -80,7 +80,7 @@ ViewReport make_report(ViewerSession& session) {
   out.number("decode_ms_median", decode.median_ms(), 3);
   out.number("decode_ms_p99", decode.quantile_ms(kP99), 3);
   out.number("render_ms_median", 0.0, 3);
-  out.count("rendered_frames", 0);
+  out.count("rendered_pictures", 0);
   out.number("motion_to_decoded_ms_median", motion.median_ms(), 3);
   out.number("motion_to_decoded_ms_p99", motion.quantile_ms(kP99), 3);
   out.count("motion_samples_seen", motion.count());
@@ -90,7 +90,7 @@ ViewReport make_report(ViewerSession& session) {
   out.count("missed_frames", pictures.missed_frames + strands.missed_frames);
   out.count("rejected_frames", pictures.rejected_frames + strands.rejected_frames);
   out.count("keyframe_requests", strands.keyframe_requests);
-  out.count("dropped_by_client", net.dropped_strand_frames);
+  out.count("dropped_by_client", net.dropped_frames);
   out.count("dropped_by_server", server.dropped_frames);
   out.number("strand_share", session.quality().strand_share, 3);
   out.count("rate_divisor", session.quality().rate_divisor);
@@ -118,7 +118,7 @@ void set_mode_reason(ViewReport& report, const std::string& reason) {
 void set_render_times(ViewReport& report, const StageTimer& render_timer) {
   for (ReportEntry& entry : report) {
     if (entry.key == "render_ms_median") entry.text = fmt::format("{:.3f}", render_timer.median_ms());
-    if (entry.key == "rendered_frames") entry.text = std::to_string(render_timer.count());
+    if (entry.key == "rendered_pictures") entry.text = std::to_string(render_timer.count());
   }
 }
 
@@ -158,7 +158,7 @@ std::string to_summary(const ViewReport& report) {
       "  server          {} ms per step, realtime factor {}\n",
       v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
       v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
-      v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_frames"),
+      v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"),
       v("motion_to_decoded_ms_median"), v("motion_to_decoded_ms_p99"), v("motion_samples_seen"),
       v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"));
 }

@@ -59,7 +59,7 @@ Status ViewerSession::pump(std::chrono::milliseconds timeout) {
     } else if (const auto* closed = std::get_if<ClosedEvent>(&event)) {
       return closed->error;
     }
-    if (was_shown_ && !has_picture()) ++blank_frames_;
+    if (was_shown_ && !has_picture()) ++blank_pictures_;
     was_shown_ = was_shown_ || has_picture();
   }
   return {};
@@ -163,7 +163,7 @@ void ViewerSession::take_picture(const MediaEvent& event) {
   last_picture_stream_ = header.stream_id;
   picture_decode_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
   image_ = std::make_shared<const Image>(*pictures_.image());
-  if (is_blank(*image_)) ++blank_frames_;
+  if (is_blank(*image_)) ++blank_pictures_;
   ++image_count_;
   acknowledge(event, begin_ns);
 }

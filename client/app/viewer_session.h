@@ -65,7 +65,7 @@ class ViewerSession {
   /// True once there is something to show: asset and snapshot, or a picture.
   bool has_picture() const;
   /// Frames of one colour only, and moments without anything to show after the first frame: must be 0.
-  uint64_t blank_frames() const { return blank_frames_; }
+  uint64_t blank_pictures() const { return blank_pictures_; }
   /// The newest decoded picture of the server, null before the first.
   const Image* image() const { return image_.get(); }
   std::shared_ptr<const Image> shared_image() const { return image_; }
@@ -113,7 +113,7 @@ class ViewerSession {
   std::optional<StreamMode> requested_mode_;  // not yet sent
   int64_t mode_requested_ns_ = 0;
   bool was_shown_ = false;
-  uint64_t blank_frames_ = 0;
+  uint64_t blank_pictures_ = 0;
   uint64_t image_count_ = 0;
   uint32_t last_picture_sequence_ = 0;
   uint16_t last_picture_stream_ = 0;

@@ -74,7 +74,7 @@ class WindowedView {
   Result<ViewReport> run(const std::atomic<bool>& stop) {
     const int64_t begin_ns = now_ns();
     while (!stop) {
-      const WindowActions actions = window_->begin_frame();
+      const WindowActions actions = window_->begin_picture();
       if (actions.wants_quit) break;
       const uint64_t session_number = state_->session_number;
       state_ = viewer_.look(state_, kNewsWait);
@@ -82,8 +82,8 @@ class WindowedView {
       RETURN_IF_ERROR(prepare_renderer());
       act(actions);
       RETURN_IF_ERROR(draw());
-      ++frame_count_;
-      window_->end_frame(hud());
+      ++turn_count_;
+      window_->end_picture(hud());
       report();
       if (actions.wants_screenshot) save_screenshot();
       if (options_.seconds && static_cast<double>(now_ns() - begin_ns) * 1e-9 >= *options_.seconds) break;
@@ -244,7 +244,7 @@ class WindowedView {
   HudState hud() {
     const int64_t time_ns = now_ns();
     const ViewerState& now = *state_;
-    fps_.update(frame_count_, time_ns);
+    fps_.update(turn_count_, time_ns);
     bytes_.update(now.net.received_bytes, time_ns);
     received_.update(now.decoded_frames, time_ns);
 
@@ -280,7 +280,7 @@ class WindowedView {
     hud.tick = now.status.tick;
     hud.dropped_by_server = now.status.dropped_frames;
     hud.missed_frames = now.missed_frames;
-    hud.dropped_by_client = now.net.dropped_strand_frames;
+    hud.dropped_by_client = now.net.dropped_frames;
     hud.viewer_count = now.status.viewer_count;
     hud.is_paused = now.status.is_paused;
     hud.is_motion_stale = now.has_status && now.status.is_motion_stale;
@@ -309,7 +309,7 @@ class WindowedView {
   bool is_camera_sent_ = false;
   int64_t camera_sent_ns_ = 0;
   int64_t reported_ns_ = 0;
-  uint64_t frame_count_ = 0;
+  uint64_t turn_count_ = 0;
   uint32_t screenshot_count_ = 0;
   std::string message_;
   int64_t message_ns_ = 0;

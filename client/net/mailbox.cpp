@@ -46,18 +46,18 @@ Mailbox::Outcome Mailbox::push_chained(MediaEvent event, Lane& lane) {
   const bool is_alone = stands_alone(event.header);
   if (is_alone) lane.is_waiting_for_keyframe = false;
   if (lane.is_waiting_for_keyframe) {
-    ++dropped_strand_frames_;
+    ++dropped_frames_;
     return Outcome::KeyframeNeeded;
   }
-  const bool overflows = lane.frame_count + 1 > limits_.strand_frames ||
-                         lane.bytes + event.message.size() > limits_.strand_bytes;
+  const bool overflows = lane.frame_count + 1 > limits_.chained_frames ||
+                         lane.bytes + event.message.size() > limits_.chained_bytes;
   if (overflows) {
     const bool is_strands = is_strand_frame(event.header.opcode);
-    dropped_strand_frames_ += erase_media(is_strands ? is_strand_frame : is_chained_picture);
+    dropped_frames_ += erase_media(is_strands ? is_strand_frame : is_chained_picture);
     lane = {};
     // A keyframe stands alone, so it may start the queue afresh; a delta cannot be used any more.
     if (!is_alone) {
-      ++dropped_strand_frames_;
+      ++dropped_frames_;
       lane.is_waiting_for_keyframe = true;
       return Outcome::KeyframeNeeded;
     }
@@ -129,9 +129,9 @@ std::vector<ClientEvent> Mailbox::wait(std::chrono::milliseconds timeout) {
   return taken;
 }
 
-uint64_t Mailbox::dropped_strand_frames() const {
+uint64_t Mailbox::dropped_frames() const {
   const std::lock_guard lock(mutex_);
-  return dropped_strand_frames_;
+  return dropped_frames_;
 }
 
 }  // namespace strandcast

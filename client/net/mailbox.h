@@ -36,8 +36,9 @@ using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality
                                  SessionList, ClosedEvent>;
 
 struct MailboxLimits {
-  size_t strand_frames = 240;            // four seconds at 60 Hz; as many pictures that build on each other
-  uint64_t strand_bytes = 128ull << 20;  // likewise; at least one message of the largest size fits
+  // Of strand frames, and as much of pictures that build on each other.
+  size_t chained_frames = 240;            // four seconds at 60 Hz
+  uint64_t chained_bytes = 128ull << 20;  // at least one message of the largest size fits
   size_t notices = 64;
 };
 
@@ -65,8 +66,8 @@ class Mailbox {
   /// As take(), but waits for the first event up to `timeout`.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
 
-  /// Strand frames and pictures thrown away because the application did not keep up.
-  uint64_t dropped_strand_frames() const;
+  /// Frames, of strands and pictures, thrown away because the application did not keep up.
+  uint64_t dropped_frames() const;
 
  private:
   struct Lane;
@@ -88,7 +89,7 @@ class Mailbox {
   };
   Lane strands_;
   Lane pictures_;
-  uint64_t dropped_strand_frames_ = 0;
+  uint64_t dropped_frames_ = 0;
   bool is_closed_ = false;
 };
 

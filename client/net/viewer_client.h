@@ -41,7 +41,7 @@ struct ConnectionCounters {
   uint64_t received_bytes = 0;  // payload of WebSocket messages
   uint64_t received_messages = 0;
   uint64_t sent_messages = 0;
-  uint64_t dropped_strand_frames = 0;  // the application was too slow
+  uint64_t dropped_frames = 0;  // the application was too slow
 };
 
 class ViewerClient {

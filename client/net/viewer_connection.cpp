@@ -107,7 +107,7 @@ ClockOffset ViewerClient::Connection::clock() const {
 ConnectionCounters ViewerClient::Connection::counters() const {
   const std::lock_guard lock(mutex_);
   ConnectionCounters counters = counters_;
-  counters.dropped_strand_frames = mailbox_.dropped_strand_frames();
+  counters.dropped_frames = mailbox_.dropped_frames();
   return counters;
 }
 

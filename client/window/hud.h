@@ -1,4 +1,4 @@
-// What the window's panel shows. Plain data, filled by the application every frame.
+// What the window's panel shows. Plain data, filled by the application for every picture.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// The panels over the picture, drawn with Dear ImGui inside a running frame. Main thread only.
+// The panels over the picture, drawn with Dear ImGui between begin_picture() and end_picture(). Main thread
+// only.
 #pragma once
 
 #include "client/window/hud.h"

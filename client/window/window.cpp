@@ -165,7 +165,7 @@ const std::string& Window::why_no_strands() const {
   return state_->why_no_strands;
 }
 
-WindowActions Window::begin_frame() {
+WindowActions Window::begin_picture() {
   glfwPollEvents();
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
@@ -208,7 +208,7 @@ void Window::show_image(const Image& image, uint64_t image_number) {
                                            ImVec2(corner.x + shown.x, corner.y + shown.y));
 }
 
-void Window::end_frame(const HudState& hud) {
+void Window::end_picture(const HudState& hud) {
   // The renderer leaves its own target bound; the panel's backend draws into whatever it finds.
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glDisable(GL_FRAMEBUFFER_SRGB);

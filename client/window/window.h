@@ -40,16 +40,16 @@ class Window {
   /// Why strands cannot be drawn in this window; empty when they can.
   const std::string& why_no_strands() const;
 
-  /// Handles events and begins a frame.
-  WindowActions begin_frame();
+  /// Handles events and begins a picture.
+  WindowActions begin_picture();
   /// Size of the framebuffer, pixels; 0 x 0 while minimised.
   RenderSize framebuffer_size() const;
   /// Fills the framebuffer with a dark grey, for when there is nothing to show yet.
   void clear();
   /// Fills the window with a picture (frames mode), scaled to fit.
   void show_image(const Image& image, uint64_t image_number);
-  /// Draws the panel and the help over whatever was drawn, and shows the frame; waits for the display.
-  void end_frame(const HudState& hud);
+  /// Draws the panel and the help over whatever was drawn, and shows the picture; waits for the display.
+  void end_picture(const HudState& hud);
 
  private:
   struct State;

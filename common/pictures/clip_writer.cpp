@@ -14,8 +14,8 @@ namespace {
 constexpr float kClipQuality = 80.0f;
 constexpr int kClipMethod = 2;  // 0 fast .. 6 small
 constexpr int kClipChannels = 4;
-constexpr double kMinFramesPerS = 0.1;
-constexpr double kMaxFramesPerS = 1000.0;
+constexpr double kMinPicturesPerS = 0.1;
+constexpr double kMaxPicturesPerS = 1000.0;
 
 struct FreeEncoder {
   void operator()(WebPAnimEncoder* encoder) const { WebPAnimEncoderDelete(encoder); }
@@ -34,14 +34,16 @@ struct Picture {
 
 struct ClipWriter::State {
   std::filesystem::path path;
-  double frame_ms = 0.0;
-  uint64_t frames = 0;
+  double picture_ms = 0.0;
+  uint64_t pictures = 0;
   uint32_t width = 0;
   uint32_t height = 0;
   bool is_finished = false;
   std::unique_ptr<WebPAnimEncoder, FreeEncoder> encoder;
 
-  int timestamp_ms() const { return static_cast<int>(std::lround(static_cast<double>(frames) * frame_ms)); }
+  int timestamp_ms() const {
+    return static_cast<int>(std::lround(static_cast<double>(pictures) * picture_ms));
+  }
 };
 
 ClipWriter::ClipWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -49,13 +51,13 @@ ClipWriter::ClipWriter(ClipWriter&&) noexcept = default;
 ClipWriter& ClipWriter::operator=(ClipWriter&&) noexcept = default;
 ClipWriter::~ClipWriter() = default;
 
-Result<ClipWriter> ClipWriter::make(const std::filesystem::path& path, double frames_per_s) {
-  if (!(frames_per_s >= kMinFramesPerS && frames_per_s <= kMaxFramesPerS))
-    return at(path.string(), make_error(ErrorCode::BadInput, "clip rate {} Hz is not in {}..{}", frames_per_s,
-                                        kMinFramesPerS, kMaxFramesPerS));
+Result<ClipWriter> ClipWriter::make(const std::filesystem::path& path, double pictures_per_s) {
+  if (!(pictures_per_s >= kMinPicturesPerS && pictures_per_s <= kMaxPicturesPerS))
+    return at(path.string(), make_error(ErrorCode::BadInput, "clip rate {} Hz is not in {}..{}",
+                                        pictures_per_s, kMinPicturesPerS, kMaxPicturesPerS));
   auto state = std::make_unique<State>();
   state->path = path;
-  state->frame_ms = 1000.0 / frames_per_s;
+  state->picture_ms = 1000.0 / pictures_per_s;
   return ClipWriter(std::move(state));
 }
 
@@ -74,8 +76,8 @@ Status ClipWriter::add(const Image& image) {
   }
   if (image.width != state.width || image.height != state.height)
     return at(state.path.string(),
-              make_error(ErrorCode::BadInput, "frame {} has {} x {} pixels, the clip {} x {}", state.frames,
-                         image.width, image.height, state.width, state.height));
+              make_error(ErrorCode::BadInput, "picture {} has {} x {} pixels, the clip {} x {}",
+                         state.pictures, image.width, image.height, state.width, state.height));
   WebPConfig config;
   CHECK(WebPConfigPreset(&config, WEBP_PRESET_PICTURE, kClipQuality));
   config.method = kClipMethod;
@@ -88,9 +90,9 @@ Status ClipWriter::add(const Image& image) {
                             static_cast<int>(image.width) * kClipChannels) &&
       WebPAnimEncoderAdd(state.encoder.get(), &frame.picture, state.timestamp_ms(), &config);
   if (!is_added)
-    return at(state.path.string(), make_error(ErrorCode::Internal, "cannot encode frame {} ({})",
-                                              state.frames, WebPAnimEncoderGetError(state.encoder.get())));
-  ++state.frames;
+    return at(state.path.string(), make_error(ErrorCode::Internal, "cannot encode picture {} ({})",
+                                              state.pictures, WebPAnimEncoderGetError(state.encoder.get())));
+  ++state.pictures;
   return {};
 }
 
@@ -99,11 +101,11 @@ Status ClipWriter::finish() {
   if (state.is_finished)
     return at(state.path.string(), make_error(ErrorCode::Internal, "clip is already written"));
   state.is_finished = true;
-  if (state.frames == 0)
-    return at(state.path.string(), make_error(ErrorCode::BadInput, "clip has no frames"));
+  if (state.pictures == 0)
+    return at(state.path.string(), make_error(ErrorCode::BadInput, "the clip has no pictures"));
   WebPData data;
   WebPDataInit(&data);
-  // A last empty frame gives the one before it its duration.
+  // A last empty picture gives the one before it its duration.
   const bool is_assembled = WebPAnimEncoderAdd(state.encoder.get(), nullptr, state.timestamp_ms(), nullptr) &&
                             WebPAnimEncoderAssemble(state.encoder.get(), &data);
   Status status;

@@ -1,4 +1,4 @@
-// Pictures: JPEG by libjpeg-turbo (frame stream), PNG by libpng (screenshots), animated WebP by libwebp
+// Pictures: JPEG by libjpeg-turbo (picture stream), PNG by libpng (screenshots), animated WebP by libwebp
 // (clips).
 #pragma once
 
@@ -41,10 +41,10 @@ Status save_png(const std::filesystem::path& path, const Image& image);
 /// Untrusted input like decode_jpeg; errors name the file.
 Result<Image> load_png(const std::filesystem::path& path);
 
-/// Writes an animated WebP frame by frame; all frames have the size of the first.
+/// Writes an animated WebP picture by picture; all have the size of the first.
 class ClipWriter {
  public:
-  static Result<ClipWriter> make(const std::filesystem::path& path, double frames_per_s);
+  static Result<ClipWriter> make(const std::filesystem::path& path, double pictures_per_s);
   ClipWriter(ClipWriter&&) noexcept;
   ClipWriter& operator=(ClipWriter&&) noexcept;
   ~ClipWriter();

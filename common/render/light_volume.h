@@ -11,7 +11,7 @@
 
 namespace strandcast {
 
-/// What of a scene the volume needs and does not change from frame to frame.
+/// What of a scene the volume needs and does not change from picture to picture.
 struct LightVolumeDesc {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;  // per strand

@@ -384,7 +384,7 @@ TEST_F(EndToEnd, TheHeadlessViewerLeavesPictureClipAndReport) {
   EXPECT_EQ(png->width, 120u);
   EXPECT_GT(std::filesystem::file_size(options.clip), 100u);
   const std::string lines = to_lines(*report);
-  EXPECT_THAT(lines, HasSubstr("rendered_frames=6\n")) << "five of the clip and the picture";
+  EXPECT_THAT(lines, HasSubstr("rendered_pictures=6\n")) << "five of the clip and the picture";
   EXPECT_THAT(lines, HasSubstr("strands=150\n"));
   EXPECT_THAT(to_json(*report), HasSubstr("\"mode\": \"strands\""));
 }
@@ -432,9 +432,9 @@ bool has_virtual_display() {
 TEST_F(EndToEnd, TheWindowOpensDrawsAndLeaves) {
   if (!has_virtual_display())
     GTEST_SKIP() << "xvfb-run (package xvfb) is not installed: no display to open a window on";
-  const std::string nothing = "rendered_frames=0\n";
+  const std::string nothing = "rendered_pictures=0\n";
   const std::string report = window_report(server_->port(), "", "--playout smooth", nothing);
-  EXPECT_THAT(report, HasSubstr("rendered_frames="));
+  EXPECT_THAT(report, HasSubstr("rendered_pictures="));
   EXPECT_EQ(report.find(nothing), std::string::npos) << report;
 }
 
@@ -446,7 +446,7 @@ TEST_F(EndToEnd, AWindowWithoutOpenGl45AsksForTheServersPictures) {
   const std::string report = window_report(server_->port(), "MESA_GL_VERSION_OVERRIDE=3.3", "", nothing);
   EXPECT_THAT(report, HasSubstr("mode=frames\n"));
   EXPECT_THAT(report, HasSubstr("no OpenGL 4.5"));
-  EXPECT_THAT(report, HasSubstr("blank_frames=0\n"));
+  EXPECT_THAT(report, HasSubstr("blank_pictures=0\n"));
   EXPECT_EQ(report.find(nothing), std::string::npos) << report;
 }
 

@@ -68,7 +68,7 @@ class ModeSwitching : public test::ServerFixture {
     return pump_until([&] { return viewer_->decoded_frames() >= frames + 10; });
   }
   void expect_no_gap() const {
-    EXPECT_EQ(viewer_->blank_frames(), 0u);
+    EXPECT_EQ(viewer_->blank_pictures(), 0u);
     EXPECT_EQ(viewer_->picture_stats().rejected_frames, 0u);
   }
 

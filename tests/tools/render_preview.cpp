@@ -80,28 +80,28 @@ Status run(int argc, char** argv) {
   strands.position_m = asset.rest_position_m;
   strands.world_from_head.rotation =
       glm::angleAxis(glm::radians(options.turn_degrees), glm::dvec3(0.0, 1.0, 0.0));
-  std::vector<double> frame_ms;
+  std::vector<double> picture_ms;
   std::clock_t cpu_begin = 0;
   for (int i = 0; i < options.repeat; ++i) {
-    if (i <= 1) cpu_begin = std::clock();  // the first frame compiles
+    if (i <= 1) cpu_begin = std::clock();  // the first picture compiles
     const int64_t begin_ns = now_ns();
     RETURN_IF_ERROR(renderer->draw(strands, scene.camera, options.size));
     const Image image = renderer->read_image();
-    frame_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    picture_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     if (i == 0) RETURN_IF_ERROR(save_png(options.out, image));
   }
   const double cpu_ms =
       1e3 * static_cast<double>(std::clock() - cpu_begin) / CLOCKS_PER_SEC / std::max(1, options.repeat - 1);
-  std::sort(frame_ms.begin(), frame_ms.end());
+  std::sort(picture_ms.begin(), picture_ms.end());
   const RenderProfile& profile = renderer->profile();
   std::printf(
-      "%s: %ux%u, %llu strands, %llu segments; frame %.1f ms (best %.1f), %.1f ms of CPU; expand %.1f, "
+      "%s: %ux%u, %llu strands, %llu segments; picture %.1f ms (best %.1f), %.1f ms of CPU; expand %.1f, "
       "strands %.1f, "
       "head %.1f, resolve %.1f\n",
       context->info().renderer.c_str(), options.size.width, options.size.height,
       static_cast<unsigned long long>(profile.drawn_strands),
-      static_cast<unsigned long long>(profile.drawn_segments), frame_ms[frame_ms.size() / 2],
-      frame_ms.front(), cpu_ms, profile.expand_ms, profile.strands_ms, profile.head_ms, profile.resolve_ms);
+      static_cast<unsigned long long>(profile.drawn_segments), picture_ms[picture_ms.size() / 2],
+      picture_ms.front(), cpu_ms, profile.expand_ms, profile.strands_ms, profile.head_ms, profile.resolve_ms);
   return {};
 }
 

@@ -39,11 +39,11 @@ TEST(Mailbox, KeepsEveryStrandFrameInOrderAndOnlyTheNewestPicture) {
   EXPECT_EQ(sequences(events, Opcode::JpegFrame), (std::vector<uint32_t>{8}));
   EXPECT_EQ(events.size(), 4u);
   EXPECT_TRUE(mailbox.take().empty());
-  EXPECT_EQ(mailbox.dropped_strand_frames(), 0u);
+  EXPECT_EQ(mailbox.dropped_frames(), 0u);
 }
 
 TEST(Mailbox, PicturesThatBuildOnEachOtherKeepTheirOrderAndTheirBound) {
-  Mailbox mailbox({.strand_frames = 3});
+  Mailbox mailbox({.chained_frames = 3});
   const auto chained = [](Opcode opcode, uint32_t sequence) {
     MediaEvent event = media(opcode, sequence);
     event.header.base_sequence = sequence - 1;
@@ -57,14 +57,14 @@ TEST(Mailbox, PicturesThatBuildOnEachOtherKeepTheirOrderAndTheirBound) {
   EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 5)), Mailbox::Outcome::KeyframeNeeded);
   EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 1)), Mailbox::Outcome::Kept) << "base 0: a whole one";
   EXPECT_EQ(mailbox.push(chained(Opcode::JpegTiles, 2)), Mailbox::Outcome::Kept);
-  EXPECT_EQ(mailbox.dropped_strand_frames(), 5u);
+  EXPECT_EQ(mailbox.dropped_frames(), 5u);
   const auto events = mailbox.take();
   EXPECT_EQ(sequences(events, Opcode::JpegTiles), (std::vector<uint32_t>{1, 2}));
   EXPECT_EQ(sequences(events, Opcode::StrandDelta), (std::vector<uint32_t>{1, 2, 3}));
 }
 
 TEST(Mailbox, DropsAllStrandFramesOnOverflowUntilTheNextKeyframe) {
-  Mailbox mailbox({.strand_frames = 3});
+  Mailbox mailbox({.chained_frames = 3});
   EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 1)), Mailbox::Outcome::Kept);
   EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 2)), Mailbox::Outcome::Kept);
   EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 3)), Mailbox::Outcome::Kept);
@@ -76,18 +76,18 @@ TEST(Mailbox, DropsAllStrandFramesOnOverflowUntilTheNextKeyframe) {
   EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 7)), Mailbox::Outcome::Kept);
   EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 8)), Mailbox::Outcome::Kept);
   EXPECT_EQ(mailbox.take().size(), 2u);
-  EXPECT_EQ(mailbox.dropped_strand_frames(), 6u);
+  EXPECT_EQ(mailbox.dropped_frames(), 6u);
 }
 
 TEST(Mailbox, StaysWithinItsByteLimitAndLetsAKeyframeStartAfresh) {
-  Mailbox mailbox({.strand_bytes = 1000});
+  Mailbox mailbox({.chained_bytes = 1000});
   mailbox.push(media(Opcode::StrandKeyframe, 1, 600));
   mailbox.push(media(Opcode::StrandDelta, 2, 400));
   EXPECT_EQ(mailbox.push(media(Opcode::StrandKeyframe, 3, 700)), Mailbox::Outcome::Kept);
   const auto events = mailbox.take();
   EXPECT_EQ(sequences(events, Opcode::StrandKeyframe), (std::vector<uint32_t>{3}));
   EXPECT_EQ(events.size(), 1u);
-  EXPECT_EQ(mailbox.dropped_strand_frames(), 2u);
+  EXPECT_EQ(mailbox.dropped_frames(), 2u);
 }
 
 TEST(Mailbox, BoundsStatusAndNotices) {
