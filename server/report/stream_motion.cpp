@@ -52,21 +52,21 @@ Pose violent_head(double t_s) {
 
 }  // namespace
 
-const char* to_string(MotionClass motion_class) {
-  switch (motion_class) {
-    case MotionClass::Idle:
+const char* to_string(MotionLevel motion_level) {
+  switch (motion_level) {
+    case MotionLevel::Idle:
       return "idle";
-    case MotionClass::Active:
+    case MotionLevel::Active:
       return "walking and turning";
-    case MotionClass::Violent:
+    case MotionLevel::Violent:
       return "violent";
   }
   return "";
 }
 
-MotionClass motion_class_of(double hair_rms_mps) {
-  if (hair_rms_mps < kActiveHairMps) return MotionClass::Idle;
-  return hair_rms_mps < kViolentHairMps ? MotionClass::Active : MotionClass::Violent;
+MotionLevel motion_level_of(double hair_rms_mps) {
+  if (hair_rms_mps < kActiveHairMps) return MotionLevel::Idle;
+  return hair_rms_mps < kViolentHairMps ? MotionLevel::Active : MotionLevel::Violent;
 }
 
 HeadMeasure measure_head(const std::vector<Pose>& world_from_head, double frame_s) {

@@ -13,13 +13,13 @@
 namespace strandcast {
 
 /// How much hair moves; decides which goals a recording is held to.
-enum class MotionClass { Idle, Active, Violent };
+enum class MotionLevel { Idle, Active, Violent };
 /// "idle", "walking and turning", "violent".
-const char* to_string(MotionClass motion_class);
+const char* to_string(MotionLevel motion_level);
 
 /// By the root of the mean square speed of all vertices in head space. Standing has about 0.02 m/s, recorded
 /// and built-in walking 0.07 to 0.45, jumps, spins and salsa 0.56 to 1.2.
-MotionClass motion_class_of(double hair_rms_mps);
+MotionLevel motion_level_of(double hair_rms_mps);
 inline constexpr double kActiveHairMps = 0.04;
 inline constexpr double kViolentHairMps = 0.5;
 

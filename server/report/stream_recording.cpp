@@ -130,7 +130,7 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   }
   recording.head = measure_head(poses, kStreamFrameS);
   recording.hair_rms_mps = hair_rms_mps(recording.frames);
-  recording.motion_class = motion_class_of(recording.hair_rms_mps);
+  recording.motion_level = motion_level_of(recording.hair_rms_mps);
   return recording;
 }
 

@@ -35,7 +35,7 @@ struct StreamRecording {
   std::string motion_name;
   HeadMeasure head;           // of the recorded part
   double hair_rms_mps = 0.0;  // of all vertices, in head space
-  MotionClass motion_class = MotionClass::Idle;
+  MotionLevel motion_level = MotionLevel::Idle;
   StreamShape shape;
   std::vector<StreamFrame> frames;
   std::vector<double> step_ms;  // (frames) wall time of solving and reading back

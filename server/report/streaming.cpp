@@ -152,7 +152,7 @@ class StreamingRun {
     progress_.end_run(0.0);
     StreamRecording& recording = *recorded;
     const bool has_curve =
-        seen_.insert({recording.motion_class, size.strand_count, size.vertex_count}).second;
+        seen_.insert({recording.motion_level, size.strand_count, size.vertex_count}).second;
     const std::vector<StreamCodecRow> codecs = codecs_for(has_curve);
     const auto cost = static_cast<double>(size.vertices() * recording.frames.size());
     progress_.expect(static_cast<uint32_t>(codecs.size()), cost * static_cast<double>(codecs.size()));
@@ -163,7 +163,7 @@ class StreamingRun {
       progress_.end_run(cost);
     }
     // Walking on the first size, or whatever comes first.
-    const bool is_walk = recording.motion_class == MotionClass::Active;
+    const bool is_walk = recording.motion_level == MotionLevel::Active;
     if (report_.latency.stages.empty() || (is_walk && !has_walk_latency_)) {
       ASSIGN_OR_RETURN(report_.latency, measure_latency(recording, kLatencyCodec, kGoalBoundM));
       has_walk_latency_ = is_walk;
@@ -178,7 +178,7 @@ class StreamingRun {
   const gl::ShaderLibrary* shaders_;
   std::string solver_;
   Progress progress_;
-  std::set<std::tuple<MotionClass, uint32_t, uint32_t>> seen_;
+  std::set<std::tuple<MotionLevel, uint32_t, uint32_t>> seen_;
   bool has_walk_latency_ = false;
 };
 
@@ -212,7 +212,7 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
 
   StreamingRow row;
   row.motion = recording.motion_name;
-  row.motion_class = recording.motion_class;
+  row.motion_level = recording.motion_level;
   row.size = {recording.shape.strand_count, recording.shape.vertex_count};
   row.codec = codec.name;
   row.is_ours = codec.is_ours;

@@ -33,7 +33,7 @@ inline constexpr size_t kStartFrames = 9;
 /// One codec at one bound on one recording. Times are medians over frames.
 struct StreamingRow {
   std::string motion;
-  MotionClass motion_class = MotionClass::Idle;
+  MotionLevel motion_level = MotionLevel::Idle;
   StreamSize size;
   std::string codec;
   bool is_ours = false;

@@ -71,11 +71,11 @@ class Worst {
   std::string place_;
 };
 
-GoalLine class_goal(const StreamingReport& report, MotionClass motion_class, double limit) {
+GoalLine level_goal(const StreamingReport& report, MotionLevel motion_level, double limit) {
   Worst worst(Better::Low, limit);
   for (const StreamingRow* row : judged_rows(report))
-    if (row->motion_class == motion_class) worst.add(row->bits, place_of(*row));
-  return worst.line(fmt::format("{}: at most {:g} bits per vertex", to_string(motion_class), limit), " bits");
+    if (row->motion_level == motion_level) worst.add(row->bits, place_of(*row));
+  return worst.line(fmt::format("{}: at most {:g} bits per vertex", to_string(motion_level), limit), " bits");
 }
 
 GoalLine ratio_goal(const StreamingReport& report, PeerKind kind) {
@@ -83,7 +83,7 @@ GoalLine ratio_goal(const StreamingReport& report, PeerKind kind) {
   Worst worst(Better::High, limit);
   for (const StreamingRow* row : judged_rows(report)) {
     // Positions of a violent motion cost others no more than any; the goal is not stated for them.
-    if (kind == PeerKind::Plain && row->motion_class == MotionClass::Violent) continue;
+    if (kind == PeerKind::Plain && row->motion_level == MotionLevel::Violent) continue;
     if (const StreamingRow* peer = best_peer(report, *row, kind); peer != nullptr)
       worst.add(peer->bits / row->bits, fmt::format("{}, {}", place_of(*row), peer->codec));
   }
@@ -163,9 +163,9 @@ std::vector<GoalLine> judge_streaming(const StreamingReport& report) {
   };
   return {
       bound_goal(report),
-      class_goal(report, MotionClass::Active, kActiveBits),
-      class_goal(report, MotionClass::Idle, kIdleBits),
-      class_goal(report, MotionClass::Violent, kViolentBits),
+      level_goal(report, MotionLevel::Active, kActiveBits),
+      level_goal(report, MotionLevel::Idle, kIdleBits),
+      level_goal(report, MotionLevel::Violent, kViolentBits),
       ratio_goal(report, PeerKind::Temporal),
       ratio_goal(report, PeerKind::Plain),
       join_goal(report),

@@ -50,12 +50,12 @@ bool is_same_recording(const StreamingRow& a, const StreamingRow& b) {
 /// The recording that plots of one recording are of: walking and turning where there is any.
 const StreamingRow* shown_recording(const StreamingReport& report) {
   for (const StreamingRow& row : report.rows)
-    if (row.motion_class == MotionClass::Active) return &row;
+    if (row.motion_level == MotionLevel::Active) return &row;
   return report.rows.empty() ? nullptr : &report.rows.front();
 }
 
 std::string recording_words(const StreamingRow& row) {
-  return fmt::format("{} ({}), {} vertices", row.motion, to_string(row.motion_class), to_string(row.size));
+  return fmt::format("{} ({}), {} vertices", row.motion, to_string(row.motion_level), to_string(row.size));
 }
 
 /// The names of a report's codecs, in the order of kCodecStyles.
@@ -98,7 +98,7 @@ HtmlTable recording_table(const StreamingReport& report) {
                    "frames of 1/60 s"};
   for (const StreamRecording& recording : report.recordings) {
     table.rows.push_back(
-        {recording.motion_name, to_string(recording.motion_class),
+        {recording.motion_name, to_string(recording.motion_level),
          fmt::format("{:.2f}", recording.hair_rms_mps), fmt::format("{:.2f}", recording.head.mean_speed_mps),
          fmt::format("{:.0f}", recording.head.mean_turn_rad_per_s * 180.0 / std::numbers::pi),
          to_string(StreamSize{recording.shape.strand_count, recording.shape.vertex_count}),
@@ -111,7 +111,7 @@ HtmlTable codec_table(const StreamingReport& report, const StreamRecording& reco
   const StreamSize size{recording.shape.strand_count, recording.shape.vertex_count};
   HtmlTable table;
   table.caption =
-      fmt::format("{}, {}, {}", recording.motion_name, to_string(recording.motion_class), to_string(size));
+      fmt::format("{}, {}, {}", recording.motion_name, to_string(recording.motion_level), to_string(size));
   table.columns = {"codec",
                    "bound, mm",
                    "bits/vertex",
@@ -203,7 +203,7 @@ std::string streaming_csv(const StreamingReport& report) {
                "rms_error_mm", "keeps_bound", "encode_cpu_ms", "decode_cpu_ms", "encode_wall_ms",
                "decode_wall_ms"});
   for (const StreamingRow& row : report.rows) {
-    csv.add_row({row.motion, to_string(row.motion_class), fmt::format("{}", row.size.strand_count),
+    csv.add_row({row.motion, to_string(row.motion_level), fmt::format("{}", row.size.strand_count),
                  fmt::format("{}", row.size.vertex_count), row.codec,
                  row.is_ours       ? "ours"
                  : row.is_temporal ? "peer, temporal"

@@ -27,14 +27,14 @@ TEST(StreamMotion, AHeadIsMeasuredByItsWayAndItsTurn) {
 }
 
 TEST(StreamMotion, TheBuiltInOnesAreWhatTheyAreCalled) {
-  std::vector<MotionClass> classes;
+  std::vector<MotionLevel> classes;
   for (const StreamMotion& motion : built_in_stream_motions()) {
     const auto recording = record_strands({motion, {24, 8}, 3.0, "", nullptr});
     ASSERT_TRUE(recording.ok()) << recording.error().to_string();
     EXPECT_EQ(recording->frames.size(), 180u);
-    classes.push_back(recording->motion_class);
+    classes.push_back(recording->motion_level);
   }
-  EXPECT_THAT(classes, testing::ElementsAre(MotionClass::Idle, MotionClass::Active, MotionClass::Violent));
+  EXPECT_THAT(classes, testing::ElementsAre(MotionLevel::Idle, MotionLevel::Active, MotionLevel::Violent));
 }
 
 TEST(StreamRecording, RefusesWhatDoesNotFit) {
@@ -49,10 +49,10 @@ TEST(StreamRecording, RefusesWhatDoesNotFit) {
   EXPECT_EQ(too_large.error().code, ErrorCode::LimitExceeded);
 }
 
-StreamingRow row(const char* codec, MotionClass motion_class, double bits) {
+StreamingRow row(const char* codec, MotionLevel motion_level, double bits) {
   StreamingRow result;
-  result.motion = to_string(motion_class);
-  result.motion_class = motion_class;
+  result.motion = to_string(motion_level);
+  result.motion_level = motion_level;
   result.size = {10'000, 16};
   result.codec = codec;
   result.is_ours = std::string(codec) == "tangent" || std::string(codec) == "delta";
@@ -70,15 +70,15 @@ StreamingRow row(const char* codec, MotionClass motion_class, double bits) {
 StreamingReport just_met() {
   StreamingReport report;
   report.processors = 2;
-  const std::pair<MotionClass, double> bits[] = {
-      {MotionClass::Active, 3.5}, {MotionClass::Idle, 1.8}, {MotionClass::Violent, 6.0}};
-  for (const auto& [motion_class, ours] : bits) {
-    report.rows.push_back(row("tangent", motion_class, ours));
-    report.rows.push_back(row("delta", motion_class, 2.0 * ours));
-    report.rows.push_back(row("draco temporal", motion_class, 2.0 * ours));
-    report.rows.push_back(row("zfp temporal", motion_class, 3.0 * ours));
+  const std::pair<MotionLevel, double> bits[] = {
+      {MotionLevel::Active, 3.5}, {MotionLevel::Idle, 1.8}, {MotionLevel::Violent, 6.0}};
+  for (const auto& [motion_level, ours] : bits) {
+    report.rows.push_back(row("tangent", motion_level, ours));
+    report.rows.push_back(row("delta", motion_level, 2.0 * ours));
+    report.rows.push_back(row("draco temporal", motion_level, 2.0 * ours));
+    report.rows.push_back(row("zfp temporal", motion_level, 3.0 * ours));
     report.rows.push_back(
-        row("draco", motion_class, motion_class == MotionClass::Violent ? 4.0 * ours : 6.0 * ours));
+        row("draco", motion_level, motion_level == MotionLevel::Violent ? 4.0 * ours : 6.0 * ours));
   }
   return report;
 }
@@ -97,9 +97,9 @@ TEST(StreamingGoals, EachIsMissedByALittleTooMuchOfItsOwn) {
   const size_t count = judge_streaming(just_met()).size();
   const std::vector<void (*)(StreamingRow&)> spoils = {
       [](StreamingRow& r) { r.max_error_m = 1.01 * r.bound_m; },
-      [](StreamingRow& r) { r.bits *= r.motion_class == MotionClass::Active ? 1.01 : 1.0; },
-      [](StreamingRow& r) { r.bits *= r.motion_class == MotionClass::Idle ? 1.01 : 1.0; },
-      [](StreamingRow& r) { r.bits *= r.motion_class == MotionClass::Violent ? 1.01 : 1.0; },
+      [](StreamingRow& r) { r.bits *= r.motion_level == MotionLevel::Active ? 1.01 : 1.0; },
+      [](StreamingRow& r) { r.bits *= r.motion_level == MotionLevel::Idle ? 1.01 : 1.0; },
+      [](StreamingRow& r) { r.bits *= r.motion_level == MotionLevel::Violent ? 1.01 : 1.0; },
   };
   for (size_t i = 0; i < spoils.size(); ++i) {
     StreamingReport report = just_met();
@@ -120,7 +120,7 @@ TEST(StreamingGoals, EachIsMissedByALittleTooMuchOfItsOwn) {
 
 TEST(StreamingGoals, APeerThatMissesTheBoundIsNoPeer) {
   StreamingReport report = just_met();
-  StreamingRow cheat = row("meshopt+zstd temporal", MotionClass::Active, 1.0);
+  StreamingRow cheat = row("meshopt+zstd temporal", MotionLevel::Active, 1.0);
   cheat.max_error_m = 2.0 * cheat.bound_m;
   report.rows.push_back(cheat);
   EXPECT_THAT(verdicts(report), testing::Each(Verdict::Met));
