@@ -8,6 +8,7 @@
 #include <boost/asio/ssl/stream.hpp>
 #include <boost/beast/websocket/teardown.hpp>
 #include <optional>
+#include <vector>
 
 #include "common/net/net_stream_private.h"
 #include "common/net/tls_private.h"
@@ -35,6 +36,7 @@ struct NetStream::State {
   explicit State(Socket connected) : socket(std::move(connected)) {}
   Socket socket;
   std::optional<asio::ssl::stream<Socket&>> tls;
+  std::vector<std::byte> put_back;
 };
 
 NetStream::NetStream(Socket socket) : state_(std::make_unique<State>(std::move(socket))) {}
@@ -69,6 +71,10 @@ bool NetStream::is_tls_hello() {
   state_->socket.non_blocking(true, error);
   const size_t size = state_->socket.receive(asio::buffer(&first, 1), Socket::message_peek, error);
   return !error && size == 1 && first == kTlsHandshakeRecord;
+}
+
+void NetStream::put_back(std::span<const std::byte> bytes) {
+  state_->put_back.insert(state_->put_back.begin(), bytes.begin(), bytes.end());
 }
 
 void NetStream::async_accept_tls(const TlsContextPtr& context, Done done) {
@@ -125,6 +131,12 @@ void NetStream::async_tear_down(boost::beast::role_type role, Done done) {
 }
 
 void NetStream::read_some(const MutableBuffers& buffers, Transferred done) {
+  if (std::vector<std::byte>& held = state_->put_back; !held.empty()) {
+    const size_t size = asio::buffer_copy(buffers, asio::buffer(held));
+    held.erase(held.begin(), held.begin() + static_cast<std::ptrdiff_t>(size));
+    return asio::post(get_executor(),
+                      [size, done = std::move(done)]() mutable { std::move(done)(error_code(), size); });
+  }
   if (state_->tls) return state_->tls->async_read_some(buffers, plain(std::move(done)));
   state_->socket.async_read_some(buffers, plain(std::move(done)));
 }

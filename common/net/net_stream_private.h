@@ -11,6 +11,7 @@
 #include <boost/container/static_vector.hpp>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -42,6 +43,9 @@ class NetStream {
   void async_wait_readable(Done done);
   /// True when the other side has begun with a TLS handshake. After async_wait_readable() only.
   bool is_tls_hello();
+
+  /// Gives back what was read too far: the next reads begin with it. Not while a read is under way.
+  void put_back(std::span<const std::byte> bytes);
 
   /// From here on everything is encrypted.
   void async_accept_tls(const TlsContextPtr& context, Done done);

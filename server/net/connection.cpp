@@ -13,7 +13,6 @@
 namespace strandcast::net {
 namespace {
 
-constexpr uint32_t kMaxHttpHeaderBytes = 8u << 10;
 constexpr const char* kWebSocketPath = "/v1";
 
 std::string_view view(beast::string_view text) {
@@ -33,6 +32,26 @@ std::string key_of(const asio::ip::address& address) {
   auto bytes = address.to_v6().to_bytes();
   std::fill(bytes.begin() + bytes.size() / 2, bytes.end(), uint8_t{0});
   return asio::ip::make_address_v6(bytes).to_string() + "/64";
+}
+
+using Request = http::request<http::empty_body>;
+
+bool has_body(const http::request_parser<http::empty_body>& parser) {
+  return parser.get().count(http::field::transfer_encoding) > 0 || parser.content_length().value_or(0) > 0;
+}
+
+/// True when a field is there twice of which a proxy or a browser may believe the other one.
+bool is_ambiguous(const Request& request) {
+  const auto fields = {http::field::host, http::field::origin, http::field::authorization,
+                       http::field::sec_websocket_key, http::field::sec_websocket_version};
+  return std::any_of(fields.begin(), fields.end(),
+                     [&](http::field field) { return request.count(field) > 1; });
+}
+
+/// The other side went away in the middle.
+bool is_gone(const beast::error_code& error) {
+  return error == http::error::end_of_stream || error == asio::error::connection_reset ||
+         error == http::error::partial_message || error == asio::error::operation_aborted;
 }
 
 bool offers_protocol(beast::string_view header) {
@@ -90,17 +109,18 @@ void Connection::on_tls(const beast::error_code& error) {
   finish();
 }
 
+/// The header only: a body would be in memory before anybody could refuse it.
 void Connection::read_request() {
   parser_.emplace();
   parser_->header_limit(kMaxHttpHeaderBytes);
-  parser_->body_limit(0);
-  http::async_read(stream_, buffer_, *parser_,
-                   [self = shared_from_this()](const beast::error_code& error, size_t size) {
-                     // Beast limits the first line and the fields each by itself.
-                     const bool is_long = !error && size > kMaxHttpHeaderBytes;
-                     const beast::error_code too_long = http::error::header_limit;
-                     self->guarded([&] { self->on_request(is_long ? too_long : error); });
-                   });
+  parser_->body_limit(boost::none);
+  http::async_read_header(stream_, buffer_, *parser_,
+                          [self = shared_from_this()](const beast::error_code& error, size_t size) {
+                            // Beast limits the first line and the fields each by itself.
+                            const bool is_long = !error && size > kMaxHttpHeaderBytes;
+                            const beast::error_code too_long = http::error::header_limit;
+                            self->guarded([&] { self->on_request(is_long ? too_long : error); });
+                          });
 }
 
 void Connection::check_deadline(int64_t time_ns) {
@@ -111,13 +131,16 @@ void Connection::check_deadline(int64_t time_ns) {
 
 void Connection::on_request(const beast::error_code& error) {
   if (is_finished_) return;
-  if (error == http::error::end_of_stream || error == asio::error::connection_reset ||
-      error == http::error::partial_message || error == asio::error::operation_aborted)
-    return finish();
-  if (error) {
-    context_.count(&NetCounters::refused_http);
-    return respond(http::status::bad_request, "Bad request: " + error.message() + "\n");
-  }
+  if (is_gone(error)) return finish();
+  if (error == http::error::header_limit || error == http::error::buffer_overflow)
+    return refuse(http::status::request_header_fields_too_large,
+                  fmt::format("The header of a request has at most {} bytes.", kMaxHttpHeaderBytes));
+  if (error) return refuse(http::status::bad_request, "Bad request: " + error.message());
+  const Request& request = parser_->get();
+  if (has_body(*parser_))
+    return refuse(http::status::payload_too_large, "Requests are served without a body only.");
+  if (is_ambiguous(request))
+    return refuse(http::status::bad_request, "A field is there twice that may be there once.");
   const bool is_plain_allowed =
       context_.tls == nullptr ||
       (peer_.is_trusted && context_.config.plain_access == PlainAccess::TrustedLoopback);
@@ -127,30 +150,30 @@ void Connection::on_request(const beast::error_code& error) {
     response_.set(http::field::connection, "Upgrade");
     return respond(http::status::upgrade_required, "This server speaks TLS only: use wss:// or --tls.\n");
   }
-  const auto& request = parser_->get();
-  const std::string_view host = view(request[http::field::host]);
-  if (!is_host_allowed(host, local_address_, is_loopback_, context_.config.allowed_hosts)) {
-    context_.count(&NetCounters::refused_http);
-    return respond(http::status::forbidden, "This Host is not served here (--allow-host adds one).\n");
-  }
-  if (websocket::is_upgrade(request) && view(request.target()) == kWebSocketPath) {
-    if (!is_origin_allowed(view(request[http::field::origin]), host, context_.config.allowed_origins)) {
-      context_.count(&NetCounters::refused_http);
-      return respond(http::status::forbidden,
-                     "Pages of another origin may not connect (--allow-origin adds one).\n");
-    }
-    if (!offers_protocol(request[http::field::sec_websocket_protocol])) {
-      context_.count(&NetCounters::refused_http);
-      return respond(http::status::bad_request,
-                     fmt::format("The WebSocket subprotocol must be {}.\n", kWebSocketProtocol));
-    }
-    return upgrade();
-  }
-  if (request.method() == http::verb::get && view(request.target()) == "/healthz")
-    return respond(http::status::ok, "ok\n");
-  if (request.method() == http::verb::get && view(request.target()) == "/metrics") return answer_metrics();
-  context_.count(&NetCounters::refused_http);
-  respond(http::status::not_found, "Not found. Here are: /healthz /metrics /v1 (WebSocket).\n");
+  if (!is_host_allowed(view(request[http::field::host]), local_address_, is_loopback_,
+                       context_.config.allowed_hosts))
+    return refuse(http::status::forbidden, "This Host is not served here (--allow-host adds one).");
+  answer(request);
+}
+
+void Connection::answer(const Request& request) {
+  const std::string_view path = view(request.target());
+  if (websocket::is_upgrade(request) && path == kWebSocketPath) return answer_upgrade(request);
+  const bool is_get = request.method() == http::verb::get;
+  if (is_get && path == "/healthz") return respond(http::status::ok, "ok\n");
+  if (is_get && path == "/metrics") return answer_metrics();
+  refuse(http::status::not_found, "Not found. Here are: /healthz /metrics /v1 (WebSocket).");
+}
+
+void Connection::answer_upgrade(const Request& request) {
+  if (!is_origin_allowed(view(request[http::field::origin]), view(request[http::field::host]),
+                         context_.config.allowed_origins))
+    return refuse(http::status::forbidden,
+                  "Pages of another origin may not connect (--allow-origin adds one).");
+  if (!offers_protocol(request[http::field::sec_websocket_protocol]))
+    return refuse(http::status::bad_request,
+                  fmt::format("The WebSocket subprotocol must be {}.", kWebSocketProtocol));
+  upgrade();
 }
 
 /// What the server does is for those who may watch it: beyond trusted loopback any role's token is needed.
@@ -169,6 +192,9 @@ void Connection::answer_metrics() {
 }
 
 void Connection::upgrade() {
+  // A client may say Hello before it has our answer.
+  const auto read_too_far = buffer_.cdata();
+  stream_.put_back({static_cast<const std::byte*>(read_too_far.data()), read_too_far.size()});
   const SessionId id = context_.next_session++;
   const bool has_room = context_.has_room(peer_.key);
   auto session = std::make_shared<Session>(context_, id, std::move(stream_), peer_);
@@ -177,6 +203,11 @@ void Connection::upgrade() {
   is_finished_ = true;
   context_.connections.erase(shared_from_this());
   session->start(parser_->release(), has_room);
+}
+
+void Connection::refuse(http::status status, const std::string& sentence) {
+  context_.count(&NetCounters::refused_http);
+  respond(status, sentence + "\n");
 }
 
 void Connection::respond(http::status status, const std::string& text, const char* content_type) {

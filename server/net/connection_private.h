@@ -27,6 +27,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void on_tls(const beast::error_code& error);
   void read_request();
   void on_request(const beast::error_code& error);
+  void answer(const http::request<http::empty_body>& request);
+  void answer_upgrade(const http::request<http::empty_body>& request);
+  void refuse(http::status status, const std::string& sentence);
   void respond(http::status status, const std::string& text, const char* content_type = "text/plain");
   void answer_metrics();
   void upgrade();
@@ -38,7 +41,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::string local_address_;
   bool is_loopback_ = false;
   bool is_finished_ = false;
-  beast::flat_buffer buffer_;
+  beast::flat_buffer buffer_{kMaxHttpReadBytes};
   std::optional<http::request_parser<http::empty_body>> parser_;
   http::response<http::string_body> response_;
 };

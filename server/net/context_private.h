@@ -25,6 +25,11 @@ inline constexpr size_t kWriteChunkBytes = 64u << 10;
 inline constexpr size_t kSpareConnections = 64;
 inline constexpr size_t kSpareConnectionsPerAddress = 16;
 
+/// First line and fields of a request.
+inline constexpr size_t kMaxHttpHeaderBytes = 8u << 10;
+/// What is read of a request: the header, and one byte that tells a longer one. The rest waits in the kernel.
+inline constexpr size_t kMaxHttpReadBytes = kMaxHttpHeaderBytes + 1;
+
 /// A message of the largest size and the buffer's own steps.
 inline constexpr size_t kMaxSessionReadBytes = kMaxControlBytes + (4u << 10);
 /// Enough to keep a long fast link busy; the kernel takes twice as much for its own.

@@ -30,14 +30,101 @@ TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
   EXPECT_NE(test::http_get(server_->port(), "/healthz", "evil.example").find("403"), std::string::npos);
 }
 
-TEST_F(ServerNet, RefusesLongHeadersAndBodies) {
+TEST_F(ServerNet, RefusesLongHeaders) {
   start();
-  EXPECT_EQ(test::http_get(server_->port(), "/" + std::string(20'000, 'a')).find("200 OK"),
-            std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/" + std::string(20'000, 'a')).find(" 431 "), std::string::npos);
   RawClient client(server_->port());
-  client.send_raw("POST /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 5\r\n\r\nhello");
-  EXPECT_EQ(client.read_raw_to_end().find("200 OK"), std::string::npos);
+  client.send_raw("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + std::string(1 << 20, 'x'));
+  EXPECT_NE(client.read_raw_to_end().find(" 431 "), std::string::npos) << "without an end";
   EXPECT_NE(test::http_get(server_->port(), "/healthz").find("200 OK"), std::string::npos);
+}
+
+// Whatever is behind the header is not read, so that nothing of it can make the server hold anything.
+TEST_F(ServerNet, BodiesAreRefusedUnread) {
+  NetConfig config;
+  config.limits.handshake_ms = 60'000;
+  start(config);
+  const std::string chunked = "Transfer-Encoding: chunked\r\n\r\n";
+  const std::string much(4 << 20, '0');
+  const std::string cases[] = {"Content-Length: 5\r\n\r\nhello",
+                               "Content-Length: 5\r\n\r\n",
+                               "Content-Length: 18446744073709551615\r\n\r\n" + much,
+                               "Transfer-Encoding: identity\r\n\r\n",
+                               chunked,
+                               chunked + much,
+                               chunked + "1;" + much,
+                               chunked + "0\r\nX: " + much,
+                               chunked + "0\r\nX: " + std::string(70'000, 'x') + "\r\n\r\n"};
+  for (const std::string& rest : cases)
+    for (const char* line : {"GET /healthz", "POST /healthz", "GET /v1"}) {
+      RawClient client(server_->port());
+      client.send_raw(line + std::string(" HTTP/1.1\r\nHost: 127.0.0.1\r\n") + rest);
+      const std::string answer = client.read_raw_to_end();
+      EXPECT_TRUE(answer.starts_with("HTTP/1.1 413 ")) << line << " " << rest.substr(0, 40) << ": " << answer;
+      EXPECT_NE(answer.find("without a body"), std::string::npos);
+    }
+  EXPECT_EQ(server_->counters().refused_http, 3 * std::size(cases));
+  RawClient empty(server_->port());
+  empty.send_raw("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 0\r\n\r\n");
+  EXPECT_NE(empty.read_raw_to_end().find("200 OK"), std::string::npos) << "a body of no bytes is none";
+}
+
+// Two readers could take one each for true.
+TEST_F(ServerNet, FieldsThatDecideStandOnce) {
+  start();
+  const std::string upgrade =
+      "GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Protocol: strandcast.v1\r\n";
+  for (const char* field :
+       {"Host: 127.0.0.1", "host: evil.example", "Origin: http://127.0.0.1\r\nOrigin: http://127.0.0.1",
+        "Origin: http://127.0.0.1\r\nOrigin: http://evil.example",
+        "Authorization: Bearer a\r\nAuthorization: Bearer b",
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="}) {
+    RawClient client(server_->port());
+    client.send_raw(upgrade + field + "\r\n\r\n");
+    EXPECT_TRUE(client.read_raw_to_end().starts_with("HTTP/1.1 400 ")) << field;
+  }
+  EXPECT_EQ(server_->counters().open_sessions, 0u);
+}
+
+/// A message as a client's WebSocket frame, masked with zeros.
+std::string frame_of(const std::vector<std::byte>& message) {
+  constexpr uint8_t kFinalBinary = 0x82, kMasked = 0x80, kSixteenBits = 126, kSixtyFourBits = 127;
+  std::string frame(1, static_cast<char>(kFinalBinary));
+  const size_t size = message.size();
+  const int length_bytes = size < kSixteenBits ? 0 : size <= UINT16_MAX ? 2 : 8;
+  frame += static_cast<char>(kMasked | (length_bytes == 0   ? static_cast<uint8_t>(size)
+                                        : length_bytes == 2 ? kSixteenBits
+                                                            : kSixtyFourBits));
+  for (int i = length_bytes - 1; i >= 0; --i) frame += static_cast<char>(size >> (8 * i));
+  return frame + std::string(4, '\0') + std::string(reinterpret_cast<const char*>(message.data()), size);
+}
+
+// A client that knows this server need not wait for the answer to its upgrade.
+TEST_F(ServerNet, AHelloRightBehindTheUpgradeIsRead) {
+  start();
+  const std::string upgrade =
+      "GET /v1 HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Protocol: strandcast.v1\r\n\r\n";
+  const MotionSamples::Sample sample{1, {{1.0, 2.0, 3.0}, {0.5, 0.5, 0.5, 0.5}}};
+  const std::vector<std::byte> longest =
+      encode(ClientMessage(MotionSamples{std::vector<MotionSamples::Sample>(256, sample)}));
+  const std::string all = upgrade + frame_of(encode(ClientMessage(hello(Role::Source)))) + frame_of(longest) +
+                          frame_of(longest) + frame_of(encode(ClientMessage(Ping{1})));
+  ASSERT_GT(all.size(), 8'192u) << "more than the header may have";
+  // In one piece, and in two that part within the Hello, right behind the header and right before its end.
+  uint64_t sessions = 0;
+  for (const size_t first : {all.size(), upgrade.size() + 3, upgrade.size(), upgrade.size() - 1}) {
+    RawClient client(server_->port());
+    client.send_raw(all.substr(0, first));
+    give_time_to_misbehave();  // so that the pieces arrive one by one
+    client.send_raw(all.substr(first));
+    ++sessions;
+    EXPECT_TRUE(eventually([&] { return server_->counters().messages_received == 4 * sessions; })) << first;
+    EXPECT_EQ(app_.motion, 512 * sessions);
+  }
 }
 
 TEST_F(ServerNet, HandshakeNeedsPathProtocolHostAndOrigin) {
