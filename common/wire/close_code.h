@@ -13,7 +13,7 @@ enum class CloseCode : uint16_t {
   Policy = 1008,        // wrong order, wrong role or too many messages
   TooBig = 1009,        // message above kMaxControlBytes
   Internal = 1011,      // ours: please report
-  TryLater = 1013,      // this client reads too slowly for its control messages
+  TryLater = 1013,      // what it wants cannot be had now, or it reads too slowly
   Unauthorized = 4001,  // token refused: do not try again
   Kicked = 4002,        // by an admin: do not try again
   Full = 4003,          // no place for another session: do not try again at once

@@ -56,7 +56,7 @@ class Server::State : public NetHandler {
   Status reload_tls() { return net_->reload_tls(); }
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
 
-  Result<Admission> on_hello(SessionId session, const Hello& hello) override;
+  Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
   void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override {
     hub_.push(session, samples, arrival_ns);
   }
@@ -283,11 +283,12 @@ Welcome Server::State::make_welcome(const Viewers::Place& place) const {
   return welcome;
 }
 
-Result<Admission> Server::State::on_hello(SessionId session, const Hello& hello) {
+Result<Admission> Server::State::on_hello(const Visitor& visitor, const Hello& hello) {
+  const SessionId session = visitor.session;
   if (hello.mode == StreamMode::Frames && hello.role != Role::Source)
     if (const std::optional<Error> error = frames_->failure())
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
-  ASSIGN_OR_RETURN(const Viewers::Place place, viewers_.add(session, hello));
+  ASSIGN_OR_RETURN(const Viewers::Place place, viewers_.add(visitor, hello));
   Admission admission;
   admission.welcome = make_welcome(place);
   if (hello.role != Role::Source && place.mode == StreamMode::Strands) admission.asset = asset_frame_;

@@ -20,6 +20,20 @@ PictureCodec best_codec(PictureCodecs decodable, const RenderSize& size) {
   return PictureCodec::Jpeg;
 }
 
+RenderSize size_of(const SceneDesc& scene) {
+  return {scene.stream.frame_width, scene.stream.frame_height};
+}
+
+/// The scene's camera and quality at this size.
+PictureView make_view(const SceneDesc& scene, const RenderSize& size, PictureCodecs decodable) {
+  PictureView view;
+  view.camera = scene.camera;
+  view.size = size;
+  view.quality = static_cast<int>(scene.stream.jpeg_quality);
+  view.codec = best_codec(decodable, size);
+  return view;
+}
+
 std::vector<double> costs_of(const std::vector<PictureStep>& ladder) {
   std::vector<double> costs;
   for (const PictureStep& step : ladder) costs.push_back(step.relative_cost);
@@ -28,18 +42,24 @@ std::vector<double> costs_of(const std::vector<PictureStep>& ladder) {
 
 }  // namespace
 
-Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
+Viewers::Viewers(const SceneDesc& scene) : scene_(scene), views_(make_view(scene, size_of(scene), 0)) {}
+
+Result<PictureClass> Viewers::assign_view(SessionId session, const Viewer& viewer, const PictureView& view) {
+  const bool is_controller = viewer.role == Role::Controller || viewer.role == Role::Admin;
+  return views_.assign({session, viewer.peer, is_controller}, view);
+}
+
+Result<Viewers::Place> Viewers::add(const Visitor& visitor, const Hello& hello) {
   Place place;
   Viewer viewer;
   viewer.role = hello.role;
+  viewer.peer = visitor.peer;
   viewer.wanted = hello.mode;
-  place.size = {hello.frame_width > 0 ? hello.frame_width : scene_.stream.frame_width,
-                hello.frame_height > 0 ? hello.frame_height : scene_.stream.frame_height};
+  place.size = size_of(scene_);
+  if (hello.frame_width > 0) place.size.width = hello.frame_width;
+  if (hello.frame_height > 0) place.size.height = hello.frame_height;
   viewer.size = place.size;
-  viewer.view.camera = scene_.camera;
-  viewer.view.size = place.size;
-  viewer.view.quality = static_cast<int>(scene_.stream.jpeg_quality);
-  viewer.view.codec = best_codec(hello.picture_codecs, place.size);
+  viewer.view = make_view(scene_, place.size, hello.picture_codecs);
   viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
   viewer.step = find_step(viewer.ladder, viewer.view.quality);
   if (hello.role == Role::Source) {
@@ -48,7 +68,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
     place.mode = StreamMode::Frames;
     place.reason = "frames were asked for";
     RETURN_IF_ERROR(validate(viewer.view));
-    ASSIGN_OR_RETURN(place.picture_class, views_.assign(session, viewer.view));
+    ASSIGN_OR_RETURN(place.picture_class, assign_view(visitor.session, viewer, viewer.view));
     place.picture_costs = costs_of(viewer.ladder);
     place.picture_step = viewer.step;
   } else {
@@ -57,7 +77,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, const Hello& hello) {
                        : "strands: one stream serves every camera, and nothing speaks against it yet";
   }
   viewer.mode = place.mode;
-  viewers_[session] = viewer;
+  viewers_[visitor.session] = viewer;
   count();
   return place;
 }
@@ -78,7 +98,7 @@ Result<std::optional<PictureClass>> Viewers::set_camera(SessionId session, const
   std::optional<PictureClass> picture_class;
   if (viewer.gets(StreamMode::Frames)) {
     RETURN_IF_ERROR(validate(view));
-    ASSIGN_OR_RETURN(picture_class, views_.assign(session, view));
+    ASSIGN_OR_RETURN(picture_class, assign_view(session, viewer, view));
   }
   viewer.view = view;
   return picture_class;
@@ -144,7 +164,7 @@ std::optional<ModeSwitch> Viewers::begin_change(SessionId session, const ModeCho
   if (choice.mode == StreamMode::Frames) {
     Status usable = validate(viewer.view);
     if (usable) {
-      auto assigned = views_.assign(session, viewer.view);
+      auto assigned = assign_view(session, viewer, viewer.view);
       usable = assigned ? Status() : assigned.error();
       if (assigned) change.picture_class = *assigned;
       change.picture_costs = costs_of(viewer.ladder);
@@ -197,7 +217,7 @@ Result<Viewers::Pictures> Viewers::set_picture_step(SessionId session, size_t st
   view.rate_divisor = wanted.rate_divisor;
   view.size.width = std::max(width / wanted.size_divisor, kMinPictureSide);
   view.size.height = std::max(height / wanted.size_divisor, kMinPictureSide);
-  ASSIGN_OR_RETURN(const uint32_t picture_class, views_.assign(session, view));
+  ASSIGN_OR_RETURN(const uint32_t picture_class, assign_view(session, found->second, view));
   found->second.view = view;
   found->second.step = step;
   return Pictures{picture_class, view};

@@ -42,11 +42,11 @@ class Viewers {
     PictureView view;
   };
 
-  explicit Viewers(const SceneDesc& scene) : scene_(scene) {}
+  explicit Viewers(const SceneDesc& scene);
 
-  /// A Source gets a place too, without any stream. LimitExceeded when too many different pictures are asked
-  /// for, BadInput for a size that cannot be drawn.
-  Result<Place> add(SessionId session, const Hello& hello);
+  /// A Source gets a place too, without any stream. Unavailable while too many pictures are drawn for others,
+  /// BadInput for a size that cannot be drawn.
+  Result<Place> add(const Visitor& visitor, const Hello& hello);
   void remove(SessionId session);
   /// The new picture class of a viewer of frames; none for one of strands, whose camera is kept for later.
   /// NotFound for a session that views nothing.
@@ -63,8 +63,8 @@ class Viewers {
   /// The session has got the first frame of this mode.
   void set_mode(SessionId session, StreamMode mode, int64_t time_ns);
 
-  /// Moves the viewer along its ladder. NotFound for a session without pictures, LimitExceeded when too many
-  /// different pictures are drawn; it then keeps what it had.
+  /// Moves the viewer along its ladder. NotFound for a session without pictures, Unavailable as in
+  /// PictureViews; it then keeps what it had.
   Result<Pictures> set_picture_step(SessionId session, size_t step);
   /// Nothing for a session without pictures.
   std::optional<Pictures> pictures(SessionId session) const;
@@ -84,6 +84,7 @@ class Viewers {
  private:
   struct Viewer {
     Role role = Role::Viewer;
+    std::string peer;
     StreamMode wanted = StreamMode::Strands;  // may be Auto
     StreamMode mode = StreamMode::Strands;    // of the frames it gets
     std::optional<StreamMode> next;           // the change to this mode is under way
@@ -101,6 +102,7 @@ class Viewers {
 
     bool gets(StreamMode kind) const { return role != Role::Source && (mode == kind || next == kind); }
   };
+  Result<PictureClass> assign_view(SessionId session, const Viewer& viewer, const PictureView& view);
   ModeChoice choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns);
   std::optional<ModeSwitch> begin_change(SessionId session, const ModeChoice& choice, int64_t time_ns);
   ModeSwitch stay(SessionId session, const std::string& reason);

@@ -17,10 +17,16 @@ constexpr size_t kMaxPendingBytes = 64u << 20;
 constexpr double kMsPerNs = 1e-6;
 constexpr double kNsPerS = 1e9;
 constexpr int kFrameThreadNice = 10;
+/// Weight of the newest drawing in what a view costs: a first drawing also pays for buffers and shaders.
+constexpr double kNewestCostShare = 0.5;
 
 /// Whether other views can still be drawn: this one is too large, say, or its camera impossible.
 bool concerns_view_only(const Error& error) {
   return error.code == ErrorCode::BadInput || error.code == ErrorCode::LimitExceeded;
+}
+
+double pixels_of(const PictureView& view) {
+  return static_cast<double>(view.size.width) * static_cast<double>(view.size.height);
 }
 
 double ms_since(int64_t begin_ns) {
@@ -123,7 +129,7 @@ void FrameWorker::run() {
       if (const auto drawn = drawn_.find(picture_class); drawn != drawn_.end())
         drawn->second.is_whole_wanted = drawn->second.encoder != nullptr;
     const auto due = next_due();
-    if (due && due->time_ns <= now_ns()) serve(*due);
+    if (due && due->wait.due_ns <= now_ns()) serve(*due);
   }
   painter_.reset();  // on the thread that owns its context
 }
@@ -134,7 +140,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
     const bool has_news = is_stopping_ || can_draw() != is_active_ || has_new_views_ || !pending_.empty() ||
                           !wanted_wholes_.empty();
     const auto due = is_active_ ? next_due() : std::nullopt;
-    const int64_t wait_ns = due ? due->time_ns - now_ns() : 1;
+    const int64_t wait_ns = due ? due->wait.due_ns - now_ns() : 1;
     if (has_news || wait_ns <= 0) break;
     if (due)
       changed_.wait_for(lock, std::chrono::nanoseconds(wait_ns));
@@ -178,8 +184,50 @@ void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
       drawn.encoder.reset();
       drawn.is_whole_wanted = false;
     }
+    if (pixels_of(drawn.view) != pixels_of(view)) drawn.cost_ms = 0.0;
     drawn.view = view;
   }
+  share_time();
+}
+
+/// Settles how often each view may be drawn. Classes that look alike are one drawing.
+void FrameWorker::share_time() {
+  const double interval_ms = static_cast<double>(frame_interval_ns_) * kMsPerNs;
+  std::vector<std::vector<Drawn*>> alike;
+  std::vector<PictureLoad> loads;
+  for (auto& [picture_class, drawn] : drawn_) {
+    if (drawn.is_refused) continue;
+    size_t i = 0;
+    while (i < alike.size() && !look_alike(alike[i].front()->view, drawn.view)) ++i;
+    if (i == alike.size()) {
+      alike.emplace_back();
+      loads.push_back({0.0, drawn.view.rate_divisor * interval_ms});
+    }
+    alike[i].push_back(&drawn);
+    const double guess_ms = ms_per_pixel_ * pixels_of(drawn.view);
+    loads[i].cost_ms = std::max(loads[i].cost_ms, drawn.cost_ms > 0.0 ? drawn.cost_ms : guess_ms);
+    loads[i].period_ms = std::min(loads[i].period_ms, drawn.view.rate_divisor * interval_ms);
+  }
+  const std::vector<PictureTurn> turns = share_drawing_time(loads);
+  for (size_t i = 0; i < alike.size(); ++i)
+    for (Drawn* drawn : alike[i]) {
+      const auto spacing_ns = static_cast<int64_t>(turns[i].spacing_ms / kMsPerNs);
+      drawn->spacing_ns = std::max(spacing_ns, drawn->view.rate_divisor * frame_interval_ns_);
+      drawn->is_blocking = turns[i].is_blocking;
+    }
+}
+
+void FrameWorker::note_cost(const std::vector<uint32_t>& classes, double cost_ms) {
+  for (const uint32_t picture_class : classes) {
+    Drawn& drawn = drawn_[picture_class];
+    ms_per_pixel_ = cost_ms / pixels_of(drawn.view);
+    drawn.cost_ms = drawn.cost_ms == 0.0
+                        ? cost_ms
+                        : kNewestCostShare * cost_ms + (1.0 - kNewestCostShare) * drawn.cost_ms;
+  }
+  share_time();
+  if (!classes.empty() && drawn_[classes.front()].is_blocking)
+    blocking_rest_ns_ = now_ns() + static_cast<int64_t>(blocking_rest_ms(cost_ms) / kMsPerNs);
 }
 
 void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
@@ -208,9 +256,10 @@ void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
 std::optional<FrameWorker::Due> FrameWorker::next_due() const {
   std::optional<Due> first;
   if (snapshot_ == nullptr) return first;
+  const int64_t time_ns = now_ns();
   for (const auto& [picture_class, drawn] : drawn_) {
     const auto due = next_due_of(picture_class, drawn);
-    if (due && (!first || due->time_ns < first->time_ns)) first = due;
+    if (due && (!first || goes_before(due->wait, first->wait, time_ns))) first = due;
   }
   return first;
 }
@@ -219,7 +268,8 @@ std::optional<FrameWorker::Due> FrameWorker::next_due_of(uint32_t picture_class,
   std::optional<Due> first;
   if (drawn.is_refused) return first;
   const auto consider = [&](Task task, int64_t time_ns) {
-    if (!first || time_ns < first->time_ns) first = Due{picture_class, task, time_ns};
+    if (!first || time_ns < first->wait.due_ns)
+      first = Due{picture_class, task, {time_ns, time_ns + drawn.spacing_ns}};
   };
   if (drawn.decode_count != decode_count_) consider(Task::Paint, paint_due_ns(drawn));
   if (drawn.encoder == nullptr) return first;
@@ -230,7 +280,8 @@ std::optional<FrameWorker::Due> FrameWorker::next_due_of(uint32_t picture_class,
 }
 
 int64_t FrameWorker::paint_due_ns(const Drawn& drawn) const {
-  return drawn.begin_ns == 0 ? 0 : drawn.begin_ns + drawn.view.rate_divisor * frame_interval_ns_;
+  const int64_t due_ns = drawn.begin_ns == 0 ? 0 : drawn.begin_ns + drawn.spacing_ns;
+  return drawn.is_blocking ? std::max(due_ns, blocking_rest_ns_) : due_ns;
 }
 
 void FrameWorker::serve(const Due& due) {
@@ -250,12 +301,8 @@ void FrameWorker::paint_alike(const PictureView& view) {
     drawn.begin_ns = begin_ns;
     classes.push_back(picture_class);
   }
-  const auto image = [&]() -> Result<Image> {
-    if (painter_ == nullptr) {
-      ASSIGN_OR_RETURN(painter_, make_painter_());
-    }
-    return painter_->paint(snapshot_, view);
-  }();
+  const bool had_painter = painter_ != nullptr;
+  const Result<Image> image = paint(view);
   {
     const std::lock_guard lock(mutex_);
     ++counters_.paints;
@@ -271,6 +318,15 @@ void FrameWorker::paint_alike(const PictureView& view) {
       fail(image.error());
     }
   }
+  // Making the painter compiles shaders, which is no cost of this view.
+  if (image && had_painter) note_cost(classes, ms_since(begin_ns));
+}
+
+Result<Image> FrameWorker::paint(const PictureView& view) {
+  if (painter_ == nullptr) {
+    ASSIGN_OR_RETURN(painter_, make_painter_());
+  }
+  return painter_->paint(snapshot_, view);
 }
 
 PictureStamp FrameWorker::stamp(uint32_t picture_class) const {

@@ -1,6 +1,7 @@
 // FrameWorker: a thread that decodes the strand stream as a client would, draws it for the viewers who asked
-// for frames and encodes the pictures: one drawing per camera and size, one encode per picture class. It
-// sleeps while there are none, and nothing waits for it. All functions from any thread.
+// for frames and encodes the pictures: one drawing per camera and size, one encode per picture class, and
+// each view gets a fair share of the time (picture_turns.h). It sleeps while there are none, and nothing
+// waits for it. All functions from any thread.
 #pragma once
 
 #include <condition_variable>
@@ -13,6 +14,7 @@
 #include <optional>
 #include <set>
 #include <thread>
+#include <vector>
 
 #include "common/base/profile.h"
 #include "common/base/result.h"
@@ -20,6 +22,7 @@
 #include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "server/encode/picture_painter.h"
+#include "server/encode/picture_turns.h"
 #include "server/encode/picture_views.h"
 
 namespace strandcast {
@@ -92,6 +95,9 @@ class FrameWorker {
     uint64_t decode_count = 0;                // when last drawn, 0 = never with this view
     int64_t begin_ns = 0;                     // when that drawing began; 0 = never
     int64_t change_ns = 0;                    // when the picture last changed
+    double cost_ms = 0.0;                     // smoothed, of drawing and encoding this view; 0 = not known
+    int64_t spacing_ns = 0;                   // between the beginnings of two drawings
+    bool is_blocking = false;                 // as in PictureTurn
     bool is_still = false;                    // and was sent finely since
     bool is_whole_wanted = false;
     bool is_refused = false;  // this view cannot be drawn
@@ -107,7 +113,7 @@ class FrameWorker {
   struct Due {
     uint32_t picture_class = 0;
     Task task = Task::Paint;
-    int64_t time_ns = 0;
+    PictureWait wait;
   };
 
   void run();
@@ -117,11 +123,14 @@ class FrameWorker {
   void rest();
   void update_views(const std::map<uint32_t, PictureView>& views);
   void decode(const std::deque<EncodedFramePtr>& strand_frames);
+  void share_time();
+  void note_cost(const std::vector<uint32_t>& classes, double cost_ms);
   std::optional<Due> next_due() const;
   std::optional<Due> next_due_of(uint32_t picture_class, const Drawn& drawn) const;
   int64_t paint_due_ns(const Drawn& drawn) const;
   void serve(const Due& due);
   void paint_alike(const PictureView& view);
+  Result<Image> paint(const PictureView& view);
   Status encode(uint32_t picture_class, const Image& image);
   Status resend(const Due& due);
   PictureStamp stamp(uint32_t picture_class) const;
@@ -155,6 +164,8 @@ class FrameWorker {
   uint64_t decode_count_ = 0;
   bool is_chain_lost_ = true;  // until a keyframe comes
   std::map<uint32_t, Drawn> drawn_;
+  double ms_per_pixel_ = 0.0;     // of the newest drawing: the guess for views that were never drawn
+  int64_t blocking_rest_ns_ = 0;  // until then no blocking view is drawn
 
   std::thread thread_;  // last: starts when everything else is there
 };

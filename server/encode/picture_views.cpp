@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace strandcast {
 namespace {
@@ -15,6 +16,22 @@ constexpr uint32_t kMaxPictureRateDivisor = 64;
 
 bool is_finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+uint64_t pixels_of(const PictureView& view) {
+  return uint64_t{view.size.width} * view.size.height;
+}
+
+std::string pixels_text(const char* whose, uint64_t wanted, uint64_t limit) {
+  constexpr double kMillion = 1e6;
+  return fmt::format("{} would have {:.1f} million pixels of pictures, and may have {:.1f}", whose,
+                     static_cast<double>(wanted) / kMillion, static_cast<double>(limit) / kMillion);
+}
+
+Error no_room(const std::string& why) {
+  return make_error(
+      ErrorCode::Unavailable,
+      "{}: ask for the scene's own picture, for a smaller one or for strands, or try again later", why);
 }
 
 }  // namespace
@@ -53,59 +70,97 @@ Status validate(const PictureView& view) {
   return {};
 }
 
-size_t PictureViews::members(uint32_t picture_class) const {
-  return static_cast<size_t>(std::count_if(class_of_viewer_.begin(), class_of_viewer_.end(),
-                                           [&](const auto& entry) { return entry.second == picture_class; }));
+size_t PictureViews::member_count(uint32_t picture_class) const {
+  return static_cast<size_t>(std::count_if(members_.begin(), members_.end(), [&](const auto& entry) {
+    return entry.second.picture_class == picture_class;
+  }));
 }
 
-Result<uint32_t> PictureViews::assign(uint64_t viewer, const PictureView& view) {
+/// The scene's own picture, in any codec.
+bool PictureViews::is_reserved(const PictureView& view) const {
+  PictureView same = view;
+  same.codec = reserved_.codec;
+  return same == reserved_;
+}
+
+Result<uint32_t> PictureViews::assign(const PictureOwner& owner, const PictureView& view) {
   RETURN_IF_ERROR(validate(view));
-  const auto held = class_of_viewer_.find(viewer);
-  const bool is_alone = held != class_of_viewer_.end() && members(held->second) == 1;
-  for (const auto& [picture_class, other] : view_of_class_) {
-    if (!(other == view)) continue;
-    const uint32_t joined = picture_class;
-    if (is_alone && held->second != joined) view_of_class_.erase(held->second);
-    class_of_viewer_[viewer] = joined;
+  const auto held = members_.find(owner.viewer);
+  const uint32_t held_class = held != members_.end() ? held->second.picture_class : 0;
+  const bool is_alone = held_class != 0 && member_count(held_class) == 1;
+  const auto equal = std::find_if(view_of_class_.begin(), view_of_class_.end(),
+                                  [&](const auto& entry) { return entry.second == view; });
+  if (equal != view_of_class_.end()) {
+    const uint32_t joined = equal->first;
+    if (is_alone && held_class != joined) view_of_class_.erase(held_class);
+    members_[owner.viewer] = {owner, joined};
     return joined;
   }
-  const uint32_t own_class = is_alone ? held->second : 0;
-  if (!has_room(view, own_class))
-    return make_error(ErrorCode::LimitExceeded,
-                      "{} different pictures are being drawn already; ask for one of them or for strands",
-                      kMaxPictureViews);
-  if (is_alone) {
-    view_of_class_[own_class] = view;
-    return own_class;
-  }
-  view_of_class_[next_class_] = view;
-  class_of_viewer_[viewer] = next_class_;
-  return next_class_++;
+  RETURN_IF_ERROR(check_room(owner, view, is_alone ? held_class : 0));
+  const uint32_t own_class = is_alone ? held_class : next_class_++;
+  view_of_class_[own_class] = view;
+  members_[owner.viewer] = {owner, own_class};
+  return own_class;
 }
 
-/// Whether the view can be drawn and encoded besides all classes but `left_class`.
-bool PictureViews::has_room(const PictureView& view, uint32_t left_class) const {
+/// Of this view and of all classes that count and are not reserved.
+template <class IsCounted>
+PictureUse PictureViews::use_with(const PictureView& view, IsCounted is_counted) const {
   std::vector<PictureView> drawn = {view};
-  size_t classes = 1;
+  PictureUse use{0, 1, pixels_of(view)};
   for (const auto& [picture_class, other] : view_of_class_) {
-    if (picture_class == left_class) continue;
-    ++classes;
+    if (is_reserved(other) || !is_counted(picture_class)) continue;
+    ++use.classes;
+    use.pixels += pixels_of(other);
     const auto is_same = [&](const PictureView& one) { return look_alike(one, other); };
     if (std::none_of(drawn.begin(), drawn.end(), is_same)) drawn.push_back(other);
   }
-  return drawn.size() <= kMaxPictureViews && classes <= kMaxPictureClasses;
+  use.views = drawn.size();
+  return use;
+}
+
+/// Whether the view can be drawn and encoded besides all classes but `left_class`, and is within the share of
+/// its owner. A class that several share counts for each of their addresses.
+Status PictureViews::check_room(const PictureOwner& owner, const PictureView& view,
+                                uint32_t left_class) const {
+  if (is_reserved(view)) return {};
+  const auto has_member = [&](uint32_t picture_class, auto is_one) {
+    return std::any_of(members_.begin(), members_.end(), [&](const auto& entry) {
+      return entry.second.picture_class == picture_class && is_one(entry.second.owner);
+    });
+  };
+  const PictureUse all = use_with(view, [&](uint32_t one) { return one != left_class; });
+  const PictureUse of_viewers = use_with(view, [&](uint32_t one) {
+    return one != left_class && !has_member(one, [](const auto& other) { return other.is_controller; });
+  });
+  const PictureUse of_peer = use_with(view, [&](uint32_t one) {
+    return one != left_class && has_member(one, [&](const auto& other) { return other.peer == owner.peer; });
+  });
+  // The scene's own view has its place among the views.
+  if (all.views > kMaxPictureViews - 1 || all.classes > kMaxPictureClasses - kReservedPictureClasses)
+    return no_room(fmt::format("{} different pictures are being drawn already", all.classes - 1));
+  if (of_peer.views > kMaxPictureViewsOfPeer || of_peer.classes > kMaxPictureClassesOfPeer)
+    return no_room(
+        fmt::format("{} different pictures are being drawn for this address already", of_peer.classes - 1));
+  if (of_peer.pixels > kMaxPeerPixels)
+    return no_room(pixels_text("one address", of_peer.pixels, kMaxPeerPixels));
+  if (!owner.is_controller && of_viewers.pixels > kMaxViewerPixels)
+    return no_room(pixels_text("viewers", of_viewers.pixels, kMaxViewerPixels));
+  if (all.pixels > kMaxPicturePixels)
+    return no_room(pixels_text("all together", all.pixels, kMaxPicturePixels));
+  return {};
 }
 
 uint32_t PictureViews::class_of(uint64_t viewer) const {
-  const auto found = class_of_viewer_.find(viewer);
-  return found != class_of_viewer_.end() ? found->second : 0;
+  const auto found = members_.find(viewer);
+  return found != members_.end() ? found->second.picture_class : 0;
 }
 
 void PictureViews::remove(uint64_t viewer) {
-  const auto held = class_of_viewer_.find(viewer);
-  if (held == class_of_viewer_.end()) return;
-  if (members(held->second) == 1) view_of_class_.erase(held->second);
-  class_of_viewer_.erase(held);
+  const auto held = members_.find(viewer);
+  if (held == members_.end()) return;
+  if (member_count(held->second.picture_class) == 1) view_of_class_.erase(held->second.picture_class);
+  members_.erase(held);
 }
 
 std::map<uint32_t, PictureView> PictureViews::views() const {

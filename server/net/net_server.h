@@ -29,6 +29,12 @@ inline constexpr uint32_t kMaxSessionsPerAddress = 64;
 
 using SessionId = uint64_t;  // never reused by one server
 
+/// Who says Hello.
+struct Visitor {
+  SessionId session = 0;
+  std::string peer;  // what counts as one address, for shares
+};
+
 /// Limits of one session; tests shorten the times.
 struct NetLimits {
   uint32_t sessions = kMaxSessions;
@@ -103,9 +109,9 @@ struct ModeSwitch {
 class NetHandler {
  public:
   virtual ~NetHandler() = default;
-  /// An error closes the session with its sentence: LimitExceeded as Full, Unauthorized as Unauthorized, else
-  /// Policy.
-  virtual Result<Admission> on_hello(SessionId session, const Hello& hello) = 0;
+  /// An error closes the session with its sentence: LimitExceeded as Full, Unavailable as TryLater,
+  /// Unauthorized as Unauthorized, else Policy.
+  virtual Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) = 0;
   virtual void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) = 0;
   virtual void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) = 0;
   virtual void on_command(SessionId session, const ControlCommand& command) = 0;

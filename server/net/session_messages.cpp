@@ -15,6 +15,8 @@ CloseCode close_code_for(const Error& error) {
   switch (error.code) {
     case ErrorCode::LimitExceeded:
       return CloseCode::Full;
+    case ErrorCode::Unavailable:
+      return CloseCode::TryLater;
     case ErrorCode::Unauthorized:
       return CloseCode::Unauthorized;
     default:
@@ -59,7 +61,7 @@ void Session::join(const Hello& hello) {
              allowed.error().to_string());
     return close(close_code_for(allowed.error()), allowed.error().to_string());
   }
-  Result<Admission> admission = context_.handler.on_hello(id_, hello);
+  Result<Admission> admission = context_.handler.on_hello({id_, peer_.key}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   hello_.token.clear();

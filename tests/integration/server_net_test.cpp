@@ -238,15 +238,16 @@ TEST_F(ServerNet, HandlerErrorsAndExceptionsEndOneSession) {
   start();
   app_.publish_next();
   auto healthy = join();
-  for (const char* name : {"throw", "refuse"}) {
+  const std::vector<std::pair<std::string, CloseCode>> cases = {
+      {"throw", CloseCode::Internal}, {"refuse", CloseCode::Policy}, {"no place", CloseCode::TryLater}};
+  for (const auto& [name, expected] : cases) {
     RawClient client(server_->port());
     ASSERT_TRUE(client.handshake());
     Hello message = hello();
     message.name = name;
     client.send(message);
     const RawClient::End end = client.read_end();
-    EXPECT_EQ(end.close_code,
-              name == std::string("throw") ? code(CloseCode::Internal) : code(CloseCode::Policy));
+    EXPECT_EQ(end.close_code, code(expected)) << name;
     EXPECT_FALSE(end.reason.empty());
   }
   healthy->send(Ping{1});

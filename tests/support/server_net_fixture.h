@@ -33,11 +33,12 @@ inline EncodedFramePtr media(Opcode opcode, uint32_t sequence, uint32_t base_seq
 /// A chain of strand frames like an encoder's; also the handler that counts what reached the application.
 class FakeApp : public NetHandler {
  public:
-  Result<Admission> on_hello(SessionId session, const Hello& hello) override {
+  Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override {
     if (hello.name == "throw") throw std::runtime_error("handler failed on purpose");
     if (hello.name == "refuse") return make_error(ErrorCode::BadInput, "Refused on purpose.");
+    if (hello.name == "no place") return make_error(ErrorCode::Unavailable, "No place on purpose.");
     const std::lock_guard lock(mutex_);
-    joined_.insert(session);
+    joined_.insert(visitor.session);
     Admission admission;
     admission.welcome.session_id = "0123456789abcdef";
     admission.welcome.scene_name = "fake";

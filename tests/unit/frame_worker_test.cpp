@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <map>
 #include <set>
 #include <thread>
 
@@ -16,6 +17,7 @@ constexpr uint32_t kStrands = 6;
 constexpr uint32_t kVertices = 4;
 constexpr double kFastHz = 1e6;    // no pause between frames
 constexpr double kNeverHz = 1e-6;  // the first frame and no other
+constexpr std::chrono::milliseconds kSlowPaint{20};
 
 Snapshot make_state(uint64_t tick) {
   Snapshot snapshot;
@@ -39,6 +41,8 @@ struct Studio {
   bool is_dark = false;
   int paints = 0;
   uint32_t largest_width = 1000;  // of what can be painted
+  uint32_t quick_width = 1000;    // of what is painted at once; larger pictures take kSlowPaint
+  std::map<uint32_t, int> paints_by_width;
   int painters_made = 0;
   int painters_alive = 0;
   std::set<std::thread::id> threads;
@@ -81,6 +85,8 @@ class FakePainter : public PicturePainter {
     if (width > studio_.largest_width)
       return make_error(ErrorCode::LimitExceeded, "the canvas has {} columns", studio_.largest_width);
     ++studio_.paints;
+    ++studio_.paints_by_width[width];
+    if (width > studio_.quick_width) std::this_thread::sleep_for(kSlowPaint);
     // Another state or camera gives another picture, unless the studio is dark.
     Image image{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height * 4, 255)};
     const auto level =
@@ -424,6 +430,26 @@ TEST_F(FrameWork, AnotherSizeOrCodecGoesOnWithTheNumbersOfTheClass) {
   ASSERT_TRUE(eventually([&] { return frame_count() == 3; }));
   for (uint32_t i = 0; i < 3; ++i) EXPECT_EQ(frames()[i].second->header.sequence, i + 1);
   EXPECT_EQ(frames()[2].second->header.opcode, Opcode::Vp8Frame);
+}
+
+// Both wait for a turn all the time: taking turns one by one would give each as many.
+TEST_F(FrameWork, AViewThatTakesLongIsDrawnMoreRarelyThanOneThatDoesNot) {
+  studio_.quick_width = 100;
+  const auto worker = start(kFastHz);
+  next_delta();
+  auto views = one_view();
+  views[2].size = {112, 16};
+  worker->set_views(views);
+  join_chain(*worker);
+  const auto paints = [&](uint32_t width) {
+    return studio_.get([&](Studio& s) { return s.paints_by_width[width]; });
+  };
+  ASSERT_TRUE(eventually([&] {
+    worker->offer(next_delta());
+    if (requests_.exchange(0) > 0) worker->offer(keyframe());
+    return paints(112) >= 8;
+  }));
+  EXPECT_GE(paints(32), 3 * paints(112));
 }
 
 TEST_F(FrameWork, AFailedDrawingEndsFramesToo) {

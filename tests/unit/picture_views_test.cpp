@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 
 namespace strandcast {
 namespace {
@@ -14,65 +15,139 @@ PictureView view_at(float x_m) {
   return view;
 }
 
+/// The picture of the scene, which no test asks for by accident.
+PictureView scene_view() {
+  PictureView view = view_at(-5.0f);
+  view.size = {640, 360};
+  return view;
+}
+
+/// One who has an address of its own.
+PictureOwner one(uint64_t viewer) {
+  return {viewer, std::to_string(viewer), false};
+}
+
 TEST(PictureViews, EqualViewsShareAClassAndOthersDoNot) {
-  PictureViews views;
-  const auto a = views.assign(1, view_at(0.0f));
-  const auto b = views.assign(2, view_at(0.0f));
-  const auto c = views.assign(3, view_at(0.5f));
+  PictureViews views(scene_view());
+  const auto a = views.assign(one(1), view_at(0.0f));
+  const auto b = views.assign(one(2), view_at(0.0f));
+  const auto c = views.assign(one(3), view_at(0.5f));
   ASSERT_TRUE(a && b && c);
   EXPECT_EQ(*a, *b);
   EXPECT_NE(*a, *c);
   PictureView better = view_at(0.0f);
   better.quality = 95;
-  EXPECT_NE(*views.assign(4, better), *a);
+  EXPECT_NE(*views.assign(one(4), better), *a);
   better.size = {320, 180};
   EXPECT_EQ(views.views().size(), 3u);
 }
 
 TEST(PictureViews, AViewerAloneKeepsItsClassWhenItsCameraMoves) {
-  PictureViews views;
-  const uint32_t first = *views.assign(1, view_at(0.0f));
-  for (int i = 1; i < 100; ++i) EXPECT_EQ(*views.assign(1, view_at(0.125f * static_cast<float>(i))), first);
+  PictureViews views(scene_view());
+  const uint32_t first = *views.assign(one(1), view_at(0.0f));
+  for (int i = 1; i < 100; ++i)
+    EXPECT_EQ(*views.assign(one(1), view_at(0.125f * static_cast<float>(i))), first);
   EXPECT_EQ(views.views().size(), 1u);
   EXPECT_EQ(views.views().at(first), view_at(0.125f * 99.0f));
 }
 
 TEST(PictureViews, AViewerLeavesASharedClassToTheOthers) {
-  PictureViews views;
-  const uint32_t shared = *views.assign(1, view_at(0.0f));
-  ASSERT_TRUE(views.assign(2, view_at(0.0f)));
-  const uint32_t own = *views.assign(1, view_at(0.3f));
+  PictureViews views(scene_view());
+  const uint32_t shared = *views.assign(one(1), view_at(0.0f));
+  ASSERT_TRUE(views.assign(one(2), view_at(0.0f)));
+  const uint32_t own = *views.assign(one(1), view_at(0.3f));
   EXPECT_NE(own, shared);
   EXPECT_EQ(views.views().at(shared), view_at(0.0f));
-  EXPECT_EQ(*views.assign(1, view_at(0.0f)), shared);
+  EXPECT_EQ(*views.assign(one(1), view_at(0.0f)), shared);
   EXPECT_EQ(views.views().size(), 1u) << "the class it was alone in is gone";
 }
 
 TEST(PictureViews, ThereAreOnlyAFewClassesAndRefusalChangesNothing) {
-  PictureViews views;
-  for (uint64_t viewer = 0; viewer < kMaxPictureViews; ++viewer)
-    ASSERT_TRUE(views.assign(viewer, view_at(static_cast<float>(viewer))));
-  const auto refused = views.assign(99, view_at(9.0f));
+  PictureViews views(scene_view());
+  for (uint64_t viewer = 0; viewer + 1 < kMaxPictureViews; ++viewer)
+    ASSERT_TRUE(views.assign(one(viewer), view_at(static_cast<float>(viewer))));
+  const auto refused = views.assign(one(99), view_at(9.0f));
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
-  EXPECT_EQ(views.viewer_count(), kMaxPictureViews);
-  const uint32_t shared = *views.assign(99, view_at(1.0f));
-  ASSERT_FALSE(views.assign(99, view_at(9.0f)));
-  EXPECT_EQ(*views.assign(100, view_at(1.0f)), shared);
+  EXPECT_EQ(refused.error().code, ErrorCode::Unavailable);
+  EXPECT_EQ(views.viewer_count(), kMaxPictureViews - 1);
+  const uint32_t shared = *views.assign(one(99), view_at(1.0f));
+  ASSERT_FALSE(views.assign(one(99), view_at(9.0f)));
+  EXPECT_EQ(*views.assign(one(100), view_at(1.0f)), shared);
   views.remove(0);
-  EXPECT_TRUE(views.assign(99, view_at(9.0f))) << "a place came free";
+  EXPECT_TRUE(views.assign(one(99), view_at(9.0f))) << "a place came free";
+}
+
+PictureView sized(uint32_t width, uint32_t height, float x_m = 0.0f) {
+  PictureView view = view_at(x_m);
+  view.size = {width, height};
+  return view;
+}
+
+TEST(PictureViews, ThePictureOfTheSceneHasRoomInEveryCodecWhateverOthersTake) {
+  PictureViews views(scene_view());
+  uint64_t viewer = 0;
+  // As many classes as there can be, of as many addresses.
+  for (int quality = 1; quality <= 100; ++quality) {
+    PictureView view = scene_view();
+    view.quality = quality == scene_view().quality ? 99 : quality;
+    if (!views.assign(one(viewer++), view)) break;
+  }
+  ASSERT_EQ(views.views().size(), kMaxPictureClasses - kReservedPictureClasses);
+  for (const PictureCodec codec : kPictureCodecs) {
+    PictureView view = scene_view();
+    view.codec = codec;
+    EXPECT_TRUE(views.assign(one(viewer++), view)) << to_string(codec);
+  }
+  EXPECT_EQ(views.views().size(), kMaxPictureClasses);
+}
+
+TEST(PictureViews, OneAddressCannotTakeAllViews) {
+  PictureViews views(scene_view());
+  uint64_t viewer = 0;
+  const auto of_crowd = [&](const PictureView& view) {
+    return views.assign({viewer++, "crowd", true}, view);
+  };
+  for (size_t i = 0; i < kMaxPictureViewsOfPeer; ++i)
+    ASSERT_TRUE(of_crowd(sized(64, 64, static_cast<float>(i))));
+  const auto refused = of_crowd(sized(64, 64, 9.0f));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("for this address"));
+  EXPECT_TRUE(views.assign(one(99), sized(64, 64, 9.0f))) << "another address has room";
+  EXPECT_TRUE(of_crowd(sized(64, 64, 0.0f))) << "what is drawn already costs nothing";
+}
+
+TEST(PictureViews, PixelsAreBoundedForAnAddressForViewersAndInAll) {
+  PictureViews views(scene_view());
+  // Of one address: exactly one picture of the largest size.
+  ASSERT_EQ(kMaxPeerPixels, kLargestPicturePixels);
+  ASSERT_TRUE(views.assign({1, "a", true}, sized(kMaxPictureWidth, kMaxPictureHeight)));
+  EXPECT_FALSE(views.assign({2, "a", true}, sized(16, 16)));
+  // In all: a second one of another address, and then nothing.
+  ASSERT_TRUE(views.assign({3, "b", true}, sized(kMaxPictureWidth, kMaxPictureHeight, 1.0f)));
+  EXPECT_FALSE(views.assign({4, "c", true}, sized(16, 16)));
+  EXPECT_TRUE(views.assign({4, "c", false}, scene_view())) << "but the scene's own";
+  views.remove(1);
+  views.remove(3);
+  // Viewers together: one and a half.
+  ASSERT_TRUE(views.assign({5, "a", false}, sized(kMaxPictureWidth, kMaxPictureHeight)));
+  ASSERT_TRUE(views.assign({6, "b", false}, sized(kMaxPictureWidth, kMaxPictureHeight / 2)));
+  EXPECT_FALSE(views.assign({7, "c", false}, sized(16, 16)));
+  EXPECT_TRUE(views.assign({7, "c", true}, sized(kMaxPictureWidth, kMaxPictureHeight / 2))) << "a controller";
+  // Who has taken its share may still look elsewhere, or ask for less.
+  EXPECT_TRUE(views.assign({5, "a", false}, sized(kMaxPictureWidth, kMaxPictureHeight, 2.0f)));
+  EXPECT_TRUE(views.assign({5, "a", false}, sized(kMaxPictureWidth / 2, kMaxPictureHeight, 2.0f)));
 }
 
 TEST(PictureViews, ClassesEndWithTheirLastViewerAndNumbersDoNotReturn) {
-  PictureViews views;
-  const uint32_t first = *views.assign(1, view_at(0.0f));
-  ASSERT_TRUE(views.assign(2, view_at(0.0f)));
+  PictureViews views(scene_view());
+  const uint32_t first = *views.assign(one(1), view_at(0.0f));
+  ASSERT_TRUE(views.assign(one(2), view_at(0.0f)));
   views.remove(1);
   EXPECT_EQ(views.views().size(), 1u);
   views.remove(2);
   views.remove(2);
   EXPECT_TRUE(views.views().empty());
-  EXPECT_NE(*views.assign(1, view_at(0.0f)), first);
+  EXPECT_NE(*views.assign(one(1), view_at(0.0f)), first);
 }
 
 TEST(PictureViews, RefusesViewsThatCannotBeDrawn) {

@@ -92,15 +92,19 @@ Hello hello(Role role, StreamMode mode, uint32_t width = 0, uint32_t height = 0)
   return message;
 }
 
+Visitor from(SessionId session, const std::string& peer = "10.0.0.1") {
+  return {session, peer};
+}
+
 TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   Viewers viewers(built_in_scene());
-  const auto automatic = viewers.add(1, hello(Role::Viewer, StreamMode::Auto));
+  const auto automatic = viewers.add(from(1), hello(Role::Viewer, StreamMode::Auto));
   ASSERT_TRUE(automatic.ok());
   EXPECT_EQ(automatic->mode, StreamMode::Strands);
   EXPECT_FALSE(automatic->reason.empty());
-  ASSERT_TRUE(viewers.add(2, hello(Role::Source, StreamMode::Frames)).ok());
-  const auto first = viewers.add(3, hello(Role::Viewer, StreamMode::Frames));
-  const auto second = viewers.add(4, hello(Role::Controller, StreamMode::Frames));
+  ASSERT_TRUE(viewers.add(from(2), hello(Role::Source, StreamMode::Frames)).ok());
+  const auto first = viewers.add(from(3), hello(Role::Viewer, StreamMode::Frames));
+  const auto second = viewers.add(from(4), hello(Role::Controller, StreamMode::Frames));
   ASSERT_TRUE(first.ok() && second.ok());
   EXPECT_EQ(first->picture_class, second->picture_class);
   EXPECT_EQ(viewers.facts().strand_viewers, 1u);
@@ -126,7 +130,7 @@ TEST(Viewers, AViewerGetsTheBestCodecItDecodes) {
   Hello message = hello(Role::Viewer, StreamMode::Frames);
   const auto codec_for = [&](PictureCodecs decodable) {
     message.picture_codecs = decodable;
-    EXPECT_TRUE(viewers.add(1, message).ok());
+    EXPECT_TRUE(viewers.add(from(1), message).ok());
     return viewers.pictures(1)->view.codec;
   };
   EXPECT_EQ(codec_for(0), PictureCodec::Jpeg) << "a client of before";
@@ -142,8 +146,8 @@ TEST(Viewers, AViewerGetsTheBestCodecItDecodes) {
 
 TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
   Viewers viewers(built_in_scene());
-  const auto first = viewers.add(1, hello(Role::Viewer, StreamMode::Frames, 640, 360));
-  const auto second = viewers.add(2, hello(Role::Viewer, StreamMode::Frames, 640, 360));
+  const auto first = viewers.add(from(1), hello(Role::Viewer, StreamMode::Frames, 640, 360));
+  const auto second = viewers.add(from(2), hello(Role::Viewer, StreamMode::Frames, 640, 360));
   ASSERT_TRUE(first.ok() && second.ok());
   ASSERT_EQ(first->picture_class, second->picture_class);
   EXPECT_EQ(viewers.pictures(1)->view.quality, 80) << "the scene's";
@@ -167,15 +171,43 @@ TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
   EXPECT_FALSE(viewers.set_picture_step(3, 0).ok());
 }
 
-TEST(Viewers, RefusesPicturesBeyondTheLimit) {
+/// Takes every place for pictures of their own that there is, from as many addresses as needed.
+void fill(Viewers& viewers) {
+  for (uint32_t i = 0; i + 1 < kMaxPictureViews; ++i)
+    ASSERT_TRUE(
+        viewers.add(from(10 + i, std::to_string(i)), hello(Role::Viewer, StreamMode::Frames, 64 + i, 64))
+            .ok());
+}
+
+TEST(Viewers, RefusesPicturesBeyondTheLimitForNowAndKeepsThePictureOfTheScene) {
   Viewers viewers(built_in_scene());
-  for (uint32_t i = 0; i < kMaxPictureViews; ++i)
-    ASSERT_TRUE(viewers.add(i, hello(Role::Viewer, StreamMode::Frames, 64 + i, 64)).ok());
-  const auto refused = viewers.add(100, hello(Role::Viewer, StreamMode::Frames, 512, 512));
+  ASSERT_NO_FATAL_FAILURE(fill(viewers));
+  const auto refused = viewers.add(from(100, "late"), hello(Role::Viewer, StreamMode::Frames, 512, 512));
   ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
-  EXPECT_FALSE(viewers.add(101, hello(Role::Viewer, StreamMode::Frames, 1'000'000, 2)).ok());
-  EXPECT_EQ(viewers.facts().frame_viewers, kMaxPictureViews);
+  EXPECT_EQ(refused.error().code, ErrorCode::Unavailable) << "later there may be room";
+  EXPECT_EQ(viewers.add(from(101), hello(Role::Viewer, StreamMode::Frames, 1'000'000, 2)).error().code,
+            ErrorCode::BadInput);
+  EXPECT_EQ(viewers.facts().frame_viewers, kMaxPictureViews - 1);
+  for (const PictureCodec codec : kPictureCodecs) {
+    Hello late = hello(Role::Viewer, StreamMode::Frames);
+    late.picture_codecs = codec_bit(codec);
+    EXPECT_TRUE(viewers.add(from(200 + static_cast<SessionId>(codec), "late"), late).ok())
+        << to_string(codec);
+  }
+}
+
+TEST(Viewers, AControllerFindsPixelsThatViewersCannotTake) {
+  Viewers viewers(built_in_scene());
+  const auto large = [&](SessionId session, Role role, const std::string& peer) {
+    return viewers.add(from(session, peer),
+                       hello(role, StreamMode::Frames, 1920 + 4 * static_cast<uint32_t>(session), 1080));
+  };
+  SessionId session = 0;
+  while (session < kMaxPictureViews && large(session, Role::Viewer, std::to_string(session)).ok()) ++session;
+  const auto refused = large(session, Role::Viewer, "late");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, HasSubstr("million pixels"));
+  EXPECT_TRUE(large(session, Role::Controller, "late").ok());
 }
 
 /// Facts under which both modes work and strands are the better ones.
@@ -190,7 +222,7 @@ constexpr int64_t kTick = 250'000'000;
 
 TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
   Viewers viewers(built_in_scene());
-  ASSERT_TRUE(viewers.add(1, hello(Role::Viewer, StreamMode::Strands, 64, 64)).ok());
+  ASSERT_TRUE(viewers.add(from(1), hello(Role::Viewer, StreamMode::Strands, 64, 64)).ok());
   int64_t time_ns = 1'000 * kTick;
   EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns)) << "nothing was asked for";
   viewers.request_mode(1, StreamMode::Frames);
@@ -228,7 +260,7 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
 
 TEST(Viewers, AChangeWithoutAFirstFrameIsGivenUp) {
   Viewers viewers(built_in_scene());
-  ASSERT_TRUE(viewers.add(1, hello(Role::Viewer, StreamMode::Auto)).ok());
+  ASSERT_TRUE(viewers.add(from(1), hello(Role::Viewer, StreamMode::Auto)).ok());
   viewers.set_report(1, {.device = DrawingDevice::None});
   EXPECT_EQ(viewers.report(1).device, DrawingDevice::None);
   ModeFacts facts = good_facts();
@@ -249,9 +281,8 @@ TEST(Viewers, AChangeWithoutAFirstFrameIsGivenUp) {
 
 TEST(Viewers, FramesThatCannotBeHadAreRefusedWithTheReason) {
   Viewers viewers(built_in_scene());
-  for (uint32_t i = 0; i < kMaxPictureViews; ++i)
-    ASSERT_TRUE(viewers.add(10 + i, hello(Role::Viewer, StreamMode::Frames, 64 + i, 64)).ok());
-  ASSERT_TRUE(viewers.add(1, hello(Role::Viewer, StreamMode::Strands)).ok());
+  ASSERT_NO_FATAL_FAILURE(fill(viewers));
+  ASSERT_TRUE(viewers.add(from(1), hello(Role::Viewer, StreamMode::Strands, 512, 512)).ok());
   viewers.request_mode(1, StreamMode::Frames);
   const auto full = viewers.consider(1, good_facts(), kTick);
   ASSERT_TRUE(full);
