@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/text.h"
 #include "common/groom/groom_asset.h"
 #include "common/log/log.h"
 #include "common/strands/scene_asset.h"
+#include "server/app/control_budget.h"
 #include "server/app/mode_facts.h"
 #include "server/app/scene_change.h"
 #include "server/app/viewers.h"
@@ -21,7 +23,13 @@ namespace strandcast {
 namespace {
 
 constexpr const char* kServerVersion = "0.1.0";
+constexpr size_t kMaxLoggedCharacters = 200;
 constexpr auto kStatusInterval = std::chrono::milliseconds(500);
+
+const char* name_of(Command command) {
+  constexpr const char* kNames[] = {"pause", "resume", "step once", "reset"};
+  return kNames[static_cast<size_t>(command)];
+}
 
 std::string make_session_id() {
   std::random_device random;
@@ -64,10 +72,10 @@ class Server::State : public NetHandler {
     hub_.push(session, samples, arrival_ns);
   }
   void on_command(SessionId session, const ControlCommand& command) override {
-    sim_->post(command, reply_to(session));
+    if (may_control(session, name_of(command.command))) sim_->post(command, reply_to(session));
   }
   void on_parameter(SessionId session, const SetParameter& parameter) override {
-    sim_->post(parameter, reply_to(session));
+    if (may_control(session, parameter.assignment)) sim_->post(parameter, reply_to(session));
   }
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_ack(SessionId, const FrameAck&) override {}
@@ -105,6 +113,7 @@ class Server::State : public NetHandler {
   SimLoop::Reply reply_to(SessionId session) {
     return [this, session](Notice notice) { net_->send(session, std::move(notice)); };
   }
+  bool may_control(SessionId session, std::string_view what);
   Welcome make_welcome(const Viewers::Place& place) const;
   void follow_viewers();
   void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);
@@ -118,6 +127,7 @@ class Server::State : public NetHandler {
   InputHub hub_;
   SnapshotSlot slot_;
   Viewers viewers_;
+  ControlBudget control_budget_;
   std::shared_ptr<const SceneContent> content_;
   std::shared_ptr<const SceneAsset> asset_;
   EncodedFramePtr asset_frame_;
@@ -355,7 +365,19 @@ void Server::State::on_link(SessionId session, const LinkState& link, int64_t ti
   follow_viewers();
 }
 
+/// Within the controller's budget, and on record.
+bool Server::State::may_control(SessionId session, std::string_view what) {
+  if (!control_budget_.take(session, now_ns())) {
+    net_->send(session, Notice{true, fmt::format("More than {:.0f} commands a second: this one was left out.",
+                                                 kControlsPerS)});
+    return false;
+  }
+  log_info("app", "{}: {}", viewers_.describe(session), one_line(what, kMaxLoggedCharacters));
+  return true;
+}
+
 void Server::State::on_left(SessionId session) {
+  control_budget_.remove(session);
   hub_.remove_source(session);
   viewers_.remove(session);
   follow_viewers();

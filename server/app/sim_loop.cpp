@@ -1,5 +1,6 @@
 #include "server/app/sim_loop.h"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <future>
@@ -91,6 +92,7 @@ Status SimLoop::begin() {
   const StreamDesc& stream = config_.scene.stream;
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
   publisher_.emplace(config_.content->groom, quantum_m);
+  stream_ = stream;
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
@@ -101,11 +103,9 @@ Status SimLoop::begin() {
 void SimLoop::loop() {
   while (true) {
     const std::deque<Job> jobs = wait_for_jobs();
-    {
-      const std::lock_guard lock(mutex_);
-      if (is_stopping_) return;
-    }
-    for (const Job& job : jobs) carry_out(job);
+    if (is_stopping_) return;
+    for (const Job& job : jobs) carry_out_in_turn(job);
+    follow_stream_settings();
     const auto time_ns = clock_->take_step(now_ns());
     if (time_ns) step(*time_ns);
     const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0);
@@ -116,16 +116,50 @@ void SimLoop::loop() {
 std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   // A job may have asked for a single step: it is taken by the turn of the loop that carries the job out, or,
   // when there are several, by the next ones, which then must not sleep.
-  const std::optional<int64_t> due_ns = clock_->next_due_ns();
-  const auto is_awake = [this] { return is_stopping_ || !jobs_.empty() || clock_->has_single_steps(); };
   std::unique_lock lock(mutex_);
-  if (due_ns) {
-    const std::chrono::steady_clock::time_point due{std::chrono::nanoseconds(*due_ns)};
-    changed_.wait_until(lock, due, is_awake);
+  const auto is_awake = [this] {
+    const auto is_facts = [](const Job& job) { return std::holds_alternative<RuntimeFacts>(job.what); };
+    const bool has_turn = !jobs_.empty() && now_ns() >= jobs_rest_ns_;
+    return is_stopping_ || has_turn || clock_->has_single_steps() ||
+           std::any_of(jobs_.begin(), jobs_.end(), is_facts);
+  };
+  std::optional<int64_t> wake_ns = clock_->next_due_ns();
+  const auto wake_by = [&](int64_t time_ns) { wake_ns = std::min(wake_ns.value_or(time_ns), time_ns); };
+  if (has_other_stream()) wake_by(stream_changed_ns_ + kStreamChangeNs);
+  if (now_ns() < jobs_rest_ns_) wake_by(jobs_rest_ns_);
+  if (wake_ns) {
+    const std::chrono::steady_clock::time_point wake{std::chrono::nanoseconds(*wake_ns)};
+    changed_.wait_until(lock, wake, is_awake);
   } else {
     changed_.wait(lock, is_awake);
   }
-  return std::exchange(jobs_, {});
+  return take_jobs();
+}
+
+/// All news of viewers, and the next command when it has its turn. mutex_ is held.
+std::deque<SimLoop::Job> SimLoop::take_jobs() {
+  std::deque<Job> taken;
+  bool has_command = now_ns() < jobs_rest_ns_;
+  for (auto job = jobs_.begin(); job != jobs_.end();) {
+    const bool is_command = !std::holds_alternative<RuntimeFacts>(job->what);
+    if (is_command && std::exchange(has_command, true)) {
+      ++job;
+      continue;
+    }
+    taken.push_back(std::move(*job));
+    job = jobs_.erase(job);
+  }
+  return taken;
+}
+
+/// After a command others wait, the longer the more it took.
+void SimLoop::carry_out_in_turn(const Job& job) {
+  const int64_t begin_ns = now_ns();
+  carry_out(job);
+  if (std::holds_alternative<RuntimeFacts>(job.what)) return;
+  const int64_t end_ns = now_ns();
+  const double rest_ns = static_cast<double>(end_ns - begin_ns) * (1.0 / kJobShare - 1.0);
+  jobs_rest_ns_ = end_ns + static_cast<int64_t>(rest_ns);
 }
 
 void SimLoop::push(Job job) {
@@ -198,20 +232,27 @@ Notice SimLoop::change(const std::string& assignment) {
   if (is_other_solver || !needs_same_solver(features, solver_features_))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
-  const bool is_other_stream = scene->stream != config_.scene.stream;
   config_.scene = *scene;
   builder_->change(*scene, colliders_of(*scene, *config_.content));
-  if (is_other_stream) change_stream();
+  follow_stream_settings();
+  if (has_other_stream())
+    return {false, fmt::format("{} soon: the stream changes at most every {} ms.", assignment,
+                               kStreamChangeNs / 1'000'000)};
   return {false, fmt::format("{} from step {} on.", assignment, tick_ + 1)};
 }
 
-/// Publishes the present state once more, so that viewers see the change also while paused.
-void SimLoop::change_stream() {
-  const StreamDesc& stream = config_.scene.stream;
-  const Result<float> quantum_m = lattice_step_m(stream.codec, stream.bound_m);
+/// Publishes the present state once more, so that viewers see the change also while paused. Of many settings
+/// that come in a short time only the last is ever published.
+void SimLoop::follow_stream_settings() {
+  const int64_t time_ns = now_ns();
+  if (!has_other_stream() || (stream_changed_ns_ != 0 && time_ns - stream_changed_ns_ < kStreamChangeNs))
+    return;
+  stream_ = config_.scene.stream;
+  stream_changed_ns_ = time_ns;
+  const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
   CHECK(quantum_m.ok());  // the codec cannot change while running
   publisher_->set_quantum_m(*quantum_m);
-  if (config_.on_stream_change) config_.on_stream_change(stream);
+  if (config_.on_stream_change) config_.on_stream_change(stream_);
   publish();
 }
 
@@ -262,10 +303,12 @@ void SimLoop::step(int64_t time_ns) {
   if (scene_step.rigid_turn) turn_rigidly(*scene_step.rigid_turn);
   timer_->begin();
   for (const StepInput& substep : scene_step.substeps) {
+    if (is_stopping_) return;  // many substeps of a slow solver take long
     solver_->substep(substep);
     head_velocity_mps_ = substep.head_shift_m / substep.h_s;
   }
   step_timer_.add_ms(timer_->end_ms());
+  last_step_ns_ = now_ns();
   if (viewers(facts_) > 0 || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
 
@@ -338,7 +381,9 @@ void SimLoop::update_stats() {
 
 SimStats SimLoop::stats() const {
   const std::lock_guard lock(mutex_);
-  return stats_;
+  SimStats stats = stats_;
+  stats.last_step_ns = last_step_ns_;
+  return stats;
 }
 
 std::optional<Error> SimLoop::failure() const {

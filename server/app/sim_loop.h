@@ -1,7 +1,9 @@
 // SimLoop: the simulation thread with its GL context: takes input, steps the solver, publishes. Commands and
-// facts reach it through a queue and are carried out between two steps. It never waits for a viewer.
+// facts reach it through a queue and are carried out between two steps, commands one at a time and within
+// kJobShare of the time. It never waits for a viewer.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -64,10 +66,16 @@ struct SimStats {
   uint64_t solver_bytes = 0;
   bool is_software = false;  // OpenGL runs on processor cores
   std::string solver_name;
+  int64_t last_step_ns = 0;  // server clock at the end of the newest step; 0 = none yet
 };
 
 /// Commands that may wait for the simulation thread; each can cost a new solver.
 inline constexpr size_t kMaxPendingJobs = 32;
+/// Share of the time that commands take at most: a new solver for each of many does not stop the hair.
+inline constexpr double kJobShare = 0.25;
+/// The stream is coded otherwise at most this often, with the newest settings: each time costs every viewer a
+/// keyframe.
+inline constexpr int64_t kStreamChangeNs = 500'000'000;
 
 class SimLoop {
  public:
@@ -88,7 +96,7 @@ class SimLoop {
   /// How many watch; has_wind_stream is found by the loop itself.
   void set_facts(const RuntimeFacts& facts);
   SimStats stats() const;
-  /// Ends the thread after the step that is under way. From one thread.
+  /// Ends the thread after the substep or command that is under way. From one thread.
   void stop();
   /// Why the simulation ended; nothing while it runs.
   std::optional<Error> failure() const;
@@ -105,10 +113,13 @@ class SimLoop {
   void loop();
   void push(Job job);
   std::deque<Job> wait_for_jobs();
+  std::deque<Job> take_jobs();
+  void carry_out_in_turn(const Job& job);
   void carry_out(const Job& job);
   Notice command(Command command);
   Notice change(const std::string& assignment);
-  void change_stream();
+  void follow_stream_settings();
+  bool has_other_stream() const { return config_.scene.stream != stream_; }
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_facts(const RuntimeFacts& facts);
   void step(int64_t time_ns);
@@ -141,11 +152,15 @@ class SimLoop {
   uint64_t published_tick_ = 0;
   uint64_t published_count_ = 0;
   uint64_t solver_builds_ = 0;
+  StreamDesc stream_;              // as it is published; the scene's is what it is to be
+  int64_t stream_changed_ns_ = 0;  // 0 = never
+  int64_t jobs_rest_ns_ = 0;       // no command is carried out before
+  std::atomic<int64_t> last_step_ns_{0};
 
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable changed_;
   std::deque<Job> jobs_;
-  bool is_stopping_ = false;
+  std::atomic<bool> is_stopping_{false};
   SimStats stats_;
   std::optional<Error> failure_;
 

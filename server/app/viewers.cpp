@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/text.h"
+
 namespace strandcast {
 
 namespace {
@@ -54,6 +56,7 @@ Result<Viewers::Place> Viewers::add(const Visitor& visitor, const Hello& hello) 
   Viewer viewer;
   viewer.role = hello.role;
   viewer.peer = visitor.peer;
+  viewer.name = hello.name;
   viewer.wanted = hello.mode;
   place.size = size_of(scene_);
   if (hello.frame_width > 0) place.size.width = hello.frame_width;
@@ -86,6 +89,13 @@ void Viewers::remove(SessionId session) {
   views_.remove(session);
   viewers_.erase(session);
   count();
+}
+
+std::string Viewers::describe(SessionId session) const {
+  const auto found = viewers_.find(session);
+  if (found == viewers_.end()) return fmt::format("session {}", session);
+  return fmt::format("session {} ({} '{}')", session, to_string(found->second.role),
+                     one_line(found->second.name, kMaxNameChars));
 }
 
 Result<std::optional<PictureClass>> Viewers::set_camera(SessionId session, const CameraDesc& camera) {

@@ -48,6 +48,8 @@ class Viewers {
   /// BadInput for a size that cannot be drawn.
   Result<Place> add(const Visitor& visitor, const Hello& hello);
   void remove(SessionId session);
+  /// For the log: number, role and name.
+  std::string describe(SessionId session) const;
   /// The new picture class of a viewer of frames; none for one of strands, whose camera is kept for later.
   /// NotFound for a session that views nothing.
   Result<std::optional<PictureClass>> set_camera(SessionId session, const CameraDesc& camera);
@@ -85,6 +87,7 @@ class Viewers {
   struct Viewer {
     Role role = Role::Viewer;
     std::string peer;
+    std::string name;
     StreamMode wanted = StreamMode::Strands;  // may be Auto
     StreamMode mode = StreamMode::Strands;    // of the frames it gets
     std::optional<StreamMode> next;           // the change to this mode is under way

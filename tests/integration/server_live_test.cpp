@@ -7,6 +7,7 @@
 #include <deque>
 #include <future>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -62,6 +63,9 @@ class StrandClient {
   /// Sends a command or a change and returns its answer; states on the way are kept for next().
   Notice ask(const ClientMessage& message) {
     raw.send(message);
+    return next_notice();
+  }
+  Notice next_notice() {
     while (notices_.empty())
       if (!receive()) return {true, "no answer"};
     Notice notice = notices_.front();
@@ -142,6 +146,126 @@ TEST(SimLoopJobs, CommandsBeyondTheLimitAreRefusedAtOnce) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   EXPECT_EQ(answered, kMaxPendingJobs) << "what was accepted is carried out";
   (*loop)->stop();
+}
+
+/// A loop over a small scene without a network; null after a skip or a failure.
+class Loop {
+ public:
+  explicit Loop(SimLoopConfig config) {
+    auto content = load_scene_content(config.scene);
+    if (!content.ok()) return;
+    config.content = std::make_shared<const SceneContent>(std::move(*content));
+    auto started = SimLoop::start(std::move(config), hub_, slot_);
+    if (started.ok())
+      loop_ = std::move(*started);
+    else
+      error_ = started.error();
+  }
+  explicit operator bool() const { return loop_ != nullptr; }
+  SimLoop* operator->() const { return loop_.get(); }
+  std::string trouble() const { return error_.to_string(); }
+  /// Posts the change and waits for its answer.
+  Notice ask(const std::string& assignment) const {
+    auto answer = std::make_shared<std::promise<Notice>>();
+    loop_->post(SetParameter{assignment}, [answer](Notice notice) { answer->set_value(std::move(notice)); });
+    return answer->get_future().get();
+  }
+
+ private:
+  InputHub hub_;
+  SnapshotSlot slot_;
+  Error error_;
+  std::unique_ptr<SimLoop> loop_;
+};
+
+TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOneCounts) {
+  std::mutex mutex;
+  std::vector<StreamDesc> streams;
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_stream_change = [&](const StreamDesc& stream) {
+    const std::lock_guard lock(mutex);
+    streams.push_back(stream);
+  };
+  const Loop loop(std::move(config));
+  if (!loop) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  const int64_t begin_ns = now_ns();
+  constexpr int kChanges = 300;
+  for (int i = 0; i < kChanges; ++i) {
+    const Notice notice = loop.ask(fmt::format("stream.bound_m={}", i % 2 == 0 ? "0.0002" : "0.0003"));
+    ASSERT_FALSE(notice.is_error) << notice.text;
+  }
+  const Notice last = loop.ask("stream.bound_m=0.0004");
+  EXPECT_FALSE(last.is_error);
+  const auto newest = [&] {
+    const std::lock_guard lock(mutex);
+    return streams.empty() ? 0.0f : streams.back().bound_m;
+  };
+  ASSERT_TRUE(eventually([&] { return newest() == 0.0004f; }));
+  const std::lock_guard lock(mutex);
+  EXPECT_LE(streams.size(), static_cast<size_t>((now_ns() - begin_ns) / kStreamChangeNs) + 1);
+}
+
+TEST(SimLoopJobs, NewSolversLeaveTimeForStepsBetweenThem) {
+  std::promise<void> held, go;
+  auto let_go = go.get_future().share();
+  std::atomic<int> published = 0;
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_publish = [&](const std::shared_ptr<const Snapshot>&) {
+    if (++published != 2) return;
+    held.set_value();
+    let_go.wait();
+  };
+  const Loop loop(std::move(config));
+  if (!loop) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  held.get_future().wait();
+  std::mutex mutex;
+  std::vector<std::string> answers;
+  constexpr size_t kJobs = 30;
+  static_assert(kJobs <= kMaxPendingJobs);
+  for (size_t i = 0; i < kJobs; ++i)
+    loop->post(SetParameter{i % 2 == 0 ? "solver.name=pbd" : "solver.name=dftl"}, [&](const Notice& notice) {
+      const std::lock_guard lock(mutex);
+      answers.push_back(notice.text);
+    });
+  go.set_value();
+  ASSERT_TRUE(eventually([&] {
+    const std::lock_guard lock(mutex);
+    return answers.size() == kJobs;
+  }));
+  const auto step_of = [](const std::string& text) {
+    return std::stoul(text.substr(text.find("step ") + 5));
+  };
+  EXPECT_GT(step_of(answers.back()), step_of(answers.front())) << answers.front() << " " << answers.back();
+}
+
+// One step of it takes seconds, and whoever ends the server waits for none of them.
+TEST(SimLoopJobs, StopDoesNotWaitForTheRestOfTheSubsteps) {
+  SimLoopConfig config;
+  config.scene = test::small_scene(3'000, 16);
+  config.scene.solver.name = "super_helix";
+  config.scene.solver.parameters.clear();
+  config.scene.substeps = 64;
+  const Loop loop(std::move(config));
+  if (!loop) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  give_time_to_misbehave();
+  loop->stop();
+  EXPECT_EQ(loop->stats().last_step_ns, 0) << "the first step was finished";
+}
+
+TEST_F(LiveServer, AControllerThatFloodsIsRefusedInOneSentence) {
+  if (!start()) return;
+  StrandClient controller = join(Role::Controller);
+  constexpr int kCommands = 300;
+  for (int i = 0; i < kCommands; ++i)
+    controller.raw.send(SetParameter{fmt::format("wind.mean_mps.x={}", 1 + i % 5)});
+  int refused = 0;
+  for (int i = 0; i < kCommands; ++i)
+    refused += controller.next_notice().text.find("commands a second") != std::string::npos ? 1 : 0;
+  EXPECT_GT(refused, 0);
+  StrandClient other = join(Role::Controller);
+  EXPECT_FALSE(other.ask(SetParameter{"wind.mean_mps.x=2"}).is_error) << "the budget of another is its own";
 }
 
 TEST_F(LiveServer, LateJoinerHasTheSameStatesBitForBit) {

@@ -4,6 +4,7 @@
 
 #include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
+#include "server/app/control_budget.h"
 #include "server/app/explain.h"
 #include "server/app/options.h"
 #include "server/app/pass_table.h"
@@ -300,6 +301,28 @@ TEST(Viewers, FramesThatCannotBeHadAreRefusedWithTheReason) {
   const auto rescued = viewers.consider(10, broken, 100 * kTick);
   ASSERT_TRUE(rescued);
   EXPECT_EQ(rescued->change.mode, StreamMode::Strands);
+}
+
+TEST(ControlBudget, AControllerHasItsBurstThenItsRateAndOthersHaveTheirs) {
+  ControlBudget budget;
+  constexpr int64_t kBeginNs = 1'000'000'000, kSecondNs = 1'000'000'000;
+  const auto count = [&](SessionId session, int64_t time_ns) {
+    int taken = 0;
+    while (taken < 1'000 && budget.take(session, time_ns)) ++taken;
+    return taken;
+  };
+  EXPECT_EQ(count(1, kBeginNs), static_cast<int>(kControlBurst));
+  EXPECT_EQ(count(1, kBeginNs + kSecondNs), static_cast<int>(kControlsPerS));
+  EXPECT_EQ(count(2, kBeginNs + kSecondNs), static_cast<int>(kControlBurst));
+  EXPECT_EQ(count(1, kBeginNs + 100 * kSecondNs), static_cast<int>(kControlBurst)) << "no more is saved up";
+}
+
+TEST(Viewers, IsDescribedForTheLogOnOneLine) {
+  Viewers viewers(built_in_scene());
+  Hello message = hello(Role::Controller, StreamMode::Strands);
+  message.name = "a\u202e\u0085b";
+  ASSERT_TRUE(viewers.add(from(7), message).ok());
+  EXPECT_EQ(viewers.describe(7), "session 7 (controller 'a??b')");
 }
 
 TEST(ServerPlan, RunsOnlyWhatTheSceneAndItsViewersNeed) {
