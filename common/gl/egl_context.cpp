@@ -10,6 +10,7 @@
 #include <optional>
 #include <string_view>
 
+#include "common/gl/objects.h"
 #include "common/log/log.h"
 
 namespace strandcast::gl {
@@ -187,6 +188,7 @@ Result<std::unique_ptr<EglContext>> EglContext::make(const std::string& device, 
     context->display_ = opened->display;
     context->context_ = opened->context;
     context->info_ = opened->info;
+    count_context(1);
     return context;
   }
   return make_error(ErrorCode::Unavailable, "no OpenGL 4.5 context for GL device '{}' (tried: {})", device,
@@ -198,6 +200,7 @@ EglContext::~EglContext() {
   if (context_ == nullptr) return;
   if (eglGetCurrentContext() == context_) release();
   eglDestroyContext(display_, context_);
+  count_context(-1);
 }
 
 Status EglContext::make_current() {

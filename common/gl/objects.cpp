@@ -2,10 +2,42 @@
 
 #include <epoxy/gl.h>
 
+#include <algorithm>
+#include <atomic>
+
 #include "common/base/check.h"
 
 namespace strandcast::gl {
 namespace {
+
+struct AtomicCounts {
+  std::array<std::atomic<int64_t>, kObjectKindCount> objects{};
+  std::atomic<int64_t> contexts{0};
+  std::atomic<int64_t> size_bytes{0};
+  std::atomic<int64_t> compiled_programs{0};
+};
+
+AtomicCounts& counts() {
+  static AtomicCounts counts;
+  return counts;
+}
+
+uint64_t read_count(const std::atomic<int64_t>& count) {
+  return static_cast<uint64_t>(count.load(std::memory_order_relaxed));
+}
+
+/// Bytes of one sample as the driver stores it; 0 when the storage could not be had.
+uint64_t sample_bytes(uint32_t texture) {
+  constexpr int kBitsPerByte = 8;
+  uint64_t bits = 0;
+  for (const GLenum part : {GL_TEXTURE_RED_SIZE, GL_TEXTURE_GREEN_SIZE, GL_TEXTURE_BLUE_SIZE,
+                            GL_TEXTURE_ALPHA_SIZE, GL_TEXTURE_DEPTH_SIZE, GL_TEXTURE_STENCIL_SIZE}) {
+    GLint part_bits = 0;
+    glGetTextureLevelParameteriv(texture, 0, part, &part_bits);
+    bits += static_cast<uint64_t>(std::max(part_bits, 0));
+  }
+  return bits / kBitsPerByte;
+}
 
 void label_object(GLenum kind, uint32_t name, const std::string& label) {
   glObjectLabel(kind, name, static_cast<GLsizei>(label.size()), label.data());
@@ -21,6 +53,35 @@ uint32_t create_buffer(const std::string& label, size_t size_bytes, const void* 
 }
 
 }  // namespace
+
+const char* to_string(ObjectKind kind) {
+  static constexpr std::array<const char*, kObjectKindCount> kNames = {
+      "buffer", "texture", "framebuffer", "program", "vertex_array", "query"};
+  return kNames[static_cast<size_t>(kind)];
+}
+
+ObjectCounts object_counts() {
+  const AtomicCounts& now = counts();
+  ObjectCounts copy;
+  for (size_t kind = 0; kind < kObjectKindCount; ++kind) copy.objects[kind] = read_count(now.objects[kind]);
+  copy.contexts = read_count(now.contexts);
+  copy.size_bytes = read_count(now.size_bytes);
+  copy.compiled_programs = read_count(now.compiled_programs);
+  return copy;
+}
+
+void count_object(ObjectKind kind, int64_t difference, int64_t size_bytes) {
+  counts().objects[static_cast<size_t>(kind)].fetch_add(difference, std::memory_order_relaxed);
+  counts().size_bytes.fetch_add(size_bytes, std::memory_order_relaxed);
+}
+
+void count_context(int64_t difference) {
+  counts().contexts.fetch_add(difference, std::memory_order_relaxed);
+}
+
+void count_compiled_program() {
+  counts().compiled_programs.fetch_add(1, std::memory_order_relaxed);
+}
 
 void delete_buffer(uint32_t name) {
   glDeleteBuffers(1, &name);
@@ -42,13 +103,13 @@ void delete_query(uint32_t name) {
 }
 
 Buffer::Buffer(const std::string& label, size_t size_bytes)
-    : handle_(create_buffer(label, size_bytes, nullptr)), size_bytes_(size_bytes) {
+    : handle_(create_buffer(label, size_bytes, nullptr), size_bytes), size_bytes_(size_bytes) {
   // Fresh storage is undefined and differs between drivers.
   if (handle_) glClearNamedBufferData(name(), GL_R8UI, GL_RED_INTEGER, GL_UNSIGNED_BYTE, nullptr);
 }
 
 Buffer::Buffer(const std::string& label, std::span<const std::byte> bytes)
-    : handle_(create_buffer(label, bytes.size(), bytes.data())), size_bytes_(bytes.size()) {}
+    : handle_(create_buffer(label, bytes.size(), bytes.data()), bytes.size()), size_bytes_(bytes.size()) {}
 
 void Buffer::write(size_t offset_bytes, std::span<const std::byte> bytes) {
   CHECK(offset_bytes <= size_bytes_ && bytes.size() <= size_bytes_ - offset_bytes);
@@ -99,7 +160,27 @@ Texture::Texture(const std::string& label, uint32_t internal_format, uint32_t wi
     glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   }
   label_object(GL_TEXTURE, name, label);
-  handle_ = Handle<delete_texture>(name);
+  handle_ =
+      Handle<delete_texture>(name, uint64_t{width} * height * std::max(samples, 1u) * sample_bytes(name));
+}
+
+Texture Texture::volume(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
+                        uint32_t depth) {
+  CHECK(width > 0 && height > 0 && depth > 0);
+  Texture texture;
+  texture.width_ = width;
+  texture.height_ = height;
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_3D, 1, &name);
+  glTextureStorage3D(name, 1, internal_format, static_cast<GLsizei>(width), static_cast<GLsizei>(height),
+                     static_cast<GLsizei>(depth));
+  glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
+    glTextureParameteri(name, axis, GL_CLAMP_TO_EDGE);
+  label_object(GL_TEXTURE, name, label);
+  texture.handle_ = Handle<delete_texture>(name, uint64_t{width} * height * depth * sample_bytes(name));
+  return texture;
 }
 
 void Texture::bind(uint32_t unit) const {

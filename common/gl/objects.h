@@ -1,7 +1,8 @@
 // Move-only GL objects, direct state access only, labelled for debuggers. All calls need a current context;
-// the destructor needs the same one. No global state.
+// the destructor needs the same one. Global are only the counts of what there is.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -13,26 +14,27 @@
 
 namespace strandcast::gl {
 
-/// Owns one GL name and deletes it with Delete.
-template <void (*Delete)(uint32_t)>
-class Handle {
- public:
-  Handle() = default;
-  explicit Handle(uint32_t name) : name_(name) {}
-  Handle(Handle&& other) noexcept : name_(std::exchange(other.name_, 0u)) {}
-  Handle& operator=(Handle&& other) noexcept {
-    std::swap(name_, other.name_);
-    return *this;
-  }
-  ~Handle() {
-    if (name_ != 0) Delete(name_);
-  }
-  uint32_t name() const { return name_; }
-  explicit operator bool() const { return name_ != 0; }
+enum class ObjectKind : uint8_t { Buffer, Texture, Framebuffer, Program, VertexArray, Query };
+inline constexpr size_t kObjectKindCount = 6;
+/// As printed and in metrics: "buffer", "vertex_array".
+const char* to_string(ObjectKind kind);
 
- private:
-  uint32_t name_ = 0;
+/// What this process holds of GL, in all contexts.
+struct ObjectCounts {
+  std::array<uint64_t, kObjectKindCount> objects{};  // by kind
+  uint64_t contexts = 0;
+  uint64_t size_bytes = 0;         // storage of buffers and textures
+  uint64_t compiled_programs = 0;  // since the process began
+
+  uint64_t of(ObjectKind kind) const { return objects[static_cast<size_t>(kind)]; }
+  bool operator==(const ObjectCounts&) const = default;
 };
+/// Any thread, no context.
+ObjectCounts object_counts();
+/// For those who make objects, contexts and programs: one more, or one less.
+void count_object(ObjectKind kind, int64_t difference, int64_t size_bytes);
+void count_context(int64_t difference);
+void count_compiled_program();
 
 void delete_buffer(uint32_t name);
 void delete_texture(uint32_t name);
@@ -40,6 +42,49 @@ void delete_framebuffer(uint32_t name);
 void delete_program(uint32_t name);
 void delete_vertex_array(uint32_t name);
 void delete_query(uint32_t name);
+
+template <void (*Delete)(uint32_t)>
+inline constexpr ObjectKind kKindOf = ObjectKind::Buffer;
+template <>
+inline constexpr ObjectKind kKindOf<delete_texture> = ObjectKind::Texture;
+template <>
+inline constexpr ObjectKind kKindOf<delete_framebuffer> = ObjectKind::Framebuffer;
+template <>
+inline constexpr ObjectKind kKindOf<delete_program> = ObjectKind::Program;
+template <>
+inline constexpr ObjectKind kKindOf<delete_vertex_array> = ObjectKind::VertexArray;
+template <>
+inline constexpr ObjectKind kKindOf<delete_query> = ObjectKind::Query;
+
+/// Owns one GL name and deletes it with Delete.
+template <void (*Delete)(uint32_t)>
+class Handle {
+ public:
+  Handle() = default;
+  /// `size_bytes`: of the storage behind the name, for the counts.
+  explicit Handle(uint32_t name, uint64_t size_bytes = 0) : name_(name), size_bytes_(size_bytes) {
+    if (name_ != 0) count_object(kKindOf<Delete>, 1, static_cast<int64_t>(size_bytes_));
+  }
+  Handle(Handle&& other) noexcept
+      : name_(std::exchange(other.name_, 0u)), size_bytes_(std::exchange(other.size_bytes_, 0u)) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(name_, other.name_);
+    std::swap(size_bytes_, other.size_bytes_);
+    return *this;
+  }
+  ~Handle() {
+    if (name_ == 0) return;
+    Delete(name_);
+    count_object(kKindOf<Delete>, -1, -static_cast<int64_t>(size_bytes_));
+  }
+  uint32_t name() const { return name_; }
+  uint64_t size_bytes() const { return size_bytes_; }
+  explicit operator bool() const { return name_ != 0; }
+
+ private:
+  uint32_t name_ = 0;
+  uint64_t size_bytes_ = 0;
+};
 
 /// Immutable-size storage; contents may be rewritten. A size of 0 makes an empty handle.
 class Buffer {
@@ -78,15 +123,18 @@ class Buffer {
   size_t size_bytes_ = 0;
 };
 
-/// 2-D colour or depth texture without mipmaps; nearest filter, clamped to its edge.
+/// 2-D colour or depth texture without mipmaps, nearest filter; or 3-D, linear. Clamped to its edge.
 class Texture {
  public:
   Texture() = default;
   /// `samples` > 1 makes a multisample texture.
   Texture(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
           uint32_t samples);
+  static Texture volume(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
+                        uint32_t depth);
   void bind(uint32_t unit) const;
   uint32_t name() const { return handle_.name(); }
+  uint64_t size_bytes() const { return handle_.size_bytes(); }
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
 

@@ -187,6 +187,7 @@ Result<Program> Program::make(const ShaderLibrary& library, const std::vector<st
   Program program;
   program.handle_ = Handle<delete_program>(glCreateProgram());
   if (auto linked = link(program.name(), shaders, captured); !linked) return at(label, linked.error());
+  count_compiled_program();
   GLint longest_label = 0;
   glGetIntegerv(GL_MAX_LABEL_LENGTH, &longest_label);
   const size_t label_size = std::min(label.size(), static_cast<size_t>(std::max(longest_label, 1) - 1));

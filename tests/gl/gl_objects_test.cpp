@@ -49,6 +49,55 @@ TEST_F(GlObjects, MovingLeavesExactlyOneOwner) {
   EXPECT_EQ(glIsBuffer(name), GL_FALSE);
 }
 
+TEST_F(GlObjects, AreCountedByKindWithTheirBytes) {
+  const ObjectCounts before = object_counts();
+  const auto more = [&](ObjectKind kind) { return object_counts().of(kind) - before.of(kind); };
+  {
+    Buffer buffer("counted", 100);
+    const Buffer empty("empty", 0);
+    const Texture plain("plain", GL_RGBA8, 4, 2, 1);
+    const Texture samples("samples", GL_RGBA8, 4, 2, 4);
+    const Texture volume = Texture::volume("volume", GL_RG16, 2, 3, 5);
+    const Framebuffer target = Framebuffer::without_attachments("target");
+    const VertexArray vertices("vertices");
+    EXPECT_EQ(more(ObjectKind::Buffer), 1u) << "an empty one has no name";
+    EXPECT_EQ(more(ObjectKind::Texture), 3u);
+    EXPECT_EQ(more(ObjectKind::Framebuffer), 1u);
+    EXPECT_EQ(more(ObjectKind::VertexArray), 1u);
+    EXPECT_EQ(more(ObjectKind::Program), 0u);
+    EXPECT_EQ(object_counts().size_bytes - before.size_bytes,
+              100u + 4u * 2 * 4 + 4u * 2 * 4 * 4 + 2u * 3 * 5 * 4);
+    const Buffer moved = std::move(buffer);
+    EXPECT_EQ(more(ObjectKind::Buffer), 1u);
+    buffer = Buffer("another", 60);
+    EXPECT_EQ(more(ObjectKind::Buffer), 2u);
+  }
+  EXPECT_EQ(object_counts(), before);
+}
+
+TEST_F(GlObjects, ProgramsAndContextsAreCountedToo) {
+  const ObjectCounts before = object_counts();
+  {
+    TemporaryFolder folder;
+    folder.write("point.vert", "void main() {\n  gl_Position = vec4(0.0);\n}\n");
+    folder.write("wrong.vert", "void main() {\n  gl_Position = 1;\n}\n");
+    const auto program = Program::make(ShaderLibrary(folder.path()), {"point.vert"}, {});
+    ASSERT_TRUE(program) << program.error().to_string();
+    EXPECT_FALSE(Program::make(ShaderLibrary(folder.path()), {"wrong.vert"}, {}));
+    EXPECT_EQ(object_counts().of(ObjectKind::Program), before.of(ObjectKind::Program) + 1);
+    EXPECT_EQ(object_counts().compiled_programs, before.compiled_programs + 1);
+  }
+  EXPECT_EQ(object_counts().of(ObjectKind::Program), before.of(ObjectKind::Program));
+  EXPECT_EQ(object_counts().compiled_programs, before.compiled_programs + 1) << "since start, not now";
+  {
+    const auto other = EglContext::make("auto");
+    ASSERT_TRUE(other);
+    EXPECT_EQ(object_counts().contexts, before.contexts + 1);
+  }
+  EXPECT_EQ(object_counts().contexts, before.contexts);
+  ASSERT_TRUE(context_->make_current());
+}
+
 TEST_F(GlObjects, AreLabelled) {
   const Buffer buffer("strand positions", 4);
   std::array<char, 64> label{};
