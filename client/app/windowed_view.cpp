@@ -211,8 +211,7 @@ class WindowedView {
   Status draw_strands(const DrawnView& view, const std::shared_ptr<const Snapshot>& newest) {
     const auto strands = player_.strands_at(state_->timeline, now_ns());
     RETURN_IF_ERROR(renderer_->draw(*strands, view.camera, view.size));
-    const RenderProfile& profile = renderer_->profile();
-    const double draw_ms = profile.expand_ms + profile.strands_ms + profile.head_ms + profile.resolve_ms;
+    const double draw_ms = renderer_->profile().total_ms;
     render_timer_.add_ms(draw_ms);
     const bool is_other_size = view.size.width != drawn_.size.width || view.size.height != drawn_.size.height;
     if (is_other_size) draw_timer_ = StageTimer();  // says nothing about this size

@@ -9,85 +9,101 @@
 namespace strandcast::gl {
 namespace {
 
-using Names = std::set<std::string>;
+using ResourceSet = std::set<const Resource*>;
 
-Status check_names(const std::vector<PassDeclaration>& passes,
-                   const std::vector<ResourceDeclaration>& resources,
-                   const std::vector<std::string>& external, const std::vector<std::string>& wanted) {
-  Names known(external.begin(), external.end());
-  Names declared;
-  for (const ResourceDeclaration& resource : resources) {
-    if (!declared.insert(resource.name).second)
-      return make_error(ErrorCode::BadInput, "resource '{}' is declared twice", resource.name);
-    known.insert(resource.name);
-  }
-  Names pass_names;
-  for (const PassDeclaration& pass : passes) {
+std::vector<std::string> names_of(const Resources& resources) {
+  std::vector<std::string> names;
+  for (const Resource* resource : resources) names.push_back(resource->name());
+  return names;
+}
+
+/// Every resource that the passes name, each once, in the order of the list.
+Resources all_resources(const std::vector<PassDeclaration>& passes) {
+  Resources all;
+  ResourceSet seen;
+  for (const PassDeclaration& pass : passes)
+    for (const auto* resources : {&pass.reads, &pass.writes})
+      for (const Resource* resource : *resources)
+        if (seen.insert(resource).second) all.push_back(resource);
+  return all;
+}
+
+/// Names are what people and metrics tell passes and resources apart by.
+Status check_names(const std::vector<PassDeclaration>& passes, const Resources& resources) {
+  std::set<std::string> pass_names;
+  for (const PassDeclaration& pass : passes)
     if (!pass_names.insert(pass.name).second)
       return make_error(ErrorCode::BadInput, "pass '{}' is declared twice", pass.name);
-    for (const auto* names : {&pass.reads, &pass.writes})
-      for (const std::string& name : *names)
-        if (!known.contains(name))
-          return make_error(ErrorCode::BadInput, "pass '{}' uses the undeclared resource '{}'", pass.name,
-                            name);
-  }
-  for (const std::string& name : wanted)
-    if (!known.contains(name))
-      return make_error(ErrorCode::BadInput, "the wanted resource '{}' is undeclared", name);
+  std::set<std::string> resource_names;
+  for (const Resource* resource : resources)
+    if (!resource_names.insert(resource->name()).second)
+      return make_error(ErrorCode::BadInput, "two resources are called '{}'", resource->name());
   return {};
 }
 
 /// Every input of a running pass comes from outside or from a running pass before it.
 Status check_inputs(const std::vector<PassDeclaration>& passes, const PassPlan& plan,
-                    const std::vector<std::string>& external) {
-  Names available(external.begin(), external.end());
-  for (const PassDeclaration& pass : passes) {
-    if (!plan.runs(pass.name)) continue;
-    for (const std::string& name : pass.reads)
-      if (!available.contains(name))
+                    const Resources& external) {
+  ResourceSet available(external.begin(), external.end());
+  for (size_t i = 0; i < passes.size(); ++i) {
+    if (plan.passes[i].fate != PassFate::Kept) continue;
+    for (const Resource* resource : passes[i].reads)
+      if (!available.contains(resource))
         return make_error(ErrorCode::BadInput, "pass '{}' reads '{}', which no running pass before it writes",
-                          pass.name, name);
-    available.insert(pass.writes.begin(), pass.writes.end());
+                          passes[i].name, resource->name());
+    available.insert(passes[i].writes.begin(), passes[i].writes.end());
   }
   return {};
 }
 
 }  // namespace
 
-bool PassPlan::runs(const std::string& pass) const {
+const char* to_string(PassFate fate) {
+  switch (fate) {
+    case PassFate::Kept:
+      return "kept";
+    case PassFate::NotRequested:
+      return "not requested";
+    case PassFate::Unread:
+      return "unread";
+  }
+  return "?";
+}
+
+bool PassPlan::runs(std::string_view pass) const {
   return std::any_of(passes.begin(), passes.end(), [&](const PassDecision& decision) {
     return decision.name == pass && decision.fate == PassFate::Kept;
   });
 }
 
-bool PassPlan::is_live(const std::string& resource) const {
-  return std::find(live_resources.begin(), live_resources.end(), resource) != live_resources.end();
+bool PassPlan::is_live(const Resource& resource) const {
+  return std::find(live.begin(), live.end(), &resource) != live.end();
 }
 
-Result<PassPlan> make_pass_plan(const std::vector<PassDeclaration>& passes,
-                                const std::vector<ResourceDeclaration>& resources,
-                                const std::vector<std::string>& external,
-                                const std::vector<std::string>& wanted) {
-  RETURN_IF_ERROR(check_names(passes, resources, external, wanted));
+Result<PassPlan> make_pass_plan(const std::vector<PassDeclaration>& passes, const Resources& external,
+                                const Resources& wanted) {
+  const Resources resources = all_resources(passes);
+  RETURN_IF_ERROR(check_names(passes, resources));
   PassPlan plan;
-  Names used;
-  std::map<std::string, std::string>
-      reader;  // of each needed resource: a pass after this one, or the outside
-  for (const std::string& name : wanted) reader[name] = "the outside";
+  ResourceSet used;
+  // Of each needed resource: a pass after this one, or the outside.
+  std::map<const Resource*, std::string> reader;
+  for (const Resource* resource : wanted) reader[resource] = "the outside";
   for (auto pass = passes.rbegin(); pass != passes.rend(); ++pass) {
     PassDecision decision{pass->name, PassFate::Unread, {}};
     const auto needed = std::find_if(pass->writes.begin(), pass->writes.end(),
-                                     [&](const std::string& name) { return reader.contains(name); });
+                                     [&](const Resource* resource) { return reader.contains(resource); });
     if (!pass->is_enabled) {
       decision.fate = PassFate::NotRequested;
       decision.reason = pass->disabled_reason;
     } else if (needed == pass->writes.end()) {
-      decision.reason = pass->writes.empty() ? "it writes nothing"
-                                             : fmt::format("nothing reads {}", fmt::join(pass->writes, ", "));
+      decision.reason = pass->writes.empty()
+                            ? "it writes nothing"
+                            : fmt::format("nothing reads {}", fmt::join(names_of(pass->writes), ", "));
     } else {
       decision.fate = PassFate::Kept;
-      decision.reason = fmt::format("writes {} for {}", *needed, reader[*needed]);
-      for (const std::string& name : pass->reads) reader.try_emplace(name, pass->name);
+      decision.reason = fmt::format("writes {} for {}", (*needed)->name(), reader[*needed]);
+      for (const Resource* resource : pass->reads) reader.try_emplace(resource, pass->name);
       used.insert(pass->reads.begin(), pass->reads.end());
       used.insert(pass->writes.begin(), pass->writes.end());
     }
@@ -95,10 +111,11 @@ Result<PassPlan> make_pass_plan(const std::vector<PassDeclaration>& passes,
   }
   std::reverse(plan.passes.begin(), plan.passes.end());
   RETURN_IF_ERROR(check_inputs(passes, plan, external));
-  for (const ResourceDeclaration& resource : resources) {
-    const bool is_live = used.contains(resource.name);
-    if (is_live) plan.live_resources.push_back(resource.name);
-    (is_live ? plan.live_bytes : plan.saved_bytes) += resource.size_bytes;
+  for (const Resource* resource : resources) {
+    if (std::find(external.begin(), external.end(), resource) != external.end()) continue;
+    const bool is_live = used.contains(resource);
+    if (is_live) plan.live.push_back(resource);
+    (is_live ? plan.live_bytes : plan.saved_bytes) += resource->size_bytes();
   }
   return plan;
 }

@@ -1,32 +1,27 @@
-// The one renderer, used by the server's picture stream and by every client: expands key strands and
-// followers by tessellation (isolines, cubic Hermite along the strand, barycentric between three key
-// strands), draws camera-facing quads with Kajiya-Kay diffuse and Sadeghi specular lobes, and the head. Same
-// inputs on one driver give the same pixels. Needs a current GL 4.5 core context; all calls from its thread.
-// Does not simulate, decode or do I/O.
+// The one renderer, used by the server's picture stream and by every client: runs the passes of a render path
+// (render_path.h) over what it is given. Same inputs on one driver give the same pixels. Needs a current GL
+// 4.5 core context; all calls from its thread. Does not simulate, decode or do I/O.
 #pragma once
 
-#include <glm/glm.hpp>
 #include <memory>
-#include <vector>
+#include <string_view>
 
 #include "common/base/picture_size.h"
-#include "common/base/profile.h"
 #include "common/base/result.h"
 #include "common/gl/egl_context.h"
+#include "common/gl/pass_list.h"
 #include "common/gl/program.h"
 #include "common/pictures/image_codec.h"
+#include "common/render/render_path.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/posed_strands.h"
 #include "common/strands/scene_asset.h"
 
 namespace strandcast {
 
-/// Milliseconds of the last draw, by pass.
+/// Of the last draw.
 struct RenderProfile {
-  double expand_ms = 0.0;  // light volume, upload and tessellation
-  double strands_ms = 0.0;
-  double head_ms = 0.0;
-  double resolve_ms = 0.0;
+  double total_ms = 0.0;  // of all passes
   uint64_t drawn_strands = 0;
   uint64_t drawn_segments = 0;
 };
@@ -36,7 +31,8 @@ class Renderer {
   /// Compiles, allocates and uploads only what asset and look need.
   static Result<std::unique_ptr<Renderer>> make(const gl::ShaderLibrary& shaders,
                                                 const gl::DeviceInfo& device, const SceneAsset& asset,
-                                                const LookDesc& look);
+                                                const LookDesc& look,
+                                                const RenderPath& path = segment_path());
   virtual ~Renderer() = default;
 
   /// Draws into an internal target of the given size with 2 x 2 samples per pixel, resolved to sRGB. Strands
@@ -48,6 +44,12 @@ class Renderer {
   /// Copies the last draw to the framebuffer object `target` (0 = window), scaled to its size.
   virtual void blit_to(uint32_t target, RenderSize target_size) = 0;
   virtual const RenderProfile& profile() const = 0;
+  /// The passes as they run, and those that do not.
+  virtual const gl::PassListBase& passes() const = 0;
 };
+
+/// The passes that a renderer of this would run, without any GL.
+Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, bool is_software,
+                                      const RenderPath& path = segment_path());
 
 }  // namespace strandcast

@@ -5,19 +5,14 @@
 namespace strandcast {
 namespace {
 
-/// A fact's value with its cause, so that analyse() and explain() cannot disagree.
-struct Decision {
-  bool value = false;
-  const char* reason = "";
-};
-
-Decision decide_wind(const SceneDesc& scene, const RuntimeFacts& facts) {
+// Facts carry their cause, so that analyse() and explain() cannot disagree.
+Fact decide_wind(const SceneDesc& scene, const RuntimeFacts& facts) {
   if (facts.has_wind_stream) return {true, "a wind stream is connected"};
   if (scene.wind.mean_mps != glm::vec3(0.0f)) return {true, "wind.mean_mps is not zero"};
   return {false, "wind.mean_mps is zero and no wind stream is connected"};
 }
 
-Decision decide_turbulence(const SceneDesc& scene, const RuntimeFacts& facts) {
+Fact decide_turbulence(const SceneDesc& scene, const RuntimeFacts& facts) {
   if (facts.has_wind_stream)
     return {false, "a wind stream replaces the scene's gusts and is the same over the head"};
   if (scene.wind.mean_mps == glm::vec3(0.0f))
@@ -26,38 +21,42 @@ Decision decide_turbulence(const SceneDesc& scene, const RuntimeFacts& facts) {
   return {true, "wind.gust_intensity is above zero"};
 }
 
-Decision decide_colliders(const SceneDesc& scene, const RuntimeFacts&) {
+Fact decide_colliders(const SceneDesc& scene, const RuntimeFacts&) {
   if (!scene.colliders.empty()) return {true, "the scene lists colliders"};
   if (scene.has_auto_collider) return {true, "has_auto_collider fits one sphere to the roots"};
   return {false, "the scene lists no colliders and has_auto_collider is false"};
 }
 
-Decision decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
+Fact decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
   if (facts.strand_viewers > 0) return {true, "a viewer receives strands"};
   return {false, "no viewer receives strands"};
 }
 
-Decision decide_frame_viewers(const SceneDesc&, const RuntimeFacts& facts) {
+Fact decide_frame_viewers(const SceneDesc&, const RuntimeFacts& facts) {
   if (facts.frame_viewers > 0) return {true, "a viewer receives rendered frames"};
-  if (facts.is_recording_pictures) return {true, "pictures are being recorded"};
-  return {false, "no viewer receives rendered frames and no pictures are recorded"};
+  return {false, "no viewer receives rendered frames"};
 }
 
-Decision decide_followers(const SceneDesc& scene, const RuntimeFacts&) {
-  if (scene.look.followers > 0) return {true, "look.followers is above zero"};
-  return {false, "look.followers is zero"};
+Fact decide_strands(const SceneAsset& asset) {
+  if (asset.strand_count > 0) return {true, "the groom has strands"};
+  return {false, "the groom has no strands"};
 }
 
-Decision decide_head_mesh(const SceneDesc& scene, const RuntimeFacts&) {
-  if (!scene.head.is_visible) return {false, "head.is_visible is false"};
-  if (scene.head.mesh_path.empty()) return {true, "head.is_visible is true (built-in head)"};
-  return {true, "head.is_visible is true (head.mesh_path)"};
+Fact decide_followers(const SceneAsset& asset, const LookDesc& look) {
+  if (look.followers == 0) return {false, "look.followers is zero"};
+  if (asset.triangle.empty()) return {false, "no three roots are neighbours"};
+  return {true, "look.followers is above zero"};
+}
+
+Fact decide_head_mesh(const SceneAsset& asset) {
+  if (!asset.head.triangle.empty()) return {true, "the scene shows a head (head.is_visible)"};
+  return {false, "the scene has no head mesh (head.is_visible)"};
 }
 
 struct FactRow {
   const char* name;
   bool SceneFeatures::*member;
-  Decision (*decide)(const SceneDesc&, const RuntimeFacts&);
+  Fact (*decide)(const SceneDesc&, const RuntimeFacts&);
 };
 
 constexpr std::array kFacts{
@@ -66,8 +65,6 @@ constexpr std::array kFacts{
     FactRow{"has_colliders", &SceneFeatures::has_colliders, decide_colliders},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},
     FactRow{"has_frame_viewers", &SceneFeatures::has_frame_viewers, decide_frame_viewers},
-    FactRow{"has_followers", &SceneFeatures::has_followers, decide_followers},
-    FactRow{"has_head_mesh", &SceneFeatures::has_head_mesh, decide_head_mesh},
 };
 static_assert(sizeof(SceneFeatures) == kFacts.size(), "every fact has a row");
 
@@ -82,10 +79,22 @@ SceneFeatures analyse(const SceneDesc& scene, const RuntimeFacts& facts) {
 std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& facts) {
   std::vector<FeatureReason> reasons;
   for (const FactRow& row : kFacts) {
-    const Decision decision = row.decide(scene, facts);
+    const Fact decision = row.decide(scene, facts);
     reasons.push_back({row.name, decision.value, decision.reason});
   }
   return reasons;
+}
+
+PictureFeatures analyse_picture(const SceneAsset& asset, const LookDesc& look) {
+  return {decide_strands(asset), decide_followers(asset, look), decide_head_mesh(asset)};
+}
+
+std::vector<FeatureReason> explain(const PictureFeatures& features) {
+  const auto row = [](const char* name, const Fact& fact) {
+    return FeatureReason{name, fact.value, fact.reason};
+  };
+  return {row("has_strands", features.has_strands), row("has_followers", features.has_followers),
+          row("has_head_mesh", features.has_head_mesh)};
 }
 
 }  // namespace strandcast

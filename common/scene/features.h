@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/scene/scene_desc.h"
+#include "common/strands/scene_asset.h"
 
 namespace strandcast {
 
@@ -13,7 +14,6 @@ struct RuntimeFacts {
   bool has_wind_stream = false;
   uint32_t strand_viewers = 0;
   uint32_t frame_viewers = 0;
-  bool is_recording_pictures = false;
 };
 
 /// Positive facts; all false = the barest simulation.
@@ -23,8 +23,6 @@ struct SceneFeatures {
   bool has_colliders = false;
   bool has_strand_viewers = false;
   bool has_frame_viewers = false;
-  bool has_followers = false;
-  bool has_head_mesh = false;
 
   bool operator==(const SceneFeatures&) const = default;
 };
@@ -38,5 +36,21 @@ struct FeatureReason {
   std::string reason;
 };
 std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& facts);
+
+/// A fact's value with its cause.
+struct Fact {
+  bool value = false;
+  const char* reason = "";
+};
+
+/// What of a picture there is to draw: for the server's frames and for viewers, who have no scene file.
+struct PictureFeatures {
+  Fact has_strands;
+  Fact has_followers;
+  Fact has_head_mesh;
+};
+
+PictureFeatures analyse_picture(const SceneAsset& asset, const LookDesc& look);
+std::vector<FeatureReason> explain(const PictureFeatures& features);
 
 }  // namespace strandcast

@@ -20,16 +20,8 @@ namespace {
 constexpr int kWarmUpSteps = 3;
 constexpr int kMeasuredSteps = 10;
 
-const char* to_string(gl::PassFate fate) {
-  switch (fate) {
-    case gl::PassFate::Kept:
-      return "kept";
-    case gl::PassFate::NotRequested:
-      return "not requested";
-    case gl::PassFate::Unread:
-      return "unread";
-  }
-  return "?";
+std::string fact_text(const FeatureReason& fact) {
+  return fmt::format("  {:<20} {:<4} {}\n", fact.name, fact.value ? "yes" : "no", fact.reason);
 }
 
 std::string size_text(uint64_t bytes) {
@@ -96,8 +88,8 @@ Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asse
       asset.strand_count, asset.vertex_count, scene.solver.name, scene.step_rate_hz, scene.substeps);
   text += fmt::format("Assumed: {} viewers of strands, {} of frames\n\nFacts\n", facts.strand_viewers,
                       facts.frame_viewers);
-  for (const FeatureReason& reason : explain(scene, facts))
-    text += fmt::format("  {:<20} {:<4} {}\n", reason.name, reason.value ? "yes" : "no", reason.reason);
+  for (const FeatureReason& reason : explain(scene, facts)) text += fact_text(reason);
+  for (const FeatureReason& reason : explain(analyse_picture(asset, scene.look))) text += fact_text(reason);
   text += "\nPasses\n";
   for (size_t i = 0; i < plan.passes.size(); ++i) {
     const gl::PassDeclaration& pass = plan.passes[i];
@@ -105,7 +97,7 @@ Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asse
     const auto time = times.find(pass.name);
     const bool has_time = decision.fate == gl::PassFate::Kept && time != times.end();
     text +=
-        fmt::format("  {:<18} {:<14} {:>12}  {:>9}  {}\n", pass.name, to_string(decision.fate),
+        fmt::format("  {:<18} {:<14} {:>12}  {:>9}  {}\n", pass.name, gl::to_string(decision.fate),
                     size_text(written_bytes(plan, pass)),
                     has_time ? fmt::format("{:.2f} ms", time->second) : std::string("-"), decision.reason);
   }

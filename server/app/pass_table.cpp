@@ -1,6 +1,8 @@
 #include "server/app/pass_table.h"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "server/sim/solver.h"
 
@@ -13,28 +15,42 @@ constexpr uint64_t kPixelBytes = 4;
 constexpr uint64_t kSamples = 4;           // of the multisampled picture
 constexpr uint64_t kColorDepthBytes = 12;  // per sample: half-float colour and depth
 
-/// Names of the resources between the passes.
-std::vector<gl::ResourceDeclaration> make_resources(const SceneDesc& scene, const SceneAsset& asset) {
+/// What the passes hand to one another, by name.
+class ResourceTable {
+ public:
+  ResourceTable(const SceneDesc& scene, const SceneAsset& asset);
+  const gl::Resource* operator[](const std::string& name) const { return by_name_.at(name); }
+  std::vector<std::unique_ptr<gl::Resource>> take() { return std::move(resources_); }
+
+ private:
+  void add(const char* name, uint64_t size_bytes) {
+    resources_.push_back(std::make_unique<gl::Resource>(name, size_bytes));
+    by_name_[name] = resources_.back().get();
+  }
+  std::vector<std::unique_ptr<gl::Resource>> resources_;
+  std::map<std::string, const gl::Resource*> by_name_;
+};
+
+ResourceTable::ResourceTable(const SceneDesc& scene, const SceneAsset& asset) {
   const uint64_t vertices = uint64_t{asset.strand_count} * asset.vertex_count;
   const uint64_t drawn_strands = asset.strand_count + uint64_t{scene.look.followers} * asset.triangle.size();
   const uint64_t drawn_points = drawn_strands * (uint64_t{asset.vertex_count - 1} * scene.look.segments + 1);
   const uint64_t pixels = uint64_t{scene.stream.frame_width} * scene.stream.frame_height;
   const uint64_t colliders = std::max<uint64_t>(scene.colliders.size(), scene.has_auto_collider ? 1 : 0);
-  return {
-      {"wind", kVec4Bytes},
-      {"gusts", kMaxGustWaves * 2 * kVec4Bytes},
-      {"colliders", colliders * kVec4Bytes},
-      {"rest shape", vertices * kVec4Bytes},
-      {"strand state", 2 * vertices * kVec4Bytes},
-      {"state on the host", 2 * vertices * kVec3Bytes},
-      {"snapshot", vertices * kVec3Bytes},
-      {"strand frames", vertices * kVec3Bytes},
-      {"decoded snapshot", vertices * 2 * kVec3Bytes},
-      {"expanded strands", drawn_points * kVec4Bytes},
-      {"head mesh", asset.head.position_m.size() * 2 * kVec3Bytes + asset.head.triangle.size() * kVec3Bytes},
-      {"picture", pixels * kSamples * kColorDepthBytes},
-      {"resolved picture", pixels * kPixelBytes},
-      {"jpeg frames", pixels * kPixelBytes}};
+  add("wind", kVec4Bytes);
+  add("gusts", kMaxGustWaves * 2 * kVec4Bytes);
+  add("colliders", colliders * kVec4Bytes);
+  add("rest shape", vertices * kVec4Bytes);
+  add("strand state", 2 * vertices * kVec4Bytes);
+  add("state on the host", 2 * vertices * kVec3Bytes);
+  add("snapshot", vertices * kVec3Bytes);
+  add("strand frames", vertices * kVec3Bytes);
+  add("decoded snapshot", vertices * 2 * kVec3Bytes);
+  add("expanded strands", drawn_points * kVec4Bytes);
+  add("head mesh", asset.head.position_m.size() * 2 * kVec3Bytes + asset.head.triangle.size() * kVec3Bytes);
+  add("picture", pixels * kSamples * kColorDepthBytes);
+  add("resolved picture", pixels * kPixelBytes);
+  add("jpeg frames", pixels * kPixelBytes);
 }
 
 /// A pass that runs only under a fact, with the fact's own words when it does not hold.
@@ -53,18 +69,26 @@ gl::PassDeclaration under_fact(gl::PassDeclaration pass, const std::vector<Featu
 Result<ServerPlan> make_server_plan(const SceneDesc& scene, const SceneAsset& asset,
                                     const RuntimeFacts& facts) {
   ServerPlan plan;
-  plan.resources = make_resources(scene, asset);
-  const std::vector<FeatureReason> reasons = explain(scene, facts);
+  ResourceTable table(scene, asset);
+  std::vector<FeatureReason> reasons = explain(scene, facts);
+  const PictureFeatures picture = analyse_picture(asset, scene.look);
+  for (const FeatureReason& reason : explain(picture)) reasons.push_back(reason);
   const SceneFeatures features = analyse(scene, facts);
-  const auto pass = [](const char* name, std::vector<std::string> reads, std::vector<std::string> writes) {
-    return gl::PassDeclaration{name, true, {}, std::move(reads), std::move(writes)};
+  const auto named = [&](const std::vector<std::string>& names) {
+    gl::Resources resources;
+    for (const std::string& name : names) resources.push_back(table[name]);
+    return resources;
+  };
+  const auto pass = [&](const char* name, const std::vector<std::string>& reads,
+                        const std::vector<std::string>& writes) {
+    return gl::PassDeclaration{name, named(reads), named(writes), true, {}};
   };
   std::vector<std::string> step_reads = {"rest shape"};
   if (features.has_wind) step_reads.push_back("wind");
   if (features.has_turbulence) step_reads.push_back("gusts");
   if (features.has_colliders) step_reads.push_back("colliders");
   std::vector<std::string> draw_reads = {"expanded strands"};
-  if (features.has_head_mesh) draw_reads.push_back("head mesh");
+  if (picture.has_head_mesh.value) draw_reads.push_back("head mesh");
 
   plan.passes = {
       under_fact(pass("scene/wind", {}, {"wind"}), reasons, "has_wind"),
@@ -87,15 +111,16 @@ Result<ServerPlan> make_server_plan(const SceneDesc& scene, const SceneAsset& as
   std::vector<std::string> wanted = {"strand state"};
   if (features.has_strand_viewers) wanted.push_back("strand frames");
   if (features.has_frame_viewers) wanted.push_back("jpeg frames");
-  ASSIGN_OR_RETURN(plan.plan, gl::make_pass_plan(plan.passes, plan.resources, {"rest shape"}, wanted));
+  ASSIGN_OR_RETURN(plan.plan, gl::make_pass_plan(plan.passes, named({"rest shape"}), named(wanted)));
+  plan.resources = table.take();
   return plan;
 }
 
 uint64_t written_bytes(const ServerPlan& plan, const gl::PassDeclaration& pass) {
   uint64_t bytes = 0;
-  for (const gl::ResourceDeclaration& resource : plan.resources)
-    if (std::find(pass.writes.begin(), pass.writes.end(), resource.name) != pass.writes.end())
-      bytes += resource.size_bytes;
+  for (const auto& resource : plan.resources)
+    if (std::find(pass.writes.begin(), pass.writes.end(), resource.get()) != pass.writes.end())
+      bytes += resource->size_bytes();
   return bytes;
 }
 

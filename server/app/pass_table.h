@@ -1,10 +1,10 @@
 // The server's passes as the plan sees them: what each needs, reads and writes, and what that costs in
-// memory.
-// --explain prints it. Pure functions, any thread.
+// memory. --explain prints it. Pure functions, any thread.
 #pragma once
 
-#include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/gl/pass_plan.h"
@@ -15,7 +15,7 @@ namespace strandcast {
 
 struct ServerPlan {
   std::vector<gl::PassDeclaration> passes;
-  std::vector<gl::ResourceDeclaration> resources;
+  std::vector<std::unique_ptr<gl::Resource>> resources;
   gl::PassPlan plan;
 };
 

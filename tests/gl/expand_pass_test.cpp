@@ -44,6 +44,40 @@ SceneAsset make_asset(const Keys& keys, const std::vector<RootTriangle>& triangl
   return asset;
 }
 
+/// A program with its buffers.
+class Expander {
+ public:
+  Expander(const Keys& keys, const std::vector<RootTriangle>& triangles, const FollowerDesc& followers,
+           uint32_t max_segments)
+      : keys_(keys.strand_count, keys.vertex_count),
+        sizes_(keys_, static_cast<uint32_t>(triangles.size()), followers.per_triangle),
+        expanded_(sizes_.buffer_bytes(max_segments)) {
+    auto made = StrandExpander::make(gl::ShaderLibrary(), make_asset(keys, triangles), followers);
+    if (!made) {
+      ADD_FAILURE() << made.error().to_string();
+      return;
+    }
+    expander_ = std::move(*made);
+    keys_.allocate();
+    keys_.position().write(keys.position_m);
+    expanded_.allocate();
+  }
+  uint32_t run(uint32_t first, uint32_t count, const ExpandLevel& level) const {
+    return expander_.run(keys_, expanded_, first, count, level);
+  }
+  uint32_t strand_count(uint32_t followers) const { return sizes_.strand_count(followers); }
+  uint32_t max_followers() const { return sizes_.max_followers(); }
+  uint32_t segments_per_strand(uint32_t segments) const { return sizes_.segments_per_strand(segments); }
+  const gl::Buffer& expanded() const { return expanded_.vertex(); }
+  uint64_t size_bytes() const { return keys_.size_bytes() + expanded_.size_bytes() + expander_.size_bytes(); }
+
+ private:
+  KeyStrands keys_;
+  ExpandSizes sizes_;
+  ExpandedStrands expanded_;
+  StrandExpander expander_;
+};
+
 class ExpandPassTest : public GlTest {
  protected:
   void SetUp() override {
@@ -52,19 +86,8 @@ class ExpandPassTest : public GlTest {
     framebuffer_.bind();
   }
 
-  ExpandPass make_pass(const Keys& keys, const std::vector<RootTriangle>& triangles,
-                       const FollowerDesc& followers, uint32_t max_segments) {
-    auto pass = ExpandPass::make(gl::ShaderLibrary(), make_asset(keys, triangles), followers, max_segments);
-    if (!pass) {
-      ADD_FAILURE() << pass.error().to_string();
-      return ExpandPass();
-    }
-    pass->upload(keys.position_m);
-    return std::move(*pass);
-  }
-
   // All points of the strands first .. first + count - 1, strand-major, in order along the strand.
-  static std::vector<ExpandedVertex> expand(const ExpandPass& pass, uint32_t first, uint32_t count,
+  static std::vector<ExpandedVertex> expand(const Expander& pass, uint32_t first, uint32_t count,
                                             uint32_t segments) {
     const uint32_t written = pass.run(first, count, {segments, pass.max_followers()});
     const uint32_t per_strand = pass.segments_per_strand(segments);
@@ -101,7 +124,7 @@ class ExpandPassTest : public GlTest {
 TEST_F(ExpandPassTest, CurvesPassThroughTheVerticesBitForBit) {
   const Keys keys = make_keys(70, 16);
   const uint32_t segments = 3;
-  const ExpandPass pass = make_pass(keys, {}, {}, segments);
+  const Expander pass(keys, {}, {}, segments);
   const auto points = expand(pass, 0, 70, segments);
   ASSERT_EQ(points.size(), 70u * 46u);
   for (uint32_t s = 0; s < 70; ++s)
@@ -111,7 +134,7 @@ TEST_F(ExpandPassTest, CurvesPassThroughTheVerticesBitForBit) {
 
 TEST_F(ExpandPassTest, KeyStrandsMatchTheReference) {
   const Keys keys = make_keys(70, 16);
-  const ExpandPass pass = make_pass(keys, {}, {}, 4);
+  const Expander pass(keys, {}, {}, 4);
   const auto points = expand(pass, 0, 70, 4);
   ASSERT_EQ(points.size(), 70u * 61u);
   for (uint32_t s = 0; s < 70; ++s)
@@ -132,7 +155,7 @@ TEST_F(ExpandPassTest, StraightAndQuadraticStrandsAreExact) {
     keys.position_m.emplace_back(0.01f * x, -0.02f * x, 0.005f * x);
     keys.position_m.emplace_back(0.01f * x, -0.002f * x * x, 0.0f);
   }
-  const ExpandPass pass = make_pass(keys, {}, {}, 8);
+  const Expander pass(keys, {}, {}, 8);
   const auto points = expand(pass, 0, 2, 8);
   ASSERT_EQ(points.size(), 2u * 57u);
   for (int i = 0; i <= 56; ++i) {
@@ -149,7 +172,7 @@ TEST_F(ExpandPassTest, StraightAndQuadraticStrandsAreExact) {
 TEST_F(ExpandPassTest, FollowersMatchTheReference) {
   const Keys keys = make_keys(60, 12);
   const std::vector<RootTriangle> triangles{{0, 1, 50}, {1, 50, 51}, {7, 8, 57}};
-  const ExpandPass pass = make_pass(keys, triangles, kStyledFollowers, 3);
+  const Expander pass(keys, triangles, kStyledFollowers, 3);
   ASSERT_EQ(pass.strand_count(pass.max_followers()), 60u + 15u);
   const auto points = expand(pass, 60, 15, 3);
   ASSERT_EQ(points.size(), 15u * 34u);
@@ -168,7 +191,7 @@ TEST_F(ExpandPassTest, FollowerRootsStayInTheirTriangle) {
   const std::vector<RootTriangle> triangles{{0, 1, 50}, {3, 4, 53}};
   FollowerDesc followers = kStyledFollowers;
   followers.per_triangle = 40;
-  const ExpandPass pass = make_pass(keys, triangles, followers, 1);
+  const Expander pass(keys, triangles, followers, 1);
   const auto points = expand(pass, 60, 80, 1);
   ASSERT_EQ(points.size(), 80u * 4u);
   for (uint32_t f = 0; f < 80; ++f) {
@@ -187,7 +210,7 @@ TEST_F(ExpandPassTest, FollowersOfParallelKeysHaveTheirLength) {
     keys.position_m[3 * v + 1] = keys.position_m[3 * v] + glm::vec3(0.004f, 0, 0);
     keys.position_m[3 * v + 2] = keys.position_m[3 * v] + glm::vec3(0, 0, 0.004f);
   }
-  const ExpandPass pass = make_pass(keys, {{0, 1, 2}}, kPlainFollowers, 4);
+  const Expander pass(keys, {{0, 1, 2}}, kPlainFollowers, 4);
   const auto points = expand(pass, 0, 7, 4);
   ASSERT_EQ(points.size(), 7u * 37u);
   const auto length_m = [&](uint32_t strand) {
@@ -205,7 +228,7 @@ TEST_F(ExpandPassTest, MoreVerticesThanOneDrawMayHoldAreAllRight) {
   const uint32_t strands = 3000;
   const Keys keys = make_keys(strands, 32);
   const uint32_t segments = 1;
-  const ExpandPass pass = make_pass(keys, {}, {}, segments);
+  const Expander pass(keys, {}, {}, segments);
   ASSERT_GT(strands * 32, shader::kMaxTessellatedVerticesPerDraw);
   const auto points = expand(pass, 0, strands, segments);
   ASSERT_EQ(points.size(), strands * 32u);
@@ -217,7 +240,7 @@ TEST_F(ExpandPassTest, MoreVerticesThanOneDrawMayHoldAreAllRight) {
 TEST_F(ExpandPassTest, StrandsLongerThanATessellationLevelComeInRuns) {
   // 63 gaps x 8 segments = 504, tessellated 64 at a time.
   const Keys keys = make_keys(67, 64);
-  const ExpandPass pass = make_pass(keys, {}, {}, 8);
+  const Expander pass(keys, {}, {}, 8);
   const auto points = expand(pass, 0, 67, 8);
   ASSERT_EQ(points.size(), 67u * 505u);
   for (const uint32_t s : {0u, 63u, 64u, 66u})
@@ -230,7 +253,7 @@ TEST_F(ExpandPassTest, StrandsLongerThanATessellationLevelComeInRuns) {
 
 TEST_F(ExpandPassTest, ABatchEqualsTheSameStrandsOfTheWhole) {
   const Keys keys = make_keys(200, 6);
-  const ExpandPass pass = make_pass(keys, {{0, 1, 50}, {10, 11, 60}}, kStyledFollowers, 2);
+  const Expander pass(keys, {{0, 1, 50}, {10, 11, 60}}, kStyledFollowers, 2);
   const auto whole = expand(pass, 0, pass.strand_count(pass.max_followers()), 2);
   const auto batch = expand(pass, 150, 57, 2);
   ASSERT_EQ(batch.size(), 57u * 11u);
@@ -239,7 +262,7 @@ TEST_F(ExpandPassTest, ABatchEqualsTheSameStrandsOfTheWhole) {
 
 TEST_F(ExpandPassTest, FewerFollowersAreSomeOfTheSameOnes) {
   const Keys keys = make_keys(60, 5);
-  const ExpandPass pass = make_pass(keys, {{0, 1, 50}, {3, 4, 53}}, kStyledFollowers, 1);
+  const Expander pass(keys, {{0, 1, 50}, {3, 4, 53}}, kStyledFollowers, 1);
   const auto points_of = [&](uint32_t followers) {
     std::vector<ExpandedVertex> raw(2 * static_cast<size_t>(pass.run(60, 2 * followers, {1, followers})));
     pass.expanded().read(0, std::as_writable_bytes(std::span(raw)));
@@ -262,7 +285,7 @@ TEST_F(ExpandPassTest, CoincidentVerticesGiveFiniteUnitTangents) {
                                  0.0f);                    // back and forth: zero Catmull-Rom tangents
     keys.position_m.emplace_back(1e-20f * v, 0.0f, 0.0f);  // shorter than a float can square
   }
-  const ExpandPass pass = make_pass(keys, {{0, 1, 2}, {0, 0, 0}}, kStyledFollowers, 4);
+  const Expander pass(keys, {{0, 1, 2}, {0, 0, 0}}, kStyledFollowers, 4);
   for (const ExpandedVertex& point : expand(pass, 0, pass.strand_count(pass.max_followers()), 4)) {
     for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(std::isfinite(point.position_m[axis]));
     EXPECT_NEAR(glm::length(point.tangent), 1.0f, 1e-3f);
@@ -272,8 +295,8 @@ TEST_F(ExpandPassTest, CoincidentVerticesGiveFiniteUnitTangents) {
 TEST_F(ExpandPassTest, WithoutFollowersNothingIsAllocatedForThem) {
   const Keys keys = make_keys(10, 6);
   const std::vector<RootTriangle> triangles{{0, 1, 2}, {3, 4, 5}};
-  const ExpandPass none = make_pass(keys, triangles, FollowerDesc{}, 2);
-  const ExpandPass some = make_pass(keys, triangles, kPlainFollowers, 2);
+  const Expander none(keys, triangles, FollowerDesc{}, 2);
+  const Expander some(keys, triangles, kPlainFollowers, 2);
   EXPECT_EQ(none.strand_count(none.max_followers()), 10u);
   EXPECT_EQ(none.size_bytes(), 10 * 6 * sizeof(glm::vec3) + 10 * 10 * 2 * sizeof(ExpandedVertex));
   EXPECT_EQ(some.size_bytes(),

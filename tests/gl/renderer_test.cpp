@@ -232,8 +232,9 @@ TEST_F(RendererTest, TheProfileCountsWhatWasDrawn) {
   draw(*renderer, {{}, asset.rest_position_m}, front_camera());
   EXPECT_EQ(renderer->profile().drawn_strands, 10u + 8u * 2u);
   EXPECT_EQ(renderer->profile().drawn_segments, 26u * 5u);
-  EXPECT_GT(renderer->profile().strands_ms, 0.0);
-  EXPECT_EQ(renderer->profile().head_ms, 0.0);
+  EXPECT_GT(renderer->passes().last_ms("render/strands"), 0.0);
+  EXPECT_EQ(renderer->passes().last_ms("render/head"), 0.0);
+  EXPECT_GT(renderer->profile().total_ms, renderer->passes().last_ms("render/strands"));
 }
 
 TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {

@@ -94,14 +94,14 @@ Status run(int argc, char** argv) {
       1e3 * static_cast<double>(std::clock() - cpu_begin) / CLOCKS_PER_SEC / std::max(1, options.repeat - 1);
   std::sort(picture_ms.begin(), picture_ms.end());
   const RenderProfile& profile = renderer->profile();
-  std::printf(
-      "%s: %ux%u, %llu strands, %llu segments; picture %.1f ms (best %.1f), %.1f ms of CPU; expand %.1f, "
-      "strands %.1f, "
-      "head %.1f, resolve %.1f\n",
-      context->info().renderer.c_str(), options.size.width, options.size.height,
-      static_cast<unsigned long long>(profile.drawn_strands),
-      static_cast<unsigned long long>(profile.drawn_segments), picture_ms[picture_ms.size() / 2],
-      picture_ms.front(), cpu_ms, profile.expand_ms, profile.strands_ms, profile.head_ms, profile.resolve_ms);
+  std::string passes;
+  for (const gl::PassReport& pass : renderer->passes().report())
+    passes += fmt::format(", {} {:.1f}", pass.name, pass.median_ms);
+  std::printf("%s: %ux%u, %llu strands, %llu segments; picture %.1f ms (best %.1f), %.1f ms of CPU%s\n",
+              context->info().renderer.c_str(), options.size.width, options.size.height,
+              static_cast<unsigned long long>(profile.drawn_strands),
+              static_cast<unsigned long long>(profile.drawn_segments), picture_ms[picture_ms.size() / 2],
+              picture_ms.front(), cpu_ms, passes.c_str());
   return {};
 }
 

@@ -8,8 +8,6 @@ namespace {
 TEST(Features, EmptySceneNeedsNothing) {
   SceneDesc scene;
   scene.has_auto_collider = false;
-  scene.head.is_visible = false;
-  scene.look.followers = 0;
   EXPECT_EQ(analyse(scene, {}), SceneFeatures{});
 }
 
@@ -35,9 +33,33 @@ TEST(Features, EachFactFollowsItsOwnCause) {
   EXPECT_TRUE(analyse(scene, {.strand_viewers = 1}).has_strand_viewers);
   EXPECT_FALSE(analyse(scene, {.strand_viewers = 1}).has_frame_viewers);
   EXPECT_TRUE(analyse(scene, {.frame_viewers = 2}).has_frame_viewers);
-  EXPECT_TRUE(analyse(scene, {.is_recording_pictures = true}).has_frame_viewers);
-  EXPECT_TRUE(analyse(scene, {}).has_head_mesh);
-  EXPECT_TRUE(analyse(scene, {}).has_followers);
+}
+
+TEST(Features, WhatThereIsToDrawFollowsFromAssetAndLook) {
+  SceneAsset asset;
+  LookDesc look;
+  look.followers = 3;
+  const auto facts = [&] {
+    const PictureFeatures features = analyse_picture(asset, look);
+    return std::vector<bool>{features.has_strands.value, features.has_followers.value,
+                             features.has_head_mesh.value};
+  };
+  EXPECT_EQ(facts(), (std::vector<bool>{false, false, false}));
+  asset.strand_count = 3;
+  EXPECT_EQ(facts(), (std::vector<bool>{true, false, false})) << "followers need triangles of roots";
+  asset.triangle = {{0, 1, 2}};
+  asset.head.triangle = {{0, 1, 2}};
+  EXPECT_EQ(facts(), (std::vector<bool>{true, true, true}));
+  const auto on = explain(analyse_picture(asset, look));
+  look.followers = 0;
+  EXPECT_EQ(facts(), (std::vector<bool>{true, false, true}));
+  const auto off = explain(analyse_picture({}, look));
+  ASSERT_EQ(on.size(), 3u);
+  for (size_t i = 0; i < on.size(); ++i) {
+    EXPECT_TRUE(on[i].value && !off[i].value) << on[i].name;
+    EXPECT_EQ(on[i].name, off[i].name);
+    EXPECT_NE(on[i].reason, off[i].reason) << on[i].name;
+  }
 }
 
 TEST(Features, ExplainAgreesWithAnalyse) {
@@ -49,19 +71,14 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.colliders.resize(coin() ? 0 : 2);
     scene.wind.mean_mps.x = coin() ? 0.0f : 1.0f;
     scene.wind.gust_intensity = coin() ? 0.0f : 0.5f;
-    scene.look.followers = coin() ? 0 : 3;
-    scene.head.is_visible = coin();
-    if (coin()) scene.head.mesh_path = "x.obj";
-    const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u, coin()};
+    const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u};
     const SceneFeatures features = analyse(scene, facts);
     SceneFeatures explained;
     const std::map<std::string, bool*> fact{{"has_wind", &explained.has_wind},
                                             {"has_turbulence", &explained.has_turbulence},
                                             {"has_colliders", &explained.has_colliders},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
-                                            {"has_frame_viewers", &explained.has_frame_viewers},
-                                            {"has_followers", &explained.has_followers},
-                                            {"has_head_mesh", &explained.has_head_mesh}};
+                                            {"has_frame_viewers", &explained.has_frame_viewers}};
     const auto reasons = explain(scene, facts);
     ASSERT_EQ(reasons.size(), fact.size());
     for (const FeatureReason& reason : reasons) {
@@ -75,8 +92,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
 
 TEST(Features, ReasonsDifferWithTheValue) {
   SceneDesc bare;
-  bare.has_auto_collider = bare.head.is_visible = false;
-  bare.look.followers = 0;
+  bare.has_auto_collider = false;
   SceneDesc full;
   full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1};
   const auto off = explain(bare, {});

@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/base/check.h"
 #include "shaders/shared/bindings.h"
@@ -11,7 +12,19 @@
 namespace strandcast {
 namespace {
 
-constexpr uint64_t kSegmentBytes = 2 * sizeof(ExpandedVertex);
+// Followers: chosen by eye on the built-in scene. Lengths are shares of the mean strand length.
+constexpr float kFollowerClump = 0.75f;
+constexpr float kFollowerVariation = 0.012f;
+constexpr float kFollowerShorten = 0.18f;
+// What is drawn follows from its size on the screen. A segment shorter than `segment_px` shows no bend, so
+// fewer are drawn per gap; strands thinner than `width_px` are replaced by fewer that together are as wide.
+// Every triangle costs a CPU about half a microsecond, so software renderers get coarser targets.
+struct DetailTarget {
+  float segment_px;
+  float width_px;
+};
+constexpr DetailTarget kHardwareDetail{5.0f, 0.25f};
+constexpr DetailTarget kSoftwareDetail{9.0f, 0.6f};
 // Strands per patch: enough to fill the lanes of a vector unit, and a whole patch stays far below the limit
 // per draw.
 constexpr uint32_t kLinesPerPatch = shader::kMaxTessellationLevel;
@@ -36,48 +49,126 @@ void draw_lines(const gl::Program& program, uint32_t first, uint32_t strands, ui
   draw_lines(program, first + patches * lines, strands - patches * lines, run_segments);
 }
 
+ExpandSizes sizes_of(const RenderScene& scene) {
+  return {scene.key_strands, scene.triangle_count, scene.look.followers};
+}
+
+/// Key strands, then all followers, in as many batches as the buffer needs.
+class ExpandPass final : public RenderPass {
+ public:
+  ExpandPass(RenderScene& scene, ExpandedStrands& expanded)
+      : Pass({"render/expand",
+              {&scene.key_strands},
+              {&expanded},
+              scene.features.has_strands.value,
+              scene.features.has_strands.reason}),
+        scene_(scene),
+        expanded_(expanded),
+        sizes_(sizes_of(scene)) {}
+
+  bool is_batched() const override { return true; }
+  uint64_t size_bytes() const override {
+    return scene_.features.has_followers.value ? sizeof(RootTriangle) * uint64_t{scene_.triangle_count} : 0;
+  }
+
+  Status prepare(const RenderSetup& setup) override {
+    const FollowerDesc followers{sizes_.max_followers(), kFollowerClump,
+                                 kFollowerVariation * scene_.rest.mean_length_m, kFollowerShorten};
+    ASSIGN_OR_RETURN(expander_, StrandExpander::make(setup.shaders, setup.asset, followers));
+    expanded_.allocate();
+    return {};
+  }
+
+  Status run(RenderTurn& turn) override {
+    if (turn.batch_index == 0) begin(turn.view);
+    const uint32_t first = turn.batch_index * batch_strands_;
+    const uint32_t count = std::min(batch_strands_, strand_count_ - first);
+    expanded_.segment_count = expander_.run(scene_.key_strands, expanded_, first, count, level_);
+    turn.drawn_strands += count;
+    turn.drawn_segments += expanded_.segment_count;
+    turn.has_more_batches = first + count < strand_count_;
+    return {};
+  }
+
+ private:
+  void begin(const View& view) {
+    level_ = choose_level(view);
+    strand_count_ = sizes_.strand_count(level_.followers);
+    batch_strands_ = sizes_.batch_strands(expanded_.size_bytes(), level_.segments_per_gap);
+    expanded_.width_m = 2.0f * scene_.look.strand_radius_m *
+                        static_cast<float>(sizes_.strand_count(sizes_.max_followers())) /
+                        static_cast<float>(strand_count_);
+  }
+  ExpandLevel choose_level(const View& view) const;
+
+  RenderScene& scene_;
+  ExpandedStrands& expanded_;
+  ExpandSizes sizes_;
+  StrandExpander expander_;
+  // Of the draw that is under way.
+  ExpandLevel level_;
+  uint32_t strand_count_ = 0;
+  uint32_t batch_strands_ = 0;
+};
+
+// What is too small to be seen on the screen is not drawn: bends within a few pixels, and strands far thinner
+// than a pixel, for which fewer and wider ones stand.
+ExpandLevel ExpandPass::choose_level(const View& view) const {
+  const DetailTarget& detail = scene_.is_software ? kSoftwareDetail : kHardwareDetail;
+  const auto gap_count = static_cast<float>(sizes_.segments_per_strand(1));
+  const float px_per_m = view.focal_px / static_cast<float>(kSamplesPerSide) / view.target_distance_m;
+  const float gap_px = scene_.rest.mean_length_m / gap_count * px_per_m;
+  const float width_px = 2.0f * scene_.look.strand_radius_m * px_per_m;
+  // A size that is not a number takes the least detail.
+  const auto at_most = [](float wanted, uint32_t limit) {
+    return wanted > 1.0f ? static_cast<uint32_t>(std::min(std::ceil(wanted), static_cast<float>(limit)))
+                         : std::min(1u, limit);
+  };
+  ExpandLevel level;
+  level.segments_per_gap = at_most(gap_px / detail.segment_px, scene_.look.segments);
+  level.followers = at_most(static_cast<float>(sizes_.max_followers()) * width_px / detail.width_px,
+                            sizes_.max_followers());
+  return level;
+}
+
 }  // namespace
 
-Result<ExpandPass> ExpandPass::make(const gl::ShaderLibrary& shaders, const SceneAsset& asset,
-                                    const FollowerDesc& followers, uint32_t max_segments_per_gap) {
-  CHECK(asset.strand_count > 0 && asset.vertex_count >= kMinVertexCount && max_segments_per_gap > 0);
-  ExpandPass pass;
-  pass.followers_ = followers;
-  if (asset.triangle.empty()) pass.followers_.per_triangle = 0;
-  const bool has_followers = pass.followers_.per_triangle > 0;
-  ASSIGN_OR_RETURN(pass.program_, gl::Program::make(shaders, {"render/expand.vert", "render/expand.tese"},
-                                                    {{"HAS_FOLLOWERS", has_followers ? 1 : 0}}, kCaptured));
-  pass.key_count_ = asset.strand_count;
-  pass.vertex_count_ = asset.vertex_count;
-  pass.triangle_count_ = static_cast<uint32_t>(asset.triangle.size());
-  pass.no_attributes_ = gl::VertexArray("expand");
-  pass.key_position_ = gl::Buffer(
-      "key position", sizeof(glm::vec3) * static_cast<size_t>(asset.strand_count) * asset.vertex_count);
-  if (has_followers) pass.root_triangle_ = gl::Buffer::of("root triangle", asset.triangle);
-  const uint64_t strand_bytes = kSegmentBytes * pass.segments_per_strand(max_segments_per_gap);
-  pass.expanded_ = gl::Buffer("expanded", std::min(strand_bytes * pass.strand_count(pass.max_followers()),
-                                                   kMaxExpandedBytes / strand_bytes * strand_bytes));
-  return pass;
+uint64_t ExpandSizes::buffer_bytes(uint32_t max_segments_per_gap) const {
+  const uint64_t strand_bytes = kSegmentBytes * segments_per_strand(max_segments_per_gap);
+  if (strand_bytes == 0) return 0;
+  return std::min(strand_bytes * strand_count(max_followers_),
+                  kMaxExpandedBytes / strand_bytes * strand_bytes);
 }
 
-void ExpandPass::upload(const std::vector<glm::vec3>& position_m) {
-  key_position_.write(position_m);
+uint32_t ExpandSizes::batch_strands(uint64_t size_bytes, uint32_t segments_per_gap) const {
+  return static_cast<uint32_t>(size_bytes / (kSegmentBytes * segments_per_strand(segments_per_gap)));
 }
 
-uint32_t ExpandPass::batch_strands(uint32_t segments_per_gap) const {
-  return static_cast<uint32_t>(expanded_.size_bytes() /
-                               (kSegmentBytes * segments_per_strand(segments_per_gap)));
+Result<StrandExpander> StrandExpander::make(const gl::ShaderLibrary& shaders, const SceneAsset& asset,
+                                            const FollowerDesc& followers) {
+  CHECK(asset.strand_count > 0 && asset.vertex_count >= kMinVertexCount);
+  StrandExpander expander;
+  expander.followers_ = followers;
+  if (asset.triangle.empty()) expander.followers_.per_triangle = 0;
+  const bool has_followers = expander.followers_.per_triangle > 0;
+  ASSIGN_OR_RETURN(expander.program_,
+                   gl::Program::make(shaders, {"render/expand.vert", "render/expand.tese"},
+                                     {{"HAS_FOLLOWERS", has_followers ? 1 : 0}}, kCaptured));
+  expander.no_attributes_ = gl::VertexArray("expand");
+  if (has_followers) expander.root_triangle_ = gl::Buffer::of("root triangle", asset.triangle);
+  return expander;
 }
 
-uint32_t ExpandPass::run(uint32_t first, uint32_t count, const ExpandLevel& level) const {
-  CHECK(level.followers <= followers_.per_triangle && first + count <= strand_count(level.followers));
-  CHECK(count <= batch_strands(level.segments_per_gap));
-  const uint32_t segments = segments_per_strand(level.segments_per_gap);
+uint32_t StrandExpander::run(const KeyStrands& keys, const ExpandedStrands& expanded, uint32_t first,
+                             uint32_t count, const ExpandLevel& level) const {
+  const uint32_t segments = level.segments_per_gap * (keys.vertex_count() - 1);
+  CHECK(level.followers <= followers_.per_triangle);
+  CHECK(uint64_t{count} * segments * kSegmentBytes <= expanded.size_bytes());
   program_.use();
   no_attributes_.bind();
-  key_position_.bind_storage(shader::kBindingKeyPosition);
-  program_.set("u_key_count", key_count_);
-  program_.set("u_vertex_count", vertex_count_);
+  keys.position().bind_storage(shader::kBindingKeyPosition);
+  program_.set("u_key_count", keys.strand_count());
+  program_.set("u_vertex_count", keys.vertex_count());
   program_.set("u_segments", level.segments_per_gap);
   if (followers_.per_triangle > 0) {
     root_triangle_.bind_storage(shader::kBindingRootTriangle);
@@ -89,7 +180,7 @@ uint32_t ExpandPass::run(uint32_t first, uint32_t count, const ExpandLevel& leve
   }
   glPatchParameteri(GL_PATCH_VERTICES, 1);
   glEnable(GL_RASTERIZER_DISCARD);
-  glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, expanded_.name());
+  glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, expanded.vertex().name());
   glBeginTransformFeedback(GL_LINES);
   for (uint32_t point = 0; point < segments; point += shader::kMaxTessellationLevel) {
     const uint32_t run_segments = std::min(shader::kMaxTessellationLevel, segments - point);
@@ -103,8 +194,12 @@ uint32_t ExpandPass::run(uint32_t first, uint32_t count, const ExpandLevel& leve
   return count * segments;
 }
 
-uint64_t ExpandPass::size_bytes() const {
-  return key_position_.size_bytes() + root_triangle_.size_bytes() + expanded_.size_bytes();
+std::unique_ptr<ExpandedStrands> make_expanded_strands(const RenderScene& scene) {
+  return std::make_unique<ExpandedStrands>(sizes_of(scene).buffer_bytes(scene.look.segments));
+}
+
+std::unique_ptr<RenderPass> make_expand_pass(RenderScene& scene, ExpandedStrands& expanded) {
+  return std::make_unique<ExpandPass>(scene, expanded);
 }
 
 }  // namespace strandcast

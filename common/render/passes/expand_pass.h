@@ -1,27 +1,19 @@
-// Expand pass: key strands and followers through tessellation into a buffer of line segments, once per draw.
-// The other passes pull their vertices from that buffer. Needs a bound framebuffer; all calls from the
-// context's thread.
+// Expand pass: key strands and followers through tessellation into a buffer of line segments. The passes
+// after it pull their vertices from that buffer. Needs a bound framebuffer; all calls from the context's
+// thread.
 #pragma once
 
 #include <cstdint>
-#include <glm/glm.hpp>
-#include <vector>
+#include <memory>
 
 #include "common/base/result.h"
 #include "common/gl/objects.h"
 #include "common/gl/program.h"
-#include "common/strands/scene_asset.h"
+#include "common/render/passes/strand_buffers.h"
+#include "common/render/render_scene.h"
+#include "common/render/render_turn.h"
 
 namespace strandcast {
-
-/// One end of an expanded segment, as shaders/render/strand.vert reads it.
-struct ExpandedVertex {
-  glm::vec3 position_m;  // head space
-  float along;           // 0 at the root, 1 at the tip
-  glm::vec3 tangent;     // unit, towards the tip
-  uint32_t strand;       // key strands first, then followers
-};
-static_assert(sizeof(ExpandedVertex) == 32);
 
 struct FollowerDesc {
   uint32_t per_triangle = 0;
@@ -41,45 +33,58 @@ struct ExpandLevel {
   uint32_t followers = 0;         // per triangle, at most FollowerDesc::per_triangle
 };
 
-class ExpandPass {
+/// What is known about an expansion before there is any GL.
+class ExpandSizes {
  public:
-  ExpandPass() = default;
-  /// The asset must have strands. Followers need triangles: without them none are drawn, and no code for them
-  /// is compiled.
-  static Result<ExpandPass> make(const gl::ShaderLibrary& shaders, const SceneAsset& asset,
-                                 const FollowerDesc& followers, uint32_t max_segments_per_gap);
-
-  /// `position_m`: (vertex_count x strand_count) head space.
-  void upload(const std::vector<glm::vec3>& position_m);
+  ExpandSizes(const KeyStrands& keys, uint32_t triangle_count, uint32_t followers_per_triangle)
+      : key_count_(keys.strand_count()),
+        vertex_count_(keys.vertex_count()),
+        triangle_count_(triangle_count),
+        max_followers_(triangle_count > 0 ? followers_per_triangle : 0) {}
 
   /// Key strands and followers together.
-  uint32_t strand_count(uint32_t followers_per_triangle) const {
-    return key_count_ + triangle_count_ * followers_per_triangle;
-  }
+  uint32_t strand_count(uint32_t followers) const { return key_count_ + triangle_count_ * followers; }
   /// Followers per triangle at most; 0 without triangles.
-  uint32_t max_followers() const { return followers_.per_triangle; }
-  /// Strands that fit in the buffer at once.
-  uint32_t batch_strands(uint32_t segments_per_gap) const;
+  uint32_t max_followers() const { return max_followers_; }
   uint32_t segments_per_strand(uint32_t segments_per_gap) const {
-    return segments_per_gap * (vertex_count_ - 1);
+    return vertex_count_ > 0 ? segments_per_gap * (vertex_count_ - 1) : 0;
   }
-  /// Expands strands first .. first + count - 1; count at most batch_strands(). Returns the segments written.
-  uint32_t run(uint32_t first, uint32_t count, const ExpandLevel& level) const;
+  /// Bytes of a buffer for all strands at once, as far as kMaxExpandedBytes allows.
+  uint64_t buffer_bytes(uint32_t max_segments_per_gap) const;
+  /// Strands that fit in a buffer of so many bytes.
+  uint32_t batch_strands(uint64_t size_bytes, uint32_t segments_per_gap) const;
+  uint32_t vertex_count() const { return vertex_count_; }
+  uint32_t key_count() const { return key_count_; }
 
-  /// (segments x 2) ExpandedVertex of the last run. Segments of one strand may come in any order.
-  const gl::Buffer& expanded() const { return expanded_; }
-  uint64_t size_bytes() const;
+ private:
+  uint32_t key_count_;
+  uint32_t vertex_count_;
+  uint32_t triangle_count_;
+  uint32_t max_followers_;
+};
+
+/// The GL part: program and triangles.
+class StrandExpander {
+ public:
+  StrandExpander() = default;
+  /// The asset must have strands. Followers need triangles: without them none are drawn, and no code for them
+  /// is compiled.
+  static Result<StrandExpander> make(const gl::ShaderLibrary& shaders, const SceneAsset& asset,
+                                     const FollowerDesc& followers);
+  /// Expands strands first .. first + count - 1 into `expanded`. Returns the segments written.
+  uint32_t run(const KeyStrands& keys, const ExpandedStrands& expanded, uint32_t first, uint32_t count,
+               const ExpandLevel& level) const;
+  uint64_t size_bytes() const { return root_triangle_.size_bytes(); }
 
  private:
   gl::Program program_;
   gl::VertexArray no_attributes_;
-  gl::Buffer key_position_;
   gl::Buffer root_triangle_;
-  gl::Buffer expanded_;
   FollowerDesc followers_;
-  uint32_t key_count_ = 0;
-  uint32_t vertex_count_ = 0;
-  uint32_t triangle_count_ = 0;
 };
+
+/// What the expand pass writes for a pass after it.
+std::unique_ptr<ExpandedStrands> make_expanded_strands(const RenderScene& scene);
+std::unique_ptr<RenderPass> make_expand_pass(RenderScene& scene, ExpandedStrands& expanded);
 
 }  // namespace strandcast

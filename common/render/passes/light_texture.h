@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 
 #include "common/gl/objects.h"
+#include "common/gl/pass_plan.h"
 #include "common/gl/program.h"
 #include "common/render/light_volume.h"
 #include "common/render/view.h"
@@ -12,15 +13,19 @@
 
 namespace strandcast {
 
-class LightTexture {
+class LightTexture final : public gl::Resource {
  public:
+  LightTexture() : Resource("light volume") {}
+  /// Allocates when the volume has another size than the last.
   void upload(const LightVolume& volume);
   /// Light and surroundings as the shaders see them, in head space.
   void set_light(const LookDesc& look, const View& view, const glm::vec3& to_light_in_head);
   void set_uniforms(const gl::Program& program, uint32_t unit) const;
+  /// Follows the hair: 0 before the first upload.
+  uint64_t size_bytes() const override { return texture_.size_bytes(); }
 
  private:
-  gl::Handle<gl::delete_texture> texture_;
+  gl::Texture texture_;
   glm::ivec3 size_{0};
   glm::vec3 origin_m_{0.0f};
   glm::vec3 volume_from_m_{1.0f};

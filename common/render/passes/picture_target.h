@@ -1,5 +1,5 @@
-// Targets of one picture size: the scene with several samples per pixel, and the resolved sRGB picture. All
-// calls from the context's thread.
+// Targets of one picture size: the scene with several samples per pixel, and the picture that it is resolved
+// into. All calls from the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 #include "common/base/result.h"
 #include "common/gl/objects.h"
-#include "common/gl/program.h"
+#include "common/gl/pass_plan.h"
 #include "common/pictures/image_codec.h"
 
 namespace strandcast {
@@ -16,34 +16,44 @@ namespace strandcast {
 /// thinner than a pixel equally well.
 inline constexpr uint32_t kSamplesPerSide = 2;
 
-class PictureTarget {
+/// Linear RGB with coverage in alpha, and depth, per sample.
+class SceneTarget final : public gl::Resource {
  public:
-  PictureTarget() = default;
-  static Result<PictureTarget> make(const gl::ShaderLibrary& shaders);
-
+  SceneTarget() : Resource("scene") {}
   /// Allocates for a picture of this size, unless it has that size already. LimitExceeded when OpenGL cannot;
   /// the target then has no size.
-  Status resize(glm::uvec2 size);
-  /// Binds and clears the scene target; viewport and depth state are set.
-  void begin_scene() const;
-  /// Scene over the background (linear RGB) into the picture.
-  void resolve(const glm::vec3& background) const;
+  Status resize(glm::uvec2 picture_px);
+  /// Makes it what is drawn into: viewport, depth test, nothing else switched on.
+  void begin() const;
+  void clear() const;
+  const gl::Texture& color() const { return color_; }
+  /// 0 before the first resize().
+  uint64_t size_bytes() const override { return color_.size_bytes() + depth_.size_bytes(); }
+
+ private:
+  gl::Texture color_;
+  gl::Texture depth_;
+  gl::Framebuffer framebuffer_;
+  glm::uvec2 size_px_{0};  // in samples
+};
+
+/// sRGB, first row at the top.
+class PictureTarget final : public gl::Resource {
+ public:
+  PictureTarget() : Resource("picture") {}
+  /// As SceneTarget.
+  Status resize(glm::uvec2 picture_px);
+  void begin() const;
   /// Top row first.
   Image read_image() const;
   void blit_to(uint32_t framebuffer, glm::uvec2 size) const;
-
-  glm::uvec2 size() const { return size_; }
-  glm::uvec2 scene_size() const { return size_ * kSamplesPerSide; }
+  glm::uvec2 size_px() const { return size_px_; }
+  uint64_t size_bytes() const override { return color_.size_bytes(); }
 
  private:
-  gl::Program program_;
-  gl::VertexArray no_attributes_;
-  gl::Texture scene_color_;
-  gl::Texture scene_depth_;
-  gl::Framebuffer scene_;
-  gl::Texture picture_color_;
-  gl::Framebuffer picture_;
-  glm::uvec2 size_{0};
+  gl::Texture color_;
+  gl::Framebuffer framebuffer_;
+  glm::uvec2 size_px_{0};
 };
 
 }  // namespace strandcast

@@ -24,38 +24,68 @@ std::vector<uint16_t> make_quad_indices() {
   return index;
 }
 
+class StrandPass final : public RenderPass {
+ public:
+  StrandPass(RenderScene& scene, ExpandedStrands& expanded)
+      : Pass({"render/strands",
+              {&expanded, &scene.light},
+              {&scene.scene},
+              scene.features.has_strands.value,
+              scene.features.has_strands.reason}),
+        scene_(scene),
+        expanded_(expanded) {}
+
+  bool is_batched() const override { return true; }
+  uint64_t size_bytes() const override {
+    return uint64_t{kSegmentsPerDraw} * kIndicesPerSegment * sizeof(uint16_t);
+  }
+
+  Status prepare(const RenderSetup& setup) override {
+    ASSIGN_OR_RETURN(program_,
+                     gl::Program::make(setup.shaders, {"render/strand.vert", "render/strand.frag"}, {}));
+    vertex_array_ = gl::VertexArray("strand");
+    quad_index_ = gl::Buffer::of("quad index", make_quad_indices());
+    glVertexArrayElementBuffer(vertex_array_.name(), quad_index_.name());
+    return {};
+  }
+
+  Status run(RenderTurn& turn) override {
+    const LookDesc& look = scene_.look;
+    scene_.scene.begin();
+    program_.use();
+    vertex_array_.bind();
+    expanded_.vertex().bind_storage(shader::kBindingExpanded);
+    scene_.light.set_uniforms(program_, kLightUnit);
+    program_.set("u_clip_from_head", turn.view.clip_from_head);
+    program_.set("u_eye_m", turn.view.eye_m);
+    program_.set("u_target_px", turn.view.target_px);
+    program_.set("u_focal_px", turn.view.focal_px);
+    program_.set("u_near_m", turn.view.near_m);
+    program_.set("u_strand_width_m", expanded_.width_m);
+    program_.set("u_tip_scale", look.tip_scale);
+    program_.set("u_root_color", look.root_color);
+    program_.set("u_tip_color", look.tip_color);
+    const uint32_t segments = expanded_.segment_count;
+    for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
+      const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
+      glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
+                               GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
+    }
+    return {};
+  }
+
+ private:
+  RenderScene& scene_;
+  ExpandedStrands& expanded_;
+  gl::Program program_;
+  gl::VertexArray vertex_array_;
+  gl::Buffer quad_index_;
+};
+
 }  // namespace
 
-Result<StrandPass> StrandPass::make(const gl::ShaderLibrary& shaders) {
-  StrandPass pass;
-  ASSIGN_OR_RETURN(pass.program_,
-                   gl::Program::make(shaders, {"render/strand.vert", "render/strand.frag"}, {}));
-  pass.vertex_array_ = gl::VertexArray("strand");
-  pass.quad_index_ = gl::Buffer::of("quad index", make_quad_indices());
-  glVertexArrayElementBuffer(pass.vertex_array_.name(), pass.quad_index_.name());
-  return pass;
-}
-
-void StrandPass::run(const gl::Buffer& expanded, uint32_t segments, float width_m, const View& view,
-                     const LookDesc& look, const LightTexture& light) const {
-  program_.use();
-  vertex_array_.bind();
-  expanded.bind_storage(shader::kBindingExpanded);
-  light.set_uniforms(program_, kLightUnit);
-  program_.set("u_clip_from_head", view.clip_from_head);
-  program_.set("u_eye_m", view.eye_m);
-  program_.set("u_target_px", view.target_px);
-  program_.set("u_focal_px", view.focal_px);
-  program_.set("u_near_m", view.near_m);
-  program_.set("u_strand_width_m", width_m);
-  program_.set("u_tip_scale", look.tip_scale);
-  program_.set("u_root_color", look.root_color);
-  program_.set("u_tip_color", look.tip_color);
-  for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
-    const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
-    glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
-                             GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
-  }
+std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded) {
+  return std::make_unique<StrandPass>(scene, expanded);
 }
 
 }  // namespace strandcast

@@ -2,30 +2,14 @@
 // instead of sorted blending. All calls from the context's thread.
 #pragma once
 
-#include <cstdint>
+#include <memory>
 
-#include "common/base/result.h"
-#include "common/gl/objects.h"
-#include "common/gl/program.h"
-#include "common/render/passes/light_texture.h"
-#include "common/render/view.h"
-#include "common/scene/scene_desc.h"
+#include "common/render/passes/strand_buffers.h"
+#include "common/render/render_scene.h"
+#include "common/render/render_turn.h"
 
 namespace strandcast {
 
-class StrandPass {
- public:
-  StrandPass() = default;
-  static Result<StrandPass> make(const gl::ShaderLibrary& shaders);
-  /// Draws the first `segments` segments of an expanded buffer into the bound framebuffer with depth test,
-  /// strands `width_m` wide at the root.
-  void run(const gl::Buffer& expanded, uint32_t segments, float width_m, const View& view,
-           const LookDesc& look, const LightTexture& light) const;
-
- private:
-  gl::Program program_;
-  gl::VertexArray vertex_array_;
-  gl::Buffer quad_index_;
-};
+std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded);
 
 }  // namespace strandcast

@@ -1,0 +1,50 @@
+// Resolve pass: the samples of the scene over the background into an sRGB picture.
+
+#include <epoxy/gl.h>
+
+#include "common/render/render_path.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kSceneUnit = 0;
+
+class ResolvePass final : public RenderPass {
+ public:
+  explicit ResolvePass(RenderScene& scene)
+      : Pass({"render/resolve", {&scene.scene}, {&scene.picture}, true, {}}), scene_(scene) {}
+
+  Status prepare(const RenderSetup& setup) override {
+    ASSIGN_OR_RETURN(program_,
+                     gl::Program::make(setup.shaders, {"render/resolve.vert", "render/resolve.frag"}, {}));
+    no_attributes_ = gl::VertexArray("resolve");
+    return {};
+  }
+
+  Status run(RenderTurn& turn) override {
+    RETURN_IF_ERROR(scene_.picture.resize(turn.size_px));
+    scene_.picture.begin();
+    program_.use();
+    no_attributes_.bind();
+    scene_.scene.color().bind(kSceneUnit);
+    program_.set("u_scene", static_cast<int>(kSceneUnit));
+    program_.set("u_samples", static_cast<int>(kSamplesPerSide));
+    program_.set("u_target_height", static_cast<int>(turn.size_px.y));
+    program_.set("u_background", scene_.look.background);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    return {};
+  }
+
+ private:
+  RenderScene& scene_;
+  gl::Program program_;
+  gl::VertexArray no_attributes_;
+};
+
+}  // namespace
+
+std::unique_ptr<RenderPass> make_resolve_pass(RenderScene& scene) {
+  return std::make_unique<ResolvePass>(scene);
+}
+
+}  // namespace strandcast

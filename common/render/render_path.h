@@ -1,0 +1,23 @@
+// Render paths: ways to draw a scene, each a list of passes over the same RenderScene. A path declares its
+// passes; what runs of them, the renderer's list decides. No GL calls in here.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/render/render_scene.h"
+#include "common/render/render_turn.h"
+
+namespace strandcast {
+
+struct RenderPath {
+  std::string name;
+  std::string summary;
+  /// Adds all passes in the order in which they run; the last one writes scene.picture.
+  void (*add_passes)(RenderScene& scene, RenderPassList& passes);
+};
+
+/// Segments of strands as camera-facing quads with a depth test and a fixed pattern of coverage.
+const RenderPath& segment_path();
+
+}  // namespace strandcast

@@ -1,0 +1,114 @@
+#include "common/render/render_scene.h"
+
+#include <algorithm>
+
+#include "common/render/passes/expand_pass.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kMaxFollowers = 64;  // per triangle
+// Cells of the light volume along the largest extent of the rest shape.
+constexpr float kLightCells = 32.0f;
+constexpr float kMinLightCellM = 1e-4f;
+// With fewer roots a sphere fitted to them is no skull.
+constexpr uint32_t kMinSkullRoots = 32;
+// Nor is it one when more than this share of the head's vertices lies deep inside of it, in radii.
+constexpr float kDeepInside = 0.75f;
+constexpr float kMaxDeepShare = 0.15f;
+// The skull that shadows is a little smaller than the sphere through the roots, so that it does not darken
+// them.
+constexpr float kSkullShrink = 0.93f;
+
+RestFacts measure_rest(const SceneAsset& asset) {
+  RestFacts facts;
+  if (asset.strand_count == 0) return facts;
+  double length_m = 0.0;
+  glm::vec3 low = asset.rest_position_m.front();
+  glm::vec3 high = low;
+  for (size_t i = 0; i < asset.rest_position_m.size(); ++i) {
+    const glm::vec3& point = asset.rest_position_m[i];
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+    if (i >= asset.strand_count)
+      length_m += glm::length(point - asset.rest_position_m[i - asset.strand_count]);
+  }
+  facts.mean_length_m = static_cast<float>(length_m / asset.strand_count);
+  facts.extent_m = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  return facts;
+}
+
+// Whether a ball lies under the skin of a head instead of swallowing it, as a sphere through a mane that goes
+// on down the neck would.
+bool is_skull_of(const FittedSphere& ball, const Mesh& head) {
+  const auto deep =
+      std::count_if(head.position_m.begin(), head.position_m.end(), [&](const glm::vec3& point) {
+        return glm::length(point - ball.center_m) < kDeepInside * ball.radius_m;
+      });
+  return static_cast<float>(deep) < kMaxDeepShare * static_cast<float>(head.position_m.size());
+}
+
+LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, const RestFacts& rest) {
+  LightVolumeDesc desc;
+  desc.strand_count = asset.strand_count;
+  desc.vertex_count = asset.vertex_count;
+  desc.cell_m = std::max(rest.extent_m / kLightCells, kMinLightCellM);
+  desc.strand_width_m = 2.0f * look.strand_radius_m;
+  if (asset.strand_count > 0)
+    desc.strands_per_key = 1.0f + static_cast<float>(asset.triangle.size() * look.followers) /
+                                      static_cast<float>(asset.strand_count);
+  if (asset.strand_count >= kMinSkullRoots && !asset.head.triangle.empty()) {
+    const std::vector<glm::vec3> roots_m(asset.rest_position_m.begin(),
+                                         asset.rest_position_m.begin() + asset.strand_count);
+    desc.skull = fit_sphere(roots_m);
+    desc.has_skull = is_skull_of(desc.skull, asset.head);
+    desc.skull.radius_m *= kSkullShrink;
+  }
+  return desc;
+}
+
+LookDesc limited(LookDesc look) {
+  look.followers = std::min(look.followers, kMaxFollowers);
+  look.segments = std::clamp(look.segments, 1u, kMaxSegmentsPerGap);
+  return look;
+}
+
+}  // namespace
+
+Status check_asset(const SceneAsset& asset) {
+  const size_t expected = static_cast<size_t>(asset.strand_count) * asset.vertex_count;
+  if (asset.rest_position_m.size() != expected)
+    return make_error(ErrorCode::BadInput, "scene asset has {} rest positions for {} strands x {} vertices",
+                      asset.rest_position_m.size(), asset.strand_count, asset.vertex_count);
+  if (asset.strand_count > 0 &&
+      (asset.vertex_count < kMinVertexCount || asset.vertex_count > kMaxVertexCount))
+    return make_error(ErrorCode::BadInput, "scene asset has {} vertices per strand, allowed are {} to {}",
+                      asset.vertex_count, kMinVertexCount, kMaxVertexCount);
+  for (const RootTriangle& triangle : asset.triangle)
+    if (glm::any(glm::greaterThanEqual(triangle, glm::uvec3(asset.strand_count))))
+      return make_error(ErrorCode::BadInput,
+                        "root triangle ({}, {}, {}) names a strand beyond the {} there are", triangle.x,
+                        triangle.y, triangle.z, asset.strand_count);
+  if (asset.head.normal.size() != asset.head.position_m.size())
+    return make_error(ErrorCode::BadInput, "head mesh has {} normals for {} vertices",
+                      asset.head.normal.size(), asset.head.position_m.size());
+  for (const glm::uvec3& triangle : asset.head.triangle)
+    if (glm::any(glm::greaterThanEqual(triangle, glm::uvec3(asset.head.position_m.size()))))
+      return make_error(ErrorCode::BadInput,
+                        "head triangle ({}, {}, {}) names a vertex beyond the {} there are", triangle.x,
+                        triangle.y, triangle.z, asset.head.position_m.size());
+  return {};
+}
+
+RenderScene::RenderScene(const SceneAsset& asset, const LookDesc& wanted_look, bool is_drawn_by_software)
+    : look(limited(wanted_look)),
+      features(analyse_picture(asset, look)),
+      is_software(is_drawn_by_software),
+      triangle_count(static_cast<uint32_t>(asset.triangle.size())),
+      head_vertex_count(static_cast<uint32_t>(asset.head.position_m.size())),
+      head_triangle_count(static_cast<uint32_t>(asset.head.triangle.size())),
+      rest(measure_rest(asset)),
+      light_volume(describe_light(asset, look, rest)),
+      key_strands(asset.strand_count, asset.vertex_count) {}
+
+}  // namespace strandcast
