@@ -1,6 +1,6 @@
-// The one list of scene fields with their ranges, walked by the reader and the writer of scene files so that
-// the two cannot disagree. For common/scene; common/wire takes the ranges. Names are those of scene.proto; a
-// name that scene.proto lacks is a broken invariant found by the first test.
+// The one list of scene fields with their ranges, walked by the reader and the writer of scene files, and for
+// look and camera by those of messages (common/wire), so that they cannot disagree. Names are those of
+// scene.proto; a name that scene.proto lacks is a broken invariant found by the first test.
 #pragma once
 
 #include <limits>
@@ -111,6 +111,15 @@ void visit_look(Visitor& v, LookDesc& look) {
 }
 
 template <class Visitor>
+void visit_camera(Visitor& v, CameraDesc& camera) {
+  v.vector("offset_m", camera.offset_m, kCameraOffset);
+  v.require("offset_m", glm::length(camera.offset_m) >= kMinDirectionLength,
+            "is almost zero, it must be at least 0.001 m long");
+  v.vector("target_m", camera.target_m, kCameraOffset);
+  v.number("fov_y_rad", camera.fov_y_rad, kFieldOfView);
+}
+
+template <class Visitor>
 void visit_stream(Visitor& v, StreamDesc& stream) {
   v.text("codec", stream.codec, kMaxNameBytes);
   v.require("codec", stream.codec == "delta" || stream.codec == "raw" || stream.codec == "tangent",
@@ -154,13 +163,7 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.number("seed", scene.wind.seed, kSeed);
   });
   v.group("look", [&] { visit_look(v, scene.look); });
-  v.group("camera", [&] {
-    v.vector("offset_m", scene.camera.offset_m, kCameraOffset);
-    v.require("offset_m", glm::length(scene.camera.offset_m) >= kMinDirectionLength,
-              "is almost zero, it must be at least 0.001 m long");
-    v.vector("target_m", scene.camera.target_m, kCameraOffset);
-    v.number("fov_y_rad", scene.camera.fov_y_rad, kFieldOfView);
-  });
+  v.group("camera", [&] { visit_camera(v, scene.camera); });
   v.group("stream", [&] { visit_stream(v, scene.stream); });
 }
 

@@ -48,45 +48,58 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   uint32_t frame_width = 0, frame_height = 0;  // frames mode; 0 = server's choice
   bool acknowledges = false;                   // will send a FrameAck for every media message it can use
   PictureCodecs picture_codecs = 0;            // what it decodes besides whole JPEG pictures
+  bool operator==(const Hello&) const = default;
 };
 struct MotionSamples {  // from a Source
   struct Sample {
     int64_t time_ns = 0;  // source clock, monotonic
     Pose world_from_head;
+    bool operator==(const Sample&) const = default;
   };
   std::vector<Sample> samples;  // oldest first, at most kMaxSamplesPerMessage
+  bool operator==(const MotionSamples&) const = default;
 };
 struct WindSamples {  // from a Source
   struct Sample {
     int64_t time_ns = 0;           // source clock
     glm::vec3 velocity_mps{0.0f};  // world
+    bool operator==(const Sample&) const = default;
   };
   std::vector<Sample> samples;
+  bool operator==(const WindSamples&) const = default;
 };
 struct CameraChange {  // frames mode: the viewer's camera
   CameraDesc camera;
+  bool operator==(const CameraChange&) const = default;
 };
-struct KeyframeRequest {};
+struct KeyframeRequest {
+  bool operator==(const KeyframeRequest&) const = default;
+};
 struct FrameAck {  // of every media message that was used
   uint32_t sequence = 0;
   int64_t receive_time_ns = 0;  // client clock
   uint32_t decode_us = 0;
   uint16_t stream_id = 0;  // of its header
+  bool operator==(const FrameAck&) const = default;
 };
 struct Ping {  // clock probe
   int64_t client_time_ns = 0;
+  bool operator==(const Ping&) const = default;
 };
 enum class Command { Pause, Resume, StepOnce, Reset };
 struct ControlCommand {  // from a Controller
   Command command = Command::Pause;
+  bool operator==(const ControlCommand&) const = default;
 };
 struct SetParameter {  // from a Controller: scene field path, value as text ("solver.name=dftl")
   std::string assignment;
+  bool operator==(const SetParameter&) const = default;
 };
 enum class AdminAction { ListSessions, Kick, ShutDown };
 struct AdminCommand {  // from an Admin; answered by a SessionList or a Notice
   AdminAction action = AdminAction::ListSessions;
   uint64_t session = 0;  // whom to kick
+  bool operator==(const AdminCommand&) const = default;
 };
 enum class DrawingDevice { Unknown, None, Software, Hardware };
 struct ViewerReport {      // about once a second: what this machine makes of what it gets; 0 = not measured
@@ -95,9 +108,11 @@ struct ViewerReport {      // about once a second: what this machine makes of wh
   double picture_decode_ms = 0.0;  // median per picture of the server's
   double shown_hz = 0.0;           // different pictures shown per second
   DrawingDevice device = DrawingDevice::Unknown;
+  bool operator==(const ViewerReport&) const = default;
 };
 struct ModeRequest {  // answered by a ModeChange
   StreamMode mode = StreamMode::Auto;
+  bool operator==(const ModeRequest&) const = default;
 };
 using ClientMessage =
     std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
@@ -119,11 +134,13 @@ struct Welcome {
   CameraDesc camera;
   uint32_t frame_width = 0, frame_height = 0;
   Role role = Role::Viewer;  // as granted
+  bool operator==(const Welcome&) const = default;
 };
 struct Pong {
   int64_t client_time_ns = 0;  // echoed
   int64_t server_receive_ns = 0;
   int64_t server_send_ns = 0;
+  bool operator==(const Pong&) const = default;
 };
 struct ServerStatus {  // about twice a second to every viewer
   uint64_t tick = 0;
@@ -140,6 +157,7 @@ struct ServerStatus {  // about twice a second to every viewer
   // Strands put back to rest so far; one may count many times.
   uint64_t quarantined_strands = 0;    // without usable numbers
   uint64_t overstretched_strands = 0;  // stretched too far
+  bool operator==(const ServerStatus&) const = default;
 };
 struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on
   uint16_t stream_id = 0;     // of the frames it is about
@@ -147,11 +165,13 @@ struct StreamQuality {        // how strands are coded for this viewer from the 
   float strand_share = 1.0f;  // in (0, 1]
   float bound_m = 0.0f;       // Euclidean error
   std::string reason;         // for a person
+  bool operator==(const StreamQuality&) const = default;
 };
 struct ModeChange {                       // what the client gets from the next frame on, and why
   StreamMode mode = StreamMode::Strands;  // never Auto
   std::string reason;                     // for a person
   uint32_t frame_width = 0, frame_height = 0;
+  bool operator==(const ModeChange&) const = default;
 };
 struct FrameQuality {      // how pictures are made for this viewer from the next whole one on
   uint16_t stream_id = 0;  // of the frames it is about
@@ -160,13 +180,16 @@ struct FrameQuality {      // how pictures are made for this viewer from the nex
   uint32_t quality = 0;  // 1..100, as in JPEG
   PictureCodec codec = PictureCodec::Jpeg;
   std::string reason;  // for a person
+  bool operator==(const FrameQuality&) const = default;
 };
 struct Goodbye {       // the server closes right after it
   std::string reason;  // one sentence
+  bool operator==(const Goodbye&) const = default;
 };
 struct Notice {  // answer to SetParameter and ControlCommand, or a warning
   bool is_error = false;
   std::string text;
+  bool operator==(const Notice&) const = default;
 };
 struct SessionInfo {
   uint64_t id = 0;
@@ -177,9 +200,11 @@ struct SessionInfo {
   uint64_t sent_bytes = 0;
   double queue_delay_ms = 0.0;  // as in ServerStatus
   double connected_s = 0.0;
+  bool operator==(const SessionInfo&) const = default;
 };
 struct SessionList {                  // answer to an AdminCommand
   std::vector<SessionInfo> sessions;  // at most kMaxListedSessions
+  bool operator==(const SessionList&) const = default;
 };
 using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange,
                                    SessionList, FrameQuality>;

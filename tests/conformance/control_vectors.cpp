@@ -97,6 +97,8 @@ std::vector<StoredMessage> new_messages(const std::vector<StoredMessage>& known)
     samples.push_back(stored_from<v1::ClientMessage>(encode(message)));
   for (const auto& message : sample_server_messages())
     samples.push_back(stored_from<v1::ServerMessage>(encode(message)));
+  // Its defaults are not all those of protobuf.
+  samples.push_back(stored_from<v1::ServerMessage>(encode(ServerMessage(ServerStatus{}))));
   std::set<std::string> names = set_fields(known);
   std::vector<StoredMessage> fresh;
   for (const StoredMessage& sample : samples) {

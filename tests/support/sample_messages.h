@@ -74,8 +74,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
       ModeChange{StreamMode::Frames, "the viewer draws 3 pictures per second", 640, 360},
       SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
                    {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}},
-      FrameQuality{0x8003, 640, 360, 7.5, 50, PictureCodec::JpegTiles, "a slow link"},
-      ServerStatus{}};  // its defaults are not all those of protobuf
+      FrameQuality{0x8003, 640, 360, 7.5, 50, PictureCodec::JpegTiles, "a slow link"}};
 }
 
 }  // namespace strandcast

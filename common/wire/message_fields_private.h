@@ -1,0 +1,271 @@
+// The one list of the fields of every control message, with their limits: walked by the writer and by the
+// reader of messages (messages.cpp), so that the two cannot disagree. Names are those of session.proto and
+// input.proto; a name that is not there is a broken invariant found by the first test. Private to
+// common/wire.
+//
+// A new field: its line in proto/, its member in messages.h, its line here. What a visitor knows:
+//   value         a number or flag that may be anything     number     one within a range
+//   measure       a time or rate: finite, not negative      side       of a picture: 0 or within a range
+//   choice        an enumerator up to a last one            text       for people: a sender shortens and
+//   cleans it exact_text    text that is sent as it is, in bytes      secret     likewise, and never printed
+//   group, repeated, require and the parts of looks and cameras: as in common/scene/scene_fields.h
+#pragma once
+
+#include <algorithm>
+
+#include "common/scene/scene_fields.h"
+#include "common/wire/messages.h"
+
+namespace strandcast::wire_fields {
+
+using scene_fields::Range;
+
+inline constexpr Range kStreamId{0, UINT16_MAX, ""};
+inline constexpr Range kRateDivisor{1, kMaxRateDivisor, "steps"};
+inline constexpr Range kStrandShare{1e-6, 1.0, ""};
+inline constexpr Range kReportedTime{0.0, kMaxReportedMs, "ms"};
+inline constexpr Range kReportedRate{0.0, kMaxReportedHz, "Hz"};
+inline constexpr int kBehindNone = 1;  // number of the first enumerator where 0 stands for none on the wire
+
+/// Name of a kind of message: its field in ClientMessage or ServerMessage.
+template <class Message>
+inline constexpr const char* kKind = nullptr;
+
+// ---- client to server ----
+
+template <>
+inline constexpr const char* kKind<Hello> = "hello";
+template <class Visitor>
+void visit(Visitor& v, Hello& m) {
+  v.choice("role", m.role, Role::Admin);
+  v.choice("mode", m.mode, StreamMode::Auto);
+  v.text("name", m.name, kMaxNameChars);
+  v.secret("token", m.token, kMaxTokenBytes);
+  v.side("frame_width", m.frame_width, scene_fields::kFrameWidth);
+  v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
+  v.value("acknowledges", m.acknowledges);
+  v.value("picture_codecs", m.picture_codecs);  // bits that this version does not know mean nothing
+}
+
+template <>
+inline constexpr const char* kKind<MotionSamples> = "motion";
+template <class Visitor>
+void visit(Visitor& v, MotionSamples& m) {
+  v.repeated("samples", m.samples, kMaxSamplesPerMessage, [&](MotionSamples::Sample& sample) {
+    v.value("time_ns", sample.time_ns);
+    v.value("position_x_m", sample.world_from_head.position_m.x);
+    v.value("position_y_m", sample.world_from_head.position_m.y);
+    v.value("position_z_m", sample.world_from_head.position_m.z);
+    v.value("rotation_w", sample.world_from_head.rotation.w);
+    v.value("rotation_x", sample.world_from_head.rotation.x);
+    v.value("rotation_y", sample.world_from_head.rotation.y);
+    v.value("rotation_z", sample.world_from_head.rotation.z);
+  });
+}
+
+template <>
+inline constexpr const char* kKind<WindSamples> = "wind";
+template <class Visitor>
+void visit(Visitor& v, WindSamples& m) {
+  v.repeated("samples", m.samples, kMaxSamplesPerMessage, [&](WindSamples::Sample& sample) {
+    v.value("time_ns", sample.time_ns);
+    v.value("velocity_x_mps", sample.velocity_mps.x);
+    v.value("velocity_y_mps", sample.velocity_mps.y);
+    v.value("velocity_z_mps", sample.velocity_mps.z);
+  });
+}
+
+template <>
+inline constexpr const char* kKind<CameraChange> = "camera";
+template <class Visitor>
+void visit(Visitor& v, CameraChange& m) {
+  v.group("camera", [&] { scene_fields::visit_camera(v, m.camera); });
+}
+
+template <>
+inline constexpr const char* kKind<KeyframeRequest> = "keyframe_request";
+template <class Visitor>
+void visit(Visitor&, KeyframeRequest&) {}
+
+template <>
+inline constexpr const char* kKind<FrameAck> = "frame_ack";
+template <class Visitor>
+void visit(Visitor& v, FrameAck& m) {
+  v.value("sequence", m.sequence);
+  v.value("receive_time_ns", m.receive_time_ns);
+  v.value("decode_us", m.decode_us);
+  v.number("stream_id", m.stream_id, kStreamId);
+}
+
+template <>
+inline constexpr const char* kKind<Ping> = "ping";
+template <class Visitor>
+void visit(Visitor& v, Ping& m) {
+  v.value("client_time_ns", m.client_time_ns);
+}
+
+template <>
+inline constexpr const char* kKind<ControlCommand> = "command";
+template <class Visitor>
+void visit(Visitor& v, ControlCommand& m) {
+  v.choice("command", m.command, Command::Reset, kBehindNone);
+}
+
+template <>
+inline constexpr const char* kKind<SetParameter> = "set_parameter";
+template <class Visitor>
+void visit(Visitor& v, SetParameter& m) {
+  v.exact_text("assignment", m.assignment, kMaxAssignmentBytes);
+}
+
+template <>
+inline constexpr const char* kKind<AdminCommand> = "admin";
+template <class Visitor>
+void visit(Visitor& v, AdminCommand& m) {
+  v.choice("action", m.action, AdminAction::ShutDown, kBehindNone);
+  v.value("session", m.session);
+}
+
+template <>
+inline constexpr const char* kKind<ViewerReport> = "viewer_report";
+template <class Visitor>
+void visit(Visitor& v, ViewerReport& m) {
+  v.number("decode_ms", m.decode_ms, kReportedTime);
+  v.number("draw_ms", m.draw_ms, kReportedTime);
+  v.number("picture_decode_ms", m.picture_decode_ms, kReportedTime);
+  v.number("shown_hz", m.shown_hz, kReportedRate);
+  v.choice("device", m.device, DrawingDevice::Hardware);
+}
+
+template <>
+inline constexpr const char* kKind<ModeRequest> = "mode_request";
+template <class Visitor>
+void visit(Visitor& v, ModeRequest& m) {
+  v.choice("mode", m.mode, StreamMode::Auto);
+}
+
+// ---- server to client ----
+
+static_assert(kSessionIdChars == 16, "as the sentence below says");
+inline bool is_session_id(const std::string& text) {
+  return text.size() == kSessionIdChars && std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
+}
+
+template <>
+inline constexpr const char* kKind<Welcome> = "welcome";
+template <class Visitor>
+void visit(Visitor& v, Welcome& m) {
+  v.exact_text("session_id", m.session_id, kSessionIdChars);
+  v.require("session_id", is_session_id(m.session_id), "is not 16 hexadecimal digits");
+  v.text("server_version", m.server_version, kMaxNameChars);
+  v.text("scene_name", m.scene_name, kMaxNameChars);
+  v.choice("mode", m.mode, StreamMode::Frames);
+  v.text("mode_reason", m.mode_reason, kMaxTextChars);
+  v.exact_text("codec", m.codec, kMaxNameChars);
+  v.number("strand_count", m.strand_count, scene_fields::kStrandCount);
+  v.number("vertex_count", m.vertex_count, scene_fields::kVertexCount);
+  v.number("bound_m", m.bound_m, scene_fields::kStreamBound);
+  v.number("step_rate_hz", m.step_rate_hz, scene_fields::kStepRate);
+  v.group("look", [&] { scene_fields::visit_look(v, m.look); });
+  v.group("camera", [&] { scene_fields::visit_camera(v, m.camera); });
+  v.side("frame_width", m.frame_width, scene_fields::kFrameWidth);
+  v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
+  v.choice("role", m.role, Role::Admin);
+}
+
+template <>
+inline constexpr const char* kKind<Pong> = "pong";
+template <class Visitor>
+void visit(Visitor& v, Pong& m) {
+  v.value("client_time_ns", m.client_time_ns);
+  v.value("server_receive_ns", m.server_receive_ns);
+  v.value("server_send_ns", m.server_send_ns);
+}
+
+template <>
+inline constexpr const char* kKind<ServerStatus> = "status";
+template <class Visitor>
+void visit(Visitor& v, ServerStatus& m) {
+  v.value("tick", m.tick);
+  v.measure("sim_ms", m.sim_ms);
+  v.measure("encode_ms", m.encode_ms);
+  v.measure("render_ms", m.render_ms);
+  v.measure("realtime_factor", m.realtime_factor);
+  v.value("is_paused", m.is_paused);
+  v.value("is_motion_stale", m.is_motion_stale);
+  v.value("viewer_count", m.viewer_count);
+  v.value("dropped_frames", m.dropped_frames);
+  v.value("rejected_samples", m.rejected_samples);
+  v.measure("queue_delay_ms", m.queue_delay_ms);
+  v.value("quarantined_strands", m.quarantined_strands);
+  v.value("overstretched_strands", m.overstretched_strands);
+}
+
+template <>
+inline constexpr const char* kKind<Goodbye> = "goodbye";
+template <class Visitor>
+void visit(Visitor& v, Goodbye& m) {
+  v.text("reason", m.reason, kMaxTextChars);
+}
+
+template <>
+inline constexpr const char* kKind<Notice> = "notice";
+template <class Visitor>
+void visit(Visitor& v, Notice& m) {
+  v.value("is_error", m.is_error);
+  v.text("text", m.text, kMaxTextChars);
+}
+
+template <>
+inline constexpr const char* kKind<StreamQuality> = "quality";
+template <class Visitor>
+void visit(Visitor& v, StreamQuality& m) {
+  v.number("stream_id", m.stream_id, kStreamId);
+  v.number("rate_divisor", m.rate_divisor, kRateDivisor);
+  v.number("strand_share", m.strand_share, kStrandShare);
+  v.number("bound_m", m.bound_m, scene_fields::kStreamBound);
+  v.text("reason", m.reason, kMaxTextChars);
+}
+
+template <>
+inline constexpr const char* kKind<ModeChange> = "mode_change";
+template <class Visitor>
+void visit(Visitor& v, ModeChange& m) {
+  v.choice("mode", m.mode, StreamMode::Frames);
+  v.text("reason", m.reason, kMaxTextChars);
+  v.side("frame_width", m.frame_width, scene_fields::kFrameWidth);
+  v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
+}
+
+template <>
+inline constexpr const char* kKind<FrameQuality> = "frame_quality";
+template <class Visitor>
+void visit(Visitor& v, FrameQuality& m) {
+  v.number("stream_id", m.stream_id, kStreamId);
+  v.number("width", m.width, scene_fields::kFrameWidth);
+  v.number("height", m.height, scene_fields::kFrameHeight);
+  v.number("rate_hz", m.rate_hz, scene_fields::kFrameRate);
+  v.number("quality", m.quality, scene_fields::kJpegQuality);
+  v.choice("codec", m.codec, PictureCodec::H264);
+  v.text("reason", m.reason, kMaxTextChars);
+}
+
+template <>
+inline constexpr const char* kKind<SessionList> = "sessions";
+template <class Visitor>
+void visit(Visitor& v, SessionList& m) {
+  v.repeated("sessions", m.sessions, kMaxListedSessions, [&](SessionInfo& session) {
+    v.value("id", session.id);
+    v.text("name", session.name, kMaxListedNameChars);
+    v.text("address", session.address, kMaxAddressChars);
+    v.choice("role", session.role, Role::Admin);
+    v.choice("mode", session.mode, StreamMode::Auto);
+    v.value("sent_bytes", session.sent_bytes);
+    v.measure("queue_delay_ms", session.queue_delay_ms);
+    v.measure("connected_s", session.connected_s);
+  });
+}
+
+}  // namespace strandcast::wire_fields

@@ -1,0 +1,45 @@
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+const char* to_string(StreamMode mode) {
+  switch (mode) {
+    case StreamMode::Strands:
+      return "strands";
+    case StreamMode::Frames:
+      return "frames";
+    case StreamMode::Auto:
+      return "auto";
+  }
+  return "unknown";
+}
+
+const char* to_string(DrawingDevice device) {
+  switch (device) {
+    case DrawingDevice::Unknown:
+      return "unknown";
+    case DrawingDevice::None:
+      return "none";
+    case DrawingDevice::Software:
+      return "software";
+    case DrawingDevice::Hardware:
+      return "hardware";
+  }
+  return "unknown";
+}
+
+const char* to_string(Role role) {
+  switch (role) {
+    case Role::Viewer:
+      return "viewer";
+    case Role::Controller:
+      return "controller";
+    case Role::Source:
+      return "source";
+    case Role::Admin:
+      return "admin";
+  }
+  return "unknown";
+}
+
+}  // namespace strandcast
