@@ -39,13 +39,12 @@ function(strandcast_program name)
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS})
 endfunction()
 
-# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [SERIAL] [TIMEOUT s]): a GoogleTest program; every
-# TEST in it becomes one CTest test. SERIAL: never beside another test (it loads both cores).
+# strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL] [TIMEOUT s]): a GoogleTest program. Every
+# suite in it is one CTest test, NAME.Suite; with ALONE every TEST is, NAME.Suite.Test, in a process of its own. Tests of
+# the label `integration` run alone and get the label `network` too, which allows a second try (tests/run.sh), unless
+# they are OFFLINE. SERIAL: never beside another test (it loads both cores). TIMEOUT: of one CTest test.
 function(strandcast_test name)
-  cmake_parse_arguments(ARG "SERIAL" "LABEL;TIMEOUT" "SOURCES;LIBS" ${ARGN})
-  if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 120)
-  endif()
+  cmake_parse_arguments(ARG "ALONE;OFFLINE;SERIAL" "LABEL;TIMEOUT" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
@@ -53,15 +52,35 @@ function(strandcast_test name)
   if(TARGET strandcast_test_pch)
     target_precompile_headers(${name} REUSE_FROM strandcast_test_pch)
   endif()
+  set(mode suites)
+  set(timeout_s 600)
+  set(labels ${ARG_LABEL})
+  if(ARG_LABEL STREQUAL "integration" AND NOT ARG_OFFLINE)
+    list(APPEND labels network)
+  endif()
+  if(ARG_LABEL STREQUAL "integration" OR ARG_ALONE)
+    set(mode tests)
+    set(timeout_s 120)
+  endif()
+  if(ARG_TIMEOUT)
+    set(timeout_s ${ARG_TIMEOUT})
+  endif()
+  set(environment "")
   if(STRANDCAST_SANITIZE)
-    math(EXPR ARG_TIMEOUT "${ARG_TIMEOUT} * 5")
+    math(EXPR timeout_s "${timeout_s} * 5")
   endif()
-  set(properties LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
   if(STRANDCAST_SANITIZE MATCHES "thread")
-    list(APPEND properties ENVIRONMENT TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp)
+    set(environment TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp)
   endif()
-  if(ARG_SERIAL)
-    list(APPEND properties RUN_SERIAL TRUE)
-  endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
+  set(list_file ${CMAKE_CURRENT_BINARY_DIR}/${name}_tests.cmake)
+  add_custom_command(TARGET ${name} POST_BUILD BYPRODUCTS ${list_file}
+    COMMAND ${CMAKE_COMMAND} -DNAME=${name} -DPROGRAM=$<TARGET_FILE:${name}> -DOUTPUT=${list_file} -DMODE=${mode}
+      -DRESULTS=${CMAKE_BINARY_DIR}/test_results -DLISTS=${CMAKE_BINARY_DIR}/test_lists
+      "-DLABELS=${labels}" -DTIMEOUT_S=${timeout_s} -DSERIAL=${ARG_SERIAL}
+      -DENVIRONMENT=${environment} -P ${CMAKE_SOURCE_DIR}/cmake/list_tests.cmake
+    VERBATIM)
+  # What is not built must not look as if it had passed.
+  file(WRITE ${list_file}.include "if(EXISTS \"${list_file}\")\n  include(\"${list_file}\")\nelse()\n"
+    "  add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)\nendif()\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${list_file}.include)
 endfunction()
