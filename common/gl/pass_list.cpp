@@ -5,6 +5,10 @@
 
 namespace strandcast::gl {
 
+PassReport make_report(std::string name, PassFate fate, std::string reason, const StageTimer& timer) {
+  return {std::move(name), fate, std::move(reason), 0, timer.count(), timer.median_ms()};
+}
+
 Status PassListBase::plan(const Resources& external, const Resources& wanted) {
   std::vector<PassDeclaration> declarations;
   for (const Slot& slot : slots_) declarations.push_back(slot.entry->declaration());

@@ -31,6 +31,8 @@ struct PassReport {
   bool operator==(const PassReport&) const = default;
 };
 using PassReports = std::vector<PassReport>;
+/// A line for work that is no pass of a list: on a thread of its own, whenever something comes.
+PassReport make_report(std::string name, PassFate fate, std::string reason, const StageTimer& timer);
 
 /// What all passes have, whatever they run on: a declaration and a time.
 class PassEntry {

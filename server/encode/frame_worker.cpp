@@ -111,6 +111,14 @@ FrameCounters FrameWorker::counters() const {
   return counters;
 }
 
+gl::PassReports FrameWorker::passes() const {
+  const std::lock_guard lock(mutex_);
+  if (painted_.empty()) return {};
+  PictureCodecs wanted = 0;
+  for (const auto& [picture_class, view] : views_) wanted |= codec_bit(view.codec);
+  return picture_passes(timers_, painted_, wanted);
+}
+
 void FrameWorker::run() {
   // Drawing in software takes every core it gets; the simulation goes first. On Linux this is the thread's
   // own value, and the driver's threads inherit it.
@@ -165,6 +173,8 @@ void FrameWorker::rest() {
   painter_.reset();
   snapshot_.reset();
   drawn_.clear();
+  const std::lock_guard lock(mutex_);
+  painted_.clear();
 }
 
 void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
@@ -232,9 +242,12 @@ void FrameWorker::note_cost(const std::vector<uint32_t>& classes, double cost_ms
 
 void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
   uint64_t decoded = 0, losses = 0;
+  std::vector<double> decode_ms;
   for (const EncodedFramePtr& frame : strand_frames) {
     if (is_chain_lost_ && frame->header.opcode != Opcode::StrandKeyframe) continue;
+    const int64_t begin_ns = now_ns();
     auto snapshot = decoder_->decode(frame->message);
+    decode_ms.push_back(ms_since(begin_ns));
     is_chain_lost_ = !snapshot;
     if (!snapshot) {
       ++losses;
@@ -249,6 +262,7 @@ void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
   // Also when a keyframe that was asked for has been crowded out of the queue since.
   if (is_chain_lost_ && !strand_frames.empty()) hooks_.request_keyframe();
   const std::lock_guard lock(mutex_);
+  for (const double one_ms : decode_ms) timers_.decode.add_ms(one_ms);
   counters_.decoded += decoded;
   counters_.chain_losses += losses;
 }
@@ -307,6 +321,7 @@ void FrameWorker::paint_alike(const PictureView& view) {
     const std::lock_guard lock(mutex_);
     ++counters_.paints;
     paint_timer_.add_ms(ms_since(begin_ns));
+    if (painter_ != nullptr) painted_ = painter_->passes();
   }
   for (const uint32_t picture_class : classes) {
     if (image) {
@@ -353,6 +368,7 @@ Status FrameWorker::encode(uint32_t picture_class, const Image& image) {
   {
     const std::lock_guard lock(mutex_);
     encode_timer_.add_ms(ms_since(begin_ns));
+    timers_.encode[static_cast<size_t>(drawn.view.codec)].add_ms(ms_since(begin_ns));
   }
   give(picture_class, picture);
   return {};

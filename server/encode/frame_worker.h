@@ -22,6 +22,7 @@
 #include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "server/encode/picture_painter.h"
+#include "server/encode/picture_passes.h"
 #include "server/encode/picture_turns.h"
 #include "server/encode/picture_views.h"
 
@@ -85,6 +86,8 @@ class FrameWorker {
   /// Why no frames can be had; nothing while all is well.
   std::optional<Error> failure() const;
   FrameCounters counters() const;
+  /// What the thread runs and how long it takes; empty while there is nothing to draw.
+  gl::PassReports passes() const;
 
  private:
   /// One class's progress.
@@ -156,6 +159,8 @@ class FrameWorker {
   FrameCounters counters_;
   StageTimer paint_timer_;
   StageTimer encode_timer_;
+  PictureTimers timers_;
+  gl::PassReports painted_;  // by the painter, with its times; empty without one
 
   // Of the worker's thread.
   bool is_active_ = false;

@@ -26,17 +26,29 @@ class GlPicturePainter : public PicturePainter {
       painted_ = snapshot;
     }
     RETURN_IF_ERROR(renderer_->draw(strands_, view.camera, view.size));
+    const ScopedStage stage(read_timer_);
     return renderer_->read_image();
+  }
+
+  gl::PassReports passes() const override {
+    gl::PassReports passes = renderer_->passes().report();
+    passes.push_back(read_back_report(read_timer_));
+    return passes;
   }
 
  private:
   std::unique_ptr<gl::EglContext> context_;  // outlives the renderer's GL objects
   std::unique_ptr<Renderer> renderer_;
+  StageTimer read_timer_;
   PosedStrands strands_;
   std::shared_ptr<const Snapshot> painted_;  // whose strands these are
 };
 
 }  // namespace
+
+gl::PassReport read_back_report(const StageTimer& timer) {
+  return gl::make_report("render/read", gl::PassFate::Kept, "writes the picture for its encoders", timer);
+}
 
 MakePicturePainter gl_picture_painter(GlPainterConfig config) {
   return [config = std::move(config)]() -> Result<std::unique_ptr<PicturePainter>> {

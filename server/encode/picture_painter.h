@@ -7,7 +7,9 @@
 #include <optional>
 #include <string>
 
+#include "common/base/profile.h"
 #include "common/base/result.h"
+#include "common/gl/pass_list.h"
 #include "common/pictures/image_codec.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
@@ -23,6 +25,8 @@ class PicturePainter {
   /// again after a reset. BadInput and LimitExceeded concern this view alone; after any other error nothing
   /// can be painted any more.
   virtual Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) = 0;
+  /// What it runs to paint.
+  virtual gl::PassReports passes() const { return {}; }
 };
 
 using MakePicturePainter = std::function<Result<std::unique_ptr<PicturePainter>>()>;
@@ -33,6 +37,9 @@ struct GlPainterConfig {
   std::shared_ptr<const SceneAsset> asset;
   LookDesc look;
 };
+
+/// The line of the copy from the device to the processor.
+gl::PassReport read_back_report(const StageTimer& timer);
 
 /// A maker of painters with a GL context of their own and the renderer of common/render.
 MakePicturePainter gl_picture_painter(GlPainterConfig config);

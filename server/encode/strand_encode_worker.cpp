@@ -82,6 +82,18 @@ StrandEncodeCounters StrandEncodeWorker::counters() const {
   return counters;
 }
 
+gl::PassReport strand_encode_report(uint16_t stream_id, bool has_listeners, const StageTimer& timer) {
+  return gl::make_report(stream_id == 0 ? "encode/strands" : fmt::format("encode/strands_{}", stream_id),
+                         has_listeners ? gl::PassFate::Kept : gl::PassFate::Unread,
+                         has_listeners ? "writes strand frames for its readers" : "nobody reads its frames",
+                         timer);
+}
+
+gl::PassReport StrandEncodeWorker::pass() const {
+  const std::lock_guard lock(counters_mutex_);
+  return strand_encode_report(stream_id_, has_listeners_, encode_timer_);
+}
+
 bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
   if (is_stopping_) return true;
   if (!has_listeners_ || !has_state(view, config())) return false;

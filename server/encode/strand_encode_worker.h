@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/base/profile.h"
+#include "common/gl/pass_list.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/strand_codec.h"
 #include "server/publish/snapshot_slot.h"
@@ -44,6 +45,9 @@ inline constexpr std::chrono::milliseconds kLongestStateWait{250};
 /// already.
 Snapshot coarsen(const Snapshot& snapshot, uint32_t factor);
 
+/// "encode/strands" for the first class, "encode/strands_3" for stream 3.
+gl::PassReport strand_encode_report(uint16_t stream_id, bool has_listeners, const StageTimer& timer);
+
 class StrandEncodeWorker {
  public:
   /// Called on the worker's thread, frames in the order of the chain: the keyframe of sequence s comes after
@@ -69,6 +73,8 @@ class StrandEncodeWorker {
   void request_keyframe();
 
   StrandEncodeCounters counters() const;
+  /// The line of its work among the passes.
+  gl::PassReport pass() const;
 
  private:
   enum class Audience { Followers, Joiners };

@@ -11,6 +11,7 @@
 #include "common/render/renderer.h"
 #include "common/strands/strand_codec.h"
 #include "server/encode/frame_worker.h"
+#include "server/encode/picture_passes.h"
 #include "tests/support/eventually.h"
 #include "tests/support/gl_fixture.h"
 
@@ -166,6 +167,50 @@ TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {
   const int difference =
       std::abs(corner[0] - middle[0]) + std::abs(corner[1] - middle[1]) + std::abs(corner[2] - middle[2]);
   EXPECT_GT(difference, 20);
+}
+
+/// Names and fates: what a list says that does not depend on the machine.
+std::vector<std::pair<std::string, gl::PassFate>> decisions(const gl::PassReports& passes) {
+  std::vector<std::pair<std::string, gl::PassFate>> decided;
+  for (const gl::PassReport& pass : passes) decided.emplace_back(pass.name, pass.fate);
+  return decided;
+}
+
+TEST_F(GlPainting, TheFrameThreadHoldsGlAndHasPassesOnlyWhileSomebodyWatches) {
+  const gl::ObjectCounts before = gl::object_counts();
+  auto encoder = std::move(*make_strand_encoder("delta"));
+  encoder->encode(make_state(*asset_, 1));
+  std::atomic<int> pictures{0};
+  std::atomic<int> requests{0};
+  FrameWorker::Hooks hooks;
+  hooks.sink = [&](uint32_t, PicturePtr) { ++pictures; };
+  hooks.request_keyframe = [&] { ++requests; };
+  FrameWorker worker(std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count})),
+                     gl_picture_painter(config_), {1000.0}, std::move(hooks));
+  worker.offer(encoder->encode_for_join(make_state(*asset_, 1)).keyframe);  // for nobody
+  EXPECT_TRUE(worker.passes().empty());
+
+  worker.set_views({{1, small_view()}});
+  ASSERT_TRUE(eventually([&] { return requests > 0; }));
+  EXPECT_EQ(gl::object_counts(), before) << "no context, no program, no buffer before the first viewer";
+  worker.offer(encoder->encode_for_join(make_state(*asset_, 2)).keyframe);
+  ASSERT_TRUE(eventually([&] { return pictures > 0 || worker.failure(); }));
+  ASSERT_FALSE(worker.failure()) << worker.failure()->to_string();
+  EXPECT_EQ(gl::object_counts().contexts, before.contexts + 1);
+  const gl::PassReports ran = worker.passes();
+  const auto planned =
+      plan_picture_passes(*asset_, config_.look, context_->info().is_software, codec_bit(PictureCodec::Jpeg));
+  ASSERT_TRUE(planned) << planned.error().to_string();
+  EXPECT_EQ(decisions(ran), decisions(*planned));
+  for (const gl::PassReport& pass : ran)
+    EXPECT_EQ(pass.runs > 0, pass.fate == gl::PassFate::Kept) << pass.name;
+
+  worker.set_views({});
+  ASSERT_TRUE(eventually([&] { return gl::object_counts().contexts == before.contexts; }));
+  EXPECT_TRUE(eventually([&] { return worker.passes().empty(); }));
+  gl::ObjectCounts after = gl::object_counts();
+  after.compiled_programs = before.compiled_programs;  // counts on
+  EXPECT_EQ(after, before);
 }
 
 TEST_F(GlPainting, AnUnknownDeviceIsAnErrorThatNamesTheKnownOnes) {
