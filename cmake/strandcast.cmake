@@ -25,11 +25,18 @@ if(STRANDCAST_SANITIZE)
   target_link_options(strandcast_flags INTERFACE -fsanitize=${STRANDCAST_SANITIZE})
 endif()
 
-# strandcast_library(NAME SOURCES a.cpp ... LIBS x y ...): a static library with the project's flags.
+# strandcast_library(NAME SOURCES a.cpp ... LIBS x y ... [PCH z]): a static library with the project's flags. PCH: whose
+# precompiled headers its files begin with (strandcast_usual where nothing is said; `none`).
 function(strandcast_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PCH" "SOURCES;LIBS" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC strandcast_flags ${ARG_LIBS})
+  if(NOT ARG_PCH)
+    set(ARG_PCH strandcast_usual)
+  endif()
+  if(NOT ARG_PCH STREQUAL "none")
+    target_precompile_headers(${name} REUSE_FROM ${ARG_PCH})
+  endif()
 endfunction()
 
 # strandcast_program(NAME SOURCES ... LIBS ...): an executable in build/<preset>/bin.
@@ -37,6 +44,13 @@ function(strandcast_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS})
+  target_precompile_headers(${name} REUSE_FROM strandcast_usual)
+endfunction()
+
+# strandcast_lightly_optimised(a.cpp ...): files of this folder that read options or drive tests, where -O3 costs more
+# to compile than it ever saves.
+function(strandcast_lightly_optimised)
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O1)
 endfunction()
 
 # strandcast_test(NAME LABEL unit SOURCES ... LIBS ... [ALONE] [OFFLINE] [SERIAL] [TIMEOUT s]): a GoogleTest program. Every
@@ -49,9 +63,8 @@ function(strandcast_test name)
   target_link_libraries(${name} PRIVATE strandcast_flags ${ARG_LIBS} GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     STRANDCAST_SHARED_DATA="${CMAKE_SOURCE_DIR}/../shared/data" STRANDCAST_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-  if(TARGET strandcast_test_pch)
-    target_precompile_headers(${name} REUSE_FROM strandcast_test_pch)
-  endif()
+  target_compile_options(${name} PRIVATE ${strandcast_test_options})
+  target_precompile_headers(${name} REUSE_FROM strandcast_gtest)
   set(mode suites)
   set(timeout_s 600)
   set(labels ${ARG_LABEL})
