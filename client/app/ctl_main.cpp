@@ -7,6 +7,7 @@
 #include "client/app/feed.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
+#include "common/base/version.h"
 #include "common/log/log.h"
 
 namespace {
@@ -57,6 +58,7 @@ void declare_feed(CLI::App& app, CommandLine& line) {
 int run(int argc, char** argv) {
   CLI::App app("Strandcast control: feeds, watches, steers and checks a running strandcast-server.",
                "strandcast-ctl");
+  app.set_version_flag("--version", fmt::format("strandcast-ctl {}", version()));
   CommandLine line;
   app.require_subcommand(1);
   app.fallthrough();  // --connect may stand behind the sub-command too

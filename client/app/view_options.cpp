@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "common/base/file.h"
+#include "common/base/version.h"
 
 namespace strandcast {
 
@@ -160,6 +161,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
 
 ViewCommandLine read_view_command_line(int argc, const char* const* argv) {
   CLI::App app("Strandcast viewer: shows the hair of a running strandcast-server.", "strandcast-view");
+  app.set_version_flag("--version", fmt::format("strandcast-view {}", version()));
   RawOptions raw;
   ViewOptions options;
   declare(app, raw, options);

@@ -2,12 +2,15 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/base/version.h"
 #include "common/scene/scene_file.h"
 
 namespace strandcast {
 namespace {
 
-constexpr const char* kVersionText = "strandcast-server 0.1.0";
+std::string version_text() {
+  return fmt::format("strandcast-server {}", version());
+}
 
 void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom, std::string& explained) {
   app.add_option("--scene", options.scene_path, "scene file (protobuf text); default: the built-in scene");
@@ -78,7 +81,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   std::string explained;
   RawRunOptions raw;
   CLI::App app("Simulates hair and streams it to viewers.", "strandcast-server");
-  app.set_version_flag("--version", kVersionText);
+  app.set_version_flag("--version", version_text());
   add_scene_options(app, options, groom, explained);
   add_run_options(app, options, raw);
   try {
@@ -86,7 +89,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   } catch (const CLI::CallForHelp&) {
     options.help = app.help();
   } catch (const CLI::CallForVersion&) {
-    options.help = std::string(kVersionText) + "\n";
+    options.help = version_text() + "\n";
   } catch (const CLI::ParseError& error) {
     return make_error(ErrorCode::BadInput, "{} (--help lists the options)", error.what());
   }

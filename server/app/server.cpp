@@ -10,6 +10,7 @@
 
 #include "common/base/check.h"
 #include "common/base/text.h"
+#include "common/base/version.h"
 #include "common/groom/groom_asset.h"
 #include "common/log/log.h"
 #include "common/strands/scene_asset.h"
@@ -22,7 +23,6 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kServerVersion = "0.1.0";
 constexpr size_t kMaxLoggedCharacters = 200;
 constexpr auto kStatusInterval = std::chrono::milliseconds(500);
 
@@ -277,7 +277,7 @@ Welcome Server::State::make_welcome(const Viewers::Place& place) const {
   const SceneDesc& scene = config_.scene;
   Welcome welcome;
   welcome.session_id = session_id_;
-  welcome.server_version = kServerVersion;
+  welcome.server_version = version();
   welcome.scene_name = scene.name;
   welcome.mode = place.mode;
   welcome.mode_reason = place.reason;

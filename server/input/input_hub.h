@@ -3,22 +3,19 @@
 // waits: the same calls give the same frames.
 //
 // Policy (the numbers are the constants below):
-// * A source's clock is mapped to the server's by the fastest sample of the last 10 s (clock_map.h), so
-// network jitter
-//   does not reach the hair. A source clock that steps by more than kClockJumpNs starts a new mapping.
+// * A source's clock is mapped to the server's by the fastest sample of the last 10 s (clock_map.h), so that
+//   network jitter does not reach the hair. A source clock that steps by more than kClockJumpNs starts a new
+//   mapping.
 // * One source at a time drives the head, and one the wind: the first that sends a possible sample, until it
-// is removed
-//   or has been silent for kMotionStaleNs / kWindStaleNs. Samples of others are refused meanwhile.
+//   is removed or has been silent for kMotionStaleNs / kWindStaleNs. Samples of others are refused meanwhile.
 // * Between two samples the pose is interpolated (lerp, slerp); when none is later the newest is held, so
-// that live
-//   feeding adds no delay. Without motion for kMotionStaleNs the frame says so and the last pose stays.
-//   Without wind for kWindStaleNs the scene's own wind returns.
+//   that live feeding adds no delay. Without motion for kMotionStaleNs the frame says so and the last pose
+//   stays. Without wind for kWindStaleNs the scene's own wind returns.
 // * Refused and counted: samples not newer than the newest one used, duplicates, impossible values, more than
 //   kMaxSampleRateHz per source and kind, more than kMaxInputSources sources. Buffers are bounded; the oldest
 //   samples go first.
 // * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples, or between frames, is carried
-// out in one
-//   frame, flagged as a teleport and never interpolated.
+//   out in one frame, flagged as a teleport and never interpolated.
 #pragma once
 
 #include <cstdint>

@@ -123,8 +123,8 @@ double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, u
 
 // Backward Euler for the linear drag toward the air and the linear pull to the groomed shape, forward for the
 // rest, written for the velocity u relative to the head joint, which moves at V during the substep:
-//   (1 + h k + h^2 s_i) u = v - V + h (g - f_i R g_0 + k (w - V)) + h s_i (target - x),   x_predicted = x + h
-//   u.
+//   (1 + h k + h^2 s_i) u = v - V + h (g - f_i R g_0 + k (w - V)) + h s_i (target - x),
+//   x_predicted = x + h u.
 // R turns the head; g_0 is the gravity that the groom was made under, in head space. The share f_i of it that
 // the pull carries is a pre-stress: it moves the target up by f_i R g_0 / s_i, just as far as g = R g_0 lets
 // it sag.

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/base/version.h"
 #include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
 #include "server/app/control_budget.h"
@@ -385,6 +386,7 @@ TEST(ServerOptions, ReadsWhatTheCommandLineSays) {
   EXPECT_TRUE(parse({"--explain"})->is_explaining);
   EXPECT_EQ(parse({"--explain", "x.textproto"})->scene_path, "x.textproto");
   EXPECT_FALSE(parse({"--help"})->help.empty());
+  EXPECT_EQ(parse({"--version"})->help, fmt::format("strandcast-server {}\n", version()));
 }
 
 TEST(ServerOptions, NamesWhatIsWrong) {
