@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "common/base/check.h"
+
 namespace strandcast::gl {
 namespace {
 
@@ -148,21 +150,10 @@ Status link(uint32_t program, const std::vector<Shader>& shaders, const std::vec
                              }));
 }
 
-std::map<std::string, int, std::less<>> read_locations(uint32_t program) {
-  std::map<std::string, int, std::less<>> locations;
-  GLint count = 0, longest = 0;
-  glGetProgramInterfaceiv(program, GL_UNIFORM, GL_ACTIVE_RESOURCES, &count);
-  glGetProgramInterfaceiv(program, GL_UNIFORM, GL_MAX_NAME_LENGTH, &longest);
-  std::string buffer(static_cast<size_t>(std::max(longest, 1)), '\0');
-  for (GLint i = 0; i < count; ++i) {
-    GLsizei length = 0;
-    glGetProgramResourceName(program, GL_UNIFORM, static_cast<GLuint>(i), static_cast<GLsizei>(buffer.size()),
-                             &length, buffer.data());
-    const std::string name(buffer.data(), static_cast<size_t>(length));
-    const int location = glGetUniformLocation(program, name.c_str());
-    if (location >= 0) locations[name] = location;  // members of blocks have none
-  }
-  return locations;
+/// Whether a value of the C++ side's type may be given to a uniform: samplers take the number of their unit.
+bool is_settable(std::string_view declared, std::string_view given) {
+  const bool is_sampler = declared.find("sampler") != std::string_view::npos;
+  return declared == given || (is_sampler && given == "int");
 }
 
 }  // namespace
@@ -192,7 +183,10 @@ Result<Program> Program::make(const ShaderLibrary& library, const std::vector<st
   glGetIntegerv(GL_MAX_LABEL_LENGTH, &longest_label);
   const size_t label_size = std::min(label.size(), static_cast<size_t>(std::max(longest_label, 1) - 1));
   glObjectLabel(GL_PROGRAM, program.name(), static_cast<GLsizei>(label_size), label.data());
-  program.locations_ = read_locations(program.name());
+  program.label_ = label;
+  for (const StageSource& stage : stages)
+    for (const auto& [uniform, type] : declared_uniforms(stage.flat))
+      program.uniforms_[uniform] = {type, glGetUniformLocation(program.name(), uniform.c_str())};
   return program;
 }
 
@@ -200,31 +194,46 @@ void Program::use() const {
   glUseProgram(name());
 }
 
-int Program::location(std::string_view uniform) const {
-  const auto found = locations_.find(uniform);
-  return found == locations_.end() ? -1 : found->second;
+Status Program::check_uniform(std::string_view uniform, std::string_view type) const {
+  const auto found = uniforms_.find(uniform);
+  if (found == uniforms_.end()) {
+    std::vector<std::string> known;
+    for (const auto& [name, declared] : uniforms_) known.push_back(name);
+    return at(label_, make_error(ErrorCode::BadInput, "no variant declares a uniform {} (known: {})", uniform,
+                                 known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
+  }
+  if (is_settable(found->second.type, type)) return {};
+  return at(label_, make_error(ErrorCode::BadInput, "uniform {} is declared as {}, not as {}", uniform,
+                               found->second.type, type));
+}
+
+int Program::location(std::string_view uniform, std::string_view type) const {
+  const auto found = uniforms_.find(uniform);
+  if (found != uniforms_.end() && is_settable(found->second.type, type)) return found->second.location;
+  const std::string sentence = check_uniform(uniform, type).error().to_string();
+  check_failed(sentence.c_str(), __FILE__, __LINE__);
 }
 
 void Program::set(std::string_view uniform, int value) const {
-  glProgramUniform1i(name(), location(uniform), value);
+  glProgramUniform1i(name(), location(uniform, "int"), value);
 }
 void Program::set(std::string_view uniform, uint32_t value) const {
-  glProgramUniform1ui(name(), location(uniform), value);
+  glProgramUniform1ui(name(), location(uniform, "uint"), value);
 }
 void Program::set(std::string_view uniform, float value) const {
-  glProgramUniform1f(name(), location(uniform), value);
+  glProgramUniform1f(name(), location(uniform, "float"), value);
 }
 void Program::set(std::string_view uniform, const glm::vec2& value) const {
-  glProgramUniform2fv(name(), location(uniform), 1, &value[0]);
+  glProgramUniform2fv(name(), location(uniform, "vec2"), 1, &value[0]);
 }
 void Program::set(std::string_view uniform, const glm::vec3& value) const {
-  glProgramUniform3fv(name(), location(uniform), 1, &value[0]);
+  glProgramUniform3fv(name(), location(uniform, "vec3"), 1, &value[0]);
 }
 void Program::set(std::string_view uniform, const glm::vec4& value) const {
-  glProgramUniform4fv(name(), location(uniform), 1, &value[0]);
+  glProgramUniform4fv(name(), location(uniform, "vec4"), 1, &value[0]);
 }
 void Program::set(std::string_view uniform, const glm::mat4& value) const {
-  glProgramUniformMatrix4fv(name(), location(uniform), 1, GL_FALSE, &value[0][0]);
+  glProgramUniformMatrix4fv(name(), location(uniform, "mat4"), 1, GL_FALSE, &value[0][0]);
 }
 
 }  // namespace strandcast::gl

@@ -52,6 +52,9 @@ class ShaderLibrary {
   std::optional<std::filesystem::path> folder_;
 };
 
+/// Uniforms outside of blocks that the source declares in any of its variants, by name with their GLSL type.
+std::map<std::string, std::string> declared_uniforms(const FlatSource& source);
+
 /// All combinations of the axes' values; one empty variant when there are no axes.
 std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes);
 
@@ -74,7 +77,11 @@ class Program {
   void use() const;
   uint32_t name() const { return handle_.name(); }
 
-  // Uniforms by name; unknown (or optimised away) names are ignored. Do not change which program is in use.
+  /// BadInput unless a stage declares a uniform of that name and GLSL type ("float") in any of its variants.
+  Status check_uniform(std::string_view name, std::string_view type) const;
+
+  // Uniforms by name. One that is declared but not used by this variant is ignored; a name or type that no
+  // stage declares stops the process with a sentence. Do not change which program is in use.
   void set(std::string_view name, int value) const;
   void set(std::string_view name, uint32_t value) const;
   void set(std::string_view name, float value) const;
@@ -84,9 +91,14 @@ class Program {
   void set(std::string_view name, const glm::mat4& value) const;
 
  private:
-  int location(std::string_view name) const;
+  struct Uniform {
+    std::string type;   // as declared
+    int location = -1;  // -1 = not used by this variant
+  };
+  int location(std::string_view name, std::string_view type) const;
   Handle<delete_program> handle_;
-  std::map<std::string, int, std::less<>> locations_;
+  std::string label_;
+  std::map<std::string, Uniform, std::less<>> uniforms_;
 };
 
 /// Largest dispatch group count per dimension that every GL 4.5 device accepts.

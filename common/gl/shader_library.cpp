@@ -186,6 +186,18 @@ std::vector<std::string> ShaderLibrary::stage_files() const {
   return paths;
 }
 
+std::map<std::string, std::string> declared_uniforms(const FlatSource& source) {
+  // Blocks have a brace where this wants a name. What is declared in an unused #if counts: another variant
+  // has it.
+  static const std::regex kComment(R"(//[^\n]*)");
+  static const std::regex kDeclaration(R"(\buniform\s+(?:(?:lowp|mediump|highp)\s+)?(\w+)\s+(\w+)\s*[;=\[])");
+  const std::string text = std::regex_replace(source.text, kComment, "");
+  std::map<std::string, std::string> uniforms;
+  for (std::sregex_iterator it(text.begin(), text.end(), kDeclaration), end; it != end; ++it)
+    uniforms[(*it)[2].str()] = (*it)[1].str();
+  return uniforms;
+}
+
 std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes) {
   std::vector<Variant> variants{{}};
   for (const VariantAxis& axis : axes) {

@@ -80,6 +80,7 @@ void SimLoop::run(std::function<void(Status)> on_ready) {
   // GL objects go before their context, on this thread.
   timer_.reset();
   solver_.reset();
+  strands_.reset();
   context_.reset();
 }
 
@@ -260,12 +261,13 @@ void SimLoop::follow_stream_settings() {
 Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& features) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, {&shaders_, features}));
-  RETURN_IF_ERROR(solver->load(config_.content->groom, builder_->world_from_head().rotation));
-  if (solver_ != nullptr) {
-    solver_->read(scratch_);
-    solver->write(scratch_);
-  }
+  // A solver with strands of its own leaves none behind on the GPU.
+  if (solver_ == nullptr || solver_->strands() == nullptr) strands_ = std::make_shared<StrandState>();
+  const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands_};
+  ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, gpu));
+  const glm::dquat& rotation = builder_->world_from_head().rotation;
+  RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
+                                     : hand_over(*solver_, *solver, config_.content->groom, rotation));
   solver_ = std::move(solver);
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
@@ -300,7 +302,7 @@ void SimLoop::step(int64_t time_ns) {
   ++tick_;
   const double end_time_s = static_cast<double>(tick_) / config_.scene.step_rate_hz;
   const SceneStep& scene_step = builder_->build(input_, solver_features_, end_time_s);
-  if (scene_step.rigid_turn) turn_rigidly(*scene_step.rigid_turn);
+  if (scene_step.has_jumped) solver_->rebase(scene_step.world_from_head.rotation);
   timer_->begin();
   for (const StepInput& substep : scene_step.substeps) {
     if (is_stopping_) return;  // many substeps of a slow solver take long
@@ -310,17 +312,6 @@ void SimLoop::step(int64_t time_ns) {
   step_timer_.add_ms(timer_->end_ms());
   last_step_ns_ = now_ns();
   if (viewers(facts_) > 0 || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
-}
-
-/// Loading is how a solver is told that the old rotation is no movement.
-void SimLoop::turn_rigidly(const glm::dquat& turn) {
-  solver_->read(scratch_);
-  for (auto* values : {&scratch_.position_m, &scratch_.velocity_mps})
-    for (glm::vec3& value : *values) value = glm::vec3(turn * glm::dvec3(value));
-  if (const Status status = solver_->load(config_.content->groom, builder_->world_from_head().rotation);
-      !status)
-    return log_error("sim", "{}", status.error().to_string());
-  solver_->write(scratch_);
 }
 
 void SimLoop::publish() {

@@ -30,6 +30,7 @@
 #include "server/scene/sim_clock.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/solver_registry.h"
+#include "server/sim/strand_state.h"
 
 namespace strandcast {
 
@@ -123,7 +124,6 @@ class SimLoop {
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_facts(const RuntimeFacts& facts);
   void step(int64_t time_ns);
-  void turn_rigidly(const glm::dquat& turn);
   void publish();
   void report_quarantine();
   void update_stats();
@@ -135,6 +135,7 @@ class SimLoop {
   // Of the simulation thread.
   std::unique_ptr<gl::EglContext> context_;
   gl::ShaderLibrary shaders_;
+  std::shared_ptr<StrandState> strands_;  // what solvers on the GPU work on, one after the other
   std::unique_ptr<Solver> solver_;
   SceneFeatures solver_features_;  // what the solver was built for
   std::optional<StepBuilder> builder_;
@@ -142,7 +143,6 @@ class SimLoop {
   std::optional<SimClock> clock_;
   std::optional<gl::GpuTimer> timer_;
   RuntimeFacts facts_;
-  SolverState scratch_;
   StageTimer step_timer_;
   InputFrame input_;
   glm::dvec3 head_velocity_mps_{0.0};     // during the last substep

@@ -103,12 +103,9 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
                                     double end_time_s) {
   const Pose target = input.has_motion ? input.world_from_head : world_from_head_;
   Pose from = world_from_head_;
-  step_.rigid_turn.reset();
   // The first pose is a jump too: until then the head stood at the origin.
-  if (input.has_motion && (input.has_teleported || !has_motion_)) {
-    step_.rigid_turn = target.rotation * glm::inverse(world_from_head_.rotation);
-    from = target;
-  }
+  step_.has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
+  if (step_.has_jumped) from = target;
   has_motion_ = has_motion_ || input.has_motion;
 
   const auto count = static_cast<double>(step_.substeps.size());

@@ -16,9 +16,8 @@ namespace strandcast {
 struct SceneStep {
   Pose world_from_head;             // at the end of the step
   std::vector<StepInput> substeps;  // scene.substeps of them
-  /// Set when the head jumped: strands are first turned by this, about the head joint, and move along
-  /// otherwise.
-  std::optional<glm::dquat> rigid_turn;
+  /// The head jumped to this pose: strands go along as they are (Solver::rebase) before the first substep.
+  bool has_jumped = false;
 };
 
 class StepBuilder {

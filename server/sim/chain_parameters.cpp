@@ -1,20 +1,12 @@
 #include "server/sim/chain_parameters.h"
 
-#include <cmath>
-
 #include "server/sim/strand_kernel.h"
 #include "shaders/shared/limits.h"
 
 namespace strandcast {
-namespace {
-
-constexpr const char* kCorrectionName = "s_damping";  // of the follow solvers only
-
-}  // namespace
 
 std::vector<SolverParameterInfo> chain_parameter_infos() {
-  std::vector<SolverParameterInfo> infos = shared_parameter_infos();
-  std::erase_if(infos, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
+  std::vector<SolverParameterInfo> infos = uncorrected_parameter_infos();
   infos.push_back({"radius_m", 5e-5, 1e-6, 1e-2, "m", "radius of the circular cross section"});
   infos.push_back({"density_kgpm3", 1300.0, 1.0, 1e5, "kg/m^3", "density"});
   infos.push_back({"young_modulus_pa", 3e9, 0.0, 1e16, "Pa", "Young's modulus; 0 = limp"});
@@ -33,13 +25,8 @@ ChainParameters read_chain_parameters(const SolverParameters& parameters, const 
   if (const auto poisson_ratio = parameters.find("poisson_ratio"); poisson_ratio != parameters.end())
     result.twist_stiffness_m4ps2 = result.bend_stiffness_m4ps2 / (1.0 + poisson_ratio->second);
   result.damping_s = parameters.at("bending_damping_s");
-  result.effort = static_cast<uint32_t>(std::lround(parameters.at(effort_name)));
+  result.effort = read_count(parameters, effort_name);
   return result;
-}
-
-StrandParameters read_shared_chain_parameters(SolverParameters parameters) {
-  parameters[kCorrectionName] = 0.0;
-  return read_strand_parameters(parameters);
 }
 
 SolverParameters chain_as_hair(const HairConstants& hair) {
@@ -60,9 +47,11 @@ Result<std::unique_ptr<Solver>> make_chain_kernel(const std::string& name, const
   desc.name = name;
   desc.shader_path = "sim/" + name + ".comp";
   desc.local_size = shader::kStrandLocalSize;
-  desc.uniforms["u_chain"] = glm::vec4(
-      glm::dvec4(chain.bend_stiffness_m4ps2, chain.twist_stiffness_m4ps2, chain.damping_s, chain.effort));
-  return StrandKernel::make(std::move(desc), read_shared_chain_parameters(parameters), context);
+  desc.constants = {{"u_bend_stiffness", chain.bend_stiffness_m4ps2},
+                    {"u_twist_stiffness", chain.twist_stiffness_m4ps2},
+                    {"u_bending_damping", chain.damping_s},
+                    {"u_rounds", chain.effort}};
+  return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
 }  // namespace strandcast

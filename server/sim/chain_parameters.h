@@ -20,9 +20,8 @@ struct ChainParameters {
 /// The shared entries that such a model has (no velocity correction), and its own without the effort.
 std::vector<SolverParameterInfo> chain_parameter_infos();
 
-/// Reads them out of a completed map; the effort from the entry of that name, rounded.
+/// Reads its own out of a completed map; the effort from the entry of that name, rounded.
 ChainParameters read_chain_parameters(const SolverParameters& parameters, const std::string& effort_name);
-StrandParameters read_shared_chain_parameters(SolverParameters parameters);
 
 /// For SolverRow::as_hair: true constants, no pull to the groomed shape, no damping, no drag.
 SolverParameters chain_as_hair(const HairConstants& hair);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/check.h"
 #include "server/sim/reference_contact.h"
 
 namespace strandcast {
@@ -11,23 +10,10 @@ namespace {
 
 constexpr double kTinyLength = 1e-12;
 
-bool is_sane(const glm::dvec3& value) {
-  return glm::dot(value, value) < 1e30;
-}
-
 }  // namespace
 
-Status ReferenceStrands::load(const Groom& groom, const glm::dquat& world_from_head) {
-  ASSIGN_OR_RETURN(layout_, make_strand_layout(groom));
-  previous_rotation_ = limited_rotation(world_from_head);
-  previous_carry_ = {1.0, 0.0, 0.0, 0.0};
-  previous_h_s_ = 1.0;
-  position_m_.resize(layout_.size());
-  velocity_mps_.assign(layout_.size(), glm::dvec3(0.0));
-  for (size_t i = 0; i < layout_.size(); ++i)
-    position_m_[i] = previous_rotation_ * glm::dvec3(layout_.rest[i]);
-  step_index_ = 0;
-  const size_t n = layout_.vertex_count;
+void ReferenceStrands::on_load() {
+  const size_t n = layout().vertex_count;
   scratch_.target_m.resize(n);
   scratch_.old_m.resize(n);
   scratch_.predicted_m.resize(n);
@@ -36,77 +22,62 @@ Status ReferenceStrands::load(const Groom& groom, const glm::dquat& world_from_h
   scratch_.velocity_mps.resize(n);
   scratch_.inertia.resize(n);
   scratch_.segment_m.resize(n);
-  memory_.assign(layout_.strand_count * memory_size(), 0.0);
-  on_load();
-  return {};
+  scratch_.is_intact.resize(n);
+  memory_.assign(layout().strand_count * memory_size(), 0.0);
+  prepare();
 }
 
-void ReferenceStrands::substep(const StepInput& input) {
-  input_ = &input;
-  h_s_ = limited_substep_s(input);
-  rotation_ = limited_rotation(input.world_from_head);
-  head_velocity_mps_ = limited(input.head_shift_m, kMaxHeadShiftM) / h_s_;
-  for (uint32_t strand_index = 0; strand_index < layout_.strand_count; ++strand_index) {
-    begin(scratch_, strand_index);
-    for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-      scratch_.predicted_m[i] = is_pinned(i) ? scratch_.target_m[i] : predict(scratch_, i);
-    }
-    scratch_.placed_m = scratch_.predicted_m;
-    solve(scratch_);
-    // The root last: models read from it how the head moved before.
-    for (uint32_t i = layout_.vertex_count; i-- > 0;) {
-      position_m_[layout_.index(i, strand_index)] = scratch_.placed_m[i];
-      velocity_mps_[layout_.index(i, strand_index)] = finish_velocity(scratch_, i);
-    }
+void ReferenceStrands::step_strand(const ReferenceStep&, uint32_t strand_index,
+                                   std::span<glm::dvec3> position_m, std::span<glm::dvec3> velocity_mps) {
+  scratch_.index = strand_index;
+  begin(scratch_, position_m, velocity_mps);
+  for (uint32_t i = 0; i < layout().vertex_count; ++i)
+    scratch_.predicted_m[i] = is_pinned(i) ? scratch_.target_m[i] : predict(scratch_, i);
+  scratch_.placed_m = scratch_.predicted_m;
+  solve(scratch_);
+  for (uint32_t i = 0; i < layout().vertex_count; ++i) {
+    position_m[i] = scratch_.placed_m[i];
+    velocity_mps[i] = finish_velocity(scratch_, i);
   }
-  previous_carry_ = carry();
-  previous_h_s_ = h_s_;
-  previous_rotation_ = rotation_;
-  ++step_index_;
-  input_ = nullptr;
 }
 
 std::span<double> ReferenceStrands::memory_of(uint32_t strand_index) {
   return std::span(memory_).subspan(strand_index * memory_size(), memory_size());
 }
 
-void ReferenceStrands::begin(ReferenceStrand& strand, uint32_t strand_index) {
-  strand.index = strand_index;
-  strand.memory = memory_of(strand_index);
-  for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-    const size_t at = layout_.index(i, strand_index);
-    const glm::dvec3 rest(layout_.rest[at]);
-    const bool is_sound = is_sane(velocity_mps_[at]) && is_sane(position_m_[at]);
-    if (!is_sound) std::fill(strand.memory.begin(), strand.memory.end(), 0.0);
-    strand.velocity_mps[i] = is_sound ? velocity_mps_[at] - head_velocity_mps_ : glm::dvec3(0.0);
-    const double rate = air_drag_per_s(strand) + h_s_ * style_stiffness_per_s2(strand, i);
-    strand.inertia[i] = 1.0 + h_s_ * rate;
-    strand.target_m[i] = rotation_ * rest;
-    strand.old_m[i] = is_sane(position_m_[at]) ? position_m_[at] : strand.target_m[i];
+void ReferenceStrands::forget(uint32_t strand_index) {
+  const std::span<double> memory = memory_of(strand_index);
+  std::fill(memory.begin(), memory.end(), 0.0);
+}
+
+void ReferenceStrands::begin(ReferenceStrand& strand, std::span<const glm::dvec3> position_m,
+                             std::span<const glm::dvec3> velocity_mps) {
+  strand.memory = memory_of(strand.index);
+  for (uint32_t i = 0; i < layout().vertex_count; ++i) {
+    const glm::dvec3 rest(layout().rest[layout().index(i, strand.index)]);
+    const bool is_sound = is_sane(velocity_mps[i]) && is_sane(position_m[i]);
+    strand.is_intact[i] = is_sound;
+    if (!is_sound) forget(strand.index);
+    strand.velocity_mps[i] = is_sound ? velocity_mps[i] - head_velocity_mps() : glm::dvec3(0.0);
+    const double rate = air_drag_per_s(strand) + h_s() * style_stiffness_per_s2(strand, i);
+    strand.inertia[i] = 1.0 + h_s() * rate;
+    strand.target_m[i] = rotation() * rest;
+    strand.old_m[i] = is_sane(position_m[i]) ? position_m[i] : strand.target_m[i];
     strand.segment_m[i] =
-        i == 0 ? 0.0 : glm::distance(rest, glm::dvec3(layout_.rest[layout_.index(i - 1, strand_index)]));
+        i == 0 ? 0.0 : glm::distance(rest, glm::dvec3(layout().rest[layout().index(i - 1, strand.index)]));
     strand.pushed_m[i] = glm::dvec3(0.0);
   }
-}
-
-bool ReferenceStrands::was_intact(const ReferenceStrand& strand, uint32_t i) const {
-  const size_t at = layout_.index(i, strand.index);
-  return is_sane(velocity_mps_[at]) && is_sane(position_m_[at]);
-}
-
-glm::dvec3 ReferenceStrands::previous_turn_mps(const glm::dvec3& arm_m) const {
-  return (arm_m - glm::conjugate(previous_carry_) * arm_m) / previous_h_s_;
 }
 
 glm::dvec3 ReferenceStrands::uncarried_gravity_mps2(const ReferenceStrand& strand, uint32_t i) const {
   const double carried_share =
       parameters_.sag_free * std::min(1.0, style_stiffness_per_s2(strand, i) / kSupportStiffnessPerS2);
-  const glm::dvec3 groom_gravity = limited(input_->groom_gravity_in_head_mps2, kMaxGravityMps2);
-  return limited(input_->gravity_mps2, kMaxGravityMps2) - carried_share * (rotation_ * groom_gravity);
+  const glm::dvec3 groom_gravity = limited(input().groom_gravity_in_head_mps2, kMaxGravityMps2);
+  return limited(input().gravity_mps2, kMaxGravityMps2) - carried_share * (rotation() * groom_gravity);
 }
 
 double ReferenceStrands::thickness(const ReferenceStrand& strand) const {
-  return thickness_factor(glm::vec3(layout_.rest[layout_.index(0, strand.index)]),
+  return thickness_factor(glm::vec3(layout().rest[layout().index(0, strand.index)]),
                           parameters_.thickness_spread);
 }
 
@@ -115,7 +86,7 @@ double ReferenceStrands::air_drag_per_s(const ReferenceStrand& strand) const {
 }
 
 double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, uint32_t i) const {
-  const double from_tip = 1.0 - static_cast<double>(layout_.arc[layout_.index(i, strand.index)]);
+  const double from_tip = 1.0 - static_cast<double>(layout().arc[layout().index(i, strand.index)]);
   const double tip_share = parameters_.style_tip_share;
   return thickness(strand) * thickness(strand) * parameters_.style_stiffness_per_s2 *
          (tip_share + (1.0 - tip_share) * from_tip * from_tip);
@@ -131,12 +102,12 @@ double ReferenceStrands::style_stiffness_per_s2(const ReferenceStrand& strand, u
 glm::dvec3 ReferenceStrands::predict(const ReferenceStrand& strand, uint32_t i) const {
   const double stiffness = style_stiffness_per_s2(strand, i);
   const double drag = air_drag_per_s(strand);
-  const glm::dvec3 relative_air = air_velocity_mps(*input_, strand.old_m[i]) - head_velocity_mps_;
+  const glm::dvec3 relative_air = air_velocity_mps(input(), strand.old_m[i]) - head_velocity_mps();
   const glm::dvec3 impulse = strand.velocity_mps[i] +
-                             h_s_ * (uncarried_gravity_mps2(strand, i) + drag * relative_air) +
-                             h_s_ * stiffness * (strand.target_m[i] - strand.old_m[i]);
-  const glm::dvec3 u = impulse / (1.0 + h_s_ * drag + h_s_ * h_s_ * stiffness);
-  return strand.old_m[i] + h_s_ * shortened(u, parameters_.max_speed_mps);
+                             h_s() * (uncarried_gravity_mps2(strand, i) + drag * relative_air) +
+                             h_s() * stiffness * (strand.target_m[i] - strand.old_m[i]);
+  const glm::dvec3 u = impulse / (1.0 + h_s() * drag + h_s() * h_s() * stiffness);
+  return strand.old_m[i] + h_s() * shortened(u, parameters_.max_speed_mps);
 }
 
 void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
@@ -148,12 +119,12 @@ void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
   const double norm = glm::length(direction);
   glm::dvec3 end = norm < kTinyLength ? start : start + length * (direction / norm);
 
-  const glm::dvec3 outside = pushed_out(*input_, rotation_ * glm::conjugate(previous_rotation_),
-                                        parameters_.collider_friction, {strand.old_m[i], start, end, length});
+  const glm::dvec3 outside =
+      pushed_out(input(), carry(), parameters_.collider_friction, {strand.old_m[i], start, end, length});
   strand.pushed_m[i] = outside - end;
   end = outside;
-  if (layout_.pinned_tail_count > 0) {
-    const uint32_t tail = layout_.tail_begin();
+  if (layout().pinned_tail_count > 0) {
+    const uint32_t tail = layout().tail_begin();
     double reach = 0.0;
     for (uint32_t j = i + 1; j <= tail; ++j) reach += strand.segment_m[j];
     const glm::dvec3 anchor = strand.target_m[tail];
@@ -168,8 +139,8 @@ void ReferenceStrands::place(ReferenceStrand& strand, uint32_t i) const {
 // 003 section 2.1.4: v_i = (p_i(t+h) - p_i(t)) / h - s_damping d_(i+1) / h, where d is what the length
 // constraint moved a vertex by; friction and the speed limit are ours.
 glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint32_t i) const {
-  glm::dvec3 u = way_m(strand, i) / h_s_;
-  const bool has_next = i + 1 < layout_.vertex_count && !is_pinned(i) && !is_pinned(i + 1);
+  glm::dvec3 u = way_m(strand, i) / h_s();
+  const bool has_next = i + 1 < layout().vertex_count && !is_pinned(i) && !is_pinned(i + 1);
   if (has_next) {
     glm::dvec3 correction = strand.placed_m[i + 1] - strand.predicted_m[i + 1] - strand.pushed_m[i + 1];
     // A string takes no thrust: of a correction that points away from vertex i only a share counts.
@@ -179,43 +150,9 @@ glm::dvec3 ReferenceStrands::finish_velocity(const ReferenceStrand& strand, uint
       const double thrust_m = std::max(0.0, glm::dot(correction, direction));
       correction -= (1.0 - parameters_.thrust_share) * thrust_m * direction;
     }
-    u -= parameters_.s_damping * correction / h_s_;
+    u -= parameters_.s_damping * correction / h_s();
   }
-  return shortened(u, parameters_.max_speed_mps) + head_velocity_mps_;
-}
-
-void ReferenceStrands::read(SolverState& state) {
-  state.position_m.resize(layout_.size());
-  state.velocity_mps.resize(layout_.size());
-  for (size_t i = 0; i < layout_.size(); ++i) {
-    state.position_m[i] = glm::vec3(position_m_[i]);
-    state.velocity_mps[i] = glm::vec3(velocity_mps_[i]);
-  }
-}
-
-// A strand that is written as it was read goes on as if nothing had happened.
-void ReferenceStrands::write(const SolverState& state) {
-  CHECK(state.position_m.size() == layout_.size() && state.velocity_mps.size() == layout_.size());
-  for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-    bool is_changed = false;
-    for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-      const size_t at = layout_.index(i, s);
-      is_changed = is_changed || state.position_m[at] != glm::vec3(position_m_[at]) ||
-                   state.velocity_mps[at] != glm::vec3(velocity_mps_[at]);
-    }
-    if (!is_changed) continue;
-    const std::span<double> memory = memory_of(s);
-    std::fill(memory.begin(), memory.end(), 0.0);
-    for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-      const size_t at = layout_.index(i, s);
-      position_m_[at] = glm::dvec3(state.position_m[at]);
-      velocity_mps_[at] = glm::dvec3(state.velocity_mps[at]);
-    }
-  }
-}
-
-uint64_t ReferenceStrands::memory_bytes() const {
-  return layout_.size() * (2 * sizeof(glm::dvec3) + sizeof(glm::vec4) + sizeof(float));
+  return shortened(u, parameters_.max_speed_mps) + head_velocity_mps();
 }
 
 }  // namespace strandcast

@@ -51,6 +51,8 @@ struct SolverState {
 
 using SolverParameters = std::map<std::string, double>;
 
+class StrandState;
+
 class Solver {
  public:
   virtual ~Solver() = default;
@@ -60,10 +62,23 @@ class Solver {
   virtual void substep(const StepInput& input) = 0;
   /// Copies the state out; resizes `state` on first use only.
   virtual void read(SolverState& state) = 0;
-  /// Replaces positions and velocities (same layout as read).
+  /// Replaces positions and velocities (same layout as read). A strand that is given what it has goes on as
+  /// if nothing had happened; another one starts without a history.
   virtual void write(const SolverState& state) = 0;
+  /// The head has jumped to this rotation, wherever it is: strands jump along with all that the model knows
+  /// of them. Seen from the head nothing has changed.
+  virtual void rebase(const glm::dquat& world_from_head) = 0;
   /// Bytes the solver keeps on its device.
   virtual uint64_t memory_bytes() const = 0;
+
+  /// The strands that it works on when these are on the GPU; nullptr for a solver that has its own.
+  virtual const StrandState* strands() const { return nullptr; }
+  /// Goes on with strands() as another solver left them; allocates. On an error the other one may go on.
+  virtual Status follow() { return {}; }
 };
+
+/// `to` goes on where `from` is, with the same strands: at once when both work on the same strands, else by
+/// way of a copy. On an error `from` is as it was.
+Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head);
 
 }  // namespace strandcast

@@ -43,6 +43,15 @@ Result<const SolverRow*> find_solver(const std::string& name) {
   return make_error(ErrorCode::NotFound, "unknown solver '{}' (known: {})", name, known);
 }
 
+Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head) {
+  if (to.strands() != nullptr && to.strands() == from.strands()) return to.follow();
+  SolverState state;
+  from.read(state);
+  RETURN_IF_ERROR(to.load(groom, world_from_head));
+  to.write(state);
+  return {};
+}
+
 Status check_step(const SolverRow& row, const SolverParameters& complete, double substep_s) {
   return row.check_step ? row.check_step(complete, substep_s) : Status();
 }

@@ -30,6 +30,8 @@ struct GpuSolverContext {
   const gl::ShaderLibrary* shaders = nullptr;
   SceneFeatures features;
   KernelForm form = KernelForm::Auto;
+  /// The strands to work on, which outlive the solver as the caller likes; nullptr = the solver's own.
+  std::shared_ptr<StrandState> strands = {};
 };
 
 struct SolverRow {

@@ -9,15 +9,16 @@ glm::vec4 pack(const glm::dvec3& vector, double w) {
   return glm::vec4(glm::dvec4(vector, w));
 }
 
-}  // namespace
-
+/// Columns of a matrix as a uniform block holds them.
 std::array<glm::vec4, 3> block_columns(const glm::dmat3& matrix) {
   return {glm::vec4(glm::vec3(matrix[0]), 0.0f), glm::vec4(glm::vec3(matrix[1]), 0.0f),
           glm::vec4(glm::vec3(matrix[2]), 0.0f)};
 }
 
+}  // namespace
+
 StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
-                          const StrandLayout& layout, const glm::dquat& previous_world_from_head) {
+                          const StrandLayout& layout, const HeadPath& head) {
   const double h_s = limited_substep_s(input);
   const glm::dquat rotation = limited_rotation(input.world_from_head);
   const glm::dvec3 head_velocity = limited(input.head_shift_m, kMaxHeadShiftM) / h_s;
@@ -27,7 +28,7 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
 
   StepBlock block{};
   block.world_from_head = block_columns(glm::mat3_cast(rotation));
-  block.carry = block_columns(glm::mat3_cast(rotation * glm::conjugate(previous_world_from_head)));
+  block.carry = block_columns(glm::mat3_cast(rotation * glm::conjugate(head.world_from_head)));
   block.head_velocity = pack(head_velocity, h_s);
   block.push = pack(h_s * acceleration, 1.0 / h_s);
   const glm::dvec3 groom_gravity = limited(input.groom_gravity_in_head_mps2, kMaxGravityMps2);
@@ -37,6 +38,8 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
   block.contact = glm::vec4(glm::dvec4(parameters.collider_friction, parameters.air_drag_per_s,
                                        1.0 - parameters.thrust_share, parameters.thickness_spread));
   block.wind = pack(relative_wind, 0.0);
+  block.step_index = head.step_index;
+  block.previous_turn = block_columns(head.turn_per_s);
   block.shape = {layout.strand_count, layout.vertex_count, layout.pinned_root_count, layout.tail_begin()};
   const size_t wave_count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);
   for (size_t i = 0; i < wave_count; ++i) {

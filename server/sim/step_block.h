@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 
+#include "server/sim/head_path.h"
 #include "server/sim/strand_layout.h"
 #include "server/sim/strand_parameters.h"
 #include "shaders/shared/limits.h"
@@ -20,7 +21,8 @@ struct StepBlock {
   glm::vec4 style;
   glm::vec4 contact;
   glm::uvec4 shape;
-  glm::uvec4 odd_even;
+  uint32_t step_index;
+  std::array<uint32_t, 3> unused;
   std::array<glm::vec4, 3> previous_turn;
   glm::vec4 wind;
   std::array<glm::vec4, shader::kMaxGustWaves> gust_amplitude;
@@ -31,12 +33,8 @@ static_assert(sizeof(StepBlock) ==
               16 * (3 + 3 + 7 + 3 + 1 + 2 * shader::kMaxGustWaves + shader::kMaxSphereColliders));
 static_assert(shader::kMaxGustWaves == kMaxGustWaves && shader::kMaxSphereColliders == kMaxSphereColliders);
 
-/// The block for one substep; the odd-even fields and the turn before stay zero. Inputs are held to the
-/// limits of strand_layout.h.
+/// The block for one substep; `head` is as before it. Inputs are held to the limits of strand_layout.h.
 StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
-                          const StrandLayout& layout, const glm::dquat& previous_world_from_head);
-
-/// Columns of a matrix as a uniform block holds them.
-std::array<glm::vec4, 3> block_columns(const glm::dmat3& matrix);
+                          const StrandLayout& layout, const HeadPath& head);
 
 }  // namespace strandcast

@@ -1,6 +1,7 @@
 #include "server/sim/strand_parameters.h"
 
 #include <bit>
+#include <cmath>
 
 #include "common/base/hash.h"
 
@@ -21,6 +22,16 @@ std::vector<SolverParameterInfo> shared_parameter_infos() {
       {"collider_friction", 0.3, 0.0, 10.0, "", "Coulomb friction of strands on colliders"},
       {"max_speed_mps", 30.0, 0.1, 1000.0, "m/s", "largest speed of a vertex relative to the head"},
   };
+}
+
+std::vector<SolverParameterInfo> uncorrected_parameter_infos() {
+  std::vector<SolverParameterInfo> infos = shared_parameter_infos();
+  std::erase_if(infos, [](const SolverParameterInfo& info) { return info.name == "s_damping"; });
+  return infos;
+}
+
+uint32_t read_count(const SolverParameters& parameters, const std::string& name) {
+  return static_cast<uint32_t>(std::lround(parameters.at(name)));
 }
 
 SolverParameterInfo thrust_share_info() {
@@ -51,7 +62,6 @@ double thickness_factor(const glm::vec3& root_in_head_m, double spread) {
 
 StrandParameters read_strand_parameters(const SolverParameters& parameters) {
   StrandParameters result;
-  result.s_damping = parameters.at("s_damping");
   result.air_drag_per_s = parameters.at("air_drag_per_s");
   result.style_stiffness_per_s2 = parameters.at("style_stiffness_per_s2");
   result.style_tip_share = parameters.at("style_tip_share");
@@ -62,6 +72,7 @@ StrandParameters read_strand_parameters(const SolverParameters& parameters) {
     const auto found = parameters.find(name);
     return found == parameters.end() ? otherwise : found->second;
   };
+  result.s_damping = optional("s_damping", 0.0);
   result.thrust_share = optional("thrust_share", 1.0);
   result.thickness_spread = optional("thickness_spread", 0.0);
   return result;

@@ -26,6 +26,8 @@ struct StrandParameters {
 
 /// Table entries of the shared parameters, to which a solver appends its own.
 std::vector<SolverParameterInfo> shared_parameter_infos();
+/// Those of them that a model without the velocity correction has.
+std::vector<SolverParameterInfo> uncorrected_parameter_infos();
 
 /// What cures dynamic Follow-The-Leader of two faults that 003 section 5.2 reports; not all solvers have
 /// both. The jitter under fast reversals: a follower that is nearer than its segment's length is pushed away,
@@ -42,7 +44,10 @@ SolverParameterInfo thickness_spread_info();
 /// head: neither the order nor the number of strands changes it.
 double thickness_factor(const glm::vec3& root_in_head_m, double spread);
 
-/// Reads the shared parameters out of a completed map.
+/// A whole number out of a completed map, rounded.
+uint32_t read_count(const SolverParameters& parameters, const std::string& name);
+
+/// Reads the shared parameters out of a completed map; what the model has not is off.
 StrandParameters read_strand_parameters(const SolverParameters& parameters);
 
 }  // namespace strandcast

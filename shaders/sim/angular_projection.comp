@@ -17,9 +17,10 @@ Joint joint_at(Strand strand, uint i, Frame before, vec3 turn_before, float tens
   const float segment = max(g_along[i].w, kMinLength);
   const bool is_clamp = i == strand.first;
   const float span = is_clamp ? segment : segment + max(g_along[i - 1u].w, kMinLength);
-  const float clamp_bend = clamp_stiffness(u_chain.x, tension * u_step.push.w * u_step.push.w, segment);
-  const float bend = h * h * (is_clamp ? clamp_bend : 2.0 * u_chain.x / span);
-  const float rate = u_chain.z * u_step.push.w;
+  const float tension_m2ps2 = tension * u_step.push.w * u_step.push.w;
+  const float clamp_bend = clamp_stiffness(u_bend_stiffness, tension_m2ps2, segment);
+  const float bend = h * h * (is_clamp ? clamp_bend : 2.0 * u_bend_stiffness / span);
+  const float rate = u_bending_damping * u_step.push.w;
   Joint joint;
   joint.moment = bend * (bend_between(out_of(before, g_rest[i].xyz), g_along[i].xyz) +
                          rate * (g_turn[i].xyz - turn_before));

@@ -58,9 +58,10 @@ Joint joint_at(Strand strand, uint i, float tension) {
   const float segment = max(g_along[i].w, kMinLength);
   const bool is_clamp = i == strand.first;
   const float span = is_clamp ? segment : segment + max(g_along[i - 1u].w, kMinLength);
-  const float clamp_bend = clamp_stiffness(u_chain.x, tension * u_step.push.w * u_step.push.w, segment);
-  const float bend = h * h * (is_clamp ? clamp_bend : 2.0 * u_chain.x / span);
-  const float twist = h * h * 2.0 * u_chain.y / span;
+  const float tension_m2ps2 = tension * u_step.push.w * u_step.push.w;
+  const float clamp_bend = clamp_stiffness(u_bend_stiffness, tension_m2ps2, segment);
+  const float bend = h * h * (is_clamp ? clamp_bend : 2.0 * u_bend_stiffness / span);
+  const float twist = h * h * 2.0 * u_twist_stiffness / span;
 
   const float opening = 1.0 / max(1.0 + dot(rest.along, now.along), kMinOpening);
   const vec3 middle = (rest.along + now.along) * opening;
@@ -71,7 +72,7 @@ Joint joint_at(Strand strand, uint i, float tension) {
   const vec3 axis = direction_or(middle, now.along);
   const mat3 elastic = scaled(bend) + outerProduct((twist * dot(middle, middle) - bend) * axis, axis);
   const vec3 turn_before = is_clamp ? strand.clamp_turn : g_turn[i - 1u].xyz;
-  const float rate = u_chain.z * u_step.push.w;
+  const float rate = u_bending_damping * u_step.push.w;
   Joint joint;
   joint.moment = bend * bend_between(rest.along, now.along) + (twist * angle) * middle +
                  rate * (elastic * (g_turn[i].xyz - turn_before));

@@ -6,8 +6,10 @@
 
 layout(local_size_x = kStrandLocalSize) in;
 
-// Bending and twist stiffness over mass per length, m^4/s^2; damping, s; times the segments turn per step.
-uniform vec4 u_chain;
+uniform float u_bend_stiffness;   // over mass per length, m^4/s^2
+uniform float u_twist_stiffness;  // over mass per length, m^4/s^2
+uniform float u_bending_damping;  // moments lead by this time, s
+uniform uint u_rounds;            // times the segments turn per step
 
 // A pinned tip is a vertex of so many strands' mass at its target, and takes at least so many rounds.
 const float kAnchorMass = 100.0;
@@ -293,9 +295,9 @@ void main() {
     bool is_bad = false;
     vec3 position = begin(strand);
 #if HAS_PINNED_TAIL
-    const uint rounds = max(uint(u_chain.w), kHeldRounds);
+    const uint rounds = max(u_rounds, kHeldRounds);
 #else
-    const uint rounds = uint(u_chain.w);
+    const uint rounds = u_rounds;
 #endif
     for (uint round = 0u; round < rounds; ++round) position = turned_chain(strand, position, is_bad);
     finish(strand, position, is_bad);

@@ -5,6 +5,9 @@
 
 layout(local_size_x = kStrandLocalSize) in;
 
+uniform uint u_iterations;        // times the odd and the even vertices follow their leaders
+uniform uint u_has_exact_length;  // 1 = segments are laid end to end afterwards
+
 vec4 g_point[kMaxVertexCount];  // w = segment before
 vec3 g_predicted[kMaxVertexCount];
 vec3 g_target[kMaxVertexCount];
@@ -104,12 +107,12 @@ void main() {
 #if !HAS_PINNED_TAIL
   restore_lengths();
 #endif
-  for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) {
+  for (uint iteration = 0u; iteration < u_iterations; ++iteration) {
     place_every_second(strand, 1u);
     place_every_second(strand, 0u);
   }
 #if !HAS_PINNED_TAIL
-  if (u_step.odd_even.y != 0u) restore_lengths();
+  if (u_has_exact_length != 0u) restore_lengths();
 #endif
 
   at = strand;

@@ -6,6 +6,9 @@
 
 layout(local_size_x = kVertexLocalSize) in;
 
+uniform uint u_iterations;        // times the odd and the even vertices follow their leaders
+uniform uint u_has_exact_length;  // 1 = segments are laid end to end afterwards
+
 // (vertices x strands of the group), strand fastest; later reused for corrections.
 shared vec3 s_point[kVertexLocalSize];
 shared vec3 s_target[kVertexLocalSize];
@@ -98,12 +101,12 @@ void main() {
 #if !HAS_PINNED_TAIL
   restore_lengths(lane, vertex);
 #endif
-  for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) {
+  for (uint iteration = 0u; iteration < u_iterations; ++iteration) {
     place_in_turn(lane, vertex, 1u, anchor, reach, pushed);
     place_in_turn(lane, vertex, 0u, anchor, reach, pushed);
   }
 #if !HAS_PINNED_TAIL
-  if (u_step.odd_even.y != 0u) restore_lengths(lane, vertex);
+  if (u_has_exact_length != 0u) restore_lengths(lane, vertex);
 #endif
 
   const vec3 end = lane.is_free ? s_point[lane.local] : vertex.target;

@@ -218,7 +218,7 @@ bool backward(Rod rod) {
 
 void store_node(uint at, vec3 position, vec3 velocity, float tension, vec3 displacement,
                 vec3 velocity_change) {
-  b_position.position[at] = vec4(position, 0.0);
+  store_vertex(at, position, texelFetch(u_position, int(at)).w);
   b_velocity.velocity[at] = vec4(velocity, tension);
   b_displacement.value[at] = vec4(displacement, 0.0);
   b_velocity_change.value[at] = vec4(velocity_change, 0.0);

@@ -5,8 +5,13 @@
 
 layout(local_size_x = kStrandLocalSize) in;
 
-uniform vec4 u_springs;  // stretch, m/s^2; its damper, m/s; bend, m^3/s^2; altitude, m/s^2
-uniform vec4 u_limits;   // shortest segment, m; stretch; stiffness over inertia; where in the step forces are
+// Springs, over the mass per length.
+uniform float u_stretch;          // m/s^2
+uniform float u_stretch_damping;  // m/s
+uniform float u_bend;             // m^3/s^2
+uniform float u_altitude;         // m/s^2
+uniform float u_shortest_segment;  // for mass and leverage, m
+uniform float u_stretch_limit;     // relative
 
 const float kFoldedBack = 1e-6;
 // Closer than 16 degrees to the reverse of its groomed direction, an edge turns less about itself than the
@@ -20,7 +25,7 @@ uint element(uint strand, uint vertex) { return vertex * u_step.shape.x + strand
 
 vec3 target_at(uint at) { return turned_with_head(texelFetch(u_rest, int(at)).xyz); }
 
-float soft_length(float segment) { return max(segment, u_limits.x); }
+float soft_length(float segment) { return max(segment, u_shortest_segment); }
 
 // Velocity before the substep relative to the head joint, as predict() sees it.
 vec3 velocity_before(uint at, bool is_free) {
@@ -80,7 +85,7 @@ vec3 finished(uint at, vec3 start, vec3 start_target, vec3 solved, float segment
   const vec3 edge = solved - start;
   float reach = sqrt(dot(edge, edge));
 #if HAS_PINNED_TAIL == 0
-  const float most = segment * (1.0 + u_limits.y);
+  const float most = segment * (1.0 + u_stretch_limit);
   reach = clamp(reach, max(2.0 * segment - most, 0.0), most);
 #endif
   Vertex vertex;

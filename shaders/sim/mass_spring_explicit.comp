@@ -2,6 +2,8 @@
 // and Verlet differ in where during the step the forces are taken.
 #include "sim/mass_spring.glsl"
 
+uniform float u_middle;  // where in the step forces are taken: 0 = at its start, 0.5 = half way
+
 vec4 g_point[kMaxVertexCount];  // where forces are taken; w = mass over the mass per length
 vec4 g_force[kMaxVertexCount];  // over the mass per length, m^2/s^2
 
@@ -9,7 +11,7 @@ void add_force(uint vertex, vec3 force) { g_force[vertex].xyz += force; }
 
 void add_forces(uint strand, uint last) {
   const uint first = u_step.shape.z;
-  const float share = u_limits.w * u_step.head_velocity.w;
+  const float share = u_middle * u_step.head_velocity.w;
   uint at = element(strand, first - 1u);
   vec3 velocity = velocity_before(at, false);
   vec3 position = position_before(at) + share * velocity;
@@ -51,14 +53,14 @@ void add_forces(uint strand, uint last) {
 
     const float opening = dot(direction, velocity_now - velocity);
     const float stretch = dot(edge, direction) - rest_point.w;
-    const vec3 pull = (u_springs.x * stretch + u_springs.y * opening) * direction;
+    const vec3 pull = (u_stretch * stretch + u_stretch_damping * opening) * direction;
     add_force(i, -pull);
     add_force(i - 1u, pull);
     if (i == first) {
-      add_force(i, (-2.0 * u_springs.z / soft) * (strain - rest));
+      add_force(i, (-2.0 * u_bend / soft) * (strain - rest));
     } else {
       const mat3 joint = rest_change(direction1, rest, groomed1);
-      const vec3 stress = u_springs.z * (strain - joint * strain1);
+      const vec3 stress = u_bend * (strain - joint * strain1);
       const vec3 on_after = stress / soft;
       const vec3 on_before = (stress * joint) / soft1;
       add_force(i, -on_after);
@@ -72,7 +74,7 @@ void add_forces(uint strand, uint last) {
       const vec3 by_b = cross(edge, edge0) * per_base;
       const vec3 by_c = cross(edge0, edge1) * per_base;
       const float rest_altitude = dot(target0, cross(target1, target_now - target)) * per_base;
-      const float push = u_springs.w * (dot(edge0, by_a) - rest_altitude);
+      const float push = u_altitude * (dot(edge0, by_a) - rest_altitude);
       if (i - 1u > first + 1u) add_force(i - 3u, push * by_a);
       if (i - 1u > first) add_force(i - 2u, push * (by_b - by_a));
       add_force(i - 1u, push * (by_c - by_b));
@@ -113,7 +115,7 @@ void main() {
     const Vertex vertex = predict(at);
     const vec3 impulse = g_force[i].xyz * (h / (g_point[i].w * hold(vertex.arc)));
     const vec3 velocity = within_speed_limit((vertex.predicted - vertex.old) * u_step.push.w + impulse);
-    const vec3 solved = g_point[i].xyz + ((1.0 - u_limits.w) * h) * velocity;
+    const vec3 solved = g_point[i].xyz + ((1.0 - u_middle) * h) * velocity;
     const bool is_bad = is_broken(solved);
     const vec3 end =
         is_bad ? vertex.target : finished(at, start, start_target, solved, vertex.segment, vertex.arc);

@@ -6,6 +6,9 @@
 // Blocks on either side of the diagonal: stretch 1, bend 2, altitude 3.
 const uint kReach = 2u + uint(HAS_ALTITUDE);
 
+uniform uint u_solves;           // Newton steps
+uniform float u_most_stiffness;  // of a spring over what inertia resists with
+
 // A row of the system: what couples the vertex to itself and to those after it, and the force.
 struct Row {
   mat3 diagonal;
@@ -104,13 +107,13 @@ vec3 solved_upper(Pivot pivot, vec3 v) {
 mat3 scaled_rows(vec3 scale, mat3 m) { return mat3(scale * m[0], scale * m[1], scale * m[2]); }
 
 // h^2 times a stiffness, no stiffer than float can tell from rigid.
-float capped(float stiffness, float inertia) { return min(stiffness, u_limits.z * inertia); }
+float capped(float stiffness, float inertia) { return min(stiffness, u_most_stiffness * inertia); }
 
 void add_stretch(Edge edge, float segment, float length_before, inout Row start, inout Row end) {
   const float h = u_step.head_velocity.w;
   const float length_now = dot(edge.vector, edge.direction);
-  const float spring = capped(h * h * u_springs.x, edge.soft);
-  const float damper = capped(h * u_springs.y, edge.soft);
+  const float spring = capped(h * h * u_stretch, edge.soft);
+  const float damper = capped(h * u_stretch_damping, edge.soft);
   const vec3 pull =
       (spring * (length_now - segment) + damper * (length_now - length_before)) * edge.direction;
   const float across = spring * max(length_now - segment, 0.0) / max(length_now, kFoldedBack);
@@ -125,7 +128,7 @@ void add_stretch(Edge edge, float segment, float length_before, inout Row start,
 
 float bend_weight(float soft) {
   const float h = u_step.head_velocity.w;
-  return capped(h * h * u_springs.z, soft * soft * soft / kBendPerStretch);
+  return capped(h * h * u_bend, soft * soft * soft / kBendPerStretch);
 }
 
 void add_clamp(Edge edge, vec3 rest, inout Row end) {
@@ -161,7 +164,7 @@ void add_altitude(Edge a, Edge b, Edge c, inout Row row0, inout Row row1, inout 
   const float h = u_step.head_velocity.w;
   const float shortest = min(min(a.soft, b.soft), c.soft);
   const float longest = max(max(a.soft, b.soft), c.soft);
-  const float spring = capped(h * h * u_springs.w, shortest / kAltitudePerStretch);
+  const float spring = capped(h * h * u_altitude, shortest / kAltitudePerStretch);
   const float per_base = 1.0 / (longest * longest);
   const vec3 by_a = cross(b.vector, c.vector) * per_base;
   const vec3 by_b = cross(c.vector, a.vector) * per_base;
@@ -287,7 +290,7 @@ void forward(uint strand, uint solve) {
         const vec3 velocity = within_speed_limit(velocity_before(at, true));
         point = i >= tail ? goal : vertex.old + u_step.head_velocity.w * velocity;
 #if HAS_PINNED_TAIL == 0
-        const float most = vertex.segment * (1.0 + u_limits.y);
+        const float most = vertex.segment * (1.0 + u_stretch_limit);
         const float reach = clamp(length_before, max(2.0 * vertex.segment - most, 0.0), most);
         point = position + reach * direction_of(point - position, rest);
 #endif
@@ -398,7 +401,7 @@ void main() {
   const uint strand = gl_GlobalInvocationID.x;
   if (strand >= u_step.shape.x) return;
   bool is_bad = false;
-  for (uint solve = 0u; solve < u_step.odd_even.x; ++solve) {
+  for (uint solve = 0u; solve < u_solves; ++solve) {
     if (u_step.shape.w > u_step.shape.z) forward(strand, solve);
     is_bad = backward() || is_bad;
   }

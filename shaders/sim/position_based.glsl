@@ -5,9 +5,14 @@
 
 layout(local_size_x = kStrandLocalSize) in;
 
-// x for stretch, y for bending. pbd: share of the error per iteration. xpbd: compliance times mass per
-// length, s^2/m. z = tractrix sweeps, w = 1: before the iterations.
-uniform vec4 u_give;
+// pbd: share of the error per iteration. xpbd: compliance times mass per length, s^2/m.
+uniform float u_stretch_give;
+uniform float u_bend_give;
+uniform uint u_iterations;  // times all constraints are solved
+#if HAS_TRACTRIX_SWEEPS
+uniform uint u_tractrix_sweeps;  // 1 = from the root to the tip, 2 = from the tip first
+uniform uint u_tractrix_first;   // 1 = before the iterations
+#endif
 
 // What the constraints of one vertex remember.
 struct Link {
@@ -106,7 +111,7 @@ void sweep_from_tip(uint first, uint tail) {
 
 // Tractrix sweeps as a first guess for the constraints.
 void guess(uint first, uint tail) {
-  if (u_give.z > 1.5) sweep_from_tip(first, tail);
+  if (u_tractrix_sweeps > 1u) sweep_from_tip(first, tail);
   vec3 head_before = g_point[first - 1u].xyz;
   vec3 head = head_before;
   for (uint i = first; i < tail; ++i) {
@@ -122,7 +127,7 @@ void guess(uint first, uint tail) {
 void finish(uint strand, uint first, uint tail) {
   const uint stride = u_step.shape.x;
   for (uint i = first; i < tail; ++i) g_solved[i] = g_point[i].xyz;
-  if (u_give.z > 1.5) sweep_from_tip(first, tail);
+  if (u_tractrix_sweeps > 1u) sweep_from_tip(first, tail);
   uint at = (first - 1u) * stride + strand;
   vec3 start = g_point[first - 1u].xyz;
   vec3 start_target = start;
@@ -175,17 +180,17 @@ void main() {
     at += stride;
   }
 
-  vec2 give = u_give.xy;
+  vec2 give = vec2(u_stretch_give, u_bend_give);
 #if IS_COMPLIANT
   give *= (total / float(vertices - 1u)) * u_step.push.w * u_step.push.w;
 #endif
 #if HAS_TRACTRIX_SWEEPS
   const uint first = u_step.shape.z;
   const uint tail = u_step.shape.w;
-  const bool is_guess = u_give.w > 0.5;
+  const bool is_guess = u_tractrix_first != 0u;
   if (is_guess) guess(first, tail);
 #endif
-  for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) sweep(strand, vertices - 1u, give);
+  for (uint iteration = 0u; iteration < u_iterations; ++iteration) sweep(strand, vertices - 1u, give);
 #if HAS_TRACTRIX_SWEEPS
   if (!is_guess) finish(strand, first, tail);
 #endif

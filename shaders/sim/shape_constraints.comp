@@ -4,10 +4,16 @@
 
 layout(local_size_x = kStrandLocalSize) in;
 
-uniform vec4 u_shape;  // bending stiffness over mass per length, m^4/s^2; iterations of it, share of each
-                       // correction; rest unused
-uniform vec4 u_shock;  // share passed on, acceleration that is fast, m/s^2; damping, damping when fast, 1/s
-uniform vec4 u_air;    // drag along the strand over drag across it, stretch limit; rest unused
+uniform float u_bend_stiffness;    // of the local shape, over mass per length, m^4/s^2
+uniform uint u_shape_iterations;   // times the local shape is held
+uniform float u_shape_relaxation;  // share of each correction of it
+uniform uint u_iterations;         // times the lengths are held
+uniform float u_stretch_limit;     // relative
+uniform float u_shock_share;       // of a change of the head's motion
+uniform float u_fast;              // acceleration that is fast, m/s^2
+uniform float u_damping;           // 1/s
+uniform float u_fast_damping;      // when fast, 1/s
+uniform float u_air_along;         // drag along the strand over drag across it
 
 const float kMostGive = 1e12;    // finite whatever the groom
 const float kGiveShare = 0.375;  // see the header named above
@@ -48,8 +54,8 @@ Shock shock_of(uint strand) {
   }
   shock.root = root.old;
   const float acceleration = length(now - shock.velocity) * u_step.push.w;
-  shock.fast = clamp(acceleration / u_shock.y - 1.0, 0.0, 1.0);
-  shock.share = mix(u_shock.x, 1.0, shock.fast);
+  shock.fast = clamp(acceleration / u_fast - 1.0, 0.0, 1.0);
+  shock.share = mix(u_shock_share, 1.0, shock.fast);
   return shock;
 }
 
@@ -58,7 +64,7 @@ Shock shock_of(uint strand) {
 vec3 start_velocity(Vertex vertex, Shock shock) {
   const vec3 before = shock.velocity + previous_turn(vertex.old - shock.root);
   const vec3 now = rigid_velocity(vertex.old);
-  const vec3 own = (vertex.velocity - before) * exp(-u_shock.z * u_step.head_velocity.w);
+  const vec3 own = (vertex.velocity - before) * exp(-u_damping * u_step.head_velocity.w);
   return mix(own, carried_by_head(own), shock.share) + mix(before, now, shock.share);
 }
 
@@ -66,7 +72,7 @@ vec3 start_velocity(Vertex vertex, Shock shock) {
 void advance(inout Vertex vertex, vec3 velocity, vec3 along) {
   const float h = u_step.head_velocity.w;
   const float drag = h * u_step.contact.y;
-  const float along_drag = drag * u_air.x;
+  const float along_drag = drag * u_air_along;
   const float stiffness = style_stiffness(vertex.arc);
   const float pull = h * stiffness;
   const vec3 air = u_step.wind.xyz + gust_velocity(vertex.old);
@@ -107,7 +113,7 @@ void hold_shape(uint last, float give) {
     const vec3 wanted = state.w * turned_from_to(groomed_before, before, groomed);
     const vec3 multiplier = g_multiplier[i];
     vec3 push = -(b - a - wanted + give * multiplier) / (w_a + w_b + give);
-    push = w_a + w_b > 0.0 ? u_shape.z * push : vec3(0.0);
+    push = w_a + w_b > 0.0 ? u_shape_relaxation * push : vec3(0.0);
     g_multiplier[i] = multiplier + push;
     a -= w_a * push;
     b += w_b * push;
@@ -161,8 +167,8 @@ void finish(uint strand, float fast) {
   const uint stride = u_step.shape.x;
   const uint first = u_step.shape.z;
   const uint tail = u_step.shape.w;
-  const vec2 limit = vec2(1.0) + vec2(-1.0, 1.0) * ((1.0 - fast) * u_air.y);
-  const float kept = exp(-u_shock.w * fast * u_step.head_velocity.w);
+  const vec2 limit = vec2(1.0) + vec2(-1.0, 1.0) * ((1.0 - fast) * u_stretch_limit);
+  const float kept = exp(-u_fast_damping * fast * u_step.head_velocity.w);
   vec3 anchor = vec3(0.0);
   float reach = 0.0;
 #if HAS_PINNED_TAIL
@@ -237,8 +243,9 @@ void main() {
   const Shock shock = shock_of(strand);
   const float total = begin_strand(strand, shock);
   const float segment = total / float(max(vertices - u_step.shape.z, 1u));
-  const float give = kGiveShare * total * segment * segment * segment / max(u_shape.x * h * h, kTinySquared);
-  for (float round = 0.0; round < u_shape.y; round += 1.0) hold_shape(last, min(give, kMostGive));
-  for (uint iteration = 0u; iteration < u_step.odd_even.x; ++iteration) hold_lengths(last);
+  const float stiffness = max(u_bend_stiffness * h * h, kTinySquared);
+  const float give = kGiveShare * total * segment * segment * segment / stiffness;
+  for (uint round = 0u; round < u_shape_iterations; ++round) hold_shape(last, min(give, kMostGive));
+  for (uint iteration = 0u; iteration < u_iterations; ++iteration) hold_lengths(last);
   finish(strand, shock.fast);
 }

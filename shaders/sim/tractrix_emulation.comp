@@ -5,7 +5,8 @@
 
 layout(local_size_x = kStrandLocalSize) in;
 
-uniform vec4 u_order;  // seed, 1 = random
+uniform uint u_has_random_order;  // 0 = from the tip to the root
+uniform uint u_order_seed;
 
 vec3 g_wanted[kMaxVertexCount];
 
@@ -23,9 +24,9 @@ uint shuffled(uint value, uint bits, uint key) {
 // The same order in all strands, so that they stay side by side in the lanes.
 void move_all(uint first, uint tail) {
   const uint count = tail - first;
-  const bool is_random = u_order.y >= 0.5;
+  const bool is_random = u_has_random_order != 0u;
   const uint bits = uint(findMSB(max(count - 1u, 1u))) + 1u;
-  const uint key = mix_u32(uint(u_order.x) + mix_u32(u_step.odd_even.z));
+  const uint key = mix_u32(u_order_seed + mix_u32(u_step.step_index));
   const uint turns = is_random ? 1u << bits : count;
   for (uint k = 0u; k < turns; ++k) {
     const uint pick = is_random ? shuffled(k, bits, key) : count - 1u - k;

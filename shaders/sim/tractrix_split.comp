@@ -12,7 +12,8 @@ layout(std430, binding = kBindingDisplacement) writeonly restrict buffer OffsetB
   vec4 value[];
 } b_offset;
 
-uniform vec4 u_style;  // share of the turn towards the groomed segment; rate of the dragged strand's, 1/s
+uniform float u_style_mix;     // share of the turn towards the groomed segment
+uniform float u_style_return;  // rate of the dragged strand's, 1/s
 
 // Below this the sine of the angle between two directions does not say in which plane to turn.
 const float kNoPlaneSquared = 1e-12;
@@ -108,12 +109,12 @@ void main() {
     const vec3 groomed = direction_of(vertex.target - start_target, vec3(0.0));
     const vec3 along = direction_of(end - start, groomed);
     vertex.old = before.shown;
-    vertex.predicted = shown_start + rest.w * mixed(along, groomed, u_style.x);
+    vertex.predicted = shown_start + rest.w * mixed(along, groomed, u_style_mix);
     const vec3 shown = placed(shown_start, start_target, vertex, anchor, reach, is_last, pushed);
     store_vertex(at, shown, vertex.arc);
     store_velocity(at, (is_last ? end - before.dragged : shown - before.shown) * u_step.push.w);
     // What is kept of the dragged strand takes on the style, outside of the leader's velocity.
-    const float returned = u_style.y * min(1.0, style_stiffness(vertex.arc) * u_step.support.w);
+    const float returned = u_style_return * min(1.0, style_stiffness(vertex.arc) * u_step.support.w);
     kept += rest.w * mixed(along, groomed, returned / (u_step.push.w + returned));
     b_offset.value[at] = vec4(kept - shown, 0.0);
     head_before = g_point[i].xyz;

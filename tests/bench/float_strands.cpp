@@ -54,8 +54,15 @@ Status FloatStrands::load(const Groom& groom, const glm::dquat& world_from_head)
   return {};
 }
 
+void FloatStrands::rebase(const glm::dquat& world_from_head) {
+  const glm::dquat turn = limited_rotation(world_from_head) * glm::conjugate(previous_rotation_);
+  for (auto* values : {&state_.position_m, &state_.velocity_mps})
+    for (glm::vec3& value : *values) value = glm::vec3(turn * glm::dvec3(value));
+  previous_rotation_ = limited_rotation(world_from_head);
+}
+
 void FloatStrands::substep(const StepInput& input) {
-  const StepBlock block = make_step_block(input, parameters_, layout_, previous_rotation_);
+  const StepBlock block = make_step_block(input, parameters_, layout_, HeadPath::at_rest(previous_rotation_));
   previous_rotation_ = limited_rotation(input.world_from_head);
   const glm::mat3 rotation = glm::mat3(glm::mat3_cast(previous_rotation_));
   const auto collider_count =

@@ -16,6 +16,7 @@ class FloatStrands final : public Solver {
   void substep(const StepInput& input) override;
   void read(SolverState& state) override;
   void write(const SolverState& state) override;
+  void rebase(const glm::dquat& world_from_head) override;
   uint64_t memory_bytes() const override;
 
  private:

@@ -151,18 +151,75 @@ TEST_F(Programs, LinkErrorsNameTheStages) {
   EXPECT_THAT(error_of({"a.vert", "a.frag"}), HasSubstr("a.vert + a.frag: does not link"));
 }
 
-TEST_F(Programs, UniformsAreSetByNameAndUnknownOnesIgnored) {
-  folder_.write(
-      "u.comp",
-      std::string("uniform uint u_value;\nuniform vec3 u_more;\n#define VALUE (u_value + uint(u_more.y))\n") +
-          kWriteValue);
+constexpr const char* kUniforms =
+    "#pragma variant HAS_SCALE 0 1\n"
+    "uniform uint u_value;\nuniform vec3 u_more;  // not: uniform float u_comment;\n"
+    "layout(binding = 3) uniform samplerBuffer u_table;\n"
+    "#if HAS_SCALE\nuniform float u_scale;\n#endif\n"
+    "#define VALUE (u_value + uint(u_more.y))\n";
+
+TEST_F(Programs, UniformsAreSetByNameAndThoseThatAVariantDoesNotUseAreIgnored) {
+  folder_.write("u.comp", std::string(kUniforms) + kWriteValue);
   const auto program = Program::make(library(), {"u.comp"}, {});
   ASSERT_TRUE(program) << program.error().to_string();
   program->set("u_value", 40u);
   program->set("u_more", glm::vec3(9.0f, 2.0f, 9.0f));
-  program->set("u_none", 1.0f);
+  program->set("u_scale", 1.0f);  // of the other variant
+  program->set("u_table", 3);     // optimised away
   EXPECT_THAT(run_kernel(*program, 1), ElementsAre(42u));
   EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
+}
+
+TEST_F(Programs, UniformsThatNoVariantDeclaresAreErrorsWithTheirName) {
+  folder_.write("u.comp", std::string(kUniforms) + kWriteValue);
+  const auto program = Program::make(library(), {"u.comp"}, {});
+  ASSERT_TRUE(program) << program.error().to_string();
+  EXPECT_TRUE(program->check_uniform("u_scale", "float"));
+  EXPECT_TRUE(program->check_uniform("u_table", "int"));
+  for (const char* name : {"u_valve", "u_comment", "value", ""}) {
+    const Status unknown = program->check_uniform(name, "uint");
+    ASSERT_FALSE(unknown) << name;
+    EXPECT_EQ(
+        unknown.error().to_string(),
+        fmt::format("u.comp: no variant declares a uniform {} (known: u_more, u_scale, u_table, u_value)",
+                    name));
+  }
+  const Status other_type = program->check_uniform("u_value", "float");
+  ASSERT_FALSE(other_type);
+  EXPECT_EQ(other_type.error().to_string(), "u.comp: uniform u_value is declared as uint, not as float");
+}
+
+TEST_F(Programs, SettingAnUnknownUniformStopsTheProcessWithItsName) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // the driver has threads
+  folder_.write("u.comp", std::string(kUniforms) + kWriteValue);
+  const auto set = [this](auto value) {
+    const auto program = Program::make(library(), {"u.comp"}, {});
+    if (program) program->set("u_valve", value);
+  };
+  EXPECT_DEATH(set(1u), "u.comp: no variant declares a uniform u_valve");
+  EXPECT_DEATH(set(1.0f), "u.comp: no variant declares a uniform u_valve");
+}
+
+TEST_F(Programs, TheDeclaredUniformsOfOurShadersHoldThoseThatTheDriverKnows) {
+  const ShaderLibrary embedded;
+  for (const std::string& stage : embedded.stage_files()) {
+    if (!stage.ends_with(".comp")) continue;
+    const auto flat = embedded.flatten(stage);
+    ASSERT_TRUE(flat) << stage;
+    const auto declared = declared_uniforms(*flat);
+    const auto program = Program::make(embedded, {stage}, {});
+    ASSERT_TRUE(program) << program.error().to_string();
+    GLint count = 0;
+    glGetProgramiv(program->name(), GL_ACTIVE_UNIFORMS, &count);
+    for (GLint i = 0; i < count; ++i) {
+      char name[256] = {};
+      GLint size = 0;
+      GLenum type = 0;
+      glGetActiveUniform(program->name(), static_cast<GLuint>(i), sizeof(name), nullptr, &size, &type, name);
+      if (glGetUniformLocation(program->name(), name) < 0) continue;  // of a block
+      EXPECT_TRUE(declared.contains(name)) << stage << ": " << name;
+    }
+  }
 }
 
 TEST_F(Programs, TheShaderHashIsTheHashOfTheHost) {

@@ -79,6 +79,7 @@ class FakeModel : public Solver {
   void substep(const StepInput& input) override { move_(step_++, input, state_); }
   void read(SolverState& state) override { state = state_; }
   void write(const SolverState& state) override { state_ = state; }
+  void rebase(const glm::dquat&) override {}
   uint64_t memory_bytes() const override { return 0; }
 
  private:

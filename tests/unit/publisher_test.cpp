@@ -32,6 +32,7 @@ class FakeSolver : public Solver {
     read_target = out.position_m.data();
   }
   void write(const SolverState& in) override { state = in; }
+  void rebase(const glm::dquat&) override {}
   uint64_t memory_bytes() const override { return 0; }
 
   SolverState state;

@@ -14,8 +14,7 @@ const glm::dvec3 kAlong(0.0, 0.0, 1.0);
 class AngularProjectionReference final : public ReferenceChain {
  public:
   explicit AngularProjectionReference(const SolverParameters& parameters)
-      : ReferenceChain(read_shared_chain_parameters(parameters),
-                       read_chain_parameters(parameters, "sweeps")) {}
+      : ReferenceChain(read_strand_parameters(parameters), read_chain_parameters(parameters, "sweeps")) {}
 
  private:
   glm::dquat frame_before(const ReferenceChainState& chain, size_t i) const {

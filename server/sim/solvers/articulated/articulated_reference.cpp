@@ -70,8 +70,7 @@ struct Joint {
 class ArticulatedReference final : public ReferenceChain {
  public:
   explicit ArticulatedReference(const SolverParameters& parameters)
-      : ReferenceChain(read_shared_chain_parameters(parameters),
-                       read_chain_parameters(parameters, "solves")) {}
+      : ReferenceChain(read_strand_parameters(parameters), read_chain_parameters(parameters, "solves")) {}
 
  private:
   /// The joint before a segment; `tension` is the force that stretches the segment.

@@ -15,8 +15,8 @@ Result<std::unique_ptr<Solver>> make_dftl_parallel_gpu(const SolverParameters& p
   desc.is_per_vertex = (context.form == KernelForm::Auto ? suiting : context.form) == KernelForm::PerVertex;
   desc.shader_path = desc.is_per_vertex ? "sim/dftl_parallel.comp" : "sim/dftl_odd_even.comp";
   desc.local_size = desc.is_per_vertex ? shader::kVertexLocalSize : shader::kStrandLocalSize;
-  desc.iterations = static_cast<uint32_t>(std::lround(parameters.at("iterations")));
-  desc.has_exact_length = parameters.at("exact_length") >= 0.5;
+  desc.constants = {{"u_iterations", read_count(parameters, "iterations")},
+                    {"u_has_exact_length", parameters.at("exact_length") >= 0.5 ? 1u : 0u}};
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 

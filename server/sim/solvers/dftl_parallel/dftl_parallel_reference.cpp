@@ -10,7 +10,7 @@ class DftlParallelReference final : public ReferenceStrands {
  public:
   explicit DftlParallelReference(const SolverParameters& parameters)
       : ReferenceStrands(read_strand_parameters(parameters)),
-        iterations_(static_cast<uint32_t>(std::lround(parameters.at("iterations")))),
+        iterations_(read_count(parameters, "iterations")),
         has_exact_length_(parameters.at("exact_length") >= 0.5) {}
 
  private:

@@ -2,21 +2,16 @@
 #include <array>
 #include <cmath>
 
-#include "common/base/check.h"
 #include "server/sim/banded_system.h"
 #include "server/sim/reference_contact.h"
+#include "server/sim/reference_solver.h"
 #include "server/sim/solvers/direct_rod/direct_rod_rest.h"
 
 namespace strandcast {
 namespace {
 
 constexpr double kTinyLength = 1e-10;
-constexpr double kBrokenM = 1e12;
 constexpr double kFoldedBack = 1e-6;  // 1 + cosine of tangents that face each other
-
-bool is_sane(const glm::dvec3& value) {
-  return glm::dot(value, value) < kBrokenM * kBrokenM;
-}
 
 /// Part of a vector at right angles to a unit vector, as a matrix.
 glm::dmat3 across(const glm::dvec3& direction) {
@@ -68,17 +63,6 @@ struct RodStrand {
   double history_step_s = 0.0;  // length of the step before; 0 = starts anew
 };
 
-/// What one step of one strand works with.
-struct RodStep {
-  const StepInput* input = nullptr;
-  double h_s = 0.0;
-  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
-  glm::dquat carry{1.0, 0.0, 0.0, 0.0};
-  glm::dvec3 shift_m{0.0};
-  glm::dvec3 head_velocity_mps{0.0};
-  glm::dvec3 gravity_mps2{0.0};
-};
-
 /// Backward differences: h rate = now (x - x_n) - before (x_n - x_(n-1)).
 struct Differences {
   double now = 1.0;
@@ -112,7 +96,7 @@ void set_untwisted(RodStrand& strand, uint32_t first, const glm::dquat& rotation
 class RodMotion {
  public:
   RodMotion(const RodParameters& parameters, const StrandLayout& layout, uint32_t strand_index,
-            const RodStep& step, RodStrand& strand)
+            const ReferenceStep& step, RodStrand& strand)
       : parameters_(parameters),
         step_(step),
         strand_(strand),
@@ -260,7 +244,8 @@ class RodMotion {
                                      differences_.before * vertex.velocity_change_mps) /
                                     h;
     const glm::dvec3 air = air_velocity_mps(*step_.input, vertex.position_m);
-    system.add_force(i - first_, mass * (step_.gravity_mps2 + drag * (air - velocity) - acceleration));
+    system.add_force(i - first_, mass * (limited(step_.input->gravity_mps2, kMaxGravityMps2) +
+                                         drag * (air - velocity) - acceleration));
     const double rate = differences_.now / h;
     system.add_block(i - first_, i - first_, glm::dmat3(mass * (rate * rate + drag * rate)));
   }
@@ -449,7 +434,7 @@ class RodMotion {
   }
 
   const RodParameters& parameters_;
-  const RodStep& step_;
+  const ReferenceStep& step_;
   RodStrand& strand_;
   uint32_t n_;
   uint32_t first_;
@@ -465,102 +450,77 @@ class RodMotion {
   double penalty_ = 0.0;
 };
 
-class DirectRodReference final : public Solver {
+class DirectRodReference final : public ReferenceSolver {
  public:
   explicit DirectRodReference(const SolverParameters& parameters)
-      : parameters_(read_rod_parameters(parameters)) {}
-
-  Status load(const Groom& groom, const glm::dquat& world_from_head) override {
-    ASSIGN_OR_RETURN(layout_, make_strand_layout(groom, kMaxReferenceVertexCount));
-    previous_rotation_ = limited_rotation(world_from_head);
-    strands_.assign(layout_.strand_count, {});
-    groom_gravity_in_head_mps2_ = glm::dvec3(0.0);
-    is_untouched_ = true;
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-      RodStrand& strand = strands_[s];
-      strand.vertex.assign(layout_.vertex_count, {});
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i)
-        strand.vertex[i].position_m = previous_rotation_ * glm::dvec3(layout_.rest[layout_.index(i, s)]);
-    }
-    set_rest();
-    return {};
-  }
-
-  void substep(const StepInput& input) override {
-    const glm::dvec3 groom_gravity = limited(input.groom_gravity_in_head_mps2, kMaxGravityMps2);
-    if (parameters_.sag_free > 0.0 && groom_gravity != groom_gravity_in_head_mps2_) {
-      groom_gravity_in_head_mps2_ = groom_gravity;
-      set_rest();
-    }
-    is_untouched_ = false;
-    RodStep step;
-    step.input = &input;
-    step.h_s = limited_substep_s(input);
-    step.rotation = limited_rotation(input.world_from_head);
-    step.carry = step.rotation * glm::conjugate(previous_rotation_);
-    step.shift_m = limited(input.head_shift_m, kMaxHeadShiftM);
-    step.head_velocity_mps = step.shift_m / step.h_s;
-    step.gravity_mps2 = limited(input.gravity_mps2, kMaxGravityMps2);
-    for (uint32_t s = 0; s < layout_.strand_count; ++s)
-      RodMotion(parameters_, layout_, s, step, strands_[s]).run();
-    previous_rotation_ = step.rotation;
-  }
-
-  void read(SolverState& state) override {
-    state.position_m.resize(layout_.size());
-    state.velocity_mps.resize(layout_.size());
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-        state.position_m[layout_.index(i, s)] = glm::vec3(strands_[s].vertex[i].position_m);
-        state.velocity_mps[layout_.index(i, s)] = glm::vec3(strands_[s].vertex[i].velocity_mps);
-      }
-    }
-  }
-
-  // A strand that is written as it was read goes on as if nothing had happened.
-  void write(const SolverState& state) override {
-    CHECK(state.position_m.size() == layout_.size() && state.velocity_mps.size() == layout_.size());
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-      RodStrand& strand = strands_[s];
-      bool is_changed = false;
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-        is_changed = is_changed ||
-                     state.position_m[layout_.index(i, s)] != glm::vec3(strand.vertex[i].position_m) ||
-                     state.velocity_mps[layout_.index(i, s)] != glm::vec3(strand.vertex[i].velocity_mps);
-      }
-      if (!is_changed) continue;
-      is_untouched_ = false;
-      strand.history_step_s = 0.0;
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-        strand.vertex[i] = RodVertex{};
-        strand.vertex[i].position_m = glm::dvec3(state.position_m[layout_.index(i, s)]);
-        strand.vertex[i].velocity_mps = glm::dvec3(state.velocity_mps[layout_.index(i, s)]);
-      }
-      set_untwisted(strand, layout_.pinned_root_count, previous_rotation_);
-    }
-  }
-
-  uint64_t memory_bytes() const override { return layout_.size() * sizeof(RodVertex); }
+      : ReferenceSolver(kMaxReferenceVertexCount), parameters_(read_rod_parameters(parameters)) {}
 
  private:
+  void on_load() override {
+    groom_gravity_in_head_mps2_ = glm::dvec3(0.0);
+    strands_.assign(layout().strand_count, {});
+    for (RodStrand& strand : strands_) strand.vertex.assign(layout().vertex_count, {});
+    set_rest();
+  }
+
+  void on_step(const ReferenceStep& step) override {
+    const glm::dvec3 groom_gravity = limited(step.input->groom_gravity_in_head_mps2, kMaxGravityMps2);
+    if (parameters_.sag_free <= 0.0 || groom_gravity == groom_gravity_in_head_mps2_) return;
+    groom_gravity_in_head_mps2_ = groom_gravity;
+    set_rest();
+  }
+
+  void step_strand(const ReferenceStep& step, uint32_t strand_index, std::span<glm::dvec3> position_m,
+                   std::span<glm::dvec3> velocity_mps) override {
+    RodStrand& strand = strands_[strand_index];
+    for (uint32_t i = 0; i < layout().vertex_count; ++i) {
+      strand.vertex[i].position_m = position_m[i];
+      strand.vertex[i].velocity_mps = velocity_mps[i];
+    }
+    RodMotion(parameters_, layout(), strand_index, step, strand).run();
+    for (uint32_t i = 0; i < layout().vertex_count; ++i) {
+      position_m[i] = strand.vertex[i].position_m;
+      velocity_mps[i] = strand.vertex[i].velocity_mps;
+    }
+  }
+
+  void forget(uint32_t strand_index) override {
+    RodStrand& strand = strands_[strand_index];
+    strand.history_step_s = 0.0;
+    for (uint32_t i = 0; i < layout().vertex_count; ++i) {
+      strand.vertex[i] = RodVertex{};
+      strand.vertex[i].position_m = position_m(strand_index)[i];
+    }
+    set_untwisted(strand, layout().pinned_root_count, head().world_from_head);
+  }
+
+  void turn_memory(const glm::dquat& turn) override {
+    for (RodStrand& strand : strands_) {
+      for (RodVertex& vertex : strand.vertex) {
+        vertex.displacement_m = turn * vertex.displacement_m;
+        vertex.velocity_change_mps = turn * vertex.velocity_change_mps;
+        vertex.axis = turn * vertex.axis;
+      }
+    }
+  }
+
+  uint64_t model_bytes() const override { return layout().size() * sizeof(RodVertex); }
+
   /// The rest shape; what has not moved yet starts in it, with the tensions and frames it has as loaded.
   void set_rest() {
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+    for (uint32_t s = 0; s < layout().strand_count; ++s) {
       RodStrand& strand = strands_[s];
-      strand.rest = make_rod_rest(layout_, s, parameters_, groom_gravity_in_head_mps2_);
-      for (uint32_t i = 0; i < layout_.vertex_count && is_untouched_; ++i) {
+      strand.rest = make_rod_rest(layout(), s, parameters_, groom_gravity_in_head_mps2_);
+      for (uint32_t i = 0; i < layout().vertex_count && is_at_rest(); ++i) {
         strand.vertex[i].tension_m2ps2 = strand.rest.tension_m2ps2[i];
-        strand.vertex[i].axis = previous_rotation_ * strand.rest.axis[i];
+        strand.vertex[i].axis = head().world_from_head * strand.rest.axis[i];
       }
     }
   }
 
   RodParameters parameters_;
-  StrandLayout layout_;
   std::vector<RodStrand> strands_;
   glm::dvec3 groom_gravity_in_head_mps2_{0.0};  // under which the rest shape was found
-  bool is_untouched_ = true;                    // as loaded
-  glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
 };
 
 }  // namespace

@@ -195,8 +195,8 @@ RodParameters read_rod_parameters(const SolverParameters& parameters) {
   result.air_drag_per_s = parameters.at("air_drag_per_s");
   result.collider_friction = parameters.at("collider_friction");
   result.max_speed_mps = parameters.at("max_speed_mps");
-  result.solves = static_cast<uint32_t>(std::lround(parameters.at("solves")));
-  result.order = static_cast<uint32_t>(std::lround(parameters.at("order")));
+  result.solves = read_count(parameters, "solves");
+  result.order = read_count(parameters, "order");
   result.sag_free = parameters.at("sag_free");
   return result;
 }

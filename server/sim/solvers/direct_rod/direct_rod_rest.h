@@ -7,6 +7,7 @@
 
 #include "server/sim/solvers/direct_rod/direct_rod.h"
 #include "server/sim/strand_layout.h"
+#include "server/sim/strand_parameters.h"
 
 namespace strandcast {
 

@@ -8,17 +8,10 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kCorrectionName = "s_damping";
-
-/// The dynamic solver's parameters without the velocity correction, which this model has not.
-StrandParameters read_parameters(SolverParameters parameters) {
-  parameters[kCorrectionName] = 0.0;
-  return read_strand_parameters(parameters);
-}
-
 class FtlReference final : public ReferenceStrands {
  public:
-  explicit FtlReference(const SolverParameters& parameters) : ReferenceStrands(read_parameters(parameters)) {}
+  explicit FtlReference(const SolverParameters& parameters)
+      : ReferenceStrands(read_strand_parameters(parameters)) {}
 
  private:
   void solve(ReferenceStrand& strand) const override {
@@ -33,7 +26,7 @@ Result<std::unique_ptr<Solver>> make_ftl_gpu(const SolverParameters& parameters,
   desc.name = "ftl";
   desc.shader_path = "sim/dftl.comp";
   desc.local_size = shader::kStrandLocalSize;
-  return StrandKernel::make(std::move(desc), read_parameters(parameters), context);
+  return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
 }  // namespace
@@ -47,9 +40,8 @@ SolverRow ftl_row() {
   row.source =
       "Woodhouse, Real-Time Hair Rendering and Simulation, University of Bristol 2017, section 2.1.4 "
       "(equations of dv, p_i and d_i), after Brown, Latombe and Montgomery 2004";
-  row.parameters = shared_parameter_infos();
+  row.parameters = uncorrected_parameter_infos();
   row.parameters.push_back(thickness_spread_info());
-  std::erase_if(row.parameters, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
   // The segments are a chain of followers that no reaction holds back: what one does, the next does larger.
   row.comes_to_rest = false;
   row.make_gpu = make_ftl_gpu;

@@ -9,27 +9,29 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kCorrectionName = "s_damping";  // of the follow solvers only
 constexpr const char* kIntegratorNames[] = {"symplectic Euler", "Verlet", "backward Euler"};
 
 Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const GpuSolverContext& context) {
   const MassSpringParameters parameters = read_mass_spring(given);
   StrandKernelDesc desc;
   desc.name = "mass_spring";
-  desc.shader_path = "sim/mass_spring_explicit.comp";
-  if (parameters.integrator == SpringIntegrator::BackwardEuler)
+  desc.local_size = shader::kStrandLocalSize;
+  desc.constants = {{"u_stretch", parameters.stretch_mps2},
+                    {"u_stretch_damping", parameters.stretch_damping_mps},
+                    {"u_bend", parameters.bend_m3ps2},
+                    {"u_altitude", parameters.altitude_mps2},
+                    {"u_shortest_segment", parameters.shortest_segment_m},
+                    {"u_stretch_limit", parameters.stretch_limit}};
+  if (parameters.integrator == SpringIntegrator::BackwardEuler) {
     desc.shader_path =
         parameters.altitude_mps2 > 0.0 ? "sim/mass_spring_altitude.comp" : "sim/mass_spring.comp";
-  desc.local_size = shader::kStrandLocalSize;
-  desc.iterations = parameters.solves;
-  desc.uniforms["u_springs"] = glm::vec4(glm::dvec4(parameters.stretch_mps2, parameters.stretch_damping_mps,
-                                                    parameters.bend_m3ps2, parameters.altitude_mps2));
-  const double middle = parameters.integrator == SpringIntegrator::Verlet ? 0.5 : 0.0;
-  desc.uniforms["u_limits"] = glm::vec4(
-      glm::dvec4(parameters.shortest_segment_m, parameters.stretch_limit, kMaxImplicitRatio, middle));
-  SolverParameters shared = given;
-  shared[kCorrectionName] = 0.0;
-  return StrandKernel::make(std::move(desc), read_strand_parameters(shared), context);
+    desc.constants["u_solves"] = parameters.solves;
+    desc.constants["u_most_stiffness"] = kMaxImplicitRatio;
+  } else {
+    desc.shader_path = "sim/mass_spring_explicit.comp";
+    desc.constants["u_middle"] = parameters.integrator == SpringIntegrator::Verlet ? 0.5 : 0.0;
+  }
+  return StrandKernel::make(std::move(desc), read_strand_parameters(given), context);
 }
 
 Status check_explicit_step(const SolverParameters& given, double substep_s) {
@@ -72,7 +74,7 @@ MassSpringParameters read_mass_spring(const SolverParameters& parameters) {
   const double density = parameters.at("linear_density_kg_per_m");
   MassSpringParameters result;
   result.integrator = static_cast<SpringIntegrator>(std::lround(parameters.at("integrator")));
-  result.solves = static_cast<uint32_t>(std::lround(parameters.at("solves")));
+  result.solves = read_count(parameters, "solves");
   result.stretch_mps2 = parameters.at("stretch_stiffness_n_per_m") / density;
   result.stretch_damping_mps = parameters.at("stretch_damping_ns_per_m") / density;
   result.bend_m3ps2 = parameters.at("bend_stiffness_nm_per_rad") / density;
@@ -101,8 +103,7 @@ SolverRow mass_spring_row() {
       "Sams, Hair Simulation for Real-Time Applications, Bournemouth University 2014, sections 3.1 and 3.2; "
       "Selle, Lentine, Fedkiw, A Mass Spring Model for Hair Simulation, SIGGRAPH 2008, sections 3 and 4; "
       "implicit step: Baraff, Witkin, Large Steps in Cloth Simulation, SIGGRAPH 1998, equation 6";
-  row.parameters = shared_parameter_infos();
-  std::erase_if(row.parameters, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
+  row.parameters = uncorrected_parameter_infos();
   row.parameters.insert(
       row.parameters.end(),
       {{"integrator", 2.0, 0.0, 2.0, "",

@@ -2,25 +2,18 @@
 #include <array>
 #include <cmath>
 
-#include "common/base/check.h"
 #include "server/sim/banded_system.h"
 #include "server/sim/reference_contact.h"
+#include "server/sim/reference_solver.h"
 #include "server/sim/solvers/mass_spring/mass_spring.h"
-#include "server/sim/strand_layout.h"
 #include "server/sim/strand_parameters.h"
 
 namespace strandcast {
 namespace {
 
 constexpr double kTinyLengthM = 1e-10;
-constexpr double kBrokenM = 1e12;
 constexpr double kFoldedBack = 1e-6;
 constexpr double kNearlyReversed = 0.02;  // 1 + cos of 164 degrees
-constexpr const char* kCorrectionName = "s_damping";
-
-bool is_sane(const glm::dvec3& value) {
-  return glm::dot(value, value) < kBrokenM * kBrokenM;
-}
 
 glm::dvec3 direction_of(const glm::dvec3& vector, const glm::dvec3& other) {
   const double length = glm::length(vector);
@@ -48,20 +41,11 @@ struct Strain {
 /// Altitude springs reach three vertices.
 using SpringSystem = BandedSystem<3, 4>;
 
-/// What one substep of all strands works with.
-struct SpringStep {
-  const StepInput* input = nullptr;
-  double h_s = 0.0;
-  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
-  glm::dquat carry{1.0, 0.0, 0.0, 0.0};
-  glm::dvec3 head_velocity_mps{0.0};
-};
-
 /// One substep of one strand; positions relative to the head joint, velocities relative to its movement.
 class SpringMotion {
  public:
   SpringMotion(const MassSpringParameters& springs, const StrandParameters& shared,
-               const StrandLayout& layout, uint32_t strand_index, const SpringStep& step)
+               const StrandLayout& layout, uint32_t strand_index, const ReferenceStep& step)
       : springs_(springs),
         shared_(shared),
         step_(step),
@@ -80,7 +64,7 @@ class SpringMotion {
   }
 
   /// Positions and world velocities before the substep are replaced by those after it.
-  void run(std::vector<glm::dvec3>& position, std::vector<glm::dvec3>& velocity) {
+  void run(std::span<glm::dvec3> position, std::span<glm::dvec3> velocity) {
     begin(position, velocity);
     const bool is_implicit = springs_.integrator == SpringIntegrator::BackwardEuler;
     bool is_sound = true;
@@ -90,7 +74,7 @@ class SpringMotion {
     } else {
       explicit_step();
     }
-    position = finish(is_sound);
+    std::ranges::copy(finish(is_sound), position.begin());
     for (uint32_t i = 0; i < n_; ++i) {
       const glm::dvec3 relative = is_free(i) ? end_velocity_[i] + (position[i] - x_[i]) / step_.h_s
                                              : (target_[i] - old_[i]) / step_.h_s;
@@ -111,7 +95,7 @@ class SpringMotion {
     return std::min(stiffness, kMaxImplicitRatio * inertia);
   }
 
-  void begin(const std::vector<glm::dvec3>& position, const std::vector<glm::dvec3>& velocity) {
+  void begin(std::span<const glm::dvec3> position, std::span<const glm::dvec3> velocity) {
     for (uint32_t i = 0; i < n_; ++i) {
       const bool is_intact = is_sane(position[i]) && is_sane(velocity[i]);
       old_.push_back(is_intact ? position[i] : target_[i]);
@@ -335,7 +319,7 @@ class SpringMotion {
 
   const MassSpringParameters& springs_;
   const StrandParameters& shared_;
-  const SpringStep& step_;
+  const ReferenceStep& step_;
   uint32_t n_;
   uint32_t first_;
   uint32_t tail_;
@@ -353,70 +337,19 @@ class SpringMotion {
   std::vector<glm::dvec3> rest_;          // where that edge would be without a moment
 };
 
-class MassSpringReference final : public Solver {
+class MassSpringReference final : public ReferenceSolver {
  public:
-  explicit MassSpringReference(SolverParameters parameters) : springs_(read_mass_spring(parameters)) {
-    parameters[kCorrectionName] = 0.0;
-    shared_ = read_strand_parameters(parameters);
-  }
-
-  Status load(const Groom& groom, const glm::dquat& world_from_head) override {
-    ASSIGN_OR_RETURN(layout_, make_strand_layout(groom));
-    previous_rotation_ = limited_rotation(world_from_head);
-    position_m_.assign(layout_.strand_count, std::vector<glm::dvec3>(layout_.vertex_count));
-    velocity_mps_.assign(layout_.strand_count,
-                         std::vector<glm::dvec3>(layout_.vertex_count, glm::dvec3(0.0)));
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i)
-        position_m_[s][i] = previous_rotation_ * glm::dvec3(layout_.rest[layout_.index(i, s)]);
-    }
-    return {};
-  }
-
-  void substep(const StepInput& input) override {
-    SpringStep step;
-    step.input = &input;
-    step.h_s = limited_substep_s(input);
-    step.rotation = limited_rotation(input.world_from_head);
-    step.carry = step.rotation * glm::conjugate(previous_rotation_);
-    step.head_velocity_mps = limited(input.head_shift_m, kMaxHeadShiftM) / step.h_s;
-    for (uint32_t s = 0; s < layout_.strand_count; ++s)
-      SpringMotion(springs_, shared_, layout_, s, step).run(position_m_[s], velocity_mps_[s]);
-    previous_rotation_ = step.rotation;
-  }
-
-  void read(SolverState& state) override {
-    state.position_m.resize(layout_.size());
-    state.velocity_mps.resize(layout_.size());
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-        state.position_m[layout_.index(i, s)] = glm::vec3(position_m_[s][i]);
-        state.velocity_mps[layout_.index(i, s)] = glm::vec3(velocity_mps_[s][i]);
-      }
-    }
-  }
-
-  void write(const SolverState& state) override {
-    CHECK(state.position_m.size() == layout_.size() && state.velocity_mps.size() == layout_.size());
-    for (uint32_t s = 0; s < layout_.strand_count; ++s) {
-      for (uint32_t i = 0; i < layout_.vertex_count; ++i) {
-        position_m_[s][i] = glm::dvec3(state.position_m[layout_.index(i, s)]);
-        velocity_mps_[s][i] = glm::dvec3(state.velocity_mps[layout_.index(i, s)]);
-      }
-    }
-  }
-
-  uint64_t memory_bytes() const override {
-    return layout_.size() * (2 * sizeof(glm::dvec3) + sizeof(glm::vec4) + sizeof(float));
-  }
+  explicit MassSpringReference(const SolverParameters& parameters)
+      : springs_(read_mass_spring(parameters)), shared_(read_strand_parameters(parameters)) {}
 
  private:
+  void step_strand(const ReferenceStep& step, uint32_t strand_index, std::span<glm::dvec3> position_m,
+                   std::span<glm::dvec3> velocity_mps) override {
+    SpringMotion(springs_, shared_, layout(), strand_index, step).run(position_m, velocity_mps);
+  }
+
   MassSpringParameters springs_;
   StrandParameters shared_;
-  StrandLayout layout_;
-  std::vector<std::vector<glm::dvec3>> position_m_;  // per strand and vertex, head-relative world
-  std::vector<std::vector<glm::dvec3>> velocity_mps_;
-  glm::dquat previous_rotation_{1.0, 0.0, 0.0, 0.0};
 };
 
 }  // namespace

@@ -8,7 +8,6 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kCorrectionName = "s_damping";  // of the follow solvers only
 constexpr const char* kSweepsName = "tractrix_sweeps";
 constexpr const char* kFirstName = "tractrix_first";
 constexpr double kDefaultIterations = 10.0;
@@ -23,26 +22,24 @@ Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const Gp
   desc.name = is_compliant ? "xpbd" : "pbd";
   desc.shader_path = is_compliant ? "sim/xpbd.comp" : "sim/pbd.comp";
   desc.local_size = shader::kStrandLocalSize;
-  desc.iterations = parameters.iterations;
   const double density = parameters.linear_density_kgpm;
   const glm::dvec2 give =
       is_compliant ? density * glm::dvec2(parameters.stretch_compliance_mpn, parameters.bend_compliance_mpn)
                    : glm::dvec2(parameters.stretch_share, parameters.bend_share);
+  desc.constants = {
+      {"u_stretch_give", give.x}, {"u_bend_give", give.y}, {"u_iterations", parameters.iterations}};
   if (parameters.tractrix_sweeps > 0) {
     desc.name = "tractrix_hybrid";
     desc.shader_path = "sim/tractrix_hybrid.comp";
+    desc.constants["u_tractrix_sweeps"] = parameters.tractrix_sweeps;
+    desc.constants["u_tractrix_first"] = parameters.has_tractrix_first ? 1u : 0u;
   }
-  desc.uniforms["u_give"] =
-      glm::vec4(glm::dvec4(give, parameters.tractrix_sweeps, parameters.has_tractrix_first ? 1.0 : 0.0));
-  SolverParameters shared = given;
-  shared[kCorrectionName] = 0.0;
-  return StrandKernel::make(std::move(desc), read_strand_parameters(shared), context);
+  return StrandKernel::make(std::move(desc), read_strand_parameters(given), context);
 }
 
 SolverRow common_row(bool is_compliant) {
   SolverRow row;
-  row.parameters = shared_parameter_infos();
-  std::erase_if(row.parameters, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
+  row.parameters = uncorrected_parameter_infos();
   row.parameters.push_back({"iterations", is_compliant ? kDefaultCompliantIterations : kDefaultIterations,
                             1.0, kMaxIterations, "",
                             "times all constraints are solved per substep (rounded)"});
@@ -60,10 +57,10 @@ SolverRow common_row(bool is_compliant) {
 
 PositionBasedParameters read_position_based(const SolverParameters& parameters, bool is_compliant) {
   PositionBasedParameters result;
-  result.iterations = static_cast<uint32_t>(std::lround(parameters.at("iterations")));
+  result.iterations = read_count(parameters, "iterations");
   result.is_compliant = is_compliant;
   if (parameters.contains(kSweepsName)) {
-    result.tractrix_sweeps = static_cast<uint32_t>(std::lround(parameters.at(kSweepsName)));
+    result.tractrix_sweeps = read_count(parameters, kSweepsName);
     result.has_tractrix_first = parameters.at(kFirstName) >= 0.5;
   }
   if (is_compliant) {

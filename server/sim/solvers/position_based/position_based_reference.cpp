@@ -11,11 +11,6 @@ namespace {
 constexpr double kTinyLengthM = 1e-10;
 constexpr double kTinyMassKg = 1e-15;
 
-StrandParameters read_shared(SolverParameters parameters) {
-  parameters["s_damping"] = 0.0;
-  return read_strand_parameters(parameters);
-}
-
 /// A distance that two vertices should have.
 struct DistanceConstraint {
   uint32_t a = 0;
@@ -30,7 +25,7 @@ struct DistanceConstraint {
 class PositionBasedReference final : public ReferenceStrands {
  public:
   PositionBasedReference(const SolverParameters& parameters, bool is_compliant)
-      : ReferenceStrands(read_shared(parameters)),
+      : ReferenceStrands(read_strand_parameters(parameters)),
         model_(read_position_based(parameters, is_compliant)),
         friction_(parameters.at("collider_friction")) {}
 

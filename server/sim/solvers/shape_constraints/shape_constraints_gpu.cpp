@@ -8,7 +8,6 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kCorrectionName = "s_damping";  // of the follow solvers only
 // TressFX takes 2, for hair without gravity. At 60 Hz 2 / 4 / 8 let limp strands of 16 vertices and 30 cm
 // swing with a period of 0.74 / 0.91 / 1.005 of that of many small steps.
 constexpr double kDefaultLengthIterations = 8.0;
@@ -33,20 +32,21 @@ Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const Gp
   desc.name = "shape_constraints";
   desc.shader_path = "sim/shape_constraints.comp";
   desc.local_size = shader::kStrandLocalSize;
-  desc.iterations = model.length_iterations;
-  desc.uniforms["u_shape"] =
-      glm::vec4(glm::dvec4(model.bend_stiffness_m4ps2, model.shape_iterations, model.shape_relaxation, 0.0));
-  desc.uniforms["u_shock"] = glm::vec4(
-      glm::dvec4(model.shock_share, model.fast_mps2, model.damping_per_s, model.fast_damping_per_s));
-  desc.uniforms["u_air"] = glm::vec4(glm::dvec4(model.air_along_share, model.stretch_limit, 0.0, 0.0));
-  SolverParameters shared = given;
-  shared[kCorrectionName] = 0.0;
-  return StrandKernel::make(std::move(desc), read_strand_parameters(shared), context);
+  desc.constants = {{"u_iterations", model.length_iterations},
+                    {"u_stretch_limit", model.stretch_limit},
+                    {"u_bend_stiffness", model.bend_stiffness_m4ps2},
+                    {"u_shape_iterations", model.shape_iterations},
+                    {"u_shape_relaxation", model.shape_relaxation},
+                    {"u_shock_share", model.shock_share},
+                    {"u_fast", model.fast_mps2},
+                    {"u_damping", model.damping_per_s},
+                    {"u_fast_damping", model.fast_damping_per_s},
+                    {"u_air_along", model.air_along_share}};
+  return StrandKernel::make(std::move(desc), read_strand_parameters(given), context);
 }
 
 std::vector<SolverParameterInfo> parameter_infos() {
-  std::vector<SolverParameterInfo> infos = shared_parameter_infos();
-  std::erase_if(infos, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
+  std::vector<SolverParameterInfo> infos = uncorrected_parameter_infos();
   for (SolverParameterInfo& info : infos) {
     if (info.name == "style_stiffness_per_s2") info.default_value = kDefaultStylePerS2;
   }
@@ -80,10 +80,9 @@ std::vector<SolverParameterInfo> parameter_infos() {
 
 ShapeConstraintsParameters read_shape_constraints(const SolverParameters& parameters) {
   ShapeConstraintsParameters result;
-  result.length_iterations = static_cast<uint32_t>(std::lround(parameters.at("iterations")));
+  result.length_iterations = read_count(parameters, "iterations");
   result.bend_stiffness_m4ps2 = parameters.at("bend_stiffness_m4_per_s2");
-  if (result.bend_stiffness_m4ps2 > 0.0)
-    result.shape_iterations = static_cast<uint32_t>(std::lround(parameters.at("shape_iterations")));
+  if (result.bend_stiffness_m4ps2 > 0.0) result.shape_iterations = read_count(parameters, "shape_iterations");
   if (result.shape_iterations < kConvergingShapeIterations) result.shape_relaxation = kShapeRelaxation;
   result.shock_share = parameters.at("shock_share");
   result.fast_mps2 = parameters.at("fast_acceleration_mps2");

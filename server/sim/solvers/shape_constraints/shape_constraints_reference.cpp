@@ -12,11 +12,6 @@ namespace {
 
 constexpr double kTinyLengthM = 1e-10;
 
-StrandParameters read_shared(SolverParameters parameters) {
-  parameters["s_damping"] = 0.0;
-  return read_strand_parameters(parameters);
-}
-
 glm::dvec3 unit_or(const glm::dvec3& vector, const glm::dvec3& otherwise) {
   const double length = glm::length(vector);
   return length > kTinyLengthM ? vector / length : otherwise;
@@ -35,7 +30,7 @@ glm::dvec3 turned(const glm::dvec3& from, const glm::dvec3& to, const glm::dvec3
 class ShapeConstraintsReference final : public ReferenceStrands {
  public:
   explicit ShapeConstraintsReference(const SolverParameters& parameters)
-      : ReferenceStrands(read_shared(parameters)), model_(read_shape_constraints(parameters)) {}
+      : ReferenceStrands(read_strand_parameters(parameters)), model_(read_shape_constraints(parameters)) {}
 
  private:
   /// World velocity of a point that turns and moves with the head: in this substep and in the one before.

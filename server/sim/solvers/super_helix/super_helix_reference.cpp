@@ -21,7 +21,7 @@ constexpr double kMinDistanceM = 1e-9;
 class SuperHelixReference final : public ReferenceStrands {
  public:
   explicit SuperHelixReference(const SolverParameters& parameters)
-      : ReferenceStrands(read_shared_chain_parameters(parameters)),
+      : ReferenceStrands(read_strand_parameters(parameters)),
         parameters_(read_chain_parameters(parameters, kEffortName)),
         friction_(parameters.at("collider_friction")) {}
 
@@ -35,7 +35,7 @@ class SuperHelixReference final : public ReferenceStrands {
                                : 0;
   }
 
-  void on_load() override {
+  void prepare() override {
     lines_.clear();
     if (!has_free_vertices()) return;
     std::vector<glm::dvec3> points;

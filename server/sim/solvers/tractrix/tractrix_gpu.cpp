@@ -6,7 +6,6 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kCorrectionName = "s_damping";
 constexpr double kDefaultStyleMix = 0.3;
 constexpr double kDefaultStyleReturnPerS = 0.5;
 constexpr double kMaxSeed = 65535.0;  // exact in the float that carries it
@@ -17,8 +16,8 @@ Result<std::unique_ptr<Solver>> make_emulation_gpu(const SolverParameters& param
   desc.name = "tractrix_emulation";
   desc.shader_path = "sim/tractrix_emulation.comp";
   desc.local_size = shader::kStrandLocalSize;
-  desc.uniforms["u_order"] =
-      glm::vec4(glm::dvec4(parameters.at("order_seed"), parameters.at("random_order"), 0.0, 0.0));
+  desc.constants = {{"u_order_seed", static_cast<uint32_t>(parameters.at("order_seed"))},
+                    {"u_has_random_order", parameters.at("random_order") >= 0.5 ? 1u : 0u}};
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
@@ -28,9 +27,8 @@ Result<std::unique_ptr<Solver>> make_split_gpu(SolverParameters parameters, cons
   desc.shader_path = "sim/tractrix_split.comp";
   desc.local_size = shader::kStrandLocalSize;
   desc.has_offset = true;
-  desc.uniforms["u_style"] =
-      glm::vec4(glm::dvec4(parameters.at("style_mix"), parameters.at("style_return_per_s"), 0.0, 0.0));
-  parameters[kCorrectionName] = 0.0;
+  desc.constants = {{"u_style_mix", parameters.at("style_mix")},
+                    {"u_style_return", parameters.at("style_return_per_s")}};
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
@@ -66,8 +64,7 @@ SolverRow tractrix_split_row() {
   row.source =
       "Zappe, Simulation of hair with the Tractrix curve, Ravensburg-Weingarten 2020, section 3.0.2, "
       "algorithm 4; step: section 2.2.3, after Sreenivasan, Goel and Ghosal 2010";
-  row.parameters = shared_parameter_infos();
-  std::erase_if(row.parameters, [](const SolverParameterInfo& info) { return info.name == kCorrectionName; });
+  row.parameters = uncorrected_parameter_infos();
   row.parameters.push_back({"style_mix", kDefaultStyleMix, 0.0, 1.0, "",
                             "share of the turn of every segment towards the groomed one: 0 = all motion, 1 = "
                             "all style"});

@@ -70,17 +70,22 @@ class EmulationReference final : public TractrixReference {
 class SplitReference final : public TractrixReference {
  public:
   explicit SplitReference(const SolverParameters& parameters)
-      : TractrixReference(without_correction(parameters)),
+      : TractrixReference(parameters),
         style_mix_(parameters.at("style_mix")),
         style_return_per_s_(parameters.at("style_return_per_s")) {}
 
  private:
-  static SolverParameters without_correction(SolverParameters parameters) {
-    parameters["s_damping"] = 0.0;
-    return parameters;
-  }
-
   size_t memory_size() const override { return size_t{3} * layout().vertex_count; }
+
+  void turn_memory(const glm::dquat& turn) override {
+    for (uint32_t s = 0; s < layout().strand_count; ++s) {
+      const std::span<double> memory = memory_of(s);
+      for (size_t i = 0; i < memory.size(); i += 3) {
+        const glm::dvec3 turned = turn * glm::dvec3(memory[i], memory[i + 1], memory[i + 2]);
+        for (int axis = 0; axis < 3; ++axis) memory[i + static_cast<size_t>(axis)] = turned[axis];
+      }
+    }
+  }
 
   void solve(ReferenceStrand& strand) const override {
     if (end() <= first()) return;

@@ -1,0 +1,61 @@
+#include "server/sim/gpu_solver.h"
+
+#include <epoxy/gl.h>
+
+#include "common/base/check.h"
+#include "shaders/shared/bindings.h"
+
+namespace strandcast {
+
+GpuSolver::GpuSolver(const GpuSolverContext& context, const StrandParameters& parameters)
+    : strands_(context.strands ? context.strands : std::make_shared<StrandState>()),
+      parameters_(parameters),
+      features_(context.features),
+      step_("step", sizeof(StepBlock)) {
+  CHECK(context.shaders != nullptr);
+  shaders_ = *context.shaders;
+}
+
+Status GpuSolver::load(const Groom& groom, const glm::dquat& world_from_head) {
+  RETURN_IF_ERROR(strands_->load(groom, world_from_head));
+  RETURN_IF_ERROR(prepare());
+  begin();
+  return {};
+}
+
+Status GpuSolver::follow() {
+  RETURN_IF_ERROR(prepare());
+  strands_->forget_model();
+  begin();
+  return {};
+}
+
+void GpuSolver::substep(const StepInput& input) {
+  adapt(input);
+  const StepBlock block = make_step_block(input, parameters_, layout(), strands_->head());
+  step_.write(0, std::as_bytes(std::span(&block, 1)));
+  step_.bind_uniform(shader::kBindingStep);
+  strands_->bind();
+  const gl::Program& program = programs().fitting(input.colliders.size());
+  program.use();
+  run(program);
+  // The next substep fetches what this one stored; read() copies it.
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
+                  GL_BUFFER_UPDATE_BARRIER_BIT);
+  strands_->advance(input);
+}
+
+// A strand that is written as it was read goes on as if nothing had happened; another one starts anew.
+void GpuSolver::write(const SolverState& state) {
+  forget(strands_->write(state));
+}
+
+void GpuSolver::rebase(const glm::dquat& world_from_head) {
+  turn_memory(strands_->rebase(world_from_head));
+}
+
+uint64_t GpuSolver::memory_bytes() const {
+  return strands_->memory_bytes() + step_.size_bytes() + model_bytes();
+}
+
+}  // namespace strandcast
