@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/app/feed.h"
+#include "client/app/line_budget.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
@@ -178,11 +179,18 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
   if (!client && (client.error().code == ErrorCode::BadInput || client.error().code == ErrorCode::NotFound))
     client = connect(target, Role::Viewer);
   if (!client) return fail(client.error());
+  LineBudget lines;
+  const auto print = [&lines](const std::string& line) {
+    if (!lines.take(now_ns())) return;
+    if (const uint64_t left_out = lines.take_left_out())
+      std::cout << fmt::format("({} lines left out)\n", left_out);
+    std::cout << line << std::endl;
+  };
   const int64_t begin_ns = now_ns();
   while (!stop && (seconds == 0.0 || static_cast<double>(now_ns() - begin_ns) * 1e-9 < seconds)) {
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
-      if (const auto* status = std::get_if<ServerStatus>(&event)) std::cout << to_line(*status) << std::endl;
-      if (const auto* notice = std::get_if<Notice>(&event)) std::cout << notice->text << std::endl;
+      if (const auto* status = std::get_if<ServerStatus>(&event)) print(to_line(*status));
+      if (const auto* notice = std::get_if<Notice>(&event)) print(notice->text);
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
     }
   }

@@ -1,9 +1,9 @@
 #include "client/app/headless_view.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include "client/app/clip_store.h"
 #include "client/app/live_connection.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
@@ -20,8 +20,7 @@ constexpr double kStallTimeoutS = 15.0;  // no frame for this long although more
 
 /// What was received and is to be written.
 struct Collected {
-  std::vector<std::shared_ptr<const Snapshot>> clip_snapshots;
-  std::vector<Image> clip_images;
+  ClipStore clip;
   std::shared_ptr<const Snapshot> screenshot_snapshot;
   std::optional<Image> screenshot_image;
 };
@@ -33,10 +32,27 @@ struct Drawn {
   Welcome welcome;
 };
 
+/// How long a run connects and receives; nothing = as long as it takes.
+class TimeLimit {
+ public:
+  explicit TimeLimit(const std::optional<double>& limit_s) : limit_s_(limit_s) {}
+  bool is_over() const { return limit_s_ && elapsed_s() >= *limit_s_; }
+  double elapsed_s() const { return static_cast<double>(now_ns() - begin_ns_) * 1e-9; }
+
+ private:
+  const std::optional<double> limit_s_;
+  const int64_t begin_ns_ = now_ns();
+};
+
 class Collector {
  public:
-  Collector(const ViewOptions& options, LiveConnection& live, const std::atomic<bool>& stop)
-      : options_(options), live_(live), stop_(stop), sampler_(options.clip_fps, options.clip_s) {
+  Collector(const ViewOptions& options, LiveConnection& live, const TimeLimit& limit,
+            const std::atomic<bool>& stop)
+      : options_(options),
+        live_(live),
+        limit_(limit),
+        stop_(stop),
+        collected_{ClipStore(options.clip_fps, options.clip_s), {}, {}} {
     begin_session();
   }
   ~Collector() { session().set_snapshot_listener({}); }
@@ -106,9 +122,9 @@ class Collector {
     const int64_t begin_ns = now_ns();
     while (!stop_ && !session().has_picture()) {
       RETURN_IF_ERROR(pump());
-      if (static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
+      if (limit_.is_over() || static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
         return make_error(ErrorCode::Timeout, "the server sent nothing to show for {} s{}",
-                          kFirstPictureTimeoutS,
+                          std::min(kFirstPictureTimeoutS, options_.seconds.value_or(kFirstPictureTimeoutS)),
                           session().replay().stats().last_error.empty()
                               ? std::string()
                               : "; last problem: " + session().replay().stats().last_error);
@@ -117,16 +133,15 @@ class Collector {
   }
 
   bool is_complete() {
+    if (limit_.is_over()) return true;
     const bool wants_clip = !options_.clip.empty();
-    if (wants_clip && !sampler_.is_full()) return false;
-    if (options_.seconds) return static_cast<double>(now_ns() - begin_ns_) * 1e-9 >= *options_.seconds;
+    if (options_.seconds || (wants_clip && !collected_.clip.is_full())) return false;
     if (wants_clip && options_.screenshot.empty()) return true;
     return decoded_frames() >= options_.after_frames;
   }
 
   void take(const std::shared_ptr<const Snapshot>& snapshot) {
-    if (!options_.clip.empty() && sampler_.wants(snapshot->sim_time_ns))
-      collected_.clip_snapshots.push_back(snapshot);
+    if (!options_.clip.empty()) collected_.clip.add(snapshot);
     if (!collected_.screenshot_snapshot && decoded_frames() >= options_.after_frames)
       collected_.screenshot_snapshot = snapshot;
   }
@@ -136,18 +151,16 @@ class Collector {
   void take_image() {
     if (session().image_count() == taken_images_ || session().image() == nullptr) return;
     taken_images_ = session().image_count();
-    if (!options_.clip.empty() && sampler_.wants(now_ns()))
-      collected_.clip_images.push_back(*session().image());
+    if (!options_.clip.empty()) collected_.clip.add(*session().image(), now_ns());
     if (!collected_.screenshot_image && taken_images_ >= options_.after_frames)
       collected_.screenshot_image = *session().image();
   }
 
   const ViewOptions& options_;
   LiveConnection& live_;
+  const TimeLimit& limit_;
   const std::atomic<bool>& stop_;
-  ClipSampler sampler_;
   Collected collected_;
-  const int64_t begin_ns_ = now_ns();
   int64_t reported_ns_ = 0;
   uint64_t earlier_frames_ = 0;  // of sessions that broke
   uint64_t known_frames_ = 0;    // of the running one
@@ -157,15 +170,16 @@ class Collector {
 Status write_images(const ViewOptions& options, const Collected& collected) {
   if (!options.screenshot.empty() && collected.screenshot_image)
     RETURN_IF_ERROR(save_png(options.screenshot, *collected.screenshot_image));
-  if (options.clip.empty() || collected.clip_images.empty()) return {};
+  if (options.clip.empty() || collected.clip.images().empty()) return {};
   ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
-  for (const Image& image : collected.clip_images) RETURN_IF_ERROR(clip.add(image));
+  for (const Image& image : collected.clip.images()) RETURN_IF_ERROR(clip.add(image));
   return clip.finish();
 }
 
 /// Draws the collected snapshots with the same renderer as the server and the window, in the current context.
+/// After a stop nothing more is drawn, and a clip that has begun is not written.
 Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Collected& collected,
-                        StageTimer& render_timer) {
+                        StageTimer& render_timer, const std::atomic<bool>& stop) {
   const gl::ShaderLibrary shaders =
       options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir);
   ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, scene.device, *scene.asset, scene.welcome.look));
@@ -184,7 +198,8 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
   }
   if (options.clip.empty()) return {};
   ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
-  for (const auto& snapshot : collected.clip_snapshots) {
+  for (const auto& snapshot : collected.clip.snapshots()) {
+    if (stop) return {};
     ASSIGN_OR_RETURN(const Image image, draw(*snapshot, options.clip_size));
     RETURN_IF_ERROR(clip.add(image));
   }
@@ -192,24 +207,6 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
 }
 
 }  // namespace
-
-ClipSampler::ClipSampler(double pictures_per_s, double duration_s)
-    : period_ns_(1e9 / pictures_per_s),
-      wanted_(static_cast<size_t>(std::max(1.0, std::round(pictures_per_s * duration_s)))) {}
-
-bool ClipSampler::wants(int64_t sim_time_ns) {
-  if (is_full()) return false;
-  const auto time_ns = static_cast<double>(sim_time_ns);
-  // Time that runs backwards is a reset of the server: the clip goes on from there.
-  if (taken_ == 0 || sim_time_ns < last_ns_) next_ns_ = time_ns;
-  last_ns_ = sim_time_ns;
-  if (time_ns < next_ns_) return false;
-  ++taken_;
-  // Kept on the grid, so that a late state does not shift all that follow; after a gap the grid starts anew.
-  next_ns_ += period_ns_;
-  if (next_ns_ <= time_ns) next_ns_ = time_ns + period_ns_;
-  return true;
-}
 
 Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bool>& stop) {
   const bool wants_render = !options.screenshot.empty() || !options.clip.empty();
@@ -226,8 +223,14 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
       own_reason = "frames: strands cannot be drawn here: " + made.error().to_string();
     }
   }
+  const TimeLimit limit(options.seconds);
+  config.cancel = [&]() -> std::optional<Error> {
+    if (stop) return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
+    if (!limit.is_over()) return std::nullopt;
+    return make_error(ErrorCode::Timeout, "the server did not answer within {} s", *options.seconds);
+  };
   ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
-  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, stop).run());
+  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, limit, stop).run());
   ViewerSession* session = &live->session();
 
   StageTimer render_timer;
@@ -237,9 +240,13 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   const Drawn scene{context ? context->info() : gl::DeviceInfo{}, session->shared_asset(),
                     session->welcome()};
   live.reset();  // the server need not serve a viewer that only draws now
+  if (stop && wants_render) log_warn("render", "stopped: nothing is drawn");
+  if (stop) return report;
+  if (collected.clip.is_cut())
+    log_warn("render", "the clip ends early: its states would take more than {} MiB", kMaxClipBytes >> 20);
   if (wants_render && mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
   if (wants_render && mode == StreamMode::Strands && scene.asset)
-    RETURN_IF_ERROR(render_snapshots(options, scene, collected, render_timer));
+    RETURN_IF_ERROR(render_snapshots(options, scene, collected, render_timer, stop));
   set_render_times(report, render_timer);
   return report;
 }

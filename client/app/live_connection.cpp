@@ -13,7 +13,16 @@ Result<std::unique_ptr<LiveConnection>> LiveConnection::open(const ClientConfig&
 }
 
 LiveConnection::LiveConnection(const ClientConfig& config, std::unique_ptr<ViewerSession> session)
-    : config_(config), session_(std::move(session)), policy_(static_cast<uint32_t>(now_ns())) {}
+    : config_(config), session_(std::move(session)), policy_(static_cast<uint32_t>(now_ns())) {
+  config_.cancel = [this, cancel = config.cancel]() -> std::optional<Error> {
+    if (is_leaving_) return make_error(ErrorCode::Unavailable, "the viewer is leaving");
+    return cancel ? cancel() : std::nullopt;
+  };
+}
+
+LiveConnection::~LiveConnection() {
+  is_leaving_ = true;
+}
 
 bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   if (is_connected_) {

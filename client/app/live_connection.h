@@ -2,6 +2,7 @@
 // beside the caller's thread, so a window stays alive meanwhile. One thread otherwise.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -16,6 +17,10 @@ class LiveConnection {
  public:
   /// The first connection must succeed: its error is the caller's.
   static Result<std::unique_ptr<LiveConnection>> open(const ClientConfig& config);
+  /// Gives up an attempt that is under way.
+  ~LiveConnection();
+  LiveConnection(const LiveConnection&) = delete;
+  LiveConnection& operator=(const LiveConnection&) = delete;
 
   /// Handles what arrived; starts and finishes attempts to reconnect. True when the session is a new one.
   bool pump(std::chrono::milliseconds timeout);
@@ -38,6 +43,7 @@ class LiveConnection {
   void lose(const Error& error);
   void start_attempt();
 
+  std::atomic<bool> is_leaving_{false};
   ClientConfig config_;
   StreamMode attempted_mode_ = StreamMode::Auto;  // of the attempt under way
   std::unique_ptr<ViewerSession> session_;
@@ -46,7 +52,7 @@ class LiveConnection {
   Error last_error_;
   std::optional<Error> final_error_;
   Clock::time_point next_attempt_;
-  Attempt attempt_;
+  Attempt attempt_;  // last: its end waits for what is under way, which reads the others
 };
 
 }  // namespace strandcast

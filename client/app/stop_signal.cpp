@@ -1,5 +1,7 @@
 #include "client/app/stop_signal.h"
 
+#include <unistd.h>
+
 #include <csignal>
 
 namespace strandcast {
@@ -8,11 +10,24 @@ namespace {
 std::atomic<bool> is_stop_wanted{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
 
+volatile std::sig_atomic_t first_signal = 0;
+
+// Async-signal-safe calls only.
+void end_by(int number) {
+  std::signal(number, SIG_DFL);
+  std::raise(number);
+}
+
 void on_signal(int number) {
-  if (is_stop_wanted.exchange(true)) {
-    std::signal(number, SIG_DFL);
-    std::raise(number);
-  }
+  if (is_stop_wanted.exchange(true)) return end_by(number);
+  first_signal = number;
+  alarm(kStopGraceS);
+}
+
+void on_alarm(int) {
+  constexpr char kSentence[] = "stopped in the middle of something that takes long\n";
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kSentence, sizeof kSentence - 1);
+  end_by(first_signal);
 }
 
 }  // namespace
@@ -20,6 +35,7 @@ void on_signal(int number) {
 const std::atomic<bool>& catch_stop_signals() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  std::signal(SIGALRM, on_alarm);
   return is_stop_wanted;
 }
 

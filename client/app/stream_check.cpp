@@ -1,7 +1,6 @@
 #include "client/app/stream_check.h"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 #include "client/app/viewer_session.h"
@@ -16,19 +15,32 @@ constexpr milliseconds kPumpWait{5};
 /// A viewer that keeps the hash of every tick it decoded.
 struct HashingViewer {
   std::unique_ptr<ViewerSession> session;
-  std::map<uint64_t, uint64_t> hash_by_tick;
+  TickHashes hashes;
 
   void listen() {
     session->set_snapshot_listener([this](const auto& snapshot) {
       // A coarser stream for a slow link, or one of fewer strands, has other numbers by design.
       const bool is_whole = snapshot->strand_count == session->welcome().strand_count;
       if (is_whole && session->quality().bound_m == session->welcome().bound_m)
-        hash_by_tick[snapshot->tick] = state_hash(*snapshot);
+        hashes.add(snapshot->tick, state_hash(*snapshot));
     });
   }
 };
 
 }  // namespace
+
+void TickHashes::add(uint64_t tick, uint64_t hash) {
+  if (!hash_by_tick_.insert_or_assign(tick, hash).second) return;
+  order_.push_back(tick);
+  if (order_.size() <= limit_) return;
+  hash_by_tick_.erase(order_.front());
+  order_.pop_front();
+}
+
+std::optional<uint64_t> TickHashes::find(uint64_t tick) const {
+  const auto found = hash_by_tick_.find(tick);
+  return found == hash_by_tick_.end() ? std::nullopt : std::optional(found->second);
+}
 
 std::string StreamCheck::to_string() const {
   std::string text =
@@ -40,13 +52,13 @@ std::string StreamCheck::to_string() const {
 
 Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, double timeout_s) {
   const int64_t begin_ns = now_ns();
-  HashingViewer first;
-  HashingViewer second;
+  HashingViewer first{nullptr, TickHashes(kKeptTicksPerFrame * frames)};
+  HashingViewer second{nullptr, TickHashes(kKeptTicksPerFrame * frames)};
   ASSIGN_OR_RETURN(first.session, ViewerSession::open(config));
   first.listen();
   const auto is_done = [&] {
     return first.session->decoded_frames() >= frames && second.session &&
-           second.hash_by_tick.size() >= frames / 2;
+           second.hashes.hash_by_tick().size() >= frames / 2;
   };
   while (!is_done()) {
     RETURN_IF_ERROR(first.session->pump(kPumpWait));
@@ -67,11 +79,11 @@ Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, do
   check.decoded_frames = first.session->decoded_frames();
   check.rejected_frames =
       first.session->replay().stats().rejected_frames + second.session->replay().stats().rejected_frames;
-  for (const auto& [tick, hash] : second.hash_by_tick) {
-    const auto other = first.hash_by_tick.find(tick);
-    if (other == first.hash_by_tick.end()) continue;
+  for (const auto& [tick, hash] : second.hashes.hash_by_tick()) {
+    const auto other = first.hashes.find(tick);
+    if (!other) continue;
     ++check.compared_ticks;
-    if (other->second != hash && check.differing_ticks++ == 0) check.first_differing_tick = tick;
+    if (*other != hash && check.differing_ticks++ == 0) check.first_differing_tick = tick;
   }
   return check;
 }

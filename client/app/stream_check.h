@@ -3,12 +3,32 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
 #include <string>
 
 #include "client/net/viewer_client.h"
 #include "common/base/result.h"
 
 namespace strandcast {
+
+/// The state hashes of the newest ticks that a viewer decoded, at most `limit` of them.
+class TickHashes {
+ public:
+  explicit TickHashes(size_t limit) : limit_(limit) {}
+  void add(uint64_t tick, uint64_t hash);
+  std::optional<uint64_t> find(uint64_t tick) const;
+  const std::map<uint64_t, uint64_t>& hash_by_tick() const { return hash_by_tick_; }
+
+ private:
+  const size_t limit_;
+  std::map<uint64_t, uint64_t> hash_by_tick_;
+  std::deque<uint64_t> order_;  // of arrival: ticks may begin again
+};
+
+/// Hashes kept of each viewer, per frame to decode: the first one goes on while the second one joins.
+inline constexpr size_t kKeptTicksPerFrame = 4;
 
 struct StreamCheck {
   uint64_t decoded_frames = 0;   // by the first viewer

@@ -32,8 +32,10 @@ int run(int argc, char** argv) {
   auto report = options.is_headless ? run_headless(options, stop) : run_windowed(options, stop);
   if (!report) return fail(report.error().to_string());
   std::cout << to_summary(*report);
-  if (!options.screenshot.empty()) std::cout << "  picture         " << options.screenshot.string() << '\n';
-  if (!options.clip.empty()) std::cout << "  clip            " << options.clip.string() << '\n';
+  const bool is_drawn = !stop;  // run_headless() draws nothing after that
+  if (is_drawn && !options.screenshot.empty())
+    std::cout << "  picture         " << options.screenshot.string() << '\n';
+  if (is_drawn && !options.clip.empty()) std::cout << "  clip            " << options.clip.string() << '\n';
   if (options.report.empty()) return 0;
   const auto saved = save_report(options.report, *report);
   return saved ? 0 : fail(saved.error().to_string());

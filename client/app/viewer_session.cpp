@@ -42,32 +42,39 @@ ViewerSession::ViewerSession(std::shared_ptr<ViewerClient> client) : client_(std
 
 Status ViewerSession::pump(std::chrono::milliseconds timeout) {
   send_mode_request();
-  for (ClientEvent& event : client_->wait(timeout)) {
-    if (auto* media = std::get_if<MediaEvent>(&event)) {
-      RETURN_IF_ERROR(handle(*media));
-    } else if (const auto* status = std::get_if<ServerStatus>(&event)) {
-      status_ = *status;
-      has_status_ = true;
-    } else if (auto* notice = std::get_if<Notice>(&event)) {
-      notices_.push_back(std::move(*notice));
-    } else if (auto* quality = std::get_if<StreamQuality>(&event)) {
-      take_quality(std::move(*quality));
-    } else if (auto* frame_quality = std::get_if<FrameQuality>(&event)) {
-      take_quality(std::move(*frame_quality));
-    } else if (auto* change = std::get_if<ModeChange>(&event)) {
-      take_mode(std::move(*change));
-    } else if (const auto* closed = std::get_if<ClosedEvent>(&event)) {
-      return closed->error;
-    }
+  std::optional<int64_t> end_ns;
+  while (auto event = client_->next(timeout)) {
+    if (!end_ns) end_ns = now_ns() + std::chrono::nanoseconds(kPumpSlice).count();
+    RETURN_IF_ERROR(handle(*event));
     if (was_shown_ && !has_picture()) ++blank_pictures_;
     was_shown_ = was_shown_ || has_picture();
+    if (now_ns() >= *end_ns) break;
+    timeout = std::chrono::milliseconds(0);
+  }
+  return {};
+}
+
+Status ViewerSession::handle(ClientEvent& event) {
+  if (const auto* media = std::get_if<MediaEvent>(&event)) return handle(*media);
+  if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
+  if (const auto* status = std::get_if<ServerStatus>(&event)) {
+    status_ = *status;
+    has_status_ = true;
+  } else if (auto* notice = std::get_if<Notice>(&event)) {
+    notices_.add(std::move(*notice));
+  } else if (auto* quality = std::get_if<StreamQuality>(&event)) {
+    take_quality(std::move(*quality));
+  } else if (auto* frame_quality = std::get_if<FrameQuality>(&event)) {
+    take_quality(std::move(*frame_quality));
+  } else if (auto* change = std::get_if<ModeChange>(&event)) {
+    take_mode(std::move(*change));
   }
   return {};
 }
 
 void ViewerSession::take_mode(ModeChange change) {
   mode_reason_ = std::move(change.reason);
-  log_info("replay", "{}", mode_reason_);
+  if (log_lines_.take(now_ns())) log_info("replay", "{}", mode_reason_);
 }
 
 /// A frame of this mode was decoded.
@@ -92,18 +99,20 @@ void ViewerSession::send_mode_request() {
 void ViewerSession::take_quality(StreamQuality quality) {
   quality_ = std::move(quality);
   ++quality_changes_;
+  if (!log_lines_.take(now_ns())) return;
   log_info("replay", "{:.3g} % of the strands every {} steps within {:.3g} mm: {}",
            quality_.strand_share * 1e2, quality_.rate_divisor, quality_.bound_m * 1e3, quality_.reason);
 }
 
 void ViewerSession::take_quality(FrameQuality quality) {
   frame_quality_ = std::move(quality);
+  if (!log_lines_.take(now_ns())) return;
   log_info("replay", "pictures of {} x {} by {}, quality {}, at most {:.3g} Hz: {}", frame_quality_->width,
            frame_quality_->height, to_string(frame_quality_->codec), frame_quality_->quality,
            frame_quality_->rate_hz, frame_quality_->reason);
 }
 
-Status ViewerSession::handle(MediaEvent& event) {
+Status ViewerSession::handle(const MediaEvent& event) {
   const int64_t begin_ns = now_ns();
   switch (event.header.opcode) {
     case Opcode::Asset:
@@ -114,7 +123,7 @@ Status ViewerSession::handle(MediaEvent& event) {
         if (asset_) show(StreamMode::Strands);
         acknowledge(event, begin_ns);
         if (listener_) listener_(snapshot);
-      } else {
+      } else if (log_lines_.take(now_ns())) {
         log_debug("replay", "frame {} not used: {}", event.header.sequence, replay_->stats().last_error);
       }
       return {};
@@ -150,7 +159,8 @@ void ViewerSession::take_picture(const MediaEvent& event) {
   const FrameHeader& header = event.header;
   if (const Status decoded = pictures_.decode(header, event.payload()); !decoded) {
     ++picture_stats_.rejected_frames;
-    log_debug("replay", "picture {} not used: {}", header.sequence, decoded.error().to_string());
+    if (log_lines_.take(now_ns()))
+      log_debug("replay", "picture {} not used: {}", header.sequence, decoded.error().to_string());
     client_->request_keyframe();
     return;
   }

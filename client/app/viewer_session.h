@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "client/app/line_budget.h"
+#include "client/app/notice_list.h"
 #include "client/net/viewer_client.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
@@ -21,6 +23,10 @@ namespace strandcast {
 
 /// Called for every decoded snapshot, in order.
 using SnapshotListener = std::function<void(const std::shared_ptr<const Snapshot>&)>;
+
+/// A call of pump() handles no further event after so long: between two calls others look at clocks and
+/// stops.
+inline constexpr std::chrono::milliseconds kPumpSlice{20};
 
 /// The server carries out one request a second.
 inline constexpr std::chrono::milliseconds kModeRequestInterval{1200};
@@ -38,8 +44,8 @@ class ViewerSession {
   /// Connects and prepares to decode; the errors of ViewerClient::connect and of an unknown codec.
   static Result<std::unique_ptr<ViewerSession>> open(const ClientConfig& config);
 
-  /// Handles everything that arrived, waiting up to `timeout` for something. The error is why the connection
-  /// ended; what was received stays readable.
+  /// Handles what arrived, waiting up to `timeout` for something: all of it, or as much as kPumpSlice allows
+  /// and at least one frame. The error is why the connection ended; what was received stays readable.
   Status pump(std::chrono::milliseconds timeout);
 
   const Welcome& welcome() const { return client_->welcome(); }
@@ -80,8 +86,8 @@ class ViewerSession {
 
   const ServerStatus& status() const { return status_; }
   bool has_status() const { return has_status_; }
-  /// Notices since the last call.
-  std::vector<Notice> take_notices() { return std::exchange(notices_, {}); }
+  /// Notices since the last call, the newest kMaxWaitingNotices.
+  std::vector<Notice> take_notices() { return notices_.take(); }
   const PictureStats& picture_stats() const { return picture_stats_; }
   const StageTimer& picture_decode_timer() const { return picture_decode_timer_; }
   /// Frames decoded so far, strands and pictures.
@@ -92,7 +98,8 @@ class ViewerSession {
 
  private:
   explicit ViewerSession(std::shared_ptr<ViewerClient> client);
-  Status handle(MediaEvent& event);
+  Status handle(ClientEvent& event);
+  Status handle(const MediaEvent& event);
   Status take_asset(const MediaEvent& event);
   void take_picture(const MediaEvent& event);
   void take_quality(StreamQuality quality);
@@ -122,7 +129,8 @@ class ViewerSession {
   uint64_t quality_changes_ = 0;
   ServerStatus status_;
   bool has_status_ = false;
-  std::vector<Notice> notices_;
+  NoticeList notices_;
+  LineBudget log_lines_;  // that the server's messages cause
   PictureStats picture_stats_;
   StageTimer picture_decode_timer_;
   SnapshotListener listener_;

@@ -98,10 +98,7 @@ void ViewerThread::publish() {
     const std::lock_guard lock(mutex_);
     state_ = std::move(state);
     client_ = session.shared_client();
-    notices_.insert(notices_.end(), std::make_move_iterator(notices.begin()),
-                    std::make_move_iterator(notices.end()));
-    if (notices_.size() > kMaxWaitingNotices)
-      notices_.erase(notices_.begin(), notices_.end() - static_cast<ptrdiff_t>(kMaxWaitingNotices));
+    for (Notice& notice : notices) notices_.add(std::move(notice));
   }
   published_.notify_one();
 }
@@ -120,7 +117,7 @@ std::shared_ptr<const ViewerState> ViewerThread::look(const std::shared_ptr<cons
 
 std::vector<Notice> ViewerThread::take_notices() {
   const std::lock_guard lock(mutex_);
-  return std::exchange(notices_, {});
+  return notices_.take();
 }
 
 Status ViewerThread::send(const ClientMessage& message) {

@@ -47,9 +47,6 @@ struct ViewerState {
   int64_t made_ns = 0;
 };
 
-/// Notices that may wait for the drawing thread; the oldest give way.
-inline constexpr size_t kMaxWaitingNotices = 64;
-
 class ViewerThread {
  public:
   explicit ViewerThread(std::unique_ptr<LiveConnection> live);
@@ -63,7 +60,7 @@ class ViewerThread {
   /// As look(), but waits up to `timeout` for one that is newer than `last`.
   std::shared_ptr<const ViewerState> look(const std::shared_ptr<const ViewerState>& last,
                                           std::chrono::milliseconds timeout);
-  /// Notices since the last call.
+  /// Notices since the last call, the newest kMaxWaitingNotices.
   std::vector<Notice> take_notices();
   /// As ViewerClient::send, to the running connection.
   Status send(const ClientMessage& message);
@@ -89,7 +86,7 @@ class ViewerThread {
   std::condition_variable published_;
   std::shared_ptr<const ViewerState> state_;
   std::shared_ptr<ViewerClient> client_;
-  std::vector<Notice> notices_;
+  NoticeList notices_;
   std::optional<StreamMode> requested_mode_;
 
   std::thread thread_;  // last: starts when everything else is there

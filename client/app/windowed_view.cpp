@@ -332,6 +332,10 @@ Result<ViewReport> run_windowed(const ViewOptions& options, const std::atomic<bo
   } else {
     config.hello.mode = StreamMode::Frames;
   }
+  config.cancel = [&stop]() -> std::optional<Error> {
+    if (!stop) return std::nullopt;
+    return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
+  };
   ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
   window->show();
   return WindowedView(options, std::move(live), std::move(window), std::move(device)).run(stop);

@@ -129,6 +129,26 @@ std::vector<ClientEvent> Mailbox::wait(std::chrono::milliseconds timeout) {
   return taken;
 }
 
+std::optional<ClientEvent> Mailbox::next(std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  if (timeout.count() > 0) arrived_.wait_for(lock, timeout, [this] { return !events_.empty(); });
+  if (events_.empty()) return std::nullopt;
+  std::optional<ClientEvent> event(std::move(events_.front()));
+  events_.pop_front();
+  leave_lane(*event);
+  return event;
+}
+
+void Mailbox::leave_lane(const ClientEvent& event) {
+  const auto* media = std::get_if<MediaEvent>(&event);
+  if (media == nullptr) return;
+  const bool is_strands = is_strand_frame(media->header.opcode);
+  if (!is_strands && !is_chained_picture(media->header.opcode)) return;
+  Lane& lane = is_strands ? strands_ : pictures_;
+  --lane.frame_count;
+  lane.bytes -= media->message.size();
+}
+
 uint64_t Mailbox::dropped_frames() const {
   const std::lock_guard lock(mutex_);
   return dropped_frames_;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -65,6 +66,9 @@ class Mailbox {
   std::vector<ClientEvent> take();
   /// As take(), but waits for the first event up to `timeout`.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
+  /// The oldest event alone, waiting up to `timeout` for one. Whoever takes long for each uses this: what
+  /// waits stays within the limits, and newer statuses and pictures replace older ones meanwhile.
+  std::optional<ClientEvent> next(std::chrono::milliseconds timeout);
 
   /// Frames, of strands and pictures, thrown away because the application did not keep up.
   uint64_t dropped_frames() const;
@@ -72,6 +76,7 @@ class Mailbox {
  private:
   struct Lane;
   Outcome push_chained(MediaEvent event, Lane& lane);
+  void leave_lane(const ClientEvent& event);
   template <class Predicate>
   size_t erase_media(Predicate predicate);
   template <class Event>

@@ -28,6 +28,9 @@ std::vector<ClientEvent> ViewerClient::poll() {
 std::vector<ClientEvent> ViewerClient::wait(std::chrono::milliseconds timeout) {
   return connection_->mailbox().wait(timeout);
 }
+std::optional<ClientEvent> ViewerClient::next(std::chrono::milliseconds timeout) {
+  return connection_->mailbox().next(timeout);
+}
 Status ViewerClient::send(const ClientMessage& message) {
   return connection_->send(encode(message));
 }

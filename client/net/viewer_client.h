@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +31,12 @@ struct ClientConfig {
   std::chrono::milliseconds welcome_timeout{5000};  // from the handshake to the Welcome
   std::chrono::milliseconds idle_timeout{15'000};   // nothing received for this long: the server is gone
   MailboxLimits mailbox;
+  /// Asked every kCancelPoll by the thread that waits in ViewerClient::connect(); a sentence ends the wait.
+  /// Empty: never.
+  std::function<std::optional<Error>()> cancel;
 };
+
+inline constexpr std::chrono::milliseconds kCancelPoll{20};
 
 inline constexpr int kQuickPings = 10;  // clock probes right after the Welcome
 inline constexpr std::chrono::milliseconds kQuickPingInterval{20};
@@ -49,7 +56,7 @@ class ViewerClient {
   /// Blocks until the server has sent its Welcome. Unavailable: nobody listens or the connection broke;
   /// Timeout; Unauthorized: the server refused, or its certificate is not to be
   /// trusted; LimitExceeded, Unsupported: the server refused; BadInput: it does not speak this
-  /// protocol.
+  /// protocol; or what config.cancel says.
   static Result<std::unique_ptr<ViewerClient>> connect(const ClientConfig& config);
   /// Says goodbye to the server (waiting a fraction of a second at most) and ends the network thread.
   ~ViewerClient();
@@ -62,6 +69,8 @@ class ViewerClient {
   std::vector<ClientEvent> poll();
   /// As poll(), waiting up to `timeout` for the first event.
   std::vector<ClientEvent> wait(std::chrono::milliseconds timeout);
+  /// As Mailbox::next().
+  std::optional<ClientEvent> next(std::chrono::milliseconds timeout);
 
   /// Puts a message into the outbox. LimitExceeded when that is full (the message is dropped), Unavailable
   /// when the connection is over. Any thread.

@@ -42,6 +42,11 @@ websocket::close_code close_code_for(const Error& error) {
 
 // What the server wrote for people, fit for a terminal.
 void clean(ServerStatus&) {}
+void clean(Welcome& welcome) {
+  for (std::string* text :
+       {&welcome.server_version, &welcome.scene_name, &welcome.mode_reason, &welcome.codec})
+    *text = one_line(*text);
+}
 void clean(Notice& notice) {
   notice.text = one_line(notice.text);
 }
@@ -77,7 +82,12 @@ Status ViewerClient::Connection::open() {
   asio::post(io_, [this] { resolve(); });
   thread_ = std::thread([this] { run(); });
   std::unique_lock lock(mutex_);
-  opened_.wait(lock, [this] { return outcome_.has_value(); });
+  while (!opened_.wait_for(lock, kCancelPoll, [this] { return outcome_.has_value(); })) {
+    lock.unlock();
+    auto reason = config_.cancel ? config_.cancel() : std::nullopt;
+    if (reason) asio::post(io_, [this, why = std::move(*reason)]() mutable { finish(std::move(why)); });
+    lock.lock();
+  }
   return *outcome_;
 }
 
@@ -165,7 +175,7 @@ void ViewerClient::Connection::upgrade() {
     request.set(http::field::sec_websocket_protocol, kWebSocketProtocol);
     request.set(http::field::user_agent, "strandcast");
   }));
-  ws_.read_message_max(kFrameHeaderBytes + kMaxMediaPayloadBytes);
+  ws_.read_message_max(kMaxMessageBytes);
   ws_.binary(true);
   ws_.async_handshake(response_, config_.address.to_string(), config_.path, [this](error_code failure) {
     if (is_finished_) return;
@@ -225,7 +235,7 @@ Error ViewerClient::Connection::error_from_stream(const error_code& failure) {
     return make_error(ErrorCode::Timeout, "nothing received for {} ms", config_.idle_timeout.count());
   if (failure == websocket::error::message_too_big || failure == websocket::error::buffer_overflow)
     return make_error(ErrorCode::BadInput, "the server sent a message of more than {} bytes",
-                      kFrameHeaderBytes + kMaxMediaPayloadBytes);
+                      kMaxMessageBytes);
   const bool is_protocol = failure.category() == error_code(websocket::error::closed).category();
   return make_error(is_protocol ? ErrorCode::BadInput : ErrorCode::Unavailable, "connection lost: {}",
                     failure.message());
@@ -256,6 +266,7 @@ Status ViewerClient::Connection::handle_control(Welcome& welcome) {
   if (is_welcome_) return make_error(ErrorCode::BadInput, "the server sent a second Welcome");
   is_welcome_ = true;
   deadline_.cancel();
+  clean(welcome);
   welcome_ = std::move(welcome);
   ping_next();
   {
@@ -267,7 +278,9 @@ Status ViewerClient::Connection::handle_control(Welcome& welcome) {
 }
 
 Status ViewerClient::Connection::handle_control(Goodbye& goodbye) {
-  // The close code that follows says whether to come back; a server that sends none gets no more patience.
+  // The close code that follows says whether to come back; a server that sends none gets no more patience,
+  // also not by saying goodbye again.
+  if (!goodbye_.empty()) return {};
   goodbye_ = one_line(goodbye.reason);
   if (goodbye_.empty()) goodbye_ = "no reason given";
   deadline_.expires_after(kFarewellTimeout);

@@ -23,6 +23,9 @@
 
 namespace strandcast {
 
+/// Of one WebSocket message from the server; what is received is kept in a buffer of this size at most.
+inline constexpr size_t kMaxMessageBytes = kFrameHeaderBytes + kMaxMediaPayloadBytes;
+
 class ViewerClient::Connection {
  public:
   Connection(const ClientConfig& config, TlsContextPtr tls);
@@ -76,7 +79,7 @@ class ViewerClient::Connection {
   boost::asio::steady_timer deadline_;
   boost::asio::steady_timer ping_timer_;
   boost::beast::websocket::response_type response_;
-  boost::beast::flat_buffer buffer_;
+  boost::beast::flat_buffer buffer_{kMaxMessageBytes};
   std::deque<int64_t> outstanding_pings_;
   int ping_count_ = 0;
   bool is_open_ = false;  // the WebSocket handshake is done

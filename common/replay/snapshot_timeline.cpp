@@ -5,6 +5,16 @@
 
 namespace strandcast {
 
+namespace {
+
+uint64_t bytes_of(const std::deque<std::shared_ptr<const Snapshot>>& snapshots) {
+  uint64_t bytes = 0;
+  for (const auto& snapshot : snapshots) bytes += snapshot->lattice.size() * sizeof(int32_t);
+  return bytes;
+}
+
+}  // namespace
+
 PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill) {
   return PosedStrands{snapshot.world_from_head, fill.positions(snapshot)};
 }
@@ -42,7 +52,8 @@ void SnapshotTimeline::add(std::shared_ptr<const Snapshot> snapshot, int64_t rec
   }
   snapshots_.push_back(std::move(snapshot));
   const size_t kept = playout_ == Playout::Smooth ? kKeptSnapshots : 1;
-  while (snapshots_.size() > kept) snapshots_.pop_front();
+  while (snapshots_.size() > kept || (snapshots_.size() > 2 && bytes_of(snapshots_) > limit_bytes_))
+    snapshots_.pop_front();
 }
 
 std::shared_ptr<const Snapshot> SnapshotTimeline::newest() const {

@@ -26,11 +26,14 @@ enum class Continuity { SameStream, OtherStream };
 
 /// Smooth playout at 60 Hz is at most 100 ms behind, and as much again after a burst.
 inline constexpr size_t kKeptSnapshots = 16;
+/// Of huge states only as many are kept as fit, but the two that a picture lies between.
+inline constexpr uint64_t kMaxKeptSnapshotBytes = 256ull << 20;
 /// A keyframe of another stream may repeat a state this much older than the newest one.
 inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
 
 class SnapshotTimeline {
  public:
+  explicit SnapshotTimeline(uint64_t limit_bytes = kMaxKeptSnapshotBytes) : limit_bytes_(limit_bytes) {}
   void set_playout(Playout playout) { playout_ = playout; }
   Playout playout() const { return playout_; }
 
@@ -45,6 +48,7 @@ class SnapshotTimeline {
   uint64_t restarts() const { return restarts_; }
 
  private:
+  uint64_t limit_bytes_;
   Playout playout_ = Playout::LowLatency;
   PlayoutClock clock_;
   std::deque<std::shared_ptr<const Snapshot>> snapshots_;  // oldest first

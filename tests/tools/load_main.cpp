@@ -55,6 +55,8 @@ void declare(CLI::App& app, CommandLine& line) {
   app.add_option("--server-pid", line.server_pid, "Watch memory and file descriptors of this process");
 }
 
+constexpr int64_t kWatchMs = 100;  // how often stops and the server's process are looked at
+
 /// Resident memory, KiB, and open file descriptors of a process; zeros when it cannot be seen.
 struct ProcessState {
   double rss_kib = 0.0;
@@ -138,7 +140,9 @@ Status run(CommandLine line) {
   if (address.is_tls) encryption = Encryption{line.tls_authorities};
   LoadViewers viewers({address.host, address.port, line.token, encryption});
   RETURN_IF_ERROR(join_all(viewers, line));
-  viewers.run_for(static_cast<int64_t>(line.warm_up_s * 1e3));
+  for (const int64_t begin_ns = now_ns();
+       !stop && static_cast<double>(now_ns() - begin_ns) * 1e-9 < line.warm_up_s;)
+    viewers.run_for(std::min<int64_t>(kWatchMs, static_cast<int64_t>(line.warm_up_s * 1e3)));
   if (viewers.measures().joined == 0)
     return make_error(
         ErrorCode::Unavailable, "nobody was let in by {}: {}", address.to_string(),
@@ -150,7 +154,6 @@ Status run(CommandLine line) {
   const ProcessState first = process_state(line.server_pid);
   ProcessState most = first;
   uint64_t turns = 0;
-  constexpr int64_t kWatchMs = 100;
   while (!stop && elapsed_s() < line.seconds && viewers.open_count() > 0) {
     viewers.run_for(line.churn_ms > 0 ? line.churn_ms : kWatchMs);
     const ProcessState now = process_state(line.server_pid);
@@ -171,7 +174,7 @@ Status run(CommandLine line) {
     print("server_descriptors_most", static_cast<double>(most.descriptors));
     print("server_descriptors_last", static_cast<double>(last.descriptors));
   }
-  print_metrics(address, {line.tls_authorities, line.token});
+  if (!stop) print_metrics(address, {line.tls_authorities, line.token});
   return {};
 }
 

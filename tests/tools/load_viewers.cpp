@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "common/base/hash.h"
 #include "common/base/profile.h"
 #include "common/strands/frame_header.h"
 #include "tests/tools/load_socket.h"
@@ -117,6 +118,7 @@ class LoadViewers::State {
     const ssize_t size = viewer.socket.send_some(viewer.unsent);
     if (size < 0) return end(viewer, 0);
     viewer.unsent.erase(viewer.unsent.begin(), viewer.unsent.begin() + size);
+    if (viewer.unsent.size() > kMaxUnsentBytes) end(viewer, 0);
   }
 
   void read(Viewer& viewer) {
@@ -180,6 +182,11 @@ class LoadViewers::State {
     take_media(viewer, header, time_ns);
   }
 
+  void keep(std::vector<float>& values, float value) {
+    if (values.size() < kMaxMeasuredValues) return values.push_back(value);
+    values[mix_u32(++replaced_) % kMaxMeasuredValues] = value;
+  }
+
   void take_media(Viewer& viewer, const FrameHeader& header, int64_t time_ns) {
     ++measures_.frames;
     const bool is_keyframe = header.opcode == Opcode::StrandKeyframe;
@@ -193,11 +200,11 @@ class LoadViewers::State {
     viewer.stream_id = header.stream_id;
     viewer.sequence = header.sequence;
     if (viewer.frame_ns != 0)
-      measures_.interval_ms.push_back(static_cast<float>(time_ns - viewer.frame_ns) * kMsPerNs);
+      keep(measures_.interval_ms, static_cast<float>(time_ns - viewer.frame_ns) * kMsPerNs);
     viewer.frame_ns = time_ns;
     if (viewer.first_frame_ns == 0) viewer.first_frame_ns = time_ns;
     if (!is_keyframe)
-      measures_.latency_ms.push_back(static_cast<float>(time_ns - header.send_time_ns) * kMsPerNs);
+      keep(measures_.latency_ms, static_cast<float>(time_ns - header.send_time_ns) * kMsPerNs);
   }
 
   void take_control(Viewer& viewer, const std::vector<std::byte>& bytes) {
@@ -220,6 +227,7 @@ class LoadViewers::State {
   TlsSettings tls_;  // when the first viewer needs it
   uint64_t last_number_ = 0;
   int64_t pinged_ns_ = 0;
+  uint32_t replaced_ = 0;  // measured values
   std::array<std::byte, kReadBytes> buffer_{};
 };
 

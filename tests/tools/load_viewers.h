@@ -16,6 +16,11 @@
 
 namespace strandcast::load {
 
+/// Bytes that may wait to be written to a server that does not read; a viewer with more is ended.
+inline constexpr size_t kMaxUnsentBytes = 1u << 20;
+/// Values kept of each list of LoadMeasures; further ones take the places of others at random.
+inline constexpr size_t kMaxMeasuredValues = 1u << 20;
+
 /// What one viewer does.
 struct ViewerPlan {
   StreamMode mode = StreamMode::Strands;
@@ -35,7 +40,8 @@ struct LoadConfig {
   std::optional<Encryption> encryption = std::nullopt;
 };
 
-/// Totals since the start or the last reset_measures(); the vectors hold one value per frame.
+/// Totals since the start or the last reset_measures(); the vectors hold one value per frame, within
+/// kMaxMeasuredValues.
 struct LoadMeasures {
   uint64_t frames = 0;
   uint64_t keyframes = 0;

@@ -108,6 +108,33 @@ TEST(Mailbox, BoundsStatusAndNotices) {
   EXPECT_EQ(notices, (std::vector<std::string>{"96", "97", "98", "99"}));
 }
 
+TEST(Mailbox, GivesOneEventAtATimeAndBoundsTheRest) {
+  Mailbox mailbox({.chained_frames = 3});
+  const auto next_sequence = [&]() -> uint32_t {
+    const auto event = mailbox.next(milliseconds(0));
+    const auto* part = event ? std::get_if<MediaEvent>(&*event) : nullptr;
+    return part ? part->header.sequence : 0;
+  };
+  EXPECT_FALSE(mailbox.next(milliseconds(1)));
+  mailbox.push(media(Opcode::StrandKeyframe, 1));
+  for (uint32_t i = 2; i <= 3; ++i)
+    EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, i)), Mailbox::Outcome::Kept);
+  EXPECT_EQ(next_sequence(), 1u);
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 4)), Mailbox::Outcome::Kept) << "one has left";
+  EXPECT_EQ(mailbox.push(media(Opcode::StrandDelta, 5)), Mailbox::Outcome::KeyframeNeeded);
+  EXPECT_EQ(next_sequence(), 0u) << "what cannot be used is gone";
+  mailbox.push(media(Opcode::StrandKeyframe, 6));
+  mailbox.push(ServerStatus{.tick = 1});
+  mailbox.push(media(Opcode::JpegFrame, 7));
+  mailbox.push(ServerStatus{.tick = 2});
+  EXPECT_EQ(next_sequence(), 6u);
+  EXPECT_EQ(next_sequence(), 7u);
+  const auto status = mailbox.next(milliseconds(0));
+  ASSERT_TRUE(status);
+  EXPECT_EQ(std::get<ServerStatus>(*status).tick, 2u);
+  EXPECT_FALSE(mailbox.next(milliseconds(0)));
+}
+
 TEST(Mailbox, EndsWithOneClosedEvent) {
   Mailbox mailbox;
   mailbox.close(make_error(ErrorCode::Timeout, "first"));

@@ -191,6 +191,25 @@ TEST_F(StrandReplayTest, MeasuresMotionLatencyOncePerSampleAndStateAge) {
   EXPECT_GE(replay_->motion_latency_timer().median_ms(), 20.0);
 }
 
+TEST(SnapshotTimeline, KeepsAsManyHugeStatesAsFitAndAtLeastTwo) {
+  constexpr uint64_t kLimitBytes = 4000;
+  const auto newest_count = [](uint64_t bytes_each) {
+    SnapshotTimeline timeline(kLimitBytes);
+    timeline.set_playout(Playout::Smooth);
+    for (int64_t i = 0; i < 40; ++i) {
+      auto snapshot = std::make_shared<Snapshot>();
+      snapshot->sim_time_ns = i * kStepNs;
+      snapshot->lattice.resize(bytes_each / sizeof(int32_t));
+      timeline.add(snapshot, i * kStepNs, Continuity::SameStream);
+    }
+    return timeline.snapshots().size();
+  };
+  EXPECT_EQ(newest_count(4), kKeptSnapshots);
+  EXPECT_EQ(newest_count(kLimitBytes / 4), 4u);
+  EXPECT_EQ(newest_count(kLimitBytes / 4 + 4), 3u);
+  EXPECT_EQ(newest_count(kLimitBytes / 2 + 4), 2u);
+}
+
 TEST(Blend, MeetsBothEndsExactlyAndIsLinearBetween) {
   HairMotion hair({.strand_count = kStrands, .vertex_count = kVertices});
   hair.step();

@@ -1,0 +1,114 @@
+// What the client's programs keep and how they stop, without a server.
+#include <atomic>
+#include <csignal>
+
+#include "client/app/clip_store.h"
+#include "client/app/line_budget.h"
+#include "client/app/notice_list.h"
+#include "client/app/stop_signal.h"
+#include "client/app/stream_check.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int64_t kMs = 1'000'000;
+
+std::shared_ptr<const Snapshot> state_at(int64_t sim_time_ns, size_t lattice_values) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->sim_time_ns = sim_time_ns;
+  snapshot->lattice.resize(lattice_values);
+  return snapshot;
+}
+
+Image image_of(uint32_t width, uint32_t height) {
+  return {width, height, std::vector<uint8_t>(size_t{4} * width * height)};
+}
+
+TEST(ClipStore, KeepsStatesAtAnEvenRateUntilTheClipHasItsLength) {
+  ClipStore clip(10.0, 0.5);
+  for (int64_t i = 0; i < 100 && !clip.is_full(); ++i) clip.add(state_at(i * 20 * kMs, 3));
+  ASSERT_EQ(clip.snapshots().size(), 5u);
+  for (size_t i = 0; i < 5; ++i)
+    EXPECT_EQ(clip.snapshots()[i]->sim_time_ns, static_cast<int64_t>(i) * 100 * kMs);
+  EXPECT_FALSE(clip.is_cut());
+}
+
+TEST(ClipStore, KeepsNoMoreBytesThanItsLimit) {
+  constexpr uint64_t kLimit = 1000;
+  ClipStore exact(10.0, 60.0, kLimit);
+  ClipStore over(10.0, 60.0, kLimit - 1);
+  for (int64_t i = 0; i < 100; ++i)
+    for (ClipStore* clip : {&exact, &over}) clip->add(state_at(i * 100 * kMs, 50));
+  EXPECT_EQ(exact.snapshots().size(), 5u) << "five times 50 numbers of 4 bytes";
+  EXPECT_EQ(over.snapshots().size(), 4u);
+  EXPECT_TRUE(exact.is_cut() && exact.is_full());
+  EXPECT_TRUE(over.is_cut() && over.is_full());
+
+  ClipStore pictures(10.0, 60.0, 5 * 4 * 8 * 8);
+  for (int64_t i = 0; i < 100; ++i) pictures.add(image_of(8, 8), i * 100 * kMs);
+  EXPECT_EQ(pictures.images().size(), 5u);
+}
+
+TEST(ClipStore, KeepsPicturesOfOneSize) {
+  ClipStore clip(10.0, 1.0);
+  for (int64_t i = 0; i < 20; ++i) clip.add(i % 2 == 0 ? image_of(8, 6) : image_of(4, 3), i * 100 * kMs);
+  ASSERT_EQ(clip.images().size(), 10u);
+  for (const Image& image : clip.images()) EXPECT_EQ(image.width, 8u);
+}
+
+TEST(LineBudget, LetsSoManyLinesThroughInASecondAndCountsTheOthers) {
+  LineBudget lines;
+  uint32_t written = 0;
+  for (int64_t i = 0; i < 1000; ++i) written += lines.take(i * kMs) ? 1 : 0;
+  EXPECT_EQ(written, kMaxForeignLinesPerS);
+  EXPECT_EQ(lines.take_left_out(), 1000u - kMaxForeignLinesPerS);
+  EXPECT_EQ(lines.take_left_out(), 0u);
+  EXPECT_TRUE(lines.take(1000 * kMs)) << "the next second";
+}
+
+TEST(NoticeList, TheOldestGiveWay) {
+  NoticeList list;
+  for (size_t i = 0; i < kMaxWaitingNotices + 3; ++i) list.add({false, std::to_string(i)});
+  const auto taken = list.take();
+  ASSERT_EQ(taken.size(), kMaxWaitingNotices);
+  EXPECT_EQ(taken.front().text, "3");
+  EXPECT_TRUE(list.take().empty());
+}
+
+TEST(TickHashes, KeepTheNewestAlsoWhenTicksBeginAgain) {
+  TickHashes hashes(3);
+  for (const uint64_t tick : {100u, 101u, 102u, 0u, 1u}) hashes.add(tick, tick + 7);
+  hashes.add(1, 9);
+  EXPECT_EQ(hashes.hash_by_tick().size(), 3u);
+  EXPECT_FALSE(hashes.find(101));
+  EXPECT_EQ(hashes.find(102), 109u);
+  EXPECT_EQ(hashes.find(1), 9u) << "again: the newer counts";
+}
+
+/// A program that is in the middle of something that looks at nothing.
+[[noreturn]] void stop_while_busy() {
+  const auto& stop = catch_stop_signals();
+  std::raise(SIGTERM);
+  if (!stop) std::_Exit(1);
+  for (std::atomic<uint64_t> turns{0};;) turns.fetch_add(1);
+}
+
+TEST(StopSignal, EndsAProgramThatDoesNotLookInTime) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(stop_while_busy(), testing::KilledBySignal(SIGTERM), "stopped in the middle");
+}
+
+TEST(StopSignal, ASecondOneEndsItAtOnce) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(
+      {
+        catch_stop_signals();
+        std::raise(SIGINT);
+        std::raise(SIGINT);
+        std::_Exit(1);
+      },
+      testing::KilledBySignal(SIGINT), "");
+}
+
+}  // namespace
+}  // namespace strandcast
