@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <sstream>
 #include <utility>
 
 #include "client/app/feed.h"
@@ -12,6 +13,7 @@
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
+#include "common/base/text.h"
 #include "common/motion/bvh.h"
 #include "common/motion/wind_csv.h"
 
@@ -140,6 +142,16 @@ std::string to_line(const ServerStatus& status) {
       some(status.overstretched_strands, "strands over-stretched"));
 }
 
+/// A foreign text, fit for a terminal.
+void print_lines(const std::string& text) {
+  constexpr int kMaxShownLines = 100;
+  constexpr size_t kMaxShownChars = 200;
+  std::istringstream lines(text);
+  std::string line;
+  for (int i = 0; i < kMaxShownLines && std::getline(lines, line); ++i)
+    std::cout << one_line(line, kMaxShownChars) << '\n';
+}
+
 std::string to_table(const SessionList& list) {
   std::string text = fmt::format("{:>8}  {:<10}  {:<7}  {:>12}  {:>8}  {:>8}  {:<20}  {}\n", "session",
                                  "role", "mode", "sent bytes", "delay ms", "since s", "address", "name");
@@ -249,8 +261,7 @@ int run_health(const CtlTarget& target) {
   const auto answer = http_get(*address, "/healthz", kHealthTimeout, {target.tls_authorities, {}});
   if (!answer) return fail(answer.error());
   constexpr unsigned kHttpOk = 200;
-  std::cout << answer->body;
-  if (!answer->body.ends_with('\n')) std::cout << '\n';
+  print_lines(answer->body);
   return answer->status == kHttpOk ? kDoneExit : kRefusedExit;
 }
 

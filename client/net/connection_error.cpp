@@ -1,3 +1,6 @@
+#include <boost/asio/error.hpp>
+#include <boost/beast/http/error.hpp>
+
 #include "client/net/connection_error_private.h"
 
 #include "common/base/text.h"
@@ -12,9 +15,9 @@ ErrorCode code_for(unsigned http_status) {
       return ErrorCode::Unauthorized;
     case 426:
       return ErrorCode::Unsupported;
-    case 429:
+    case 429:  // too many connections just now
     case 503:
-      return ErrorCode::LimitExceeded;
+      return ErrorCode::Unavailable;
     default:
       return ErrorCode::BadInput;
   }
@@ -37,6 +40,12 @@ Error error_from_tls(const net::NetStream& stream, const net::NetStream::error_c
     return make_error(ErrorCode::Unsupported, "no TLS with this server: {}", failure.message());
   return make_error(ErrorCode::Unavailable, "connection lost during the TLS handshake: {}",
                     failure.message());
+}
+
+bool is_too_long(const net::NetStream::error_code& failure) {
+  namespace http = boost::beast::http;
+  return failure == boost::asio::error::message_size || failure == http::error::header_limit ||
+         failure == http::error::body_limit || failure == http::error::buffer_overflow;
 }
 
 Error error_from_http(unsigned status, std::string_view reason, std::string_view body) {

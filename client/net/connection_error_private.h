@@ -16,6 +16,9 @@ std::string one_line(std::string_view text);
 /// ours: neither goes away by trying again. Unavailable when the connection broke.
 Error error_from_tls(const net::NetStream& stream, const net::NetStream::error_code& failure);
 
+/// Reading HTTP ended because the other side sent more than may be read.
+bool is_too_long(const net::NetStream::error_code& failure);
+
 /// The server answered the request to switch to WebSocket with this instead.
 Error error_from_http(unsigned status, std::string_view reason, std::string_view body);
 

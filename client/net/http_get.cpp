@@ -28,6 +28,8 @@ class Exchange {
     request_.set(http::field::user_agent, "strandcast");
     if (!token.empty()) request_.set(http::field::authorization, "Bearer " + token);
     parser_.body_limit(kMaxHttpBodyBytes);
+    parser_.header_limit(kMaxHttpAnswerHeaderBytes);
+    stream_.limit_reading(kMaxHttpAnswerHeaderBytes + kMaxHttpBodyBytes);
     resolver_.async_resolve(address.host, std::to_string(address.port),
                             [this](error_code failure, const tcp::resolver::results_type& results) {
                               if (!keep(failure)) return;
@@ -39,6 +41,10 @@ class Exchange {
     io_.run_for(timeout);
     if (is_done_) return HttpAnswer{parser_.get().result_int(), parser_.get().body()};
     if (tls_error_) return *tls_error_;
+    if (failure_ && is_too_long(failure_))
+      return make_error(ErrorCode::LimitExceeded,
+                        "the HTTP answer is too long: more than {} bytes of header, or {} of body",
+                        kMaxHttpAnswerHeaderBytes, kMaxHttpBodyBytes);
     if (failure_) return make_error(ErrorCode::Unavailable, "no HTTP answer: {}", failure_.message());
     return make_error(ErrorCode::Timeout, "no HTTP answer within {} ms", timeout.count());
   }
@@ -74,7 +80,7 @@ class Exchange {
   net::NetStream stream_{tcp::socket(io_)};
   http::request<http::empty_body> request_;
   http::response_parser<http::string_body> parser_;
-  beast::flat_buffer buffer_;
+  beast::flat_buffer buffer_{kMaxHttpAnswerHeaderBytes};
   error_code failure_;
   std::optional<Error> tls_error_;
   bool is_done_ = false;

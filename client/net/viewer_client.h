@@ -37,6 +37,8 @@ struct ClientConfig {
 };
 
 inline constexpr std::chrono::milliseconds kCancelPoll{20};
+/// Of the HTTP answer to the request for a WebSocket, all of it.
+inline constexpr uint64_t kMaxUpgradeAnswerBytes = 16u << 10;
 
 inline constexpr int kQuickPings = 10;  // clock probes right after the Welcome
 inline constexpr std::chrono::milliseconds kQuickPingInterval{20};

@@ -177,8 +177,15 @@ void ViewerClient::Connection::upgrade() {
   }));
   ws_.read_message_max(kMaxMessageBytes);
   ws_.binary(true);
+  // Header, body, trailer: whatever it consists of, the answer to the request is bounded.
+  ws_.next_layer().limit_reading(kMaxUpgradeAnswerBytes);
   ws_.async_handshake(response_, config_.address.to_string(), config_.path, [this](error_code failure) {
     if (is_finished_) return;
+    ws_.next_layer().limit_reading(net::NetStream::kNoReadLimit);
+    if (is_too_long(failure))
+      return finish(make_error(ErrorCode::BadInput,
+                               "the server's answer to the request for a WebSocket has more than {} bytes",
+                               kMaxUpgradeAnswerBytes));
     if (failure == websocket::error::upgrade_declined)
       return finish(error_from_http(response_.result_int(), view(response_.reason()), response_.body()));
     if (failure)

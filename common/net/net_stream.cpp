@@ -38,6 +38,7 @@ struct NetStream::State {
   Socket socket;
   std::optional<asio::ssl::stream<Socket&>> tls;
   std::vector<std::byte> put_back;
+  std::shared_ptr<uint64_t> read_left;  // null: no limit
 };
 
 NetStream::NetStream(Socket socket) : state_(std::make_unique<State>(std::move(socket))) {}
@@ -76,6 +77,10 @@ bool NetStream::is_tls_hello() {
 
 void NetStream::put_back(std::span<const std::byte> bytes) {
   state_->put_back.insert(state_->put_back.begin(), bytes.begin(), bytes.end());
+}
+
+void NetStream::limit_reading(uint64_t bytes) {
+  state_->read_left = bytes == kNoReadLimit ? nullptr : std::make_shared<uint64_t>(bytes);
 }
 
 void NetStream::async_accept_tls(const TlsContextPtr& context, Done done) {
@@ -138,6 +143,26 @@ void NetStream::read_some(const MutableBuffers& buffers, Transferred done) {
     return asio::post(get_executor(),
                       [size, done = std::move(done)]() mutable { std::move(done)(error_code(), size); });
   }
+  if (state_->read_left == nullptr) return read_fresh(buffers, std::move(done));
+  const std::shared_ptr<uint64_t> left = state_->read_left;
+  if (*left == 0)
+    return asio::post(get_executor(), [done = std::move(done)]() mutable {
+      std::move(done)(error_code(asio::error::message_size), 0);
+    });
+  MutableBuffers some;
+  size_t room = 0;
+  for (const asio::mutable_buffer& buffer : buffers) {
+    if (room == *left) break;
+    some.push_back(asio::buffer(buffer, static_cast<size_t>(*left - room)));
+    room += some.back().size();
+  }
+  read_fresh(some, [left, done = std::move(done)](const error_code& error, size_t size) mutable {
+    *left -= size;
+    std::move(done)(error, size);
+  });
+}
+
+void NetStream::read_fresh(const MutableBuffers& buffers, Transferred done) {
   if (state_->tls) return state_->tls->async_read_some(buffers, plain(std::move(done)));
   state_->socket.async_read_some(buffers, plain(std::move(done)));
 }

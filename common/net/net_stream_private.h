@@ -10,6 +10,7 @@
 #include <boost/beast/core/role.hpp>
 #include <boost/container/static_vector.hpp>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -46,6 +47,11 @@ class NetStream {
 
   /// Gives back what was read too far: the next reads begin with it. Not while a read is under way.
   void put_back(std::span<const std::byte> bytes);
+
+  /// From the next read on so many bytes can be read in all, and then reading fails with message_size. Until
+  /// limit_reading(kNoReadLimit), which is how a stream begins.
+  void limit_reading(uint64_t bytes);
+  static constexpr uint64_t kNoReadLimit = ~uint64_t{0};
 
   /// From here on everything is encrypted.
   void async_accept_tls(const TlsContextPtr& context, Done done);
@@ -94,6 +100,7 @@ class NetStream {
     return some;
   }
   void read_some(const MutableBuffers& buffers, Transferred done);
+  void read_fresh(const MutableBuffers& buffers, Transferred done);
   void write_some(const ConstBuffers& buffers, Transferred done);
 
   struct State;

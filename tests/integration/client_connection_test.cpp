@@ -123,11 +123,9 @@ TEST(ClientConnect, RefusesWhatIsNotThisProtocol) {
 }
 
 TEST(ClientConnect, NamesTheHttpStatusOfARefusal) {
-  const std::vector<std::pair<unsigned, ErrorCode>> cases = {{401, ErrorCode::Unauthorized},
-                                                             {403, ErrorCode::Unauthorized},
-                                                             {404, ErrorCode::BadInput},
-                                                             {426, ErrorCode::Unsupported},
-                                                             {503, ErrorCode::LimitExceeded}};
+  const std::vector<std::pair<unsigned, ErrorCode>> cases = {
+      {401, ErrorCode::Unauthorized}, {403, ErrorCode::Unauthorized}, {404, ErrorCode::BadInput},
+      {426, ErrorCode::Unsupported},  {429, ErrorCode::Unavailable},  {503, ErrorCode::Unavailable}};
   for (const auto& [status, code] : cases) {
     const Error error = refusal([status = status](FakePeer& peer) {
       peer.answer_http(status, "the\x1b[31m reason");
@@ -323,7 +321,68 @@ TEST(HttpGet, ReturnsStatusAndBodyAndBoundsWaiting) {
   });
   const auto bounded = http_get({"127.0.0.1", endless.port()}, "/healthz", kLong);
   ASSERT_FALSE(bounded);
-  EXPECT_EQ(bounded.error().code, ErrorCode::Unavailable);
+  EXPECT_EQ(bounded.error().code, ErrorCode::LimitExceeded);
+}
+
+/// Hostile HTTP answers: how each begins, and what then comes again and again.
+struct EndlessAnswer {
+  const char* name;
+  std::string begin;
+  std::string piece;
+};
+
+std::vector<EndlessAnswer> endless_answers(const std::string& status_line) {
+  const std::string chunked = status_line + "Transfer-Encoding: chunked\r\n\r\n";
+  const std::string kilobyte(1000, 'x');
+  return {{"a line of the header", status_line + "Name: ", kilobyte},
+          {"lines of the header", status_line, "Name: " + kilobyte + "\r\n"},
+          {"a body of any length", status_line + "\r\n", kilobyte},
+          {"a body that says its length", status_line + "Content-Length: 1000000000\r\n\r\n", kilobyte},
+          {"the extension of a chunk", chunked + "1;", kilobyte},
+          {"chunks with extensions", chunked, "1;" + kilobyte + "\r\nx\r\n"},
+          {"the length of a chunk", chunked, std::string(1000, '0')},
+          {"a trailer", chunked + "0\r\n", "Name: " + kilobyte + "\r\n"}};
+}
+
+constexpr uint64_t kEndlessBytes = 64u << 20;
+constexpr uint64_t kMostTakenBytes = 16u << 20;  // what the client's limits and the buffers of sockets take
+
+/// Sends it as long as somebody takes it; the bytes that went.
+uint64_t send_endless(FakePeer& peer, const EndlessAnswer& answer) {
+  std::string many;
+  while (many.size() < 64'000) many += answer.piece;
+  uint64_t sent = 0;
+  if (!peer.send_raw(answer.begin)) return sent;
+  while (sent < kEndlessBytes && peer.send_raw(many)) sent += many.size();
+  return sent;
+}
+
+TEST(HttpGet, LeavesAnAnswerWithoutEnd) {
+  for (const EndlessAnswer& answer : endless_answers("HTTP/1.1 200 OK\r\n")) {
+    std::atomic<uint64_t> sent{0};
+    {
+      const FakeServer server([&](FakePeer& peer) { sent = send_endless(peer, answer); });
+      const auto got = http_get({"127.0.0.1", server.port()}, "/healthz", kLong);
+      ASSERT_FALSE(got) << answer.name;
+      EXPECT_THAT(got.error().message,
+                  testing::AnyOf(HasSubstr("too long"), HasSubstr("no HTTP answer: bad")))
+          << answer.name;
+    }
+    EXPECT_LT(sent, kMostTakenBytes) << answer.name;
+  }
+}
+
+TEST(ClientHostile, AnUpgradeAnswerWithoutEndIsLeft) {
+  for (const char* status :
+       {"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: upgrade\r\n",
+        "HTTP/1.1 503 Service Unavailable\r\n"}) {
+    for (const EndlessAnswer& answer : endless_answers(status)) {
+      std::atomic<uint64_t> sent{0};
+      const Error error = refusal([&](FakePeer& peer) { sent = send_endless(peer, answer); });
+      EXPECT_EQ(error.code, ErrorCode::BadInput) << answer.name << ": " << error.to_string();
+      EXPECT_LT(sent, kMostTakenBytes) << answer.name;
+    }
+  }
 }
 
 }  // namespace

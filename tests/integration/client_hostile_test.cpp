@@ -313,6 +313,18 @@ TEST(HostileServer, NothingOfItsWelcomeSteersATerminal) {
   EXPECT_THAT(lines, HasSubstr("mode_reason=because?31m"));
 }
 
+TEST(HostileServer, NothingOfItsHealthSteersATerminal) {
+  const FakeServer server(
+      [](FakePeer& peer) { peer.answer_http(200, "fine\x1b[2J\nindeed\n" + std::string(100'000, '\n')); });
+  CtlTarget target;
+  target.connect = fmt::format("127.0.0.1:{}", server.port());
+  testing::internal::CaptureStdout();
+  EXPECT_EQ(run_health(target), kDoneExit);
+  const std::string printed = testing::internal::GetCapturedStdout();
+  EXPECT_THAT(printed, testing::StartsWith("fine [2J\nindeed\n"));
+  EXPECT_LT(printed.size(), 1000u);
+}
+
 TEST(HostileServer, MonitorPrintsSoManyLinesASecondAndNoMore) {
   constexpr uint32_t kNotices = 20'000;
   const FakeServer server([&](FakePeer& peer) {

@@ -11,6 +11,7 @@
 #include "client/net/http_get.h"
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
+#include "common/base/text.h"
 #include "tests/tools/load_viewers.h"
 
 namespace {
@@ -84,8 +85,10 @@ void print_metrics(const Address& address, const HttpAccess& access) {
   const auto answer = http_get(address, "/metrics", std::chrono::seconds(5), access);
   if (!answer) return;
   constexpr std::string_view kPrefix = "strandcast_";
+  constexpr size_t kMaxShownChars = 200;
   std::istringstream lines(answer->body);
-  for (std::string text; std::getline(lines, text);) {
+  for (std::string raw; std::getline(lines, raw);) {
+    const std::string text = one_line(raw, kMaxShownChars);
     const size_t space = text.find(' ');
     if (text.starts_with("#") || space == std::string::npos) continue;
     const size_t begin = text.starts_with(kPrefix) ? kPrefix.size() : 0;
