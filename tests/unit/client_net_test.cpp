@@ -1,9 +1,14 @@
+#include <array>
+#include <filesystem>
+#include <map>
 #include <set>
+#include <sstream>
 #include <thread>
 
 #include "client/net/address.h"
 #include "client/net/mailbox.h"
 #include "client/net/reconnect_policy.h"
+#include "common/base/file.h"
 #include "common/wire/close_code.h"
 
 namespace strandcast {
@@ -183,19 +188,74 @@ TEST(ReconnectPolicy, SpreadsManyViewers) {
   EXPECT_GT(delays.size(), 25u);
 }
 
-TEST(ReconnectPolicy, StopsWhereTryingAgainCannotHelp) {
-  for (const CloseCode code :
-       {CloseCode::Unauthorized, CloseCode::Full, CloseCode::Policy, CloseCode::BadData}) {
-    const Error error = error_from_close(static_cast<uint16_t>(code), "The reason.");
-    EXPECT_FALSE(ReconnectPolicy(3).next_delay(error, milliseconds(0))) << static_cast<int>(code);
-    EXPECT_THAT(error.message, testing::HasSubstr("The reason."));
+enum class Fate { TryAgain, Stop };
+
+/// What the protocol says of every code; the compiler asks for a new one.
+Fate fate_of(CloseCode code) {
+  switch (code) {
+    case CloseCode::Normal:
+    case CloseCode::GoingAway:
+    case CloseCode::Internal:
+    case CloseCode::TryLater:
+      return Fate::TryAgain;
+    case CloseCode::BadData:
+    case CloseCode::Policy:
+    case CloseCode::TooBig:
+    case CloseCode::Unauthorized:
+    case CloseCode::Kicked:
+    case CloseCode::Full:
+      return Fate::Stop;
   }
-  for (const CloseCode code :
-       {CloseCode::GoingAway, CloseCode::Normal, CloseCode::TryLater, CloseCode::Internal})
-    EXPECT_TRUE(
-        ReconnectPolicy(3).next_delay(error_from_close(static_cast<uint16_t>(code), ""), milliseconds(0)));
-  EXPECT_TRUE(ReconnectPolicy(3).next_delay(error_from_close(0, ""), milliseconds(0)));
-  EXPECT_TRUE(ReconnectPolicy(3).next_delay(error_from_close(4999, ""), milliseconds(0)));
+  return Fate::Stop;
+}
+
+constexpr std::array kCloseCodes = {
+    CloseCode::Normal,   CloseCode::GoingAway, CloseCode::BadData,      CloseCode::Policy, CloseCode::TooBig,
+    CloseCode::Internal, CloseCode::TryLater,  CloseCode::Unauthorized, CloseCode::Kicked, CloseCode::Full};
+
+TEST(ReconnectPolicy, DoesWithEveryCloseCodeWhatTheProtocolSays) {
+  for (const CloseCode code : kCloseCodes) {
+    const Error error = error_from_close(static_cast<uint16_t>(code), "The reason.");
+    ReconnectPolicy policy(3);
+    std::vector<int64_t> delays_ms;
+    for (int attempt = 0; attempt < 4; ++attempt)
+      if (const auto delay = policy.next_delay(error, milliseconds(0))) delays_ms.push_back(delay->count());
+    EXPECT_THAT(error.message, testing::HasSubstr("The reason."));
+    if (fate_of(code) == Fate::Stop) {
+      EXPECT_TRUE(delays_ms.empty()) << static_cast<int>(code);
+    } else {
+      ASSERT_EQ(delays_ms.size(), 4u) << static_cast<int>(code);
+      EXPECT_GT(delays_ms[3], 2 * delays_ms[0]) << "it waits longer every time";
+    }
+  }
+}
+
+/// Section 9 of the protocol: what a client does, by the first words of each row.
+TEST(ReconnectPolicy, AgreesWithTheDocument) {
+  const auto text = load_text(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "proto/WIRE.md", 1u << 20);
+  ASSERT_TRUE(text) << text.error().to_string();
+  std::map<uint16_t, Fate> documented;
+  std::istringstream lines(text->substr(text->find("## 9. Close codes")));
+  for (std::string line; std::getline(lines, line) && !line.starts_with("## 10");) {
+    const size_t last = line.rfind('|', line.size() - 2);
+    if (!line.starts_with("| ") || last == std::string::npos || !std::isdigit(line[2])) continue;
+    const std::string action = line.substr(last + 2);
+    std::istringstream codes(line.substr(2));
+    for (int code = 0; codes >> code; codes.ignore(1))
+      documented[static_cast<uint16_t>(code)] =
+          action.starts_with("try again") || action.starts_with("nothing") ? Fate::TryAgain : Fate::Stop;
+  }
+  for (const CloseCode code : kCloseCodes) {
+    ASSERT_TRUE(documented.contains(static_cast<uint16_t>(code))) << static_cast<int>(code);
+    EXPECT_EQ(fate_of(code), documented[static_cast<uint16_t>(code)]) << static_cast<int>(code);
+  }
+}
+
+TEST(ReconnectPolicy, TakesWhatItDoesNotKnowForPassing) {
+  for (const uint16_t code : {0, 1006, 1012, 4999})
+    EXPECT_TRUE(ReconnectPolicy(3).next_delay(error_from_close(code, ""), milliseconds(0))) << code;
+  for (const uint16_t code : {1002, 1003})
+    EXPECT_FALSE(ReconnectPolicy(3).next_delay(error_from_close(code, ""), milliseconds(0))) << code;
   for (const ErrorCode code : {ErrorCode::BadInput, ErrorCode::Unsupported, ErrorCode::Internal})
     EXPECT_FALSE(ReconnectPolicy(3).next_delay(make_error(code, "no"), milliseconds(0)));
 }
