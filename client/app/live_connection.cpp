@@ -13,7 +13,11 @@ Result<std::unique_ptr<LiveConnection>> LiveConnection::open(const ClientConfig&
 }
 
 LiveConnection::LiveConnection(const ClientConfig& config, std::unique_ptr<ViewerSession> session)
-    : config_(config), session_(std::move(session)), policy_(static_cast<uint32_t>(now_ns())) {
+    : config_(config),
+      modes_(std::make_shared<ModeControl>(config.hello.mode)),
+      session_(std::move(session)),
+      policy_(static_cast<uint32_t>(now_ns())) {
+  session_->follow(modes_);
   config_.cancel = [this, cancel = config.cancel]() -> std::optional<Error> {
     if (is_leaving_) return make_error(ErrorCode::Unavailable, "the viewer is leaving");
     return cancel ? cancel() : std::nullopt;
@@ -42,14 +46,9 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   }
   session_ = std::move(opened).value();
   is_connected_ = true;
-  if (attempted_mode_ != config_.hello.mode) session_->request_mode(config_.hello.mode);
+  session_->follow(modes_);
   log_info("net", "connected to {} again", config_.address.to_string());
   return true;
-}
-
-void LiveConnection::request_mode(StreamMode mode) {
-  config_.hello.mode = mode;
-  if (is_connected_) session_->request_mode(mode);
 }
 
 void LiveConnection::lose(const Error& error) {
@@ -68,7 +67,7 @@ void LiveConnection::lose(const Error& error) {
 }
 
 void LiveConnection::start_attempt() {
-  attempted_mode_ = config_.hello.mode;
+  config_.hello.mode = modes_->look().wanted;
   attempt_ = std::async(std::launch::async, [config = config_] { return ViewerSession::open(config); });
 }
 

@@ -24,8 +24,9 @@ class LiveConnection {
 
   /// Handles what arrived; starts and finishes attempts to reconnect. True when the session is a new one.
   bool pump(std::chrono::milliseconds timeout);
-  /// Asks the server for this mode, now and after every new connection.
-  void request_mode(StreamMode mode);
+  /// What is wanted, given and shown, through all sessions. A wish that was not sent goes out with the next
+  /// pump().
+  const std::shared_ptr<ModeControl>& modes() const { return modes_; }
 
   /// The running session, or the last one: its snapshots stay readable while the server is away.
   ViewerSession& session() { return *session_; }
@@ -45,7 +46,7 @@ class LiveConnection {
 
   std::atomic<bool> is_leaving_{false};
   ClientConfig config_;
-  StreamMode attempted_mode_ = StreamMode::Auto;  // of the attempt under way
+  const std::shared_ptr<ModeControl> modes_;
   std::unique_ptr<ViewerSession> session_;
   ReconnectPolicy policy_;
   bool is_connected_ = true;

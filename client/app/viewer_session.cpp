@@ -33,15 +33,15 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
   session->replay_ = std::move(replay).value();
   session->opened_ns_ = now_ns();
   session->quality_.bound_m = session->welcome().bound_m;
-  session->mode_ = session->welcome().mode;
-  session->mode_reason_ = session->welcome().mode_reason;
+  session->asked_mode_ = config.hello.mode;
+  session->follow(std::make_shared<ModeControl>(config.hello.mode));
   return session;
 }
 
 ViewerSession::ViewerSession(std::shared_ptr<ViewerClient> client) : client_(std::move(client)) {}
 
 Status ViewerSession::pump(std::chrono::milliseconds timeout) {
-  send_mode_request();
+  send_mode_request(*modes_, *client_);
   std::optional<int64_t> end_ns;
   while (auto event = client_->next(timeout)) {
     if (!end_ns) end_ns = now_ns() + std::chrono::nanoseconds(kPumpSlice).count();
@@ -73,27 +73,26 @@ Status ViewerSession::handle(ClientEvent& event) {
 }
 
 void ViewerSession::take_mode(ModeChange change) {
-  mode_reason_ = std::move(change.reason);
-  if (log_lines_.take(now_ns())) log_info("replay", "{}", mode_reason_);
+  if (log_lines_.take(now_ns())) log_info("replay", "{}", change.reason);
+  modes_->note_answer(std::move(change));
 }
 
 /// A frame of this mode was decoded.
 void ViewerSession::show(StreamMode mode) {
-  if (std::exchange(mode_, mode) == mode) return;
-  ++mode_changes_;
+  if (!modes_->note_shown(mode)) return;
   // Each stream counts its frames by itself, and those that were not sent to us are not missing.
   last_picture_sequence_ = 0;
   if (mode == StreamMode::Frames) replay_->forget_sequence();
 }
 
-void ViewerSession::send_mode_request() {
-  const int64_t time_ns = now_ns();
-  const int64_t interval_ns = std::chrono::nanoseconds(kModeRequestInterval).count();
-  if (!requested_mode_ || (mode_requested_ns_ != 0 && time_ns - mode_requested_ns_ < interval_ns)) return;
-  const auto sent = client_->send(ModeRequest{*requested_mode_});
-  if (!sent) return;  // asked again with the next pump
-  mode_requested_ns_ = time_ns;
-  requested_mode_.reset();
+void ViewerSession::request_mode(StreamMode mode) {
+  modes_->want(mode);
+  send_mode_request(*modes_, *client_);
+}
+
+void ViewerSession::follow(std::shared_ptr<ModeControl> modes) {
+  modes_ = std::move(modes);
+  modes_->begin_session(asked_mode_, welcome());
 }
 
 void ViewerSession::take_quality(StreamQuality quality) {
@@ -187,7 +186,7 @@ void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns
 }
 
 bool ViewerSession::has_picture() const {
-  if (mode_ == StreamMode::Frames) return image_ != nullptr;
+  if (mode() == StreamMode::Frames) return image_ != nullptr;
   return asset_ != nullptr && replay_->newest() != nullptr;
 }
 

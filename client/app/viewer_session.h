@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/app/line_budget.h"
+#include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
 #include "client/net/viewer_client.h"
 #include "common/base/profile.h"
@@ -27,9 +28,6 @@ using SnapshotListener = std::function<void(const std::shared_ptr<const Snapshot
 /// A call of pump() handles no further event after so long: between two calls others look at clocks and
 /// stops.
 inline constexpr std::chrono::milliseconds kPumpSlice{20};
-
-/// The server carries out one request a second.
-inline constexpr std::chrono::milliseconds kModeRequestInterval{1200};
 
 struct PictureStats {  // frames mode
   uint64_t received_frames = 0;
@@ -60,13 +58,15 @@ class ViewerSession {
   std::shared_ptr<const SceneAsset> shared_asset() const { return asset_; }
   /// What is to be shown: strands or the server's pictures, whichever was decoded last; before the first,
   /// what the Welcome says. A change of mode thus shows only once there is something to show.
-  StreamMode mode() const { return mode_; }
+  StreamMode mode() const { return modes_->shown(); }
   /// Why, for a person.
-  const std::string& mode_reason() const { return mode_reason_; }
-  uint64_t mode_changes() const { return mode_changes_; }
-  /// Asks for another mode, or leaves the choice to the server; at most once in kModeRequestInterval, of
-  /// several the newest.
-  void request_mode(StreamMode mode) { requested_mode_ = mode; }
+  std::string mode_reason() const { return modes_->look().reason; }
+  uint64_t mode_changes() const { return modes_->look().changes; }
+  /// Asks for another mode, or leaves the choice to the server, which carries out one request a second, the
+  /// newest.
+  void request_mode(StreamMode mode);
+  /// From now on `modes` is what knows the mode: it begins with this session.
+  void follow(std::shared_ptr<ModeControl> modes);
 
   /// True once there is something to show: asset and snapshot, or a picture.
   bool has_picture() const;
@@ -107,18 +107,14 @@ class ViewerSession {
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
   void show(StreamMode mode);
-  void send_mode_request();
 
   std::shared_ptr<ViewerClient> client_;
   std::unique_ptr<StrandReplay> replay_;
   std::shared_ptr<const SceneAsset> asset_;
   PictureDecoder pictures_;
-  std::shared_ptr<const Image> image_;  // a copy: others may still show it when the next one is decoded
-  StreamMode mode_ = StreamMode::Strands;
-  std::string mode_reason_;
-  uint64_t mode_changes_ = 0;
-  std::optional<StreamMode> requested_mode_;  // not yet sent
-  int64_t mode_requested_ns_ = 0;
+  std::shared_ptr<const Image> image_;        // a copy: others may still show it when the next one is decoded
+  StreamMode asked_mode_ = StreamMode::Auto;  // in the Hello
+  std::shared_ptr<ModeControl> modes_;
   bool was_shown_ = false;
   uint64_t blank_pictures_ = 0;
   uint64_t image_count_ = 0;

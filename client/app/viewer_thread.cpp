@@ -7,13 +7,14 @@
 namespace strandcast {
 namespace {
 
-/// Longest sleep while nothing arrives: how late a change of playout or mode is noticed.
+/// Longest sleep while nothing arrives: how late a change of playout is noticed.
 constexpr std::chrono::milliseconds kPumpWait{20};
 constexpr double kMsPerNs = 1e-6;
 
 }  // namespace
 
-ViewerThread::ViewerThread(std::unique_ptr<LiveConnection> live) : live_(std::move(live)) {
+ViewerThread::ViewerThread(std::unique_ptr<LiveConnection> live)
+    : live_(std::move(live)), modes_(live_->modes()) {
   publish();
   thread_ = std::thread([this] { run(); });
 }
@@ -51,12 +52,6 @@ void ViewerThread::fail(const std::string& what) {
 void ViewerThread::receive() {
   while (!is_stopping_) {
     live_->session().replay().set_playout(playout_);
-    std::optional<StreamMode> mode;
-    {
-      const std::lock_guard lock(mutex_);
-      mode = std::exchange(requested_mode_, std::nullopt);
-    }
-    if (mode) live_->request_mode(*mode);
     if (live_->pump(kPumpWait)) ++session_number_;
     publish();
   }
@@ -73,8 +68,7 @@ void ViewerThread::publish() {
   state->final_error = live_->final_error();
   state->welcome = session.welcome();
   state->asset = session.shared_asset();
-  state->mode = session.mode();
-  state->mode_reason = session.mode_reason();
+  state->mode = modes_->look();
   state->timeline = session.replay().timeline();
   state->image = session.shared_image();
   state->image_count = session.image_count();
@@ -130,8 +124,13 @@ Status ViewerThread::send(const ClientMessage& message) {
 }
 
 void ViewerThread::request_mode(StreamMode mode) {
-  const std::lock_guard lock(mutex_);
-  requested_mode_ = mode;
+  modes_->want(mode);
+  std::shared_ptr<ViewerClient> client;
+  {
+    const std::lock_guard lock(mutex_);
+    client = client_;
+  }
+  send_mode_request(*modes_, *client);
 }
 
 ViewReport ViewerThread::stop_and_report() {

@@ -26,8 +26,7 @@ struct ViewerState {
   std::optional<Error> final_error;  // trying again cannot help
   Welcome welcome;
   std::shared_ptr<const SceneAsset> asset;  // null until it came
-  StreamMode mode = StreamMode::Strands;    // what is to be shown
-  std::string mode_reason;
+  ModeView mode;
   SnapshotTimeline timeline;           // strands
   std::shared_ptr<const Image> image;  // the server's newest picture
   uint64_t image_count = 0;
@@ -65,8 +64,9 @@ class ViewerThread {
   /// As ViewerClient::send, to the running connection.
   Status send(const ClientMessage& message);
   void set_playout(Playout playout) { playout_ = playout; }
-  /// As LiveConnection::request_mode, with the next turn of the thread.
+  /// Asks the server for this mode, at once, and in later sessions too.
   void request_mode(StreamMode mode);
+  StreamMode wanted_mode() const { return modes_->look().wanted; }
   /// Ends the thread; what it measured.
   ViewReport stop_and_report();
 
@@ -78,6 +78,7 @@ class ViewerThread {
   void publish();
 
   std::unique_ptr<LiveConnection> live_;  // of the thread while it runs
+  const std::shared_ptr<ModeControl> modes_;
   uint64_t session_number_ = 1;
   std::atomic<bool> is_stopping_{false};
   std::atomic<Playout> playout_{Playout::LowLatency};
@@ -87,7 +88,6 @@ class ViewerThread {
   std::shared_ptr<const ViewerState> state_;
   std::shared_ptr<ViewerClient> client_;
   NoticeList notices_;
-  std::optional<StreamMode> requested_mode_;
 
   std::thread thread_;  // last: starts when everything else is there
 };

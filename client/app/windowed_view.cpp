@@ -63,7 +63,6 @@ class WindowedView {
         device_(std::move(device)),
         shaders_(options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir)),
         orbit_(live->session().welcome().camera),
-        wanted_mode_(options.mode),
         playout_(options.playout),
         viewer_(std::move(live)),
         state_(viewer_.look()) {
@@ -96,7 +95,7 @@ class WindowedView {
   }
 
  private:
-  bool is_frames() const { return state_->mode == StreamMode::Frames; }
+  bool is_frames() const { return state_->mode.shown == StreamMode::Frames; }
 
   void begin_session() { is_camera_sent_ = false; }
 
@@ -112,7 +111,7 @@ class WindowedView {
       is_first_draw_ = true;
       return {};
     }
-    if (wanted_mode_ == StreamMode::Strands) return made.error();
+    if (viewer_.wanted_mode() == StreamMode::Strands) return made.error();
     // Somebody else can draw them.
     device_.reset();
     own_reason_ = "frames: strands cannot be drawn here: " + made.error().to_string();
@@ -149,11 +148,10 @@ class WindowedView {
   /// Strands, frames, the server's choice, and again.
   void change_mode() {
     if (!device_) return show_message(own_reason_);
-    wanted_mode_ = wanted_mode_ == StreamMode::Auto      ? StreamMode::Strands
-                   : wanted_mode_ == StreamMode::Strands ? StreamMode::Frames
-                                                         : StreamMode::Auto;
-    viewer_.request_mode(wanted_mode_);
-    show_message(fmt::format("asking for {}", to_string(wanted_mode_)));
+    const StreamMode last = viewer_.wanted_mode();
+    viewer_.request_mode(last == StreamMode::Auto      ? StreamMode::Strands
+                         : last == StreamMode::Strands ? StreamMode::Frames
+                                                       : StreamMode::Auto);
   }
 
   /// Tells the server about once a second what this machine makes of the stream.
@@ -259,8 +257,8 @@ class WindowedView {
       hud.mode +=
           fmt::format(", {:.3g} % of them every {} steps within {:.2g} mm", now.quality.strand_share * 1e2,
                       now.quality.rate_divisor, now.quality.bound_m * 1e3);
-    if (wanted_mode_ == StreamMode::Auto) hud.mode = "auto: " + hud.mode;
-    hud.mode_reason = own_reason_.empty() ? now.mode_reason : own_reason_;
+    hud.mode_wish = now.mode.wish();
+    hud.mode_reason = own_reason_.empty() ? now.mode.reason : own_reason_;
     if (static_cast<double>(time_ns - message_ns_) * 1e-9 < kMessageS) hud.message = message_;
     hud.fps = fps_.per_s();
     hud.render_ms = render_timer_.median_ms();
@@ -292,7 +290,6 @@ class WindowedView {
   gl::ShaderLibrary shaders_;
   std::unique_ptr<Renderer> renderer_;  // below window_: it needs the window's context to go
   OrbitCamera orbit_;
-  StreamMode wanted_mode_;
   std::string own_reason_;  // why this machine needs frames; empty = the server's reason counts
   Playout playout_;
   TimelinePlayer player_;

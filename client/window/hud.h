@@ -9,7 +9,8 @@ namespace strandcast {
 struct HudState {
   std::string title;        // scene name and sizes
   std::string connection;   // "127.0.0.1:7878", or what is wrong with it
-  std::string mode;         // strands or frames, playout
+  std::string mode;         // what is shown: strands or frames, playout
+  std::string mode_wish;    // what was asked for, and what became of it
   std::string mode_reason;  // why, by the server or this machine
   std::string message;      // newest notice, fades out by the application
   double fps = 0.0;

@@ -38,6 +38,7 @@ void draw_hud_panel(const HudState& hud) {
     ImGui::TextUnformatted(hud.connection.c_str());
     ImGui::Separator();
     row("shows", hud.mode);
+    row("asked for", hud.mode_wish);
     if (!hud.mode_reason.empty()) row("because", hud.mode_reason);
     row("picture", fmt::format("{:.0f} fps, {:.1f} ms", hud.fps, hud.render_ms));
     row("server step", fmt::format("{:.2f} ms, x{:.2f} real time", hud.sim_ms, hud.realtime_factor));

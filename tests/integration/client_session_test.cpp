@@ -3,6 +3,7 @@
 #include <zstd.h>
 
 #include <atomic>
+#include <future>
 
 #include "client/app/viewer_session.h"
 #include "client/app/viewer_thread.h"
@@ -196,8 +197,39 @@ TEST(ViewerThread, DecodesAndAcknowledgesEveryFrameWhileNobodyLooks) {
   EXPECT_EQ(state->timeline.newest()->tick, kFrames);
   EXPECT_EQ(state->timeline.snapshots().size(), 1u) << "what nobody looked at does not pile up";
   viewer.request_mode(StreamMode::Auto);
-  EXPECT_TRUE(eventually([&] { return viewer.look()->mode_reason == "as before"; }));
+  EXPECT_TRUE(eventually([&] { return viewer.look()->mode.reason == "as before"; }));
   EXPECT_THAT(to_lines(viewer.stop_and_report()), HasSubstr("decoded_frames=50\n"));
+}
+
+TEST(ViewerThread, SendsEveryWishForAModeAtOnce) {
+  std::promise<std::vector<StreamMode>> asked;
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(kStrands, kVertices));
+    std::vector<StreamMode> modes;
+    while (modes.size() < 3)
+      if (const auto request = peer.read_until<ModeRequest>())
+        modes.push_back(request->mode);
+      else
+        break;
+    asked.set_value(modes);
+    peer.send(ModeChange{StreamMode::Strands, "nothing else is to be had", 0, 0});
+    peer.read_to_end();
+  });
+  auto live = LiveConnection::open(config_for(server.port()));
+  ASSERT_TRUE(live) << live.error().to_string();
+  ViewerThread viewer(std::move(*live));
+  const std::vector<StreamMode> wishes = {StreamMode::Strands, StreamMode::Auto, StreamMode::Frames};
+  for (const StreamMode mode : wishes) viewer.request_mode(mode);
+  EXPECT_EQ(viewer.wanted_mode(), StreamMode::Frames);
+  EXPECT_EQ(asked.get_future().get(), wishes) << "a key press does not wait for a clock";
+  ASSERT_TRUE(eventually([&] {
+    const ModeView now = viewer.look()->mode;
+    return now.wanted == StreamMode::Frames && now.is_answered;
+  }));
+  const ModeView mode = viewer.look()->mode;
+  EXPECT_EQ(mode.wanted, StreamMode::Frames);
+  EXPECT_EQ(mode.given, StreamMode::Strands);
+  EXPECT_EQ(mode.wish(), "frames, not to be had");
 }
 
 }  // namespace

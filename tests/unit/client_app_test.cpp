@@ -4,6 +4,7 @@
 
 #include "client/app/clip_store.h"
 #include "client/app/line_budget.h"
+#include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
 #include "client/app/stop_signal.h"
 #include "client/app/stream_check.h"
@@ -83,6 +84,62 @@ TEST(TickHashes, KeepTheNewestAlsoWhenTicksBeginAgain) {
   EXPECT_FALSE(hashes.find(101));
   EXPECT_EQ(hashes.find(102), 109u);
   EXPECT_EQ(hashes.find(1), 9u) << "again: the newer counts";
+}
+
+Welcome welcome_to(StreamMode mode) {
+  Welcome welcome;
+  welcome.mode = mode;
+  welcome.mode_reason = "at first";
+  return welcome;
+}
+
+TEST(ModeControl, AWishIsTakenOnceAndGivenBackWhenItCouldNotBeSent) {
+  ModeControl modes(StreamMode::Auto);
+  modes.begin_session(StreamMode::Auto, welcome_to(StreamMode::Strands));
+  EXPECT_FALSE(modes.take_request()) << "the Hello has said it";
+  modes.want(StreamMode::Frames);
+  EXPECT_EQ(modes.take_request(), StreamMode::Frames);
+  EXPECT_FALSE(modes.take_request());
+  modes.give_back_request();
+  modes.want(StreamMode::Strands);
+  EXPECT_EQ(modes.take_request(), StreamMode::Strands) << "of several the newest";
+  modes.want(StreamMode::Strands);
+  EXPECT_EQ(modes.take_request(), StreamMode::Strands) << "a person may ask again";
+}
+
+TEST(ModeControl, AWishThatCameBetweenTwoSessionsIsTold) {
+  ModeControl modes(StreamMode::Auto);
+  modes.begin_session(StreamMode::Auto, welcome_to(StreamMode::Strands));
+  modes.want(StreamMode::Frames);  // while the next session is being opened with the old wish
+  modes.begin_session(StreamMode::Auto, welcome_to(StreamMode::Strands));
+  EXPECT_FALSE(modes.look().is_answered);
+  EXPECT_EQ(modes.take_request(), StreamMode::Frames);
+  modes.begin_session(StreamMode::Frames, welcome_to(StreamMode::Frames));
+  EXPECT_FALSE(modes.take_request()) << "this Hello has said it";
+  EXPECT_TRUE(modes.look().is_answered);
+}
+
+TEST(ModeControl, TellsWhatWasAskedWhatWasGivenAndWhatIsShownApart) {
+  ModeControl modes(StreamMode::Auto);
+  modes.begin_session(StreamMode::Auto, welcome_to(StreamMode::Strands));
+  EXPECT_EQ(modes.look().wish(), "auto");
+  EXPECT_EQ(modes.look().reason, "at first");
+  modes.want(StreamMode::Frames);
+  EXPECT_EQ(modes.look().wish(), "frames, asking the server");
+  (void)modes.take_request();
+  modes.note_answer({StreamMode::Frames, "asked for", 64, 36});
+  EXPECT_EQ(modes.look().given, StreamMode::Frames);
+  EXPECT_EQ(modes.look().shown, StreamMode::Strands) << "until the first picture is decoded";
+  EXPECT_EQ(modes.look().wish(), "frames, not here yet");
+  EXPECT_TRUE(modes.note_shown(StreamMode::Frames));
+  EXPECT_FALSE(modes.note_shown(StreamMode::Frames));
+  EXPECT_EQ(modes.look().changes, 1u);
+  EXPECT_EQ(modes.look().wish(), "frames");
+  modes.want(StreamMode::Strands);
+  (void)modes.take_request();
+  modes.note_answer({StreamMode::Frames, "no strands today", 64, 36});
+  EXPECT_EQ(modes.look().wish(), "strands, not to be had");
+  EXPECT_EQ(modes.look().reason, "no strands today");
 }
 
 /// A program that is in the middle of something that looks at nothing.
