@@ -246,19 +246,32 @@ PredictorWeights fit_weights(const StrandChain& chain, const std::vector<int32_t
   return best;
 }
 
-std::vector<int32_t> find_residual(const StrandChain& chain, const PredictorWeights& weights,
-                                   const std::vector<int32_t>& velocity) {
-  CHECK(velocity.size() == 3 * chain.plane_size());
-  std::vector<int32_t> residual(velocity.size());
+namespace {
+
+/// work(i, prediction) for every value of (3 x vertex_count x strand_count), in the order of decoding:
+/// `velocity` is known for all before.
+template <class Work>
+void for_each_prediction(const StrandChain& chain, const PredictorWeights& weights, const int32_t* velocity,
+                         Work work) {
   std::vector<uint32_t> sum(chain.strand_count);
-  for_each_row(chain, weights, velocity.data(),
+  for_each_row(chain, weights, velocity,
                [&](size_t begin, const RowFeatures& features, const RowWeights& row_weights) {
                  sum_rows(features, row_weights, 0, sum.data(), sum.size());
                  const NeighbourTerms neighbours(row_weights);
                  for (size_t s = 0; s < sum.size(); ++s)
-                   residual[begin + s] = wrapping_difference(velocity[begin + s],
-                                                             neighbours.predict(chain, features, sum[s], s));
+                   work(begin + s, neighbours.predict(chain, features, sum[s], s));
                });
+}
+
+}  // namespace
+
+std::vector<int32_t> find_residual(const StrandChain& chain, const PredictorWeights& weights,
+                                   const std::vector<int32_t>& velocity) {
+  CHECK(velocity.size() == 3 * chain.plane_size());
+  std::vector<int32_t> residual(velocity.size());
+  for_each_prediction(chain, weights, velocity.data(), [&](size_t i, int32_t prediction) {
+    residual[i] = wrapping_difference(velocity[i], prediction);
+  });
   return residual;
 }
 
@@ -266,15 +279,9 @@ std::vector<int32_t> find_velocity(const StrandChain& chain, const PredictorWeig
                                    const std::vector<int32_t>& residual) {
   CHECK(residual.size() == 3 * chain.plane_size());
   std::vector<int32_t> velocity(residual.size());
-  std::vector<uint32_t> sum(chain.strand_count);
-  for_each_row(chain, weights, velocity.data(),
-               [&](size_t begin, const RowFeatures& features, const RowWeights& row_weights) {
-                 sum_rows(features, row_weights, 0, sum.data(), sum.size());
-                 const NeighbourTerms neighbours(row_weights);
-                 for (size_t s = 0; s < sum.size(); ++s)
-                   velocity[begin + s] =
-                       wrapping_sum(residual[begin + s], neighbours.predict(chain, features, sum[s], s));
-               });
+  for_each_prediction(chain, weights, velocity.data(), [&](size_t i, int32_t prediction) {
+    velocity[i] = wrapping_sum(residual[i], prediction);
+  });
   return velocity;
 }
 

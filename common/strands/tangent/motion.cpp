@@ -164,40 +164,28 @@ class EscapeWalk {
 void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
                  TangentFrame& frame) {
   EscapeWalk escapes(frame.codes.escapes[slice]);
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    const MotionRow row(layout, history, frame, v);
-    row.sum_features(slice);
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
-         place += kLaneCount) {
-      Expected expected;
-      row.expect(place, expected);
-      const size_t at = row.at(place);
-      IntLaneVectors position = expected.placed(load_codes(frame.codes, at));
-      escapes.place(at, position, [&](size_t lane) { return row.last(at + lane); });
-      row.store(expected, place, position);
-    }
-  }
+  for_each_block(layout, history, slice, frame,
+                 [&](const MotionRow& row, size_t place, const Expected& moved) {
+                   const size_t at = row.at(place);
+                   IntLaneVectors position = moved.placed(load_codes(frame.codes, at));
+                   escapes.place(at, position, [&](size_t lane) { return row.last(at + lane); });
+                   row.store(moved, place, position);
+                 });
 }
 
 void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
                   TangentFrame& frame) {
   EscapeWalk escapes(frame.codes.escapes[slice]);
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    const MotionRow row(layout, history, frame, v);
-    const ShapeRow shape(layout, history.quantum_m, frame.lattice, v);
-    row.sum_features(slice);
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
-         place += kLaneCount) {
-      Expected moved;
-      row.expect(place, moved);
-      const Expected expected = shape.expect(place, frame.shape_weights);
-      const size_t at = row.at(place);
-      IntLaneVectors position =
-          expected.placed(sum_of(expected.codes_of(moved), load_codes(frame.codes, at)));
-      escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
-      row.store(moved, place, position);
-    }
-  }
+  for_each_block(layout, history, slice, frame,
+                 [&](const MotionRow& row, size_t place, const Expected& moved) {
+                   const ShapeRow shape(layout, history.quantum_m, frame.lattice, row.vertex());
+                   const Expected expected = shape.expect(place, frame.shape_weights);
+                   const size_t at = row.at(place);
+                   IntLaneVectors position =
+                       expected.placed(sum_of(expected.codes_of(moved), load_codes(frame.codes, at)));
+                   escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
+                   row.store(moved, place, position);
+                 });
 }
 
 void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame) {

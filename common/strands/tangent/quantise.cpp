@@ -277,47 +277,35 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
 
 void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
                     uint32_t slice, TangentFrame& frame) {
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    const MotionRow row(layout, history, frame, v);
-    row.sum_features(slice);
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
-         place += kLaneCount) {
-      Expected expected;
-      row.expect(place, expected);
-      const size_t at = row.at(place);
-      const IntLaneVectors wanted = load_vectors(target, at);
-      Found found{expected, wanted};
-      find_codes(found);
-      escape_others(found, at, frame.codes.escapes[slice],
-                    [&](uint32_t lane) { return row.last(at + lane); });
-      store_codes(found.codes, frame.codes, at);
-      row.store(expected, place, found.position);
-    }
-  }
+  for_each_block(layout, history, slice, frame,
+                 [&](const MotionRow& row, size_t place, const Expected& moved) {
+                   const size_t at = row.at(place);
+                   const IntLaneVectors wanted = load_vectors(target, at);
+                   Found found{moved, wanted};
+                   find_codes(found);
+                   escape_others(found, at, frame.codes.escapes[slice],
+                                 [&](uint32_t lane) { return row.last(at + lane); });
+                   store_codes(found.codes, frame.codes, at);
+                   row.store(moved, place, found.position);
+                 });
 }
 
 void quantise_anchor(const TangentLayout& layout, const TangentHistory& history,
                      const Planes<int32_t>& target, uint32_t slice, TangentFrame& frame) {
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    const MotionRow row(layout, history, frame, v);
-    const ShapeRow shape(layout, history.quantum_m, frame.lattice, v);
-    row.sum_features(slice);
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
-         place += kLaneCount) {
-      Expected moved;
-      row.expect(place, moved);
-      const Expected expected = shape.expect(place, frame.shape_weights);
-      const size_t at = row.at(place);
-      const IntLaneVectors wanted = load_vectors(target, at);
-      Found found{expected, wanted, expected.codes_of(moved)};
-      find_codes(found);
-      escape_others(found, at, frame.shape_codes.escapes[slice],
-                    [&](uint32_t lane) { return lane_of(expected.base, lane); });
-      store_codes(found.codes, frame.shape_codes, at);
-      store_codes(found.apart(), frame.codes, at);
-      row.store(moved, place, found.position);
-    }
-  }
+  for_each_block(layout, history, slice, frame,
+                 [&](const MotionRow& row, size_t place, const Expected& moved) {
+                   const ShapeRow shape(layout, history.quantum_m, frame.lattice, row.vertex());
+                   const Expected expected = shape.expect(place, frame.shape_weights);
+                   const size_t at = row.at(place);
+                   const IntLaneVectors wanted = load_vectors(target, at);
+                   Found found{expected, wanted, expected.codes_of(moved)};
+                   find_codes(found);
+                   escape_others(found, at, frame.shape_codes.escapes[slice],
+                                 [&](uint32_t lane) { return lane_of(expected.base, lane); });
+                   store_codes(found.codes, frame.shape_codes, at);
+                   store_codes(found.apart(), frame.codes, at);
+                   row.store(moved, place, found.position);
+                 });
   frame.codes.escapes[slice] = frame.shape_codes.escapes[slice];
 }
 

@@ -228,6 +228,7 @@ class MotionRow {
     for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
   }
 
+  uint32_t vertex() const { return v_; }
   /// Of a place in this row, in a plane.
   size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
 
@@ -321,5 +322,23 @@ class MotionRow {
   float length_blend_;
   std::array<FeatureRows, 3> features_;
 };
+
+/// Goes through the vertices of a slice block by block, from the roots on: work(row, place, moved) gets the
+/// row of the block, its first place, and where the motion lets expect its vertices, and stores what they
+/// become.
+template <class Work>
+STRANDCAST_INLINE void for_each_block(const TangentLayout& layout, const TangentHistory& history,
+                                      uint32_t slice, TangentFrame& frame, Work work) {
+  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
+    const MotionRow row(layout, history, frame, v);
+    row.sum_features(slice);
+    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
+         place += kLaneCount) {
+      Expected moved;
+      row.expect(place, moved);
+      work(row, place, moved);
+    }
+  }
+}
 
 }  // namespace strandcast::tangent
