@@ -9,7 +9,7 @@ namespace {
 /// The words of all lines of a kept file.
 std::vector<std::vector<std::string>> lines_of(const std::string& name) {
   const auto text =
-      load_text(std::string(STRANDCAST_SOURCE_DIR) + "/tests/conformance/vectors/" + name, 1u << 20);
+      load_text(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "tests/conformance/vectors" / name, 1u << 20);
   EXPECT_TRUE(text) << text.error().to_string();
   std::vector<std::vector<std::string>> lines;
   std::istringstream stream(text ? *text : std::string());

@@ -31,7 +31,7 @@ TEST(StateHash, IsWhatTheDocumentSays) {
 }
 
 TEST(StateHash, TheWorkedExampleOfTheDocumentIsRight) {
-  const auto text = load_text(std::string(STRANDCAST_SOURCE_DIR) + "/proto/WIRE.md", 1 << 20);
+  const auto text = load_text(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "proto/WIRE.md", 1 << 20);
   ASSERT_TRUE(text) << text.error().to_string();
   EXPECT_NE(text->find("0x100000001b3"), std::string::npos);
   ReferenceHash hash;
