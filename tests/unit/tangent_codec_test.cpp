@@ -309,7 +309,7 @@ TEST(TangentCodec, PosesOfTheHeadForetellWhatLagsBehindIt) {
 TEST(TangentLayout, EveryStrandHasOnePlaceAndNeighboursComeBefore) {
   for (const uint32_t strands : {1u, 7u, 1023u, 1024u, 2047u, 5000u}) {
     HairMotion hair({strands, 3, MotionKind::Still});
-    const TangentLayout layout = make_tangent_layout(strands, 3, hair.rest_in_head());
+    const Layout layout = make_layout(strands, 3, hair.rest_in_head());
     EXPECT_EQ(layout.slice_count(), strands < 1024 ? 1u : 8u);
     std::set<uint32_t> seen;
     for (uint32_t slice = 0; slice < layout.slice_count(); ++slice) {
@@ -334,7 +334,7 @@ TEST(TangentLayout, EveryStrandHasOnePlaceAndNeighboursComeBefore) {
 TEST(TangentLayout, TheFirstSlicesThinTheGroomEvenly) {
   constexpr uint32_t kStrands = 4096;
   HairMotion hair({kStrands, 2, MotionKind::Still});
-  const TangentLayout layout = make_tangent_layout(kStrands, 2, hair.rest_in_head());
+  const Layout layout = make_layout(kStrands, 2, hair.rest_in_head());
   const auto share_left = [&](uint32_t slices) {
     int left = 0;
     int all = 0;

@@ -366,7 +366,7 @@ TEST(StrandBytes, BombsInPlaceOfSymbolTablesAreRefused) {
     EXPECT_EQ(decoded.error().place, "symbol tables");
   }
   // Tables that do not rise would make a share of nothing or less.
-  const Bytes flat = compressed(Bytes(sizeof(TangentTables)), ContentSize::Declared);
+  const Bytes flat = compressed(Bytes(sizeof(Tables)), ContentSize::Declared);
   Bytes message(key->message.begin(), key->message.begin() + kTablesAt);
   ByteWriter writer(message);
   writer.put(static_cast<uint32_t>(flat.size()));
@@ -376,6 +376,28 @@ TEST(StrandBytes, BombsInPlaceOfSymbolTablesAreRefused) {
   ASSERT_FALSE(decoded);
   EXPECT_THAT(decoded.error().message, testing::HasSubstr("does not rise"));
   EXPECT_TRUE(stream.decoder->decode(key->message));
+}
+
+// Before anything is decoded with it: a hostile server could announce the hash of what would come out.
+TEST(StrandBytes, UnknownFlagsAndLengthsBeyondTheLastOneAreRefused) {
+  Stream stream("tangent");
+  ASSERT_TRUE(stream.decoder->decode(stream.next()->message));
+  const auto delta = stream.next();
+  constexpr size_t kFlagsAt = kFrameHeaderBytes + kStrandFixedBytes;
+  constexpr size_t kBlendAt = kFlagsAt + 1;
+  for (const int blend : {kMaxLengthBlend + 1, 255}) {
+    Bytes message = delta->message;
+    message[kBlendAt] = static_cast<std::byte>(blend);
+    const auto decoded = stream.decoder->decode(message);
+    ASSERT_FALSE(decoded);
+    EXPECT_EQ(decoded.error().code, ErrorCode::BadInput);
+    EXPECT_EQ(decoded.error().message,
+              fmt::format("strand payload blends lengths by {}/16, at most 16 are possible", blend));
+  }
+  Bytes message = delta->message;
+  message[kFlagsAt] = std::byte{2};
+  EXPECT_EQ(stream.decoder->decode(message).error().message, "strand payload has flags 2, known is 1");
+  EXPECT_TRUE(stream.decoder->decode(delta->message)) << "the stream goes on";
 }
 
 // ---- assets and pictures ----

@@ -17,7 +17,7 @@
 namespace strandcast::tangent {
 namespace {
 
-constexpr uint8_t kTangentCodecNumber = 5;
+constexpr uint8_t kCodecNumber = 5;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
@@ -29,18 +29,18 @@ struct BodyHead {
 };
 
 /// What a stream remembers on both sides.
-struct TangentChain {
-  TangentHistory history;
+struct Chain {
+  History history;
   SymbolSizes sizes;
-  TangentTables tables = make_first_tables();
+  Tables tables = make_first_tables();
 
-  void reset(const TangentLayout& layout) {
+  void reset(const Layout& layout) {
     history.reset(layout);
     sizes.reset(layout);
     tables = make_first_tables();
   }
   /// After an anchor: what a joiner knows, and no more. The tables stay.
-  void forget_motion(const TangentLayout& layout) {
+  void forget_motion(const Layout& layout) {
     history.forget_motion();
     sizes.reset(layout);
   }
@@ -48,13 +48,13 @@ struct TangentChain {
 
 /// work(first, count) for all slices, `at_once` of them at a time.
 template <class Work>
-void for_each_slice(const TangentLayout& layout, uint32_t at_once, Work work) {
+void for_each_slice(const Layout& layout, uint32_t at_once, Work work) {
   const uint32_t count = layout.slice_count();
   for_each_part((count + at_once - 1) / at_once, threads_for(layout),
                 [&](uint32_t group) { work(group * at_once, std::min(at_once, count - group * at_once)); });
 }
 template <class Work>
-void for_each_slice(const TangentLayout& layout, Work work) {
+void for_each_slice(const Layout& layout, Work work) {
   for_each_slice(layout, 1, [&](uint32_t slice, uint32_t) { work(slice); });
 }
 
@@ -62,8 +62,7 @@ void for_each_slice(const TangentLayout& layout, Work work) {
 constexpr int32_t kFarthestTarget = kMaxLattice - 2 * kStepsPerBound;
 
 /// `planes` lends its memory.
-Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot,
-                          Planes<int32_t> planes = {}) {
+Planes<int32_t> planes_of(const Layout& layout, const Snapshot& snapshot, Planes<int32_t> planes = {}) {
   for (size_t axis = 0; axis < 3; ++axis) {
     planes[axis].assign(layout.plane_size(), 0);
     for (size_t v = 0; v < layout.vertex_count; ++v) {
@@ -78,8 +77,7 @@ Planes<int32_t> planes_of(const TangentLayout& layout, const Snapshot& snapshot,
 }
 
 /// Of one slice; `snapshot` has room for all.
-void set_lattice(const TangentLayout& layout, const Planes<int32_t>& planes, uint32_t slice,
-                 Snapshot& snapshot) {
+void set_lattice(const Layout& layout, const Planes<int32_t>& planes, uint32_t slice, Snapshot& snapshot) {
   const size_t end = layout.slice_begin[slice + 1];
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t v = 0; v < layout.vertex_count; ++v) {
@@ -103,7 +101,7 @@ Snapshot without_lattice(const Snapshot& snapshot) {
   return copy;
 }
 
-class TangentEncoder final : public StrandEncoder {
+class Encoder final : public StrandEncoder {
  public:
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
@@ -136,9 +134,9 @@ class TangentEncoder final : public StrandEncoder {
     CHECK(snapshot.strand_count > 0 && snapshot.vertex_count > 0 && snapshot.quantum_m > 0.0f);
     CHECK(snapshot.lattice.size() == 3 * snapshot.plane_size());
     const bool has_rest = rest_in_head_m_.size() == snapshot.plane_size();
-    layout_ = make_tangent_layout(
-        snapshot.strand_count, snapshot.vertex_count,
-        has_rest ? std::span<const glm::vec3>(rest_in_head_m_) : std::span<const glm::vec3>());
+    layout_ =
+        make_layout(snapshot.strand_count, snapshot.vertex_count,
+                    has_rest ? std::span<const glm::vec3>(rest_in_head_m_) : std::span<const glm::vec3>());
     chain_.reset(layout_);
     chain_.history.quantum_m = snapshot.quantum_m;
     // As if the strands had always been where they are: the first frame is an anchor that nobody follows.
@@ -172,7 +170,7 @@ class TangentEncoder final : public StrandEncoder {
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
     Snapshot decoded = begin(snapshot);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
-    std::vector<TangentTables> tables(layout_.slice_count(), chain_.tables);
+    std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
     Slices slices(layout_.slice_count());
     for_each_slice(layout_, [&](uint32_t slice) {
       quantise_slice(layout_, chain_.history, target_, slice, frame_);
@@ -196,7 +194,7 @@ class TangentEncoder final : public StrandEncoder {
     Slices shape_slices(layout_.slice_count());
     for_each_slice(layout_, [&](uint32_t slice) {
       quantise_anchor(layout_, chain_.history, target_, slice, frame_);
-      TangentTables tables = chain_.tables;
+      Tables tables = chain_.tables;
       write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]);
       writers_[slice].finish(slices[slice]);
       tables = chain_.tables;
@@ -256,15 +254,15 @@ class TangentEncoder final : public StrandEncoder {
                                     std::span<const std::byte> body) {
     std::vector<std::byte> payload;
     payload.reserve(kStrandFixedBytes + body.size());
-    append_fixed_part(decoded, kTangentCodecNumber, payload);
+    append_fixed_part(decoded, kCodecNumber, payload);
     ByteWriter(payload).put_bytes(body);
     return make_encoded_frame(header, payload);
   }
 
   std::vector<glm::vec3> rest_in_head_m_;
-  TangentLayout layout_;
-  TangentChain chain_;
-  TangentFrame frame_;
+  Layout layout_;
+  Chain chain_;
+  Frame frame_;
   SymbolSizes next_sizes_;
   SymbolSizes no_sizes_;
   // Kept for their memory.
@@ -276,19 +274,19 @@ class TangentEncoder final : public StrandEncoder {
   bool has_chain_ = false;
 };
 
-class TangentDecoder final : public StrandDecoder {
+class Decoder final : public StrandDecoder {
  public:
-  explicit TangentDecoder(const StrandStreamLimits& limits) : limits_(limits) {}
+  explicit Decoder(const StrandStreamLimits& limits) : limits_(limits) {}
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
-    make_layout(fits ? rest_in_head_m : std::span<const glm::vec3>());
+    reset_layout(fits ? rest_in_head_m : std::span<const glm::vec3>());
   }
 
   Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> bytes) override {
-    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, kTangentCodecNumber, limits_));
+    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, kCodecNumber, limits_));
     RETURN_IF_ERROR(check_chain(message.header, sequence_));
-    if (layout_.strand_count == 0) make_layout({});
+    if (layout_.strand_count == 0) reset_layout({});
     auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
     if (message.header.opcode == Opcode::StrandKeyframe)
       RETURN_IF_ERROR(read_keyframe(message, *snapshot));
@@ -299,8 +297,8 @@ class TangentDecoder final : public StrandDecoder {
   }
 
  private:
-  void make_layout(std::span<const glm::vec3> rest_in_head_m) {
-    layout_ = make_tangent_layout(limits_.strand_count, limits_.vertex_count, rest_in_head_m);
+  void reset_layout(std::span<const glm::vec3> rest_in_head_m) {
+    layout_ = make_layout(limits_.strand_count, limits_.vertex_count, rest_in_head_m);
     frame_.resize(layout_);
     next_sizes_.reset(layout_);
     no_sizes_.reset(layout_);
@@ -308,7 +306,7 @@ class TangentDecoder final : public StrandDecoder {
   }
 
   Status read_keyframe(const StrandMessage& message, Snapshot& snapshot) {
-    TangentChain chain;
+    Chain chain;
     chain.reset(layout_);
     chain.history.quantum_m = message.fixed.quantum_m;
     ByteReader body(message.body);
@@ -321,7 +319,7 @@ class TangentDecoder final : public StrandDecoder {
     if (auto filled = zstd_.fill(packed, std::as_writable_bytes(std::span(chain.tables))); !filled)
       return at("symbol tables", filled.error());
     RETURN_IF_ERROR(check_tables(chain.tables));
-    TangentTables tables = chain.tables;
+    Tables tables = chain.tables;
     RETURN_IF_ERROR(
         read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, snapshot,
                     [&](uint32_t slice) { place_shape(layout_, chain.history.quantum_m, slice, frame_); }));
@@ -349,6 +347,10 @@ class TangentDecoder final : public StrandDecoder {
     if (head.flags > kAnchorFlag)
       return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
                         kAnchorFlag);
+    if (head.length_blend > kMaxLengthBlend)
+      return make_error(ErrorCode::BadInput,
+                        "strand payload blends lengths by {}/16, at most {} are possible", head.length_blend,
+                        kMaxLengthBlend);
     frame_.length_blend = head.length_blend;
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     ValueReader weights;
@@ -357,7 +359,7 @@ class TangentDecoder final : public StrandDecoder {
     if (!weights.is_spent())
       return make_error(ErrorCode::BadInput, "the weights do not end where their symbols end");
     frame_.apply_weights();
-    TangentTables tables = chain_.tables;
+    Tables tables = chain_.tables;
     RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {
       const auto place = is_anchor ? place_anchor : place_slice;
       place(layout_, chain_.history, slice, frame_);
@@ -377,14 +379,14 @@ class TangentDecoder final : public StrandDecoder {
   /// Reads `codes` of all slices, to the last byte; place(slice) finds their positions. `tables` become those
   /// that the slices end with.
   template <class Place>
-  Status read_slices(std::span<const std::byte> source, TangentTables& tables, const SymbolSizes& sizes,
-                     TangentCodes& codes, Snapshot& snapshot, Place place) {
+  Status read_slices(std::span<const std::byte> source, Tables& tables, const SymbolSizes& sizes,
+                     Codes& codes, Snapshot& snapshot, Place place) {
     std::vector<ValueReader> readers(layout_.slice_count());
     ASSIGN_OR_RETURN(const auto rest, open_slices(source, readers));
     if (!rest.empty())
       return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
                         rest.size());
-    std::vector<TangentTables> learnt(layout_.slice_count(), tables);
+    std::vector<Tables> learnt(layout_.slice_count(), tables);
     snapshot.lattice.resize(3 * snapshot.plane_size());
     for_each_slice(layout_, kSlicesAtOnce, [&](uint32_t begin, uint32_t count) {
       std::vector<SliceSymbols> symbols;
@@ -416,7 +418,7 @@ class TangentDecoder final : public StrandDecoder {
     return {};
   }
 
-  static Status check_tables(const TangentTables& tables) {
+  static Status check_tables(const Tables& tables) {
     for (size_t i = 0; i < tables.size(); ++i) {
       bool is_rising = tables[i].start[0] == 0;
       for (uint32_t k = 0; k < kSymbolCount; ++k) is_rising &= tables[i].share(k) > 0;
@@ -432,9 +434,9 @@ class TangentDecoder final : public StrandDecoder {
   }
 
   StrandStreamLimits limits_;
-  TangentLayout layout_;
-  TangentChain chain_;
-  TangentFrame frame_;
+  Layout layout_;
+  Chain chain_;
+  Frame frame_;
   SymbolSizes next_sizes_;
   SymbolSizes no_sizes_;
   ZstdDecompressor zstd_;
@@ -449,10 +451,10 @@ float lattice_step_m(float bound_m) {
 }
 
 std::unique_ptr<StrandEncoder> make_encoder() {
-  return std::make_unique<TangentEncoder>();
+  return std::make_unique<Encoder>();
 }
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits) {
-  return std::make_unique<TangentDecoder>(limits);
+  return std::make_unique<Decoder>(limits);
 }
 
 }  // namespace strandcast::tangent

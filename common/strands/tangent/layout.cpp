@@ -47,7 +47,7 @@ uint32_t slice_of(uint32_t i, uint32_t strand_count) {
   return 4 + static_cast<uint32_t>(eighth / 2);
 }
 
-void find_neighbours(TangentLayout& layout, std::span<const glm::vec3> rest_in_head_m) {
+void find_neighbours(Layout& layout, std::span<const glm::vec3> rest_in_head_m) {
   for (auto& neighbour : layout.neighbour) neighbour.assign(layout.stride, layout.no_neighbour());
   if (rest_in_head_m.empty()) return;
   for (uint32_t slice = 0; slice < layout.slice_count(); ++slice) {
@@ -75,8 +75,7 @@ void find_neighbours(TangentLayout& layout, std::span<const glm::vec3> rest_in_h
 
 }  // namespace
 
-TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
-                                  std::span<const glm::vec3> rest_in_head_m) {
+Layout make_layout(uint32_t strand_count, uint32_t vertex_count, std::span<const glm::vec3> rest_in_head_m) {
   CHECK(rest_in_head_m.empty() || rest_in_head_m.size() == size_t{strand_count} * vertex_count);
   const std::vector<uint32_t> order = curve_order(strand_count, rest_in_head_m);
   const bool is_sliced = strand_count >= kThinnings * kStrandsPerSlice;
@@ -84,7 +83,7 @@ TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
   for (uint32_t i = 0; i < strand_count; ++i)
     slices[is_sliced ? slice_of(i, strand_count) : 0].push_back(order[i]);
 
-  TangentLayout layout;
+  Layout layout;
   layout.strand_count = strand_count;
   layout.vertex_count = vertex_count;
   for (const auto& slice : slices) {

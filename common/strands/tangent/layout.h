@@ -1,4 +1,4 @@
-// TangentLayout: what the "tangent" codec knows of a groom before the first frame, computed alike on both
+// Layout: what the "tangent" codec knows of a groom before the first frame, computed alike on both
 // sides from the rest shape: the order in which strands are coded, the slices, who is whose neighbour, and
 // rest lengths. Private to common/strands/tangent.
 #pragma once
@@ -18,7 +18,7 @@ inline constexpr uint32_t kNoStrand = UINT32_MAX;
 
 /// Strands in coding order. A place is a position in that order; slices begin at whole blocks, so some places
 /// at a slice's end hold no strand. The last block of all, `no_neighbour()`, holds zeros in every array.
-struct TangentLayout {
+struct Layout {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   uint32_t stride = 0;                             // places, the block of zeros included
@@ -39,7 +39,6 @@ struct TangentLayout {
 ///
 /// Slices hold every 8th strand along a curve through the roots, then those halfway between, and so on, so
 /// that the first n slices are an even thinning of the groom.
-TangentLayout make_tangent_layout(uint32_t strand_count, uint32_t vertex_count,
-                                  std::span<const glm::vec3> rest_in_head_m);
+Layout make_layout(uint32_t strand_count, uint32_t vertex_count, std::span<const glm::vec3> rest_in_head_m);
 
 }  // namespace strandcast::tangent

@@ -7,18 +7,18 @@
 #include "common/strands/wrapping.h"
 
 namespace strandcast::tangent {
-Threads threads_for(const TangentLayout& layout) {
+Threads threads_for(const Layout& layout) {
   constexpr size_t kManyEnough = 40'000;  // vertices
   return layout.plane_size() >= kManyEnough ? Threads::All : Threads::One;
 }
 
-uint32_t motion_class_count(const TangentLayout& layout) {
+uint32_t motion_class_count(const Layout& layout) {
   const size_t vertices = size_t{layout.strand_count} * layout.vertex_count;
   if (vertices < kManyVertices) return kFewMotionClasses;
   return std::min(kMotionClassCount, layout.vertex_count);
 }
 
-uint32_t motion_class(const TangentLayout& layout, uint32_t v) {
+uint32_t motion_class(const Layout& layout, uint32_t v) {
   const uint32_t last = std::max(layout.vertex_count, 2u) - 1;
   if (size_t{layout.strand_count} * layout.vertex_count >= kManyVertices)
     return v * (motion_class_count(layout) - 1) / last;
@@ -26,8 +26,8 @@ uint32_t motion_class(const TangentLayout& layout, uint32_t v) {
   return v == last ? 1 : 2;
 }
 
-FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
-                         const TangentFrame& frame, size_t axis, uint32_t v) {
+FeatureRows feature_rows(const Layout& layout, const History& history, const Frame& frame, size_t axis,
+                         uint32_t v) {
   const std::array planes = {&frame.velocity,   &history.velocity,        &history.velocity_before,
                              &history.residual, &history.residual_before, &history.drift};
   FeatureRows rows;
@@ -79,7 +79,7 @@ Lattice escaped(const Escape& escape, const Lattice& from) {
   return position;
 }
 
-void TangentHistory::reset(const TangentLayout& layout) {
+void History::reset(const Layout& layout) {
   for (size_t axis = 0; axis < 3; ++axis) {
     lattice[axis].assign(layout.plane_size(), 0);
     for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
@@ -87,19 +87,19 @@ void TangentHistory::reset(const TangentLayout& layout) {
   }
 }
 
-void TangentHistory::forget_motion() {
+void History::forget_motion() {
   for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
     for (auto& plane : *planes) std::fill(plane.begin(), plane.end(), 0.0f);
   head = {head.pose, {}};
 }
 
-void TangentCodes::resize(const TangentLayout& layout) {
+void Codes::resize(const Layout& layout) {
   // Zeros, as places without a strand must hold them also after a chain with another layout.
   for (auto* values : {&first, &second, &length}) values->assign(layout.plane_size(), 0);
   escapes.assign(layout.slice_count(), {});
 }
 
-void TangentFrame::resize(const TangentLayout& layout) {
+void Frame::resize(const Layout& layout) {
   const size_t size = layout.plane_size();
   codes.resize(layout);
   shape_codes.resize(layout);
@@ -116,7 +116,7 @@ void TangentFrame::resize(const TangentLayout& layout) {
     for (auto& row : planes) row.assign(layout.stride, 0.0f);
 }
 
-void TangentFrame::apply_weights() {
+void Frame::apply_weights() {
   for (size_t c = 0; c < motion.size(); ++c) {
     MotionClass& by = motion[c];
     for (uint32_t k = 0; k < kMotionFeatureCount; ++k)
@@ -133,7 +133,7 @@ void TangentFrame::apply_weights() {
 
 namespace {
 
-CodeLanes load_codes(const TangentCodes& codes, size_t at) {
+CodeLanes load_codes(const Codes& codes, size_t at) {
   return {load_lanes(codes.first.data() + at), load_lanes(codes.second.data() + at),
           load_lanes(codes.length.data() + at)};
 }
@@ -161,8 +161,7 @@ class EscapeWalk {
 
 }  // namespace
 
-void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
-                 TangentFrame& frame) {
+void place_slice(const Layout& layout, const History& history, uint32_t slice, Frame& frame) {
   EscapeWalk escapes(frame.codes.escapes[slice]);
   for_each_block(layout, history, slice, frame,
                  [&](const MotionRow& row, size_t place, const Expected& moved) {
@@ -173,8 +172,7 @@ void place_slice(const TangentLayout& layout, const TangentHistory& history, uin
                  });
 }
 
-void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
-                  TangentFrame& frame) {
+void place_anchor(const Layout& layout, const History& history, uint32_t slice, Frame& frame) {
   EscapeWalk escapes(frame.codes.escapes[slice]);
   for_each_block(layout, history, slice, frame,
                  [&](const MotionRow& row, size_t place, const Expected& moved) {
@@ -188,7 +186,7 @@ void place_anchor(const TangentLayout& layout, const TangentHistory& history, ui
                  });
 }
 
-void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame) {
+void place_shape(const Layout& layout, float quantum_m, uint32_t slice, Frame& frame) {
   EscapeWalk escapes(frame.shape_codes.escapes[slice]);
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     const ShapeRow shape(layout, quantum_m, frame.lattice, v);
@@ -204,7 +202,7 @@ void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, T
   }
 }
 
-void remember(TangentHistory& history, TangentFrame& frame) {
+void remember(History& history, Frame& frame) {
   history.head = frame.head;
   std::swap(history.lattice, frame.lattice);
   std::swap(history.velocity_before, history.velocity);

@@ -4,7 +4,7 @@
 // slices of one frame may be worked on side by side.
 //
 // Prediction: the last decoded position plus a weighted sum of what both sides know (features listed in
-// tangent_row.h), brought to the known length from the decoded vertex before it. Two integers correct it
+// row.h), brought to the known length from the decoded vertex before it. Two integers correct it
 // in the plane across the segment, a third one, rarely needed, its length. All lengths are in lattice steps.
 #pragma once
 
@@ -26,6 +26,7 @@ inline constexpr float kMotionWeight = 1.0f / 4096;  // unit of the weights on t
 inline constexpr float kShapeWeight = 1.0f / 1024;
 inline constexpr float kDriftShare = 0.85f;         // of the drift that is left one frame later
 inline constexpr float kLengthWeight = 1.0f / 16;   // unit of the length blend
+inline constexpr uint8_t kMaxLengthBlend = 16;      // all of the last length
 inline constexpr int32_t kEscapedLength = 1 << 20;  // in place of a length correction
 inline constexpr uint32_t kShapeFeatureCount = 16;
 inline constexpr uint32_t kShapeClassCount = 16;  // roots; first segments; and so on; the rest
@@ -45,7 +46,7 @@ struct MotionClass {
 using ShapeWeights = std::array<std::array<int16_t, kShapeFeatureCount>, kShapeClassCount>;
 
 /// What both sides remember of the frames so far.
-struct TangentHistory {
+struct History {
   float quantum_m = 0.0f;
   HeadMotion head;
   Planes<int32_t> lattice;
@@ -55,7 +56,7 @@ struct TangentHistory {
   Planes<float> residual_before;
   Planes<float> drift;  // sum of all velocities, older ones fading: where strands swing back from
 
-  void reset(const TangentLayout& layout);
+  void reset(const Layout& layout);
   /// Forgets all but where the strands are and the pose: what a keyframe tells a late joiner.
   void forget_motion();
 };
@@ -68,13 +69,13 @@ struct Escape {
 };
 
 /// The integers of one frame.
-struct TangentCodes {
+struct Codes {
   std::vector<int32_t> first;  // (vertex_count x stride) first coordinate across the segment
   std::vector<int32_t> second;
   std::vector<int32_t> length;               // correction along the segment, or kEscapedLength
   std::vector<std::vector<Escape>> escapes;  // of each slice, in coding order
 
-  void resize(const TangentLayout& layout);
+  void resize(const Layout& layout);
 };
 
 /// One frame, coded after a history.
@@ -82,14 +83,14 @@ struct TangentCodes {
 /// An *anchor* is a frame that can also be told without a history: its integers count from where the shape of
 /// the strands lets expect a vertex. Who has the history is told how far they are from those that the motion
 /// lets expect.
-struct TangentFrame {
+struct Frame {
   HeadMotion head;
   MotionWeights weights{};
   std::array<MotionClass, kMotionClassCount> motion;  // by apply_weights
   uint8_t length_blend = 0;  // of the last decoded length against the rest length, in 1/16
-  TangentCodes codes;
+  Codes codes;
   ShapeWeights shape_weights{};  // of an anchor
-  TangentCodes shape_codes;      // of an anchor, for who has no history
+  Codes shape_codes;             // of an anchor, for who has no history
   Planes<int32_t> lattice;
   Planes<float> velocity;
   Planes<float> residual;
@@ -100,41 +101,38 @@ struct TangentFrame {
   std::vector<float> zeros;
   std::vector<int32_t> zero_lattice;
 
-  void resize(const TangentLayout& layout);
+  void resize(const Layout& layout);
   /// Once `head` and `weights` are those of the frame.
   void apply_weights();
 };
 
 /// Smaller grooms are coded on the calling thread.
-Threads threads_for(const TangentLayout& layout);
+Threads threads_for(const Layout& layout);
 
 /// How many classes of weights a frame of this groom has.
-uint32_t motion_class_count(const TangentLayout& layout);
+uint32_t motion_class_count(const Layout& layout);
 
 /// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
 /// sample of strands.
-void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
-                TangentFrame& frame);
+void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target, Frame& frame);
 
 /// Weights that suit the shape of `target` best.
-ShapeWeights fit_shape(const TangentLayout& layout, float quantum_m, const Planes<int32_t>& target);
+ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target);
 
 /// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
 /// decode to. Of an anchor it fills both kinds of integers.
-void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
-                    uint32_t slice, TangentFrame& frame);
-void quantise_anchor(const TangentLayout& layout, const TangentHistory& history,
-                     const Planes<int32_t>& target, uint32_t slice, TangentFrame& frame);
+void quantise_slice(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                    uint32_t slice, Frame& frame);
+void quantise_anchor(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                     uint32_t slice, Frame& frame);
 
 /// Decoder: positions, velocities and residuals of a slice from its integers.
-void place_slice(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
-                 TangentFrame& frame);
-void place_anchor(const TangentLayout& layout, const TangentHistory& history, uint32_t slice,
-                  TangentFrame& frame);
+void place_slice(const Layout& layout, const History& history, uint32_t slice, Frame& frame);
+void place_anchor(const Layout& layout, const History& history, uint32_t slice, Frame& frame);
 /// Decoder: positions of a slice of an anchor from the integers for who has no history.
-void place_shape(const TangentLayout& layout, float quantum_m, uint32_t slice, TangentFrame& frame);
+void place_shape(const Layout& layout, float quantum_m, uint32_t slice, Frame& frame);
 
 /// The frame becomes history.
-void remember(TangentHistory& history, TangentFrame& frame);
+void remember(History& history, Frame& frame);
 
 }  // namespace strandcast::tangent

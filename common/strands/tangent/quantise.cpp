@@ -123,7 +123,7 @@ STRANDCAST_INLINE IntLaneVectors load_vectors(const Planes<int32_t>& planes, siz
   return vectors;
 }
 
-STRANDCAST_INLINE void store_codes(const CodeLanes& codes, TangentCodes& to, size_t at) {
+STRANDCAST_INLINE void store_codes(const CodeLanes& codes, Codes& to, size_t at) {
   store_lanes(codes.first, to.first.data() + at);
   store_lanes(codes.second, to.second.data() + at);
   store_lanes(codes.length, to.length.data() + at);
@@ -137,7 +137,7 @@ constexpr double kNoise = 8.0;  // steps; a thirtieth of the bound is not worth 
 constexpr double kNoiseNow = 80.0;
 
 /// Strands to fit to: runs at even distances.
-std::vector<uint32_t> sample_places(const TangentLayout& layout) {
+std::vector<uint32_t> sample_places(const Layout& layout) {
   const size_t step = kRun * std::max<size_t>(1, layout.stride / kSampleStrands);
   std::vector<uint32_t> places;
   for (size_t run = step / 2 / kRun * kRun; run < layout.no_neighbour(); run += step)
@@ -149,8 +149,8 @@ std::vector<uint32_t> sample_places(const TangentLayout& layout) {
 /// The vertices of a row as samples: like MotionRow, but with `target` in place of what is yet to be decoded.
 class SampleRow {
  public:
-  SampleRow(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
-            const TangentFrame& frame, uint32_t v)
+  SampleRow(const Layout& layout, const History& history, const Planes<int32_t>& target, const Frame& frame,
+            uint32_t v)
       : layout_(layout), history_(history), target_(target), frame_(frame), v_(v) {
     for (size_t axis = 0; axis < 3; ++axis) rows_[axis] = feature_rows(layout, history, frame, axis, v);
   }
@@ -208,10 +208,10 @@ class SampleRow {
     return layout_.neighbour[strand == MotionStrand::Neighbour ? 0 : 1][place];
   }
 
-  const TangentLayout& layout_;
-  const TangentHistory& history_;
+  const Layout& layout_;
+  const History& history_;
   const Planes<int32_t>& target_;
-  const TangentFrame& frame_;
+  const Frame& frame_;
   uint32_t v_;
   std::array<FeatureRows, 3> rows_;
 };
@@ -235,8 +235,8 @@ void add_row(const SampleRow& row, std::span<const uint32_t> sample, LeastSquare
 }
 
 /// Share of the last decoded length that predicts the next one best, in 1/16.
-uint8_t fit_length_blend(const TangentLayout& layout, const TangentHistory& history,
-                         const Planes<int32_t>& target, std::span<const uint32_t> sample) {
+uint8_t fit_length_blend(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                         std::span<const uint32_t> sample) {
   double numerator = 0.0;
   double denominator = 0.0;
   for (uint32_t v = 1; v < layout.vertex_count; ++v) {
@@ -262,8 +262,7 @@ uint8_t fit_length_blend(const TangentLayout& layout, const TangentHistory& hist
 
 }  // namespace
 
-void fit_motion(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
-                TangentFrame& frame) {
+void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target, Frame& frame) {
   const std::vector<uint32_t> sample = sample_places(layout);
   frame.length_blend = fit_length_blend(layout, history, target, sample);
   for_each_part(motion_class_count(layout), threads_for(layout), [&](uint32_t c) {
@@ -275,8 +274,8 @@ void fit_motion(const TangentLayout& layout, const TangentHistory& history, cons
   frame.apply_weights();
 }
 
-void quantise_slice(const TangentLayout& layout, const TangentHistory& history, const Planes<int32_t>& target,
-                    uint32_t slice, TangentFrame& frame) {
+void quantise_slice(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                    uint32_t slice, Frame& frame) {
   for_each_block(layout, history, slice, frame,
                  [&](const MotionRow& row, size_t place, const Expected& moved) {
                    const size_t at = row.at(place);
@@ -290,8 +289,8 @@ void quantise_slice(const TangentLayout& layout, const TangentHistory& history, 
                  });
 }
 
-void quantise_anchor(const TangentLayout& layout, const TangentHistory& history,
-                     const Planes<int32_t>& target, uint32_t slice, TangentFrame& frame) {
+void quantise_anchor(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                     uint32_t slice, Frame& frame) {
   for_each_block(layout, history, slice, frame,
                  [&](const MotionRow& row, size_t place, const Expected& moved) {
                    const ShapeRow shape(layout, history.quantum_m, frame.lattice, row.vertex());

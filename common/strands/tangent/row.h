@@ -95,13 +95,13 @@ STRANDCAST_INLINE IntLanes nearest_lanes(const Lanes& value) {
 }
 
 /// Which weights serve a row. Near the root and at the tip strands move by laws of their own.
-uint32_t motion_class(const TangentLayout& layout, uint32_t v);
+uint32_t motion_class(const Layout& layout, uint32_t v);
 
 /// Rows of floats that features of one axis lie in, those of neighbours at the neighbour's place; absent ones
 /// are zeros. What is "now" of the own row is there once its block is stored.
 using FeatureRows = std::array<const float*, kHeadFeature>;
-FeatureRows feature_rows(const TangentLayout& layout, const TangentHistory& history,
-                         const TangentFrame& frame, size_t axis, uint32_t v);
+FeatureRows feature_rows(const Layout& layout, const History& history, const Frame& frame, size_t axis,
+                         uint32_t v);
 
 struct LastAndBase {
   const int32_t* last;
@@ -222,7 +222,7 @@ struct Expected {
 
 class MotionRow {
  public:
-  MotionRow(const TangentLayout& layout, const TangentHistory& history, TangentFrame& frame, uint32_t v)
+  MotionRow(const Layout& layout, const History& history, Frame& frame, uint32_t v)
       : layout_(layout), history_(history), frame_(frame), v_(v), by_(frame.motion[motion_class(layout, v)]) {
     length_blend_ = static_cast<float>(frame.length_blend) * kLengthWeight;
     for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
@@ -288,7 +288,7 @@ class MotionRow {
   Lattice last(size_t at) const {
     return {history_.lattice[0][at], history_.lattice[1][at], history_.lattice[2][at]};
   }
-  TangentFrame& frame() const { return frame_; }
+  Frame& frame() const { return frame_; }
 
  private:
   template <MotionStrand strand>
@@ -314,9 +314,9 @@ class MotionRow {
   /// Decoded positions of the parents; not for roots.
   const int32_t* bases(size_t axis) const { return frame_.lattice[axis].data() + at(0) - layout_.stride; }
 
-  const TangentLayout& layout_;
-  const TangentHistory& history_;
-  TangentFrame& frame_;
+  const Layout& layout_;
+  const History& history_;
+  Frame& frame_;
   uint32_t v_;
   MotionClass by_;
   float length_blend_;
@@ -327,8 +327,8 @@ class MotionRow {
 /// row of the block, its first place, and where the motion lets expect its vertices, and stores what they
 /// become.
 template <class Work>
-STRANDCAST_INLINE void for_each_block(const TangentLayout& layout, const TangentHistory& history,
-                                      uint32_t slice, TangentFrame& frame, Work work) {
+STRANDCAST_INLINE void for_each_block(const Layout& layout, const History& history, uint32_t slice,
+                                      Frame& frame, Work work) {
   for (uint32_t v = 0; v < layout.vertex_count; ++v) {
     const MotionRow row(layout, history, frame, v);
     row.sum_features(slice);

@@ -44,7 +44,7 @@ STRANDCAST_INLINE LaneVectors turned(const LaneVectors& x, const LaneVectors& fr
 
 /// Edges at given places.
 struct Edges {
-  const TangentLayout& layout;
+  const Layout& layout;
   float quantum_m;
   const Planes<int32_t>& position;
 
@@ -144,7 +144,7 @@ void add_block(const ShapeRow& row, const Planes<int32_t>& target, size_t place,
 
 }  // namespace
 
-ShapeWeights fit_shape(const TangentLayout& layout, float quantum_m, const Planes<int32_t>& target) {
+ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target) {
   constexpr size_t kStep = 4 * kLaneCount;
   constexpr double kNoise = 150.0;  // steps: what edges are off by
   std::array<double, kShapeFeatureCount> noise;

@@ -25,7 +25,7 @@ inline uint32_t shape_class(uint32_t v) {
 class ShapeRow {
  public:
   /// `position` is known for earlier rows and for earlier blocks of this one.
-  ShapeRow(const TangentLayout& layout, float quantum_m, const Planes<int32_t>& position, uint32_t v)
+  ShapeRow(const Layout& layout, float quantum_m, const Planes<int32_t>& position, uint32_t v)
       : layout_(layout), quantum_m_(quantum_m), position_(position), v_(v) {}
 
   ShapeFeatures features(size_t place) const;
@@ -35,7 +35,7 @@ class ShapeRow {
   IntLaneVectors base(size_t place) const;
 
  private:
-  const TangentLayout& layout_;
+  const Layout& layout_;
   float quantum_m_;
   const Planes<int32_t>& position_;
   uint32_t v_;

@@ -94,7 +94,7 @@ struct SizeRows {
   const uint32_t* neighbour;
   const uint32_t* second_neighbour;
 
-  SizeRows(const TangentLayout& layout, const SymbolSizes& then, SymbolSizes& sizes, uint32_t v,
+  SizeRows(const Layout& layout, const SymbolSizes& then, SymbolSizes& sizes, uint32_t v,
            const uint16_t* zeros, const uint8_t* zero_bytes) {
     const size_t stride = layout.stride;
     const size_t begin = v * stride;
@@ -123,7 +123,7 @@ uint32_t length_table(uint32_t near, const SizeRows& rows, size_t place) {
 /// The integers of one vertex; true when it is escaped.
 template <class Port>
 bool code_vertex(uint32_t near, SizeRows& rows, size_t place, int32_t& first, int32_t& second,
-                 int32_t& length, TangentTables& tables, Port& port) {
+                 int32_t& length, Tables& tables, Port& port) {
   SymbolTable* const firsts = tables.data();
   SymbolTable* const seconds = firsts + kSizeCount;
   SymbolTable* const lengths = seconds + kSizeCount * kFirstSizes;
@@ -146,7 +146,7 @@ bool code_vertex(uint32_t near, SizeRows& rows, size_t place, int32_t& first, in
 }
 
 /// Strands of a slice; places without one are the last.
-size_t strands_in(const TangentLayout& layout, uint32_t slice) {
+size_t strands_in(const Layout& layout, uint32_t slice) {
   size_t end = layout.slice_begin[slice + 1];
   while (end > layout.slice_begin[slice] && layout.strand_at[end - 1] == kNoStrand) --end;
   return end - layout.slice_begin[slice];
@@ -156,8 +156,7 @@ size_t strands_in(const TangentLayout& layout, uint32_t slice) {
 template <class Coder>
 class SymbolWalk {
  public:
-  SymbolWalk(const TangentLayout& layout, uint32_t slice, const SymbolSizes& then, SymbolSizes& now,
-             Coder coder)
+  SymbolWalk(const Layout& layout, uint32_t slice, const SymbolSizes& then, SymbolSizes& now, Coder coder)
       : layout_(layout),
         begin_(layout.slice_begin[slice]),
         count_(strands_in(layout, slice)),
@@ -177,7 +176,7 @@ class SymbolWalk {
   void code(size_t i) { coder_(row_ + begin_ + i, rows_, begin_ + i); }
 
  private:
-  const TangentLayout& layout_;
+  const Layout& layout_;
   size_t begin_;
   size_t count_;
   std::vector<uint16_t> zeros_;
@@ -242,31 +241,31 @@ void read_weights(uint32_t class_count, MotionWeights& weights, ValueReader& rea
   });
 }
 
-TangentTables make_first_tables() {
-  TangentTables tables;
+Tables make_first_tables() {
+  Tables tables;
   tables.fill(first_table());
   return tables;
 }
 
-TangentTables mean_tables(std::span<const TangentTables> tables) {
-  TangentTables mean;
-  for (size_t i = 0; i < kTangentTableCount; ++i) {
+Tables mean_tables(std::span<const Tables> tables) {
+  Tables mean;
+  for (size_t i = 0; i < kTableCount; ++i) {
     for (uint32_t k = 0; k < kSymbolCount; ++k) {
       int32_t sum = 0;
-      for (const TangentTables& one : tables) sum += one[i].start[k];
+      for (const Tables& one : tables) sum += one[i].start[k];
       mean[i].start[k] = static_cast<int16_t>(sum / static_cast<int32_t>(tables.size()));
     }
   }
   return mean;
 }
 
-void SymbolSizes::reset(const TangentLayout& layout) {
+void SymbolSizes::reset(const Layout& layout) {
   across.assign(layout.plane_size(), 0);
   length.assign(layout.plane_size(), 0);
 }
 
-void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentCodes& codes,
-                   const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer) {
+void write_symbols(const Layout& layout, uint32_t slice, const Codes& codes, const SymbolSizes& then,
+                   SymbolSizes& now, Tables& tables, ValueWriter& writer) {
   WritePort port{writer};
   auto escape = codes.escapes[slice].begin();
   SymbolWalk walk(layout, slice, then, now, [&](size_t at, SizeRows& rows, size_t place) {
@@ -282,7 +281,7 @@ void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentCod
   }
 }
 
-void read_symbols(const TangentLayout& layout, const SymbolSizes& then, TangentCodes& codes, SymbolSizes& now,
+void read_symbols(const Layout& layout, const SymbolSizes& then, Codes& codes, SymbolSizes& now,
                   std::span<SliceSymbols> slices) {
   const auto make_walk = [&](SliceSymbols& symbols) {
     codes.escapes[symbols.slice].clear();

@@ -16,20 +16,20 @@ namespace strandcast::tangent {
 inline constexpr uint32_t kSizeCount = 28;  // classes of expected size
 inline constexpr uint32_t kFirstSizes = 4;  // the second coordinate is also told apart by the first
 inline constexpr uint32_t kLengthTableCount = 15;
-inline constexpr uint32_t kTangentTableCount = kSizeCount * (1 + kFirstSizes) + kLengthTableCount;
-using TangentTables = std::array<SymbolTable, kTangentTableCount>;
+inline constexpr uint32_t kTableCount = kSizeCount * (1 + kFirstSizes) + kLengthTableCount;
+using Tables = std::array<SymbolTable, kTableCount>;
 
-TangentTables make_first_tables();
+Tables make_first_tables();
 
 /// The mean of the tables that the slices of a frame ended with: the next frame starts from it.
-TangentTables mean_tables(std::span<const TangentTables> tables);
+Tables mean_tables(std::span<const Tables> tables);
 
 /// Sizes of the integers of one frame, (vertex_count x stride).
 struct SymbolSizes {
   std::vector<uint16_t> across;
   std::vector<uint8_t> length;
 
-  void reset(const TangentLayout& layout);
+  void reset(const Layout& layout);
 };
 
 /// Weights of the first classes, each told by how far it is from that of the class before.
@@ -38,20 +38,20 @@ void write_weights(uint32_t class_count, const MotionWeights& weights, ValueWrit
 void read_weights(uint32_t class_count, MotionWeights& weights, ValueReader& reader);
 
 /// Writes a slice's integers and escapes; `then` are the sizes of the frame before, `now` is filled.
-void write_symbols(const TangentLayout& layout, uint32_t slice, const TangentCodes& codes,
-                   const SymbolSizes& then, SymbolSizes& now, TangentTables& tables, ValueWriter& writer);
+void write_symbols(const Layout& layout, uint32_t slice, const Codes& codes, const SymbolSizes& then,
+                   SymbolSizes& now, Tables& tables, ValueWriter& writer);
 
 /// A slice to be read.
 struct SliceSymbols {
   uint32_t slice;
-  TangentTables& tables;
+  Tables& tables;
   ValueReader& reader;
 };
 /// As many are read side by side: a symbol waits for the one before it in its slice, but for no other slice.
 inline constexpr uint32_t kSlicesAtOnce = 2;
 /// The inverse, from untrusted bytes, for one to kSlicesAtOnce slices: any bytes give some integers; escapes
 /// take bytes, so there are no more than there is room for.
-void read_symbols(const TangentLayout& layout, const SymbolSizes& then, TangentCodes& codes, SymbolSizes& now,
+void read_symbols(const Layout& layout, const SymbolSizes& then, Codes& codes, SymbolSizes& now,
                   std::span<SliceSymbols> slices);
 
 }  // namespace strandcast::tangent
