@@ -28,13 +28,13 @@ int fail(const Error& error) {
   return kExitBadInput;
 }
 
-/// Those that stop the server, and SIGHUP where it means to read the certificate again.
-sigset_t handled_signals(const ServerConfig& config) {
+/// Those that stop the server, and SIGHUP, which means that files are to be read again.
+sigset_t handled_signals() {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
-  if (config.net.tls) sigaddset(&signals, SIGHUP);
+  sigaddset(&signals, SIGHUP);
   return signals;
 }
 
@@ -75,7 +75,8 @@ Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
   return std::move(file.tokens);
 }
 
-void reload_tls(Server& server) {
+void reload(Server& server, const NetConfig& net) {
+  if (!net.tls) return log_info("app", "SIGHUP: there is no certificate that could be read again");
   if (const Status status = server.reload_tls(); !status)
     return log_error("app", "the old certificate stays: {}", status.error().to_string());
   log_info("app", "certificate read again");
@@ -86,8 +87,7 @@ int serve(const ServerOptions& options, ServerConfig config) {
   auto tokens = load_tokens(options);
   if (!tokens) return fail(tokens.error());
   config.net.tokens = std::move(tokens).value();
-  const sigset_t signals = handled_signals(config);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  const sigset_t signals = handled_signals();
   auto server = Server::start(config);
   if (!server) return fail(server.error());
   if (const Status status = write_port(options.port_path, (*server)->port()); !status)
@@ -98,14 +98,14 @@ int serve(const ServerOptions& options, ServerConfig config) {
   const timespec poll{0, kPollNs};
   while (!(*server)->failure() && !(*server)->is_shut_down_wanted()) {
     const int signal = sigtimedwait(&signals, nullptr, &poll);
-    if (signal == SIGHUP) reload_tls(**server);
+    if (signal == SIGHUP) reload(**server, config.net);
     if (signal > 0 && signal != SIGHUP) break;
     if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
   }
   // A second signal ends the process at once.
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
-  if (config.net.tls) std::signal(SIGHUP, SIG_IGN);
+  std::signal(SIGHUP, SIG_IGN);
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
   const std::optional<Error> failure = (*server)->failure();
   (*server)->stop();
@@ -122,6 +122,10 @@ int run(int argc, const char* const* argv) {
   if (!options->help.empty()) return fmt::print("{}", options->help), 0;
   if (options->is_listing_solvers) return fmt::print("{}", list_solvers()), 0;
   init_log(options->log_level);
+  // Before anything takes time: a reload of the service may come right after its start.
+  const bool is_serving = !options->is_printing_scene && !options->is_explaining;
+  const sigset_t signals = handled_signals();
+  if (is_serving) pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   const Result<ServerConfig> config = load_config(*options);
   if (!config) return fail(config.error());
   if (options->is_printing_scene) return fmt::print("{}", to_text(config->scene)), 0;

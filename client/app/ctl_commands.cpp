@@ -199,7 +199,10 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
     std::cout << line << std::endl;
   };
   const int64_t begin_ns = now_ns();
-  while (!stop && (seconds == 0.0 || static_cast<double>(now_ns() - begin_ns) * 1e-9 < seconds)) {
+  const auto is_over = [&] {
+    return seconds > 0.0 && static_cast<double>(now_ns() - begin_ns) * 1e-9 >= seconds;
+  };
+  while (!stop && std::cout && !is_over()) {
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
       if (const auto* status = std::get_if<ServerStatus>(&event)) print(to_line(*status));
       if (const auto* notice = std::get_if<Notice>(&event)) print(notice->text);

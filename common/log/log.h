@@ -1,33 +1,48 @@
-// Logging through spdlog: one logger per process, tags are the stage names (input, scene, sim, publish,
-// encode, net, replay, render). Any thread. Levels: error = a person must act, warn = degraded, info = state
-// changes, debug = for developers. Never logs tokens.
+// Logging: one logger per process, tags are the stage names (input, scene, sim, publish, encode, net, replay,
+// render). Any thread. Never waits for whoever reads the log, and cleans what it writes: texts of strangers
+// may stand in it. Levels: error = a person must act, warn = degraded, info = state changes, debug = for
+// developers. Never logs tokens.
 #pragma once
 
-#include <spdlog/spdlog.h>
+#include <fmt/format.h>
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace strandcast {
 
-/// Sends logs to standard error at `level` ("debug", "info", "warn", "error", "off"); false if unknown.
+enum class LogLevel { Debug, Info, Warn, Error };
+
+/// Longest message of one line; the rest is cut.
+inline constexpr size_t kMaxLogMessageChars = 2'000;
+
+/// Sends logs to standard error at `level` ("debug", "info", "warn", "error", "off"); false if unknown. A
+/// reader of the process's output that goes away no longer ends it (SIGPIPE is ignored from here on).
 bool init_log(const std::string& level);
+
+bool is_logged(LogLevel level);
+/// One line; `message` is cleaned as by one_line().
+void log_line(LogLevel level, const char* tag, std::string_view message);
+/// Lines that found no room on standard error, since start.
+uint64_t dropped_log_lines();
 
 template <class... Args>
 void log_info(const char* tag, fmt::format_string<Args...> format, Args&&... args) {
-  spdlog::info("[{}] {}", tag, fmt::format(format, std::forward<Args>(args)...));
+  log_line(LogLevel::Info, tag, fmt::format(format, std::forward<Args>(args)...));
 }
 template <class... Args>
 void log_warn(const char* tag, fmt::format_string<Args...> format, Args&&... args) {
-  spdlog::warn("[{}] {}", tag, fmt::format(format, std::forward<Args>(args)...));
+  log_line(LogLevel::Warn, tag, fmt::format(format, std::forward<Args>(args)...));
 }
 template <class... Args>
 void log_error(const char* tag, fmt::format_string<Args...> format, Args&&... args) {
-  spdlog::error("[{}] {}", tag, fmt::format(format, std::forward<Args>(args)...));
+  log_line(LogLevel::Error, tag, fmt::format(format, std::forward<Args>(args)...));
 }
 template <class... Args>
 void log_debug(const char* tag, fmt::format_string<Args...> format, Args&&... args) {
-  if (spdlog::should_log(spdlog::level::debug))
-    spdlog::debug("[{}] {}", tag, fmt::format(format, std::forward<Args>(args)...));
+  if (is_logged(LogLevel::Debug))
+    log_line(LogLevel::Debug, tag, fmt::format(format, std::forward<Args>(args)...));
 }
 
 }  // namespace strandcast
