@@ -1,6 +1,7 @@
 #include "server/app/options.h"
 
 #include <CLI/CLI.hpp>
+#include <variant>
 
 #include "common/base/version.h"
 #include "common/scene/scene_file.h"
@@ -10,6 +11,61 @@ namespace {
 
 std::string version_text() {
   return fmt::format("strandcast-server {}", version());
+}
+
+constexpr double kMaxRunS = 1e9;
+constexpr double kMaxViewerMbit = 1e6;
+constexpr uint32_t kMaxExplainedViewers = 10'000;
+
+/// A number from `low` to `high`. CLI::Range lets NaN pass.
+CLI::Validator in_range(double low, double high) {
+  const std::string range = fmt::format("{}..{}", low, high);
+  return CLI::Validator(
+      [low, high, range](const std::string& text) {
+        double value = 0.0;
+        const bool is_number = CLI::detail::lexical_cast(text, value);
+        return is_number && value >= low && value <= high ? std::string() : text + " is not within " + range;
+      },
+      range);
+}
+
+/// A limit that may be set, and how far.
+struct LimitRow {
+  const char* option;
+  std::variant<uint32_t NetLimits::*, int64_t NetLimits::*, double NetLimits::*> limit;
+  double low, high;
+  const char* help;
+};
+
+const LimitRow kLimitRows[] = {
+    {"--max-sessions", &NetLimits::sessions, 1, kMaxSessions, "sessions at once"},
+    {"--max-sessions-per-address", &NetLimits::sessions_per_address, 1, kMaxSessions,
+     "sessions of one address (of IPv6: one /64) at once"},
+    {"--connections-per-s", &NetLimits::connections_per_s, 1, 10'000,
+     "new connections of one address a second, and as many at once; not on trusted loopback"},
+    {"--messages-per-s", &NetLimits::messages_per_s, 10, 10'000,
+     "messages of one session a second, and as many at once"},
+    {"--wrong-tokens", &NetLimits::wrong_tokens, 0, 1'000,
+     "wrong tokens of one address that are forgiven within the window"},
+    {"--wrong-token-window-ms", &NetLimits::wrong_token_window_ms, 1'000, 86'400'000,
+     "how long a wrong token is remembered"},
+    {"--wrong-token-block-ms", &NetLimits::wrong_token_block_ms, 1'000, 86'400'000,
+     "how long no token of an address is looked at after one wrong one too many"},
+    {"--handshake-ms", &NetLimits::handshake_ms, 100, 60'000, "time from the connection to the Hello"},
+    {"--idle-ms", &NetLimits::idle_ms, 1'000, 600'000, "silence, our pings unanswered, that ends a session"},
+    {"--stalled-ms", &NetLimits::stalled_ms, 500, 60'000,
+     "a viewer that takes or answers nothing for so long is dropped"}};
+
+void add_limit_options(CLI::App& app, NetLimits& limits) {
+  for (const LimitRow& row : kLimitRows)
+    std::visit(
+        [&](auto limit) {
+          app.add_option(row.option, limits.*limit, row.help)
+              ->check(in_range(row.low, row.high))
+              ->capture_default_str()
+              ->group("Limits");
+        },
+        row.limit);
 }
 
 void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom, std::string& explained) {
@@ -22,7 +78,8 @@ void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom
                "print the solvers and their parameters, and leave");
   app.add_option("--explain", explained, "print what runs for the scene and why, and leave")->expected(0, 1);
   app.add_option("--frame-viewers", options.explained_frame_viewers,
-                 "with --explain: assume so many frame viewers");
+                 "with --explain: assume so many frame viewers")
+      ->check(in_range(0, kMaxExplainedViewers));
   app.add_flag("--print-scene", options.is_printing_scene, "print the scene with its overrides, and leave");
 }
 
@@ -33,7 +90,19 @@ struct RawRunOptions {
   bool is_loopback_distrusted = false;
   TlsFiles tls;
   bool is_tls_only = false;
+  std::vector<std::string> trusted_proxies;
+  bool has_proxy_protocol = false;
 };
+
+void add_proxy_options(CLI::App& app, RawRunOptions& raw) {
+  auto* proxies = app.add_option("--trusted-proxy", raw.trusted_proxies,
+                                 "ADDRESS or ADDRESS/BITS of a proxy that may say for whom it connects, in "
+                                 "X-Forwarded-For or a PROXY header; repeatable");
+  proxies->expected(1)->take_all();
+  app.add_flag("--proxy-protocol", raw.has_proxy_protocol,
+               "trusted proxies begin each connection with a PROXY header of version 2")
+      ->needs(proxies);
+}
 
 void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
   NetConfig& net = options.config.net;
@@ -63,14 +132,16 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
       ->needs(certificate);
   app.add_option("--viewer-mbit", raw.viewer_mbit,
                  "most that the strands for one viewer may take, Mbit/s; 0 = no cap")
-      ->check(CLI::NonNegativeNumber);
+      ->check(in_range(0.0, kMaxViewerMbit));
   app.add_option("--gl-device", options.config.gl_device, "auto, software, hardware or a device number")
       ->capture_default_str();
   app.add_option("--shader-dir", raw.shader_folder, "read shaders from this folder instead of the program");
   app.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
-  app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(CLI::NonNegativeNumber);
+  app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));
+  add_proxy_options(app, raw);
+  add_limit_options(app, net.limits);
 }
 
 }  // namespace
@@ -98,6 +169,11 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   if (!raw.tls.certificate.empty()) options.config.net.tls = raw.tls;
   if (raw.is_tls_only) options.config.net.plain_access = PlainAccess::Nobody;
   if (raw.is_loopback_distrusted) options.config.net.loopback_trust = LoopbackTrust::LikeAllOthers;
+  for (const std::string& text : raw.trusted_proxies) {
+    ASSIGN_OR_RETURN(const AddressRange range, parse_address_range(text));
+    options.config.net.trusted_proxies.push_back(range);
+  }
+  if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;
   options.is_explaining = app.count("--explain") > 0;
   if (!explained.empty()) {
     if (!options.scene_path.empty())

@@ -25,6 +25,8 @@ namespace {
 
 constexpr size_t kMaxLoggedCharacters = 200;
 constexpr auto kStatusInterval = std::chrono::milliseconds(500);
+/// A simulation that has not stepped for so long is not ready; the rarest step takes 0.1 s.
+constexpr double kMaxReadyStepAgeS = 2.0;
 
 const char* name_of(Command command) {
   constexpr const char* kNames[] = {"pause", "resume", "step once", "reset"};
@@ -102,6 +104,7 @@ class Server::State : public NetHandler {
     follow_viewers();
   }
   void on_left(SessionId session) override;
+  Status readiness() override;
   std::string metrics() override;
 
  private:
@@ -434,6 +437,18 @@ ServerCounters Server::State::counters() const {
   return counters;
 }
 
+Status Server::State::readiness() {
+  if (const std::optional<Error> error = sim_->failure()) return *error;
+  const SimStats stats = sim_->stats();
+  if (stats.is_paused) return {};
+  if (stats.last_step_ns == 0)
+    return make_error(ErrorCode::Unavailable, "The simulation has not stepped yet.");
+  const double age_s = static_cast<double>(now_ns() - stats.last_step_ns) * 1e-9;
+  if (age_s < kMaxReadyStepAgeS) return {};
+  return make_error(ErrorCode::Unavailable, "The simulation has not stepped for {:.1f} s (limit {} s).",
+                    age_s, kMaxReadyStepAgeS);
+}
+
 std::string Server::State::metrics() {
   const ServerCounters now = counters();
   std::string text;
@@ -473,6 +488,7 @@ std::string Server::State::metrics() {
   total("input_rejected_total", now.input.rejected());
   gauge("viewers_strands", now.strand_viewers);
   gauge("viewers_frames", now.frame_viewers);
+  total("log_dropped_lines_total", dropped_log_lines());
   return text;
 }
 

@@ -5,10 +5,13 @@
 
 namespace strandcast {
 
-AddressGuard::Verdict AddressGuard::on_connection(const std::string& address, int64_t time_ns) {
-  Entry& one = entry(address, time_ns);
-  if (time_ns < one.blocked_until_ns) return Verdict::Blocked;
-  return one.rate.take(time_ns) ? Verdict::Welcome : Verdict::TooFast;
+bool AddressGuard::take_connection(const std::string& address, int64_t time_ns) {
+  return entry(address, time_ns).rate.take(time_ns);
+}
+
+bool AddressGuard::is_blocked(const std::string& address, int64_t time_ns) const {
+  const auto found = entries_.find(address);
+  return found != entries_.end() && time_ns < found->second.blocked_until_ns;
 }
 
 void AddressGuard::on_wrong_token(const std::string& address, int64_t time_ns) {

@@ -23,8 +23,10 @@ class AddressGuard {
  public:
   explicit AddressGuard(const GuardLimits& limits) : limits_(limits) {}
 
-  enum class Verdict { Welcome, TooFast, Blocked };
-  Verdict on_connection(const std::string& address, int64_t time_ns);
+  /// False when this connection is one too many.
+  bool take_connection(const std::string& address, int64_t time_ns);
+  /// True while no token of this address is looked at.
+  bool is_blocked(const std::string& address, int64_t time_ns) const;
   void on_wrong_token(const std::string& address, int64_t time_ns);
 
   size_t size() const { return entries_.size(); }

@@ -8,40 +8,31 @@
 #include "common/log/log.h"
 #include "server/net/access.h"
 #include "server/net/metrics.h"
+#include "server/net/proxy.h"
 #include "server/net/session_private.h"
 
 namespace strandcast::net {
 namespace {
 
 constexpr const char* kWebSocketPath = "/v1";
+constexpr const char* kForwardedFor = "X-Forwarded-For";
+/// Of what a peer wrote, in a line of the log.
+constexpr size_t kMaxQuotedBytes = 100;
 
 std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
 }
 
-/// An IPv4 peer of a listener on "::" counts as the IPv4 address it is.
-asio::ip::address plain_address(const asio::ip::address& address) {
-  if (address.is_v6() && address.to_v6().is_v4_mapped())
-    return asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6());
-  return address;
+IpAddress to_ip(const asio::ip::address& address) {
+  return address.is_v4() ? IpAddress(address.to_v4().to_bytes()) : IpAddress(address.to_v6().to_bytes());
 }
-
-/// A network of 64 bits is as easily had as one address of IPv4.
-std::string key_of(const asio::ip::address& address) {
-  if (!address.is_v6()) return address.to_string();
-  auto bytes = address.to_v6().to_bytes();
-  std::fill(bytes.begin() + bytes.size() / 2, bytes.end(), uint8_t{0});
-  return asio::ip::make_address_v6(bytes).to_string() + "/64";
-}
-
-using Request = http::request<http::empty_body>;
 
 bool has_body(const http::request_parser<http::empty_body>& parser) {
   return parser.get().count(http::field::transfer_encoding) > 0 || parser.content_length().value_or(0) > 0;
 }
 
 /// True when a field is there twice of which a proxy or a browser may believe the other one.
-bool is_ambiguous(const Request& request) {
+bool is_ambiguous(const http::request<http::empty_body>& request) {
   const auto fields = {http::field::host, http::field::origin, http::field::authorization,
                        http::field::sec_websocket_key, http::field::sec_websocket_version};
   return std::any_of(fields.begin(), fields.end(),
@@ -60,19 +51,36 @@ bool offers_protocol(beast::string_view header) {
   return false;
 }
 
+std::string quoted(beast::string_view text) {
+  return fmt::format("'{}'", view(text).substr(0, kMaxQuotedBytes));
+}
+
 }  // namespace
 
 Connection::Connection(Context& context, tcp::socket socket) : context_(context), stream_(std::move(socket)) {
   beast::error_code error;
-  const asio::ip::address peer = plain_address(stream_.socket().remote_endpoint(error).address());
-  const asio::ip::address local = plain_address(stream_.socket().local_endpoint(error).address());
+  const IpAddress peer = to_ip(stream_.socket().remote_endpoint(error).address());
+  const IpAddress local = to_ip(stream_.socket().local_endpoint(error).address());
   local_address_ = local.to_string();
   is_loopback_ = local.is_loopback();
   peer_.address = peer.to_string();
-  peer_.key = key_of(peer);
-  peer_.is_trusted = is_loopback_ && context.config.loopback_trust == LoopbackTrust::Trusted;
+  peer_.key = peer.key();
+  peer_.is_proxy = is_in(context.config.trusted_proxies, peer);
+  peer_.is_trusted =
+      is_loopback_ && context.config.loopback_trust == LoopbackTrust::Trusted && !peer_.is_proxy;
   peer_.accepted_ns = now_ns();
   stream_.socket().set_option(tcp::no_delay(true), error);
+}
+
+bool Connection::is_welcome() {
+  const bool is_counted = !peer_.is_trusted && !peer_.is_proxy;
+  if (is_counted && !context_.guard.take_connection(peer_.key, peer_.accepted_ns)) {
+    context_.refuse(Refusal::Rate, peer_, "connects too often");
+    return false;
+  }
+  if (context_.make_place(peer_)) return true;
+  context_.refuse(Refusal::Full, peer_, "too many connections without a Hello");
+  return false;
 }
 
 template <class Work>
@@ -86,27 +94,69 @@ void Connection::guarded(Work&& work) {
 }
 
 void Connection::start() {
-  if (context_.tls == nullptr) return read_request();
-  stream_.async_wait_readable([self = shared_from_this()](const beast::error_code& error) {
-    if (error || self->is_finished_) return self->finish();
-    self->guarded([&] { self->begin(); });
-  });
+  if (peer_.is_proxy && context_.config.proxy_protocol == ProxyProtocol::Version2)
+    return read_proxy_header(kProxyFixedBytes);
+  begin();
+}
+
+/// Exactly so many bytes: what follows belongs to TLS or HTTP.
+void Connection::read_proxy_header(size_t size) {
+  const size_t old_size = proxy_header_.size();
+  proxy_header_.resize(size);
+  asio::async_read(stream_.socket(), asio::buffer(proxy_header_) + old_size,
+                   [self = shared_from_this()](const beast::error_code& error, size_t) {
+                     self->guarded([&] { self->on_proxy_header(error); });
+                   });
+}
+
+void Connection::on_proxy_header(const beast::error_code& error) {
+  if (is_finished_) return;
+  if (error) return finish();
+  const auto bytes = std::as_bytes(std::span(proxy_header_));
+  const Result<size_t> size = proxy_header_bytes(bytes);
+  if (!size) return drop(Refusal::Proxy, size.error().to_string());
+  if (bytes.size() < *size) return read_proxy_header(*size);
+  const Result<std::optional<ProxiedPeer>> proxied = parse_proxy_header(bytes);
+  if (!proxied) return drop(Refusal::Proxy, proxied.error().to_string());
+  if (const std::optional<ProxiedPeer>& ends = *proxied) {
+    local_address_ = ends->local_address.to_string();
+    is_loopback_ = ends->local_address.is_loopback();
+    if (const auto why = stand_for(ends->address)) return drop(*why, "connects too often through a proxy");
+  }
+  begin();
+}
+
+/// From here on this is the connection of a proxy's client. It is counted like one of its own would have
+/// been.
+std::optional<Refusal> Connection::stand_for(const IpAddress& client) {
+  const std::string key = client.key();
+  const bool is_proxy = is_in(context_.config.trusted_proxies, client);
+  const bool has_many = !is_proxy && context_.waiting_of(key) >= kSpareConnectionsPerAddress;
+  peer_.address = client.to_string();
+  peer_.key = key;
+  peer_.is_proxy = is_proxy;
+  if (!is_proxy && !context_.guard.take_connection(key, peer_.accepted_ns)) return Refusal::Rate;
+  return has_many ? std::optional(Refusal::Full) : std::nullopt;
 }
 
 /// The first byte tells TLS from HTTP.
 void Connection::begin() {
-  if (!stream_.is_tls_hello()) return read_request();
-  stream_.async_accept_tls(context_.tls, [self = shared_from_this()](const beast::error_code& error) {
-    self->guarded([&] { self->on_tls(error); });
+  if (context_.tls == nullptr) return read_request();
+  stream_.async_wait_readable([self = shared_from_this()](const beast::error_code& wait_error) {
+    if (wait_error || self->is_finished_) return self->finish();
+    self->guarded([&] {
+      if (!self->stream_.is_tls_hello()) return self->read_request();
+      self->stream_.async_accept_tls(self->context_.tls, [self](const beast::error_code& error) {
+        self->guarded([&] { self->on_tls(error); });
+      });
+    });
   });
 }
 
 void Connection::on_tls(const beast::error_code& error) {
   if (is_finished_) return;
   if (!error) return read_request();
-  context_.count(&NetCounters::refused_tls);
-  log_debug("net", "connection from {}: no TLS: {}", peer_.address, error.message());
-  finish();
+  drop(Refusal::Tls, "no TLS: " + error.message());
 }
 
 /// The header only: a body would be in memory before anybody could refuse it.
@@ -125,70 +175,115 @@ void Connection::read_request() {
 
 void Connection::check_deadline(int64_t time_ns) {
   if (is_finished_ || time_ns - peer_.accepted_ns < context_.config.limits.handshake_ms * kNsPerMs) return;
-  context_.count(&NetCounters::timeouts);
-  finish();
+  drop(Refusal::Timeout,
+       fmt::format("no request answered within {} ms", context_.config.limits.handshake_ms));
 }
 
 void Connection::on_request(const beast::error_code& error) {
   if (is_finished_) return;
   if (is_gone(error)) return finish();
   if (error == http::error::header_limit || error == http::error::buffer_overflow)
-    return refuse(http::status::request_header_fields_too_large,
+    return refuse(Refusal::Request, http::status::request_header_fields_too_large,
                   fmt::format("The header of a request has at most {} bytes.", kMaxHttpHeaderBytes));
-  if (error) return refuse(http::status::bad_request, "Bad request: " + error.message());
+  if (error) return refuse(Refusal::Request, http::status::bad_request, "Bad request: " + error.message());
   const Request& request = parser_->get();
-  if (has_body(*parser_))
-    return refuse(http::status::payload_too_large, "Requests are served without a body only.");
-  if (is_ambiguous(request))
-    return refuse(http::status::bad_request, "A field is there twice that may be there once.");
+  if (is_fit(request) && is_client_known(request) && may_be_plain()) answer(request);
+}
+
+/// Nothing in it may mean one thing to us and another to somebody before us.
+bool Connection::is_fit(const Request& request) {
+  if (has_body(*parser_)) {
+    refuse(Refusal::Request, http::status::payload_too_large, "Requests are served without a body only.");
+    return false;
+  }
+  if (is_ambiguous(request)) {
+    refuse(Refusal::Request, http::status::bad_request, "A field is there twice that may be there once.");
+    return false;
+  }
+  return true;
+}
+
+/// Asks the field in which a proxy of ours says for whom it connects.
+bool Connection::is_client_known(const Request& request) {
+  if (!peer_.is_proxy || request.count(kForwardedFor) == 0) return true;
+  std::string all;
+  const auto [begin, end] = request.equal_range(kForwardedFor);
+  for (auto field = begin; field != end; ++field) {
+    if (field != begin) all.push_back(',');
+    all.append(view(field->value()));
+  }
+  const Result<IpAddress> client = forwarded_client(all, context_.config.trusted_proxies);
+  if (!client) {
+    refuse(Refusal::Proxy, http::status::bad_request, client.error().message + ".");
+    return false;
+  }
+  const std::optional<Refusal> why = stand_for(*client);
+  if (why) refuse(*why, http::status::too_many_requests, "Too many connections of one address.");
+  return !why;
+}
+
+bool Connection::may_be_plain() {
   const bool is_plain_allowed =
       context_.tls == nullptr ||
       (peer_.is_trusted && context_.config.plain_access == PlainAccess::TrustedLoopback);
-  if (!stream_.is_tls() && !is_plain_allowed) {
-    context_.count(&NetCounters::refused_tls);
-    response_.set(http::field::upgrade, "TLS/1.2");
-    response_.set(http::field::connection, "Upgrade");
-    return respond(http::status::upgrade_required, "This server speaks TLS only: use wss:// or --tls.\n");
-  }
-  if (!is_host_allowed(view(request[http::field::host]), local_address_, is_loopback_,
-                       context_.config.allowed_hosts))
-    return refuse(http::status::forbidden, "This Host is not served here (--allow-host adds one).");
-  answer(request);
+  if (stream_.is_tls() || is_plain_allowed) return true;
+  response_.set(http::field::upgrade, "TLS/1.2");
+  response_.set(http::field::connection, "Upgrade");
+  refuse(Refusal::Tls, http::status::upgrade_required, "This server speaks TLS only: use wss:// or --tls.");
+  return false;
 }
 
 void Connection::answer(const Request& request) {
+  const auto host = request[http::field::host];
+  if (!is_host_allowed(view(host), local_address_, is_loopback_, context_.config.allowed_hosts))
+    return refuse(Refusal::Host, http::status::forbidden,
+                  "This Host is not served here (--allow-host adds one).", quoted(host));
   const std::string_view path = view(request.target());
   if (websocket::is_upgrade(request) && path == kWebSocketPath) return answer_upgrade(request);
   const bool is_get = request.method() == http::verb::get;
   if (is_get && path == "/healthz") return respond(http::status::ok, "ok\n");
-  if (is_get && path == "/metrics") return answer_metrics();
-  refuse(http::status::not_found, "Not found. Here are: /healthz /metrics /v1 (WebSocket).");
+  if (is_get && path == "/readyz") return answer_readiness();
+  if (is_get && path == "/metrics") return answer_metrics(request);
+  refuse(Refusal::Path, http::status::not_found,
+         "Not found. Here are: /healthz /readyz /metrics /v1 (WebSocket).", quoted(request.target()));
 }
 
-void Connection::answer_upgrade(const Request& request) {
-  if (!is_origin_allowed(view(request[http::field::origin]), view(request[http::field::host]),
-                         context_.config.allowed_origins))
-    return refuse(http::status::forbidden,
-                  "Pages of another origin may not connect (--allow-origin adds one).");
-  if (!offers_protocol(request[http::field::sec_websocket_protocol]))
-    return refuse(http::status::bad_request,
-                  fmt::format("The WebSocket subprotocol must be {}.", kWebSocketProtocol));
-  upgrade();
+void Connection::answer_readiness() {
+  const Status status = context_.is_stopping
+                            ? Status(make_error(ErrorCode::Unavailable, "The server is stopping."))
+                            : context_.handler.readiness();
+  if (status) return respond(http::status::ok, "ready\n");
+  respond(http::status::service_unavailable, status.error().message + "\n");
 }
 
 /// What the server does is for those who may watch it: beyond trusted loopback any role's token is needed.
-void Connection::answer_metrics() {
+void Connection::answer_metrics(const Request& request) {
   constexpr std::string_view kScheme = "Bearer ";
-  const std::string_view given = view(parser_->get()[http::field::authorization]);
+  const std::string_view given = view(request[http::field::authorization]);
+  if (!peer_.is_trusted && !given.empty() && context_.guard.is_blocked(peer_.key, now_ns()))
+    return refuse(Refusal::Blocked, http::status::too_many_requests, kBlockedSentence);
   if (!peer_.is_trusted &&
       (!given.starts_with(kScheme) || !find_grant(context_.config.tokens, given.substr(kScheme.size())))) {
-    context_.count(&NetCounters::refused_token);
     if (!given.empty()) context_.guard.on_wrong_token(peer_.key, now_ns());
     response_.set(http::field::www_authenticate, "Bearer");
-    return respond(http::status::unauthorized, "/metrics needs a token here (Authorization: Bearer).\n");
+    return refuse(given.empty() ? Refusal::Path : Refusal::Token, http::status::unauthorized,
+                  "/metrics needs a token here (Authorization: Bearer).");
   }
   respond(http::status::ok, format_metrics(context_.counters_now()) + context_.handler.metrics(),
           "text/plain; version=0.0.4");
+}
+
+void Connection::answer_upgrade(const Request& request) {
+  const auto origin = request[http::field::origin];
+  if (!is_origin_allowed(view(origin), view(request[http::field::host]), context_.config.allowed_origins))
+    return refuse(Refusal::Origin, http::status::forbidden,
+                  "Pages of another origin may not connect (--allow-origin adds one).", quoted(origin));
+  const auto protocols = request[http::field::sec_websocket_protocol];
+  if (!offers_protocol(protocols))
+    return refuse(Refusal::Path, http::status::bad_request,
+                  fmt::format("The WebSocket subprotocol must be {}.", kWebSocketProtocol),
+                  quoted(protocols));
+  upgrade();
 }
 
 void Connection::upgrade() {
@@ -205,8 +300,16 @@ void Connection::upgrade() {
   session->start(parser_->release(), has_room);
 }
 
-void Connection::refuse(http::status status, const std::string& sentence) {
-  context_.count(&NetCounters::refused_http);
+/// Closes without an answer.
+void Connection::drop(Refusal why, const std::string& sentence) {
+  context_.refuse(why, peer_, sentence);
+  finish();
+}
+
+/// One sentence to the peer, and one to the log, which may quote the peer in `detail`.
+void Connection::refuse(Refusal why, http::status status, const std::string& sentence,
+                        const std::string& detail) {
+  context_.refuse(why, peer_, detail.empty() ? sentence : detail);
   respond(status, sentence + "\n");
 }
 

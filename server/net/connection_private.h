@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/net/beast_private.h"
 #include "server/net/context_private.h"
@@ -14,6 +15,9 @@ namespace strandcast::net {
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(Context& context, tcp::socket socket);
+  /// False when its address has too many connections: it is to be closed unanswered. A proxy of ours is
+  /// welcome; whom it speaks for is looked at when that is known.
+  bool is_welcome();
   void start();
   /// Ends what takes too long.
   void check_deadline(int64_t time_ns);
@@ -21,18 +25,28 @@ class Connection : public std::enable_shared_from_this<Connection> {
   const Peer& peer() const { return peer_; }
 
  private:
+  using Request = http::request<http::empty_body>;
+
   template <class Work>
   void guarded(Work&& work);
+  void read_proxy_header(size_t size);
+  void on_proxy_header(const beast::error_code& error);
+  std::optional<Refusal> stand_for(const IpAddress& client);
   void begin();
   void on_tls(const beast::error_code& error);
   void read_request();
   void on_request(const beast::error_code& error);
-  void answer(const http::request<http::empty_body>& request);
-  void answer_upgrade(const http::request<http::empty_body>& request);
-  void refuse(http::status status, const std::string& sentence);
-  void respond(http::status status, const std::string& text, const char* content_type = "text/plain");
-  void answer_metrics();
+  bool is_fit(const Request& request);
+  bool is_client_known(const Request& request);
+  bool may_be_plain();
+  void answer(const Request& request);
+  void answer_readiness();
+  void answer_metrics(const Request& request);
+  void answer_upgrade(const Request& request);
   void upgrade();
+  void drop(Refusal why, const std::string& sentence);
+  void refuse(Refusal why, http::status status, const std::string& sentence, const std::string& detail = {});
+  void respond(http::status status, const std::string& text, const char* content_type = "text/plain");
   void finish();
 
   Context& context_;
@@ -41,6 +55,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::string local_address_;
   bool is_loopback_ = false;
   bool is_finished_ = false;
+  std::vector<uint8_t> proxy_header_;
   beast::flat_buffer buffer_{kMaxHttpReadBytes};
   std::optional<http::request_parser<http::empty_body>> parser_;
   http::response<http::string_body> response_;

@@ -1,8 +1,46 @@
-#include "server/net/beast_private.h"
 #include "server/net/context_private.h"
+
+#include <algorithm>
+#include <functional>
+
+#include "common/base/profile.h"
+#include "server/net/beast_private.h"
+#include "server/net/connection_private.h"
 #include "server/net/session_private.h"
 
 namespace strandcast::net {
+namespace {
+
+/// Somebody without a Hello that was accepted.
+struct Waiting {
+  const Peer* peer = nullptr;
+  std::function<void()> end;
+};
+
+bool is_waiting(const Session& session) {
+  return session.state() != Session::State::Joined && session.state() != Session::State::Closed;
+}
+
+std::vector<Waiting> all_waiting(const Context& context) {
+  std::vector<Waiting> all;
+  for (const auto& connection : context.connections)
+    all.push_back({&connection->peer(), [connection] { connection->abort(); }});
+  for (const auto& [id, session] : context.sessions)
+    if (is_waiting(*session)) all.push_back({&session->peer(), [one = session] { one->abort(); }});
+  return all;
+}
+
+/// Of the address that has most of them, the one that came first.
+const Waiting& least_worthy(const std::vector<Waiting>& waiting) {
+  std::map<std::string_view, size_t> count_of;
+  for (const Waiting& one : waiting) ++count_of[one.peer->key];
+  return *std::min_element(waiting.begin(), waiting.end(), [&](const Waiting& a, const Waiting& b) {
+    const size_t a_count = count_of[a.peer->key], b_count = count_of[b.peer->key];
+    return a_count != b_count ? a_count > b_count : a.peer->accepted_ns < b.peer->accepted_ns;
+  });
+}
+
+}  // namespace
 
 Context::Context(const NetConfig& net_config, NetHandler& net_handler)
     : config(net_config),
@@ -10,17 +48,51 @@ Context::Context(const NetConfig& net_config, NetHandler& net_handler)
       strands(net_config.strand_classes),
       guard({net_config.limits.connections_per_s, net_config.limits.wrong_tokens,
              net_config.limits.wrong_token_window_ms * kNsPerMs,
-             net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}) {}
+             net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}),
+      refusal_lines({net_config.limits.refusal_lines_per_address, net_config.limits.refusal_lines}),
+      session_lines({net_config.limits.session_lines, net_config.limits.session_lines}) {}
+
+void Context::refuse(Refusal why, const Peer& peer, std::string_view detail) {
+  const RefusalRow& row = row_of(why);
+  count(row.counter);
+  const LogBudget::Verdict verdict = refusal_lines.take(peer.key, now_ns());
+  if (verdict.left_out > 0) log_warn("net", "{} refusals before this one left no line", verdict.left_out);
+  if (verdict.is_written) log_warn("net", "refused {} {}: {}", peer.address, row.word, detail);
+}
+
+void Context::note(const std::string& line, LogLevel level) {
+  const LogBudget::Verdict verdict = session_lines.take({}, now_ns());
+  if (verdict.left_out > 0) log_warn("net", "{} lines about sessions were left out", verdict.left_out);
+  if (verdict.is_written) log_line(level, "net", line);
+}
 
 bool Context::has_room(const std::string& peer_key) const {
   size_t all = 0;
   size_t of_peer = 0;
   for (const auto& [id, session] : sessions) {
-    if (session->state() == Session::State::Closing) continue;
+    if (session->state() != Session::State::Joined) continue;
     ++all;
     if (session->peer().key == peer_key) ++of_peer;
   }
   return all < config.limits.sessions && of_peer < config.limits.sessions_per_address;
+}
+
+size_t Context::waiting_of(const std::string& peer_key) const {
+  const std::vector<Waiting> waiting = all_waiting(*this);
+  return static_cast<size_t>(std::count_if(waiting.begin(), waiting.end(),
+                                           [&](const Waiting& one) { return one.peer->key == peer_key; }));
+}
+
+bool Context::make_place(const Peer& peer) {
+  std::vector<Waiting> waiting = all_waiting(*this);
+  std::erase_if(waiting, [&](const Waiting& one) { return one.peer->is_trusted != peer.is_trusted; });
+  if (peer.is_trusted) return waiting.size() < config.limits.sessions + kSpareConnections;
+  if (!peer.is_proxy && waiting_of(peer.key) >= kSpareConnectionsPerAddress) return false;
+  if (waiting.size() < kSpareConnections) return true;
+  const Waiting& oldest = least_worthy(waiting);
+  refuse(Refusal::Full, *oldest.peer, "gave its place to somebody else before it said Hello");
+  oldest.end();
+  return true;
 }
 
 SessionList Context::list_sessions(int64_t time_ns) const {

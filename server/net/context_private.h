@@ -7,10 +7,14 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "common/log/log.h"
 #include "server/net/address_guard.h"
+#include "server/net/log_budget.h"
 #include "server/net/net_server.h"
+#include "server/net/refusal_private.h"
 #include "server/net/send_queue.h"
 #include "server/net/stream_costs.h"
 
@@ -21,9 +25,12 @@ class Session;
 
 /// Bytes handed to the kernel at once: a write without progress is noticed per chunk, not per frame.
 inline constexpr size_t kWriteChunkBytes = 64u << 10;
-/// Connections beyond the sessions: HTTP requests, and those that are told that the server is full.
+/// Connections without a Hello that was accepted: HTTP requests, and sessions that begin or end. They have
+/// places of their own, so that they can take none of the sessions'; trusted loopback has its own again.
 inline constexpr size_t kSpareConnections = 64;
 inline constexpr size_t kSpareConnectionsPerAddress = 16;
+inline constexpr const char* kBlockedSentence =
+    "Too many wrong tokens came from this address: wait a minute.";
 
 /// First line and fields of a request.
 inline constexpr size_t kMaxHttpHeaderBytes = 8u << 10;
@@ -47,6 +54,7 @@ struct Peer {
   std::string address;
   std::string key;          // what counts as one address: of IPv6 the network of 64 bits
   bool is_trusted = false;  // on trusted loopback
+  bool is_proxy = false;    // a proxy of ours, which has not said yet for whom it connects
   int64_t accepted_ns = 0;
 };
 
@@ -61,8 +69,17 @@ struct Context {
     const std::lock_guard lock(mutex);
     return counters;
   }
-  /// True while another session of this peer fits; sessions that are closing do not count.
+  /// Counts, and leaves a line in the log while there is room for it. `detail` may hold what the peer wrote.
+  void refuse(Refusal why, const Peer& peer, std::string_view detail);
+  /// A line about a session while there is room for it.
+  void note(const std::string& line, LogLevel level = LogLevel::Info);
+  /// True while another session of this peer fits; only those that joined count.
   bool has_room(const std::string& peer_key) const;
+  /// How many of this peer have no Hello that was accepted.
+  size_t waiting_of(const std::string& peer_key) const;
+  /// True when one more may wait for its Hello. Among strangers the oldest of the address that has most gives
+  /// its place to the newest.
+  bool make_place(const Peer& peer);
   /// Those that have joined.
   SessionList list_sessions(int64_t time_ns) const;
   /// Ends a session; false when there is none of this number.
@@ -80,6 +97,8 @@ struct Context {
   SessionId next_session = 1;
   bool is_stopping = false;
   AddressGuard guard;
+  LogBudget refusal_lines;
+  LogBudget session_lines;
   TlsContextPtr tls;  // null: no TLS
 
  private:

@@ -23,6 +23,7 @@ namespace {
 constexpr auto kSweepInterval = std::chrono::milliseconds(50);
 /// Pause after a failed accept (no file descriptors left): the others are served meanwhile.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
+constexpr int64_t kAcceptTellNs = 10'000'000'000;
 constexpr int kListenBacklog = 128;
 
 std::string own_host_name() {
@@ -42,7 +43,6 @@ struct NetServer::State {
   Status open();
   void accept();
   void on_accept(const error_code& error, net::tcp::socket socket);
-  bool has_place(const std::string& peer_key) const;
   void sweep();
   void begin_stop();
   void end_if_done(int64_t time_ns);
@@ -58,6 +58,7 @@ struct NetServer::State {
   net::tcp::acceptor acceptor;
   net::asio::steady_timer sweep_timer;
   net::asio::steady_timer accept_timer;
+  int64_t accept_told_ns = 0;
   uint16_t port = 0;
   int64_t stop_deadline_ns = 0;
   std::atomic<bool> has_stopped{false};
@@ -73,7 +74,8 @@ Status NetServer::State::open() {
     return make_error(ErrorCode::BadInput,
                       "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)",
                       config.address);
-  const bool is_trusted = address.is_loopback() && config.loopback_trust == LoopbackTrust::Trusted;
+  const bool is_trusted = address.is_loopback() && config.loopback_trust == LoopbackTrust::Trusted &&
+                          config.trusted_proxies.empty();
   RETURN_IF_ERROR(check_listening(is_trusted, config.address, config.tokens));
   if (config.tls) {
     ASSIGN_OR_RETURN(context.tls, make_server_tls(*config.tls));
@@ -107,7 +109,12 @@ void NetServer::State::on_accept(const error_code& error, net::tcp::socket socke
   if (error == net::asio::error::operation_aborted || context.is_stopping) return;
   if (error) {
     context.count(&NetCounters::accept_errors);
-    log_warn("net", "cannot accept a connection: {}", error.message());
+    // It is tried again at once: one line in a while is enough.
+    if (const int64_t time_ns = now_ns();
+        time_ns - accept_told_ns > net::kAcceptTellNs || accept_told_ns == 0) {
+      accept_told_ns = time_ns;
+      log_warn("net", "cannot accept a connection: {}", error.message());
+    }
     accept_timer.expires_after(net::kAcceptPause);
     accept_timer.async_wait([this](const error_code& wait_error) {
       if (!wait_error) accept();
@@ -116,27 +123,11 @@ void NetServer::State::on_accept(const error_code& error, net::tcp::socket socke
   }
   context.count(&NetCounters::connections);
   auto connection = std::make_shared<net::Connection>(context, std::move(socket));
-  const net::Peer& peer = connection->peer();
-  const auto verdict = peer.is_trusted ? AddressGuard::Verdict::Welcome
-                                       : context.guard.on_connection(peer.key, peer.accepted_ns);
-  if (verdict != AddressGuard::Verdict::Welcome) {
-    context.count(&NetCounters::refused_rate);
-  } else if (!has_place(peer.key)) {
-    context.count(&NetCounters::refused_full);
-  } else {
+  if (connection->is_welcome()) {
     context.connections.insert(connection);
     connection->start();
   }
   accept();
-}
-
-bool NetServer::State::has_place(const std::string& peer_key) const {
-  size_t of_peer = 0;
-  for (const auto& connection : context.connections) of_peer += connection->peer().key == peer_key ? 1 : 0;
-  for (const auto& [id, session] : context.sessions) of_peer += session->peer().key == peer_key ? 1 : 0;
-  const NetLimits& limits = context.config.limits;
-  return context.connections.size() + context.sessions.size() < limits.sessions + net::kSpareConnections &&
-         of_peer < limits.sessions_per_address + net::kSpareConnectionsPerAddress;
 }
 
 void NetServer::State::sweep() {

@@ -1,6 +1,7 @@
-// NetServer: one TCP port with HTTP (/healthz, /metrics) and the WebSocket protocol of proto/WIRE.md at /v1.
-// One network thread; every public function may be called from any thread and never waits for a client. It
-// does not simulate, encode pictures or strands, or decide what a session may see: that is the NetHandler's.
+// NetServer: one TCP port with HTTP (/healthz, /readyz, /metrics) and the WebSocket protocol of proto/WIRE.md
+// at /v1. One network thread; every public function may be called from any thread and never waits for a
+// client. It does not simulate, encode pictures or strands, or decide what a session may see: that is the
+// NetHandler's.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +18,7 @@
 #include "common/strands/frame_header.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
+#include "server/net/ip_address.h"
 #include "server/net/roles.h"
 #include "server/net/strand_class.h"
 #include "server/net/stream_costs.h"
@@ -52,15 +54,21 @@ struct NetLimits {
   double connections_per_s = 10.0;  // and as many at once
   uint32_t wrong_tokens = 5;        // in wrong_token_window_ms; one more blocks
   int64_t wrong_token_window_ms = 60'000;
-  int64_t wrong_token_block_ms = 60'000;  // nothing is accepted from there
-  uint32_t guarded_addresses = 1'024;     // remembered for this at once
-  double viewer_bytes_per_s = 0.0;        // cap of what a stream may take for one viewer; 0 = none
+  int64_t wrong_token_block_ms = 60'000;    // no token is looked at from there
+  uint32_t guarded_addresses = 1'024;       // remembered for this at once
+  uint32_t refusal_lines_per_address = 10;  // in the log, a minute
+  uint32_t refusal_lines = 300;             // of all addresses
+  uint32_t session_lines = 1'200;           // about those who are in, of all
+  double viewer_bytes_per_s = 0.0;          // cap of what a stream may take for one viewer; 0 = none
 };
 
 /// LikeAllOthers: behind a proxy or tunnel on this machine, where everybody seems to be local.
 enum class LoopbackTrust { Trusted, LikeAllOthers };
 /// Who may do without TLS when the server has a certificate.
 enum class PlainAccess { TrustedLoopback, Nobody };
+
+/// Whether trusted proxies begin each connection with a PROXY header.
+enum class ProxyProtocol { None, Version2 };
 
 struct NetConfig {
   std::string address = "127.0.0.1";  // numeric, or "localhost"
@@ -72,6 +80,9 @@ struct NetConfig {
   std::vector<std::string>
       allowed_hosts;  // accepted in the Host header, besides the server's own address and name
   std::vector<std::string> allowed_origins;  // of web pages, besides this very server
+  // Who may say for whom it connects; connections from there are never trusted for coming from loopback.
+  std::vector<AddressRange> trusted_proxies;
+  ProxyProtocol proxy_protocol = ProxyProtocol::None;
   NetLimits limits;
   std::vector<StrandClass> strand_classes = {StrandClass{}};  // at first; best first, index = stream_id
 };
@@ -138,6 +149,8 @@ class NetHandler {
   virtual void on_mode(SessionId, StreamMode) {}
   /// Once for every session whose on_hello succeeded.
   virtual void on_left(SessionId session) = 0;
+  /// The answer of /readyz: the simulation is stepping, or one sentence why not.
+  virtual Status readiness() { return {}; }
   /// Lines added to /metrics, in Prometheus text form.
   virtual std::string metrics() { return {}; }
 };
@@ -150,7 +163,7 @@ struct NetCounters {
   uint64_t accept_errors = 0;
   uint64_t refused_full = 0;
   uint64_t refused_token = 0;
-  uint64_t refused_rate = 0;  // too many connections or wrong tokens from one address
+  uint64_t refused_rate = 0;  // too many connections of one address, and tokens after too many wrong ones
   uint64_t refused_tls = 0;   // failed TLS handshakes, and requests without TLS
   uint64_t refused_http = 0;  // wrong path, host, origin or request
   uint64_t bad_messages = 0;  // malformed, out of order, wrong role or too many

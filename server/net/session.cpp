@@ -58,12 +58,15 @@ void Session::on_open(bool has_room) {
   state_ = State::AwaitHello;
   read();
   if (context_.is_stopping) return close(CloseCode::GoingAway, "The server is stopping.");
-  if (!has_room) {
-    context_.count(&NetCounters::refused_full);
-    close(CloseCode::Full,
-          fmt::format("The server is full: at most {} sessions and {} from one address.",
-                      context_.config.limits.sessions, context_.config.limits.sessions_per_address));
-  }
+  if (!has_room) close_as_full();
+}
+
+void Session::close_as_full() {
+  const NetLimits& limits = context_.config.limits;
+  const std::string sentence = fmt::format("The server is full: at most {} sessions and {} from one address.",
+                                           limits.sessions, limits.sessions_per_address);
+  context_.refuse(Refusal::Full, peer_, sentence);
+  close(CloseCode::Full, sentence);
 }
 
 void Session::read() {
@@ -126,20 +129,25 @@ void Session::on_control_frame(websocket::frame_type kind) {
     flow_.on_round_trip(received_ns_ - probe_sent_ns_, received_ns_);
 }
 
-/// A write does not get on; or something waits for an answer and nothing at all comes; or other things come,
-/// but never an acknowledgement.
-bool Session::is_stalled(int64_t time_ns) const {
+/// Why it has to go: a write does not get on; or something waits for an answer and nothing at all comes; or
+/// other things come, but never an acknowledgement. Empty while all is well.
+std::string Session::stall_reason(int64_t time_ns) const {
   const NetLimits& limits = context_.config.limits;
   const auto is_past = [&](int64_t since_ns, int64_t limit_ms) {
     return time_ns - since_ns >= limit_ms * kNsPerMs;
   };
-  if (is_writing_ && is_past(progress_ns_, limits.stalled_ms)) return true;
+  if (is_writing_ && is_past(progress_ns_, limits.stalled_ms))
+    return fmt::format("takes nothing for {} ms", limits.stalled_ms);
   const int64_t due_ns = flow_.oldest_due_ns(time_ns);
-  if (due_ns != 0 && is_past(due_ns, limits.unused_ms)) return true;
+  if (due_ns != 0 && is_past(due_ns, limits.unused_ms))
+    return fmt::format("acknowledges nothing for {} ms while it says other things", limits.unused_ms);
   // What is on its way holds up the answer to a probe as well.
   const int64_t heard_ns = std::max({due_ns, received_ns_, is_writing_ ? progress_ns_ : 0});
-  if (due_ns != 0 && is_past(heard_ns, limits.stalled_ms)) return true;
-  return is_probe_under_way_ && is_past(std::max(probe_sent_ns_, heard_ns), limits.stalled_ms);
+  if (due_ns != 0 && is_past(heard_ns, limits.stalled_ms))
+    return fmt::format("says nothing for {} ms although an acknowledgement is due", limits.stalled_ms);
+  if (is_probe_under_way_ && is_past(std::max(probe_sent_ns_, heard_ns), limits.stalled_ms))
+    return fmt::format("answers no ping for {} ms", limits.stalled_ms);
+  return {};
 }
 
 void Session::pump() {
@@ -224,16 +232,16 @@ void Session::check_deadlines(int64_t time_ns) {
     return;
   }
   if (state_ == State::AwaitHello && in_state_ms >= limits.handshake_ms) {
-    context_.count(&NetCounters::timeouts);
-    return close(CloseCode::Policy, fmt::format("No Hello within {} ms.", limits.handshake_ms));
+    const std::string sentence = fmt::format("No Hello within {} ms.", limits.handshake_ms);
+    context_.refuse(Refusal::Timeout, peer_, sentence);
+    return close(CloseCode::Policy, sentence);
   }
   // A write ends when the kernel has room for all of it, which on a slow link takes long.
   const size_t untaken_bytes = is_writing_ ? socket_.next_layer().untaken_bytes() : 0;
   if (untaken_bytes < std::exchange(untaken_bytes_, untaken_bytes)) note_progress(time_ns);
-  if (is_stalled(time_ns)) {
+  if (const std::string reason = stall_reason(time_ns); !reason.empty()) {
     context_.count(&NetCounters::stalled);
-    log_warn("net", "session {} from {}: takes nothing for {} ms, dropped", id_, peer_.address,
-             limits.stalled_ms);
+    context_.note(fmt::format("session {} from {}: {}, dropped", id_, peer_.address, reason), LogLevel::Warn);
     return abort();
   }
   if (state_ != State::Joined) return;
@@ -252,7 +260,7 @@ void Session::abort() {
 
 void Session::leave() {
   if (!std::exchange(has_joined_, false)) return;
-  log_info("net", "session {} left", id_);
+  context_.note(fmt::format("session {} left", id_));
   context_.handler.on_left(id_);
 }
 

@@ -147,7 +147,7 @@ void Session::change_strand_class(size_t chosen) {
 }
 
 void Session::announce_quality(const std::string& reason) {
-  log_info("net", "session {}: {}", id_, reason);
+  context_.note(fmt::format("session {}: {}", id_, reason));
   const StrandClass& now = context_.strands.classes()[strand_class_];
   queue_control(StreamQuality{strand_class_, now.rate_divisor, now.strand_share, now.bound_m, reason});
 }

@@ -52,15 +52,28 @@ void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
   dispatch(*message, arrival_ns);
 }
 
-void Session::join(const Hello& hello) {
-  if (const Status allowed = check_role(context_.config.tokens, hello); !allowed) {
-    context_.count(&NetCounters::refused_token);
-    if (allowed.error().code == ErrorCode::Unauthorized && !peer_.is_trusted)
-      context_.guard.on_wrong_token(peer_.key, now_ns());
-    log_warn("net", "session {} from {} as {}: {}", id_, peer_.address, to_string(hello.role),
-             allowed.error().to_string());
-    return close(close_code_for(allowed.error()), allowed.error().to_string());
+/// Whether this client may have the role that it asks for; else the session ends.
+bool Session::check_token(const Hello& hello) {
+  const bool is_guessing = !peer_.is_trusted && !context_.config.tokens.empty();
+  // Not even a right one, or it would show that the others were wrong.
+  if (is_guessing && context_.guard.is_blocked(peer_.key, now_ns())) {
+    context_.refuse(Refusal::Blocked, peer_, "tries a token too soon after too many wrong ones");
+    close(CloseCode::TryLater, kBlockedSentence);
+    return false;
   }
+  const Status allowed = check_role(context_.config.tokens, hello);
+  if (allowed) return true;
+  const std::string sentence = allowed.error().to_string();
+  const bool is_wrong = allowed.error().code == ErrorCode::Unauthorized;
+  if (is_guessing && is_wrong) context_.guard.on_wrong_token(peer_.key, now_ns());
+  context_.refuse(is_wrong ? Refusal::Token : Refusal::Role, peer_, sentence);
+  close(close_code_for(allowed.error()), sentence);
+  return false;
+}
+
+void Session::join(const Hello& hello) {
+  if (!check_token(hello)) return;
+  if (!context_.has_room(peer_.key)) return close_as_full();
   Result<Admission> admission = context_.handler.on_hello({id_, peer_.key}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
@@ -74,8 +87,8 @@ void Session::join(const Hello& hello) {
   state_ = State::Joined;
   state_since_ns_ = now_ns();
   context_.update_session_counts();
-  log_info("net", "session {} from {} joined: {} '{}', {}", id_, peer_.address, to_string(hello.role),
-           hello.name, to_string(mode_));
+  context_.note(fmt::format("session {} from {} joined: {} '{}', {}", id_, peer_.address,
+                            to_string(hello.role), hello.name, to_string(mode_)));
   // Everything is set before anything is written, and strands start only behind the asset.
   if (hello.role != Role::Source) begin_media(hello, admission->asset);
   queue_control(std::move(admission->welcome));
@@ -136,8 +149,7 @@ SessionInfo Session::info(int64_t time_ns) const {
 }
 
 void Session::reject(CloseCode code, const std::string& reason) {
-  context_.count(&NetCounters::bad_messages);
-  log_warn("net", "session {} from {}: {}", id_, peer_.address, reason);
+  context_.refuse(Refusal::Message, peer_, reason);
   close(code, reason);
 }
 

@@ -70,7 +70,7 @@ void Session::finish_mode_switch() {
     if (!queue_.stop_strands()) has_asset_ = false;
   }
   context_.count(&NetCounters::mode_changes);
-  log_info("net", "session {} gets {}: {}", id_, to_string(mode_), next.change.reason);
+  context_.note(fmt::format("session {} gets {}: {}", id_, to_string(mode_), next.change.reason));
   context_.handler.on_mode(id_, mode_);
   queue_control(next.change);
   if (mode_ == StreamMode::Frames || state_ != State::Joined) return;

@@ -58,6 +58,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void read();
   void on_read(const beast::error_code& error);
   void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
+  bool check_token(const Hello& hello);
   void join(const Hello& hello);
   void begin_media(const Hello& hello, const EncodedFramePtr& asset);
   void start_again(int64_t time_ns);
@@ -82,7 +83,8 @@ class Session : public std::enable_shared_from_this<Session> {
   std::string describe_link(int64_t time_ns) const;
   void probe(int64_t time_ns);
   void on_control_frame(websocket::frame_type kind);
-  bool is_stalled(int64_t time_ns) const;
+  std::string stall_reason(int64_t time_ns) const;
+  void close_as_full();
   void account_drops();
   void leave();
   void finish();

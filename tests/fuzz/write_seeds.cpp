@@ -17,6 +17,7 @@
 #include "tests/fuzz/picture_chain.h"
 #include "tests/fuzz/strand_chain.h"
 #include "tests/support/hair_motion.h"
+#include "tests/support/proxy_header.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_messages.h"
 #include "tests/support/test_pictures.h"
@@ -295,6 +296,11 @@ void add_texts(const SeedFolder& seeds) {
   seeds.add("address", "name", "hair.example");
   seeds.add("http_access", "name", "Hair.Example:7878\nhttps://hair.example:7878\n10.0.0.7\nhair.example");
   seeds.add("http_access", "ipv6", "[::1]:7878\nhttp://[::1]:7878\n::1\n\n");
+  seeds.add("proxy", "ipv4", "10.0.0.0/8\n198.51.100.1, 203.0.113.9:4711, 10.0.0.1\n" + test::proxy_v4(9));
+  seeds.add("proxy", "ipv6",
+            "fd00::/8\n[2001:db8::7]:4711, fd00::1\n" +
+                test::proxy_header(0x21, 0x21, std::string(36, '\x20') + test::bytes_of({2, 0, 1, 'a'})));
+  seeds.add("proxy", "local", "10.0.0.7\n10.0.0.7\n" + test::proxy_header(0x20, 0, {}));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Limits of the server on sockets, at the limit and one over. SECURITY.md lists which test is for which
 // limit.
+#include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"
 
 namespace strandcast {
@@ -87,22 +88,85 @@ void expect_connection_limit(uint16_t port, size_t limit) {
 }
 
 TEST_F(ServerLimits, ConnectionsOfOneAddress) {
-  NetConfig config;
-  config.limits.sessions_per_address = 1;
+  NetConfig config = strict();
   config.limits.handshake_ms = 60'000;
   start(config);
-  expect_connection_limit(port(), 1 + 16);
+  expect_connection_limit(port(), 16);
   EXPECT_EQ(server_->counters().refused_full, 1u);
 }
 
-TEST_F(ServerLimits, ConnectionsInAll) {
+TEST_F(ServerLimits, ConnectionsOnTrustedLoopback) {
   NetConfig config;
   config.limits.sessions = 1;
-  config.limits.sessions_per_address = 1'000;
   config.limits.handshake_ms = 60'000;
   start(config);
   expect_connection_limit(port(), 1 + 64);
   EXPECT_EQ(server_->counters().refused_full, 1u);
+}
+
+/// A connection that a proxy opens for 203.0.113.`last`.
+std::unique_ptr<RawClient> connect_for(uint16_t port, int last) {
+  auto client = std::make_unique<RawClient>(port);
+  client->send_raw(test::proxy_v4(last));
+  return client;
+}
+
+// From 80 addresses, some silent and some behind the upgrade: more than there are places without a Hello.
+TEST_F(ServerLimits, StrangersFillNeitherTheHallNorHealthz) {
+  NetConfig config = strict();
+  config.limits.handshake_ms = 60'000;
+  config.limits.sessions = 2;
+  config.trusted_proxies = {*parse_address_range("127.0.0.1")};
+  config.proxy_protocol = ProxyProtocol::Version2;
+  config.allowed_hosts = {"127.0.0.1"};
+  start(config);
+  std::vector<std::unique_ptr<RawClient>> strangers;
+  for (int i = 0; i < 80; ++i) {
+    strangers.push_back(connect_for(port(), i));
+    if (i % 4 == 0) {
+      ASSERT_TRUE(strangers.back()->handshake()) << i;
+    }
+  }
+  ASSERT_TRUE(eventually([&] { return server_->counters().connections == 80; }));
+  EXPECT_EQ(server_->counters().refused_full, 80u - 64u) << "the oldest made room";
+  const auto prober = connect_for(port(), 100);
+  prober->send_raw("GET /healthz HTTP/1.1\r\nHost: 192.0.2.1\r\n\r\n");
+  EXPECT_NE(prober->read_raw_to_end().find("200 OK"), std::string::npos);
+  std::vector<std::unique_ptr<RawClient>> viewers;
+  for (int i = 0; i < 2; ++i) {
+    viewers.push_back(connect_for(port(), 101));
+    ASSERT_TRUE(viewers.back()->handshake());
+    viewers.back()->send(hello(Role::Viewer, kToken));
+    EXPECT_TRUE(viewers.back()->read_control<Welcome>()) << "the hall is empty";
+  }
+  // Whoever came before the hall was full is told at the Hello.
+  auto& waiting = *strangers[76];
+  waiting.send(hello(Role::Viewer, kToken));
+  EXPECT_EQ(waiting.read_end().close_code, code(CloseCode::Full));
+}
+
+// One address with many connections loses one of its own to a newcomer.
+TEST_F(ServerLimits, WhoHasMostGivesAPlace) {
+  NetConfig config = strict();
+  config.limits.handshake_ms = 60'000;
+  config.trusted_proxies = {*parse_address_range("127.0.0.1")};
+  config.proxy_protocol = ProxyProtocol::Version2;
+  config.allowed_hosts = {"127.0.0.1"};
+  start(config);
+  std::vector<std::unique_ptr<RawClient>> singles, many;
+  for (int i = 0; i < 48; ++i) singles.push_back(connect_for(port(), i));
+  for (int i = 0; i < 16; ++i) {
+    many.push_back(connect_for(port(), 200));
+    ASSERT_TRUE(many.back()->handshake());
+  }
+  const auto prober = connect_for(port(), 100);
+  prober->send_raw("GET /healthz HTTP/1.1\r\nHost: 192.0.2.1\r\n\r\n");
+  EXPECT_NE(prober->read_raw_to_end().find("200 OK"), std::string::npos);
+  EXPECT_TRUE(many[0]->read().is_end);
+  many[1]->send(hello(Role::Viewer, kToken));
+  EXPECT_TRUE(many[1]->read_control<Welcome>());
+  singles[0]->send_raw("GET /healthz HTTP/1.1\r\nHost: 192.0.2.1\r\n\r\n");
+  EXPECT_NE(singles[0]->read_raw_to_end().find("200 OK"), std::string::npos);
 }
 
 TEST_F(ServerLimits, SilenceEndsASession) {
@@ -136,6 +200,9 @@ TEST(NetLimitsByDefault, AreAsPromised) {
   EXPECT_EQ(limits.wrong_token_window_ms, 60'000);
   EXPECT_EQ(limits.wrong_token_block_ms, 60'000);
   EXPECT_EQ(limits.guarded_addresses, 1'024u);
+  EXPECT_EQ(limits.refusal_lines_per_address, 10u);
+  EXPECT_EQ(limits.refusal_lines, 300u);
+  EXPECT_EQ(limits.session_lines, 1'200u);
 }
 
 TEST_F(ServerLimits, ConnectionsPerSecond) {
@@ -184,8 +251,9 @@ TEST_F(ServerLimits, WrongTokensOfOneAddress) {
   EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::Normal)) << "at the limit";
   EXPECT_EQ(server_->counters().refused_rate, 0u);
   EXPECT_EQ(close_code_with(port(), "wrong"), code(CloseCode::Unauthorized));
-  EXPECT_EQ(close_code_with(port(), kToken), kNoHandshake) << "one over: closed unanswered";
+  EXPECT_EQ(close_code_with(port(), kToken), code(CloseCode::TryLater)) << "one over: not even looked at";
   EXPECT_EQ(server_->counters().refused_rate, 1u);
+  EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos) << "that is no guess";
   EXPECT_EQ(server_->counters().refused_token, config.limits.wrong_tokens + 1);
 }
 
@@ -199,7 +267,11 @@ TEST_F(ServerLimits, WrongTokensForMetricsCountToo) {
   RawClient guess(port());
   guess.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer wrong\r\n\r\n");
   EXPECT_NE(guess.read_raw_to_end().find("401"), std::string::npos);
-  EXPECT_EQ(test::http_get(port(), "/healthz"), "");
+  RawClient again(port());
+  again.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer " + std::string(kToken) +
+                 "\r\n\r\n");
+  EXPECT_NE(again.read_raw_to_end().find(" 429 "), std::string::npos);
+  EXPECT_NE(test::http_get(port(), "/healthz").find("200 OK"), std::string::npos);
 }
 
 TEST_F(ServerLimits, ABlockEnds) {

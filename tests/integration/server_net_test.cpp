@@ -30,6 +30,16 @@ TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
   EXPECT_NE(test::http_get(server_->port(), "/healthz", "evil.example").find("403"), std::string::npos);
 }
 
+TEST_F(ServerNet, AliveIsNotReady) {
+  start();
+  EXPECT_NE(test::http_get(server_->port(), "/readyz").find("200 OK"), std::string::npos);
+  app_.is_stepping = false;
+  const std::string answer = test::http_get(server_->port(), "/readyz");
+  EXPECT_NE(answer.find(" 503 "), std::string::npos);
+  EXPECT_NE(answer.find("Stuck on purpose."), std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/healthz").find("200 OK"), std::string::npos);
+}
+
 TEST_F(ServerNet, RefusesLongHeaders) {
   start();
   EXPECT_NE(test::http_get(server_->port(), "/" + std::string(20'000, 'a')).find(" 431 "), std::string::npos);

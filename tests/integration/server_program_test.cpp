@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "tests/support/eventually.h"
@@ -20,7 +23,9 @@ extern char** environ;
 namespace strandcast {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 std::string text_of(const std::filesystem::path& path) {
   std::ifstream file(path);
@@ -31,7 +36,8 @@ std::string text_of(const std::filesystem::path& path) {
 
 class ServerProgram : public testing::Test {
  protected:
-  pid_t spawn(std::vector<std::string> arguments) {
+  /// Standard error goes to this descriptor, or to a file.
+  pid_t spawn(std::vector<std::string> arguments, int error_descriptor = -1) {
     arguments.insert(arguments.begin(), STRANDCAST_SERVER_PROGRAM);
     std::vector<char*> pointers;
     for (std::string& argument : arguments) pointers.push_back(argument.data());
@@ -44,6 +50,7 @@ class ServerProgram : public testing::Test {
     };
     redirect(1, folder_.path() / "out");
     redirect(2, folder_.path() / "err");
+    if (error_descriptor >= 0) posix_spawn_file_actions_adddup2(&actions, error_descriptor, 2);
     pid_t process = -1;
     const int failed =
         posix_spawn(&process, STRANDCAST_SERVER_PROGRAM, &actions, nullptr, pointers.data(), environ);
@@ -57,10 +64,24 @@ class ServerProgram : public testing::Test {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
   int run(std::vector<std::string> arguments) { return wait(spawn(std::move(arguments))); }
+  /// Starts a small server and waits until it listens; its port, 0 when it has ended.
+  uint16_t serve(std::vector<std::string> arguments = {}, int error_descriptor = -1) {
+    const std::filesystem::path port_path = folder_.path() / "port";
+    arguments.insert(arguments.end(), {"--port", "0", "--port-file", port_path.string(), "--set",
+                                       "groom.procedural.strand_count=50"});
+    process_ = spawn(std::move(arguments), error_descriptor);
+    bool has_ended = false;
+    EXPECT_TRUE(eventually([&] {
+      has_ended = waitpid(process_, nullptr, WNOHANG) == process_;
+      return has_ended || std::filesystem::exists(port_path);
+    }));
+    return has_ended ? uint16_t{0} : static_cast<uint16_t>(std::stoi(text_of(port_path)));
+  }
   std::string out() const { return text_of(folder_.path() / "out"); }
   std::string err() const { return text_of(folder_.path() / "err"); }
 
   TemporaryFolder folder_;
+  pid_t process_ = -1;
 };
 
 TEST_F(ServerProgram, BadInputIsExitCodeTwoAndOneSentence) {
@@ -84,6 +105,19 @@ TEST_F(ServerProgram, BadInputIsExitCodeTwoAndOneSentence) {
       {{"--listen", "0.0.0.0"}, "token"},
       {{"--listen", "nonsense"}, "nonsense"},
       {{"--port", "99999"}, "99999"},
+      {{"--viewer-mbit", "nan"}, "nan is not within"},
+      {{"--viewer-mbit", "inf"}, "inf is not within"},
+      {{"--viewer-mbit", "-1"}, "-1 is not within"},
+      {{"--seconds", "nan"}, "nan is not within"},
+      {{"--connections-per-s", "nan"}, "nan is not within"},
+      {{"--messages-per-s", "1e9"}, "1e9 is not within"},
+      {{"--max-sessions", "0"}, "0 is not within"},
+      {{"--max-sessions", "257"}, "257 is not within"},
+      {{"--handshake-ms", "99"}, "99 is not within"},
+      {{"--trusted-proxy", "10.0.0.7/8"}, "10.0.0.7/8"},
+      {{"--trusted-proxy", "proxy.example"}, "proxy.example"},
+      {{"--proxy-protocol"}, "--trusted-proxy"},
+      {{"--trusted-proxy", "10.0.0.7"}, "token"},
       {{"--token-file", "/no/such/token"}, "/no/such/token"},
       {{"--port", "0", "--gl-device", "nonsense"}, "nonsense"},
       {{"--explain", bad_scene}, "nonsense"}};
@@ -111,22 +145,96 @@ TEST_F(ServerProgram, PrintsSolversSceneAndPlan) {
 }
 
 TEST_F(ServerProgram, ServesUntilTerminated) {
-  const std::filesystem::path port_path = folder_.path() / "port";
-  const pid_t process = spawn({"--port", "0", "--port-file", port_path.string(), "--set",
-                               "groom.procedural.strand_count=50", "--log-level", "off"});
-  int status = 0;
-  bool has_ended = false;
-  const bool is_ready = eventually([&] {
-    has_ended = waitpid(process, &status, WNOHANG) == process;
-    return has_ended || std::filesystem::exists(port_path);
-  });
-  ASSERT_TRUE(is_ready);
-  if (has_ended && err().find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
-  ASSERT_FALSE(has_ended) << err();
-  const auto port = static_cast<uint16_t>(std::stoi(text_of(port_path)));
+  const uint16_t port = serve({"--log-level", "off"});
+  if (port == 0 && err().find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  ASSERT_NE(port, 0) << err();
   EXPECT_THAT(test::http_get(port, "/healthz"), HasSubstr("ok"));
-  ASSERT_EQ(kill(process, SIGTERM), 0);
-  EXPECT_EQ(wait(process), 0) << err();
+  ASSERT_EQ(kill(process_, SIGTERM), 0);
+  EXPECT_EQ(wait(process_), 0) << err();
+}
+
+// What `systemctl reload` sends, whether or not there is a certificate to read again.
+TEST_F(ServerProgram, AReloadIsNoEnd) {
+  const uint16_t port = serve();
+  if (port == 0 && err().find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  ASSERT_NE(port, 0) << err();
+  ASSERT_EQ(kill(process_, SIGHUP), 0);
+  EXPECT_TRUE(eventually([&] { return err().find("no certificate") != std::string::npos; })) << err();
+  EXPECT_THAT(test::http_get(port, "/healthz"), HasSubstr("ok"));
+  ASSERT_EQ(kill(process_, SIGTERM), 0);
+  EXPECT_EQ(wait(process_), 0) << err();
+}
+
+/// So many sessions, one after the other; each leaves two lines in the log.
+void join_and_leave(uint16_t port, int count) {
+  for (int i = 0; i < count; ++i) {
+    test::RawClient client(port);
+    ASSERT_TRUE(client.handshake()) << i;
+    client.send(Hello{});
+    ASSERT_TRUE(client.read_control<Welcome>()) << i;
+  }
+}
+
+TEST_F(ServerProgram, ALogThatNobodyReadsStopsNothing) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(pipe2(ends.data(), O_CLOEXEC), 0);
+  ASSERT_GT(fcntl(ends[1], F_SETPIPE_SZ, 4'096), 0);
+  const uint16_t port = serve({}, ends[1]);
+  close(ends[1]);
+  std::string log(4'096, '\0');
+  if (port == 0) log.resize(static_cast<size_t>(std::max<ssize_t>(read(ends[0], log.data(), log.size()), 0)));
+  if (port == 0 && log.find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << log;
+  ASSERT_NE(port, 0) << log;
+  join_and_leave(port, 100);  // some 10,000 bytes
+  EXPECT_THAT(test::http_get(port, "/metrics"), AllOf(HasSubstr("\nstrandcast_log_dropped_lines_total"),
+                                                      Not(HasSubstr("log_dropped_lines_total 0\n"))));
+  close(ends[0]);  // now nobody can read it any more
+  join_and_leave(port, 10);
+  EXPECT_THAT(test::http_get(port, "/healthz"), HasSubstr("ok"));
+  ASSERT_EQ(kill(process_, SIGTERM), 0);
+  EXPECT_EQ(wait(process_), 0);
+}
+
+/// The names in one of systemd's groups of system calls, groups in groups included.
+std::set<std::string> calls_in(const std::string& group) {
+  const std::unique_ptr<FILE, decltype(&pclose)> pipe(
+      popen(("systemd-analyze syscall-filter " + group + " 2>/dev/null").c_str(), "r"), pclose);
+  std::set<std::string> calls;
+  std::array<char, 256> line{};
+  while (pipe && std::fgets(line.data(), line.size(), pipe.get()) != nullptr) {
+    std::istringstream words(line.data());
+    std::string word;
+    if (!(words >> word) || word.front() == '#' || word == group) continue;
+    if (word.front() == '@')
+      calls.merge(calls_in(word));
+    else
+      calls.insert(word);
+  }
+  return calls;
+}
+
+// The frame thread would ask in vain to stand behind the simulation.
+TEST_F(ServerProgram, TheUnitAllowsWhatTheServerCalls) {
+  const std::set<std::string> service = calls_in("@system-service");
+  if (service.empty()) GTEST_SKIP() << "systemd-analyze is not installed, which knows the groups of calls";
+  std::set<std::string> allowed;
+  std::istringstream unit(
+      text_of(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy/strandcast-server.service"));
+  for (std::string line; std::getline(unit, line);) {
+    constexpr std::string_view kKey = "SystemCallFilter=";
+    if (!line.starts_with(kKey)) continue;
+    const bool is_denied = line[kKey.size()] == '~';
+    std::istringstream words(line.substr(kKey.size() + (is_denied ? 1 : 0)));
+    for (std::string word; words >> word;) {
+      const std::set<std::string> calls = word.front() == '@' ? calls_in(word) : std::set<std::string>{word};
+      for (const std::string& call : calls)
+        is_denied ? (void)allowed.erase(call) : (void)allowed.insert(call);
+    }
+  }
+  for (const char* call : {"setpriority", "poll", "sendmsg", "accept4", "rt_sigtimedwait", "clone3"})
+    EXPECT_TRUE(allowed.contains(call)) << call;
+  for (const char* call : {"mount", "ptrace", "setuid", "sched_setscheduler"})
+    EXPECT_FALSE(allowed.contains(call)) << call;
 }
 
 TEST_F(ServerProgram, LeavesAfterTheGivenTime) {

@@ -30,6 +30,7 @@ struct HandshakeOptions {
   std::string host;    // empty: the real one
   std::string origin;  // empty: none
   std::string protocol = kWebSocketProtocol;
+  std::string forwarded_for = {};  // X-Forwarded-For; empty: none
 };
 
 class RawClient {

@@ -62,6 +62,10 @@ class FakeApp : public NetHandler {
   void on_camera(SessionId, const CameraChange&) override { ++cameras; }
   void on_ack(SessionId, const FrameAck& ack) override { last_ack = ack.sequence; }
   void on_shut_down(SessionId) override { ++shut_downs; }
+  Status readiness() override {
+    if (is_stepping) return {};
+    return make_error(ErrorCode::Unavailable, "Stuck on purpose.");
+  }
   void on_keyframe_request(SessionId, uint16_t) override {
     const std::lock_guard lock(mutex_);
     ++keyframe_requests;
@@ -95,7 +99,7 @@ class FakeApp : public NetHandler {
   std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0},
       shut_downs{0};
   std::atomic<uint32_t> last_ack{0};
-  std::atomic<bool> left_twice{false};
+  std::atomic<bool> left_twice{false}, is_stepping{true};
 
  private:
   mutable std::mutex mutex_;
