@@ -17,8 +17,8 @@
 #include "server/app/control_budget.h"
 #include "server/app/mode_facts.h"
 #include "server/app/scene_change.h"
+#include "server/app/server_metrics.h"
 #include "server/app/viewers.h"
-#include "server/net/metrics.h"
 
 namespace strandcast {
 namespace {
@@ -450,46 +450,10 @@ Status Server::State::readiness() {
 }
 
 std::string Server::State::metrics() {
-  const ServerCounters now = counters();
-  std::string text;
-  const auto gauge = [&](const char* name, double value) { text += format_metric(name, "gauge", value); };
-  const auto total = [&](const char* name, uint64_t value) {
-    text += format_metric(name, "counter", static_cast<double>(value));
-  };
-  total("sim_steps_total", now.sim.tick);
-  gauge("sim_step_median_ms", now.sim.step_median_ms);
-  gauge("sim_realtime_factor", now.sim.realtime_factor);
-  total("sim_dropped_steps_total", now.sim.dropped_steps);
-  gauge("publish_read_median_ms", now.sim.read_median_ms);
-  gauge("publish_quantise_median_ms", now.sim.quantise_median_ms);
-  total("publish_snapshots_total", now.sim.published);
-  total("publish_quarantined_total", now.sim.quarantined);
-  total("publish_overstretched_total", now.sim.overstretched);
-  total("encode_frames_total", now.encode.encodes);
-  uint64_t class_encodes = 0;
-  double classes_in_use = 0.0;
-  for (const StrandEncodeCounters& one : now.strand_classes) class_encodes += one.encodes;
+  ServerCounters now = counters();
   for (uint16_t stream_id = 0; stream_id < classes_.size(); ++stream_id)
-    classes_in_use += viewers_.strand_viewers(stream_id) > 0 ? 1.0 : 0.0;
-  total("encode_all_classes_frames_total", class_encodes);
-  gauge("strand_classes_in_use", classes_in_use);
-  total("encode_keyframes_total", now.encode.keyframes);
-  total("encode_delta_bytes_total", now.encode.delta_bytes);
-  gauge("encode_median_ms", now.encode.encode_median_ms);
-  total("render_frames_total", now.frames.frames);
-  total("render_paints_total", now.frames.paints);
-  total("render_unchanged_total", now.frames.unchanged);
-  total("render_stills_total", now.frames.stills);
-  total("render_wholes_total", now.frames.wholes);
-  total("render_bytes_total", now.frames.bytes);
-  gauge("render_median_ms", now.frames.paint_median_ms);
-  gauge("render_encode_median_ms", now.frames.encode_median_ms);
-  total("input_accepted_total", now.input.accepted);
-  total("input_rejected_total", now.input.rejected());
-  gauge("viewers_strands", now.strand_viewers);
-  gauge("viewers_frames", now.frame_viewers);
-  total("log_dropped_lines_total", dropped_log_lines());
-  return text;
+    now.strand_classes_in_use += viewers_.strand_viewers(stream_id) > 0 ? 1 : 0;
+  return format_server_metrics(now, version());
 }
 
 Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}

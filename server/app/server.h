@@ -41,6 +41,7 @@ struct ServerCounters {
   uint32_t strand_viewers = 0;  // one whose mode changes counts here and in frame_viewers
   uint32_t frame_viewers = 0;
   uint32_t viewers = 0;
+  uint32_t strand_classes_in_use = 0;
 };
 
 class Server {

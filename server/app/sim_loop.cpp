@@ -309,7 +309,9 @@ void SimLoop::step(int64_t time_ns) {
     solver_->substep(substep);
     head_velocity_mps_ = substep.head_shift_m / substep.h_s;
   }
-  step_timer_.add_ms(timer_->end_ms());
+  const double step_ms = timer_->end_ms();
+  step_timer_.add_ms(step_ms);
+  step_times_.add_ms(step_ms);
   last_step_ns_ = now_ns();
   if (viewers(facts_) > 0 || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
@@ -352,6 +354,7 @@ void SimLoop::update_stats() {
   SimStats stats;
   stats.tick = tick_;
   stats.step_median_ms = step_timer_.median_ms();
+  stats.step_times = step_times_;
   stats.read_median_ms = publisher_->read_timer().median_ms();
   stats.quantise_median_ms = publisher_->quantise_timer().median_ms();
   stats.realtime_factor = clock_->realtime_factor(now_ns());

@@ -16,6 +16,7 @@
 #include <thread>
 #include <variant>
 
+#include "common/base/histogram.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
 #include "common/gl/egl_context.h"
@@ -53,6 +54,7 @@ struct SimLoopConfig {
 struct SimStats {
   uint64_t tick = 0;
   double step_median_ms = 0.0;  // solver, all substeps
+  Histogram step_times;         // likewise
   double read_median_ms = 0.0;
   double quantise_median_ms = 0.0;
   double realtime_factor = 0.0;
@@ -144,6 +146,7 @@ class SimLoop {
   std::optional<gl::GpuTimer> timer_;
   RuntimeFacts facts_;
   StageTimer step_timer_;
+  Histogram step_times_;
   InputFrame input_;
   glm::dvec3 head_velocity_mps_{0.0};     // during the last substep
   uint64_t next_quarantine_report_ = 1;   // at so many broken strands since start

@@ -269,7 +269,11 @@ void Connection::answer_metrics(const Request& request) {
     return refuse(given.empty() ? Refusal::Path : Refusal::Token, http::status::unauthorized,
                   "/metrics needs a token here (Authorization: Bearer).");
   }
-  respond(http::status::ok, format_metrics(context_.counters_now()) + context_.handler.metrics(),
+  respond(http::status::ok,
+          format_metrics(context_.counters_now()) +
+              format_histogram("net_queue_delay_ms", "How long data waits on its way to a viewer.",
+                               context_.queue_delays) +
+              context_.handler.metrics(),
           "text/plain; version=0.0.4");
 }
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/histogram.h"
 #include "common/log/log.h"
 #include "server/net/address_guard.h"
 #include "server/net/log_budget.h"
@@ -99,6 +100,7 @@ struct Context {
   AddressGuard guard;
   LogBudget refusal_lines;
   LogBudget session_lines;
+  Histogram queue_delays;  // of all viewers, as often as their links are looked at
   TlsContextPtr tls;  // null: no TLS
 
  private:

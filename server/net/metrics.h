@@ -1,14 +1,22 @@
-// Prometheus text of the network counters. Any thread.
+// Prometheus text (exposition format 0.0.4): each metric with its help and type. Any thread.
 #pragma once
 
 #include <string>
+#include <string_view>
 
+#include "common/base/histogram.h"
 #include "server/net/net_server.h"
 
 namespace strandcast {
 
-/// One line of Prometheus text with its type; `type` is "counter" or "gauge".
-std::string format_metric(const std::string& name, const char* type, double value);
+/// `type` is "counter", whose name ends in _total, or "gauge"; `help` is one line.
+std::string format_metric(std::string_view name, const char* type, const char* help, double value);
+
+/// Buckets in milliseconds, their sum and their count.
+std::string format_histogram(std::string_view name, const char* help, const Histogram& histogram);
+
+/// What runs here: a gauge that is 1, with the version as a label.
+std::string format_build_info(const char* version);
 
 std::string format_metrics(const NetCounters& counters);
 

@@ -172,6 +172,7 @@ void Session::report_link(int64_t time_ns) {
   link.mode = mode_;
   link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
   link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
+  context_.queue_delays.add_ms(link.queue_delay_ms);
   link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
   link.strand_bytes_per_s = context_.strands.bytes_per_s();
   context_.handler.on_link(id_, link, time_ns);

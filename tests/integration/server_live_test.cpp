@@ -564,6 +564,36 @@ TEST_F(LiveServer, SeveralServersLiveInOneProcessAndStopCleanly) {
   EXPECT_THAT(taken.error().message, HasSubstr(std::to_string(config.net.port)));
 }
 
+// A step that does not end: the server is alive, and says that it is not ready.
+TEST_F(LiveServer, ReadyMeansStepping) {
+  const auto is_stuck = std::make_shared<std::atomic<bool>>(false);
+  ServerConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  config.on_publish = [is_stuck](const std::shared_ptr<const Snapshot>&) {
+    EXPECT_TRUE(eventually([&] { return !*is_stuck; }));
+  };
+  if (!ServerFixture::start(std::move(config))) return;
+  const auto is_ready = [&] {
+    const std::string answer = test::http_get(server_->port(), "/readyz");
+    EXPECT_TRUE(answer.find(" 200 ") != std::string::npos ||
+                answer.find("has not stepped") != std::string::npos)
+        << answer;
+    return answer.find(" 200 ") != std::string::npos;
+  };
+  EXPECT_TRUE(eventually(is_ready));
+  *is_stuck = true;
+  EXPECT_TRUE(eventually([&] { return !is_ready(); }));
+  EXPECT_THAT(test::http_get(server_->port(), "/healthz"), HasSubstr("200 OK"));
+  *is_stuck = false;
+  EXPECT_TRUE(eventually(is_ready));
+  ASSERT_EQ(run_command(ctl_target(), ControlCommand{Command::Pause}), 0);
+  const uint64_t tick = server_->counters().sim.tick;
+  const int64_t pause_ns = now_ns();
+  constexpr int64_t kLongPauseNs = 2'500'000'000;  // longer than a step may be ago
+  EXPECT_TRUE(eventually([&] { return now_ns() - pause_ns > kLongPauseNs; }));
+  EXPECT_TRUE(is_ready()) << "paused at step " << tick;
+}
+
 TEST_F(LiveServer, MetricsTellWhatRuns) {
   if (!start()) return;
   StrandClient viewer = join();

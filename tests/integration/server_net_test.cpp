@@ -2,6 +2,7 @@
 // server.
 #include "server/net/net_server.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <thread>
 
 #include "common/base/profile.h"
+#include "tests/support/metrics_text.h"
 #include "tests/support/server_net_fixture.h"
 
 namespace strandcast {
@@ -28,6 +30,16 @@ TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
   EXPECT_NE(test::http_get(server_->port(), "/").find("404"), std::string::npos);
   EXPECT_NE(test::http_get(server_->port(), "/../etc/passwd").find("404"), std::string::npos);
   EXPECT_NE(test::http_get(server_->port(), "/healthz", "evil.example").find("403"), std::string::npos);
+}
+
+TEST_F(ServerNet, MetricsFollowTheirFormat) {
+  start();
+  const auto viewer = join();
+  const std::string answer = test::http_get(server_->port(), "/metrics");
+  const std::string text = answer.substr(answer.find("\r\n\r\n") + 4);
+  EXPECT_THAT(test::metric_faults(text), testing::IsEmpty());
+  std::vector<std::string> faults;
+  EXPECT_EQ(test::read_metrics(text, faults)["strandcast_net_joined_sessions"].samples[0].second, 1.0);
 }
 
 TEST_F(ServerNet, AliveIsNotReady) {

@@ -10,8 +10,10 @@
 #include "server/app/options.h"
 #include "server/app/pass_table.h"
 #include "server/app/scene_change.h"
+#include "server/app/server_metrics.h"
 #include "server/app/viewers.h"
 #include "server/sim/solver_registry.h"
+#include "tests/support/metrics_text.h"
 
 namespace strandcast {
 namespace {
@@ -370,6 +372,40 @@ TEST(Explain, NamesEverySolverAndEveryPass) {
 Result<ServerOptions> parse(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "strandcast-server");
   return parse_options(static_cast<int>(arguments.size()), arguments.data());
+}
+
+TEST(ServerMetrics, FollowTheirFormat) {
+  ServerCounters counters;
+  counters.sim.tick = 12'345'678'901;
+  for (const double value_ms : {0.1, 0.5, 0.6, 900.0, 5'000.0}) counters.sim.step_times.add_ms(value_ms);
+  const std::string text = format_server_metrics(counters, "1.2.3");
+  EXPECT_THAT(test::metric_faults(text), testing::IsEmpty());
+  std::vector<std::string> faults;
+  auto families = test::read_metrics(text, faults);
+  EXPECT_THAT(text, testing::HasSubstr("\nstrandcast_sim_steps_total 12345678901\n")) << "not rounded";
+  EXPECT_EQ(families["strandcast_build_info"].samples[0].first, "strandcast_build_info{version=\"1.2.3\"}");
+  const auto& steps = families["strandcast_sim_step_ms"].samples;
+  ASSERT_EQ(steps.size(), Histogram::kBoundsMs.size() + 3);
+  EXPECT_EQ(steps[0].second, 2.0) << "0.5 belongs to the bucket that it ends";
+  EXPECT_EQ(steps[1].second, 3.0);
+  EXPECT_EQ(steps[Histogram::kBoundsMs.size()].second, 5.0);
+}
+
+// The reader above finds what it is there to find.
+TEST(ServerMetrics, FaultsAreFound) {
+  const std::string good = "# HELP a_total A.\n# TYPE a_total counter\na_total 1\n";
+  EXPECT_THAT(test::metric_faults(good), testing::IsEmpty());
+  for (const char* wrong :
+       {"# TYPE a_total counter\na_total 1\n", "# HELP a_total A.\na_total 1\n", "a_total 1\n",
+        "# HELP a_total A.\n# TYPE a_total counter\n", "# HELP a A.\n# TYPE a counter\na 1\n",
+        "# HELP a_total A.\n# TYPE a_total counter\na_total nan\n",
+        "# HELP a_total A.\n# TYPE a_total counter\na_total 1\na_total 2\n",
+        "# HELP a_total A.\n# TYPE a_total counter\nb_total 1\n", "# HELP a A.\n# TYPE a gauge\na 1",
+        "# HELP h H.\n# TYPE h histogram\nh_bucket{le=\"1\"} 2\nh_bucket{le=\"+Inf\"} 1\nh_sum 1\nh_count "
+        "1\n",
+        "# HELP h H.\n# TYPE h histogram\nh_bucket{le=\"1\"} 1\nh_sum 1\nh_count 1\n"})
+    EXPECT_FALSE(test::metric_faults(wrong).empty()) << wrong;
+  EXPECT_FALSE(test::metric_faults(good + good).empty());
 }
 
 TEST(ServerOptions, ReadsWhatTheCommandLineSays) {

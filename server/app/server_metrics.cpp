@@ -1,0 +1,88 @@
+#include "server/app/server_metrics.h"
+
+#include "common/log/log.h"
+#include "server/net/metrics.h"
+
+namespace strandcast {
+namespace {
+
+/// A counter when its name says so, else a gauge.
+struct Row {
+  std::string_view name;
+  const char* help;
+  double (*value)(const ServerCounters&);
+};
+
+constexpr Row kRows[] = {
+    {"sim_steps_total", "Simulation steps.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.tick); }},
+    {"sim_step_median_ms", "Time of the solver for one step, median of the last ones.",
+     [](const ServerCounters& all) { return all.sim.step_median_ms; }},
+    {"sim_realtime_factor", "Simulated time per real time.",
+     [](const ServerCounters& all) { return all.sim.realtime_factor; }},
+    {"sim_dropped_steps_total", "Steps left out because the simulation was late.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.dropped_steps); }},
+    {"publish_read_median_ms", "Time to read a state back from the GPU, median.",
+     [](const ServerCounters& all) { return all.sim.read_median_ms; }},
+    {"publish_quantise_median_ms", "Time to bring a state onto the codec's lattice, median.",
+     [](const ServerCounters& all) { return all.sim.quantise_median_ms; }},
+    {"publish_snapshots_total", "States published.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.published); }},
+    {"publish_quarantined_total", "Strands put back to rest because they had no usable numbers.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.quarantined); }},
+    {"publish_overstretched_total", "Strands put back to rest because they had stretched too far.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.overstretched); }},
+    {"encode_frames_total", "Strand frames encoded for the first class.",
+     [](const ServerCounters& all) { return static_cast<double>(all.encode.encodes); }},
+    {"encode_all_classes_frames_total", "Strand frames encoded for all classes.",
+     [](const ServerCounters& all) {
+       uint64_t sum = 0;
+       for (const StrandEncodeCounters& one : all.strand_classes) sum += one.encodes;
+       return static_cast<double>(sum);
+     }},
+    {"strand_classes_in_use", "Strand classes that somebody watches.",
+     [](const ServerCounters& all) { return static_cast<double>(all.strand_classes_in_use); }},
+    {"encode_keyframes_total", "Keyframes of the first class.",
+     [](const ServerCounters& all) { return static_cast<double>(all.encode.keyframes); }},
+    {"encode_delta_bytes_total", "Bytes of the deltas of the first class.",
+     [](const ServerCounters& all) { return static_cast<double>(all.encode.delta_bytes); }},
+    {"encode_median_ms", "Time to encode a frame of the first class, median.",
+     [](const ServerCounters& all) { return all.encode.encode_median_ms; }},
+    {"render_frames_total", "Pictures encoded.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frames.frames); }},
+    {"render_paints_total", "Pictures drawn.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frames.paints); }},
+    {"render_unchanged_total", "Pictures not sent because nothing had changed.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frames.unchanged); }},
+    {"render_stills_total", "Pictures sent once more, finely, because nothing changed any more.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frames.stills); }},
+    {"render_wholes_total", "Pictures encoded to stand alone.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frames.wholes); }},
+    {"render_bytes_total", "Bytes of all pictures.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frames.bytes); }},
+    {"render_median_ms", "Time to draw a picture, median.",
+     [](const ServerCounters& all) { return all.frames.paint_median_ms; }},
+    {"render_encode_median_ms", "Time to encode a picture, median.",
+     [](const ServerCounters& all) { return all.frames.encode_median_ms; }},
+    {"input_accepted_total", "Samples of motion and wind taken.",
+     [](const ServerCounters& all) { return static_cast<double>(all.input.accepted); }},
+    {"input_rejected_total", "Samples of motion and wind refused.",
+     [](const ServerCounters& all) { return static_cast<double>(all.input.rejected()); }},
+    {"viewers_strands", "Viewers that get strands.",
+     [](const ServerCounters& all) { return static_cast<double>(all.strand_viewers); }},
+    {"viewers_frames", "Viewers that get pictures.",
+     [](const ServerCounters& all) { return static_cast<double>(all.frame_viewers); }},
+    {"log_dropped_lines_total", "Lines of the log that nobody read in time.",
+     [](const ServerCounters&) { return static_cast<double>(dropped_log_lines()); }}};
+
+}  // namespace
+
+std::string format_server_metrics(const ServerCounters& counters, const char* version) {
+  std::string text = format_build_info(version);
+  for (const Row& row : kRows)
+    text += format_metric(row.name, row.name.ends_with("_total") ? "counter" : "gauge", row.help,
+                          row.value(counters));
+  return text + format_histogram("sim_step_ms", "Time of the solver for one step.", counters.sim.step_times);
+}
+
+}  // namespace strandcast
