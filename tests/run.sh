@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-bash deploy/install_deps.sh xvfb xauth  # a display for the window test
+bash deploy/install_deps.sh xvfb xauth glslang-tools spirv-tools  # a display for the window test; checks of shaders
 cmake --preset ci >/dev/null
 cmake --build --preset ci
 

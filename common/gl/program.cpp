@@ -103,14 +103,7 @@ std::string read_log(Length length, Read read) {
 }
 
 Result<Shader> compile(const StageSource& stage, const Variant& variant) {
-  std::string header = "#version 450 core\n";
-  std::vector<std::string> chosen;
-  for (const VariantAxis& axis : stage.flat.axes) {
-    const auto given = variant.find(axis.name);
-    const int value = given == variant.end() ? axis.values.front() : given->second;
-    header += fmt::format("#define {} {}\n", axis.name, value);
-    chosen.push_back(fmt::format("{}={}", axis.name, value));
-  }
+  const std::string header = variant_header(stage.flat, variant);
   Shader shader(glCreateShader(stage.kind));
   const char* parts[] = {header.data(), stage.flat.text.data()};
   const GLint sizes[] = {static_cast<GLint>(header.size()), static_cast<GLint>(stage.flat.text.size())};
@@ -125,8 +118,9 @@ Result<Shader> compile(const StageSource& stage, const Variant& variant) {
                  glGetShaderInfoLog(shader.name(), size, written, text);
                });
   const auto header_lines = static_cast<uint32_t>(std::count(header.begin(), header.end(), '\n'));
+  const std::string chosen = describe_variant(stage.flat, variant);
   return at(stage.path, make_error(ErrorCode::BadInput, "does not compile{}: {}",
-                                   chosen.empty() ? "" : fmt::format(" with {}", fmt::join(chosen, " ")),
+                                   chosen.empty() ? "" : fmt::format(" with {}", chosen),
                                    map_compiler_log(stage.flat, header_lines, log)));
 }
 

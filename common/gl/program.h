@@ -58,6 +58,12 @@ std::map<std::string, std::string> declared_uniforms(const FlatSource& source);
 /// All combinations of the axes' values; one empty variant when there are no axes.
 std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes);
 
+/// What stands in front of the flattened text: the version, and a #define for each axis, with its default
+/// where the variant names no value.
+std::string variant_header(const FlatSource& source, const Variant& variant);
+/// The same values for people: "HAS_WIND=1 HAS_HEAD=0".
+std::string describe_variant(const FlatSource& source, const Variant& variant);
+
 /// Puts file:line of the original sources where a compiler log names lines of the flattened text, of which
 /// `header_lines` were put in front. Knows the forms of Mesa "0:LINE(COLUMN)", NVIDIA "0(LINE)" and others
 /// "0:LINE".

@@ -136,6 +136,11 @@ class Flattener {
   std::vector<std::string> open_;
 };
 
+int value_of(const VariantAxis& axis, const Variant& variant) {
+  const auto given = variant.find(axis.name);
+  return given == variant.end() ? axis.values.front() : given->second;
+}
+
 bool is_stage_file(std::string_view path) {
   return std::any_of(kStageExtensions.begin(), kStageExtensions.end(),
                      [&](std::string_view extension) { return path.ends_with(extension); });
@@ -211,6 +216,20 @@ std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes) {
     variants = std::move(longer);
   }
   return variants;
+}
+
+std::string variant_header(const FlatSource& source, const Variant& variant) {
+  std::string header = "#version 450 core\n";
+  for (const VariantAxis& axis : source.axes)
+    header += fmt::format("#define {} {}\n", axis.name, value_of(axis, variant));
+  return header;
+}
+
+std::string describe_variant(const FlatSource& source, const Variant& variant) {
+  std::vector<std::string> chosen;
+  for (const VariantAxis& axis : source.axes)
+    chosen.push_back(fmt::format("{}={}", axis.name, value_of(axis, variant)));
+  return fmt::format("{}", fmt::join(chosen, " "));
 }
 
 std::string map_compiler_log(const FlatSource& source, uint32_t header_lines, const std::string& log) {
