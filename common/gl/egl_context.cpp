@@ -233,6 +233,8 @@ Result<DeviceInfo> read_device_info() {
   if (!is_new_enough || (profile & GL_CONTEXT_CORE_PROFILE_BIT) == 0)
     return make_error(ErrorCode::Unsupported, "OpenGL 4.5 core is needed, '{}' has '{}'", info.renderer,
                       info.version);
+  info.limits = read_device_limits();
+  RETURN_IF_ERROR(check_device_limits(info.limits));
   for (const char* name : {"llvmpipe", "softpipe", "swrast", "SwiftShader"})
     info.is_software = info.is_software || info.renderer.find(name) != std::string::npos;
   return info;

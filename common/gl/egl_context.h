@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/gl/device_limits.h"
 
 namespace strandcast::gl {
 
@@ -17,6 +18,7 @@ struct DeviceInfo {
   std::string version;
   bool is_software = false;  // GPU timers lie there: glFinish and a wall clock instead
   int max_samples = 1;
+  DeviceLimits limits;
 };
 
 /// Software renderers draw with threads that all contexts of a display share; they run at the priority of the
@@ -46,7 +48,8 @@ class EglContext {
   DeviceInfo info_;
 };
 
-/// Reads DeviceInfo from whatever context is current (also a window's). Unsupported below GL 4.5 core.
+/// Reads DeviceInfo from whatever context is current (also a window's). Unsupported below GL 4.5 core, and
+/// where a limit is lower than our shaders need.
 Result<DeviceInfo> read_device_info();
 
 /// Turns GL debug messages of medium and high severity into log lines; call with a current context.

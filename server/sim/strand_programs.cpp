@@ -1,9 +1,12 @@
 #include "server/sim/strand_programs.h"
 
 #include <epoxy/gl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <string_view>
+
+#include "common/gl/device_limits.h"
 
 namespace strandcast {
 namespace {
@@ -55,9 +58,9 @@ const gl::Program& StrandPrograms::fitting(size_t collider_count) const {
 }
 
 Status check_group_count(const StrandLayout& layout, uint32_t group_count) {
-  if (group_count <= gl::kMaxGroupCount) return {};
-  return make_error(ErrorCode::LimitExceeded, "{} strands x {} vertices need {} work groups (at most {})",
-                    layout.strand_count, layout.vertex_count, group_count, gl::kMaxGroupCount);
+  return gl::check_device_limit(
+      gl::read_device_limits(), gl::DeviceLimit::GroupCount, group_count,
+      fmt::format("a groom of {} strands x {} vertices", layout.strand_count, layout.vertex_count));
 }
 
 }  // namespace strandcast

@@ -1,22 +1,25 @@
 #include "server/sim/strand_state.h"
 
 #include <epoxy/gl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 
 #include "common/base/check.h"
+#include "common/gl/device_limits.h"
 #include "shaders/shared/bindings.h"
 
 namespace strandcast {
 namespace {
 
-Status check_device_limits(const StrandLayout& layout) {
-  GLint most_texels = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most_texels);
-  if (layout.size() <= static_cast<size_t>(std::max(most_texels, 0))) return {};
-  return make_error(ErrorCode::Unsupported,
-                    "{} strands x {} vertices do not fit the device ({} vertices at most)",
-                    layout.strand_count, layout.vertex_count, most_texels);
+Status check_size(const StrandLayout& layout) {
+  const gl::DeviceLimits limits = gl::read_device_limits();
+  const std::string user =
+      fmt::format("a groom of {} strands x {} vertices", layout.strand_count, layout.vertex_count);
+  RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::BufferTexels, layout.size(), user));
+  return gl::check_device_limit(limits, gl::DeviceLimit::StorageBlockBytes, layout.size() * sizeof(glm::vec4),
+                                user);
 }
 
 void copy_vectors(const std::vector<glm::vec4>& from, std::vector<glm::vec3>& to) {
@@ -52,7 +55,7 @@ void turn_plane(StrandPlane& plane, const glm::dquat& turn) {
 
 Status StrandState::load(const Groom& groom, const glm::dquat& world_from_head) {
   ASSIGN_OR_RETURN(StrandLayout layout, make_strand_layout(groom));
-  RETURN_IF_ERROR(check_device_limits(layout));
+  RETURN_IF_ERROR(check_size(layout));
   head_ = HeadPath::at_rest(world_from_head);
   is_at_rest_ = true;
   rest_ = StrandPlane("strand rest", layout.rest);

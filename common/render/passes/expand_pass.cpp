@@ -1,11 +1,13 @@
 #include "common/render/passes/expand_pass.h"
 
 #include <epoxy/gl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/gl/device_limits.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 
@@ -74,6 +76,10 @@ class ExpandPass final : public RenderPass {
   Status prepare(const RenderSetup& setup) override {
     const FollowerDesc followers{sizes_.max_followers(), kFollowerClump,
                                  kFollowerVariation * scene_.rest.mean_length_m, kFollowerShorten};
+    const gl::DeviceLimits limits = gl::read_device_limits();
+    for (const uint64_t bytes : {scene_.key_strands.size_bytes(), size_bytes(), expanded_.size_bytes()})
+      RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::StorageBlockBytes, bytes,
+                                             fmt::format("a groom of {} strands", sizes_.strand_count(0))));
     ASSIGN_OR_RETURN(expander_, StrandExpander::make(setup.shaders, setup.asset, followers));
     expanded_.allocate();
     return {};

@@ -1,8 +1,12 @@
 #include "common/render/passes/picture_target.h"
 
 #include <epoxy/gl.h>
+#include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+
+#include "common/gl/device_limits.h"
 
 namespace strandcast {
 namespace {
@@ -22,6 +26,9 @@ void set_plain_state(glm::uvec2 viewport) {
 Status SceneTarget::resize(glm::uvec2 picture_px) {
   const glm::uvec2 size = picture_px * kSamplesPerSide;
   if (size == size_px_) return {};
+  RETURN_IF_ERROR(
+      gl::check_device_limit(gl::read_device_limits(), gl::DeviceLimit::TextureSize, std::max(size.x, size.y),
+                             fmt::format("a picture of {} x {} pixels", picture_px.x, picture_px.y)));
   // The old ones first: two sizes side by side may not fit.
   size_px_ = glm::uvec2(0);
   framebuffer_ = {};

@@ -1,0 +1,67 @@
+// What our shaders and buffers take of a device, beside what OpenGL 4.5 guarantees: one table, checked when a
+// context is made, and where a size follows from the scene, when its buffers are. shaders/README.md lists
+// it; a test compares it with what linked programs use. Reading needs a current context, the rest is plain
+// logic for any thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace strandcast::gl {
+
+enum class DeviceLimit : uint8_t {
+  VertexStorageBlocks,
+  TessellationStorageBlocks,
+  ComputeStorageBlocks,
+  StorageBlockBytes,
+  UniformBlockBytes,
+  BufferTexels,
+  ComputeTextureUnits,
+  VertexTextureUnits,
+  FragmentTextureUnits,
+  GroupSize,
+  GroupInvocations,
+  GroupCount,
+  SharedBytes,
+  TessellationLevel,
+  CapturedComponents,
+  TextureSize,
+};
+inline constexpr size_t kDeviceLimitCount = 16;
+
+struct DeviceLimitRow {
+  DeviceLimit limit;
+  const char* name;     // as in sentences
+  uint32_t query;       // of glGet
+  bool is_indexed;      // the query has one value per dimension; the first counts
+  uint64_t guaranteed;  // by OpenGL 4.5
+  uint64_t needed;      // whatever the scene; 0 where the scene decides
+  const char* user;     // who needs the most, or who checks where the scene decides
+};
+
+/// In the order of DeviceLimit.
+std::span<const DeviceLimitRow> device_limit_table();
+
+/// What a device offers, by DeviceLimit.
+struct DeviceLimits {
+  std::array<uint64_t, kDeviceLimitCount> values{};
+
+  uint64_t of(DeviceLimit limit) const { return values[static_cast<size_t>(limit)]; }
+};
+
+/// Of the current context.
+DeviceLimits read_device_limits();
+
+/// What is needed whatever the scene. Unsupported names the first limit that is too low, what is needed and
+/// what is given.
+Status check_device_limits(const DeviceLimits& limits);
+
+/// `user` needs so much of one limit: for sizes that follow from the scene. LimitExceeded in the same words.
+Status check_device_limit(const DeviceLimits& limits, DeviceLimit limit, uint64_t needed,
+                          const std::string& user);
+
+}  // namespace strandcast::gl
