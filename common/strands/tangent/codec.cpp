@@ -117,12 +117,14 @@ class Encoder final : public StrandEncoder {
       const EncodedFramePtr keyframe = start(snapshot);
       return {keyframe, keyframe};
     }
-    JoinFrames frames = encode_anchor(snapshot);
+    JoinFrames frames = encode_anchor(snapshot, Followers::Some);
     checked(frames.frame);
     return frames;
   }
 
  private:
+  /// Whether anybody has the frame before an anchor.
+  enum class Followers { None, Some };
   using Slices = std::vector<std::vector<std::byte>>;
 
   bool continues(const Snapshot& snapshot) const {
@@ -146,7 +148,7 @@ class Encoder final : public StrandEncoder {
     next_sizes_.reset(layout_);
     no_sizes_.reset(layout_);
     has_chain_ = true;
-    return checked(encode_anchor(snapshot).keyframe);
+    return checked(encode_anchor(snapshot, Followers::None).keyframe);
   }
 
   /// Too large a frame ends the chain.
@@ -186,7 +188,7 @@ class Encoder final : public StrandEncoder {
     return frame;
   }
 
-  JoinFrames encode_anchor(const Snapshot& snapshot) {
+  JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
     Snapshot decoded = begin(snapshot);
     frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
@@ -194,10 +196,12 @@ class Encoder final : public StrandEncoder {
     Slices shape_slices(layout_.slice_count());
     for_each_slice(layout_, [&](uint32_t slice) {
       quantise_anchor(layout_, chain_.history, target_, slice, frame_);
+      if (followers == Followers::Some) {
+        Tables tables = chain_.tables;
+        write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]);
+        writers_[slice].finish(slices[slice]);
+      }
       Tables tables = chain_.tables;
-      write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]);
-      writers_[slice].finish(slices[slice]);
-      tables = chain_.tables;
       write_symbols(layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]);
       writers_[slice].finish(shape_slices[slice]);
       set_lattice(layout_, frame_.lattice, slice, decoded);
@@ -205,7 +209,10 @@ class Encoder final : public StrandEncoder {
     remember(chain_.history, frame_);
     chain_.forget_motion(layout_);
     JoinFrames frames;
-    frames.frame = make_delta(snapshot, decoded, kAnchorFlag, slices);
+    if (followers == Followers::Some)
+      frames.frame = make_delta(snapshot, decoded, kAnchorFlag, slices);
+    else
+      ++sequence_;
     frames.keyframe = make_keyframe(snapshot, decoded, shape_slices);
     lattice_ = std::move(decoded.lattice);
     return frames;
