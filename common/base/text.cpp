@@ -93,4 +93,9 @@ std::string one_line(std::string_view text, size_t limit) {
   return cleaned(text, limit, is_hidden);
 }
 
+std::string excerpt(std::string_view text, size_t limit) {
+  const std::string begin = one_line(text, limit);
+  return one_line(text, limit + 1) == begin ? begin : begin + "...";
+}
+
 }  // namespace strandcast

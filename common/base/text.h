@@ -21,5 +21,7 @@ std::string printable(std::string_view text, size_t limit);
 /// the line, or reorder or hide what stands beside them (C1 controls, separators of lines, format
 /// characters).
 std::string one_line(std::string_view text, size_t limit);
+/// Likewise, with "..." behind it when there is more: what an error quotes.
+std::string excerpt(std::string_view text, size_t limit);
 
 }  // namespace strandcast

@@ -3,12 +3,16 @@
 // must outlive it.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "common/base/text.h"
 
 namespace strandcast {
 
@@ -69,12 +73,10 @@ std::optional<T> parse_number(std::string_view word) {
   return value;
 }
 
-/// A word from a file for an error message: at most 40 characters, unprintable ones as '?'.
+/// A word from a file for an error message: its first 40 characters, fit for one line.
 inline std::string quoted(std::string_view word) {
-  constexpr size_t kMaxQuoted = 40;
-  std::string text = "'";
-  for (const char c : word.substr(0, kMaxQuoted)) text += c >= ' ' && c <= '~' ? c : '?';
-  return text + (word.size() > kMaxQuoted ? "...'" : "'");
+  constexpr size_t kMaxQuotedChars = 40;
+  return fmt::format("'{}'", excerpt(word, kMaxQuotedChars));
 }
 
 }  // namespace strandcast

@@ -42,8 +42,7 @@ std::string_view trim(std::string_view text) {
 }
 
 std::string shown(std::string_view token) {
-  const std::string text = one_line(token, kMaxShownChars);
-  return one_line(token, kMaxShownChars + 1) == text ? text : text + "...";
+  return excerpt(token, kMaxShownChars);
 }
 
 std::string_view take_token(std::string_view& line) {

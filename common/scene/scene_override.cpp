@@ -8,6 +8,7 @@
 #include <charconv>
 #include <optional>
 
+#include "common/base/text.h"
 #include "common/groom/groom.h"
 #include "common/scene/scene_desc.h"
 
@@ -16,7 +17,7 @@ namespace {
 
 namespace pb = google::protobuf;
 
-constexpr size_t kMaxShownBytes = 200;  // of an assignment, in error messages
+constexpr size_t kMaxShownChars = 200;  // of an assignment, in error messages
 
 /// Keeps the first message of the parser instead of printing it.
 class FirstError : public pb::io::ErrorCollector {
@@ -152,7 +153,7 @@ std::string_view override_path(std::string_view assignment) {
 }
 
 Status apply_override(pb::Message& scene, const std::string& assignment) {
-  const std::string place = fmt::format("--set {}", assignment.substr(0, kMaxShownBytes));
+  const std::string place = fmt::format("--set {}", excerpt(assignment, kMaxShownChars));
   if (assignment.size() > kMaxOverrideBytes)
     return at(place, make_error(ErrorCode::LimitExceeded, "the override has {} bytes, the limit is {}",
                                 assignment.size(), kMaxOverrideBytes));

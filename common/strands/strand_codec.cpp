@@ -3,6 +3,7 @@
 #include <cstring>
 #include <utility>
 
+#include "common/base/text.h"
 #include "common/strands/strand_limits.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/strand_prefix.h"
@@ -38,12 +39,14 @@ const std::vector<Row>& rows() {
 }
 
 Result<const Row*> find_row(const std::string& codec) {
+  constexpr size_t kMaxShownChars = 64;
   std::string known;
   for (const Row& row : rows()) {
     if (row.info.name == codec) return &row;
     known += (known.empty() ? "" : ", ") + row.info.name;
   }
-  return make_error(ErrorCode::NotFound, "unknown strand codec '{}' (known: {})", codec.substr(0, 64), known);
+  return make_error(ErrorCode::NotFound, "unknown strand codec '{}' (known: {})",
+                    excerpt(codec, kMaxShownChars), known);
 }
 
 /// Gives the codec the rest shape of those strands that the snapshots have.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/text.h"
 #include "common/log/log.h"
 
 namespace strandcast::net {
@@ -214,7 +215,7 @@ void Session::close(CloseCode code, const std::string& reason) {
   close_code_ = code;
   context_.update_session_counts();
   queue_.clear();
-  (void)queue_.push_control(Goodbye{reason.substr(0, kMaxReasonCharacters)});  // cannot be full: just cleared
+  (void)queue_.push_control(Goodbye{printable(reason, kMaxReasonCharacters)});  // cannot be full: just cleared
   pump();
 }
 

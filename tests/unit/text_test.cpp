@@ -42,6 +42,12 @@ TEST(Text, PrintableReplacesWhatIsNotAndCountsCharacters) {
   EXPECT_EQ(printable("abc", 0), "");
 }
 
+TEST(Text, ExcerptsSayThatThereIsMore) {
+  EXPECT_EQ(excerpt("abc", 3), "abc");
+  EXPECT_EQ(excerpt("abcd", 3), "abc...");
+  EXPECT_EQ(excerpt("éè\n", 2), "éè...");
+}
+
 TEST(Text, OneLineShowsNothingThatActsOnATerminal) {
   EXPECT_EQ(one_line("Zoë 髪 \U0001f488", 64), "Zoë 髪 \U0001f488");
   // CSI as one C1 control, right-to-left override, line separator, zero-width space, a tag.
