@@ -17,6 +17,7 @@ while [ $# -gt 0 ]; do
 done
 [ ${#parts[@]} -gt 0 ] || parts=(fuzz dev tsan)
 
+export STRANDCAST_TEST_GRID=whole  # tests/support/test_grid.h
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth
 failed=()
 for part in "${parts[@]}"; do

@@ -8,6 +8,7 @@ bash deploy/install_deps.sh xvfb xauth glslang-tools spirv-tools  # a display fo
 cmake --preset ci >/dev/null
 cmake --build --preset ci
 
+echo "Grids of long tests: ${STRANDCAST_TEST_GRID:-small} (tests/support/test_grid.h)"
 results=build/ci/test_results
 rm -rf "$results"
 mkdir -p "$results/tried_first"
