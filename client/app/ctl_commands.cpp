@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -37,6 +38,12 @@ Result<Address> address_of(const CtlTarget& target) {
   return address;
 }
 
+/// Why to wait no longer, if somebody stopped the program.
+std::optional<Error> stopped(const CtlTarget& target) {
+  if (target.stop == nullptr || !*target.stop) return std::nullopt;
+  return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
+}
+
 Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
   ClientConfig config;
   ASSIGN_OR_RETURN(config.address, address_of(target));
@@ -45,6 +52,7 @@ Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
   config.hello.mode = StreamMode::Strands;
   config.hello.name = "strandcast-ctl";
   config.hello.token = target.token;
+  config.cancel = [target] { return stopped(target); };
   if (!target.token_file.empty()) {
     ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file, role));
   }
@@ -221,6 +229,7 @@ int ask(const CtlTarget& target, Role role, const ClientMessage& message) {
   if (const auto sent = (*client)->send(message); !sent) return fail(sent.error(), kRefusedExit);
   const int64_t begin_ns = now_ns();
   while (now_ns() - begin_ns < std::chrono::nanoseconds(kAnswerTimeout).count()) {
+    if (const auto why = stopped(target)) return fail(*why, kRefusedExit);
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
       if (const auto* list = std::get_if<SessionList>(&event)) {

@@ -22,7 +22,8 @@ struct CtlTarget {
   std::string token;
   std::filesystem::path token_file;  // read when not empty
   bool is_tls = false;
-  std::filesystem::path tls_authorities;  // means TLS when not empty
+  std::filesystem::path tls_authorities;    // means TLS when not empty
+  const std::atomic<bool>* stop = nullptr;  // set: connecting and waiting for answers end
 };
 
 struct FeedOptions {

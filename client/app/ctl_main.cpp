@@ -15,7 +15,7 @@ namespace {
 using namespace strandcast;
 
 struct CommandLine {
-  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}};
+  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}, nullptr};
   std::string log_level = "warn";
   FeedOptions feed;
   std::vector<float> wind_mps;
@@ -53,6 +53,16 @@ void declare_feed(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(0.0f, 2.0f))
       ->capture_default_str();
   app.add_option("--seed", feed.seed, "Seed of the gusts")->capture_default_str();
+}
+
+/// What to say when no command was understood but there are words left; empty otherwise.
+std::string unknown_command(const CLI::App& app) {
+  const std::vector<std::string> words = app.remaining();
+  if (!app.get_subcommands().empty() || words.empty()) return {};
+  std::string known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  return fmt::format("unknown command or option '{}' (commands: {}; --help says more)", words.front(), known);
 }
 
 int run(int argc, char** argv) {
@@ -95,8 +105,12 @@ int run(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ParseError& stop) {
-    return app.exit(stop) == 0 ? kDoneExit : kBadInputExit;
+  } catch (const CLI::ParseError& problem) {
+    if (const std::string unknown = unknown_command(app); !unknown.empty()) {
+      std::cerr << "strandcast-ctl: " << unknown << '\n';
+      return kBadInputExit;
+    }
+    return app.exit(problem) == 0 ? kDoneExit : kBadInputExit;
   }
   if (!init_log(line.log_level)) {
     std::cerr << "strandcast-ctl: unknown log level '" << line.log_level
@@ -107,6 +121,7 @@ int run(int argc, char** argv) {
     line.feed.wind_mps = glm::vec3(line.wind_mps[0], line.wind_mps[1], line.wind_mps[2]);
 
   const auto& stop = catch_stop_signals();
+  line.target.stop = &stop;
   if (*feed) return run_feed(line.target, line.feed, stop);
   if (*monitor) return run_monitor(line.target, line.monitor_s, stop);
   if (*pause) return run_command(line.target, ControlCommand{Command::Pause});

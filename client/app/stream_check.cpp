@@ -12,34 +12,31 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kPumpWait{5};
 
-/// A viewer that keeps the hash of every tick it decoded.
+/// A viewer that keeps the hashes of the ticks it decoded.
 struct HashingViewer {
   std::unique_ptr<ViewerSession> session;
   TickHashes hashes;
 
   void listen() {
     session->set_snapshot_listener([this](const auto& snapshot) {
-      // A coarser stream for a slow link, or one of fewer strands, has other numbers by design.
-      const bool is_whole = snapshot->strand_count == session->welcome().strand_count;
-      if (is_whole && session->quality().bound_m == session->welcome().bound_m)
-        hashes.add(snapshot->tick, state_hash(*snapshot));
+      hashes.add({snapshot->tick, session->replay().stream_id()}, state_hash(*snapshot));
     });
   }
 };
 
 }  // namespace
 
-void TickHashes::add(uint64_t tick, uint64_t hash) {
-  if (!hash_by_tick_.insert_or_assign(tick, hash).second) return;
-  order_.push_back(tick);
+void TickHashes::add(const Key& key, uint64_t hash) {
+  if (!hash_by_key_.insert_or_assign(key, hash).second) return;
+  order_.push_back(key);
   if (order_.size() <= limit_) return;
-  hash_by_tick_.erase(order_.front());
+  hash_by_key_.erase(order_.front());
   order_.pop_front();
 }
 
-std::optional<uint64_t> TickHashes::find(uint64_t tick) const {
-  const auto found = hash_by_tick_.find(tick);
-  return found == hash_by_tick_.end() ? std::nullopt : std::optional(found->second);
+std::optional<uint64_t> TickHashes::find(const Key& key) const {
+  const auto found = hash_by_key_.find(key);
+  return found == hash_by_key_.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::string StreamCheck::to_string() const {
@@ -47,6 +44,8 @@ std::string StreamCheck::to_string() const {
       fmt::format("{} frames decoded, {} ticks compared between two viewers, {} differ, {} frames rejected",
                   decoded_frames, compared_ticks, differing_ticks, rejected_frames);
   if (differing_ticks > 0) text += fmt::format(" (first at tick {})", first_differing_tick);
+  if (compared_ticks == 0)
+    text += " (the viewers got different streams: the link or this machine is too slow)";
   return text;
 }
 
@@ -58,9 +57,10 @@ Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, do
   first.listen();
   const auto is_done = [&] {
     return first.session->decoded_frames() >= frames && second.session &&
-           second.hashes.hash_by_tick().size() >= frames / 2;
+           second.hashes.hash_by_key().size() >= frames / 2;
   };
   while (!is_done()) {
+    if (const auto why = config.cancel ? config.cancel() : std::nullopt) return *why;
     RETURN_IF_ERROR(first.session->pump(kPumpWait));
     if (second.session) RETURN_IF_ERROR(second.session->pump(milliseconds(0)));
     // Half way in, so that the second one starts from a keyframe of its own in the middle of the chain.
@@ -79,11 +79,11 @@ Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, do
   check.decoded_frames = first.session->decoded_frames();
   check.rejected_frames =
       first.session->replay().stats().rejected_frames + second.session->replay().stats().rejected_frames;
-  for (const auto& [tick, hash] : second.hashes.hash_by_tick()) {
-    const auto other = first.hashes.find(tick);
+  for (const auto& [key, hash] : second.hashes.hash_by_key()) {
+    const auto other = first.hashes.find(key);
     if (!other) continue;
     ++check.compared_ticks;
-    if (*other != hash && check.differing_ticks++ == 0) check.first_differing_tick = tick;
+    if (*other != hash && check.differing_ticks++ == 0) check.first_differing_tick = key.tick;
   }
   return check;
 }

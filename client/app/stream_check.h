@@ -2,6 +2,7 @@
 // one half way, and compares the state hashes of every tick that both decoded. One thread.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -13,18 +14,25 @@
 
 namespace strandcast {
 
-/// The state hashes of the newest ticks that a viewer decoded, at most `limit` of them.
+/// The state hashes of the newest ticks that a viewer decoded, at most `limit` of them. A tick has a state
+/// for every stream it was sent in: within the same bound, but not the same numbers.
 class TickHashes {
  public:
+  struct Key {
+    uint64_t tick = 0;
+    uint16_t stream_id = 0;
+    auto operator<=>(const Key&) const = default;
+  };
+
   explicit TickHashes(size_t limit) : limit_(limit) {}
-  void add(uint64_t tick, uint64_t hash);
-  std::optional<uint64_t> find(uint64_t tick) const;
-  const std::map<uint64_t, uint64_t>& hash_by_tick() const { return hash_by_tick_; }
+  void add(const Key& key, uint64_t hash);
+  std::optional<uint64_t> find(const Key& key) const;
+  const std::map<Key, uint64_t>& hash_by_key() const { return hash_by_key_; }
 
  private:
   const size_t limit_;
-  std::map<uint64_t, uint64_t> hash_by_tick_;
-  std::deque<uint64_t> order_;  // of arrival: ticks may begin again
+  std::map<Key, uint64_t> hash_by_key_;
+  std::deque<Key> order_;  // of arrival: ticks may begin again
 };
 
 /// Hashes kept of each viewer, per frame to decode: the first one goes on while the second one joins.
@@ -32,7 +40,7 @@ inline constexpr size_t kKeptTicksPerFrame = 4;
 
 struct StreamCheck {
   uint64_t decoded_frames = 0;   // by the first viewer
-  uint64_t compared_ticks = 0;   // decoded by both
+  uint64_t compared_ticks = 0;   // decoded by both, of the same stream
   uint64_t differing_ticks = 0;  // with different hashes
   uint64_t rejected_frames = 0;  // by either
   uint64_t first_differing_tick = 0;
@@ -42,7 +50,7 @@ struct StreamCheck {
 };
 
 /// Decodes `frames` frames (at least 2). Errors are those of the connection, and Timeout when `timeout_s`
-/// passes first.
+/// passes first, or what `config.cancel` says.
 Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, double timeout_s);
 
 }  // namespace strandcast

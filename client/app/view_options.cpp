@@ -126,12 +126,21 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
       ->check(CLI::Range(1.0, kMaxClipFps))
       ->capture_default_str();
   app.add_option("--clip-size", raw.clip_size, "Size of the clip (default: as --size)");
-  app.add_option("--seconds", raw.seconds, "Stop after this long")->check(CLI::Range(0.1, 1e6));
+  app.add_option("--seconds", raw.seconds, "Stop receiving after this long; what came is then drawn")
+      ->check(CLI::Range(0.1, 1e6));
   app.add_option("--report", options.report, "Write what was measured: .json, else key=value lines");
   app.add_option("--shader-dir", options.shader_dir, "Read shaders from this folder");
   app.add_option("--device", options.device, "GL device for --headless: auto, software, hardware or a number")
       ->capture_default_str();
   app.add_option("--log", options.log_level, "error, warn, info, debug or off")->capture_default_str();
+}
+
+/// A file that cannot be written is better known before a long run than after it.
+Status check_folder_of(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.parent_path();
+  std::error_code ignored;
+  if (file.empty() || folder.empty() || std::filesystem::is_directory(folder, ignored)) return {};
+  return at(file.string(), make_error(ErrorCode::BadInput, "there is no folder '{}'", folder.string()));
 }
 
 Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
@@ -154,6 +163,8 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,
                       "--screenshot and --clip need --headless (in the window, S takes a picture)");
+  for (const auto* file : {&options.screenshot, &options.clip, &options.report})
+    RETURN_IF_ERROR(check_folder_of(*file));
   return options;
 }
 

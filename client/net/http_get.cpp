@@ -32,7 +32,7 @@ class Exchange {
     stream_.limit_reading(kMaxHttpAnswerHeaderBytes + kMaxHttpBodyBytes);
     resolver_.async_resolve(address.host, std::to_string(address.port),
                             [this](error_code failure, const tcp::resolver::results_type& results) {
-                              if (!keep(failure)) return;
+                              if (!keep(failure, "cannot find the host: ")) return;
                               connect(results);
                             });
   }
@@ -45,19 +45,21 @@ class Exchange {
       return make_error(ErrorCode::LimitExceeded,
                         "the HTTP answer is too long: more than {} bytes of header, or {} of body",
                         kMaxHttpAnswerHeaderBytes, kMaxHttpBodyBytes);
-    if (failure_) return make_error(ErrorCode::Unavailable, "no HTTP answer: {}", failure_.message());
+    if (failure_) return make_error(ErrorCode::Unavailable, "{}{}", what_failed_, failure_.message());
     return make_error(ErrorCode::Timeout, "no HTTP answer within {} ms", timeout.count());
   }
 
  private:
-  bool keep(const error_code& failure) {
+  bool keep(const error_code& failure, const char* what = "no HTTP answer: ") {
     if (failure) failure_ = failure;
+    if (failure) what_failed_ = what;
     return !failure;
   }
 
   void connect(const tcp::resolver::results_type& results) {
     asio::async_connect(stream_.socket(), results, [this](error_code failure, const tcp::endpoint&) {
-      if (tls_ == nullptr || failure) return write(failure);
+      if (!keep(failure, "cannot connect (is strandcast-server running?): ")) return;
+      if (tls_ == nullptr) return write(failure);
       stream_.async_connect_tls(tls_, host_, [this](error_code f) {
         if (f) tls_error_ = error_from_tls(stream_, f);
         write(f);
@@ -82,6 +84,7 @@ class Exchange {
   http::response_parser<http::string_body> parser_;
   beast::flat_buffer buffer_{kMaxHttpAnswerHeaderBytes};
   error_code failure_;
+  const char* what_failed_ = "";
   std::optional<Error> tls_error_;
   bool is_done_ = false;
 };

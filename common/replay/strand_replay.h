@@ -68,6 +68,8 @@ class StrandReplay {
   /// Time since the server sent the newest decoded frame, ms; 0 without a clock estimate.
   double state_age_ms(int64_t client_time_ns, const ClockOffset& clock) const;
 
+  /// Of the newest decoded state; each stream codes its states by itself.
+  uint16_t stream_id() const { return stream_id_; }
   const ReplayStats& stats() const { return stats_; }
   const StageTimer& decode_timer() const { return decode_timer_; }
   /// From the arrival of a motion sample at the server to the decoded state that contains it, ms.

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <thread>
 
 #include "client/app/ctl_commands.h"
 #include "client/app/headless_view.h"
+#include "client/app/stream_check.h"
 #include "common/pictures/image_codec.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_asset.h"
@@ -278,6 +280,29 @@ TEST(HostileServer, AStopEndsTheWaitForAWelcome) {
   EXPECT_THAT(report.error().message, HasSubstr("stopped"));
 }
 
+TEST(HostileServer, AStopEndsTheWaitForAnAnswer) {
+  const auto printed_by = [](const std::function<int(const CtlTarget&)>& program) {
+    std::atomic<bool> stop{false};
+    const FakeServer server([&](FakePeer& peer) {
+      peer.welcome(make_welcome(20, 8));
+      peer.read();
+      stop = true;
+      peer.wait_for_test_end();
+    });
+    CtlTarget target;
+    target.connect = fmt::format("127.0.0.1:{}", server.port());
+    target.stop = &stop;
+    testing::internal::CaptureStderr();
+    EXPECT_NE(program(target), kDoneExit);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(
+      printed_by([](const CtlTarget& target) { return run_command(target, ControlCommand{Command::Pause}); }),
+      HasSubstr("stopped"));
+  EXPECT_THAT(printed_by([](const CtlTarget& target) { return run_check(target, 10, 60.0); }),
+              HasSubstr("stopped"));
+}
+
 TEST(HostileServer, GoodbyesWithoutEndKeepNobody) {
   constexpr int kGoodbyes = 500;
   std::atomic<int> sent{0};
@@ -294,6 +319,32 @@ TEST(HostileServer, GoodbyesWithoutEndKeepNobody) {
   while (pumped) pumped = (*session)->pump(kLong);
   EXPECT_THAT(pumped.error().message, HasSubstr("Soon."));
   EXPECT_LT(sent, kGoodbyes) << "the client waited for the last one";
+}
+
+// ---- comparing ----
+
+/// A server may move one viewer to a slower stream, which codes the same ticks by itself.
+TEST(HostileServer, CheckComparesStatesOfTheSameStreamOnly) {
+  std::atomic<uint16_t> connections{0};
+  const FakeServer server([&](FakePeer& peer) {
+    const auto stream_id = static_cast<uint16_t>(connections++ == 0 ? 1 : 0);
+    peer.welcome(make_welcome(20, 8));
+    const auto encoder = make_strand_encoder("delta");
+    Snapshot snapshot;
+    snapshot.strand_count = 20;
+    snapshot.vertex_count = 8;
+    snapshot.quantum_m = 1e-4f;
+    snapshot.lattice.assign(size_t{3} * 20 * 8, stream_id);
+    for (snapshot.tick = 1; snapshot.tick <= 20; ++snapshot.tick)
+      peer.send(*with_send_time(*(*encoder)->encode(snapshot), stream_id, 1));
+    peer.read_to_end();
+  });
+  const auto check = check_stream(config_for(server.port()), 10, 60.0);
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_EQ(check->differing_ticks, 0u);
+  EXPECT_EQ(check->compared_ticks, 0u);
+  EXPECT_FALSE(check->is_good());
+  EXPECT_THAT(check->to_string(), HasSubstr("different streams"));
 }
 
 // ---- text ----

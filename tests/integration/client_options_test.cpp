@@ -1,6 +1,7 @@
 // What the clients' command lines make of addresses, roles and token files.
 #include <gmock/gmock.h>
 
+#include <array>
 #include <fstream>
 
 #include "client/app/view_options.h"
@@ -33,6 +34,19 @@ TEST(ViewOptions, EncryptWhenTheAddressOrAnOptionSaysSo) {
   const ClientConfig config = client_config(read({"--tls-ca", "ca.pem"}));
   EXPECT_TRUE(config.address.is_tls);
   EXPECT_EQ(config.tls_authorities, "ca.pem");
+}
+
+TEST(ViewOptions, AFolderThatIsNotThereIsNamedBeforeTheRun) {
+  for (const char* option : {"--screenshot", "--clip", "--report"}) {
+    const std::array<const char*, 4> arguments = {"strandcast-view", "--headless", option,
+                                                  "/no/such/folder/file"};
+    testing::internal::CaptureStderr();
+    const auto line = read_view_command_line(static_cast<int>(arguments.size()), arguments.data());
+    EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("there is no folder '/no/such/folder'"));
+    EXPECT_FALSE(line.options.has_value());
+    EXPECT_EQ(line.exit_code, 2);
+  }
+  EXPECT_EQ(read({"--headless", "--report", "here.txt"}).report, "here.txt");
 }
 
 class ClientTokenFile : public testing::Test {

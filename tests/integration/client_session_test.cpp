@@ -221,7 +221,9 @@ TEST(ViewerThread, SendsEveryWishForAModeAtOnce) {
   const std::vector<StreamMode> wishes = {StreamMode::Strands, StreamMode::Auto, StreamMode::Frames};
   for (const StreamMode mode : wishes) viewer.request_mode(mode);
   EXPECT_EQ(viewer.wanted_mode(), StreamMode::Frames);
-  EXPECT_EQ(asked.get_future().get(), wishes) << "a key press does not wait for a clock";
+  std::future<std::vector<StreamMode>> heard = asked.get_future();
+  ASSERT_EQ(heard.wait_for(kLong), std::future_status::ready) << "a key press does not wait for a clock";
+  EXPECT_EQ(heard.get(), wishes);
   ASSERT_TRUE(eventually([&] {
     const ModeView now = viewer.look()->mode;
     return now.wanted == StreamMode::Frames && now.is_answered;

@@ -78,12 +78,13 @@ TEST(NoticeList, TheOldestGiveWay) {
 
 TEST(TickHashes, KeepTheNewestAlsoWhenTicksBeginAgain) {
   TickHashes hashes(3);
-  for (const uint64_t tick : {100u, 101u, 102u, 0u, 1u}) hashes.add(tick, tick + 7);
-  hashes.add(1, 9);
-  EXPECT_EQ(hashes.hash_by_tick().size(), 3u);
-  EXPECT_FALSE(hashes.find(101));
-  EXPECT_EQ(hashes.find(102), 109u);
-  EXPECT_EQ(hashes.find(1), 9u) << "again: the newer counts";
+  for (const uint64_t tick : {100u, 101u, 102u, 0u, 1u}) hashes.add({tick, 0}, tick + 7);
+  hashes.add({1, 0}, 9);
+  EXPECT_EQ(hashes.hash_by_key().size(), 3u);
+  EXPECT_FALSE(hashes.find({101, 0}));
+  EXPECT_FALSE(hashes.find({102, 1})) << "another stream";
+  EXPECT_EQ(hashes.find({102, 0}), 109u);
+  EXPECT_EQ(hashes.find({1, 0}), 9u) << "again: the newer counts";
 }
 
 Welcome welcome_to(StreamMode mode) {
