@@ -9,20 +9,15 @@
 namespace strandcast {
 namespace {
 
-bool is_media(Opcode opcode) {
-  switch (opcode) {
-    case Opcode::Asset:
-    case Opcode::StrandKeyframe:
-    case Opcode::StrandDelta:
-    case Opcode::JpegFrame:
-    case Opcode::JpegTiles:
-    case Opcode::Vp8Frame:
-    case Opcode::H264Frame:
-      return true;
-    case Opcode::Control:
-      return false;
-  }
-  return false;
+constexpr std::array kMediaOpcodes = {Opcode::Asset,     Opcode::StrandKeyframe, Opcode::StrandDelta,
+                                      Opcode::JpegFrame, Opcode::JpegTiles,      Opcode::Vp8Frame,
+                                      Opcode::H264Frame};
+
+std::string known_opcodes() {
+  std::string list;
+  for (const Opcode opcode : kMediaOpcodes)
+    list += fmt::format("{}0x{:02x}", list.empty() ? "" : ", ", static_cast<uint8_t>(opcode));
+  return list;
 }
 
 }  // namespace
@@ -60,9 +55,9 @@ Result<FrameHeader> unpack_frame_header(std::span<const std::byte> message) {
   header.payload_bytes = reader.take<uint32_t>();
   header.sim_time_ns = reader.take<int64_t>();
   header.send_time_ns = reader.take<int64_t>();
-  if (!is_media(header.opcode))
-    return make_error(ErrorCode::BadInput,
-                      "unknown media opcode 0x{:02x} (known: 0x10, 0x20, 0x21, 0x30, 0x31, 0x32)", opcode);
+  if (std::find(kMediaOpcodes.begin(), kMediaOpcodes.end(), header.opcode) == kMediaOpcodes.end())
+    return make_error(ErrorCode::BadInput, "unknown media opcode 0x{:02x} (known: {})", opcode,
+                      known_opcodes());
   if (header.payload_bytes > kMaxMediaPayloadBytes)
     return make_error(ErrorCode::LimitExceeded, "media payload of {} bytes, the limit is {}",
                       header.payload_bytes, kMaxMediaPayloadBytes);

@@ -179,6 +179,23 @@ TEST(ControlBytes, TextThatIsNotUtf8IsRefused) {
   EXPECT_EQ(decode_client_message(bytes).error().place, "hello.name");
 }
 
+// ---- media headers ----
+
+TEST(MediaHeaders, UnknownOpcodesAreToldTheKnownOnes) {
+  Bytes message = make_encoded_frame({.opcode = Opcode::Asset, .sequence = 1}, {})->message;
+  std::string known;
+  std::string told;
+  for (int opcode = 0; opcode < 256; ++opcode) {
+    message[0] = static_cast<std::byte>(opcode);
+    const auto header = unpack_frame_header(message);
+    if (header)
+      known += fmt::format("{}0x{:02x}", known.empty() ? "" : ", ", opcode);
+    else
+      told = header.error().message;
+  }
+  EXPECT_EQ(told, fmt::format("unknown media opcode 0xff (known: {})", known));
+}
+
 // ---- strand messages ----
 
 constexpr uint32_t kStrands = 5;  // as in the fuzz entries' first size
