@@ -1,8 +1,11 @@
 #!/usr/bin/env bash
-# What a night is for: fuzzes every target, and runs the whole suite under the sanitizers.
+# What a night is for: fuzzes every target, walks the whole grids of the long tests, runs the whole suite under the
+# sanitizers, and looks at the programs as a whole.
 #   bash tests/nightly.sh                      all of it, 60 s for each fuzzer
 #   bash tests/nightly.sh --seconds 5 fuzz     the short form: only the fuzzers, 5 s each
-# Parts: fuzz, dev (address and undefined behaviour), tsan (threads). A finding stays under build/fuzz/findings.
+# Parts: fuzz, grids (property and comparing tests), dev (address and undefined behaviour), tsan (threads), lto (do all
+# files agree on every type, and does each include what it uses). A part that fails does not keep the others from
+# running; a table of all stands at the end. A finding of a fuzzer stays under build/fuzz/findings.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,27 +14,44 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | dev | tsan) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, dev, tsan)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz dev tsan)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto)
 
-export STRANDCAST_TEST_GRID=whole  # tests/support/test_grid.h
-bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth
-failed=()
+bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools spirv-tools
+log="$(mktemp)"
+trap 'rm -f "$log"' EXIT
+
+# build PRESET [OPTION...]
+build() {
+  cmake --preset "$@" >/dev/null && cmake --build --preset "$1"
+}
+
+# Prints what the part says as it goes; its last line is the part's result.
+run_part() {
+  case "$1" in
+    fuzz) build fuzz -DSTRANDCAST_FUZZ_SECONDS="$seconds" && bash tests/run_preset.sh nightly build/fuzz 1 ;;
+    grids) build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 2 -L 'property|compare' ;;
+    dev | tsan) build "$1" && bash tests/run_preset.sh "$1" "build/$1" 1 ;;
+    lto) build lto && echo "all files agree" ;;
+  esac
+}
+
+table=""
+number=0
+outcome=0
 for part in "${parts[@]}"; do
-  test_preset="$part"
-  options=()
-  if [ "$part" = fuzz ]; then
-    test_preset=nightly
-    options=(-DSTRANDCAST_FUZZ_SECONDS="$seconds")
-  fi
-  cmake --preset "$part" "${options[@]}" >/dev/null
-  cmake --build --preset "$part"
-  ctest --preset "$test_preset" -j1 || failed+=("$part")
+  number=$((number + 1))
+  echo "== $part ($number of ${#parts[@]}), begun at $(date +%H:%M:%S)"
+  begun=$SECONDS
+  status=0
+  run_part "$part" 2>&1 | tee "$log" || status=1
+  word=passed
+  [ "$status" -eq 0 ] || { word=FAILED; outcome=1; }
+  table+="$(printf '%-6s  %-6s  %6d s  %s' "$part" "$word" $((SECONDS - begun)) "$(tail -n 1 "$log")")"$'\n'
 done
-if [ ${#failed[@]} -gt 0 ]; then
-  echo "failed: ${failed[*]}" >&2
-  exit 1
-fi
+echo "== results"
+printf '%s' "$table"
+exit "$outcome"
