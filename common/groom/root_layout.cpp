@@ -6,6 +6,7 @@
 
 #include "common/base/hash.h"
 #include "common/groom/groom.h"
+#include "common/groom/head_fit.h"
 #include "common/groom/progressive_order.h"
 #include "common/math/point_tree.h"
 
@@ -24,14 +25,6 @@ constexpr std::array<float, 4> kDivergenceAt = {0.25f, 0.5f, 0.75f, 1.0f};
 constexpr uint32_t kOrderSeed = 0;
 
 using Triple = std::array<uint32_t, 3>;
-
-std::vector<glm::vec3> roots_of(const Groom& groom) {
-  std::vector<glm::vec3> roots(groom.strand_count());
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
-    roots[strand] = groom.rest_position_m[groom.offset[strand]];
-  }
-  return roots;
-}
 
 /// One strand per distinct root position (the lowest index), ascending.
 std::vector<uint32_t> distinct_roots(const std::vector<glm::vec3>& roots) {

@@ -28,12 +28,6 @@ uint32_t viewers(const RuntimeFacts& facts) {
   return facts.strand_viewers + facts.frame_viewers;
 }
 
-std::vector<SphereCollider> colliders_of(const SceneDesc& scene, const SceneContent& content) {
-  if (!scene.colliders.empty()) return scene.colliders;
-  if (!scene.has_auto_collider) return {};
-  return {fit_head_collider(content.groom)};
-}
-
 }  // namespace
 
 Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot) {
@@ -234,7 +228,7 @@ Notice SimLoop::change(const std::string& assignment) {
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
   config_.scene = *scene;
-  builder_->change(*scene, colliders_of(*scene, *config_.content));
+  builder_->change(*scene, colliders_of(*scene, config_.content->groom));
   follow_stream_settings();
   if (has_other_stream())
     return {false, fmt::format("{} soon: the stream changes at most every {} ms.", assignment,

@@ -94,6 +94,12 @@ SphereCollider fit_head_collider(const Groom& groom) {
   return {fitted.center_m, std::min(distance_m[index], fitted.radius_m) * kColliderScale};
 }
 
+std::vector<SphereCollider> colliders_of(const SceneDesc& scene, const Groom& groom) {
+  if (!scene.colliders.empty()) return scene.colliders;
+  if (!scene.has_auto_collider) return {};
+  return {fit_head_collider(groom)};
+}
+
 Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   SceneContent content;
   ASSIGN_OR_RETURN(content.groom, make_groom(scene));
@@ -101,9 +107,7 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   const bool is_centred = file != nullptr && !file->has_origin;
   const glm::vec3 shift_m = is_centred ? centre_on_roots(content.groom) : glm::vec3(0.0f);
   ASSIGN_OR_RETURN(content.head, make_head_mesh(scene, content.groom, shift_m));
-  content.colliders = scene.colliders;
-  if (content.colliders.empty() && scene.has_auto_collider)
-    content.colliders.push_back(fit_head_collider(content.groom));
+  content.colliders = colliders_of(scene, content.groom);
   return content;
 }
 

@@ -22,4 +22,7 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene);
 /// One sphere just inside the roots, so that hair rests on it without being pushed off its own root.
 SphereCollider fit_head_collider(const Groom& groom);
 
+/// Those of the scene; without any the fitted head, unless the scene wants none. Head space.
+std::vector<SphereCollider> colliders_of(const SceneDesc& scene, const Groom& groom);
+
 }  // namespace strandcast

@@ -10,12 +10,12 @@
 namespace strandcast {
 
 struct HeadPath {
-  glm::dquat world_from_head{1.0, 0.0, 0.0, 0.0};  // rotation, unit
-  glm::dmat3 turn_per_s{0.0};                      // velocity of a point by the turn of the last substep
-  uint32_t step_index = 0;                         // substeps since loading
+  glm::dquat world_from_head_rotation{1.0, 0.0, 0.0, 0.0};  // rotation, unit
+  glm::dmat3 turn_per_s{0.0};  // velocity of a point by the turn of the last substep
+  uint32_t step_index = 0;     // substeps since loading
 
   /// A strand at rest under a head of this rotation.
-  static HeadPath at_rest(const glm::dquat& world_from_head);
+  static HeadPath at_rest(const glm::dquat& world_from_head_rotation);
   /// The path after a substep.
   void advance(const StepInput& input);
   /// The head jumps to this rotation and goes on turning as it did, seen from itself. Returns the turn.

@@ -16,22 +16,47 @@ glm::dvec3 any_perpendicular(const glm::dvec3& axis) {
   return glm::normalize(glm::cross(axis, other));
 }
 
-// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
-// up to the friction coefficient times the depth that the collider has to push back.
-glm::dvec3 held_by_friction(const ReferenceSegment& segment, const glm::dquat& carry, double friction,
-                            const glm::dvec3& center, double radius) {
-  const glm::dvec3& end = segment.end_m;
-  const double distance = glm::distance(end, center);
-  if (distance < kTinyLength) return end;
-  const glm::dvec3 normal = (end - center) / distance;
-  const glm::dvec3 slip = end - carry * segment.old_m;
-  const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
-  const double way = glm::length(sliding);
-  if (way < kTinyLength) return end;
-  return end - sliding * std::min(1.0, friction * (radius - distance) / way);
+}  // namespace
+
+size_t sphere_count(const StepInput& input) {
+  return std::min<size_t>(input.colliders.size(), kMaxSphereColliders);
 }
 
-}  // namespace
+ReferenceSphere sphere_of(const StepInput& input, size_t index) {
+  const SphereCollider& given = input.colliders[index];
+  return {limited(glm::dvec3(given.center_m), kMaxColliderM),
+          std::max(0.0, limited(given.radius_m, kMaxColliderM))};
+}
+
+ReferenceSphere deepest_sphere(const StepInput& input, const glm::dvec3& point_m) {
+  ReferenceSphere deepest;
+  double most = 0.0;
+  for (size_t c = 0; c < sphere_count(input); ++c) {
+    const ReferenceSphere sphere = sphere_of(input, c);
+    const glm::dvec3 outward = point_m - sphere.center_m;
+    const double inside = sphere.radius_m * sphere.radius_m - glm::dot(outward, outward);
+    if (inside <= most) continue;
+    most = inside;
+    deepest = sphere;
+  }
+  return deepest;
+}
+
+int push_rounds(const StepInput& input) {
+  return sphere_count(input) > 1 ? 2 : 1;
+}
+
+glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
+                            double friction, const ReferenceSphere& sphere) {
+  const double distance = glm::distance(point_m, sphere.center_m);
+  if (distance < kTinyLength) return point_m;
+  const glm::dvec3 normal = (point_m - sphere.center_m) / distance;
+  const glm::dvec3 slip = point_m - carry * old_m;
+  const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
+  const double way = glm::length(sliding);
+  if (way < kTinyLength) return point_m;
+  return point_m - sliding * std::min(1.0, friction * (sphere.radius_m - distance) / way);
+}
 
 glm::dvec3 shortened(const glm::dvec3& value, double longest) {
   const double length = glm::length(value);
@@ -59,24 +84,11 @@ glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3&
 // with the largest r^2 - |p - c|^2 first, then once more.
 glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
                       ReferenceSegment segment) {
-  const size_t collider_count = std::min<size_t>(input.colliders.size(), kMaxSphereColliders);
-  const int rounds = collider_count > 1 ? 2 : 1;
-  for (int round = 0; round < rounds; ++round) {
-    double most = 0.0;
-    glm::dvec3 center(0.0);
-    double radius = 0.0;
-    for (size_t c = 0; c < collider_count; ++c) {
-      const glm::dvec3 candidate = limited(glm::dvec3(input.colliders[c].center_m), kMaxColliderM);
-      const double r = std::max(0.0, limited(input.colliders[c].radius_m, kMaxColliderM));
-      const double inside = r * r - glm::dot(segment.end_m - candidate, segment.end_m - candidate);
-      if (inside <= most) continue;
-      most = inside;
-      center = candidate;
-      radius = r;
-    }
-    if (most <= 0.0) break;
-    segment.end_m = held_by_friction(segment, carry, friction, center, radius);
-    segment.end_m = turned_onto_sphere(segment, center, radius);
+  for (int round = 0; round < push_rounds(input); ++round) {
+    const ReferenceSphere sphere = deepest_sphere(input, segment.end_m);
+    if (sphere.radius_m <= 0.0) break;
+    segment.end_m = held_by_friction(segment.old_m, segment.end_m, carry, friction, sphere);
+    segment.end_m = turned_onto_sphere(segment, sphere.center_m, sphere.radius_m);
   }
   return segment.end_m;
 }

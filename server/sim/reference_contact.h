@@ -9,6 +9,26 @@
 
 namespace strandcast {
 
+/// A collider as the solvers take it, within the limits of strand_layout.h.
+struct ReferenceSphere {
+  glm::dvec3 center_m{0.0};
+  double radius_m = 0.0;
+};
+size_t sphere_count(const StepInput& input);
+ReferenceSphere sphere_of(const StepInput& input, size_t index);
+
+/// The sphere that the point is deepest inside of, by r^2 - d^2; its radius is 0 when the point is in none.
+ReferenceSphere deepest_sphere(const StepInput& input, const glm::dvec3& point_m);
+
+/// Times a point inside several colliders is pushed, out of the deepest first.
+int push_rounds(const StepInput& input);
+
+/// Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
+/// up to the friction coefficient times the depth that the collider has to push back. `carry` is the turn of
+/// the head during the substep; the point was at `old_m` before it.
+glm::dvec3 held_by_friction(const glm::dvec3& old_m, const glm::dvec3& point_m, const glm::dquat& carry,
+                            double friction, const ReferenceSphere& sphere);
+
 /// A segment's end, moved by a collider.
 struct ReferenceSegment {
   glm::dvec3 old_m{0.0};  // of the end, before the substep

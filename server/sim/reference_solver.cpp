@@ -20,7 +20,7 @@ Status ReferenceSolver::load(const Groom& groom, const glm::dquat& world_from_he
   position_m_.clear();
   for (uint32_t s = 0; s < layout_.strand_count; ++s)
     for (uint32_t i = 0; i < layout_.vertex_count; ++i)
-      position_m_.push_back(head_.world_from_head * glm::dvec3(layout_.rest[layout_.index(i, s)]));
+      position_m_.push_back(head_.world_from_head_rotation * glm::dvec3(layout_.rest[layout_.index(i, s)]));
   velocity_mps_.assign(layout_.size(), glm::dvec3(0.0));
   on_load();
   return {};
@@ -31,7 +31,7 @@ void ReferenceSolver::substep(const StepInput& input) {
   step.input = &input;
   step.h_s = limited_substep_s(input);
   step.rotation = limited_rotation(input.world_from_head);
-  step.carry = step.rotation * glm::conjugate(head_.world_from_head);
+  step.carry = step.rotation * glm::conjugate(head_.world_from_head_rotation);
   step.shift_m = limited(input.head_shift_m, kMaxHeadShiftM);
   step.head_velocity_mps = step.shift_m / step.h_s;
   step.before = head_;

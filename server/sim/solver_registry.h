@@ -42,21 +42,8 @@ struct SolverRow {
   /// Largest relative change of a segment's length with default parameters, whatever the head does within the
   /// motion that the laws test; 0 = lengths are exact to rounding under any motion.
   double stretch_bound = 0.0;
-  /// Lengths are exact too when both ends of a strand are held; only for rows with exact lengths.
-  bool has_exact_held_length = true;
   /// Under constant forces strands come to rest within ten seconds.
   bool comes_to_rest = true;
-  /// How far the shape at rest of strands of 0.25 m may differ between substeps of 1/60 s and 1/240 s.
-  double settled_spread_m = 5e-3;
-  /// How many times as large a rounding may become within a step: constraints that are solved in turn pass it
-  /// on, and segments under pressure fold to either side.
-  double rounding_growth = 1.0;
-  /// How far a rounding may move a strand whose segments are shorter than the way they are pushed along in a
-  /// step: each push by a segment's length lets the angle to it grow e times, and rounding decides how the
-  /// segment turns around. 0 = no more than rounding_growth says.
-  double folding_spread_m = 0.0;
-  /// How deep a vertex may end a step inside a collider.
-  double collider_depth_m = 1e-6;
   /// BadInput when a step of `substep_s` with complete parameters is outside the model's stable range, with
   /// the limit, the value and the ways out; empty = every step is stable.
   std::function<Status(const SolverParameters&, double substep_s)> check_step;

@@ -28,7 +28,7 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
 
   StepBlock block{};
   block.world_from_head = block_columns(glm::mat3_cast(rotation));
-  block.carry = block_columns(glm::mat3_cast(rotation * glm::conjugate(head.world_from_head)));
+  block.carry = block_columns(glm::mat3_cast(rotation * glm::conjugate(head.world_from_head_rotation)));
   block.head_velocity = pack(head_velocity, h_s);
   block.push = pack(h_s * acceleration, 1.0 / h_s);
   const glm::dvec3 groom_gravity = limited(input.groom_gravity_in_head_mps2, kMaxGravityMps2);

@@ -61,7 +61,7 @@ Status StrandState::load(const Groom& groom, const glm::dquat& world_from_head) 
   rest_ = StrandPlane("strand rest", layout.rest);
   staging_.resize(layout.size());
   for (size_t i = 0; i < staging_.size(); ++i) {
-    const glm::dvec3 position = head_.world_from_head * glm::dvec3(layout.rest[i]);
+    const glm::dvec3 position = head_.world_from_head_rotation * glm::dvec3(layout.rest[i]);
     staging_[i] = glm::vec4(glm::vec3(position), layout.arc[i]);
   }
   position_ = StrandPlane("strand position", staging_);

@@ -14,16 +14,8 @@ vec3 position_before(uint at) {
 vec3 outside_colliders(vec3 point, uint at) {
 #if COLLIDERS >= 1
   for (int round = 0; round < kPushRounds; ++round) {
-    vec4 deepest = vec4(0.0);
-    float most = 0.0;
-    for (uint i = 0u; i < uint(COLLIDERS); ++i) {
-      const vec4 sphere = u_step.collider[i];
-      const vec3 outward = point - sphere.xyz;
-      const float inside = sphere.w * sphere.w - dot(outward, outward);
-      deepest = inside > most ? sphere : deepest;
-      most = max(inside, most);
-    }
-    if (!(most > 0.0)) break;
+    const vec4 deepest = deepest_collider(point);
+    if (!(deepest.w > 0.0)) break;
     const vec3 held = held_by_friction(position_before(at), point, deepest) - deepest.xyz;
     const float squared = dot(held, held);
     // No way out of the very centre is shorter than another.

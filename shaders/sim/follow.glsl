@@ -134,6 +134,23 @@ vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
   return end - sliding * min(1.0, most * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
 }
 
+#if COLLIDERS >= 1
+// The sphere that a point is deepest inside of, by r^2 - d^2; its radius is 0 when the point is in none.
+vec4 deepest_collider(vec3 point) {
+  vec4 deepest = vec4(0.0);
+  float most = 0.0;
+  // Constant count and indices: uniform loads stay scalar on llvmpipe.
+  for (uint i = 0u; i < uint(COLLIDERS); ++i) {
+    const vec4 sphere = u_step.collider[i];
+    const vec3 outward = point - sphere.xyz;
+    const float inside = sphere.w * sphere.w - dot(outward, outward);
+    deepest = inside > most ? sphere : deepest;
+    most = max(inside, most);
+  }
+  return deepest;
+}
+#endif
+
 // The end of a vertex's segment: as near to its prediction as the segment's length from `start`, the
 // colliders and, with a pinned tail, the distance `reach` to `anchor` allow (exactly there for the last free
 // vertex). `pushed` is what colliders moved it by.
@@ -152,17 +169,8 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float rea
 
 #if COLLIDERS >= 1
   for (int round = 0; round < kPushRounds; ++round) {
-    vec4 deepest = vec4(0.0);
-    float most = 0.0;
-    // Constant count and indices: uniform loads stay scalar on llvmpipe.
-    for (uint i = 0u; i < uint(COLLIDERS); ++i) {
-      const vec4 sphere = u_step.collider[i];
-      const vec3 outward = end - sphere.xyz;
-      const float inside = sphere.w * sphere.w - dot(outward, outward);
-      deepest = inside > most ? sphere : deepest;
-      most = max(inside, most);
-    }
-    if (!(most > 0.0)) break;
+    const vec4 deepest = deepest_collider(end);
+    if (!(deepest.w > 0.0)) break;
     const float per_segment = 1.0 / max(vertex.segment, kTinySquared);
     const vec3 held = (held_by_friction(vertex.old, end, deepest) - start) * per_segment;
     const vec3 turned = turned_onto_sphere(start, held, vertex.segment, deepest.xyz, deepest.w);

@@ -6,6 +6,7 @@
 #include "server/sim/solver_registry.h"
 #include "tests/support/gl_fixture.h"
 #include "tests/support/sim_scene.h"
+#include "tests/support/solver_bounds.h"
 #include "tests/support/test_grid.h"
 
 namespace strandcast {
@@ -37,27 +38,24 @@ struct ParityCase {
   int steps = 6;
 };
 
-// The rod's matrix holds edges that are 3 n^2 times as stiff as a vertex is heavy: one rounding of the edge
-// is so much of the vertex's motion, here the length of a strand at most.
-constexpr double kRodBoundM = 3.0 * 6e-8 * 0.25;  // times n^2
-
 // Short segments divide a rounding: iterated models are given vertices over 8 times as much, in the first
 // step.
 constexpr double kIteratedVertexCount = 8.0;
 
 double bound_for(const SolverRow& row, const ParityCase& test, int step) {
-  if (test.vertex_count > kBoundVertexCount && row.folding_spread_m > 0.0) return row.folding_spread_m;
+  const SolverBounds& bounds = bounds_of(row);
+  if (test.vertex_count > kBoundVertexCount && bounds.folding_spread_m > 0.0) return bounds.folding_spread_m;
   const double held_bound_m = row.comes_to_rest ? kHeldBoundM : kRestlessHeldBoundM;
-  if (row.rounding_growth > 1.0) {
+  if (bounds.rounding_growth > 1.0) {
     const double bound_m = test.pinning == Pinning::BothEnds ? held_bound_m : kBoundM;
     return bound_m * std::max(1.0, test.vertex_count / kIteratedVertexCount) *
-           std::pow(row.rounding_growth, step - 1);
+           std::pow(bounds.rounding_growth, step - 1);
   }
   const double bound_m = test.pinning == Pinning::BothEnds
                              ? held_bound_m
                              : kBoundM * std::max(1.0, test.vertex_count / kBoundVertexCount);
   const double squared = static_cast<double>(test.vertex_count) * test.vertex_count;
-  return row.name == "direct_rod" ? bound_m + 2.0 * kRodBoundM * squared : bound_m;
+  return bound_m + bounds.stiff_rounding_m * squared;
 }
 
 StepInput input_for(const ParityCase& test, int step) {

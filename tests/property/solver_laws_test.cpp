@@ -1,6 +1,7 @@
 // Laws that every row of the solver table keeps, on the GPU and in double.
 #include <algorithm>
 
+#include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
 
 namespace strandcast {
@@ -146,7 +147,7 @@ TEST_F(SolverLaws, LengthsAreExactAfterEveryStep) {
     for (const SolverKind& kind : all_kinds()) {
       // Iterated odd and even placement of a strand held at both ends leaves a rest, which the next test
       // bounds.
-      if (pinning == Pinning::BothEnds && !kind.row->has_exact_held_length) continue;
+      if (pinning == Pinning::BothEnds && !bounds_of(*kind.row).has_exact_held_length) continue;
       if (kind.row->stretch_bound > 0.0) continue;  // bounded below
       SCOPED_TRACE(kind.name());
       auto solver = make(kind, groom);
@@ -190,7 +191,7 @@ TEST_F(SolverLaws, TurnedInputsGiveTheTurnedMotion) {
     }
     SolverState expected = read(*solver);
     for (glm::vec3& point : expected.position_m) point = glm::vec3(turn * glm::dvec3(point));
-    const double growth = kind.row->rounding_growth;
+    const double growth = bounds_of(*kind.row).rounding_growth;
     EXPECT_LE(largest_distance_m(read(*other).position_m, expected.position_m), growth * growth * 1e-4);
   }
 }
@@ -214,7 +215,7 @@ TEST_F(SolverLaws, AHeadInUniformMotionIsAHeadAtRest) {
       cruising->substep(input);
     }
     // Velocities of 26 m/s are stored to 1e-6 m/s.
-    const double growth = kind.row->rounding_growth;
+    const double growth = bounds_of(*kind.row).rounding_growth;
     EXPECT_LE(largest_distance_m(read(*cruising).position_m, read(*solver).position_m),
               growth * growth * 1e-4);
   }
@@ -286,7 +287,7 @@ TEST_F(SolverLaws, StrandsStayOutsideACollider) {
     SCOPED_TRACE(kind.name());
     // Limp strands hang onto the sphere.
     auto solver = make(kind, groom, {{"style_stiffness_per_s2", 0.0}, {"style_mix", 0.0}});
-    const double tolerance_m = kind.row->collider_depth_m;
+    const double tolerance_m = bounds_of(*kind.row).collider_depth_m;
     size_t touching = 0;
     // Where only the tip has weight, strands take longer to come down.
     for (int step = 1; step <= 60 || (touching <= 100u && step <= 300); ++step) {
@@ -370,7 +371,8 @@ TEST_F(SolverLaws, TheSettledShapeDoesNotDependOnTheSubstep) {
       for (int step = 0; step < 10.0 / substeps_s[i]; ++step) solver->substep(input);
       settled[i] = read(*solver);
     }
-    EXPECT_LE(largest_distance_m(settled[0].position_m, settled[1].position_m), kind.row->settled_spread_m);
+    EXPECT_LE(largest_distance_m(settled[0].position_m, settled[1].position_m),
+              bounds_of(*kind.row).settled_spread_m);
   }
 }
 

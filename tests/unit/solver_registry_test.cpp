@@ -5,6 +5,7 @@
 
 #include "server/sim/strand_layout.h"
 #include "tests/support/sim_scene.h"
+#include "tests/support/solver_bounds.h"
 
 namespace strandcast {
 namespace {
@@ -27,6 +28,14 @@ TEST(SolverRegistry, RowsAreComplete) {
     ASSERT_TRUE(found);
     EXPECT_EQ(*found, &row);
   }
+}
+
+TEST(SolverRegistry, TheTestsHaveBoundsForEveryRowAndForNoOther) {
+  std::set<std::string> of_rows;
+  std::set<std::string> of_bounds;
+  for (const SolverRow& row : solver_table()) of_rows.insert(row.name);
+  for (const auto& [name, bounds] : solver_bounds()) of_bounds.insert(name);
+  EXPECT_EQ(of_rows, of_bounds) << "tests/support/solver_bounds.h";
 }
 
 TEST(SolverRegistry, EffortAndHairParametersAreTheRowsOwnAndInRange) {

@@ -24,8 +24,6 @@ SolverRow angular_projection_row() {
     parameters.erase("poisson_ratio");
     return parameters;
   };
-  row.rounding_growth =
-      1.2;  // every sweep passes on a rounding; held at both ends, segments under pressure fold
   row.make_gpu = [](const SolverParameters& parameters, const GpuSolverContext& context) {
     return make_chain_kernel("angular_projection", "sweeps", parameters, context);
   };

@@ -37,8 +37,6 @@ SolverRow dftl_parallel_row() {
       {"exact_length", 1.0, 0.0, 1.0, "",
        "1 = lay the segments end to end with exact lengths at the end, 0 = as iterated"});
   row.effort_parameter = "iterations";
-  row.has_exact_held_length = false;
-  row.collider_depth_m = 4e-3;  // the finish shifts vertices after the last contact
   row.make_gpu = make_dftl_parallel_gpu;
   row.make_reference = make_dftl_parallel_reference;
   return row;

@@ -153,7 +153,7 @@ class DirectRodGpu final : public GpuSolver {
         const bool is_clamp = i == layout().pinned_root_count || i > layout().tail_begin();
         const glm::dvec3 tangent = is_clamp ? glm::dvec3(0.0, 0.0, 1.0) : rest.joint_tangent[i];
         arrays.edge[at] = glm::vec4(glm::dvec4(tangent, rest.segment_m[i]));
-        arrays.axis[at] = glm::vec4(glm::dvec4(state().head().world_from_head * rest.axis[i], 0.0));
+        arrays.axis[at] = glm::vec4(glm::dvec4(state().head().world_from_head_rotation * rest.axis[i], 0.0));
         if (i > 0) arrays.tension_m2ps2[at] = static_cast<float>(rest.tension_m2ps2[i]);
       }
     }
@@ -202,8 +202,9 @@ class DirectRodGpu final : public GpuSolver {
     std::vector<glm::vec4> axes = axis_.read();
     for (uint32_t s = 0; s < layout().strand_count; ++s) {
       if (!is_changed[s]) continue;
-      glm::dvec3 before = state().head().world_from_head * glm::dvec3(strand[s]);
-      glm::dvec3 axis = state().head().world_from_head * glm::dvec3(strand[layout().strand_count + s]);
+      glm::dvec3 before = state().head().world_from_head_rotation * glm::dvec3(strand[s]);
+      glm::dvec3 axis =
+          state().head().world_from_head_rotation * glm::dvec3(strand[layout().strand_count + s]);
       for (uint32_t i = layout().pinned_root_count; i < layout().vertex_count; ++i) {
         const size_t at = layout().index(i, s);
         const glm::dvec3 way =

@@ -491,7 +491,7 @@ class DirectRodReference final : public ReferenceSolver {
       strand.vertex[i] = RodVertex{};
       strand.vertex[i].position_m = position_m(strand_index)[i];
     }
-    set_untwisted(strand, layout().pinned_root_count, head().world_from_head);
+    set_untwisted(strand, layout().pinned_root_count, head().world_from_head_rotation);
   }
 
   void turn_memory(const glm::dquat& turn) override {
@@ -513,7 +513,7 @@ class DirectRodReference final : public ReferenceSolver {
       strand.rest = make_rod_rest(layout(), s, parameters_, groom_gravity_in_head_mps2_);
       for (uint32_t i = 0; i < layout().vertex_count && is_at_rest(); ++i) {
         strand.vertex[i].tension_m2ps2 = strand.rest.tension_m2ps2[i];
-        strand.vertex[i].axis = head().world_from_head * strand.rest.axis[i];
+        strand.vertex[i].axis = head().world_from_head_rotation * strand.rest.axis[i];
       }
     }
   }

@@ -91,8 +91,6 @@ SolverRow pbd_row() {
       {"bend_stiffness", 0.05, 0.0, 1.0, "",
        "share of the error of a vertex's distance to the second next one taken back per substep"});
   row.stretch_bound = 0.4;
-  row.rounding_growth = 1.6;
-  row.settled_spread_m = 0.02;  // stiffness per substep, so smaller ones make stiffer strands
   return row;
 }
 
@@ -120,8 +118,6 @@ SolverRow xpbd_row() {
         {"air_drag_per_s", 0.0}};
   };
   row.stretch_bound = 0.15;
-  row.rounding_growth = 2.2;
-  row.settled_spread_m = 0.01;  // what the iterations leave of the stretch differs
   return row;
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/reference_contact.h"
 #include "server/sim/reference_strands.h"
 #include "server/sim/solvers/position_based/position_based.h"
 #include "server/sim/solvers/tractrix/tractrix_step.h"
@@ -136,35 +137,14 @@ class PositionBasedReference final : public ReferenceStrands {
     }
   }
 
-  /// Out of the deepest collider along its normal, twice when there are several, after Coulomb friction in
-  /// displacements: sliding over the collider, which turns with the head, is undone up to the friction
-  /// coefficient times the depth.
+  /// Out of the deepest collider along its normal, twice when there are several, after friction.
   glm::dvec3 outside(const glm::dvec3& old, glm::dvec3 point) const {
-    const size_t count = std::min<size_t>(input().colliders.size(), kMaxSphereColliders);
-    for (int round = 0; round < (count > 1 ? 2 : 1); ++round) {
-      double deepest = 0.0;
-      glm::dvec3 center(0.0);
-      double radius = 0.0;
-      for (size_t c = 0; c < count; ++c) {
-        const glm::dvec3 place = limited(glm::dvec3(input().colliders[c].center_m), kMaxColliderM);
-        const double r = std::max(0.0, limited(input().colliders[c].radius_m, kMaxColliderM));
-        const double inside = r * r - glm::dot(point - place, point - place);
-        if (inside <= deepest) continue;
-        deepest = inside;
-        center = place;
-        radius = r;
-      }
-      if (deepest <= 0.0) return point;
-      const glm::dvec3 outward = point - center;
-      const double distance = glm::length(outward);
-      if (distance < kTinyLengthM) return point;  // no way out is shorter than another
-      const glm::dvec3 normal = outward / distance;
-      const glm::dvec3 slip = point - carry() * old;
-      const glm::dvec3 sliding = slip - normal * glm::dot(slip, normal);
-      const double way = glm::length(sliding);
-      const double undone = way > kTinyLengthM ? std::min(1.0, friction_ * (radius - distance) / way) : 0.0;
-      const glm::dvec3 held = point - undone * sliding - center;
-      point = center + held * (radius / std::max(glm::length(held), kTinyLengthM));
+    for (int round = 0; round < push_rounds(input()); ++round) {
+      const ReferenceSphere sphere = deepest_sphere(input(), point);
+      // No way out of the very centre is shorter than another.
+      if (sphere.radius_m <= 0.0 || glm::distance(point, sphere.center_m) < kTinyLengthM) return point;
+      const glm::dvec3 held = held_by_friction(old, point, carry(), friction_, sphere) - sphere.center_m;
+      point = sphere.center_m + held * (sphere.radius_m / std::max(glm::length(held), kTinyLengthM));
     }
     return point;
   }

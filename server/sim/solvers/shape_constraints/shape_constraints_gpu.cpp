@@ -116,9 +116,6 @@ SolverRow shape_constraints_row() {
         {"shock_share", 0.0}};
   };
   row.stretch_bound = (1.0 + 1e-3) * kDefaultStretchLimit;  // lengths are rounded
-  row.rounding_growth = 1.6;
-  // Of strands of 0.25 m: smaller substeps leave less of the stretch and hold the shape more often.
-  row.settled_spread_m = 1.5 * kDefaultStretchLimit * 0.25;
   row.make_gpu = make_gpu;
   row.make_reference = make_shape_constraints_reference;
   return row;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/sim/chain_parameters.h"
+#include "server/sim/reference_contact.h"
 #include "server/sim/reference_strands.h"
 #include "server/sim/solvers/super_helix/helix_shape.h"
 
@@ -121,21 +122,17 @@ class SuperHelixReference final : public ReferenceStrands {
     return energy;
   }
 
-  glm::dvec3 center_m(size_t c) const {
-    return limited(glm::dvec3(input().colliders[c].center_m), kMaxColliderM);
-  }
   double depth_m(size_t c, const glm::dvec3& x) const {
-    return std::max(0.0, limited(input().colliders[c].radius_m, kMaxColliderM)) -
-           glm::distance(x, center_m(c));
+    const ReferenceSphere sphere = sphere_of(input(), c);
+    return sphere.radius_m - glm::distance(x, sphere.center_m);
   }
-  size_t collider_count() const { return std::min<size_t>(input().colliders.size(), kMaxSphereColliders); }
 
   /// Every collider that the vertex is inside of pushes it out in proportion to the depth.
   double add_contacts(const glm::dvec3& x, double stiffness, VertexEnergy& at) const {
     double energy = 0.0;
-    for (size_t c = 0; c < collider_count(); ++c) {
+    for (size_t c = 0; c < sphere_count(input()); ++c) {
       const double depth = depth_m(c, x);
-      const glm::dvec3 outward = x - center_m(c);
+      const glm::dvec3 outward = x - sphere_of(input(), c).center_m;
       const double distance = glm::length(outward);
       if (depth <= 0.0 || distance < kMinDistanceM) continue;
       const glm::dvec3 normal = outward / distance;
@@ -161,7 +158,8 @@ class SuperHelixReference final : public ReferenceStrands {
     bool is_touching = false;
     for (size_t k = 0; k < grip.size(); ++k) {
       double depth = 0.0;
-      for (size_t c = 0; c < collider_count(); ++c) depth += std::max(0.0, depth_m(c, shape.vertex_m[k]));
+      for (size_t c = 0; c < sphere_count(input()); ++c)
+        depth += std::max(0.0, depth_m(c, shape.vertex_m[k]));
       grip[k] = friction_ * kContactShare * mass_m(line, k) * depth;
       is_touching = is_touching || depth > 0.0;
     }
@@ -195,10 +193,6 @@ SolverRow super_helix_row() {
   row.as_hair = [](const HairConstants& hair, double, double) { return chain_as_hair(hair); };
   // The arc keeps its length; the distance of two vertices shrinks as the arc between them bends.
   row.stretch_bound = 0.004;
-  row.has_exact_held_length = false;
-  // A penalty: 7e-5 m where a strand is thrown onto a collider. Few arcs touch a sphere at few points; this
-  // is how near the others of its vertices come.
-  row.collider_depth_m = 1e-3;
   row.has_kernel = false;
   row.make_gpu = [](const SolverParameters& parameters, const GpuSolverContext&) {
     return Result<std::unique_ptr<Solver>>(make_super_helix_reference(parameters));

@@ -48,8 +48,6 @@ SolverRow tractrix_emulation_row() {
                             "1 = vertices move in a new random order each step, as published, and shiver; 0 "
                             "= from the tip to the root"});
   row.parameters.push_back({"order_seed", 1.0, 0.0, kMaxSeed, "", "of the random order"});
-  // 64 vertices in 0.25 m, a head that moves by two segments a step: measured 0.011 m after six steps.
-  row.folding_spread_m = 0.03;
   row.make_gpu = make_emulation_gpu;
   row.make_reference = make_tractrix_emulation_reference;
   return row;
