@@ -49,6 +49,7 @@ inline constexpr std::chrono::milliseconds kKeyframeRequestInterval{
 struct ConnectionCounters {
   uint64_t received_bytes = 0;  // payload of WebSocket messages
   uint64_t received_messages = 0;
+  uint64_t unknown_messages = 0;  // of a kind that a later version may know; ignored
   uint64_t sent_messages = 0;
   uint64_t dropped_frames = 0;  // the application was too slow
 };

@@ -257,10 +257,17 @@ Status ViewerClient::Connection::handle(std::span<const std::byte> bytes) {
   if (!ws_.got_binary()) return make_error(ErrorCode::BadInput, "the server sent a text message");
   if (bytes.empty()) return make_error(ErrorCode::BadInput, "the server sent an empty message");
   if (static_cast<Opcode>(bytes[0]) == Opcode::Control) {
-    ASSIGN_OR_RETURN(ServerMessage message, decode_server_message(bytes));
-    if (!is_welcome_ && !may_come_first(message))
+    Result<ServerMessage> message = decode_server_message(bytes);
+    // Of a kind that came with a later version: what we know goes on without it.
+    if (!message && message.error().code == ErrorCode::Unsupported) {
+      const std::lock_guard lock(mutex_);
+      ++counters_.unknown_messages;
+      return {};
+    }
+    if (!message) return message.error();
+    if (!is_welcome_ && !may_come_first(*message))
       return make_error(ErrorCode::BadInput, "the server sent something else before its Welcome");
-    return std::visit([this](auto& part) { return handle_control(part); }, message);
+    return std::visit([this](auto& part) { return handle_control(part); }, *message);
   }
   ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(bytes));
   if (!is_welcome_) return make_error(ErrorCode::BadInput, "the server sent media before its Welcome");

@@ -370,9 +370,11 @@ Result<Variant> decode_as(std::span<const std::byte> bytes, pb::Message& message
   const auto* field = message.GetReflection()->GetOneofFieldDescriptor(message, kinds);
   Variant result;
   MessageReader reader(message);
+  // A later version may have more kinds; a message without any is of none.
+  const bool may_be_newer = !message.GetReflection()->GetUnknownFields(message).empty();
   if (field == nullptr || !read_kind(field->name(), reader, result))
-    return make_error(ErrorCode::BadInput, "{} message is of no kind that protocol {} knows", sender,
-                      kWebSocketProtocol);
+    return make_error(may_be_newer ? ErrorCode::Unsupported : ErrorCode::BadInput,
+                      "{} message is of no kind that protocol {} knows", sender, kWebSocketProtocol);
   RETURN_IF_ERROR(reader.status());
   return result;
 }

@@ -215,7 +215,7 @@ using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice,
 std::vector<std::byte> encode(const ClientMessage& message);
 std::vector<std::byte> encode(const ServerMessage& message);
 
-/// Inverse of encode for untrusted bytes. BadInput / LimitExceeded name the field.
+/// Inverse of encode for untrusted bytes. BadInput / LimitExceeded name the field; Unsupported: ignore it.
 Result<ClientMessage> decode_client_message(std::span<const std::byte> bytes);
 Result<ServerMessage> decode_server_message(std::span<const std::byte> bytes);
 

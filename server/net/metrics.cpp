@@ -30,6 +30,8 @@ constexpr Row kTotals[] = {
     {"net_stalled_total", "Sessions dropped because they took or answered nothing.", &NetCounters::stalled},
     {"net_timeouts_total", "Connections without a Hello or request in time.", &NetCounters::timeouts},
     {"net_messages_received_total", "Messages of clients.", &NetCounters::messages_received},
+    {"net_unknown_messages_total", "Messages of a kind that this version does not know, ignored.",
+     &NetCounters::unknown_messages},
     {"net_frames_sent_total", "Media frames written whole.", &NetCounters::frames_sent},
     {"net_frames_dropped_total", "Media frames that a session was too slow for.",
      &NetCounters::frames_dropped},

@@ -170,6 +170,7 @@ struct NetCounters {
   uint64_t stalled = 0;       // dropped for a write without progress
   uint64_t timeouts = 0;      // no Hello or request in time
   uint64_t messages_received = 0;
+  uint64_t unknown_messages = 0;  // of a kind that a later version may know; ignored
   uint64_t frames_sent = 0;
   uint64_t frames_dropped = 0;  // media a session was too slow for
   uint64_t chain_losses = 0;    // sessions that had to wait for a keyframe

@@ -37,6 +37,8 @@ const char* message_name(const ClientMessage& message) {
 void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
   if (socket_.got_text()) return reject(CloseCode::BadData, "Text messages are not part of the protocol.");
   const Result<ClientMessage> message = decode_client_message(bytes);
+  if (!message && message.error().code == ErrorCode::Unsupported)
+    return context_.count(&NetCounters::unknown_messages);
   if (!message) return reject(CloseCode::BadData, message.error().to_string());
   if (state_ == State::AwaitHello) {
     const Hello* hello = std::get_if<Hello>(&*message);

@@ -6,6 +6,7 @@
 #include "client/net/http_get.h"
 #include "client/net/viewer_client.h"
 #include "common/wire/close_code.h"
+#include "tests/support/eventually.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_messages.h"
 
@@ -263,6 +264,31 @@ TEST(ClientHostile, AVanishedServerEndsTheConnection) {
   ASSERT_TRUE(client) << client.error().to_string();
   EXPECT_EQ(end_of(**client).code, ErrorCode::Timeout);
   EXPECT_FALSE((*client)->send(KeyframeRequest{})) << "nothing can be sent any more";
+}
+
+// Section 10 of WIRE.md: a later version of the protocol may have kinds of messages that this one lacks.
+TEST(ClientMessages, UnknownKindsAreIgnoredAndCounted) {
+  const FakeServer server([&](FakePeer& peer) {
+    const std::vector<std::byte> newer = bytes_of({0x01, 0xc2, 0x3e, 0x01, 0x78});  // field 1000, one byte
+    if (!peer.upgrade()) return;
+    peer.read();
+    peer.send_bytes(newer);
+    peer.send(make_welcome(kStrands, kVertices));
+    peer.send_bytes(newer);
+    peer.send(Notice{false, "still here"});
+    peer.read_to_end();
+  });
+  auto client = ViewerClient::connect(config_for(server.port()));
+  ASSERT_TRUE(client) << client.error().to_string();
+  bool has_notice = false;
+  EXPECT_TRUE(eventually([&] {
+    for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
+      EXPECT_FALSE(std::holds_alternative<ClosedEvent>(event));
+      has_notice = has_notice || std::holds_alternative<Notice>(event);
+    }
+    return has_notice;
+  }));
+  EXPECT_EQ((*client)->counters().unknown_messages, 2u);
 }
 
 TEST(ClientHostile, EndlessControlMessagesStayBounded) {

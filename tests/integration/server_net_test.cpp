@@ -249,6 +249,27 @@ TEST_F(ServerNet, GarbageAtEveryStateClosesThatSessionOnly) {
   EXPECT_GE(server_->counters().bad_messages, 5u);
 }
 
+// Section 10 of WIRE.md: a later version of the protocol may have kinds of messages that this one lacks.
+TEST_F(ServerNet, UnknownKindsAreIgnoredAndCounted) {
+  NetConfig config;
+  config.limits.messages_per_s = 20.0;
+  start(config);
+  const std::vector<std::byte> newer = {std::byte{0x01}, std::byte{0xc2}, std::byte{0x3e}, std::byte{0x01},
+                                        std::byte{0x78}};  // field 1000, one byte
+  RawClient client(server_->port());
+  ASSERT_TRUE(client.handshake());
+  client.send_bytes(newer);
+  client.send(hello());
+  ASSERT_TRUE(client.read_control<Welcome>());
+  client.send_bytes(newer);
+  client.send(Ping{1});
+  EXPECT_TRUE(client.read_control<Pong>());
+  EXPECT_EQ(server_->counters().unknown_messages, 2u);
+  EXPECT_EQ(server_->counters().bad_messages, 0u);
+  for (int i = 0; i < 100; ++i) client.send_bytes(newer);
+  EXPECT_EQ(client.read_end().close_code, code(CloseCode::Policy)) << "they count for the rate";
+}
+
 TEST_F(ServerNet, OneByteTooMuchIsTooBig) {
   start();
   auto client = join();

@@ -97,6 +97,18 @@ TEST(ControlBytes, OtherOpcodesAndNothingAreRefused) {
   EXPECT_EQ(decode_server_message(empty).error().code, ErrorCode::BadInput);
 }
 
+// A later version of the same protocol may have sent it: whoever gets it goes on (WIRE.md, section 10).
+TEST(ControlBytes, AnUnknownKindIsToldFromABrokenMessage) {
+  const Bytes newer = {std::byte{0x01}, std::byte{0xc2}, std::byte{0x3e}, std::byte{0x01},
+                       std::byte{0x78}};  // field 1000, one byte
+  EXPECT_EQ(decode_client_message(newer).error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(decode_server_message(newer).error().code, ErrorCode::Unsupported);
+  Bytes cut = newer;
+  cut.pop_back();
+  EXPECT_EQ(decode_client_message(cut).error().code, ErrorCode::BadInput);
+  EXPECT_EQ(decode_server_message(cut).error().code, ErrorCode::BadInput);
+}
+
 /// Appends an unknown protobuf field of exactly `size` bytes.
 void append_unknown_field(Bytes& bytes, size_t size) {
   constexpr uint32_t kTag = 2000 << 3 | 2;  // field 2000, length-delimited; two bytes of tag
