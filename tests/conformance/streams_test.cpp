@@ -2,6 +2,7 @@
 // with, and today's encoders still make the same bytes of the same inputs.
 #include <map>
 
+#include "common/base/file.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/strand_codec.h"
 #include "tests/conformance/reference_hash.h"
@@ -136,6 +137,18 @@ TEST(Conformance, EncodersMakeTheKeptBytes) {
            "proto/WIRE.md), run conformance_write tests/conformance/vectors, and commit the new files beside "
            "the old "
            "ones. The old files stay as they are.";
+  }
+}
+
+TEST(WireDocument, NamesEveryCodecWithItsNumber) {
+  const auto text = load_text(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "proto/WIRE.md", 1 << 20);
+  ASSERT_TRUE(text) << text.error().to_string();
+  const size_t begin = text->find("| 0 | u8 | codec: ");
+  const std::string row =
+      begin == std::string::npos ? "" : text->substr(begin, text->find('\n', begin) - begin);
+  for (const StrandCodecInfo& codec : strand_codecs()) {
+    const std::string entry = fmt::format(" {} {}", number_of(codec.name), codec.name);
+    EXPECT_TRUE(row.find(entry) != std::string::npos) << "the fixed part in WIRE.md has not:" << entry;
   }
 }
 
