@@ -16,7 +16,7 @@ constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kSkipBehindNs =
     kSecondNs / 4;                         // further behind than this: go on from now, do not send a burst
 constexpr milliseconds kLongestSleep{50};  // so that a stop is noticed
-constexpr milliseconds kFlushWait{500};    // less than a stop is given
+constexpr milliseconds kFlushWait{250};    // less than a stop is given
 
 /// Sleeps until `time_ns` of now_ns()'s clock in pieces; false when stopped.
 bool sleep_until_ns(int64_t time_ns, const std::atomic<bool>& stop) {

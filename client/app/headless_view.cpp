@@ -122,6 +122,7 @@ class Collector {
     const int64_t begin_ns = now_ns();
     while (!stop_ && !session().has_picture()) {
       RETURN_IF_ERROR(pump());
+      if (session().has_picture()) break;
       if (limit_.is_over() || static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
         return make_error(ErrorCode::Timeout, "the server sent nothing to show for {} s{}",
                           std::min(kFirstPictureTimeoutS, options_.seconds.value_or(kFirstPictureTimeoutS)),

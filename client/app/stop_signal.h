@@ -2,14 +2,15 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 
 namespace strandcast {
 
 /// How long whatever is under way may take after the first signal.
-inline constexpr unsigned kStopGraceS = 1;
+inline constexpr std::chrono::milliseconds kStopGrace{750};
 
 /// Catches SIGINT and SIGTERM from now on. The first one sets the flag, and a program that looks at it ends
-/// in its own way; one that is still there after kStopGraceS, in the middle of something long, is ended by
+/// in its own way; one that is still there after kStopGrace, in the middle of something long, is ended by
 /// that signal, and so is one that gets a second.
 const std::atomic<bool>& catch_stop_signals();
 
