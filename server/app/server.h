@@ -1,5 +1,5 @@
-// Server: everything wired together: input hub, simulation, encode and frame threads, network. Several may
-// live in one process. Threads and what they hand over: ARCHITECTURE.md.
+// Server: everything wired together: inputs, a source of states, the hub of the stream with its readers, the
+// network. Several may live in one process. Threads and what they hand over: ARCHITECTURE.md.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,17 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
-#include "server/app/sim_loop.h"
-#include "server/encode/frame_worker.h"
+#include "server/app/simulation_source.h"
 #include "server/encode/picture_painter.h"
-#include "server/encode/strand_encode_worker.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
+#include "server/stream/stream_hub.h"
 
 namespace strandcast {
+
+struct ServerConfig;
+/// The scene's simulation.
+Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& config, InputHub& inputs);
 
 struct ServerConfig {
   SceneDesc scene;
@@ -29,6 +32,9 @@ struct ServerConfig {
   SnapshotObserver on_publish;                         // may be empty
   std::function<MakePicturePainter(GlPainterConfig)> make_painter =
       gl_picture_painter;  // of the frame thread
+  /// What feeds the stream; its states have the scene's codec, bound and rate.
+  std::function<Result<std::unique_ptr<StateSource>>(const ServerConfig&, InputHub&)> make_source =
+      simulation_source;
 };
 
 struct ServerCounters {
@@ -38,7 +44,7 @@ struct ServerCounters {
   std::vector<StrandEncodeCounters> strand_classes;  // all that were ever needed, by stream_id
   FrameCounters frames;
   InputCounters input;
-  uint32_t strand_viewers = 0;  // one whose mode changes counts here and in frame_viewers
+  uint32_t strand_viewers = 0;  // readers of strands; one whose mode changes counts in frame_viewers too
   uint32_t frame_viewers = 0;
   uint32_t viewers = 0;
   uint32_t strand_classes_in_use = 0;
@@ -54,6 +60,8 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   uint16_t port() const;
+  /// For readers besides the network's sessions: a recorder, a relay.
+  StreamHub& hub();
   ServerCounters counters() const;
   /// As NetServer::reload_tls().
   Status reload_tls();

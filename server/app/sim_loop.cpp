@@ -24,14 +24,10 @@ bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
          a.has_colliders == b.has_colliders;
 }
 
-uint32_t viewers(const RuntimeFacts& facts) {
-  return facts.strand_viewers + facts.frame_viewers;
-}
-
 }  // namespace
 
-Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot) {
-  std::unique_ptr<SimLoop> loop(new SimLoop(std::move(config), hub, slot));
+Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& hub, StateSink& sink) {
+  std::unique_ptr<SimLoop> loop(new SimLoop(std::move(config), hub, sink));
   auto ready = std::make_shared<std::promise<Status>>();
   loop->thread_ = std::thread([self = loop.get(), ready] {
     self->run([ready](Status status) { ready->set_value(std::move(status)); });
@@ -41,8 +37,8 @@ Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& 
   return loop;
 }
 
-SimLoop::SimLoop(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot)
-    : config_(std::move(config)), hub_(hub), slot_(slot) {}
+SimLoop::SimLoop(SimLoopConfig config, InputHub& hub, StateSink& sink)
+    : config_(std::move(config)), hub_(hub), sink_(sink) {}
 
 SimLoop::~SimLoop() {
   stop();
@@ -113,10 +109,10 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   // when there are several, by the next ones, which then must not sleep.
   std::unique_lock lock(mutex_);
   const auto is_awake = [this] {
-    const auto is_facts = [](const Job& job) { return std::holds_alternative<RuntimeFacts>(job.what); };
+    const auto is_demand = [](const Job& job) { return std::holds_alternative<SourceDemand>(job.what); };
     const bool has_turn = !jobs_.empty() && now_ns() >= jobs_rest_ns_;
     return is_stopping_ || has_turn || clock_->has_single_steps() ||
-           std::any_of(jobs_.begin(), jobs_.end(), is_facts);
+           std::any_of(jobs_.begin(), jobs_.end(), is_demand);
   };
   std::optional<int64_t> wake_ns = clock_->next_due_ns();
   const auto wake_by = [&](int64_t time_ns) { wake_ns = std::min(wake_ns.value_or(time_ns), time_ns); };
@@ -136,7 +132,7 @@ std::deque<SimLoop::Job> SimLoop::take_jobs() {
   std::deque<Job> taken;
   bool has_command = now_ns() < jobs_rest_ns_;
   for (auto job = jobs_.begin(); job != jobs_.end();) {
-    const bool is_command = !std::holds_alternative<RuntimeFacts>(job->what);
+    const bool is_command = !std::holds_alternative<SourceDemand>(job->what);
     if (is_command && std::exchange(has_command, true)) {
       ++job;
       continue;
@@ -151,21 +147,21 @@ std::deque<SimLoop::Job> SimLoop::take_jobs() {
 void SimLoop::carry_out_in_turn(const Job& job) {
   const int64_t begin_ns = now_ns();
   carry_out(job);
-  if (std::holds_alternative<RuntimeFacts>(job.what)) return;
+  if (std::holds_alternative<SourceDemand>(job.what)) return;
   const int64_t end_ns = now_ns();
   const double rest_ns = static_cast<double>(end_ns - begin_ns) * (1.0 / kJobShare - 1.0);
   jobs_rest_ns_ = end_ns + static_cast<int64_t>(rest_ns);
 }
 
 void SimLoop::push(Job job) {
-  const bool is_facts = std::holds_alternative<RuntimeFacts>(job.what);
+  const bool is_demand = std::holds_alternative<SourceDemand>(job.what);
   bool is_full = false;
   {
     const std::lock_guard lock(mutex_);
-    // Of the facts only the newest count.
-    if (is_facts)
-      std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<RuntimeFacts>(old.what); });
-    is_full = !is_facts && jobs_.size() >= kMaxPendingJobs;
+    // Of the demands only the newest counts.
+    if (is_demand)
+      std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<SourceDemand>(old.what); });
+    is_full = !is_demand && jobs_.size() >= kMaxPendingJobs;
     if (!is_full) jobs_.push_back(std::move(job));
   }
   if (!is_full)
@@ -180,16 +176,12 @@ void SimLoop::post(const ControlCommand& command, Reply reply) {
 void SimLoop::post(const SetParameter& parameter, Reply reply) {
   push({parameter, std::move(reply)});
 }
-void SimLoop::set_facts(const RuntimeFacts& facts) {
-  push({facts, {}});
+void SimLoop::set_demand(const SourceDemand& demand) {
+  push({demand, {}});
 }
 
 void SimLoop::carry_out(const Job& job) {
-  if (const auto* facts = std::get_if<RuntimeFacts>(&job.what)) {
-    RuntimeFacts changed = *facts;
-    changed.has_wind_stream = facts_.has_wind_stream;
-    return apply_facts(changed);
-  }
+  if (const auto* demand = std::get_if<SourceDemand>(&job.what)) return apply_demand(*demand);
   const auto* control = std::get_if<ControlCommand>(&job.what);
   const Notice notice =
       control != nullptr ? command(control->command) : change(std::get<SetParameter>(job.what).assignment);
@@ -247,7 +239,7 @@ void SimLoop::follow_stream_settings() {
   const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
   CHECK(quantum_m.ok());  // the codec cannot change while running
   publisher_->set_quantum_m(*quantum_m);
-  if (config_.on_stream_change) config_.on_stream_change(stream_);
+  sink_.change_stream(stream_);
   publish();
 }
 
@@ -275,11 +267,18 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   return {};
 }
 
-void SimLoop::apply_facts(const RuntimeFacts& facts) {
-  const bool was_watched = viewers(facts_) > 0;
-  facts_ = facts;
+void SimLoop::apply_demand(const SourceDemand& demand) {
+  const bool was_watched = is_watched();
+  has_state_readers_ = demand.has_state_readers;
+  RuntimeFacts facts = demand.facts;
+  facts.has_wind_stream = facts_.has_wind_stream;
+  apply_facts(facts);
   // The first viewer sees the present state at once, also while paused.
-  if (!was_watched && viewers(facts_) > 0 && published_tick_ != tick_) publish();
+  if (!was_watched && is_watched() && published_tick_ != tick_) publish();
+}
+
+void SimLoop::apply_facts(const RuntimeFacts& facts) {
+  facts_ = facts;
   const SceneFeatures features = analyse(config_.scene, facts_);
   if (needs_same_solver(features, solver_features_)) return;
   if (const Status status = rebuild_solver(config_.scene, features); !status)
@@ -307,7 +306,7 @@ void SimLoop::step(int64_t time_ns) {
   step_timer_.add_ms(step_ms);
   step_times_.add_ms(step_ms);
   last_step_ns_ = now_ns();
-  if (viewers(facts_) > 0 || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
+  if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
 
 void SimLoop::publish() {
@@ -319,7 +318,7 @@ void SimLoop::publish() {
   input.head_velocity_mps = head_velocity_mps_;
   std::shared_ptr<const Snapshot> snapshot = publisher_->publish(*solver_, input);
   if (config_.on_publish) config_.on_publish(snapshot);
-  slot_.put(std::move(snapshot));
+  sink_.put(std::move(snapshot));
   published_tick_ = tick_;
   ++published_count_;
   if (publisher_->quarantined().empty()) return;

@@ -26,12 +26,12 @@
 #include "common/wire/messages.h"
 #include "server/input/input_hub.h"
 #include "server/publish/publisher.h"
-#include "server/publish/snapshot_slot.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/sim_clock.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
+#include "server/stream/state_source.h"
 
 namespace strandcast {
 
@@ -44,32 +44,9 @@ using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot
 struct SimLoopConfig {
   SceneDesc scene;
   std::shared_ptr<const SceneContent> content;
-  std::string gl_device = "auto";                           // as EglContext::make
-  std::optional<std::filesystem::path> shader_folder;       // none: the shaders in the binary
-  SnapshotObserver on_publish;                              // may be empty; on the simulation thread
-  std::function<void(const StreamDesc&)> on_stream_change;  // before the first state of it; likewise
-};
-
-/// Totals since start, and the present state.
-struct SimStats {
-  uint64_t tick = 0;
-  double step_median_ms = 0.0;  // solver, all substeps
-  Histogram step_times;         // likewise
-  double read_median_ms = 0.0;
-  double quantise_median_ms = 0.0;
-  double realtime_factor = 0.0;
-  bool is_paused = false;
-  bool is_motion_stale = true;
-  uint64_t rejected_samples = 0;
-  uint64_t dropped_steps = 0;
-  uint64_t published = 0;
-  uint64_t quarantined = 0;    // strands put back to rest because they had no usable numbers
-  uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
-  uint64_t solver_builds = 0;
-  uint64_t solver_bytes = 0;
-  bool is_software = false;  // OpenGL runs on processor cores
-  std::string solver_name;
-  int64_t last_step_ns = 0;  // server clock at the end of the newest step; 0 = none yet
+  std::string gl_device = "auto";                      // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+  SnapshotObserver on_publish;                         // may be empty; on the simulation thread
 };
 
 /// Commands that may wait for the simulation thread; each can cost a new solver.
@@ -83,11 +60,11 @@ inline constexpr int64_t kStreamChangeNs = 500'000'000;
 class SimLoop {
  public:
   /// Answer to a command, on the simulation thread; on the caller's when kMaxPendingJobs wait already.
-  using Reply = std::function<void(Notice)>;
+  using Reply = StateSource::Reply;
 
   /// Starts the thread and waits until the solver is loaded and the rest state published, or for the error.
-  /// `hub` and `slot` outlive the loop.
-  static Result<std::unique_ptr<SimLoop>> start(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot);
+  /// `hub` and `sink` outlive the loop.
+  static Result<std::unique_ptr<SimLoop>> start(SimLoopConfig config, InputHub& hub, StateSink& sink);
   /// stop(), if it was not called.
   ~SimLoop();
   SimLoop(const SimLoop&) = delete;
@@ -96,8 +73,8 @@ class SimLoop {
   // From any thread; return at once.
   void post(const ControlCommand& command, Reply reply);
   void post(const SetParameter& parameter, Reply reply);
-  /// How many watch; has_wind_stream is found by the loop itself.
-  void set_facts(const RuntimeFacts& facts);
+  /// What is wanted; has_wind_stream is found by the loop itself.
+  void set_demand(const SourceDemand& demand);
   SimStats stats() const;
   /// Ends the thread after the substep or command that is under way. From one thread.
   void stop();
@@ -106,11 +83,11 @@ class SimLoop {
 
  private:
   struct Job {
-    std::variant<ControlCommand, SetParameter, RuntimeFacts> what;
+    std::variant<ControlCommand, SetParameter, SourceDemand> what;
     Reply reply;
   };
 
-  SimLoop(SimLoopConfig config, InputHub& hub, SnapshotSlot& slot);
+  SimLoop(SimLoopConfig config, InputHub& hub, StateSink& sink);
   void run(std::function<void(Status)> on_ready);
   Status begin();
   void loop();
@@ -124,7 +101,9 @@ class SimLoop {
   void follow_stream_settings();
   bool has_other_stream() const { return config_.scene.stream != stream_; }
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
+  void apply_demand(const SourceDemand& demand);
   void apply_facts(const RuntimeFacts& facts);
+  bool is_watched() const { return SourceDemand{facts_, has_state_readers_}.is_watched(); }
   void step(int64_t time_ns);
   void publish();
   void report_quarantine();
@@ -132,7 +111,7 @@ class SimLoop {
 
   SimLoopConfig config_;
   InputHub& hub_;
-  SnapshotSlot& slot_;
+  StateSink& sink_;
 
   // Of the simulation thread.
   std::unique_ptr<gl::EglContext> context_;
@@ -145,6 +124,7 @@ class SimLoop {
   std::optional<SimClock> clock_;
   std::optional<gl::GpuTimer> timer_;
   RuntimeFacts facts_;
+  bool has_state_readers_ = false;
   StageTimer step_timer_;
   Histogram step_times_;
   InputFrame input_;

@@ -1,5 +1,5 @@
-// Viewers: who watches what, and which pictures have to be drawn for them. Network thread; the counts may be
-// read from any thread.
+// Viewers: which of strands and pictures each session gets, and what it therefore demands of the stream.
+// Network thread; the count may be read from any thread.
 #pragma once
 
 #include <atomic>
@@ -9,13 +9,12 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
 #include "common/wire/messages.h"
 #include "server/app/mode_policy.h"
 #include "server/encode/picture_ladder.h"
-#include "server/encode/picture_views.h"
 #include "server/net/net_server.h"
+#include "server/stream/demand.h"
 
 namespace strandcast {
 
@@ -23,6 +22,9 @@ namespace strandcast {
 inline constexpr int64_t kModeRequestNs = 1'000'000'000;
 /// A change whose first frame does not come in this time is given up.
 inline constexpr int64_t kModeChangeNs = 20'000'000'000;
+
+/// The scene's camera and quality at this size, in the best codec of those that are decodable.
+PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, PictureCodecs decodable);
 
 class Viewers {
  public:
@@ -42,12 +44,14 @@ class Viewers {
     PictureView view;
   };
 
-  explicit Viewers(const SceneDesc& scene);
+  /// `desk` outlives this.
+  Viewers(const SceneDesc& scene, DemandDesk& desk) : scene_(scene), desk_(desk) {}
 
   /// A Source gets a place too, without any stream. Unavailable while too many pictures are drawn for others,
   /// BadInput for a size that cannot be drawn.
-  Result<Place> add(const Visitor& visitor, const Hello& hello);
-  void remove(SessionId session);
+  Result<Place> add(SessionId session, ReaderId reader, const Hello& hello);
+  /// Its reader is the caller's to remove; 0 for an unknown session.
+  ReaderId remove(SessionId session);
   /// For the log: number, role and name.
   std::string describe(SessionId session) const;
   /// The new picture class of a viewer of frames; none for one of strands, whose camera is kept for later.
@@ -73,21 +77,18 @@ class Viewers {
 
   /// The class of its strand frames; it joins with class 0. Ignored when the session is gone.
   void set_strand_class(SessionId session, uint16_t stream_id);
-  /// How many watch strands of this class.
-  uint32_t strand_viewers(uint16_t stream_id) const;
   /// The size of its pictures.
   RenderSize picture_size(SessionId session) const;
 
-  std::map<uint32_t, PictureView> picture_views() const { return views_.views(); }
-  RuntimeFacts facts() const;
-  /// All who watch; facts() counts one whose mode changes for both.
+  /// All who watch.
   uint32_t viewer_count() const { return viewer_count_; }
 
  private:
   struct Viewer {
     Role role = Role::Viewer;
-    std::string peer;
     std::string name;
+    ReaderId reader = 0;
+    PictureClass picture_class = 0;
     StreamMode wanted = StreamMode::Strands;  // may be Auto
     StreamMode mode = StreamMode::Strands;    // of the frames it gets
     std::optional<StreamMode> next;           // the change to this mode is under way
@@ -105,17 +106,17 @@ class Viewers {
 
     bool gets(StreamMode kind) const { return role != Role::Source && (mode == kind || next == kind); }
   };
-  Result<PictureClass> assign_view(SessionId session, const Viewer& viewer, const PictureView& view);
+  Demand demand_of(const Viewer& viewer) const;
+  Status change(Viewer& viewer, Viewer changed);
+  void change_surely(Viewer& viewer, const Viewer& changed);
   ModeChoice choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns);
-  std::optional<ModeSwitch> begin_change(SessionId session, const ModeChoice& choice, int64_t time_ns);
-  ModeSwitch stay(SessionId session, const std::string& reason);
+  std::optional<ModeSwitch> begin_change(Viewer& viewer, const ModeChoice& choice, int64_t time_ns);
+  ModeSwitch stay(Viewer& viewer, const std::string& reason);
   void count();
 
   const SceneDesc scene_;
   std::map<SessionId, Viewer> viewers_;
-  PictureViews views_;
-  std::atomic<uint32_t> strand_viewers_{0};
-  std::atomic<uint32_t> frame_viewers_{0};
+  DemandDesk& desk_;
   std::atomic<uint32_t> viewer_count_{0};
 };
 

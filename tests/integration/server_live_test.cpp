@@ -114,6 +114,24 @@ class LiveServer : public test::ServerFixture {
   StrandClient join(Role role = Role::Viewer) { return StrandClient(server_->port(), role); }
 };
 
+/// Takes what a loop makes, and keeps how the stream was changed.
+class LoopSink : public StateSink {
+ public:
+  void put(std::shared_ptr<const Snapshot>) override {}
+  void change_stream(const StreamDesc& stream) override {
+    const std::lock_guard lock(mutex_);
+    streams_.push_back(stream);
+  }
+  std::vector<StreamDesc> streams() const {
+    const std::lock_guard lock(mutex_);
+    return streams_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<StreamDesc> streams_;
+};
+
 TEST(SimLoopJobs, CommandsBeyondTheLimitAreRefusedAtOnce) {
   // The first state published after the start holds the simulation thread until the test lets it go.
   std::promise<void> held, go;
@@ -130,8 +148,8 @@ TEST(SimLoopJobs, CommandsBeyondTheLimitAreRefusedAtOnce) {
     let_go.wait();
   };
   InputHub hub;
-  SnapshotSlot slot;
-  auto loop = SimLoop::start(std::move(config), hub, slot);
+  LoopSink sink;
+  auto loop = SimLoop::start(std::move(config), hub, sink);
   if (!loop.ok() && loop.error().code == ErrorCode::Unavailable)
     GTEST_SKIP() << "needs OpenGL 4.5: " << loop.error().to_string();
   ASSERT_TRUE(loop.ok()) << loop.error().to_string();
@@ -155,7 +173,7 @@ class Loop {
     auto content = load_scene_content(config.scene);
     if (!content.ok()) return;
     config.content = std::make_shared<const SceneContent>(std::move(*content));
-    auto started = SimLoop::start(std::move(config), hub_, slot_);
+    auto started = SimLoop::start(std::move(config), hub_, sink_);
     if (started.ok())
       loop_ = std::move(*started);
     else
@@ -164,6 +182,7 @@ class Loop {
   explicit operator bool() const { return loop_ != nullptr; }
   SimLoop* operator->() const { return loop_.get(); }
   std::string trouble() const { return error_.to_string(); }
+  std::vector<StreamDesc> streams() const { return sink_.streams(); }
   /// Posts the change and waits for its answer.
   Notice ask(const std::string& assignment) const {
     auto answer = std::make_shared<std::promise<Notice>>();
@@ -173,20 +192,14 @@ class Loop {
 
  private:
   InputHub hub_;
-  SnapshotSlot slot_;
+  LoopSink sink_;
   Error error_;
   std::unique_ptr<SimLoop> loop_;
 };
 
 TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOneCounts) {
-  std::mutex mutex;
-  std::vector<StreamDesc> streams;
   SimLoopConfig config;
   config.scene = test::small_scene(kStrands, kVertices);
-  config.on_stream_change = [&](const StreamDesc& stream) {
-    const std::lock_guard lock(mutex);
-    streams.push_back(stream);
-  };
   const Loop loop(std::move(config));
   if (!loop) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
   const int64_t begin_ns = now_ns();
@@ -197,13 +210,11 @@ TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOne
   }
   const Notice last = loop.ask("stream.bound_m=0.0004");
   EXPECT_FALSE(last.is_error);
-  const auto newest = [&] {
-    const std::lock_guard lock(mutex);
-    return streams.empty() ? 0.0f : streams.back().bound_m;
-  };
-  ASSERT_TRUE(eventually([&] { return newest() == 0.0004f; }));
-  const std::lock_guard lock(mutex);
-  EXPECT_LE(streams.size(), static_cast<size_t>((now_ns() - begin_ns) / kStreamChangeNs) + 1);
+  ASSERT_TRUE(eventually([&] {
+    const auto streams = loop.streams();
+    return !streams.empty() && streams.back().bound_m == 0.0004f;
+  }));
+  EXPECT_LE(loop.streams().size(), static_cast<size_t>((now_ns() - begin_ns) / kStreamChangeNs) + 1);
 }
 
 TEST(SimLoopJobs, NewSolversLeaveTimeForStepsBetweenThem) {

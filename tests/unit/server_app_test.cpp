@@ -13,6 +13,7 @@
 #include "server/app/server_metrics.h"
 #include "server/app/viewers.h"
 #include "server/sim/solver_registry.h"
+#include "server/stream/demand_book.h"
 #include "tests/support/metrics_text.h"
 
 namespace strandcast {
@@ -96,25 +97,41 @@ Hello hello(Role role, StreamMode mode, uint32_t width = 0, uint32_t height = 0)
   return message;
 }
 
-Visitor from(SessionId session, const std::string& peer = "10.0.0.1") {
-  return {session, peer};
-}
+/// Viewers of a scene, and what they want of the stream.
+class Viewing {
+ public:
+  Viewing() : viewers(scene_, book) {}
+  Result<Viewers::Place> add(SessionId session, const Hello& hello, const std::string& peer = "10.0.0.1") {
+    return viewers.add(session, book.add({peer, hello.role == Role::Controller}), hello);
+  }
+  void remove(SessionId session) { book.remove(viewers.remove(session)); }
+  RuntimeFacts facts() const { return book.total().facts; }
+
+ private:
+  const SceneDesc scene_ = built_in_scene();
+
+ public:
+  DemandBook book{
+      make_scene_view(scene_, {scene_.stream.frame_width, scene_.stream.frame_height}, PictureCodecs{0})};
+  Viewers viewers;
+};
 
 TEST(Viewers, CountsByModeAndSharesEqualPictures) {
-  Viewers viewers(built_in_scene());
-  const auto automatic = viewers.add(from(1), hello(Role::Viewer, StreamMode::Auto));
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  const auto automatic = viewing.add(1, hello(Role::Viewer, StreamMode::Auto));
   ASSERT_TRUE(automatic.ok());
   EXPECT_EQ(automatic->mode, StreamMode::Strands);
   EXPECT_FALSE(automatic->reason.empty());
-  ASSERT_TRUE(viewers.add(from(2), hello(Role::Source, StreamMode::Frames)).ok());
-  const auto first = viewers.add(from(3), hello(Role::Viewer, StreamMode::Frames));
-  const auto second = viewers.add(from(4), hello(Role::Controller, StreamMode::Frames));
+  ASSERT_TRUE(viewing.add(2, hello(Role::Source, StreamMode::Frames)).ok());
+  const auto first = viewing.add(3, hello(Role::Viewer, StreamMode::Frames));
+  const auto second = viewing.add(4, hello(Role::Controller, StreamMode::Frames));
   ASSERT_TRUE(first.ok() && second.ok());
   EXPECT_EQ(first->picture_class, second->picture_class);
-  EXPECT_EQ(viewers.facts().strand_viewers, 1u);
-  EXPECT_EQ(viewers.facts().frame_viewers, 2u);
+  EXPECT_EQ(viewing.facts().strand_viewers, 1u);
+  EXPECT_EQ(viewing.facts().frame_viewers, 2u);
   EXPECT_EQ(viewers.viewer_count(), 3u) << "a source watches nothing";
-  EXPECT_EQ(viewers.picture_views().size(), 1u);
+  EXPECT_EQ(viewing.book.picture_views().size(), 1u);
 
   CameraDesc camera;
   camera.offset_m = {0.0f, 0.0f, 2.0f};
@@ -124,17 +141,19 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   const auto kept = viewers.set_camera(1, camera);
   EXPECT_TRUE(kept.ok() && !*kept) << "a viewer of strands has no picture, but its camera is remembered";
   EXPECT_FALSE(viewers.set_camera(2, camera).ok()) << "a source has none";
-  for (SessionId session = 1; session <= 4; ++session) viewers.remove(session);
-  EXPECT_EQ(viewers.facts().strand_viewers + viewers.facts().frame_viewers, 0u);
-  EXPECT_TRUE(viewers.picture_views().empty());
+  for (SessionId session = 1; session <= 4; ++session) viewing.remove(session);
+  EXPECT_EQ(viewing.facts().strand_viewers + viewing.facts().frame_viewers, 0u);
+  EXPECT_TRUE(viewing.book.picture_views().empty());
 }
 
 TEST(Viewers, AViewerGetsTheBestCodecItDecodes) {
-  Viewers viewers(built_in_scene());
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
   Hello message = hello(Role::Viewer, StreamMode::Frames);
   const auto codec_for = [&](PictureCodecs decodable) {
     message.picture_codecs = decodable;
-    EXPECT_TRUE(viewers.add(from(1), message).ok());
+    viewing.remove(1);
+    EXPECT_TRUE(viewing.add(1, message).ok());
     return viewers.pictures(1)->view.codec;
   };
   EXPECT_EQ(codec_for(0), PictureCodec::Jpeg) << "a client of before";
@@ -149,9 +168,10 @@ TEST(Viewers, AViewerGetsTheBestCodecItDecodes) {
 }
 
 TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
-  Viewers viewers(built_in_scene());
-  const auto first = viewers.add(from(1), hello(Role::Viewer, StreamMode::Frames, 640, 360));
-  const auto second = viewers.add(from(2), hello(Role::Viewer, StreamMode::Frames, 640, 360));
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  const auto first = viewing.add(1, hello(Role::Viewer, StreamMode::Frames, 640, 360));
+  const auto second = viewing.add(2, hello(Role::Viewer, StreamMode::Frames, 640, 360));
   ASSERT_TRUE(first.ok() && second.ok());
   ASSERT_EQ(first->picture_class, second->picture_class);
   EXPECT_EQ(viewers.pictures(1)->view.quality, 80) << "the scene's";
@@ -176,35 +196,33 @@ TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
 }
 
 /// Takes every place for pictures of their own that there is, from as many addresses as needed.
-void fill(Viewers& viewers) {
+void fill(Viewing& viewing) {
   for (uint32_t i = 0; i + 1 < kMaxPictureViews; ++i)
     ASSERT_TRUE(
-        viewers.add(from(10 + i, std::to_string(i)), hello(Role::Viewer, StreamMode::Frames, 64 + i, 64))
-            .ok());
+        viewing.add(10 + i, hello(Role::Viewer, StreamMode::Frames, 64 + i, 64), std::to_string(i)).ok());
 }
 
 TEST(Viewers, RefusesPicturesBeyondTheLimitForNowAndKeepsThePictureOfTheScene) {
-  Viewers viewers(built_in_scene());
-  ASSERT_NO_FATAL_FAILURE(fill(viewers));
-  const auto refused = viewers.add(from(100, "late"), hello(Role::Viewer, StreamMode::Frames, 512, 512));
+  Viewing viewing;
+  ASSERT_NO_FATAL_FAILURE(fill(viewing));
+  const auto refused = viewing.add(100, hello(Role::Viewer, StreamMode::Frames, 512, 512), "late");
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::Unavailable) << "later there may be room";
-  EXPECT_EQ(viewers.add(from(101), hello(Role::Viewer, StreamMode::Frames, 1'000'000, 2)).error().code,
+  EXPECT_EQ(viewing.add(101, hello(Role::Viewer, StreamMode::Frames, 1'000'000, 2)).error().code,
             ErrorCode::BadInput);
-  EXPECT_EQ(viewers.facts().frame_viewers, kMaxPictureViews - 1);
+  EXPECT_EQ(viewing.facts().frame_viewers, kMaxPictureViews - 1);
   for (const PictureCodec codec : kPictureCodecs) {
     Hello late = hello(Role::Viewer, StreamMode::Frames);
     late.picture_codecs = codec_bit(codec);
-    EXPECT_TRUE(viewers.add(from(200 + static_cast<SessionId>(codec), "late"), late).ok())
-        << to_string(codec);
+    EXPECT_TRUE(viewing.add(200 + static_cast<SessionId>(codec), late, "late").ok()) << to_string(codec);
   }
 }
 
 TEST(Viewers, AControllerFindsPixelsThatViewersCannotTake) {
-  Viewers viewers(built_in_scene());
+  Viewing viewing;
   const auto large = [&](SessionId session, Role role, const std::string& peer) {
-    return viewers.add(from(session, peer),
-                       hello(role, StreamMode::Frames, 1920 + 4 * static_cast<uint32_t>(session), 1080));
+    return viewing.add(
+        session, hello(role, StreamMode::Frames, 1920 + 4 * static_cast<uint32_t>(session), 1080), peer);
   };
   SessionId session = 0;
   while (session < kMaxPictureViews && large(session, Role::Viewer, std::to_string(session)).ok()) ++session;
@@ -225,8 +243,9 @@ ModeFacts good_facts() {
 constexpr int64_t kTick = 250'000'000;
 
 TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
-  Viewers viewers(built_in_scene());
-  ASSERT_TRUE(viewers.add(from(1), hello(Role::Viewer, StreamMode::Strands, 64, 64)).ok());
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  ASSERT_TRUE(viewing.add(1, hello(Role::Viewer, StreamMode::Strands, 64, 64)).ok());
   int64_t time_ns = 1'000 * kTick;
   EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns)) << "nothing was asked for";
   viewers.request_mode(1, StreamMode::Frames);
@@ -236,11 +255,11 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
   EXPECT_THAT(change->change.reason, HasSubstr("asked for"));
   EXPECT_EQ(change->change.frame_width, 64u);
   EXPECT_NE(change->picture_class, 0u);
-  EXPECT_EQ(viewers.facts().strand_viewers, 1u) << "strands go on until the first picture";
-  EXPECT_EQ(viewers.facts().frame_viewers, 1u);
+  EXPECT_EQ(viewing.facts().strand_viewers, 1u) << "strands go on until the first picture";
+  EXPECT_EQ(viewing.facts().frame_viewers, 1u);
   EXPECT_EQ(viewers.viewer_count(), 1u) << "and it is one viewer all the time";
   viewers.set_mode(1, StreamMode::Frames, time_ns);
-  EXPECT_EQ(viewers.facts().strand_viewers, 0u);
+  EXPECT_EQ(viewing.facts().strand_viewers, 0u);
 
   // Three more within a second: none is carried out before the second has passed, then the newest.
   viewers.request_mode(1, StreamMode::Strands);
@@ -252,7 +271,7 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
   ASSERT_TRUE(back);
   EXPECT_EQ(back->change.mode, StreamMode::Strands);
   viewers.set_mode(1, StreamMode::Strands, time_ns + 4 * kTick);
-  EXPECT_TRUE(viewers.picture_views().empty());
+  EXPECT_TRUE(viewing.book.picture_views().empty());
 
   // What it has already is answered too.
   viewers.request_mode(1, StreamMode::Auto);
@@ -263,8 +282,9 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
 }
 
 TEST(Viewers, AChangeWithoutAFirstFrameIsGivenUp) {
-  Viewers viewers(built_in_scene());
-  ASSERT_TRUE(viewers.add(from(1), hello(Role::Viewer, StreamMode::Auto)).ok());
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  ASSERT_TRUE(viewing.add(1, hello(Role::Viewer, StreamMode::Auto)).ok());
   viewers.set_report(1, {.device = DrawingDevice::None});
   EXPECT_EQ(viewers.report(1).device, DrawingDevice::None);
   ModeFacts facts = good_facts();
@@ -277,16 +297,17 @@ TEST(Viewers, AChangeWithoutAFirstFrameIsGivenUp) {
   const auto given_up = viewers.consider(1, facts, time_ns += 1);
   ASSERT_TRUE(given_up);
   EXPECT_EQ(given_up->change.mode, StreamMode::Strands);
-  EXPECT_TRUE(viewers.picture_views().empty());
-  EXPECT_EQ(viewers.facts().frame_viewers, 0u);
+  EXPECT_TRUE(viewing.book.picture_views().empty());
+  EXPECT_EQ(viewing.facts().frame_viewers, 0u);
   EXPECT_FALSE(viewers.consider(1, facts, time_ns + kTick)) << "not tried again at once";
   EXPECT_TRUE(viewers.consider(1, facts, time_ns + 2 * kFirstDwellNs));
 }
 
 TEST(Viewers, FramesThatCannotBeHadAreRefusedWithTheReason) {
-  Viewers viewers(built_in_scene());
-  ASSERT_NO_FATAL_FAILURE(fill(viewers));
-  ASSERT_TRUE(viewers.add(from(1), hello(Role::Viewer, StreamMode::Strands, 512, 512)).ok());
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
+  ASSERT_NO_FATAL_FAILURE(fill(viewing));
+  ASSERT_TRUE(viewing.add(1, hello(Role::Viewer, StreamMode::Strands, 512, 512)).ok());
   viewers.request_mode(1, StreamMode::Frames);
   const auto full = viewers.consider(1, good_facts(), kTick);
   ASSERT_TRUE(full);
@@ -321,10 +342,11 @@ TEST(ControlBudget, AControllerHasItsBurstThenItsRateAndOthersHaveTheirs) {
 }
 
 TEST(Viewers, IsDescribedForTheLogOnOneLine) {
-  Viewers viewers(built_in_scene());
+  Viewing viewing;
+  Viewers& viewers = viewing.viewers;
   Hello message = hello(Role::Controller, StreamMode::Strands);
   message.name = "a\u202e\u0085b";
-  ASSERT_TRUE(viewers.add(from(7), message).ok());
+  ASSERT_TRUE(viewing.add(7, message).ok());
   EXPECT_EQ(viewers.describe(7), "session 7 (controller 'a??b')");
 }
 

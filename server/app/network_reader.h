@@ -1,0 +1,36 @@
+// NetworkReader: all sessions as one reader of the stream. What each of them wants is a demand of its own;
+// the network sends a frame on to those whom it concerns. Any thread.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "server/net/net_server.h"
+#include "server/stream/stream_reader.h"
+
+namespace strandcast {
+
+class NetworkReader : public StreamReader {
+ public:
+  explicit NetworkReader(NetServer& net) : net_(net) {}
+
+  void on_strands(const EncodedFramePtr& frame) override { net_.publish_strands(frame); }
+  void on_picture(PictureClass picture_class, const PicturePtr& picture) override {
+    net_.publish_picture(picture_class, picture);
+  }
+  void on_picture_refused(PictureClass picture_class, const Error& error) override {
+    net_.send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()});
+  }
+  void on_pictures_failed(const Error& error) override {
+    net_.broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});
+  }
+  /// The network thread tells every viewer first.
+  void on_stream_change(const std::vector<StrandClass>& classes, std::shared_ptr<void> until_told) override {
+    net_.set_strand_classes(classes, "the stream was changed", [until_told] {});
+  }
+
+ private:
+  NetServer& net_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,191 @@
+#include "server/app/session_desk.h"
+
+#include <algorithm>
+#include <random>
+#include <utility>
+
+#include "common/base/profile.h"
+#include "common/base/text.h"
+#include "common/base/version.h"
+#include "common/log/log.h"
+#include "server/app/mode_facts.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kMaxLoggedCharacters = 200;
+/// A source that has not stepped for so long is not ready; the rarest step takes 0.1 s.
+constexpr double kMaxReadyStepAgeS = 2.0;
+
+const char* name_of(Command command) {
+  constexpr const char* kNames[] = {"pause", "resume", "step once", "reset"};
+  return kNames[static_cast<size_t>(command)];
+}
+
+std::string make_session_id() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
+}  // namespace
+
+SessionDesk::SessionDesk(Parts parts)
+    : parts_(std::move(parts)), session_id_(make_session_id()), viewers_(parts_.scene, parts_.hub) {}
+
+void SessionDesk::connect(NetServer& net) {
+  net_ = &net;
+  reader_ = std::make_unique<NetworkReader>(net);
+}
+
+Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
+  if (hello.mode == StreamMode::Frames && hello.role != Role::Source)
+    if (const std::optional<Error> error = parts_.hub.picture_failure())
+      return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
+  const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
+  const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
+  const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, hello);
+  if (!place) {
+    parts_.hub.remove(reader);
+    return place.error();
+  }
+  Admission admission;
+  admission.welcome = make_welcome(*place);
+  if (hello.role != Role::Source && place->mode == StreamMode::Strands) admission.asset = parts_.asset;
+  admission.picture_class = place->picture_class;
+  admission.picture_costs = place->picture_costs;
+  admission.picture_step = place->picture_step;
+  if (const auto pictures = viewers_.pictures(visitor.session))
+    tell_quality(visitor.session, *pictures, "to begin with");
+  return admission;
+}
+
+Welcome SessionDesk::make_welcome(const Viewers::Place& place) const {
+  const SceneDesc& scene = parts_.scene;
+  const std::shared_ptr<const SceneAsset> asset = parts_.source.asset();
+  Welcome welcome;
+  welcome.session_id = session_id_;
+  welcome.server_version = version();
+  welcome.scene_name = scene.name;
+  welcome.mode = place.mode;
+  welcome.mode_reason = place.reason;
+  welcome.codec = scene.stream.codec;
+  welcome.strand_count = asset->strand_count;
+  welcome.vertex_count = asset->vertex_count;
+  welcome.bound_m = parts_.hub.stream().bound_m;
+  welcome.step_rate_hz = scene.step_rate_hz;
+  welcome.look = scene.look;
+  welcome.camera = scene.camera;
+  welcome.frame_width = place.size.width;
+  welcome.frame_height = place.size.height;
+  return welcome;
+}
+
+void SessionDesk::on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) {
+  parts_.inputs.push(session, samples, arrival_ns);
+  parts_.hub.tell_motion(session, samples, arrival_ns);
+}
+
+void SessionDesk::on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) {
+  parts_.inputs.push(session, samples, arrival_ns);
+  parts_.hub.tell_wind(session, samples, arrival_ns);
+}
+
+void SessionDesk::on_command(SessionId session, const ControlCommand& command) {
+  if (may_control(session, name_of(command.command))) parts_.source.post(command, reply_to(session));
+}
+
+void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter) {
+  if (may_control(session, parameter.assignment)) parts_.source.post(parameter, reply_to(session));
+}
+
+StateSource::Reply SessionDesk::reply_to(SessionId session) {
+  return [net = net_, session](Notice notice) { net->send(session, std::move(notice)); };
+}
+
+/// Within the controller's budget, and on record.
+bool SessionDesk::may_control(SessionId session, std::string_view what) {
+  if (!control_budget_.take(session, now_ns())) {
+    net_->send(session, Notice{true, fmt::format("More than {:.0f} commands a second: this one was left out.",
+                                                 kControlsPerS)});
+    return false;
+  }
+  log_info("app", "{}: {}", viewers_.describe(session), one_line(what, kMaxLoggedCharacters));
+  return true;
+}
+
+/// Posted behind what is being done, so that a joining session has its Welcome first.
+void SessionDesk::tell_quality(SessionId session, const Viewers::Pictures& pictures,
+                               const std::string& reason) {
+  const PictureView& view = pictures.view;
+  FrameQuality quality;
+  quality.stream_id = picture_stream_id(pictures.picture_class);
+  quality.width = view.size.width;
+  quality.height = view.size.height;
+  quality.rate_hz = parts_.scene.stream.frame_rate_hz / view.rate_divisor;
+  quality.quality = static_cast<uint32_t>(view.quality);
+  quality.codec = view.codec;
+  quality.reason = reason;
+  net_->send(session, quality);
+}
+
+bool SessionDesk::on_picture_step(SessionId session, size_t step, const std::string& reason) {
+  const Result<Viewers::Pictures> pictures = viewers_.set_picture_step(session, step);
+  if (!pictures) return false;
+  log_info("net", "session {}: pictures of {} x {}, quality {}; {}", session, pictures->view.size.width,
+           pictures->view.size.height, pictures->view.quality, reason);
+  tell_quality(session, *pictures, reason);
+  net_->set_picture_class(session, pictures->picture_class);
+  return true;
+}
+
+void SessionDesk::on_camera(SessionId session, const CameraChange& camera) {
+  const Result<std::optional<PictureClass>> picture_class = viewers_.set_camera(session, camera.camera);
+  if (!picture_class) return net_->send(session, Notice{true, picture_class.error().to_string()});
+  if (*picture_class) net_->set_picture_class(session, **picture_class);
+}
+
+/// Looks whether this session should change between strands and frames.
+void SessionDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
+  const StreamHub& hub = parts_.hub;
+  const std::vector<StrandClass> classes = hub.strand_classes();
+  const size_t view_count = hub.picture_views().size() + (link.mode == StreamMode::Strands ? 1 : 0);
+  const std::optional<Error> failure = hub.picture_failure();
+  const ModeSources sources{.strand_classes = classes,
+                            .link = link,
+                            .report = viewers_.report(session),
+                            .pictures = hub.frame_counters(),
+                            .paint_trouble = failure ? failure->to_string() : std::string(),
+                            .is_software = parts_.source.stats().is_software,
+                            .picture_size = viewers_.picture_size(session),
+                            .view_count = std::max<size_t>(view_count, 1),
+                            .picture_rate_hz = parts_.scene.stream.frame_rate_hz};
+  std::optional<ModeSwitch> change = viewers_.consider(session, gather_mode_facts(sources), time_ns);
+  if (!change) return;
+  change->asset = parts_.asset;
+  net_->change_mode(session, std::move(*change));
+}
+
+void SessionDesk::on_mode(SessionId session, StreamMode mode) {
+  viewers_.set_mode(session, mode, now_ns());
+  if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, "to begin with");
+}
+
+Status SessionDesk::readiness() {
+  if (const std::optional<Error> error = parts_.source.failure()) return *error;
+  const SimStats stats = parts_.source.stats();
+  if (stats.is_paused) return {};
+  if (stats.last_step_ns == 0)
+    return make_error(ErrorCode::Unavailable, "The simulation has not stepped yet.");
+  const double age_s = static_cast<double>(now_ns() - stats.last_step_ns) * 1e-9;
+  if (age_s < kMaxReadyStepAgeS) return {};
+  return make_error(ErrorCode::Unavailable, "The simulation has not stepped for {:.1f} s (limit {} s).",
+                    age_s, kMaxReadyStepAgeS);
+}
+
+void SessionDesk::on_left(SessionId session) {
+  control_budget_.remove(session);
+  parts_.inputs.remove_source(session);
+  parts_.hub.remove(viewers_.remove(session));
+}
+
+}  // namespace strandcast

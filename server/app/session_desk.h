@@ -1,0 +1,86 @@
+// SessionDesk: what the application does with sessions: lets them in, gives each a demand on the stream,
+// passes on what they send, and changes them between strands and frames. Network thread, unless said
+// otherwise.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "server/app/control_budget.h"
+#include "server/app/network_reader.h"
+#include "server/app/viewers.h"
+#include "server/input/input_hub.h"
+#include "server/net/net_server.h"
+#include "server/stream/state_source.h"
+#include "server/stream/stream_hub.h"
+
+namespace strandcast {
+
+class SessionDesk : public NetHandler {
+ public:
+  /// What outlives it. `asset` is the message for who gets strands.
+  struct Parts {
+    const SceneDesc& scene;
+    StreamHub& hub;
+    StateSource& source;
+    InputHub& inputs;
+    EncodedFramePtr asset;
+  };
+  explicit SessionDesk(Parts parts);
+
+  /// Before `net` starts; it outlives the sessions.
+  void connect(NetServer& net);
+  /// Lines for /metrics besides the network's own; from any thread.
+  void set_metrics(std::function<std::string()> metrics) { metrics_ = std::move(metrics); }
+
+  // From any thread.
+  uint32_t viewer_count() const { return viewers_.viewer_count(); }
+  bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
+
+  Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
+  void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override;
+  void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) override;
+  void on_command(SessionId session, const ControlCommand& command) override;
+  void on_parameter(SessionId session, const SetParameter& parameter) override;
+  void on_camera(SessionId session, const CameraChange& camera) override;
+  void on_ack(SessionId, const FrameAck&) override {}
+  void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
+  void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }
+  void on_picture_request(SessionId, PictureClass picture_class) override {
+    parts_.hub.request_whole(picture_class);
+  }
+  bool on_picture_step(SessionId session, size_t step, const std::string& reason) override;
+  void on_strand_class(SessionId session, uint16_t stream_id) override {
+    viewers_.set_strand_class(session, stream_id);
+  }
+  void on_report(SessionId session, const ViewerReport& report) override {
+    viewers_.set_report(session, report);
+  }
+  void on_mode_request(SessionId session, const ModeRequest& request) override {
+    viewers_.request_mode(session, request.mode);
+  }
+  void on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
+  void on_mode(SessionId session, StreamMode mode) override;
+  void on_left(SessionId session) override;
+  Status readiness() override;
+  std::string metrics() override { return metrics_ ? metrics_() : std::string(); }
+
+ private:
+  Welcome make_welcome(const Viewers::Place& place) const;
+  bool may_control(SessionId session, std::string_view what);
+  StateSource::Reply reply_to(SessionId session);
+  void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);
+
+  const Parts parts_;
+  const std::string session_id_;
+  Viewers viewers_;
+  ControlBudget control_budget_;
+  NetServer* net_ = nullptr;
+  std::unique_ptr<NetworkReader> reader_;  // of all sessions
+  std::function<std::string()> metrics_;
+  std::atomic<bool> is_shut_down_wanted_{false};
+};
+
+}  // namespace strandcast

@@ -1,0 +1,52 @@
+#include "server/app/simulation_source.h"
+
+#include <utility>
+
+#include "common/groom/groom_asset.h"
+#include "server/app/scene_change.h"
+
+namespace strandcast {
+namespace {
+
+class SimulationSource : public StateSource {
+ public:
+  SimulationSource(SimulationConfig config, std::shared_ptr<const SceneContent> content, InputHub& inputs)
+      : config_(std::move(config)),
+        content_(std::move(content)),
+        asset_(std::make_shared<const SceneAsset>(make_scene_asset(content_->groom, content_->head))),
+        inputs_(inputs) {}
+
+  std::shared_ptr<const SceneAsset> asset() const override { return asset_; }
+  Status start(StateSink& sink) override {
+    SimLoopConfig config{config_.scene, content_, config_.gl_device, config_.shader_folder,
+                         config_.on_publish};
+    ASSIGN_OR_RETURN(loop_, SimLoop::start(std::move(config), inputs_, sink));
+    return {};
+  }
+  void stop() override {
+    if (loop_ != nullptr) loop_->stop();
+  }
+  void set_demand(const SourceDemand& demand) override { loop_->set_demand(demand); }
+  void post(const ControlCommand& command, Reply reply) override { loop_->post(command, std::move(reply)); }
+  void post(const SetParameter& parameter, Reply reply) override { loop_->post(parameter, std::move(reply)); }
+  SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
+  std::optional<Error> failure() const override { return loop_ != nullptr ? loop_->failure() : std::nullopt; }
+
+ private:
+  const SimulationConfig config_;
+  const std::shared_ptr<const SceneContent> content_;
+  const std::shared_ptr<const SceneAsset> asset_;
+  InputHub& inputs_;
+  std::unique_ptr<SimLoop> loop_;  // null before start()
+};
+
+}  // namespace
+
+Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, InputHub& inputs) {
+  RETURN_IF_ERROR(check_solver(config.scene));
+  ASSIGN_OR_RETURN(SceneContent content, load_scene_content(config.scene));
+  return std::unique_ptr<StateSource>(std::make_unique<SimulationSource>(
+      std::move(config), std::make_shared<const SceneContent>(std::move(content)), inputs));
+}
+
+}  // namespace strandcast

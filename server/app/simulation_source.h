@@ -1,0 +1,24 @@
+// The simulation as a source of states: loads the scene, then steps it on a thread of its own (SimLoop).
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/app/sim_loop.h"
+#include "server/stream/state_source.h"
+
+namespace strandcast {
+
+struct SimulationConfig {
+  SceneDesc scene;
+  std::string gl_device = "auto";                      // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+  SnapshotObserver on_publish;                         // may be empty
+};
+
+/// Checks and loads the scene; OpenGL is asked for by start(). `inputs` outlives the source.
+Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, InputHub& inputs);
+
+}  // namespace strandcast

@@ -1,0 +1,62 @@
+#include "server/stream/demand_book.h"
+
+#include <algorithm>
+
+namespace strandcast {
+
+ReaderId DemandBook::add(const ReaderTraits& traits) {
+  readers_[next_reader_].traits = traits;
+  return next_reader_++;
+}
+
+Result<PictureClass> DemandBook::set_demand(ReaderId reader, const Demand& demand) {
+  const auto found = readers_.find(reader);
+  if (found == readers_.end()) return make_error(ErrorCode::NotFound, "there is no reader {}", reader);
+  PictureClass picture_class = 0;
+  if (demand.picture) {
+    const ReaderTraits& traits = found->second.traits;
+    ASSIGN_OR_RETURN(picture_class,
+                     views_.assign({reader, traits.peer, traits.is_controller}, *demand.picture));
+  } else {
+    views_.remove(reader);
+  }
+  found->second.demand = demand;
+  return picture_class;
+}
+
+void DemandBook::remove(ReaderId reader) {
+  views_.remove(reader);
+  readers_.erase(reader);
+}
+
+Demand DemandBook::demand_of(ReaderId reader) const {
+  const auto found = readers_.find(reader);
+  return found != readers_.end() ? found->second.demand : Demand{};
+}
+
+uint32_t DemandBook::strand_readers(uint16_t stream_id) const {
+  return static_cast<uint32_t>(std::count_if(readers_.begin(), readers_.end(), [&](const auto& entry) {
+    return entry.second.demand.strand_class == stream_id;
+  }));
+}
+
+std::set<uint16_t> DemandBook::strand_classes() const {
+  std::set<uint16_t> classes;
+  for (const auto& [id, reader] : readers_) {
+    if (reader.demand.strand_class) classes.insert(*reader.demand.strand_class);
+    if (reader.demand.picture) classes.insert(0);
+  }
+  return classes;
+}
+
+SourceDemand DemandBook::total() const {
+  SourceDemand total;
+  for (const auto& [id, reader] : readers_) {
+    total.facts.strand_viewers += reader.demand.strand_class ? 1 : 0;
+    total.facts.frame_viewers += reader.demand.picture ? 1 : 0;
+    total.has_state_readers |= reader.demand.has_states;
+  }
+  return total;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,58 @@
+// DemandBook: the demands of all readers, and what they come to together. Pure bookkeeping, one thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+
+#include "common/scene/features.h"
+#include "server/stream/demand.h"
+
+namespace strandcast {
+
+/// What the shares of a reader go by.
+struct ReaderTraits {
+  std::string peer;            // address, or what counts as one
+  bool is_controller = false;  // or more
+};
+
+/// What a source has to do for all readers together.
+struct SourceDemand {
+  RuntimeFacts facts;
+  bool has_state_readers = false;
+
+  bool is_watched() const { return has_state_readers || facts.strand_viewers + facts.frame_viewers > 0; }
+};
+
+class DemandBook : public DemandDesk {
+ public:
+  /// `scene_view`: as PictureViews.
+  explicit DemandBook(PictureView scene_view) : views_(std::move(scene_view)) {}
+
+  ReaderId add(const ReaderTraits& traits);
+  Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) override;
+  /// Ignored for unknown readers.
+  void remove(ReaderId reader);
+
+  /// Nothing for unknown readers.
+  Demand demand_of(ReaderId reader) const;
+  PictureClass picture_class_of(ReaderId reader) const { return views_.class_of(reader); }
+  std::map<uint32_t, PictureView> picture_views() const { return views_.views(); }
+  uint32_t strand_readers(uint16_t stream_id) const;
+  /// The classes that have to be encoded: those that readers want, and the first where pictures are drawn
+  /// from it.
+  std::set<uint16_t> strand_classes() const;
+  /// Readers of strands and of pictures; one that wants both counts for both.
+  SourceDemand total() const;
+
+ private:
+  struct Reader {
+    ReaderTraits traits;
+    Demand demand;
+  };
+  std::map<ReaderId, Reader> readers_;
+  PictureViews views_;
+  ReaderId next_reader_ = 1;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,75 @@
+// StateSource: where published states come from: a simulation, a recording that is played again, another
+// server. Exactly one feeds a hub.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/base/histogram.h"
+#include "common/base/result.h"
+#include "common/scene/scene_desc.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/snapshot.h"
+#include "common/wire/messages.h"
+#include "server/stream/demand_book.h"
+
+namespace strandcast {
+
+/// Totals since start, and the present state. A source that simulates nothing leaves most of it alone.
+struct SimStats {
+  uint64_t tick = 0;
+  double step_median_ms = 0.0;  // solver, all substeps
+  Histogram step_times;         // likewise
+  double read_median_ms = 0.0;
+  double quantise_median_ms = 0.0;
+  double realtime_factor = 0.0;
+  bool is_paused = false;
+  bool is_motion_stale = true;
+  uint64_t rejected_samples = 0;
+  uint64_t dropped_steps = 0;
+  uint64_t published = 0;
+  uint64_t quarantined = 0;    // strands put back to rest because they had no usable numbers
+  uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
+  uint64_t solver_builds = 0;
+  uint64_t solver_bytes = 0;
+  bool is_software = false;  // OpenGL runs on processor cores
+  std::string solver_name;
+  int64_t last_step_ns = 0;  // server clock at the end of the newest step; 0 = none yet
+};
+
+/// Takes what a source makes. Any thread; nothing waits for a reader.
+class StateSink {
+ public:
+  virtual ~StateSink() = default;
+  /// On the lattice of the newest change_stream(), or of the scene.
+  virtual void put(std::shared_ptr<const Snapshot> state) = 0;
+  /// Before the first state of it.
+  virtual void change_stream(const StreamDesc& stream) = 0;
+};
+
+class StateSource {
+ public:
+  /// Answer to a command, on any thread.
+  using Reply = std::function<void(Notice)>;
+
+  virtual ~StateSource() = default;
+  /// The strands at rest and what else viewers draw; the same all the time.
+  virtual std::shared_ptr<const SceneAsset> asset() const = 0;
+  /// Returns when the first state was put, or with the error. `sink` outlives the source. Call once.
+  virtual Status start(StateSink& sink) = 0;
+  /// Puts nothing more from its return on.
+  virtual void stop() = 0;
+
+  // From any thread; return at once and do not call the sink.
+  virtual void set_demand(const SourceDemand& demand) = 0;
+  virtual void post(const ControlCommand& command, Reply reply) = 0;
+  virtual void post(const SetParameter& parameter, Reply reply) = 0;
+  virtual SimStats stats() const = 0;
+  /// Why it ended by itself; nothing while it runs.
+  virtual std::optional<Error> failure() const = 0;
+};
+
+}  // namespace strandcast

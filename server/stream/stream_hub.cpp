@@ -1,0 +1,253 @@
+#include "server/stream/stream_hub.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "common/base/check.h"
+#include "common/log/log.h"
+
+namespace strandcast {
+
+StreamHub::StreamHub(StreamHubConfig config)
+    : config_(std::move(config)), stream_(config_.stream), book_(config_.scene_view) {}
+
+Result<std::unique_ptr<StreamHub>> StreamHub::make(StreamHubConfig config) {
+  std::unique_ptr<StreamHub> hub(new StreamHub(std::move(config)));
+  RETURN_IF_ERROR(hub->begin());
+  return hub;
+}
+
+StreamHub::~StreamHub() {
+  stop();
+}
+
+Status StreamHub::begin() {
+  // A wrong codec is told here, and encoders can be made later without a way to fail.
+  RETURN_IF_ERROR(make_strand_encoder(stream_.codec));
+  const SceneAsset& asset = *config_.asset;
+  ASSIGN_OR_RETURN(auto decoder,
+                   make_strand_decoder(stream_.codec, {asset.strand_count, asset.vertex_count}));
+  decoder->set_rest_shape(asset.rest_position_m);
+  classes_ = classes_of(stream_);
+  FrameWorker::Hooks hooks;
+  hooks.sink = [this](PictureClass picture_class, PicturePtr picture) {
+    give([&](const Entry& entry) { return entry.picture_class == picture_class; },
+         [&](StreamReader& reader) { reader.on_picture(picture_class, picture); });
+  };
+  hooks.request_keyframe = [this] { request_keyframe(0); };
+  hooks.on_refused = [this](PictureClass picture_class, const Error& error) {
+    give([&](const Entry& entry) { return entry.picture_class == picture_class; },
+         [&](StreamReader& reader) { reader.on_picture_refused(picture_class, error); });
+  };
+  hooks.on_failure = [this](const Error& error) {
+    give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_pictures_failed(error); });
+  };
+  frames_ = std::make_unique<FrameWorker>(std::move(decoder), config_.make_painter,
+                                          FrameWorkerConfig{stream_.frame_rate_hz}, std::move(hooks));
+  return {};
+}
+
+/// Gives something to every reader with a demand for it, once.
+template <class IsWanted, class Give>
+void StreamHub::give(IsWanted is_wanted, Give give_one) {
+  const std::lock_guard lock(mutex_);
+  std::set<StreamReader*> readers;
+  for (const auto& [id, entry] : entries_)
+    if (is_wanted(entry) && readers.insert(entry.reader).second) give_one(*entry.reader);
+}
+
+ReaderId StreamHub::add(StreamReader& reader, const ReaderTraits& traits) {
+  const std::lock_guard lock(mutex_);
+  const ReaderId id = book_.add(traits);
+  entries_[id].reader = &reader;
+  return id;
+}
+
+Result<PictureClass> StreamHub::set_demand(ReaderId reader, const Demand& demand) {
+  const std::lock_guard order(demand_mutex_);
+  PictureClass picture_class = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (demand.strand_class && *demand.strand_class >= classes_.size())
+      return make_error(ErrorCode::BadInput, "there is no strand class {}", *demand.strand_class);
+    ASSIGN_OR_RETURN(picture_class, book_.set_demand(reader, demand));
+    entries_[reader].demand = demand;
+    entries_[reader].picture_class = picture_class;
+  }
+  follow_demand();
+  return picture_class;
+}
+
+void StreamHub::remove(ReaderId reader) {
+  const std::lock_guard order(demand_mutex_);
+  {
+    const std::lock_guard lock(mutex_);
+    book_.remove(reader);
+    entries_.erase(reader);
+  }
+  follow_demand();
+}
+
+void StreamHub::set_source(std::function<void(const SourceDemand&)> on_demand) {
+  const std::lock_guard order(demand_mutex_);
+  on_demand_ = std::move(on_demand);
+  if (on_demand_) on_demand_(total());
+}
+
+/// What runs follows what is wanted. demand_mutex_ is held.
+void StreamHub::follow_demand() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (has_stopped_) return;
+    frames_->set_views(book_.picture_views());
+    const std::set<uint16_t> wanted = book_.strand_classes();
+    for (const uint16_t stream_id : wanted) encoder(stream_id).set_has_listeners(true);
+    for (uint16_t stream_id = 0; stream_id < encoders_.size(); ++stream_id)
+      if (encoders_[stream_id] != nullptr && !wanted.contains(stream_id))
+        encoders_[stream_id]->set_has_listeners(false);
+  }
+  if (on_demand_) on_demand_(total());
+}
+
+/// The encoder of a class, made when it is needed first. mutex_ is held.
+StrandEncodeWorker& StreamHub::encoder(uint16_t stream_id) {
+  encoders_.resize(std::max(classes_.size(), encoders_.size()));
+  std::unique_ptr<StrandEncodeWorker>& worker = encoders_[stream_id];
+  if (worker != nullptr) return *worker;
+  auto made = make_strand_encoder(stream_.codec);
+  CHECK(made.ok());  // begin() has made one
+  (*made)->set_rest_shape(config_.asset->rest_position_m);
+  worker = std::make_unique<StrandEncodeWorker>(
+      slot_, std::move(*made), [this](const EncodedFramePtr& frame) { give_strands(frame); },
+      encode_config(stream_id));
+  return *worker;
+}
+
+/// Pictures are drawn from the first class.
+void StreamHub::give_strands(const EncodedFramePtr& frame) {
+  const uint16_t stream_id = frame->header.stream_id;
+  if (stream_id == 0) {
+    const std::lock_guard lock(mutex_);
+    if (frames_ != nullptr && frames_->has_views()) frames_->offer(frame);
+  }
+  give([&](const Entry& entry) { return entry.demand.strand_class == stream_id; },
+       [&](StreamReader& reader) { reader.on_strands(frame); });
+}
+
+std::vector<StrandClass> StreamHub::classes_of(const StreamDesc& stream) const {
+  return make_strand_classes(
+      {config_.step_rate_hz, stream.strand_rate_hz, stream.bound_m, config_.asset->strand_count});
+}
+
+StrandEncodeConfig StreamHub::encode_config(uint16_t stream_id) const {
+  const StrandClass& row = classes_[stream_id];
+  const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
+  CHECK(quantum_m.ok());  // as above
+  return {stream_id, row.rate_divisor, row.coarsening, row.strand_share, *quantum_m};
+}
+
+void StreamHub::put(std::shared_ptr<const Snapshot> state) {
+  give([](const Entry& entry) { return entry.demand.has_states; },
+       [&](StreamReader& reader) { reader.on_state(state); });
+  slot_.put(std::move(state));
+}
+
+/// States on the new lattice wait in the slot until every reader has told whoever must know.
+void StreamHub::change_stream(const StreamDesc& stream) {
+  const std::vector<StrandClass> classes = classes_of(stream);
+  const std::shared_ptr<void> until_told(nullptr,
+                                         [this, stream, classes](void*) { begin_stream(stream, classes); });
+  std::set<StreamReader*> readers;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [id, entry] : entries_) readers.insert(entry.reader);
+  }
+  for (StreamReader* reader : readers) reader->on_stream_change(classes, until_told);
+}
+
+void StreamHub::begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes) {
+  const std::lock_guard lock(mutex_);
+  stream_ = stream;
+  classes_ = classes;
+  for (uint16_t stream_id = 0; stream_id < std::min(encoders_.size(), classes_.size()); ++stream_id)
+    if (encoders_[stream_id] != nullptr) encoders_[stream_id]->change(encode_config(stream_id));
+}
+
+void StreamHub::request_keyframe(uint16_t stream_id) {
+  const std::lock_guard lock(mutex_);
+  if (stream_id < encoders_.size() && encoders_[stream_id] != nullptr)
+    encoders_[stream_id]->request_keyframe();
+}
+
+void StreamHub::request_whole(PictureClass picture_class) {
+  const std::lock_guard lock(mutex_);
+  if (frames_ != nullptr) frames_->request_whole(picture_class);
+}
+
+void StreamHub::tell_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns) {
+  give([](const Entry& entry) { return entry.demand.has_inputs; },
+       [&](StreamReader& reader) { reader.on_motion(source, samples, arrival_ns); });
+}
+
+void StreamHub::tell_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns) {
+  give([](const Entry& entry) { return entry.demand.has_inputs; },
+       [&](StreamReader& reader) { reader.on_wind(source, samples, arrival_ns); });
+}
+
+StreamDesc StreamHub::stream() const {
+  const std::lock_guard lock(mutex_);
+  return stream_;
+}
+
+std::vector<StrandClass> StreamHub::strand_classes() const {
+  const std::lock_guard lock(mutex_);
+  return classes_;
+}
+
+std::map<uint32_t, PictureView> StreamHub::picture_views() const {
+  const std::lock_guard lock(mutex_);
+  return book_.picture_views();
+}
+
+uint32_t StreamHub::strand_readers(uint16_t stream_id) const {
+  const std::lock_guard lock(mutex_);
+  return book_.strand_readers(stream_id);
+}
+
+SourceDemand StreamHub::total() const {
+  const std::lock_guard lock(mutex_);
+  return book_.total();
+}
+
+FrameCounters StreamHub::frame_counters() const {
+  const std::lock_guard lock(mutex_);
+  return frames_ != nullptr ? frames_->counters() : FrameCounters{};
+}
+
+std::vector<StrandEncodeCounters> StreamHub::encode_counters() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<StrandEncodeCounters> counters;
+  for (const auto& worker : encoders_)
+    counters.push_back(worker != nullptr ? worker->counters() : StrandEncodeCounters{});
+  return counters;
+}
+
+std::optional<Error> StreamHub::picture_failure() const {
+  const std::lock_guard lock(mutex_);
+  return frames_ != nullptr ? frames_->failure() : std::nullopt;
+}
+
+void StreamHub::stop() {
+  slot_.stop();
+  // Each worker calls the hub: all are taken out of reach before their threads are joined.
+  std::vector<std::unique_ptr<StrandEncodeWorker>> encoders;
+  std::unique_ptr<FrameWorker> frames;
+  const std::lock_guard lock(mutex_);
+  has_stopped_ = true;
+  entries_.clear();
+  encoders.swap(encoders_);
+  frames.swap(frames_);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,110 @@
+// StreamHub: one source of states, any number of readers, and between them the encoders and the frame
+// renderer, of which those run that somebody wants. Any thread, unless said otherwise.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/scene/scene_desc.h"
+#include "common/strands/scene_asset.h"
+#include "server/encode/frame_worker.h"
+#include "server/encode/strand_encode_worker.h"
+#include "server/publish/snapshot_slot.h"
+#include "server/stream/demand_book.h"
+#include "server/stream/state_source.h"
+#include "server/stream/stream_reader.h"
+
+namespace strandcast {
+
+struct StreamHubConfig {
+  StreamDesc stream;
+  double step_rate_hz = 60.0;
+  PictureView scene_view;  // always has room
+  std::shared_ptr<const SceneAsset> asset;
+  MakePicturePainter make_painter;  // called when somebody wants pictures
+};
+
+class StreamHub : public StateSink, public DemandDesk {
+ public:
+  /// Unsupported for an unknown codec. Starts no thread but that of the frames, which sleeps.
+  static Result<std::unique_ptr<StreamHub>> make(StreamHubConfig config);
+  /// stop(), if it was not called.
+  ~StreamHub() override;
+  StreamHub(const StreamHub&) = delete;
+  StreamHub& operator=(const StreamHub&) = delete;
+
+  /// `reader` outlives its demands: until remove() or stop(). One reader may have many, each with an id and
+  /// shares of its own; it then gets what any of them asks for, once.
+  ReaderId add(StreamReader& reader, const ReaderTraits& traits = {});
+  Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) override;
+  /// Nothing is given for this demand any more from the return on. Not from within the reader.
+  void remove(ReaderId reader);
+  /// Told whenever the demands have changed, and at once.
+  void set_source(std::function<void(const SourceDemand&)> on_demand);
+
+  /// A keyframe of this class for those who begin; comes with the next state. From a reader's functions too.
+  void request_keyframe(uint16_t stream_id);
+  /// The newest picture of a class again, whole. From a reader's functions too.
+  void request_whole(PictureClass picture_class);
+
+  void put(std::shared_ptr<const Snapshot> state) override;
+  void change_stream(const StreamDesc& stream) override;
+  // What comes in, for readers that want inputs.
+  void tell_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns);
+  void tell_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns);
+
+  StreamDesc stream() const;
+  std::vector<StrandClass> strand_classes() const;
+  std::map<uint32_t, PictureView> picture_views() const;
+  uint32_t strand_readers(uint16_t stream_id) const;
+  SourceDemand total() const;
+  FrameCounters frame_counters() const;
+  /// Of all classes that were ever needed, by stream_id.
+  std::vector<StrandEncodeCounters> encode_counters() const;
+  /// Why no pictures can be drawn; nothing while all is well.
+  std::optional<Error> picture_failure() const;
+
+  /// Ends all threads; the source has stopped before. Readers get nothing more.
+  void stop();
+
+ private:
+  struct Entry {
+    StreamReader* reader = nullptr;
+    PictureClass picture_class = 0;
+    Demand demand;
+  };
+  explicit StreamHub(StreamHubConfig config);
+  Status begin();
+  void follow_demand();
+  StrandEncodeWorker& encoder(uint16_t stream_id);
+  StrandEncodeConfig encode_config(uint16_t stream_id) const;
+  std::vector<StrandClass> classes_of(const StreamDesc& stream) const;
+  void begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes);
+  void give_strands(const EncodedFramePtr& frame);
+  template <class IsWanted, class Give>
+  void give(IsWanted is_wanted, Give give_one);
+
+  const StreamHubConfig config_;
+  SnapshotSlot slot_;
+
+  std::mutex
+      demand_mutex_;  // held through a change of the demands, so that the source hears of them in order
+  std::function<void(const SourceDemand&)> on_demand_;
+
+  mutable std::mutex mutex_;  // guards the block below; taken after demand_mutex_
+  StreamDesc stream_;
+  std::vector<StrandClass> classes_;
+  DemandBook book_;
+  std::map<ReaderId, Entry> entries_;
+  std::unique_ptr<FrameWorker> frames_;
+  std::vector<std::unique_ptr<StrandEncodeWorker>> encoders_;  // by stream_id; null until somebody needs it
+  bool has_stopped_ = false;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,189 @@
+// A server whose states come from a recording in memory and go to a recorder in memory: a source and a reader
+// that the product does not know, without OpenGL.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "common/strands/strand_codec.h"
+#include "tests/support/frame_recorder.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/replay_source.h"
+#include "tests/support/sample_asset.h"
+#include "tests/support/server_fixture.h"
+
+namespace strandcast {
+namespace {
+
+using test::FrameRecorder;
+using test::RawClient;
+using test::ReplaySource;
+using testing::HasSubstr;
+
+constexpr uint32_t kStrands = 40;
+constexpr uint32_t kVertices = 6;
+constexpr size_t kStates = 30;
+
+/// Every vertex moves on by a little from state to state.
+std::vector<std::shared_ptr<const Snapshot>> recorded_states(float quantum_m) {
+  std::vector<std::shared_ptr<const Snapshot>> states;
+  for (size_t i = 0; i < kStates; ++i) {
+    auto state = std::make_shared<Snapshot>();
+    state->tick = i + 1;
+    state->sim_time_ns = static_cast<int64_t>(i) * 16'666'667;
+    state->strand_count = kStrands;
+    state->vertex_count = kVertices;
+    state->quantum_m = quantum_m;
+    for (uint32_t k = 0; k < 3 * kStrands * kVertices; ++k)
+      state->lattice.push_back(static_cast<int32_t>(k * 37 % 1'000 + i * (k % 5)));
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
+class StreamOfARecording : public test::ServerFixture {
+ protected:
+  void SetUp() override {
+    ServerConfig config;
+    config.scene = test::bald_scene();
+    config.scene.stream.codec = "delta";
+    config.gl_device = "none at all";  // whoever asks for OpenGL fails
+    const Result<float> quantum_m = lattice_step_m("delta", config.scene.stream.bound_m);
+    ASSERT_TRUE(quantum_m.ok());
+    states_ = recorded_states(*quantum_m);
+    // The one line that makes it the source.
+    config.make_source = [this](const ServerConfig&, InputHub&) { return make_source(); };
+    config.make_painter = [this](const GlPainterConfig&) -> MakePicturePainter {
+      return [this]() -> Result<std::unique_ptr<PicturePainter>> {
+        ++painters_;
+        return make_error(ErrorCode::Unavailable, "no OpenGL in this test");
+      };
+    };
+    ASSERT_TRUE(start(std::move(config)));
+  }
+  Result<std::unique_ptr<StateSource>> make_source() {
+    auto source = std::make_unique<ReplaySource>(
+        std::make_shared<const SceneAsset>(sample_asset(kStrands, kVertices)), states_);
+    source_ = source.get();
+    return std::unique_ptr<StateSource>(std::move(source));
+  }
+  uint64_t encodes() const { return server_->counters().encode.encodes; }
+
+  std::vector<std::shared_ptr<const Snapshot>> states_;
+  ReplaySource* source_ = nullptr;
+  std::atomic<int> painters_{0};
+};
+
+TEST_F(StreamOfARecording, ARecorderGetsEveryStateAndPosesAsNoViewer) {
+  EXPECT_FALSE(source_->is_watched());
+  FrameRecorder recorder;
+  const ReaderId reader = server_->hub().add(recorder);
+  Demand strands;
+  strands.strand_class = 0;
+  ASSERT_TRUE(server_->hub().set_demand(reader, strands).ok());
+  EXPECT_TRUE(source_->is_watched());
+  for (size_t count = 1; count <= kStates; ++count) {
+    ASSERT_TRUE(eventually([&] { return recorder.frames().size() >= count; })) << count;
+    if (count < kStates) source_->play_next();
+  }
+  auto decoder = make_strand_decoder("delta", {kStrands, kVertices});
+  ASSERT_TRUE(decoder.ok());
+  const auto frames = recorder.frames();
+  ASSERT_EQ(frames.size(), kStates) << "a keyframe, then one frame for each state";
+  EXPECT_EQ(frames[0]->header.opcode, Opcode::StrandKeyframe);
+  for (size_t i = 0; i < kStates; ++i) {
+    const auto decoded = (*decoder)->decode(frames[i]->message);
+    ASSERT_TRUE(decoded.ok()) << decoded.error().to_string();
+    EXPECT_EQ(state_hash(**decoded), state_hash(*states_[i])) << i;
+  }
+  const ServerCounters counters = server_->counters();
+  EXPECT_EQ(counters.viewers, 0u);
+  EXPECT_EQ(counters.net.open_sessions, 0u);
+  EXPECT_EQ(counters.strand_viewers, 1u) << "one reader of strands";
+
+  server_->hub().remove(reader);
+  EXPECT_FALSE(source_->is_watched());
+  const uint64_t before = encodes();
+  for (int i = 0; i < 5; ++i) source_->play_next();
+  give_time_to_misbehave();
+  EXPECT_EQ(encodes(), before) << "what nobody wants is not encoded";
+  EXPECT_EQ(recorder.frames().size(), kStates);
+  EXPECT_EQ(painters_, 0);
+}
+
+TEST_F(StreamOfARecording, AViewerOnTheNetworkSeesTheRecording) {
+  const auto viewer = open(client_config());
+  ASSERT_NE(viewer, nullptr);
+  uint64_t last_hash = 0;
+  viewer->set_snapshot_listener([&](const auto& state) { last_hash = state_hash(*state); });
+  for (size_t i = 0; i < kStates; ++i) {
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return last_hash == state_hash(*states_[i]); })) << i;
+    if (i + 1 < kStates) source_->play_next();
+  }
+  EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u);
+  EXPECT_EQ(server_->counters().viewers, 1u);
+  EXPECT_EQ(painters_, 0) << "nobody wanted pictures";
+}
+
+TEST_F(StreamOfARecording, StatesAndInputsComeToWhoWantsThem) {
+  FrameRecorder recorder, indifferent;
+  const ReaderId reader = server_->hub().add(recorder);
+  (void)server_->hub().add(indifferent);
+  Demand all;
+  all.has_states = all.has_inputs = true;
+  ASSERT_TRUE(server_->hub().set_demand(reader, all).ok());
+  EXPECT_TRUE(source_->is_watched());
+  source_->play_next();
+  source_->play_next();
+  EXPECT_EQ(recorder.state_hashes(),
+            (std::vector<uint64_t>{state_hash(*states_[1]), state_hash(*states_[2])}));
+  EXPECT_EQ(encodes(), 0u) << "no frames were asked for";
+
+  RawClient source(server_->port());
+  ASSERT_TRUE(source.handshake());
+  Hello hello;
+  hello.role = Role::Source;
+  source.send(hello);
+  ASSERT_TRUE(source.read_control<Welcome>().has_value());
+  source.send(MotionSamples{{MotionSamples::Sample{1'000, {}}, MotionSamples::Sample{2'000, {}}}});
+  EXPECT_TRUE(eventually([&] { return recorder.motion_samples() == 2; }));
+  EXPECT_TRUE(indifferent.state_hashes().empty());
+  EXPECT_EQ(indifferent.motion_samples(), 0u);
+}
+
+TEST_F(StreamOfARecording, WhatASourceCannotDoIsSaidInOneSentence) {
+  RawClient controller(server_->port());
+  ASSERT_TRUE(controller.handshake());
+  Hello hello;
+  hello.role = Role::Controller;
+  controller.send(hello);
+  ASSERT_TRUE(controller.read_control<Welcome>().has_value());
+  controller.send(ControlCommand{Command::Pause});
+  const auto notice = controller.read_control<Notice>();
+  ASSERT_TRUE(notice.has_value());
+  EXPECT_THAT(notice->text, HasSubstr("recording"));
+}
+
+TEST_F(StreamOfARecording, ADemandThatCannotBeMetChangesNothing) {
+  FrameRecorder recorder;
+  const ReaderId reader = server_->hub().add(recorder);
+  Demand demand;
+  demand.strand_class = 0;
+  ASSERT_TRUE(server_->hub().set_demand(reader, demand).ok());
+  for (const auto& spoil : std::vector<std::function<void(Demand&)>>{
+           [](Demand& wrong) { wrong.strand_class = 999; },
+           [](Demand& wrong) {
+             wrong.picture = PictureView{{}, {1, 1}, 80, 1, PictureCodec::Jpeg};
+           }}) {
+    Demand wrong = demand;
+    spoil(wrong);
+    EXPECT_FALSE(server_->hub().set_demand(reader, wrong).ok());
+    EXPECT_EQ(server_->hub().strand_readers(0), 1u);
+  }
+  EXPECT_FALSE(server_->hub().set_demand(reader + 100, demand).ok()) << "nobody";
+  server_->hub().remove(reader);
+  EXPECT_EQ(server_->hub().strand_readers(0), 0u);
+}
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,80 @@
+#include "server/stream/demand_book.h"
+
+namespace strandcast {
+namespace {
+
+PictureView sized(uint32_t width) {
+  PictureView view;
+  view.size = {width, 64};
+  return view;
+}
+
+Demand wants(std::optional<uint16_t> strand_class, std::optional<PictureView> picture = std::nullopt) {
+  Demand demand;
+  demand.strand_class = strand_class;
+  demand.picture = picture;
+  return demand;
+}
+
+TEST(DemandBook, WhatRunsIsTheUnionOfWhatIsWanted) {
+  DemandBook book(sized(640));
+  const ReaderId a = book.add({}), b = book.add({}), c = book.add({});
+  EXPECT_FALSE(book.total().is_watched());
+  EXPECT_TRUE(book.strand_classes().empty());
+  ASSERT_TRUE(book.set_demand(a, wants(3)).ok());
+  ASSERT_TRUE(book.set_demand(b, wants(3)).ok());
+  EXPECT_EQ(book.strand_classes(), std::set<uint16_t>{3});
+  EXPECT_EQ(book.strand_readers(3), 2u);
+  const auto pictures = book.set_demand(c, wants(std::nullopt, sized(100)));
+  ASSERT_TRUE(pictures.ok());
+  EXPECT_NE(*pictures, 0u);
+  EXPECT_EQ(book.strand_classes(), (std::set<uint16_t>{0, 3})) << "pictures are drawn from the first class";
+  EXPECT_EQ(book.strand_readers(0), 0u) << "which nobody reads";
+  EXPECT_EQ(book.total().facts.strand_viewers, 2u);
+  EXPECT_EQ(book.total().facts.frame_viewers, 1u);
+  for (const ReaderId reader : {a, b, c}) book.remove(reader);
+  EXPECT_FALSE(book.total().is_watched());
+  EXPECT_TRUE(book.strand_classes().empty());
+  EXPECT_TRUE(book.picture_views().empty());
+}
+
+TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
+  DemandBook book(sized(640));
+  const ReaderId reader = book.add({});
+  Demand states;
+  states.has_states = true;
+  ASSERT_TRUE(book.set_demand(reader, states).ok());
+  EXPECT_TRUE(book.total().is_watched());
+  EXPECT_TRUE(book.strand_classes().empty());
+  Demand inputs;
+  inputs.has_inputs = true;
+  ASSERT_TRUE(book.set_demand(reader, inputs).ok());
+  EXPECT_FALSE(book.total().is_watched()) << "inputs come whoever watches";
+}
+
+TEST(DemandBook, ARefusedDemandLeavesTheOneBefore) {
+  DemandBook book(sized(640));
+  const ReaderId reader = book.add({});
+  ASSERT_TRUE(book.set_demand(reader, wants(1, sized(100))).ok());
+  const PictureClass picture_class = book.picture_class_of(reader);
+  EXPECT_FALSE(book.set_demand(reader, wants(2, sized(1))).ok()) << "too narrow";
+  EXPECT_EQ(book.demand_of(reader).strand_class, 1);
+  EXPECT_EQ(book.demand_of(reader).picture, sized(100));
+  EXPECT_EQ(book.picture_class_of(reader), picture_class);
+  EXPECT_EQ(book.set_demand(99, wants(1)).error().code, ErrorCode::NotFound);
+}
+
+TEST(DemandBook, SharesGoByTheReadersAddress) {
+  DemandBook book(sized(640));
+  ReaderId last = 0;
+  for (uint32_t i = 0; i < kMaxPictureViewsOfPeer; ++i) {
+    last = book.add({"a", true});
+    ASSERT_TRUE(book.set_demand(last, wants(std::nullopt, sized(100 + i))).ok());
+  }
+  EXPECT_FALSE(book.set_demand(book.add({"a", true}), wants(std::nullopt, sized(200))).ok());
+  EXPECT_TRUE(book.set_demand(book.add({"b", true}), wants(std::nullopt, sized(200))).ok());
+  EXPECT_TRUE(book.set_demand(last, wants(std::nullopt, sized(300))).ok()) << "one for another of its own";
+}
+
+}  // namespace
+}  // namespace strandcast
