@@ -11,17 +11,19 @@ using namespace simulated;
 constexpr int64_t kLatestNs = 250 * kMs;
 constexpr int64_t kAdaptedNs = 3 * kS;
 
-Viewer viewer_over(double mbit_per_s, int64_t round_trip_ms, int64_t reader_ms,
-                   Content content = turning_head()) {
-  Viewer viewer({.bytes_per_s = mbit_per_s * 125e3,
-                 .round_trip_ns = round_trip_ms * kMs,
-                 .jitter_ns = 10 * kMs,
-                 .reader_ns = reader_ms * kMs},
-                std::move(content));
-  while (viewer.arrivals.empty()) viewer.run(10 * kMs);
-  viewer.run(kAdaptedNs);
-  return viewer;
-}
+/// A viewer that has had time to adapt to its link.
+class AdaptedViewer : public Viewer {
+ public:
+  AdaptedViewer(double mbit_per_s, int64_t round_trip_ms, int64_t reader_ms, Content what = turning_head())
+      : Viewer({.bytes_per_s = mbit_per_s * 125e3,
+                .round_trip_ns = round_trip_ms * kMs,
+                .jitter_ns = 10 * kMs,
+                .reader_ns = reader_ms * kMs},
+               std::move(what)) {
+    while (arrivals.empty()) run(10 * kMs);
+    run(kAdaptedNs);
+  }
+};
 
 // Three seconds after the first frame the class is found, and nothing that the hair does changes it any more.
 TEST(SlowLink, TheClassIsSettledWithinThreeSecondsAndStays) {
@@ -32,7 +34,7 @@ TEST(SlowLink, TheClassIsSettledWithinThreeSecondsAndStays) {
         for (const int64_t reader_ms : {1, 20, 40}) {
           SCOPED_TRACE(fmt::format("content {}, {} Mbit/s, {} ms, read every {} ms", content, mbit_per_s,
                                    round_trip_ms, reader_ms));
-          Viewer viewer = viewer_over(mbit_per_s, round_trip_ms, reader_ms, contents[content]);
+          AdaptedViewer viewer(mbit_per_s, round_trip_ms, reader_ms, contents[content]);
           const int64_t adapted_ns = viewer.time_ns;
           const size_t changes = viewer.changes;
           viewer.run(20 * kS - kAdaptedNs);
@@ -48,7 +50,7 @@ TEST(SlowLink, NoFrameIsLaterThanAQuarterOfASecond) {
     for (const int64_t round_trip_ms : {20, 100})
       for (const int64_t reader_ms : {1, 20}) {
         SCOPED_TRACE(fmt::format("{} Mbit/s, {} ms, read every {} ms", mbit_per_s, round_trip_ms, reader_ms));
-        Viewer viewer = viewer_over(mbit_per_s, round_trip_ms, reader_ms);
+        AdaptedViewer viewer(mbit_per_s, round_trip_ms, reader_ms);
         const int64_t adapted_ns = viewer.time_ns;
         viewer.run(40 * kS);
         EXPECT_LE(viewer.worst_age_ns(adapted_ns), kLatestNs);
@@ -63,7 +65,7 @@ TEST(SlowLink, StrandsAreNoCoarserThanTheyMustBe) {
     size_t fitting = 0;
     while (classes[fitting].relative_cost * turning_head().bytes_per_s > kUsableShare * mbit_per_s * 125e3)
       ++fitting;
-    Viewer viewer = viewer_over(mbit_per_s, 20, 1);
+    AdaptedViewer viewer(mbit_per_s, 20, 1);
     const int64_t adapted_ns = viewer.time_ns;
     viewer.run(60 * kS);
     size_t coarser = 0;

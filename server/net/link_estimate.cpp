@@ -1,0 +1,117 @@
+#include "server/net/link_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "common/base/quantile.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kNsPerS = 1e9;
+/// Round trips shorter than this differ by scheduling, not by the link.
+constexpr int64_t kLeastTransferNs = kNsPerMs;
+constexpr size_t kMaxBusySamples = 16;
+/// A rate is taken over at least this: frames and acknowledgements come in bunches.
+constexpr int64_t kBusySpanNs = 50 * kNsPerMs;
+/// A round trip differs by so much for other reasons than the rate: jitter, or a client that looks only now
+/// and then.
+constexpr int64_t kJitterNs = 50 * kNsPerMs;
+constexpr size_t kMinBusySamples = 3;
+constexpr int64_t kBusyAgeNs = 2'000 * kNsPerMs;
+
+}  // namespace
+
+int64_t LinkEstimate::on_acked(const AckedFrame& frame, int64_t time_ns) {
+  if (time_ns - bunch_ns_ >= kLeastTransferNs) {
+    before_bunch_ns_ = last_ack_ns_;
+    bunch_ns_ = time_ns;
+  }
+  const int64_t round_trip_ns = time_ns - frame.sent_ns;
+  note_capacity(frame, round_trip_ns, time_ns);
+  const int64_t own_ns = transfer_ns(frame.bytes, time_ns);
+  // Alone on its way a frame waits for nothing: what is left is the bare link, which may have become longer.
+  const int64_t bare_ns = std::max<int64_t>(round_trip_ns - own_ns, kLeastTransferNs);
+  if (frame.was_alone && !round_trips_.empty() && bare_ns > base_ns() + kHighDelayNs &&
+      time_ns - round_trips_.front().time_ns > kLongerPathNs)
+    round_trips_.clear();
+  note_round_trip(frame.was_alone ? bare_ns : round_trip_ns, time_ns);
+  last_ack_ns_ = time_ns;
+  return std::max<int64_t>(round_trip_ns - base_ns() - own_ns, 0);
+}
+
+void LinkEstimate::on_round_trip(int64_t round_trip_ns, int64_t time_ns) {
+  if (round_trip_ns >= 0) note_round_trip(std::max(round_trip_ns, kLeastTransferNs), time_ns);
+}
+
+/// Keeps the candidates for the minimum of the window: each newer one is longer than all before it.
+void LinkEstimate::note_round_trip(int64_t round_trip_ns, int64_t time_ns) {
+  const auto value = static_cast<double>(round_trip_ns);
+  while (!round_trips_.empty() && round_trips_.back().value >= value) round_trips_.pop_back();
+  round_trips_.push_back({time_ns, value});
+  while (round_trips_.front().time_ns < time_ns - kBaseWindowNs) round_trips_.pop_front();
+}
+
+int64_t LinkEstimate::base_ns() const {
+  return round_trips_.empty() ? 0 : static_cast<int64_t>(round_trips_.front().value);
+}
+
+void LinkEstimate::note_capacity(const AckedFrame& frame, int64_t round_trip_ns, int64_t time_ns) {
+  // A large frame that met nothing on its way shows the rate by how much longer it took than something small.
+  // One that took about as long as expected shows nothing new, least of all a short one.
+  if (frame.is_large && frame.was_alone && !round_trips_.empty()) {
+    const int64_t duration_ns = std::max(round_trip_ns - base_ns(), kLeastTransferNs);
+    const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
+    const auto bytes = static_cast<double>(frame.bytes);
+    const int64_t expected_ns = is_known ? static_cast<int64_t>(bytes / seen_rate_->value * kNsPerS) : 0;
+    if (!is_known || std::abs(duration_ns - expected_ns) > kJitterNs)
+      seen_rate_ = {time_ns, bytes * kNsPerS / static_cast<double>(duration_ns)};
+  }
+  note_busy_frame(frame, time_ns);
+}
+
+/// Collects frames that should have been here when the client looked last, and were not: since then the link
+/// was busy with them.
+void LinkEstimate::note_busy_frame(const AckedFrame& frame, int64_t time_ns) {
+  const bool was_queued = before_bunch_ns_ > 0 && frame.sent_ns + base_ns() + kLowDelayNs <= before_bunch_ns_;
+  if (!was_queued) {
+    busy_bytes_ = 0.0;
+    busy_ns_ = 0;
+    return;
+  }
+  const int64_t since_last_ns = time_ns - last_ack_ns_;
+  // Acknowledgements come in bunches; the end of one is known when the next begins.
+  if (busy_ns_ >= kBusySpanNs && since_last_ns >= kLeastTransferNs) {
+    busy_rates_.push_back({time_ns, std::exchange(busy_bytes_, 0.0) * kNsPerS /
+                                        static_cast<double>(std::exchange(busy_ns_, 0))});
+    if (busy_rates_.size() > kMaxBusySamples) busy_rates_.pop_front();
+    // Remembered, so that what cannot fit is not tried again soon.
+    if (const double rate = busy_bytes_per_s(time_ns); rate > 0.0) seen_rate_ = {time_ns, rate};
+  }
+  busy_bytes_ += static_cast<double>(frame.bytes);
+  busy_ns_ += since_last_ns;
+}
+
+/// What the link carried while it was the limit; 0 when it has not been of late.
+double LinkEstimate::busy_bytes_per_s(int64_t time_ns) const {
+  std::vector<double> rates;
+  for (const TimedValue& sample : busy_rates_)
+    if (sample.time_ns >= time_ns - kBusyAgeNs) rates.push_back(sample.value);
+  // A freeze makes one long interval and many of nearly nothing, a slow link makes all alike.
+  return rates.size() >= kMinBusySamples ? median(std::move(rates)) : 0.0;
+}
+
+double LinkEstimate::capacity_bytes_per_s(int64_t time_ns) const {
+  if (const double rate = busy_bytes_per_s(time_ns); rate > 0.0) return rate;
+  const bool is_known = seen_rate_ && seen_rate_->time_ns >= time_ns - capacity_age_ns_;
+  return is_known ? seen_rate_->value : 0.0;
+}
+
+int64_t LinkEstimate::transfer_ns(size_t bytes, int64_t time_ns) const {
+  const double capacity = capacity_bytes_per_s(time_ns);
+  return capacity > 0.0 ? static_cast<int64_t>(static_cast<double>(bytes) / capacity * kNsPerS) : 0;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,73 @@
+// LinkEstimate: what a link is, learned from acknowledged frames: its bare round trip and what it carries.
+// Delay is the signal, as in TCP Vegas: a reliable transport shows no loss. Plain logic on given times, no
+// I/O and no clock; network thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+namespace strandcast {
+
+inline constexpr int64_t kNsPerMs = 1'000'000;
+/// A link that shows less delay than this has no queue; with more there may be one.
+inline constexpr int64_t kLowDelayNs = 25 * kNsPerMs;
+inline constexpr int64_t kHighDelayNs = 100 * kNsPerMs;
+/// A capacity that was seen says nothing about the link after this long.
+inline constexpr int64_t kCapacityAgeNs = 30'000 * kNsPerMs;
+inline constexpr int64_t kBaseWindowNs = 10'000 * kNsPerMs;  // of the shortest round trip
+/// A link that has become longer is believed when its shortest round trip is older than this.
+inline constexpr int64_t kLongerPathNs = 2'000 * kNsPerMs;
+
+/// A value of some time.
+struct TimedValue {
+  int64_t time_ns = 0;
+  double value = 0.0;
+};
+
+/// A frame that the client has acknowledged.
+struct AckedFrame {
+  size_t bytes = 0;
+  int64_t sent_ns = 0;
+  bool is_large = false;   // stands alone: asset or keyframe
+  bool was_alone = false;  // nothing else was on its way
+};
+
+class LinkEstimate {
+ public:
+  /// Instead of kCapacityAgeNs.
+  void remember_capacity_for(int64_t duration_ns) { capacity_age_ns_ = duration_ns; }
+  /// Gives how long the frame waited on its way, ns.
+  int64_t on_acked(const AckedFrame& frame, int64_t time_ns);
+  /// A round trip of something small.
+  void on_round_trip(int64_t round_trip_ns, int64_t time_ns);
+
+  /// Round trip of the bare link; 0 while unknown.
+  int64_t base_ns() const;
+  /// Bytes/s; 0 while unknown: the link has not been the limit.
+  double capacity_bytes_per_s(int64_t time_ns) const;
+  /// How long the link is busy with so many bytes; 0 while unknown.
+  int64_t transfer_ns(size_t bytes, int64_t time_ns) const;
+  /// 0 = none came yet.
+  int64_t last_ack_ns() const { return last_ack_ns_; }
+
+ private:
+  void note_round_trip(int64_t round_trip_ns, int64_t time_ns);
+  void note_capacity(const AckedFrame& frame, int64_t round_trip_ns, int64_t time_ns);
+  void note_busy_frame(const AckedFrame& frame, int64_t time_ns);
+  double busy_bytes_per_s(int64_t time_ns) const;
+
+  int64_t capacity_age_ns_ = kCapacityAgeNs;
+  int64_t last_ack_ns_ = 0;
+  // Acknowledgements come in bunches, as the client looks.
+  int64_t bunch_ns_ = 0;                // the first one of the newest bunch
+  int64_t before_bunch_ns_ = 0;         // the last one before it
+  std::deque<TimedValue> round_trips_;  // increasing minima of the last kBaseWindowNs
+  std::deque<TimedValue> busy_rates_;   // bytes/s while the link was the limit, of spans of kBusySpanNs
+  double busy_bytes_ = 0.0;             // of the span under way
+  int64_t busy_ns_ = 0;
+  std::optional<TimedValue> seen_rate_;  // bytes/s of the newest large frame
+};
+
+}  // namespace strandcast
