@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <map>
 
-#include "server/net/net_server.h"
+#include "server/net/net_config.h"
 
 namespace strandcast {
 

@@ -7,7 +7,7 @@
 
 #include "server/app/mode_policy.h"
 #include "server/encode/frame_worker.h"
-#include "server/net/net_server.h"
+#include "server/net/net_handler.h"
 
 namespace strandcast {
 

@@ -35,6 +35,8 @@ SessionDesk::SessionDesk(Parts parts)
 void SessionDesk::connect(NetServer& net) {
   net_ = &net;
   reader_ = std::make_unique<NetworkReader>(net);
+  // It hears of changes of the stream while no session is there, too.
+  (void)parts_.hub.add(*reader_);
 }
 
 Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
@@ -43,17 +45,15 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
   const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
-  const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, hello);
+  const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, visitor.subscription, hello);
   if (!place) {
     parts_.hub.remove(reader);
     return place.error();
   }
   Admission admission;
   admission.welcome = make_welcome(*place);
-  if (hello.role != Role::Source && place->mode == StreamMode::Strands) admission.asset = parts_.asset;
-  admission.picture_class = place->picture_class;
-  admission.picture_costs = place->picture_costs;
-  admission.picture_step = place->picture_step;
+  if (hello.role != Role::Source && visitor.subscription.mode() == StreamMode::Strands)
+    admission.asset = parts_.asset;
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;
@@ -66,7 +66,6 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place) const {
   welcome.session_id = session_id_;
   welcome.server_version = version();
   welcome.scene_name = scene.name;
-  welcome.mode = place.mode;
   welcome.mode_reason = place.reason;
   welcome.codec = scene.stream.codec;
   welcome.strand_count = asset->strand_count;
@@ -134,18 +133,16 @@ bool SessionDesk::on_picture_step(SessionId session, size_t step, const std::str
   log_info("net", "session {}: pictures of {} x {}, quality {}; {}", session, pictures->view.size.width,
            pictures->view.size.height, pictures->view.quality, reason);
   tell_quality(session, *pictures, reason);
-  net_->set_picture_class(session, pictures->picture_class);
   return true;
 }
 
 void SessionDesk::on_camera(SessionId session, const CameraChange& camera) {
-  const Result<std::optional<PictureClass>> picture_class = viewers_.set_camera(session, camera.camera);
-  if (!picture_class) return net_->send(session, Notice{true, picture_class.error().to_string()});
-  if (*picture_class) net_->set_picture_class(session, **picture_class);
+  if (const Status status = viewers_.set_camera(session, camera.camera); !status)
+    net_->send(session, Notice{true, status.error().to_string()});
 }
 
 /// Looks whether this session should change between strands and frames.
-void SessionDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
+LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
   const StreamHub& hub = parts_.hub;
   const std::vector<StrandClass> classes = hub.strand_classes();
   const size_t view_count = hub.picture_views().size() + (link.mode == StreamMode::Strands ? 1 : 0);
@@ -159,14 +156,15 @@ void SessionDesk::on_link(SessionId session, const LinkState& link, int64_t time
                             .picture_size = viewers_.picture_size(session),
                             .view_count = std::max<size_t>(view_count, 1),
                             .picture_rate_hz = parts_.scene.stream.frame_rate_hz};
-  std::optional<ModeSwitch> change = viewers_.consider(session, gather_mode_facts(sources), time_ns);
-  if (!change) return;
-  change->asset = parts_.asset;
-  net_->change_mode(session, std::move(*change));
+  LinkAnswer answer;
+  if (auto change = viewers_.consider(session, gather_mode_facts(sources), time_ns))
+    answer.mode = ModeAnswer{std::move(*change), parts_.asset};
+  answer.is_request_waiting = viewers_.has_request(session);
+  return answer;
 }
 
-void SessionDesk::on_mode(SessionId session, StreamMode mode) {
-  viewers_.set_mode(session, mode, now_ns());
+void SessionDesk::on_mode(SessionId session) {
+  viewers_.note_mode(session, now_ns());
   if (const auto pictures = viewers_.pictures(session)) tell_quality(session, *pictures, "to begin with");
 }
 

@@ -52,17 +52,15 @@ class SessionDesk : public NetHandler {
     parts_.hub.request_whole(picture_class);
   }
   bool on_picture_step(SessionId session, size_t step, const std::string& reason) override;
-  void on_strand_class(SessionId session, uint16_t stream_id) override {
-    viewers_.set_strand_class(session, stream_id);
-  }
+  void on_strand_class(SessionId session) override { viewers_.note_strand_class(session); }
   void on_report(SessionId session, const ViewerReport& report) override {
     viewers_.set_report(session, report);
   }
   void on_mode_request(SessionId session, const ModeRequest& request) override {
     viewers_.request_mode(session, request.mode);
   }
-  void on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
-  void on_mode(SessionId session, StreamMode mode) override;
+  LinkAnswer on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
+  void on_mode(SessionId session) override;
   void on_left(SessionId session) override;
   Status readiness() override;
   std::string metrics() override { return metrics_ ? metrics_() : std::string(); }

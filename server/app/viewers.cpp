@@ -45,32 +45,37 @@ PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, Pict
 }
 
 /// What the viewer gets, and during a change what it is about to get as well.
-Demand Viewers::demand_of(const Viewer& viewer) const {
+Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view) {
   Demand demand;
-  if (viewer.gets(StreamMode::Strands)) demand.strand_class = viewer.strand_class;
-  if (viewer.gets(StreamMode::Frames)) demand.picture = viewer.view;
+  if (viewer.role == Role::Source) return demand;
+  if (wanted.gets(StreamMode::Strands)) demand.strand_class = wanted.strand_class;
+  if (wanted.gets(StreamMode::Frames)) demand.picture = view;
   return demand;
 }
 
 /// On an error the viewer stays as it was.
-Status Viewers::change(Viewer& viewer, Viewer changed) {
-  ASSIGN_OR_RETURN(changed.picture_class, desk_.set_demand(viewer.reader, demand_of(changed)));
-  viewer = std::move(changed);
+Status Viewers::change(Viewer& viewer, Subscription wanted, const PictureView& view) {
+  ASSIGN_OR_RETURN(wanted.pictures.picture_class,
+                   desk_.set_demand(viewer.reader, demand_of(viewer, wanted, view)));
+  *viewer.subscription = std::move(wanted);
+  viewer.view = view;
   return {};
 }
 
 /// To something that takes no more than before.
-void Viewers::change_surely(Viewer& viewer, const Viewer& changed) {
-  if (const Status status = change(viewer, changed); !status)
+void Viewers::change_surely(Viewer& viewer, const Subscription& wanted) {
+  if (const Status status = change(viewer, wanted, viewer.view); !status)
     log_error("app", "a viewer that gives up something: {}", status.error().to_string());
 }
 
-Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, const Hello& hello) {
+Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscription& subscription,
+                                    const Hello& hello) {
   Place place;
   Viewer viewer;
   viewer.role = hello.role;
   viewer.name = hello.name;
   viewer.reader = reader;
+  viewer.subscription = &subscription;
   viewer.wanted = hello.mode;
   place.size = size_of(scene_);
   if (hello.frame_width > 0) place.size.width = hello.frame_width;
@@ -78,22 +83,20 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, const He
   viewer.size = place.size;
   viewer.view = make_scene_view(scene_, place.size, hello.picture_codecs);
   viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
-  viewer.step = find_step(viewer.ladder, viewer.view.quality);
+  Subscription wanted;
+  wanted.pictures.costs = costs_of(viewer.ladder);
+  wanted.pictures.step = find_step(viewer.ladder, viewer.view.quality);
   if (hello.role == Role::Source) {
     place.reason = "a source gets no stream";
   } else if (hello.mode == StreamMode::Frames) {
-    place.mode = StreamMode::Frames;
+    wanted.start_with(StreamMode::Frames);
     place.reason = "frames were asked for";
-    place.picture_costs = costs_of(viewer.ladder);
-    place.picture_step = viewer.step;
   } else {
     place.reason = hello.mode == StreamMode::Strands
                        ? "strands were asked for"
                        : "strands: one stream serves every camera, and nothing speaks against it yet";
   }
-  viewer.mode = place.mode;
-  RETURN_IF_ERROR(change(viewer, viewer));
-  place.picture_class = viewer.picture_class;
+  RETURN_IF_ERROR(change(viewer, wanted, viewer.view));
   viewers_[session] = viewer;
   count();
   return place;
@@ -114,15 +117,13 @@ std::string Viewers::describe(SessionId session) const {
                      one_line(found->second.name, kMaxNameChars));
 }
 
-Result<std::optional<PictureClass>> Viewers::set_camera(SessionId session, const CameraDesc& camera) {
+Status Viewers::set_camera(SessionId session, const CameraDesc& camera) {
   const auto found = viewers_.find(session);
   if (found == viewers_.end() || found->second.role == Role::Source)
     return make_error(ErrorCode::NotFound, "only viewers have a camera");
-  Viewer& viewer = found->second;
-  Viewer changed = viewer;
-  changed.view.camera = camera;
-  RETURN_IF_ERROR(change(viewer, std::move(changed)));
-  return viewer.gets(StreamMode::Frames) ? std::optional(viewer.picture_class) : std::nullopt;
+  PictureView view = found->second.view;
+  view.camera = camera;
+  return change(found->second, *found->second.subscription, view);
 }
 
 void Viewers::set_report(SessionId session, const ViewerReport& report) {
@@ -140,7 +141,12 @@ void Viewers::request_mode(SessionId session, StreamMode mode) {
   if (found != viewers_.end()) found->second.request = mode;
 }
 
-std::optional<ModeSwitch> Viewers::consider(SessionId session, const ModeFacts& facts, int64_t time_ns) {
+bool Viewers::has_request(SessionId session) const {
+  const auto found = viewers_.find(session);
+  return found != viewers_.end() && found->second.request.has_value();
+}
+
+std::optional<ModeChange> Viewers::consider(SessionId session, const ModeFacts& facts, int64_t time_ns) {
   const auto found = viewers_.find(session);
   if (found == viewers_.end() || found->second.role == Role::Source) return std::nullopt;
   Viewer& viewer = found->second;
@@ -150,14 +156,15 @@ std::optional<ModeSwitch> Viewers::consider(SessionId session, const ModeFacts& 
     viewer.is_answer_due = true;
     viewer.policy = {};
   }
-  if (viewer.next && time_ns - viewer.next_since_ns >= kModeChangeNs) {
+  const Subscription& present = *viewer.subscription;
+  if (present.next() && time_ns - present.changing_since_ns() >= kModeChangeNs) {
     viewer.policy.note_failure(time_ns);
     return stay(viewer, fmt::format("{}: no first frame of the other mode came for {} s",
-                                    to_string(viewer.mode), kModeChangeNs / 1'000'000'000));
+                                    to_string(present.mode()), kModeChangeNs / 1'000'000'000));
   }
   const ModeChoice choice = choose(viewer, facts, time_ns);
-  if (choice.mode == viewer.next.value_or(viewer.mode)) {
-    const bool is_told_with_change = viewer.next.has_value();
+  if (choice.mode == present.next().value_or(present.mode())) {
+    const bool is_told_with_change = present.next().has_value();
     if (!std::exchange(viewer.is_answer_due, false) || is_told_with_change) return std::nullopt;
     return stay(viewer, choice.reason);
   }
@@ -166,56 +173,43 @@ std::optional<ModeSwitch> Viewers::consider(SessionId session, const ModeFacts& 
 
 /// What the viewer should get, given what it gets or is about to get.
 ModeChoice Viewers::choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns) {
+  const Subscription& present = *viewer.subscription;
   if (viewer.wanted == StreamMode::Auto)
-    return viewer.policy.choose(viewer.next.value_or(viewer.mode), facts, time_ns);
+    return viewer.policy.choose(present.next().value_or(present.mode()), facts, time_ns);
   if (viewer.wanted == StreamMode::Frames && !facts.paint_trouble.empty())
     return {StreamMode::Strands, "strands: no frames can be drawn here: " + facts.paint_trouble, 0};
   return {viewer.wanted, fmt::format("{} were asked for", to_string(viewer.wanted)),
           predict_strands(facts).strand_class};
 }
 
-std::optional<ModeSwitch> Viewers::begin_change(Viewer& viewer, const ModeChoice& choice, int64_t time_ns) {
+ModeChange Viewers::begin_change(Viewer& viewer, const ModeChoice& choice, int64_t time_ns) {
   // Back to what it has: the change under way is given up.
-  if (choice.mode == viewer.mode) return stay(viewer, choice.reason);
-  ModeSwitch begun;
-  begun.change = {choice.mode, choice.reason, viewer.view.size.width, viewer.view.size.height};
-  begun.strand_class = static_cast<uint16_t>(choice.strand_class);
-  Viewer changed = viewer;
-  changed.next = choice.mode;
-  changed.next_since_ns = time_ns;
-  changed.is_answer_due = false;
-  if (choice.mode == StreamMode::Strands) changed.strand_class = begun.strand_class;
-  if (const Status usable = change(viewer, std::move(changed)); !usable) {
+  if (choice.mode == viewer.subscription->mode()) return stay(viewer, choice.reason);
+  Subscription wanted = *viewer.subscription;
+  wanted.begin_change(choice.mode, time_ns);
+  if (choice.mode == StreamMode::Strands) wanted.strand_class = static_cast<uint16_t>(choice.strand_class);
+  if (const Status usable = change(viewer, wanted, viewer.view); !usable) {
     viewer.policy.note_failure(time_ns);
-    if (viewer.wanted == StreamMode::Frames) viewer.wanted = viewer.mode;
+    if (viewer.wanted == StreamMode::Frames) viewer.wanted = viewer.subscription->mode();
     return stay(viewer, "strands: no frames: " + usable.error().to_string());
   }
-  if (choice.mode == StreamMode::Frames) {
-    begun.picture_class = viewer.picture_class;
-    begun.picture_costs = costs_of(viewer.ladder);
-    begun.picture_step = viewer.step;
-  }
-  return begun;
+  viewer.is_answer_due = false;
+  return {choice.mode, choice.reason, viewer.view.size.width, viewer.view.size.height};
 }
 
-ModeSwitch Viewers::stay(Viewer& viewer, const std::string& reason) {
-  Viewer changed = viewer;
-  changed.next.reset();
-  changed.is_answer_due = false;
-  change_surely(viewer, changed);
-  ModeSwitch answer;
-  answer.change = {viewer.mode, reason, viewer.view.size.width, viewer.view.size.height};
-  return answer;
+ModeChange Viewers::stay(Viewer& viewer, const std::string& reason) {
+  Subscription wanted = *viewer.subscription;
+  wanted.give_up_change();
+  change_surely(viewer, wanted);
+  viewer.is_answer_due = false;
+  return {wanted.mode(), reason, viewer.view.size.width, viewer.view.size.height};
 }
 
-void Viewers::set_mode(SessionId session, StreamMode mode, int64_t time_ns) {
+void Viewers::note_mode(SessionId session, int64_t time_ns) {
   const auto found = viewers_.find(session);
   if (found == viewers_.end()) return;
   Viewer& viewer = found->second;
-  Viewer changed = viewer;
-  changed.mode = mode;
-  changed.next.reset();
-  change_surely(viewer, changed);
+  change_surely(viewer, *viewer.subscription);
   if (viewer.wanted == StreamMode::Auto) viewer.policy.note_change(time_ns);
 }
 
@@ -225,29 +219,27 @@ Result<Viewers::Pictures> Viewers::set_picture_step(SessionId session, size_t st
       step >= found->second.ladder.size())
     return make_error(ErrorCode::NotFound, "only viewers of frames have a quality of pictures");
   Viewer& viewer = found->second;
-  const PictureStep& wanted = viewer.ladder[step];
-  Viewer changed = viewer;
-  changed.step = step;
-  changed.view.quality = wanted.quality;
-  changed.view.rate_divisor = wanted.rate_divisor;
-  changed.view.size.width = std::max(viewer.size.width / wanted.size_divisor, kMinPictureSide);
-  changed.view.size.height = std::max(viewer.size.height / wanted.size_divisor, kMinPictureSide);
-  RETURN_IF_ERROR(change(viewer, std::move(changed)));
-  return Pictures{viewer.picture_class, viewer.view};
+  const PictureStep& row = viewer.ladder[step];
+  PictureView view = viewer.view;
+  view.quality = row.quality;
+  view.rate_divisor = row.rate_divisor;
+  view.size.width = std::max(viewer.size.width / row.size_divisor, kMinPictureSide);
+  view.size.height = std::max(viewer.size.height / row.size_divisor, kMinPictureSide);
+  Subscription wanted = *viewer.subscription;
+  wanted.pictures.step = step;
+  RETURN_IF_ERROR(change(viewer, std::move(wanted), view));
+  return Pictures{viewer.subscription->pictures.picture_class, viewer.view};
 }
 
 std::optional<Viewers::Pictures> Viewers::pictures(SessionId session) const {
   const auto found = viewers_.find(session);
   if (found == viewers_.end() || !found->second.gets(StreamMode::Frames)) return std::nullopt;
-  return Pictures{found->second.picture_class, found->second.view};
+  return Pictures{found->second.subscription->pictures.picture_class, found->second.view};
 }
 
-void Viewers::set_strand_class(SessionId session, uint16_t stream_id) {
+void Viewers::note_strand_class(SessionId session) {
   const auto found = viewers_.find(session);
-  if (found == viewers_.end()) return;
-  Viewer changed = found->second;
-  changed.strand_class = stream_id;
-  change_surely(found->second, changed);
+  if (found != viewers_.end()) change_surely(found->second, *found->second.subscription);
 }
 
 RenderSize Viewers::picture_size(SessionId session) const {

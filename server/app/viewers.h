@@ -1,5 +1,5 @@
-// Viewers: which of strands and pictures each session gets, and what it therefore demands of the stream.
-// Network thread; the count may be read from any thread.
+// Viewers: chooses which of strands and pictures each session gets, and demands it of the stream. What it
+// gets stands in its Subscription and nowhere else. Network thread; the count may be read from any thread.
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,7 @@
 #include "common/wire/messages.h"
 #include "server/app/mode_policy.h"
 #include "server/encode/picture_ladder.h"
-#include "server/net/net_server.h"
+#include "server/net/net_handler.h"
 #include "server/stream/demand.h"
 
 namespace strandcast {
@@ -30,13 +30,8 @@ class Viewers {
  public:
   /// What a joining session gets.
   struct Place {
-    StreamMode mode = StreamMode::Strands;
     std::string reason;  // of the mode, for a person
-    PictureClass picture_class = 0;
     RenderSize size;
-    // As in Admission, of a viewer of frames; it starts with the scene's quality.
-    std::vector<double> picture_costs;
-    size_t picture_step = 0;
   };
   /// What a viewer of frames gets.
   struct Pictures {
@@ -49,34 +44,34 @@ class Viewers {
 
   /// A Source gets a place too, without any stream. Unavailable while too many pictures are drawn for others,
   /// BadInput for a size that cannot be drawn.
-  Result<Place> add(SessionId session, ReaderId reader, const Hello& hello);
+  /// `subscription` is filled in, and outlives the session's place here.
+  Result<Place> add(SessionId session, ReaderId reader, Subscription& subscription, const Hello& hello);
   /// Its reader is the caller's to remove; 0 for an unknown session.
   ReaderId remove(SessionId session);
   /// For the log: number, role and name.
   std::string describe(SessionId session) const;
-  /// The new picture class of a viewer of frames; none for one of strands, whose camera is kept for later.
-  /// NotFound for a session that views nothing.
-  Result<std::optional<PictureClass>> set_camera(SessionId session, const CameraDesc& camera);
+  /// Of a viewer of strands it is kept for later. NotFound for a session that views nothing.
+  Status set_camera(SessionId session, const CameraDesc& camera);
 
   /// What the viewer says of itself; the newest counts.
   void set_report(SessionId session, const ViewerReport& report);
   ViewerReport report(SessionId session) const;
   /// What the person wants; of requests within kModeRequestNs the newest counts.
   void request_mode(SessionId session, StreamMode mode);
-  /// Call often: what to change for this session now, or what to tell it. The change is under way until
-  /// set_mode().
-  std::optional<ModeSwitch> consider(SessionId session, const ModeFacts& facts, int64_t time_ns);
-  /// The session has got the first frame of this mode.
-  void set_mode(SessionId session, StreamMode mode, int64_t time_ns);
+  bool has_request(SessionId session) const;
+  /// Call often: may begin or give up a change in the subscription. What to tell the session.
+  std::optional<ModeChange> consider(SessionId session, const ModeFacts& facts, int64_t time_ns);
+  /// A change is done.
+  void note_mode(SessionId session, int64_t time_ns);
 
-  /// Moves the viewer along its ladder. NotFound for a session without pictures, Unavailable as in
-  /// PictureViews; it then keeps what it had.
+  /// Moves the viewer along its ladder, in its subscription. NotFound for a session without pictures,
+  /// Unavailable as in PictureViews; it then keeps what it had.
   Result<Pictures> set_picture_step(SessionId session, size_t step);
   /// Nothing for a session without pictures.
   std::optional<Pictures> pictures(SessionId session) const;
 
-  /// The class of its strand frames; it joins with class 0. Ignored when the session is gone.
-  void set_strand_class(SessionId session, uint16_t stream_id);
+  /// The session has put another strand class into its subscription; it joins with class 0.
+  void note_strand_class(SessionId session);
   /// The size of its pictures.
   RenderSize picture_size(SessionId session) const;
 
@@ -88,30 +83,25 @@ class Viewers {
     Role role = Role::Viewer;
     std::string name;
     ReaderId reader = 0;
-    PictureClass picture_class = 0;
+    Subscription* subscription = nullptr;     // the session's
     StreamMode wanted = StreamMode::Strands;  // may be Auto
-    StreamMode mode = StreamMode::Strands;    // of the frames it gets
-    std::optional<StreamMode> next;           // the change to this mode is under way
-    int64_t next_since_ns = 0;
-    uint16_t strand_class = 0;
     PictureView view;
     RenderSize size;  // of its pictures, at the first steps of
     std::vector<PictureStep> ladder;
-    size_t step = 0;
     ViewerReport report;
     ModePolicy policy;
     std::optional<StreamMode> request;  // not yet looked at
     int64_t request_ns = 0;             // when the one before was; 0 = never
     bool is_answer_due = false;
 
-    bool gets(StreamMode kind) const { return role != Role::Source && (mode == kind || next == kind); }
+    bool gets(StreamMode kind) const { return role != Role::Source && subscription->gets(kind); }
   };
-  Demand demand_of(const Viewer& viewer) const;
-  Status change(Viewer& viewer, Viewer changed);
-  void change_surely(Viewer& viewer, const Viewer& changed);
+  static Demand demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view);
+  Status change(Viewer& viewer, Subscription wanted, const PictureView& view);
+  void change_surely(Viewer& viewer, const Subscription& wanted);
   ModeChoice choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns);
-  std::optional<ModeSwitch> begin_change(Viewer& viewer, const ModeChoice& choice, int64_t time_ns);
-  ModeSwitch stay(Viewer& viewer, const std::string& reason);
+  ModeChange begin_change(Viewer& viewer, const ModeChoice& choice, int64_t time_ns);
+  ModeChange stay(Viewer& viewer, const std::string& reason);
   void count();
 
   const SceneDesc scene_;

@@ -240,10 +240,6 @@ void NetServer::publish_picture(PictureClass picture_class, PicturePtr picture) 
   });
 }
 
-void NetServer::set_picture_class(SessionId session, PictureClass picture_class) {
-  state_->post_to(session, [picture_class](net::Session& one) { one.set_picture_class(picture_class); });
-}
-
 void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string reason,
                                    std::function<void()> then) {
   CHECK(!classes.empty());
@@ -253,10 +249,6 @@ void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string
     state->for_all([&](net::Session& session) { session.follow_strand_classes(reason); });
     then();
   });
-}
-
-void NetServer::change_mode(SessionId session, ModeSwitch change) {
-  state_->post_to(session, [change = std::move(change)](net::Session& one) { one.change_mode(change); });
 }
 
 void NetServer::broadcast(ServerMessage message) {

@@ -12,8 +12,8 @@ namespace strandcast::net {
 void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
   queue_.set_asset(asset);
   has_asset_ = asset != nullptr;
-  if (mode_ == StreamMode::Strands) queue_.start_strands();
-  if (mode_ == StreamMode::Frames) {
+  if (subscription_.mode() == StreamMode::Strands) queue_.start_strands();
+  if (subscription_.mode() == StreamMode::Frames) {
     queue_.start_pictures();
     // The first pictures are too small to show what the link carries.
     flow_.start_over(now_ns());
@@ -28,14 +28,15 @@ void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
 /// The client lost what it had.
 void Session::start_again(int64_t time_ns) {
   queue_.lose_chain();
-  if (mode_ == StreamMode::Frames || changes_to(StreamMode::Frames)) queue_.start_pictures();
+  if (subscription_.mode() == StreamMode::Frames || subscription_.changes_to(StreamMode::Frames))
+    queue_.start_pictures();
   flow_.forget_in_flight();
   account_drops();
   ask_for_keyframe(time_ns);
 }
 
 void Session::deliver_strands(const EncodedFramePtr& frame) {
-  if (state_ != State::Joined || frame->header.stream_id != strand_class_) return;
+  if (state_ != State::Joined || frame->header.stream_id != subscription_.strand_class) return;
   guarded([&] {
     const int64_t time_ns = now_ns();
     const SendQueue::Offer offer = queue_.offer_strands(frame);
@@ -51,12 +52,12 @@ void Session::deliver_strands(const EncodedFramePtr& frame) {
 
 void Session::deliver_picture(PictureClass picture_class, const PicturePtr& picture) {
   // The keyframe of the strands that follow needs an empty pipe.
-  if (!watches(picture_class) || changes_to(StreamMode::Strands)) return;
+  if (!watches(picture_class) || subscription_.changes_to(StreamMode::Strands)) return;
   guarded([&] {
     const int64_t time_ns = now_ns();
     const uint64_t dropped = queue_.dropped_frames();
     const SendQueue::Offer offer = queue_.offer_picture(picture);
-    if (offer == SendQueue::Offer::Queued && changes_to(StreamMode::Frames)) {
+    if (offer == SendQueue::Offer::Queued && subscription_.changes_to(StreamMode::Frames)) {
       finish_mode_switch();
     } else if (queue_.dropped_frames() != dropped) {
       flow_.on_chain_loss(time_ns);
@@ -77,8 +78,9 @@ void Session::account_drops() {
 
 void Session::ask_for_keyframe(int64_t time_ns) {
   // The first picture of a change replaces what waits; other first frames need an empty pipe.
-  const bool is_changing = changes_to(StreamMode::Frames) && queue_.awaits_picture();
-  const bool needs_picture = is_changing || (queue_.needs_picture() && !changes_to(StreamMode::Strands));
+  const bool is_changing = subscription_.changes_to(StreamMode::Frames) && queue_.awaits_picture();
+  const bool needs_picture =
+      is_changing || (queue_.needs_picture() && !subscription_.changes_to(StreamMode::Strands));
   if (state_ != State::Joined || !(needs_picture || queue_.needs_keyframe())) return;
   if (!is_changing && !flow_.may_start(time_ns)) return;
   const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
@@ -86,9 +88,9 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
   if (needs_picture)
-    context_.handler.on_picture_request(id_, is_changing ? next_mode_->picture_class : picture_class_);
+    context_.handler.on_picture_request(id_, subscription_.pictures.picture_class);
   else
-    context_.handler.on_keyframe_request(id_, strand_class_);
+    context_.handler.on_keyframe_request(id_, subscription_.strand_class);
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
@@ -106,76 +108,85 @@ std::string Session::describe_link(int64_t time_ns) const {
 
 /// Moves to another step of the ladder of pictures when the link says so.
 void Session::adapt_pictures(int64_t time_ns) {
-  if (state_ != State::Joined || mode_ != StreamMode::Frames || next_mode_ || !flow_.expects_acks()) return;
-  const double present = context_.pictures.bytes_per_s(picture_class_);
-  if (present <= 0.0 || picture_costs_.empty()) return;
+  if (state_ != State::Joined || subscription_.mode() != StreamMode::Frames || subscription_.next() ||
+      !flow_.expects_acks())
+    return;
+  const PictureChoice& pictures = subscription_.pictures;
+  const PictureClass before = pictures.picture_class;
+  const size_t step = pictures.step;
+  const double present = context_.pictures.bytes_per_s(before);
+  if (present <= 0.0 || pictures.costs.empty()) return;
   std::vector<double> costs;
-  for (const double cost : picture_costs_) costs.push_back(present * cost / picture_costs_[picture_step_]);
+  for (const double cost : pictures.costs) costs.push_back(present * cost / pictures.costs[step]);
   const double cap = context_.config.limits.viewer_bytes_per_s;
-  const size_t chosen = flow_.choose_class(picture_step_, costs, cap, time_ns);
-  if (chosen == picture_step_) return;
-  const char* why = chosen < picture_step_ ? "the link has room" : "the link or this viewer is too slow";
+  const size_t chosen = flow_.choose_class(step, costs, cap, time_ns);
+  if (chosen == step) return;
+  const char* why = chosen < step ? "the link has room" : "the link or this viewer is too slow";
   if (!context_.handler.on_picture_step(id_, chosen, fmt::format("{}: {}", why, describe_link(time_ns))))
     return;
-  picture_step_ = chosen;
-  context_.pictures.forget(picture_class_);
+  context_.pictures.forget(before);
   context_.count(&NetCounters::class_changes);
+  follow_picture_class(before);
 }
 
 /// Moves to another strand class when the link says so.
 void Session::adapt(int64_t time_ns) {
-  if (mode_ == StreamMode::Frames) return adapt_pictures(time_ns);
-  if (state_ != State::Joined || mode_ != StreamMode::Strands || !flow_.expects_acks()) return;
+  if (subscription_.mode() == StreamMode::Frames) return adapt_pictures(time_ns);
+  if (state_ != State::Joined || subscription_.mode() != StreamMode::Strands || !flow_.expects_acks()) return;
   const std::vector<double> costs = context_.strands.bytes_per_s();
   if (costs.empty()) return;
   const double cap = context_.config.limits.viewer_bytes_per_s;
-  const size_t chosen = flow_.choose_class(strand_class_, costs, cap, time_ns);
-  if (chosen == strand_class_) return;
-  const bool is_better = chosen < strand_class_;
+  const size_t chosen = flow_.choose_class(subscription_.strand_class, costs, cap, time_ns);
+  if (chosen == subscription_.strand_class) return;
+  const bool is_better = chosen < subscription_.strand_class;
   change_strand_class(chosen);
-  announce_quality(fmt::format("{}: {}; {}",
-                               is_better ? "the link has room" : "the link or this viewer is too slow",
-                               to_string(context_.strands.classes()[strand_class_]), describe_link(time_ns)));
+  announce_quality(
+      fmt::format("{}: {}; {}", is_better ? "the link has room" : "the link or this viewer is too slow",
+                  to_string(context_.strands.classes()[subscription_.strand_class]), describe_link(time_ns)));
   ask_for_keyframe(time_ns);
 }
 
 void Session::change_strand_class(size_t chosen) {
-  strand_class_ = static_cast<uint16_t>(chosen);
+  subscription_.strand_class = static_cast<uint16_t>(chosen);
   context_.count(&NetCounters::class_changes);
   queue_.restart_strands();
-  context_.handler.on_strand_class(id_, strand_class_);
+  context_.handler.on_strand_class(id_);
 }
 
 void Session::announce_quality(const std::string& reason) {
   context_.note(fmt::format("session {}: {}", id_, reason));
-  const StrandClass& now = context_.strands.classes()[strand_class_];
-  queue_control(StreamQuality{strand_class_, now.rate_divisor, now.strand_share, now.bound_m, reason});
+  const StrandClass& now = context_.strands.classes()[subscription_.strand_class];
+  queue_control(
+      StreamQuality{subscription_.strand_class, now.rate_divisor, now.strand_share, now.bound_m, reason});
 }
 
 void Session::follow_strand_classes(const std::string& reason) {
-  const bool is_concerned = mode_ == StreamMode::Strands || changes_to(StreamMode::Strands);
+  const bool is_concerned =
+      subscription_.mode() == StreamMode::Strands || subscription_.changes_to(StreamMode::Strands);
   if (state_ != State::Joined || !is_concerned || hello_.role == Role::Source) return;
   guarded([&] {
     const size_t last = context_.strands.classes().size() - 1;
-    if (strand_class_ > last) change_strand_class(last);
-    announce_quality(fmt::format("{}: {}", reason, to_string(context_.strands.classes()[strand_class_])));
+    if (subscription_.strand_class > last) change_strand_class(last);
+    announce_quality(
+        fmt::format("{}: {}", reason, to_string(context_.strands.classes()[subscription_.strand_class])));
     ask_for_keyframe(now_ns());
   });
 }
 
 void Session::report_link(int64_t time_ns) {
-  if (hello_.role == Role::Source ||
-      time_ns - link_reported_ns_ < context_.config.limits.link_interval_ms * kNsPerMs)
-    return;
+  const bool is_due = time_ns - link_reported_ns_ >= context_.config.limits.link_interval_ms * kNsPerMs;
+  if (hello_.role == Role::Source || !(is_due || is_mode_request_waiting_)) return;
   link_reported_ns_ = time_ns;
   LinkState link;
-  link.mode = mode_;
+  link.mode = subscription_.mode();
   link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
   link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   context_.queue_delays.add_ms(link.queue_delay_ms);
   link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
   link.strand_bytes_per_s = context_.strands.bytes_per_s();
-  context_.handler.on_link(id_, link, time_ns);
+  const LinkAnswer answer = context_.handler.on_link(id_, link, time_ns);
+  is_mode_request_waiting_ = answer.is_request_waiting;
+  if (answer.mode) answer_mode(*answer.mode);
 }
 
 }  // namespace strandcast::net

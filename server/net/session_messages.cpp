@@ -76,26 +76,24 @@ bool Session::check_token(const Hello& hello) {
 void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
-  Result<Admission> admission = context_.handler.on_hello({id_, peer_.key}, hello);
+  Result<Admission> admission = context_.handler.on_hello({id_, peer_.key, subscription_}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   hello_.token.clear();
   admission->welcome.role = hello.role;
-  mode_ = admission->welcome.mode;
-  picture_class_ = admission->picture_class;
-  picture_costs_ = admission->picture_costs;
-  picture_step_ = admission->picture_step;
+  admission->welcome.mode = subscription_.mode();
   has_joined_ = true;
   state_ = State::Joined;
   state_since_ns_ = now_ns();
   context_.update_session_counts();
   context_.note(fmt::format("session {} from {} joined: {} '{}', {}", id_, peer_.address,
-                            to_string(hello.role), hello.name, to_string(mode_)));
+                            to_string(hello.role), hello.name, to_string(subscription_.mode())));
   // Everything is set before anything is written, and strands start only behind the asset.
   if (hello.role != Role::Source) begin_media(hello, admission->asset);
   queue_control(std::move(admission->welcome));
   // The Welcome says nothing about a rate below that of the simulation.
-  if (mode_ == StreamMode::Strands && flow_.expects_acks() && context_.strands.classes()[0].rate_divisor > 1)
+  if (subscription_.mode() == StreamMode::Strands && flow_.expects_acks() &&
+      context_.strands.classes()[0].rate_divisor > 1)
     announce_quality("the stream is set so");
   ask_for_keyframe(now_ns());
 }
@@ -105,7 +103,11 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
   std::visit(Overloaded{[](const Hello&) {},
                         [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
                         [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
-                        [&](const CameraChange& camera) { handler.on_camera(id_, camera); },
+                        [&](const CameraChange& camera) {
+                          const PictureClass before = subscription_.pictures.picture_class;
+                          handler.on_camera(id_, camera);
+                          follow_picture_class(before);
+                        },
                         [&](const KeyframeRequest&) { start_again(arrival_ns); },
                         [&](const FrameAck& ack) {
                           on_ack(ack, arrival_ns);
@@ -117,7 +119,11 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                         [&](const ControlCommand& command) { handler.on_command(id_, command); },
                         [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
                         [&](const ViewerReport& report) { handler.on_report(id_, report); },
-                        [&](const ModeRequest& request) { handler.on_mode_request(id_, request); },
+                        [&](const ModeRequest& request) {
+                          handler.on_mode_request(id_, request);
+                          is_mode_request_waiting_ = true;
+                          report_link(arrival_ns);
+                        },
                         [&](const AdminCommand& command) { obey(command, arrival_ns); }},
              message);
 }
@@ -143,7 +149,7 @@ SessionInfo Session::info(int64_t time_ns) const {
   info.name = hello_.name;
   info.address = peer_.address;
   info.role = hello_.role;
-  info.mode = mode_;
+  info.mode = subscription_.mode();
   info.sent_bytes = sent_bytes_;
   info.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   info.connected_s = static_cast<double>(time_ns - state_since_ns_) * 1e-9;

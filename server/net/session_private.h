@@ -33,10 +33,6 @@ class Session : public std::enable_shared_from_this<Session> {
   /// Whether pictures of this class are for this session.
   bool watches(PictureClass picture_class) const;
   void deliver_picture(PictureClass picture_class, const PicturePtr& picture);
-  /// Begins with a whole picture when the class is another one than before.
-  void set_picture_class(PictureClass picture_class);
-  /// As NetServer::change_mode.
-  void change_mode(const ModeSwitch& change);
   /// Queues a control message; ignored before Welcome and while closing.
   void send(ServerMessage message);
   /// Goodbye with one sentence, then the closing handshake.
@@ -76,8 +72,9 @@ class Session : public std::enable_shared_from_this<Session> {
   void adapt(int64_t time_ns);
   void change_strand_class(size_t chosen);
   void announce_quality(const std::string& reason);
+  void follow_picture_class(PictureClass before);
+  void answer_mode(const ModeAnswer& answer);
   void finish_mode_switch();
-  bool changes_to(StreamMode mode) const { return next_mode_ && next_mode_->change.mode == mode; }
   void report_link(int64_t time_ns);
   void adapt_pictures(int64_t time_ns);
   std::string describe_link(int64_t time_ns) const;
@@ -96,19 +93,16 @@ class Session : public std::enable_shared_from_this<Session> {
   http::request<http::empty_body> request_;
   State state_ = State::Handshake;
   Hello hello_;
-  StreamMode mode_ = StreamMode::Strands;
-  PictureClass picture_class_ = 0;
-  size_t picture_step_ = 0;              // of the ladder
-  std::vector<double> picture_costs_;    // of its steps, against the first
-  std::optional<ModeSwitch> next_mode_;  // its first frame has not come yet
-  bool has_asset_ = false;               // sent, or next in line
+  Subscription subscription_;
+  std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode
+  bool is_mode_request_waiting_ = false;
+  bool has_asset_ = false;  // sent, or next in line
   bool has_joined_ = false;
 
   beast::flat_buffer read_buffer_{kMaxSessionReadBytes};
   RateLimit rate_;
   SendQueue queue_;
   FlowControl flow_;
-  uint16_t strand_class_ = 0;
   uint64_t sent_bytes_ = 0;
   uint64_t counted_drops_ = 0;
   uint64_t counted_losses_ = 0;

@@ -8,6 +8,14 @@
 #include "common/log/log.h"
 
 namespace strandcast {
+namespace {
+
+bool is_alike(const SourceDemand& a, const SourceDemand& b) {
+  return a.facts.strand_viewers == b.facts.strand_viewers && a.facts.frame_viewers == b.facts.frame_viewers &&
+         a.has_state_readers == b.has_state_readers;
+}
+
+}  // namespace
 
 StreamHub::StreamHub(StreamHubConfig config)
     : config_(std::move(config)), stream_(config_.stream), book_(config_.scene_view) {}
@@ -92,7 +100,8 @@ void StreamHub::remove(ReaderId reader) {
 void StreamHub::set_source(std::function<void(const SourceDemand&)> on_demand) {
   const std::lock_guard order(demand_mutex_);
   on_demand_ = std::move(on_demand);
-  if (on_demand_) on_demand_(total());
+  told_ = total();
+  if (on_demand_) on_demand_(told_);
 }
 
 /// What runs follows what is wanted. demand_mutex_ is held.
@@ -107,7 +116,11 @@ void StreamHub::follow_demand() {
       if (encoders_[stream_id] != nullptr && !wanted.contains(stream_id))
         encoders_[stream_id]->set_has_listeners(false);
   }
-  if (on_demand_) on_demand_(total());
+  // A camera that turns is no news for the source.
+  if (const SourceDemand now = total(); !is_alike(now, told_)) {
+    told_ = now;
+    if (on_demand_) on_demand_(now);
+  }
 }
 
 /// The encoder of a class, made when it is needed first. mutex_ is held.

@@ -96,6 +96,7 @@ class StreamHub : public StateSink, public DemandDesk {
   std::mutex
       demand_mutex_;  // held through a change of the demands, so that the source hears of them in order
   std::function<void(const SourceDemand&)> on_demand_;
+  SourceDemand told_;  // to the source
 
   mutable std::mutex mutex_;  // guards the block below; taken after demand_mutex_
   StreamDesc stream_;

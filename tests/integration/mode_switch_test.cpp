@@ -95,6 +95,22 @@ TEST_F(ModeSwitching, APersonSwitchesThereAndBackWithoutABlankFrame) {
       << "frames that were not meant for it are not missing";
 }
 
+// Nobody looks at the link in this test but because of the request.
+TEST_F(ModeSwitching, ARequestIsActedOnWithoutWaitingForALookAtTheLink) {
+  ServerConfig config;
+  config.scene = test::bald_scene();
+  config.net.limits.link_interval_ms = 3'600'000;
+  config.make_painter = pattern_painter;
+  if (!ServerFixture::start(std::move(config))) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
+  viewer_->request_mode(StreamMode::Frames);
+  ASSERT_TRUE(pump_to(StreamMode::Frames));
+  // Soon after the first: it has its turn a second later, without being asked for again.
+  viewer_->request_mode(StreamMode::Strands);
+  ASSERT_TRUE(pump_to(StreamMode::Strands));
+  expect_no_gap();
+}
+
 TEST_F(ModeSwitching, WhoBeganWithFramesGetsTheAssetBeforeStrands) {
   if (!start()) return;
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Frames));

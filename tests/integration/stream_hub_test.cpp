@@ -164,6 +164,16 @@ TEST_F(StreamOfARecording, WhatASourceCannotDoIsSaidInOneSentence) {
   EXPECT_THAT(notice->text, HasSubstr("recording"));
 }
 
+TEST_F(StreamOfARecording, TheNetworkHearsOfAChangeOfTheStreamWhileNobodyIsConnected) {
+  StreamDesc stream = server_->hub().stream();
+  stream.strand_rate_hz = 20.0;  // every third of 60 states a second
+  server_->hub().change_stream(stream);
+  ASSERT_TRUE(eventually([&] { return server_->hub().stream().strand_rate_hz == 20.0; }));
+  const auto viewer = open(client_config());
+  ASSERT_NE(viewer, nullptr);
+  EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality().rate_divisor == 3; }));
+}
+
 TEST_F(StreamOfARecording, ADemandThatCannotBeMetChangesNothing) {
   FrameRecorder recorder;
   const ReaderId reader = server_->hub().add(recorder);

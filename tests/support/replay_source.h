@@ -2,8 +2,10 @@
 // recording would be, as far as the hub is concerned.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 

@@ -43,7 +43,7 @@ class FakeApp : public NetHandler {
     admission.welcome.session_id = "0123456789abcdef";
     admission.welcome.scene_name = "fake";
     admission.welcome.codec = "delta";
-    admission.welcome.mode = hello.mode;
+    visitor.subscription.start_with(hello.mode);
     admission.welcome.strand_count = 1;
     admission.welcome.vertex_count = 16;
     admission.welcome.bound_m = 1e-4f;

@@ -101,7 +101,7 @@ const std::vector<LibraryRule>& library_rules() {
       {"imgui", {"client/window"}},
       {"CLI/", kApp},
       // The stream knows what is decided about sessions, and no socket.
-      {"server/net/net_server", {"server/net", "server/app"}},
+      {"server/net/net_", {"server/net", "server/app"}},
       {"meshoptimizer", {"server/report"}},
       {"draco/", {"server/report"}},
       {"zfp", {"server/report"}},

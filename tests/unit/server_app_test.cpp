@@ -102,9 +102,15 @@ class Viewing {
  public:
   Viewing() : viewers(scene_, book) {}
   Result<Viewers::Place> add(SessionId session, const Hello& hello, const std::string& peer = "10.0.0.1") {
-    return viewers.add(session, book.add({peer, hello.role == Role::Controller}), hello);
+    return viewers.add(session, book.add({peer, hello.role == Role::Controller}), subscriptions[session],
+                       hello);
   }
   void remove(SessionId session) { book.remove(viewers.remove(session)); }
+  /// The session has got the first frame of the next mode.
+  void finish_change(SessionId session, int64_t time_ns) {
+    subscriptions[session].finish_change();
+    viewers.note_mode(session, time_ns);
+  }
   RuntimeFacts facts() const { return book.total().facts; }
 
  private:
@@ -113,6 +119,7 @@ class Viewing {
  public:
   DemandBook book{
       make_scene_view(scene_, {scene_.stream.frame_width, scene_.stream.frame_height}, PictureCodecs{0})};
+  std::map<SessionId, Subscription> subscriptions;
   Viewers viewers;
 };
 
@@ -121,13 +128,17 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
   Viewers& viewers = viewing.viewers;
   const auto automatic = viewing.add(1, hello(Role::Viewer, StreamMode::Auto));
   ASSERT_TRUE(automatic.ok());
-  EXPECT_EQ(automatic->mode, StreamMode::Strands);
+  EXPECT_EQ(viewing.subscriptions[1].mode(), StreamMode::Strands);
   EXPECT_FALSE(automatic->reason.empty());
   ASSERT_TRUE(viewing.add(2, hello(Role::Source, StreamMode::Frames)).ok());
   const auto first = viewing.add(3, hello(Role::Viewer, StreamMode::Frames));
   const auto second = viewing.add(4, hello(Role::Controller, StreamMode::Frames));
   ASSERT_TRUE(first.ok() && second.ok());
-  EXPECT_EQ(first->picture_class, second->picture_class);
+  const auto class_of = [&](SessionId session) {
+    return viewing.subscriptions[session].pictures.picture_class;
+  };
+  const PictureClass shared = class_of(3);
+  EXPECT_EQ(class_of(4), shared);
   EXPECT_EQ(viewing.facts().strand_viewers, 1u);
   EXPECT_EQ(viewing.facts().frame_viewers, 2u);
   EXPECT_EQ(viewers.viewer_count(), 3u) << "a source watches nothing";
@@ -135,11 +146,10 @@ TEST(Viewers, CountsByModeAndSharesEqualPictures) {
 
   CameraDesc camera;
   camera.offset_m = {0.0f, 0.0f, 2.0f};
-  const auto moved = viewers.set_camera(4, camera);
-  ASSERT_TRUE(moved.ok());
-  EXPECT_NE(*moved, first->picture_class);
-  const auto kept = viewers.set_camera(1, camera);
-  EXPECT_TRUE(kept.ok() && !*kept) << "a viewer of strands has no picture, but its camera is remembered";
+  ASSERT_TRUE(viewers.set_camera(4, camera).ok());
+  EXPECT_NE(class_of(4), shared);
+  EXPECT_TRUE(viewers.set_camera(1, camera).ok());
+  EXPECT_EQ(class_of(1), 0u) << "a viewer of strands has no picture, but its camera is remembered";
   EXPECT_FALSE(viewers.set_camera(2, camera).ok()) << "a source has none";
   for (SessionId session = 1; session <= 4; ++session) viewing.remove(session);
   EXPECT_EQ(viewing.facts().strand_viewers + viewing.facts().frame_viewers, 0u);
@@ -173,12 +183,18 @@ TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
   const auto first = viewing.add(1, hello(Role::Viewer, StreamMode::Frames, 640, 360));
   const auto second = viewing.add(2, hello(Role::Viewer, StreamMode::Frames, 640, 360));
   ASSERT_TRUE(first.ok() && second.ok());
-  ASSERT_EQ(first->picture_class, second->picture_class);
+  const auto class_of = [&](SessionId session) {
+    return viewing.subscriptions[session].pictures.picture_class;
+  };
+  const PictureChoice begun = viewing.subscriptions[1].pictures;
+  ASSERT_EQ(class_of(2), begun.picture_class);
   EXPECT_EQ(viewers.pictures(1)->view.quality, 80) << "the scene's";
-  const size_t last = first->picture_costs.size() - 1;
+  const size_t last = begun.costs.size() - 1;
   const auto slow = viewers.set_picture_step(2, last);
   ASSERT_TRUE(slow.ok());
-  EXPECT_NE(slow->picture_class, first->picture_class);
+  EXPECT_NE(slow->picture_class, begun.picture_class);
+  EXPECT_EQ(class_of(2), slow->picture_class);
+  EXPECT_EQ(viewing.subscriptions[2].pictures.step, last);
   EXPECT_EQ(slow->view.size.width, 320u);
   EXPECT_EQ(slow->view.rate_divisor, 2u);
   EXPECT_EQ(slow->view.quality, 30);
@@ -188,9 +204,9 @@ TEST(Viewers, AStepOfTheLadderConcernsItsViewerOnly) {
   ASSERT_TRUE(viewers.set_camera(2, camera).ok());
   EXPECT_EQ(viewers.pictures(2)->view.size.width, 320u) << "the camera is no reason for more";
   ASSERT_TRUE(viewers.set_camera(2, viewers.pictures(1)->view.camera).ok());
-  const auto back = viewers.set_picture_step(2, first->picture_step);
+  const auto back = viewers.set_picture_step(2, begun.step);
   ASSERT_TRUE(back.ok());
-  EXPECT_EQ(back->picture_class, first->picture_class) << "one encode for both again";
+  EXPECT_EQ(back->picture_class, begun.picture_class) << "one encode for both again";
   EXPECT_FALSE(viewers.set_picture_step(2, last + 1).ok());
   EXPECT_FALSE(viewers.set_picture_step(3, 0).ok());
 }
@@ -251,14 +267,16 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
   viewers.request_mode(1, StreamMode::Frames);
   const auto change = viewers.consider(1, good_facts(), time_ns);
   ASSERT_TRUE(change);
-  EXPECT_EQ(change->change.mode, StreamMode::Frames);
-  EXPECT_THAT(change->change.reason, HasSubstr("asked for"));
-  EXPECT_EQ(change->change.frame_width, 64u);
-  EXPECT_NE(change->picture_class, 0u);
+  EXPECT_EQ(change->mode, StreamMode::Frames);
+  EXPECT_THAT(change->reason, HasSubstr("asked for"));
+  EXPECT_EQ(change->frame_width, 64u);
+  EXPECT_NE(viewing.subscriptions[1].pictures.picture_class, 0u);
+  EXPECT_EQ(viewing.subscriptions[1].mode(), StreamMode::Strands);
+  EXPECT_EQ(viewing.subscriptions[1].next(), StreamMode::Frames);
   EXPECT_EQ(viewing.facts().strand_viewers, 1u) << "strands go on until the first picture";
   EXPECT_EQ(viewing.facts().frame_viewers, 1u);
   EXPECT_EQ(viewers.viewer_count(), 1u) << "and it is one viewer all the time";
-  viewers.set_mode(1, StreamMode::Frames, time_ns);
+  viewing.finish_change(1, time_ns);
   EXPECT_EQ(viewing.facts().strand_viewers, 0u);
 
   // Three more within a second: none is carried out before the second has passed, then the newest.
@@ -269,15 +287,15 @@ TEST(Viewers, APersonSwitchesAtMostOnceASecondAndIsAlwaysAnswered) {
     EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns + tick * kTick)) << tick;
   const auto back = viewers.consider(1, good_facts(), time_ns + 4 * kTick);
   ASSERT_TRUE(back);
-  EXPECT_EQ(back->change.mode, StreamMode::Strands);
-  viewers.set_mode(1, StreamMode::Strands, time_ns + 4 * kTick);
+  EXPECT_EQ(back->mode, StreamMode::Strands);
+  viewing.finish_change(1, time_ns + 4 * kTick);
   EXPECT_TRUE(viewing.book.picture_views().empty());
 
   // What it has already is answered too.
   viewers.request_mode(1, StreamMode::Auto);
   const auto answer = viewers.consider(1, good_facts(), time_ns + 8 * kTick);
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->change.mode, StreamMode::Strands);
+  EXPECT_EQ(answer->mode, StreamMode::Strands);
   EXPECT_FALSE(viewers.consider(1, good_facts(), time_ns + 9 * kTick)) << "once";
 }
 
@@ -292,11 +310,11 @@ TEST(Viewers, AChangeWithoutAFirstFrameIsGivenUp) {
   int64_t time_ns = kTick;
   const auto change = viewers.consider(1, facts, time_ns);
   ASSERT_TRUE(change) << "who cannot draw waits for nothing";
-  EXPECT_EQ(change->change.mode, StreamMode::Frames);
+  EXPECT_EQ(change->mode, StreamMode::Frames);
   EXPECT_FALSE(viewers.consider(1, facts, time_ns += kModeChangeNs - 1)) << "under way";
   const auto given_up = viewers.consider(1, facts, time_ns += 1);
   ASSERT_TRUE(given_up);
-  EXPECT_EQ(given_up->change.mode, StreamMode::Strands);
+  EXPECT_EQ(given_up->mode, StreamMode::Strands);
   EXPECT_TRUE(viewing.book.picture_views().empty());
   EXPECT_EQ(viewing.facts().frame_viewers, 0u);
   EXPECT_FALSE(viewers.consider(1, facts, time_ns + kTick)) << "not tried again at once";
@@ -311,20 +329,20 @@ TEST(Viewers, FramesThatCannotBeHadAreRefusedWithTheReason) {
   viewers.request_mode(1, StreamMode::Frames);
   const auto full = viewers.consider(1, good_facts(), kTick);
   ASSERT_TRUE(full);
-  EXPECT_EQ(full->change.mode, StreamMode::Strands);
-  EXPECT_THAT(full->change.reason, HasSubstr("different pictures"));
+  EXPECT_EQ(full->mode, StreamMode::Strands);
+  EXPECT_THAT(full->reason, HasSubstr("different pictures"));
   EXPECT_FALSE(viewers.consider(1, good_facts(), 2 * kTick)) << "told once";
   ModeFacts broken = good_facts();
   broken.paint_trouble = "no OpenGL here";
   viewers.request_mode(1, StreamMode::Frames);
   const auto refused = viewers.consider(1, broken, 100 * kTick);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->change.mode, StreamMode::Strands);
-  EXPECT_THAT(refused->change.reason, HasSubstr("no OpenGL here"));
+  EXPECT_EQ(refused->mode, StreamMode::Strands);
+  EXPECT_THAT(refused->reason, HasSubstr("no OpenGL here"));
   // Those who watch frames when drawing fails get strands.
   const auto rescued = viewers.consider(10, broken, 100 * kTick);
   ASSERT_TRUE(rescued);
-  EXPECT_EQ(rescued->change.mode, StreamMode::Strands);
+  EXPECT_EQ(rescued->mode, StreamMode::Strands);
 }
 
 TEST(ControlBudget, AControllerHasItsBurstThenItsRateAndOthersHaveTheirs) {

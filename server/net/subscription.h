@@ -1,0 +1,58 @@
+// Subscription: what one viewer gets: strands or rendered frames, of which class, and the change that is
+// under way. The one place that knows: the application chooses, the session follows and says when a change is
+// done. Plain data and logic; network thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/wire/messages.h"
+#include "server/net/stream_costs.h"
+
+namespace strandcast {
+
+/// The rendered frames that a viewer gets, and the ladder of those that it could get.
+struct PictureChoice {
+  PictureClass picture_class = 0;
+  std::vector<double> costs;  // of each step of the ladder against the first, best first
+  size_t step = 0;            // of the ladder
+};
+
+class Subscription {
+ public:
+  uint16_t strand_class = 0;
+  PictureChoice pictures;
+
+  /// Strands or Frames: what it gets now.
+  StreamMode mode() const { return mode_; }
+  /// What it is about to get: strands or frames go on until the first of the others is there.
+  std::optional<StreamMode> next() const { return next_; }
+  int64_t changing_since_ns() const { return changing_since_ns_; }
+  bool gets(StreamMode kind) const { return mode_ == kind || next_ == kind; }
+  bool changes_to(StreamMode kind) const { return next_ == kind; }
+  bool watches(PictureClass picture_class) const {
+    return gets(StreamMode::Frames) && picture_class == pictures.picture_class;
+  }
+
+  /// Before anything is sent.
+  void start_with(StreamMode mode) { mode_ = mode; }
+  void begin_change(StreamMode next, int64_t time_ns) {
+    next_ = next;
+    changing_since_ns_ = time_ns;
+  }
+  void give_up_change() { next_.reset(); }
+  /// The first frame of the next mode is here.
+  void finish_change() {
+    mode_ = next_.value_or(mode_);
+    next_.reset();
+  }
+
+ private:
+  StreamMode mode_ = StreamMode::Strands;
+  std::optional<StreamMode> next_;
+  int64_t changing_since_ns_ = 0;
+};
+
+}  // namespace strandcast
