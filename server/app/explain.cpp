@@ -9,7 +9,7 @@
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_codec.h"
 #include "server/app/pass_table.h"
-#include "server/app/scene_change.h"
+#include "server/source/scene_change.h"
 #include "server/publish/publisher.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/solver_registry.h"

@@ -12,7 +12,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
-#include "server/app/simulation_source.h"
+#include "server/source/simulation_source.h"
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"

@@ -14,7 +14,7 @@
 #include "common/pictures/image_codec.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_codec.h"
-#include "server/app/sim_loop.h"
+#include "server/source/sim_loop.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
 

@@ -9,10 +9,10 @@
 #include "server/app/explain.h"
 #include "server/app/options.h"
 #include "server/app/pass_table.h"
-#include "server/app/scene_change.h"
 #include "server/app/server_metrics.h"
 #include "server/app/viewers.h"
 #include "server/sim/solver_registry.h"
+#include "server/source/scene_change.h"
 #include "server/stream/demand_book.h"
 #include "tests/support/metrics_text.h"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "server/app/sim_loop.h"
+#include "server/source/sim_loop.h"
 #include "server/stream/state_source.h"
 
 namespace strandcast {

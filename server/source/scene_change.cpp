@@ -1,4 +1,4 @@
-#include "server/app/scene_change.h"
+#include "server/source/scene_change.h"
 
 #include <fmt/ranges.h>
 

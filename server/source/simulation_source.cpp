@@ -1,9 +1,9 @@
-#include "server/app/simulation_source.h"
+#include "server/source/simulation_source.h"
 
 #include <utility>
 
 #include "common/groom/groom_asset.h"
-#include "server/app/scene_change.h"
+#include "server/source/scene_change.h"
 
 namespace strandcast {
 namespace {

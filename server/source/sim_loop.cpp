@@ -1,4 +1,4 @@
-#include "server/app/sim_loop.h"
+#include "server/source/sim_loop.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "common/base/check.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
-#include "server/app/scene_change.h"
+#include "server/source/scene_change.h"
 
 namespace strandcast {
 namespace {
