@@ -20,8 +20,7 @@ namespace websocket = beast::websocket;
 
 constexpr std::chrono::milliseconds kCloseTimeout{250};
 constexpr std::chrono::milliseconds kFarewellTimeout{1000};  // from Goodbye to the close frame
-constexpr size_t kMaxCloseReasonBytes =
-    123;  // RFC 6455, section 5.5: control frames carry 125 bytes, 2 are the code
+constexpr size_t kMaxCloseReasonBytes = 123;  // RFC 6455, section 5.5: 125 in a control frame, 2 are the code
 constexpr size_t kMaxOutstandingPings = 32;
 
 std::string_view view(beast::string_view text) {

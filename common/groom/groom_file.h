@@ -17,8 +17,8 @@ struct GroomFileOptions {
   float unit_m = 0.0f;         // metres per file unit; 0 = guessed from the size of the head
   bool is_z_up = false;        // +Z up and -Y forward in the file; turned to +Y up and +Z forward
   glm::vec3 origin{0.0f};      // point that becomes the head joint: file units, after the axes are turned
-  uint32_t vertex_count =
-      0;  // resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can
+  // Resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can.
+  uint32_t vertex_count = 0;
   std::optional<Pinning> pinning;  // empty: as the file says
 };
 

@@ -11,8 +11,7 @@ namespace strandcast {
 
 inline constexpr size_t kPlayoutWindow = 64;                // frames, about a second
 inline constexpr int64_t kMaxPlayoutDelayNs = 100'000'000;  // for lateness, besides one frame
-inline constexpr int64_t kPlayoutGapNs =
-    500'000'000;  // a longer silence (pause, stall) starts the fit afresh
+inline constexpr int64_t kPlayoutGapNs = 500'000'000;       // a longer silence starts the fit afresh
 
 class PlayoutClock {
  public:

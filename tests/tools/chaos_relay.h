@@ -46,8 +46,8 @@ struct RelayConfig {
   std::string to_host = "127.0.0.1";
   uint16_t to_port = 0;
   LinkPlan up, down;
-  uint64_t seed =
-      1;  // corruption and cuts depend on it, on the connection's number and on the byte's place only
+  // Corruption and cuts depend on it, on the connection's number and on the byte's place only.
+  uint64_t seed = 1;
 };
 
 struct RelayCounters {
