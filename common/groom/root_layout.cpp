@@ -15,7 +15,7 @@ namespace {
 
 constexpr uint32_t kNeighbourCount = 14;  // candidates for the star of a root; a Delaunay star has 6
 constexpr uint32_t kSpacingRank = 6;      // local spacing = distance to this neighbour
-constexpr uint32_t kStarVotes = 2;    // of the three corners
+constexpr uint32_t kStarVotes = 2;        // of the three corners
 constexpr float kMaxEdgeInSpacings = 1.6f;
 constexpr float kJitterInSpacings = 1e-3f;  // breaks ties of regular root grids the same way in every star
 // Strands of one triangle may move apart by this much of their length: a parting divides more.
