@@ -11,6 +11,7 @@
 #include "client/net/reconnect_policy.h"
 #include "client/net/viewer_client.h"
 #include "common/net/tls_private.h"
+#include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificate.h"
@@ -20,8 +21,8 @@ namespace strandcast {
 namespace {
 
 /// What OpenSSL gives as the reason why a client that knows this version of TLS only, and every cipher, gets
-/// no connection; 0 when it gets one.
-int reason_of_refusal(uint16_t port, int version) {
+/// no connection; 0 when it gets one. `begin` is sent in front of everything.
+int reason_of_refusal(uint16_t port, int version, const std::string& begin = {}) {
   const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(SSL_CTX_new(TLS_client_method()),
                                                                   SSL_CTX_free);
   SSL_CTX_set_security_level(context.get(), 0);
@@ -34,6 +35,7 @@ int reason_of_refusal(uint16_t port, int version) {
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   EXPECT_EQ(connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  EXPECT_EQ(send(descriptor, begin.data(), begin.size(), 0), static_cast<ssize_t>(begin.size()));
   const std::unique_ptr<SSL, decltype(&SSL_free)> connection(SSL_new(context.get()), SSL_free);
   SSL_set_fd(connection.get(), descriptor);
   ERR_clear_error();
@@ -184,6 +186,15 @@ TEST_F(Tls, CertificatesOfNobodyKnownAreRefused) {
   ASSERT_FALSE(client.ok());
   expect_final(client.error(), ErrorCode::BadInput, "none");
   EXPECT_EQ(app_.joined_count(), 0u);
+}
+
+TEST_F(Tls, BeginsBehindAPROXYHeader) {
+  NetConfig config = far_away(with_certificate());
+  config.trusted_proxies = {*parse_address_range("127.0.0.1")};
+  config.proxy_protocol = ProxyProtocol::Version2;
+  start(config);
+  for (const int version : {TLS1_2_VERSION, TLS1_3_VERSION})
+    EXPECT_EQ(reason_of_refusal(server_->port(), version, test::proxy_v4(9)), 0) << version;
 }
 
 TEST_F(Tls, CertificatesThatAreOverAreRefused) {
