@@ -11,6 +11,7 @@
 #include "client/app/headless_view.h"
 #include "client/app/stream_check.h"
 #include "common/pictures/image_codec.h"
+#include "common/pictures/video_codec.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/temporary_folder.h"
@@ -91,8 +92,21 @@ uint64_t heap_bytes() {
   return info.uordblks + info.hblkhd;
 }
 
+/// The payload of a picture that stands alone.
+struct WholePicture {
+  Opcode opcode = Opcode::JpegFrame;
+  std::vector<std::byte> payload;
+};
+
+std::vector<std::byte> vp8_of(uint32_t width, uint32_t height) {
+  const auto encoder = make_video_encoder(PictureCodec::Vp8, {width, height, 30.0, 1e6});
+  const Image grey{width, height, std::vector<uint8_t>(size_t{4} * width * height, 99)};
+  return *(*encoder)->encode(grey, VideoFrame::Keyframe, VideoRate::Target);
+}
+
 /// One of everything that a viewer keeps the newest of, in sizes that change.
-void send_round(FakePeer& peer, uint32_t round, const std::vector<std::vector<std::byte>>& pictures) {
+void send_round(FakePeer& peer, uint32_t round, const std::string& codec,
+                const std::vector<WholePicture>& pictures) {
   const std::string text(kMaxTextChars, 'x');
   for (uint32_t i = 0; i < kMaxWaitingNotices; ++i) peer.send(Notice{i % 2 == 0, text});
   peer.send(ServerStatus{.tick = round});
@@ -103,34 +117,41 @@ void send_round(FakePeer& peer, uint32_t round, const std::vector<std::vector<st
   list.sessions.resize(kMaxListedSessions, SessionInfo{.name = "somebody", .address = "192.0.2.1"});
   peer.send(list);
   for (uint32_t i = 0; i < pictures.size(); ++i)
-    peer.send(*make_encoded_frame({.opcode = Opcode::JpegFrame,
+    peer.send(*make_encoded_frame({.opcode = pictures[i].opcode,
                                    .stream_id = static_cast<uint16_t>(kPictureStreamBit | (round % 100)),
                                    .sequence = 1 + round * 10 + i},
-                                  pictures[i]));
+                                  pictures[i].payload));
   Snapshot snapshot;
   snapshot.tick = round;
   snapshot.sim_time_ns = int64_t{16'000'000} * round;
   snapshot.strand_count = 1 + round % 200;  // the first ones
   snapshot.vertex_count = 8;
-  snapshot.quantum_m = 1e-4f;
+  snapshot.quantum_m = *lattice_step_m(codec, 1e-4f);
   snapshot.lattice.resize(size_t{3} * snapshot.strand_count * snapshot.vertex_count);
-  const auto keyframe = (*make_strand_encoder("delta"))->encode(snapshot);
+  const auto keyframe = (*make_strand_encoder(codec))->encode(snapshot);
   peer.send(*with_send_time(*keyframe, static_cast<uint16_t>(round), round));
 }
 
-TEST(HostileServer, WhatAViewerKeepsDoesNotGrow) {
+class HostileStream : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Codecs, HostileStream, testing::Values("delta", "tangent"));
+
+TEST_P(HostileStream, WhatAViewerKeepsDoesNotGrow) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer's allocator does not tell what is in use";
 #endif
   constexpr uint32_t kFirstRounds = 30;
   constexpr uint32_t kRounds = 230;
   constexpr uint64_t kSlackBytes = 1u << 20;  // 200 rounds of notices alone are three times that
-  const std::vector<std::vector<std::byte>> pictures = {jpeg_of(640, 480, 10), jpeg_of(16, 16, 90),
-                                                        jpeg_of(200, 300, 200)};
+  const std::vector<WholePicture> pictures = {{Opcode::JpegFrame, jpeg_of(640, 480, 10)},
+                                              {Opcode::Vp8Frame, vp8_of(320, 240)},
+                                              {Opcode::JpegFrame, jpeg_of(16, 16, 90)},
+                                              {Opcode::Vp8Frame, vp8_of(64, 48)}};
   const FakeServer server([&](FakePeer& peer) {
-    peer.welcome(make_welcome(200, 8));
+    Welcome welcome = make_welcome(200, 8);
+    welcome.codec = GetParam();
+    peer.welcome(welcome);
     for (uint32_t round = 1; round <= kRounds; ++round) {
-      send_round(peer, round, pictures);
+      send_round(peer, round, GetParam(), pictures);
       if (!peer.read_until<CameraChange>()) return;
     }
     peer.read_to_end();
