@@ -278,6 +278,11 @@ void Connection::answer_metrics(const Request& request) {
 }
 
 void Connection::answer_upgrade(const Request& request) {
+  // Sessions, not the proxy's own probes: whoever set it up has to know.
+  if (peer_.is_proxy)
+    context_.note(
+        fmt::format("trusted proxy {} names no client: all of its clients count as one", peer_.address),
+        LogLevel::Warn);
   const auto origin = request[http::field::origin];
   if (!is_origin_allowed(view(origin), view(request[http::field::host]), context_.config.allowed_origins))
     return refuse(Refusal::Origin, http::status::forbidden,

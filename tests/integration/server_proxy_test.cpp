@@ -82,6 +82,14 @@ TEST_F(ServerProxy, ComingThroughAProxyOnLoopbackIsNotComingFromLoopback) {
   EXPECT_NE(client.read_raw_to_end().find(" 401 "), std::string::npos);
 }
 
+TEST_F(ServerProxy, AProxyThatSaysNothingIsTold) {
+  start(behind_proxy());
+  (void)test::http_get(server_->port(), "/healthz");
+  EXPECT_EQ(log_.count("names no client"), 0u) << "its own probe";
+  EXPECT_NE(join(hello(Role::Viewer, kToken)), nullptr);
+  EXPECT_EQ(log_.count("warning [net] trusted proxy 127.0.0.1 names no client"), 1u);
+}
+
 TEST_F(ServerProxy, AProxyThatNamesNobodyIsRefused) {
   start(behind_proxy());
   for (const char* list : {"unknown", "203.0.113.9, unknown", ""})
