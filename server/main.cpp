@@ -13,6 +13,7 @@
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
 #include "server/app/options.h"
+#include "server/app/server_passes.h"
 #include "server/net/token_file.h"
 
 namespace strandcast {
@@ -44,18 +45,16 @@ int explain_command(const ServerOptions& options, const ServerConfig& config) {
   RuntimeFacts facts;
   facts.strand_viewers = 1;
   facts.frame_viewers = options.explained_frame_viewers;
-  PassTimes times;
-  auto measured = measure_passes(config.scene, *content, facts, config.gl_device, config.shader_folder);
-  if (measured) {
-    times = *measured;
-  } else if (measured.error().code != ErrorCode::Unavailable) {
-    return fail(measured.error());
-  }
-  const auto text =
-      explain_scene(config.scene, make_scene_asset(content->groom, content->head), facts, times);
+  const SceneAsset asset = make_scene_asset(content->groom, content->head);
+  auto passes = measure_passes(config.scene, *content, facts, {config.gl_device, config.shader_folder});
+  const std::optional<Error> unmeasured = passes ? std::nullopt : std::optional(passes.error());
+  if (unmeasured && unmeasured->code == ErrorCode::Unavailable)
+    passes = plan_server(config.scene, asset, facts);
+  if (!passes) return fail(passes.error());
+  const auto text = explain_scene(config.scene, asset, facts, *passes);
   if (!text) return fail(text.error());
   fmt::print("{}", *text);
-  if (!measured) fmt::print("Times were not measured: {}\n", measured.error().to_string());
+  if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());
   return 0;
 }
 

@@ -1,24 +1,27 @@
 #include "server/app/explain.h"
 
-#include <chrono>
+#include <utility>
 
 #include "common/base/profile.h"
 #include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
 #include "common/groom/groom_asset.h"
-#include "common/strands/scene_asset.h"
+#include "common/render/renderer.h"
 #include "common/strands/strand_codec.h"
-#include "server/app/pass_table.h"
-#include "server/source/scene_change.h"
-#include "server/publish/publisher.h"
-#include "server/scene/step_builder.h"
+#include "server/app/server_passes.h"
+#include "server/encode/picture_encoder.h"
+#include "server/encode/picture_painter.h"
+#include "server/encode/picture_passes.h"
+#include "server/encode/strand_encode_worker.h"
 #include "server/sim/solver_registry.h"
+#include "server/source/scene_change.h"
+#include "server/source/sim_stages.h"
 
 namespace strandcast {
 namespace {
 
-constexpr int kWarmUpSteps = 3;
-constexpr int kMeasuredSteps = 10;
+constexpr int kMeasuredSteps = 13;
+constexpr int kMeasuredPictures = 3;
 
 std::string fact_text(const FeatureReason& fact) {
   return fmt::format("  {:<20} {:<4} {}\n", fact.name, fact.value ? "yes" : "no", fact.reason);
@@ -27,6 +30,93 @@ std::string fact_text(const FeatureReason& fact) {
 std::string size_text(uint64_t bytes) {
   constexpr double kKilobyte = 1e3;
   return fmt::format("{:.1f} kB", static_cast<double>(bytes) / kKilobyte);
+}
+
+/// What is shared by all that is measured.
+struct Bench {
+  const SceneDesc& scene;
+  const SceneAsset& asset;
+  const RuntimeFacts& facts;
+  const gl::ShaderLibrary& shaders;
+  const gl::DeviceInfo& device;
+  ThreadPasses passes;                  // measured so far
+  std::vector<EncodedFramePtr> frames;  // of the strands
+};
+
+bool is_watched(const RuntimeFacts& facts) {
+  return facts.strand_viewers + facts.frame_viewers > 0;
+}
+
+/// Steps, publishes and, when somebody watches, encodes.
+Status measure_strands(Bench& bench, const SceneContent& content) {
+  const SceneDesc& scene = bench.scene;
+  const SceneFeatures features = analyse(scene, bench.facts);
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
+  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
+  ASSIGN_OR_RETURN(auto solver, row->make_gpu(parameters, {&bench.shaders, features}));
+  RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
+  ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
+  encoder->set_rest_shape(bench.asset.rest_position_m);
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(scene.stream.codec, scene.stream.bound_m));
+  Publisher publisher(content.groom, quantum_m);
+  StepBuilder builder(scene, content.colliders);
+  SimStages stages(stage_sizes(scene, bench.asset), explain(scene, bench.facts));
+  stages.set_solver_bytes(solver->memory_bytes());
+  stages.set_watched(is_watched(bench.facts));
+  gl::GpuTimer timer(bench.device);
+  StageTimer encode_timer;
+  for (int step = 1; step <= kMeasuredSteps; ++step) {
+    StageTurn turn(builder, *solver, publisher);
+    turn.end_time_s = step / scene.step_rate_hz;
+    turn.publish.tick = static_cast<uint64_t>(step);
+    RETURN_IF_ERROR(stages.step(turn, &timer));
+    RETURN_IF_ERROR(stages.publish(turn));
+    if (!is_watched(bench.facts)) continue;
+    const ScopedStage stage(encode_timer);
+    if (EncodedFramePtr frame = encoder->encode(*turn.snapshot)) bench.frames.push_back(std::move(frame));
+  }
+  bench.passes.simulation = stages.report();
+  bench.passes.strands = {strand_encode_report(0, is_watched(bench.facts), encode_timer)};
+  return {};
+}
+
+/// Follows the strands, paints and codes pictures.
+Status measure_pictures(Bench& bench) {
+  const PictureView view = assumed_view(bench.scene);
+  ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(bench.scene.stream.codec,
+                                                     {bench.asset.strand_count, bench.asset.vertex_count}));
+  decoder->set_rest_shape(bench.asset.rest_position_m);
+  ASSIGN_OR_RETURN(auto renderer, Renderer::make(bench.shaders, bench.device, bench.asset, bench.scene.look));
+  ASSIGN_OR_RETURN(auto encoder, make_picture_encoder(view, bench.scene.stream.frame_rate_hz, 0));
+  PictureTimers timers;
+  StageTimer read_timer;
+  for (size_t i = 0; i < bench.frames.size() && i < kMeasuredPictures; ++i) {
+    const auto timed = [](StageTimer& timer, auto&& work) {
+      const ScopedStage stage(timer);
+      return work();
+    };
+    ASSIGN_OR_RETURN(const auto snapshot,
+                     timed(timers.decode, [&] { return decoder->decode(bench.frames[i]->message); }));
+    const PosedStrands strands{snapshot->world_from_head, positions_in_head(*snapshot)};
+    RETURN_IF_ERROR(renderer->draw(strands, view.camera, view.size));
+    const Image image = timed(read_timer, [&] { return renderer->read_image(); });
+    RETURN_IF_ERROR(timed(timers.encode[static_cast<size_t>(view.codec)],
+                          [&] { return encoder->encode(image, view.quality, {}); }));
+  }
+  gl::PassReports painted = renderer->passes().report();
+  painted.push_back(read_back_report(read_timer));
+  bench.passes.pictures = picture_passes(timers, painted, codec_bit(view.codec));
+  return {};
+}
+
+std::string to_text(const gl::PassReports& passes) {
+  std::string text;
+  for (const gl::PassReport& pass : passes)
+    text +=
+        fmt::format("  {:<18} {:<14} {:>12}  {:>9}  {}\n", pass.name, gl::to_string(pass.fate),
+                    size_text(pass.size_bytes),
+                    pass.runs > 0 ? fmt::format("{:.2f} ms", pass.median_ms) : std::string("-"), pass.reason);
+  return text;
 }
 
 }  // namespace
@@ -43,46 +133,26 @@ std::string list_solvers() {
   return text;
 }
 
-Result<PassTimes> measure_passes(const SceneDesc& scene, const SceneContent& content,
-                                 const RuntimeFacts& facts, const std::string& gl_device,
-                                 const std::optional<std::filesystem::path>& shader_folder) {
-  ASSIGN_OR_RETURN(auto context, gl::EglContext::make(gl_device));
-  const gl::ShaderLibrary shaders = shader_folder ? gl::ShaderLibrary(*shader_folder) : gl::ShaderLibrary();
-  const SceneFeatures features = analyse(scene, facts);
-  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
-  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  ASSIGN_OR_RETURN(auto solver, row->make_gpu(parameters, {&shaders, features}));
-  RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
-  ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
-  encoder->set_rest_shape(make_scene_asset(content.groom, {}).rest_position_m);
-  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(scene.stream.codec, scene.stream.bound_m));
-  Publisher publisher(content.groom, quantum_m);
-  StepBuilder builder(scene, content.colliders);
-  gl::GpuTimer timer(context->info());
-  StageTimer step_timer;
-  StageTimer encode_timer;
-  for (int step = 1; step <= kWarmUpSteps + kMeasuredSteps; ++step) {
-    const SceneStep& scene_step = builder.build(InputFrame{}, features, step / scene.step_rate_hz);
-    timer.begin();
-    for (const StepInput& substep : scene_step.substeps) solver->substep(substep);
-    const double step_ms = timer.end_ms();
-    PublishInput input;
-    input.tick = static_cast<uint64_t>(step);
-    const auto snapshot = publisher.publish(*solver, input);
-    const ScopedStage stage(encode_timer);
-    (void)encoder->encode(*snapshot);
-    if (step > kWarmUpSteps) step_timer.add_ms(step_ms);
+Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneContent& content,
+                                       const RuntimeFacts& facts, const MeasureConfig& config) {
+  ASSIGN_OR_RETURN(auto context, gl::EglContext::make(config.gl_device));
+  const gl::ShaderLibrary shaders =
+      config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
+  const SceneAsset asset = make_scene_asset(content.groom, content.head);
+  Bench bench{scene, asset, facts, shaders, context->info(), {}, {}};
+  RETURN_IF_ERROR(measure_strands(bench, content));
+  if (facts.frame_viewers > 0) {
+    RETURN_IF_ERROR(measure_pictures(bench));
+  } else {
+    ASSIGN_OR_RETURN(bench.passes.pictures,
+                     plan_picture_passes(asset, scene.look, context->info().is_software, 0));
   }
-  return PassTimes{{"sim/step", step_timer.median_ms()},
-                   {"publish/read", publisher.read_timer().median_ms()},
-                   {"publish/quantise", publisher.quantise_timer().median_ms()},
-                   {"encode/strands", encode_timer.median_ms()}};
+  return join_passes(std::move(bench.passes), facts.frame_viewers > 0);
 }
 
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
-                                  const PassTimes& times) {
+                                  const gl::PassReports& passes) {
   RETURN_IF_ERROR(check_solver(scene));
-  ASSIGN_OR_RETURN(const ServerPlan plan, make_server_plan(scene, asset, facts));
   std::string text = fmt::format(
       "Scene '{}': {} strands x {} vertices, solver {}, {:g} steps of {} substeps per s\n", scene.name,
       asset.strand_count, asset.vertex_count, scene.solver.name, scene.step_rate_hz, scene.substeps);
@@ -90,19 +160,9 @@ Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asse
                       facts.frame_viewers);
   for (const FeatureReason& reason : explain(scene, facts)) text += fact_text(reason);
   for (const FeatureReason& reason : explain(analyse_picture(asset, scene.look))) text += fact_text(reason);
-  text += "\nPasses\n";
-  for (size_t i = 0; i < plan.passes.size(); ++i) {
-    const gl::PassDeclaration& pass = plan.passes[i];
-    const gl::PassDecision& decision = plan.plan.passes[i];
-    const auto time = times.find(pass.name);
-    const bool has_time = decision.fate == gl::PassFate::Kept && time != times.end();
-    text +=
-        fmt::format("  {:<18} {:<14} {:>12}  {:>9}  {}\n", pass.name, gl::to_string(decision.fate),
-                    size_text(written_bytes(plan, pass)),
-                    has_time ? fmt::format("{:.2f} ms", time->second) : std::string("-"), decision.reason);
-  }
-  text += fmt::format("\nMemory: {} allocated, {} saved\n", size_text(plan.plan.live_bytes),
-                      size_text(plan.plan.saved_bytes));
+  text += "\nPasses\n" + to_text(passes);
+  text += fmt::format("\nMemory: {} allocated, {} saved\n", size_text(kept_bytes(passes)),
+                      size_text(saved_bytes(passes)));
   return text;
 }
 

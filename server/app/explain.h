@@ -2,11 +2,11 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 
 #include "common/base/result.h"
+#include "common/gl/pass_list.h"
 #include "common/scene/features.h"
 #include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
@@ -16,16 +16,18 @@ namespace strandcast {
 /// Every solver with its parameters, ranges and source.
 std::string list_solvers();
 
-/// Milliseconds per pass, by its name in the plan; passes that were not run are missing.
-using PassTimes = std::map<std::string, double>;
+struct MeasureConfig {
+  std::string gl_device = "auto";                      // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+};
 
-/// Runs a few steps of the scene in a GL context of its own and times its passes.
-Result<PassTimes> measure_passes(const SceneDesc& scene, const SceneContent& content,
-                                 const RuntimeFacts& facts, const std::string& gl_device,
-                                 const std::optional<std::filesystem::path>& shader_folder);
+/// Plans the passes of a server with these viewers, makes those that run, in a GL context of its own, and
+/// runs them a few times.
+Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneContent& content,
+                                       const RuntimeFacts& facts, const MeasureConfig& config);
 
-/// Facts with reasons, then the plan: kept, not requested or unread, with bytes and milliseconds.
+/// Facts with reasons, then the passes: kept, not requested or unread, with bytes and milliseconds.
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
-                                  const PassTimes& times);
+                                  const gl::PassReports& passes);
 
 }  // namespace strandcast

@@ -10,7 +10,9 @@
 #include "common/log/log.h"
 #include "common/strands/scene_asset.h"
 #include "server/app/server_metrics.h"
+#include "server/app/server_passes.h"
 #include "server/app/session_desk.h"
+#include "server/encode/picture_passes.h"
 
 namespace strandcast {
 namespace {
@@ -43,6 +45,7 @@ class Server::State {
   void stop();
   void wait();
   ServerCounters counters() const;
+  gl::PassReports passes() const;
   uint16_t port() const { return net_->port(); }
   StreamHub& hub() { return *hub_; }
   std::optional<Error> failure() const { return source_->failure(); }
@@ -56,6 +59,7 @@ class Server::State {
 
   const ServerConfig config_;
   InputHub inputs_;
+  gl::PassReports idle_picture_passes_;  // what the frame thread would run
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
   std::unique_ptr<StateSource> source_;
@@ -79,6 +83,7 @@ Status Server::State::start() {
   const RenderSize size{scene.stream.frame_width, scene.stream.frame_height};
   ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream, scene.step_rate_hz, make_scene_view(scene, size, 0),
                                           asset, config_.make_painter(painter)}));
+  ASSIGN_OR_RETURN(idle_picture_passes_, plan_picture_passes(*asset, scene.look, true, 0));
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
   RETURN_IF_ERROR(source_->start(*hub_));
@@ -155,11 +160,18 @@ ServerCounters Server::State::counters() const {
   return counters;
 }
 
+gl::PassReports Server::State::passes() const {
+  ThreadPasses threads{source_->stats().passes, hub_->strand_passes(), hub_->picture_passes()};
+  const bool is_drawing = !threads.pictures.empty();
+  if (!is_drawing) threads.pictures = idle_picture_passes_;
+  return join_passes(std::move(threads), is_drawing);
+}
+
 std::string Server::State::metrics() const {
   ServerCounters now = counters();
   for (uint16_t stream_id = 0; stream_id < hub_->strand_classes().size(); ++stream_id)
     now.strand_classes_in_use += hub_->strand_readers(stream_id) > 0 ? 1 : 0;
-  return format_server_metrics(now, version());
+  return format_server_metrics(now, version()) + format_passes(passes(), gl::object_counts());
 }
 
 Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -179,6 +191,9 @@ uint16_t Server::port() const {
 }
 ServerCounters Server::counters() const {
   return state_->counters();
+}
+gl::PassReports Server::passes() const {
+  return state_->passes();
 }
 Status Server::reload_tls() {
   return state_->reload_tls();

@@ -12,10 +12,10 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
-#include "server/source/simulation_source.h"
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
+#include "server/source/simulation_source.h"
 #include "server/stream/stream_hub.h"
 
 namespace strandcast {
@@ -63,6 +63,8 @@ class Server {
   /// For readers besides the network's sessions: a recorder, a relay.
   StreamHub& hub();
   ServerCounters counters() const;
+  /// What all threads run now, and what they do not.
+  gl::PassReports passes() const;
   /// As NetServer::reload_tls().
   Status reload_tls();
   /// True once an admin has asked for the end: the owner calls stop().

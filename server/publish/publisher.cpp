@@ -68,14 +68,13 @@ void Publisher::watch_stretch(double stretch_bound) {
   }
 }
 
-std::shared_ptr<const Snapshot> Publisher::publish(Solver& solver, const PublishInput& input) {
-  {
-    const ScopedStage stage(read_timer_);
-    solver.read(state_);
-  }
+void Publisher::read(Solver& solver) {
+  solver.read(state_);
   CHECK(state_.position_m.size() == rest_position_m_.size());
   CHECK(state_.velocity_mps.size() == rest_position_m_.size());
-  const ScopedStage stage(quantise_timer_);
+}
+
+std::shared_ptr<const Snapshot> Publisher::quantise(const PublishInput& input) {
   find_broken_strands();
   if (!longest_squared_m2_.empty()) find_overstretched_strands(input.sim_time_ns);
   for (const uint32_t strand : quarantined_) put_to_rest(strand, input);
@@ -95,7 +94,7 @@ std::shared_ptr<const Snapshot> Publisher::publish(Solver& solver, const Publish
   quantise_input.quantum_m = quantum_m_;
   quantise_input.position_in_head_m = position_in_head_m_;
   quantise_input.fallback_m = rest_position_m_;
-  return std::make_shared<const Snapshot>(quantise(quantise_input).snapshot);
+  return std::make_shared<const Snapshot>(strandcast::quantise(quantise_input).snapshot);
 }
 
 void Publisher::find_broken_strands() {

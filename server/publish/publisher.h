@@ -9,7 +9,6 @@
 #include <span>
 #include <vector>
 
-#include "common/base/profile.h"
 #include "common/groom/groom.h"
 #include "common/strands/snapshot.h"
 #include "server/sim/solver.h"
@@ -47,8 +46,15 @@ class Publisher {
   /// codec).
   Publisher(const Groom& groom, float quantum_m);
 
-  /// Allocates nothing but the snapshot (after the first call).
-  std::shared_ptr<const Snapshot> publish(Solver& solver, const PublishInput& input);
+  /// Both stages. Allocates nothing but the snapshot (after the first call).
+  std::shared_ptr<const Snapshot> publish(Solver& solver, const PublishInput& input) {
+    read(solver);
+    return quantise(input);
+  }
+  /// The state to the processor; waits for the device.
+  void read(Solver& solver);
+  /// What was read, as it is published: quarantine, head space, the lattice.
+  std::shared_ptr<const Snapshot> quantise(const PublishInput& input);
 
   /// From now on strands that stretch beyond overstretch_limit() are quarantined as well. `stretch_bound` as
   /// in SolverRow. Without this call stretch is not looked at.
@@ -70,8 +76,6 @@ class Publisher {
   float quantum_m() const { return quantum_m_; }
   /// From the next publish() on.
   void set_quantum_m(float quantum_m) { quantum_m_ = quantum_m; }
-  const StageTimer& read_timer() const { return read_timer_; }
-  const StageTimer& quantise_timer() const { return quantise_timer_; }
 
  private:
   void find_broken_strands();
@@ -95,8 +99,6 @@ class Publisher {
   uint64_t bad_vertex_count_ = 0;
   uint64_t quarantine_count_ = 0;
   uint64_t overstretch_count_ = 0;
-  StageTimer read_timer_;
-  StageTimer quantise_timer_;
 };
 
 }  // namespace strandcast

@@ -76,31 +76,48 @@ void StepBuilder::change(const SceneDesc& scene, std::vector<SphereCollider> col
   gust_generator_.emplace(wind.mean_mps, wind.gust_intensity, wind.gust_length_m, wind.seed);
   waves_ = make_gust_waves(wind);
   step_.substeps.resize(scene.substeps);
+  end_time_s_.resize(scene.substeps);
+  head_position_m_.resize(scene.substeps);
 }
 
-void StepBuilder::set_wind(StepInput& substep, const InputFrame& input, const SceneFeatures& features,
-                           double time_s, const glm::dvec3& head_position_m) const {
-  substep.wind_mps = glm::dvec3(0.0);
-  substep.gusts.clear();
-  if (!features.has_wind) return;
-  if (input.has_wind_stream) {
-    substep.wind_mps = input.wind_mps;
-    return;
-  }
-  substep.wind_mps = gust_generator_->sample(time_s);
-  if (!features.has_turbulence) return;
+void StepBuilder::add_wind() {
+  for (size_t i = 0; i < step_.substeps.size(); ++i)
+    step_.substeps[i].wind_mps =
+        input_.has_wind_stream ? input_.wind_mps : gust_generator_->sample(end_time_s_[i]);
+}
+
+void StepBuilder::add_gusts() {
+  if (input_.has_wind_stream) return;
   const glm::dvec3 mean_mps = scene_.wind.mean_mps;
-  for (GustWave wave : waves_) {
-    // The waves stand still in air that moves with the mean wind; x counts from the head.
-    const glm::dvec3 k = wave.wave_vector_rad_per_m;
-    const double phase_rad = wave.phase_rad + glm::dot(k, mean_mps) * time_s - glm::dot(k, head_position_m);
-    wave.phase_rad = static_cast<float>(std::remainder(phase_rad, 2.0 * std::numbers::pi));
-    substep.gusts.push_back(wave);
-  }
+  for (size_t i = 0; i < step_.substeps.size(); ++i)
+    for (GustWave wave : waves_) {
+      // The waves stand still in air that moves with the mean wind; x counts from the head.
+      const glm::dvec3 k = wave.wave_vector_rad_per_m;
+      const double phase_rad =
+          wave.phase_rad + glm::dot(k, mean_mps) * end_time_s_[i] - glm::dot(k, head_position_m_[i]);
+      wave.phase_rad = static_cast<float>(std::remainder(phase_rad, 2.0 * std::numbers::pi));
+      step_.substeps[i].gusts.push_back(wave);
+    }
+}
+
+void StepBuilder::add_colliders() {
+  for (StepInput& substep : step_.substeps)
+    for (const SphereCollider& collider : colliders_)
+      substep.colliders.push_back(
+          {glm::vec3(substep.world_from_head * glm::dvec3(collider.center_m)), collider.radius_m});
 }
 
 const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures& features,
                                     double end_time_s) {
+  begin(input, end_time_s);
+  if (features.has_wind) add_wind();
+  if (features.has_turbulence) add_gusts();
+  add_colliders();
+  return step_;
+}
+
+void StepBuilder::begin(const InputFrame& input, double end_time_s) {
+  input_ = input;
   const Pose target = input.has_motion ? input.world_from_head : world_from_head_;
   Pose from = world_from_head_;
   // The first pose is a jump too: until then the head stood at the origin.
@@ -120,16 +137,15 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
     substep.head_shift_m = pose.position_m - previous.position_m;
     substep.gravity_mps2 = scene_.gravity_mps2;
     substep.groom_gravity_in_head_mps2 = groom_gravity_in_head_mps2_;
-    set_wind(substep, input, features, end_time_s - step_s * (1.0 - blend), pose.position_m);
+    substep.wind_mps = glm::dvec3(0.0);
+    substep.gusts.clear();
     substep.colliders.clear();
-    for (const SphereCollider& collider : colliders_)
-      substep.colliders.push_back(
-          {glm::vec3(pose.rotation * glm::dvec3(collider.center_m)), collider.radius_m});
+    end_time_s_[i] = end_time_s - step_s * (1.0 - blend);
+    head_position_m_[i] = pose.position_m;
     previous = pose;
   }
   world_from_head_ = target;
   step_.world_from_head = target;
-  return step_;
 }
 
 }  // namespace strandcast

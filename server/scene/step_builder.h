@@ -28,15 +28,21 @@ class StepBuilder {
   /// Changed scene values; the head stays where it is.
   void change(const SceneDesc& scene, std::vector<SphereCollider> colliders);
 
-  /// The step that ends at `end_time_s` of simulated time. Valid until the next call.
+  /// The step that ends at `end_time_s` of simulated time: how the head moves, without wind and colliders.
+  void begin(const InputFrame& input, double end_time_s);
+  // What the facts add to it.
+  void add_wind();
+  void add_gusts();
+  void add_colliders();
+  /// Valid until the next begin().
+  const SceneStep& step() const { return step_; }
+
+  /// All of that; wind and gusts for these facts.
   const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
 
   const Pose& world_from_head() const { return world_from_head_; }
 
  private:
-  void set_wind(StepInput& substep, const InputFrame& input, const SceneFeatures& features, double time_s,
-                const glm::dvec3& head_position_m) const;
-
   SceneDesc scene_;
   // The groom is made for an upright head under the gravity that the scene begins with; later changes act on
   // it.
@@ -47,6 +53,9 @@ class StepBuilder {
   Pose world_from_head_;
   bool has_motion_ = false;
   SceneStep step_;
+  InputFrame input_;                         // of the step
+  std::vector<double> end_time_s_;           // of each substep
+  std::vector<glm::dvec3> head_position_m_;  // at the end of each substep, world
 };
 
 /// Waves that vary the wind over the size of a head: the part of the turbulence (von Karman, inertial range)

@@ -24,6 +24,12 @@ bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
          a.has_colliders == b.has_colliders;
 }
 
+double median_ms(const gl::PassReports& passes, std::string_view name) {
+  for (const gl::PassReport& pass : passes)
+    if (pass.name == name) return pass.median_ms;
+  return 0.0;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& hub, StateSink& sink) {
@@ -84,6 +90,10 @@ Status SimLoop::begin() {
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
   publisher_.emplace(config_.content->groom, quantum_m);
   stream_ = stream;
+  const Groom& groom = config_.content->groom;
+  const StageSizes sizes{groom.strand_count(), groom.uniform_vertex_count(), config_.scene.substeps,
+                         static_cast<uint32_t>(config_.content->colliders.size())};
+  stages_.emplace(sizes, explain(config_.scene, facts_));
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
@@ -257,7 +267,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   solver_ = std::move(solver);
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
-  step_timer_ = StageTimer();
+  stages_->plan_step(explain(scene, facts_));
+  stages_->set_solver_bytes(solver_->memory_bytes());
   ++solver_builds_;
   log_info("sim", "solver {}: {} strands x {} vertices, {} kB", row->name,
            config_.content->groom.strand_count(), config_.content->groom.uniform_vertex_count(),
@@ -294,29 +305,28 @@ void SimLoop::step(int64_t time_ns) {
   }
   ++tick_;
   const double end_time_s = static_cast<double>(tick_) / config_.scene.step_rate_hz;
-  const SceneStep& scene_step = builder_->build(input_, solver_features_, end_time_s);
-  if (scene_step.has_jumped) solver_->rebase(scene_step.world_from_head.rotation);
-  timer_->begin();
-  for (const StepInput& substep : scene_step.substeps) {
-    if (is_stopping_) return;  // many substeps of a slow solver take long
-    solver_->substep(substep);
-    head_velocity_mps_ = substep.head_shift_m / substep.h_s;
-  }
-  const double step_ms = timer_->end_ms();
-  step_timer_.add_ms(step_ms);
-  step_times_.add_ms(step_ms);
+  StageTurn turn(*builder_, *solver_, *publisher_);
+  turn.input = input_;
+  turn.end_time_s = end_time_s;
+  turn.is_stopping = &is_stopping_;
+  CHECK(stages_->step(turn, &*timer_).ok());  // stages of a step cannot fail
+  if (is_stopping_) return;
+  head_velocity_mps_ = turn.head_velocity_mps;
+  step_times_.add_ms(stages_->last_step_ms());
   last_step_ns_ = now_ns();
   if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
 
 void SimLoop::publish() {
-  PublishInput input;
+  StageTurn turn(*builder_, *solver_, *publisher_);
+  PublishInput& input = turn.publish;
   input.tick = tick_;
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
   input.motion_time_ns = input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
   input.head_velocity_mps = head_velocity_mps_;
-  std::shared_ptr<const Snapshot> snapshot = publisher_->publish(*solver_, input);
+  CHECK(stages_->publish(turn).ok());  // likewise
+  std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
   if (config_.on_publish) config_.on_publish(snapshot);
   sink_.put(std::move(snapshot));
   published_tick_ = tick_;
@@ -346,10 +356,12 @@ void SimLoop::report_quarantine() {
 void SimLoop::update_stats() {
   SimStats stats;
   stats.tick = tick_;
-  stats.step_median_ms = step_timer_.median_ms();
   stats.step_times = step_times_;
-  stats.read_median_ms = publisher_->read_timer().median_ms();
-  stats.quantise_median_ms = publisher_->quantise_timer().median_ms();
+  stages_->set_watched(is_watched());
+  stats.passes = stages_->report();
+  stats.step_median_ms = median_ms(stats.passes, "sim/step");
+  stats.read_median_ms = median_ms(stats.passes, "publish/read");
+  stats.quantise_median_ms = median_ms(stats.passes, "publish/quantise");
   stats.realtime_factor = clock_->realtime_factor(now_ns());
   stats.is_paused = clock_->is_paused();
   stats.is_motion_stale = input_.is_motion_stale;

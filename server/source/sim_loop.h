@@ -31,12 +31,10 @@
 #include "server/scene/step_builder.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
+#include "server/source/sim_stages.h"
 #include "server/stream/state_source.h"
 
 namespace strandcast {
-
-/// While nobody watches, states are read back only this often, to find broken strands.
-inline constexpr uint64_t kIdlePublishSteps = 30;
 
 /// Sees every published state; for tests and recordings. Must return quickly.
 using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot>&)>;
@@ -123,9 +121,9 @@ class SimLoop {
   std::optional<Publisher> publisher_;
   std::optional<SimClock> clock_;
   std::optional<gl::GpuTimer> timer_;
+  std::optional<SimStages> stages_;
   RuntimeFacts facts_;
   bool has_state_readers_ = false;
-  StageTimer step_timer_;
   Histogram step_times_;
   InputFrame input_;
   glm::dvec3 head_velocity_mps_{0.0};     // during the last substep

@@ -10,6 +10,7 @@
 
 #include "common/base/histogram.h"
 #include "common/base/result.h"
+#include "common/gl/pass_list.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/snapshot.h"
@@ -25,6 +26,7 @@ struct SimStats {
   Histogram step_times;         // likewise
   double read_median_ms = 0.0;
   double quantise_median_ms = 0.0;
+  gl::PassReports passes;  // of the source's thread; the medians above are of these
   double realtime_factor = 0.0;
   bool is_paused = false;
   bool is_motion_stale = true;

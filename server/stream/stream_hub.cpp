@@ -246,6 +246,21 @@ std::vector<StrandEncodeCounters> StreamHub::encode_counters() const {
   return counters;
 }
 
+gl::PassReports StreamHub::strand_passes() const {
+  const std::lock_guard lock(mutex_);
+  gl::PassReports passes;
+  for (const auto& worker : encoders_)
+    if (worker != nullptr) passes.push_back(worker->pass());
+  if (encoders_.empty() || encoders_[0] == nullptr)
+    passes.insert(passes.begin(), strand_encode_report(0, false, StageTimer()));
+  return passes;
+}
+
+gl::PassReports StreamHub::picture_passes() const {
+  const std::lock_guard lock(mutex_);
+  return frames_ != nullptr ? frames_->passes() : gl::PassReports{};
+}
+
 std::optional<Error> StreamHub::picture_failure() const {
   const std::lock_guard lock(mutex_);
   return frames_ != nullptr ? frames_->failure() : std::nullopt;

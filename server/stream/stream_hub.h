@@ -67,6 +67,9 @@ class StreamHub : public StateSink, public DemandDesk {
   FrameCounters frame_counters() const;
   /// Of all classes that were ever needed, by stream_id.
   std::vector<StrandEncodeCounters> encode_counters() const;
+  /// What the encoders run, and the frame thread; nothing of it while there is nothing to draw.
+  gl::PassReports strand_passes() const;
+  gl::PassReports picture_passes() const;
   /// Why no pictures can be drawn; nothing while all is well.
   std::optional<Error> picture_failure() const;
 

@@ -1,4 +1,4 @@
-// Changing a scene while it runs, who watches what, the pass plan of the server, and its command line.
+// Changing a scene while it runs, who watches what, and the command line of the server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,9 +6,7 @@
 #include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
 #include "server/app/control_budget.h"
-#include "server/app/explain.h"
 #include "server/app/options.h"
-#include "server/app/pass_table.h"
 #include "server/app/server_metrics.h"
 #include "server/app/viewers.h"
 #include "server/sim/solver_registry.h"
@@ -366,47 +364,6 @@ TEST(Viewers, IsDescribedForTheLogOnOneLine) {
   message.name = "a\u202e\u0085b";
   ASSERT_TRUE(viewing.add(7, message).ok());
   EXPECT_EQ(viewers.describe(7), "session 7 (controller 'a??b')");
-}
-
-TEST(ServerPlan, RunsOnlyWhatTheSceneAndItsViewersNeed) {
-  SceneDesc scene = built_in_scene();
-  const auto content = load_scene_content(scene);
-  ASSERT_TRUE(content.ok());
-  const SceneAsset asset = make_scene_asset(content->groom, content->head);
-  RuntimeFacts watched;
-  watched.strand_viewers = 1;
-  watched.frame_viewers = 1;
-  const auto full = make_server_plan(scene, asset, watched);
-  ASSERT_TRUE(full.ok()) << full.error().to_string();
-  for (const auto& pass : full->passes) EXPECT_TRUE(full->plan.runs(pass.name)) << pass.name;
-  EXPECT_EQ(full->plan.saved_bytes, 0u);
-
-  scene.wind.mean_mps = glm::vec3(0.0f);
-  scene.has_auto_collider = false;
-  const auto bare = make_server_plan(scene, asset, {});
-  ASSERT_TRUE(bare.ok()) << bare.error().to_string();
-  for (const auto& pass : bare->passes)
-    EXPECT_EQ(bare->plan.runs(pass.name), pass.name == "sim/step") << pass.name;
-  EXPECT_GT(bare->plan.saved_bytes, 0u);
-
-  RuntimeFacts strands_only;
-  strands_only.strand_viewers = 1;
-  const auto strands = make_server_plan(scene, asset, strands_only);
-  ASSERT_TRUE(strands.ok());
-  EXPECT_TRUE(strands->plan.runs("encode/strands"));
-  EXPECT_FALSE(strands->plan.runs("render/strands"));
-}
-
-TEST(Explain, NamesEverySolverAndEveryPass) {
-  for (const SolverRow& row : solver_table()) EXPECT_THAT(list_solvers(), HasSubstr(row.name));
-  const SceneDesc scene = built_in_scene();
-  const auto content = load_scene_content(scene);
-  ASSERT_TRUE(content.ok());
-  const auto text =
-      explain_scene(scene, make_scene_asset(content->groom, content->head), {}, {{"sim/step", 1.25}});
-  ASSERT_TRUE(text.ok());
-  for (const char* part : {"has_wind", "sim/step", "1.25 ms", "unread", "not requested", "saved"})
-    EXPECT_THAT(*text, HasSubstr(part));
 }
 
 Result<ServerOptions> parse(std::vector<const char*> arguments) {

@@ -1,0 +1,108 @@
+#include "server/source/sim_stages.h"
+
+#include <utility>
+
+#include "common/base/check.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint64_t kVec4Bytes = sizeof(glm::vec4);
+constexpr uint64_t kVec3Bytes = sizeof(glm::vec3);
+/// Per vertex of a solver that is not built yet: rest, position and velocity.
+constexpr uint64_t kStateBytes = 3 * kVec4Bytes;
+
+/// A stage that is one call of somebody else's function.
+class Stage final : public gl::Pass<StageTurn> {
+ public:
+  using Work = void (*)(StageTurn&);
+  Stage(gl::PassDeclaration declaration, gl::PassClock clock, Work work)
+      : Pass(std::move(declaration), clock), work_(work) {}
+  Status run(StageTurn& turn) override {
+    work_(turn);
+    return {};
+  }
+
+ private:
+  Work work_;
+};
+
+void run_substeps(StageTurn& turn) {
+  const SceneStep& step = turn.builder.step();
+  if (step.has_jumped) turn.solver.rebase(step.world_from_head.rotation);
+  for (const StepInput& substep : step.substeps) {
+    if (turn.is_stopping != nullptr && *turn.is_stopping) return;  // many of a slow solver take long
+    turn.solver.substep(substep);
+    turn.head_velocity_mps = substep.head_shift_m / substep.h_s;
+  }
+}
+
+const FeatureReason& fact(const std::vector<FeatureReason>& reasons, const std::string& name) {
+  for (const FeatureReason& reason : reasons)
+    if (reason.name == name) return reason;
+  CHECK(!"explain() names every fact");
+  return reasons.front();
+}
+
+}  // namespace
+
+SimStages::SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& reasons)
+    : sizes_(sizes),
+      state_(std::make_unique<KnownLater>("strand state",
+                                          kStateBytes * sizes.strand_count * sizes.vertex_count)),
+      host_state_("state on the host", 2 * kVec3Bytes * sizes.strand_count * sizes.vertex_count),
+      snapshot_("snapshot", kVec3Bytes * sizes.strand_count * sizes.vertex_count) {
+  const auto add = [this](gl::PassDeclaration declaration, Stage::Work work) {
+    publish_.add(std::make_unique<Stage>(std::move(declaration), gl::PassClock::Host, work));
+  };
+  add({"publish/read", {state_.get()}, {&host_state_}, true, {}},
+      [](StageTurn& turn) { turn.publisher.read(turn.solver); });
+  add({"publish/quantise", {&host_state_}, {&snapshot_}, true, {}},
+      [](StageTurn& turn) { turn.snapshot = turn.publisher.quantise(turn.publish); });
+  CHECK(publish_.plan({state_.get()}, {&snapshot_}).ok());
+  plan_step(reasons);
+}
+
+void SimStages::plan_step(const std::vector<FeatureReason>& reasons) {
+  step_ = std::make_unique<gl::PassList<StageTurn>>();
+  const auto resource = [this](const char* name, uint64_t size_bytes) {
+    return &step_->keep(std::make_unique<gl::Resource>(name, size_bytes));
+  };
+  const gl::Resource* motion = resource("substeps", sizes_.substeps * sizeof(StepInput));
+  const gl::Resource* wind = resource("wind", sizes_.substeps * sizeof(glm::dvec3));
+  const gl::Resource* gusts = resource("gusts", sizes_.substeps * kMaxGustWaves * sizeof(GustWave));
+  const gl::Resource* colliders =
+      resource("colliders", sizes_.substeps * sizes_.collider_count * sizeof(SphereCollider));
+  gl::Resources read_by_solver = {motion};
+  const auto add = [&](const char* name, const gl::Resource* written, const FeatureReason& reason,
+                       Stage::Work work) {
+    if (reason.value && written != motion) read_by_solver.push_back(written);
+    step_->add(
+        std::make_unique<Stage>(gl::PassDeclaration{name, {&input_}, {written}, reason.value, reason.reason},
+                                gl::PassClock::Host, work));
+  };
+  add("scene/motion", motion, {"", true, ""},
+      [](StageTurn& turn) { turn.builder.begin(turn.input, turn.end_time_s); });
+  add("scene/wind", wind, fact(reasons, "has_wind"), [](StageTurn& turn) { turn.builder.add_wind(); });
+  add("scene/gusts", gusts, fact(reasons, "has_turbulence"),
+      [](StageTurn& turn) { turn.builder.add_gusts(); });
+  add("scene/colliders", colliders, fact(reasons, "has_colliders"),
+      [](StageTurn& turn) { turn.builder.add_colliders(); });
+  step_->add(
+      std::make_unique<Stage>(gl::PassDeclaration{"sim/step", read_by_solver, {state_.get()}, true, {}},
+                              gl::PassClock::Device, run_substeps));
+  CHECK(step_->plan({&input_}, {state_.get()}).ok());
+}
+
+gl::PassReports SimStages::report() const {
+  gl::PassReports reports = step_->report();
+  for (gl::PassReport& report : publish_.report()) {
+    if (!is_watched_)
+      report.reason =
+          fmt::format("every {} steps, to find broken strands: nobody watches", kIdlePublishSteps);
+    reports.push_back(std::move(report));
+  }
+  return reports;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,91 @@
+// SimStages: what the simulation thread runs in a step and when it publishes, as passes in two lists. The
+// loop runs them, --explain prints and times the same ones. They own nothing that they work on. Simulation
+// thread.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/gl/pass_list.h"
+#include "common/scene/features.h"
+#include "server/input/input_frame.h"
+#include "server/publish/publisher.h"
+#include "server/scene/step_builder.h"
+#include "server/sim/solver.h"
+
+namespace strandcast {
+
+/// While nobody watches, states are read back only this often, to find broken strands.
+inline constexpr uint64_t kIdlePublishSteps = 30;
+
+/// What the stages work on, and what they are told and give in one turn.
+struct StageTurn : gl::PassTurn {
+  struct Setup {};  // nothing to prepare: solvers are built by whoever owns them
+  StageTurn(StepBuilder& step_builder, Solver& of_strands, Publisher& of_snapshots)
+      : builder(step_builder), solver(of_strands), publisher(of_snapshots) {}
+
+  StepBuilder& builder;
+  Solver& solver;
+  Publisher& publisher;
+  // A step takes
+  InputFrame input;
+  double end_time_s = 0.0;                         // of the step, simulated
+  const std::atomic<bool>* is_stopping = nullptr;  // looked at between substeps; may be null
+  // and gives
+  glm::dvec3 head_velocity_mps{0.0};  // during its last substep
+  // Publishing takes
+  PublishInput publish;
+  // and gives
+  std::shared_ptr<const Snapshot> snapshot;
+};
+
+/// Sizes that are known before there is any GL.
+struct StageSizes {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  uint32_t substeps = 1;
+  uint32_t collider_count = 0;
+};
+
+class SimStages {
+ public:
+  /// `reasons` are explain()'s for the facts that decide.
+  SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& reasons);
+  /// Other facts, or another solver: the step is planned and timed anew.
+  void plan_step(const std::vector<FeatureReason>& reasons);
+  /// What the solver really keeps.
+  void set_solver_bytes(uint64_t size_bytes) { state_->bytes = size_bytes; }
+  /// Whether anybody reads what is published; only for the report, the loop decides when to publish.
+  void set_watched(bool is_watched) { is_watched_ = is_watched; }
+
+  /// Ends early when it is told to stop; then nothing may be published. Without a device its work is timed on
+  /// this thread.
+  Status step(StageTurn& turn, gl::GpuTimer* device) { return step_->run(turn, device); }
+  Status publish(StageTurn& turn) { return publish_.run(turn, nullptr); }
+
+  /// What the solver took of the last step.
+  double last_step_ms() const { return step_->last_ms("sim/step"); }
+  gl::PassReports report() const;
+
+ private:
+  struct KnownLater final : gl::Resource {
+    KnownLater(std::string name, uint64_t bytes_at_most) : Resource(std::move(name)), bytes(bytes_at_most) {}
+    uint64_t size_bytes() const override { return bytes; }
+    uint64_t bytes;
+  };
+
+  StageSizes sizes_;
+  gl::Resource input_{"input"};  // from outside
+  std::unique_ptr<KnownLater> state_;
+  gl::Resource host_state_;
+  gl::Resource snapshot_;
+  std::unique_ptr<gl::PassList<StageTurn>> step_;
+  gl::PassList<StageTurn> publish_;
+  bool is_watched_ = false;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,151 @@
+// What a running server holds and runs for what nobody asked: no buffer, program, context or thread of it.
+// And that what it says it runs is what --explain plans.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/gl/egl_context.h"
+#include "common/gl/objects.h"
+#include "common/groom/groom_asset.h"
+#include "server/app/explain.h"
+#include "server/app/server_passes.h"
+#include "tests/support/server_fixture.h"
+
+namespace strandcast {
+namespace {
+
+using gl::ObjectCounts;
+using gl::ObjectKind;
+
+/// Threads with this program's name; drivers name most of theirs.
+int own_threads() {
+  const auto name_of = [](const std::filesystem::path& task) {
+    std::ifstream file(task / "comm");
+    std::string name;
+    std::getline(file, name);
+    return name;
+  };
+  const std::string own = name_of("/proc/self");
+  int count = 0;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task"))
+    if (name_of(task.path()) == own) ++count;
+  return count;
+}
+
+/// Names and fates: what a list says that does not depend on the machine.
+std::vector<std::pair<std::string, gl::PassFate>> decisions(const gl::PassReports& passes) {
+  std::vector<std::pair<std::string, gl::PassFate>> decided;
+  for (const gl::PassReport& pass : passes) decided.emplace_back(pass.name, pass.fate);
+  return decided;
+}
+
+/// No wind, nothing to collide with, no head.
+SceneDesc barest_scene() {
+  SceneDesc scene = test::bald_scene();
+  scene.wind = {};
+  scene.has_auto_collider = false;
+  return scene;
+}
+
+class ServerCost : public test::ServerFixture {
+ protected:
+  void SetUp() override {
+    // The driver's threads come with the first context and serve all.
+    auto context = gl::EglContext::make("auto");
+    if (!context) GTEST_SKIP() << "needs OpenGL 4.5: " << context.error().to_string();
+    driver_ = std::move(*context);
+    driver_->release();
+    before_ = gl::object_counts();
+    threads_before_ = own_threads();
+  }
+  uint64_t added(ObjectKind kind) const { return gl::object_counts().of(kind) - before_.of(kind); }
+  uint64_t compiled() const { return gl::object_counts().compiled_programs - before_.compiled_programs; }
+  uint64_t added_bytes() const { return gl::object_counts().size_bytes - before_.size_bytes; }
+
+  gl::PassReports planned(const SceneDesc& scene, const RuntimeFacts& facts) const {
+    const auto content = load_scene_content(scene);
+    EXPECT_TRUE(content.ok());
+    const auto passes = plan_server(scene, make_scene_asset(content->groom, content->head), facts);
+    EXPECT_TRUE(passes.ok());
+    return *passes;
+  }
+
+  std::unique_ptr<gl::EglContext> driver_;
+  ObjectCounts before_;
+  int threads_before_ = 0;
+};
+
+TEST_F(ServerCost, ASceneThatNeedsNothingHasItsStrandsAndNothingElse) {
+  ASSERT_TRUE(start(barest_scene()));
+  const ObjectCounts now = gl::object_counts();
+  EXPECT_EQ(now.contexts - before_.contexts, 1u) << "the simulation's; the frame thread has none";
+  EXPECT_EQ(compiled(), 1u) << "one kernel, no variant for colliders or gusts";
+  EXPECT_EQ(added(ObjectKind::Program), 1u);
+  EXPECT_EQ(added(ObjectKind::Framebuffer), 0u);
+  EXPECT_EQ(added(ObjectKind::VertexArray), 0u);
+  EXPECT_EQ(added_bytes(), server_->counters().sim.solver_bytes) << "buffers that no solver knows of";
+  EXPECT_EQ(decisions(server_->passes()), decisions(planned(barest_scene(), {})));
+  // Simulation, network, status, the frame thread, which sleeps, and at most the encoder of the first class.
+  EXPECT_LE(own_threads() - threads_before_, 5);
+}
+
+TEST_F(ServerCost, EachFactOfTheSceneCostsItsOwnVariants) {
+  ASSERT_TRUE(start(barest_scene()));
+  server_->stop();
+  server_.reset();
+  const uint64_t bare = compiled();
+  SceneDesc scene = barest_scene();
+  scene.has_auto_collider = true;
+  ASSERT_TRUE(start(scene));
+  EXPECT_GT(compiled() - bare, bare) << "colliders need programs that the bare scene has not";
+  EXPECT_EQ(decisions(server_->passes()), decisions(planned(scene, {})));
+}
+
+TEST_F(ServerCost, WhatViewersNeedComesAndGoesWithThem) {
+  const SceneDesc scene = barest_scene();
+  ASSERT_TRUE(start(scene));
+  const ObjectCounts unwatched = gl::object_counts();
+  {
+    const auto viewer = open(client_config(StreamMode::Strands));
+    ASSERT_TRUE(viewer);
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->has_picture(); }));
+    EXPECT_EQ(gl::object_counts(), unwatched) << "strands cost no OpenGL";
+    const RuntimeFacts facts{.strand_viewers = 1};
+    EXPECT_TRUE(eventually([&] { return decisions(server_->passes()) == decisions(planned(scene, facts)); }));
+  }
+  {
+    ClientConfig config = client_config(StreamMode::Frames);
+    config.hello.picture_codecs = decodable_picture_codecs();
+    const auto viewer = open(config);
+    ASSERT_TRUE(viewer);
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return viewer->has_picture(); }));
+    EXPECT_EQ(gl::object_counts().contexts, unwatched.contexts + 1);
+    EXPECT_GT(gl::object_counts().of(ObjectKind::Program), unwatched.of(ObjectKind::Program));
+    EXPECT_EQ(decisions(server_->passes()), decisions(planned(scene, {.frame_viewers = 1})));
+    for (const gl::PassReport& pass : server_->passes())
+      EXPECT_TRUE(!pass.name.starts_with("render/") || (pass.runs > 0) == (pass.fate == gl::PassFate::Kept))
+          << pass.name;
+  }
+  ASSERT_TRUE(eventually([&] { return gl::object_counts().contexts == unwatched.contexts; }));
+  ObjectCounts after = gl::object_counts();
+  after.compiled_programs = unwatched.compiled_programs;  // counts on
+  EXPECT_EQ(after, unwatched);
+  EXPECT_TRUE(eventually([&] { return decisions(server_->passes()) == decisions(planned(scene, {})); }));
+}
+
+TEST_F(ServerCost, WhatExplainMeasuresIsWhatItPlansAndAServerRuns) {
+  const SceneDesc scene = test::small_scene();
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  const RuntimeFacts facts{.strand_viewers = 1, .frame_viewers = 1};
+  const auto measured = measure_passes(scene, *content, facts, {});
+  ASSERT_TRUE(measured) << measured.error().to_string();
+  EXPECT_EQ(decisions(*measured), decisions(planned(scene, facts)));
+  for (const gl::PassReport& pass : *measured)
+    EXPECT_EQ(pass.runs > 0, pass.fate == gl::PassFate::Kept) << pass.name;
+}
+
+}  // namespace
+}  // namespace strandcast

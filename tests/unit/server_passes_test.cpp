@@ -1,0 +1,230 @@
+// The server's passes: which run for which viewers, that the stages of a step are the step, and what is
+// printed.
+#include "server/app/server_passes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/groom/groom_asset.h"
+#include "server/app/explain.h"
+#include "server/scene/scene_content.h"
+#include "server/sim/solver_registry.h"
+#include "tests/support/metrics_text.h"
+
+namespace strandcast {
+namespace {
+
+using gl::PassFate;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// A scene with everything that a fact decides.
+SceneDesc full_scene() {
+  SceneDesc scene = built_in_scene();
+  ProceduralGroomDesc groom;
+  groom.strand_count = 60;
+  groom.vertex_count = 6;
+  scene.groom = groom;
+  scene.wind.mean_mps = {3.0f, 0.0f, 1.0f};
+  scene.wind.gust_intensity = 0.3f;
+  return scene;
+}
+
+SceneDesc bare_scene() {
+  SceneDesc scene = full_scene();
+  scene.wind = {};
+  scene.has_auto_collider = false;
+  return scene;
+}
+
+SceneAsset asset_of(const SceneDesc& scene) {
+  const auto content = load_scene_content(scene);
+  EXPECT_TRUE(content.ok());
+  return content ? make_scene_asset(content->groom, content->head) : SceneAsset{};
+}
+
+std::vector<std::string> kept(const gl::PassReports& passes) {
+  std::vector<std::string> names;
+  for (const gl::PassReport& pass : passes)
+    if (pass.fate == PassFate::Kept) names.push_back(pass.name);
+  return names;
+}
+
+TEST(ServerPlan, RunsOnlyWhatTheSceneAndItsViewersNeed) {
+  const SceneDesc full = full_scene();
+  const auto watched = plan_server(full, asset_of(full), {.strand_viewers = 1, .frame_viewers = 1});
+  ASSERT_TRUE(watched) << watched.error().to_string();
+  int codecs = 0;
+  for (const gl::PassReport& pass : *watched) {
+    const bool is_codec = pass.name == "encode/jpeg" || pass.name == "encode/tiles" ||
+                          pass.name == "encode/vp8" || pass.name == "encode/h264";
+    if (is_codec && pass.fate == PassFate::Kept) ++codecs;
+    EXPECT_TRUE(is_codec || pass.fate == PassFate::Kept) << pass.name;
+    EXPECT_FALSE(pass.reason.empty()) << pass.name;
+  }
+  EXPECT_EQ(codecs, 1) << "one view has one codec";
+
+  const SceneDesc bare = bare_scene();
+  const auto unwatched = plan_server(bare, asset_of(bare), {});
+  ASSERT_TRUE(unwatched) << unwatched.error().to_string();
+  EXPECT_THAT(kept(*unwatched), ElementsAre("scene/motion", "sim/step", "publish/read", "publish/quantise"));
+  for (const gl::PassReport& pass : *unwatched)
+    EXPECT_EQ(pass.reason.find("nobody watches") != std::string::npos, pass.name.starts_with("publish/"))
+        << pass.name;
+  EXPECT_GT(saved_bytes(*unwatched), 0u);
+  EXPECT_LT(kept_bytes(*unwatched), kept_bytes(*watched));
+
+  const auto strands = plan_server(bare, asset_of(bare), {.strand_viewers = 1});
+  ASSERT_TRUE(strands);
+  EXPECT_THAT(kept(*strands),
+              ElementsAre("scene/motion", "sim/step", "publish/read", "publish/quantise", "encode/strands"));
+}
+
+/// Keeps what it is told.
+class RecordingSolver final : public Solver {
+ public:
+  Status load(const Groom&, const glm::dquat&) override { return {}; }
+  void substep(const StepInput& input) override {
+    steps.push_back(input);
+    if (steps.size() == stop_after) is_stopping = true;
+  }
+  void read(SolverState&) override {}
+  void write(const SolverState&) override {}
+  void rebase(const glm::dquat& world_from_head) override { jumps.push_back(world_from_head); }
+  uint64_t memory_bytes() const override { return 0; }
+
+  std::vector<StepInput> steps;
+  std::vector<glm::dquat> jumps;
+  size_t stop_after = 0;
+  std::atomic<bool> is_stopping{false};
+};
+
+InputFrame turned(int step) {
+  InputFrame input;
+  input.has_motion = true;
+  input.has_teleported = step == 3;
+  input.world_from_head.position_m = {0.01 * step, 0.002 * step, 0.0};
+  input.world_from_head.rotation = glm::angleAxis(0.05 * step, glm::dvec3(0.0, 1.0, 0.0));
+  return input;
+}
+
+struct StageWorld {
+  explicit StageWorld(const SceneDesc& wanted)
+      : scene(wanted),
+        content(load_scene_content(scene).value()),
+        builder(scene, content.colliders),
+        publisher(content.groom, 1e-4f),
+        stages(stage_sizes(scene, make_scene_asset(content.groom, {})), explain(scene, {})) {}
+  Status step(int step) {
+    StageTurn turn(builder, solver, publisher);
+    turn.input = turned(step);
+    turn.end_time_s = step / scene.step_rate_hz;
+    turn.is_stopping = &solver.is_stopping;
+    return stages.step(turn, nullptr);
+  }
+
+  SceneDesc scene;
+  SceneContent content;
+  RecordingSolver solver;
+  StepBuilder builder;
+  Publisher publisher;
+  SimStages stages;
+};
+
+TEST(SimStages, AStepRunInStagesIsTheStepThatTheFactsAskForBitForBit) {
+  for (const SceneDesc& scene : {full_scene(), bare_scene()}) {
+    StageWorld world(scene);
+    StepBuilder other(scene, world.content.colliders);
+    const SceneFeatures features = analyse(scene, {});
+    std::vector<StepInput> expected;
+    size_t jumps = 0;
+    for (int step = 1; step <= 5; ++step) {
+      ASSERT_TRUE(world.step(step));
+      const SceneStep& whole = other.build(turned(step), features, step / scene.step_rate_hz);
+      expected.insert(expected.end(), whole.substeps.begin(), whole.substeps.end());
+      jumps += whole.has_jumped ? 1 : 0;
+    }
+    EXPECT_EQ(jumps, 2u) << "the first pose, and a teleport";
+    EXPECT_EQ(world.solver.jumps.size(), jumps);
+    ASSERT_EQ(world.solver.steps.size(), expected.size());
+    for (size_t i = 0; i < expected.size(); ++i) {
+      const StepInput& ran = world.solver.steps[i];
+      EXPECT_EQ(ran.world_from_head, expected[i].world_from_head);
+      EXPECT_EQ(ran.head_shift_m, expected[i].head_shift_m);
+      EXPECT_EQ(ran.wind_mps, expected[i].wind_mps);
+      EXPECT_EQ(ran.wind_mps != glm::dvec3(0.0), features.has_wind);
+      ASSERT_EQ(ran.gusts.size(), expected[i].gusts.size());
+      EXPECT_EQ(!ran.gusts.empty(), features.has_turbulence);
+      for (size_t g = 0; g < ran.gusts.size(); ++g)
+        EXPECT_EQ(ran.gusts[g].phase_rad, expected[i].gusts[g].phase_rad);
+      ASSERT_EQ(ran.colliders.size(), expected[i].colliders.size());
+      EXPECT_EQ(!ran.colliders.empty(), features.has_colliders);
+      for (size_t c = 0; c < ran.colliders.size(); ++c)
+        EXPECT_EQ(ran.colliders[c].center_m, expected[i].colliders[c].center_m);
+    }
+  }
+}
+
+TEST(SimStages, WhatTheListSaysRanAndNothingElse) {
+  StageWorld world(bare_scene());
+  ASSERT_TRUE(world.step(1));
+  ASSERT_TRUE(world.step(2));
+  for (const gl::PassReport& pass : world.stages.report()) {
+    const bool has_run = pass.name == "scene/motion" || pass.name == "sim/step";
+    EXPECT_EQ(pass.runs, has_run ? 2u : 0u) << pass.name;
+    const bool is_off = pass.name.starts_with("scene/") && !has_run;
+    EXPECT_EQ(pass.fate == PassFate::NotRequested, is_off) << pass.name;
+  }
+  // A wind stream connects.
+  world.stages.plan_step(explain(world.scene, {.has_wind_stream = true}));
+  EXPECT_THAT(kept(world.stages.report()),
+              ElementsAre("scene/motion", "scene/wind", "sim/step", "publish/read", "publish/quantise"));
+}
+
+TEST(SimStages, AStepEndsBetweenSubstepsWhenItIsToldToStop) {
+  SceneDesc scene = bare_scene();
+  scene.substeps = 8;
+  StageWorld world(scene);
+  world.solver.stop_after = 3;
+  ASSERT_TRUE(world.step(1));
+  EXPECT_EQ(world.solver.steps.size(), 3u);
+}
+
+TEST(Explain, NamesEverySolverAndPrintsTheListAsItIs) {
+  for (const SolverRow& row : solver_table()) EXPECT_THAT(list_solvers(), HasSubstr(row.name));
+  const SceneDesc scene = bare_scene();
+  const SceneAsset asset = asset_of(scene);
+  auto passes = plan_server(scene, asset, {});
+  ASSERT_TRUE(passes);
+  (*passes)[0].runs = 1;
+  (*passes)[0].median_ms = 1.25;
+  const auto text = explain_scene(scene, asset, {}, *passes);
+  ASSERT_TRUE(text) << text.error().to_string();
+  for (const char* part : {"has_wind", "has_head_mesh", "1.25 ms", "unread", "not requested", "saved"})
+    EXPECT_THAT(*text, HasSubstr(part));
+  size_t at = text->find("\nPasses\n");
+  for (const gl::PassReport& pass : *passes) {
+    const size_t next = text->find(fmt::format("\n  {:<18} {}", pass.name, gl::to_string(pass.fate)), at);
+    ASSERT_NE(next, std::string::npos) << pass.name << " is not printed after the one before it";
+    at = next;
+  }
+}
+
+TEST(Metrics, SayThePassesAndWhatOpenGlHolds) {
+  const SceneDesc scene = bare_scene();
+  const auto passes = plan_server(scene, asset_of(scene), {});
+  ASSERT_TRUE(passes);
+  gl::ObjectCounts objects;
+  objects.objects[static_cast<size_t>(gl::ObjectKind::Buffer)] = 7;
+  objects.size_bytes = 4096;
+  const std::string text = format_passes(*passes, objects);
+  EXPECT_THAT(test::metric_faults(text), testing::IsEmpty());
+  for (const char* line :
+       {"strandcast_pass_is_kept{pass=\"sim/step\"} 1\n", "strandcast_pass_is_kept{pass=\"render/head\"} 0\n",
+        "strandcast_gl_objects{kind=\"buffer\"} 7\n", "strandcast_gl_bytes 4096\n",
+        "# TYPE strandcast_pass_median_ms gauge\n"})
+    EXPECT_THAT(text, HasSubstr(line));
+}
+
+}  // namespace
+}  // namespace strandcast
