@@ -59,10 +59,14 @@ Status StreamHub::begin() {
 /// Gives something to every reader with a demand for it, once.
 template <class IsWanted, class Give>
 void StreamHub::give(IsWanted is_wanted, Give give_one) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard giving(giving_mutex_);
   std::set<StreamReader*> readers;
-  for (const auto& [id, entry] : entries_)
-    if (is_wanted(entry) && readers.insert(entry.reader).second) give_one(*entry.reader);
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [id, entry] : entries_)
+      if (is_wanted(entry)) readers.insert(entry.reader);
+  }
+  for (StreamReader* reader : readers) give_one(*reader);
 }
 
 ReaderId StreamHub::add(StreamReader& reader, const ReaderTraits& traits) {
@@ -90,6 +94,7 @@ Result<PictureClass> StreamHub::set_demand(ReaderId reader, const Demand& demand
 void StreamHub::remove(ReaderId reader) {
   const std::lock_guard order(demand_mutex_);
   {
+    const std::lock_guard giving(giving_mutex_);
     const std::lock_guard lock(mutex_);
     book_.remove(reader);
     entries_.erase(reader);
@@ -271,6 +276,7 @@ void StreamHub::stop() {
   // Each worker calls the hub: all are taken out of reach before their threads are joined.
   std::vector<std::unique_ptr<StrandEncodeWorker>> encoders;
   std::unique_ptr<FrameWorker> frames;
+  const std::lock_guard giving(giving_mutex_);
   const std::lock_guard lock(mutex_);
   has_stopped_ = true;
   entries_.clear();

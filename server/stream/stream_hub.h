@@ -96,12 +96,13 @@ class StreamHub : public StateSink, public DemandDesk {
   const StreamHubConfig config_;
   SnapshotSlot slot_;
 
-  std::mutex
-      demand_mutex_;  // held through a change of the demands, so that the source hears of them in order
+  // Held through a change of the demands, so that the source hears of them in order.
+  std::mutex demand_mutex_;
   std::function<void(const SourceDemand&)> on_demand_;
   SourceDemand told_;  // to the source
 
-  mutable std::mutex mutex_;  // guards the block below; taken after demand_mutex_
+  std::mutex giving_mutex_;   // held while readers are called; taken after demand_mutex_
+  mutable std::mutex mutex_;  // guards the block below; taken last, and never held while a reader is called
   StreamDesc stream_;
   std::vector<StrandClass> classes_;
   DemandBook book_;

@@ -174,6 +174,35 @@ TEST_F(StreamOfARecording, TheNetworkHearsOfAChangeOfTheStreamWhileNobodyIsConne
   EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality().rate_divisor == 3; }));
 }
 
+/// Asks for what it needs from within what it is given, as a recorder that begins a file does.
+class AskingRecorder : public FrameRecorder {
+ public:
+  explicit AskingRecorder(StreamHub& hub) : hub_(hub) {}
+  void on_strands(const EncodedFramePtr& frame) override {
+    FrameRecorder::on_strands(frame);
+    hub_.request_keyframe(frame->header.stream_id);
+    hub_.request_whole(0);
+  }
+
+ private:
+  StreamHub& hub_;
+};
+
+TEST_F(StreamOfARecording, AReaderMayAskFromWithinWhatItIsGiven) {
+  AskingRecorder recorder(server_->hub());
+  const ReaderId reader = server_->hub().add(recorder);
+  Demand strands;
+  strands.strand_class = 0;
+  ASSERT_TRUE(server_->hub().set_demand(reader, strands).ok());
+  for (size_t count = 1; count <= 4; ++count) {
+    ASSERT_TRUE(eventually([&] { return recorder.frames().size() >= count; })) << count;
+    source_->play_next();
+  }
+  server_->hub().remove(reader);
+  for (const EncodedFramePtr& frame : recorder.frames())
+    EXPECT_EQ(frame->header.opcode, Opcode::StrandKeyframe) << "each was asked for by the one before";
+}
+
 TEST_F(StreamOfARecording, ADemandThatCannotBeMetChangesNothing) {
   FrameRecorder recorder;
   const ReaderId reader = server_->hub().add(recorder);
