@@ -19,8 +19,8 @@ namespace strandcast {
 
 inline constexpr size_t kMaxPictureViews = 8;     // different cameras and sizes
 inline constexpr size_t kMaxPictureClasses = 16;  // encoders
-/// Pixels of all classes together. Each class keeps its picture and what its encoder refers to: by estimate 20
-/// to 40 bytes a pixel.
+/// Pixels of all classes together. Each class keeps its picture and what its encoder refers to, by estimate
+/// 20 to 40 bytes a pixel; drawing it without a GPU takes about 100 more (2 x 2 samples of colour and depth).
 inline constexpr uint64_t kLargestPicturePixels = uint64_t{kMaxPictureWidth} * kMaxPictureHeight;
 inline constexpr uint64_t kMaxPicturePixels = 2 * kLargestPicturePixels;
 /// Of those, what viewers may take; the rest is kept for whoever controls.
