@@ -101,7 +101,7 @@ struct Context {
   LogBudget refusal_lines;
   LogBudget session_lines;
   Histogram queue_delays;  // of all viewers, as often as their links are looked at
-  TlsContextPtr tls;  // null: no TLS
+  TlsContextPtr tls;       // null: no TLS
 
  private:
   mutable std::mutex mutex;

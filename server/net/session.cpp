@@ -215,7 +215,8 @@ void Session::close(CloseCode code, const std::string& reason) {
   close_code_ = code;
   context_.update_session_counts();
   queue_.clear();
-  (void)queue_.push_control(Goodbye{printable(reason, kMaxReasonCharacters)});  // cannot be full: just cleared
+  (void)queue_.push_control(
+      Goodbye{printable(reason, kMaxReasonCharacters)});  // cannot be full: just cleared
   pump();
 }
 
