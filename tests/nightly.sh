@@ -10,6 +10,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 seconds=60
+jobs=2
 parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
@@ -32,9 +33,9 @@ build() {
 # Prints what the part says as it goes; its last line is the part's result.
 run_part() {
   case "$1" in
-    fuzz) build fuzz -DSTRANDCAST_FUZZ_SECONDS="$seconds" && bash tests/run_preset.sh nightly build/fuzz 1 ;;
-    grids) build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 2 -L 'property|compare' ;;
-    dev | tsan) build "$1" && bash tests/run_preset.sh "$1" "build/$1" 1 ;;
+    fuzz) build fuzz -DSTRANDCAST_FUZZ_SECONDS="$seconds" && bash tests/run_preset.sh nightly build/fuzz "$jobs" ;;
+    grids) build ci && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci "$jobs" -L 'property|compare' ;;
+    dev | tsan) build "$1" && bash tests/run_preset.sh "$1" "build/$1" "$jobs" ;;
     lto) build lto && echo "all files agree" ;;
   esac
 }
