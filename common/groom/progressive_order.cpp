@@ -136,7 +136,10 @@ std::vector<uint32_t> make_progressive_order(std::span<const glm::vec3> points, 
   taken.reserve(limit);
   if (limit == 0) return taken;
   const Bounds bounds = bounds_of(points);
-  float radius = std::max(glm::distance(bounds.low, bounds.high), std::numeric_limits<float>::min());
+  // The distance of points that lie very close to each other is 0, as their squares are; their extent is not.
+  const glm::vec3 extent = bounds.high - bounds.low;
+  float radius = std::max({glm::distance(bounds.low, bounds.high), extent.x, extent.y, extent.z,
+                           std::numeric_limits<float>::min()});
   TakenGrid grid(points, bounds.low, radius);
   std::vector<uint32_t> waiting = hashed_order(static_cast<uint32_t>(points.size()), seed);
   // Distance to some taken point: while it is below the radius the point need not be looked up again.
