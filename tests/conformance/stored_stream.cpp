@@ -130,7 +130,8 @@ Bytes unpacked(std::span<const std::byte> bytes) {
     }
     uint32_t before = 0;
     if (i >= sizeof(before)) std::memcpy(&before, bytes.data() + i - sizeof(before), sizeof(before));
-    if (before == frame.size()) plain.resize(plain.size() - sizeof(before));
+    const bool has_length = before == frame.size() && plain.size() >= sizeof(before);
+    if (has_length) plain.erase(plain.end() - sizeof(before), plain.end());
     plain.insert(plain.end(), content.begin(), content.end());
     i += frame.size();
   }
