@@ -26,11 +26,11 @@ Pose head_at(const StabilityTrial& trial, double time_s) {
 
 void spoil(BadInput bad_input, StepInput& input) {
   if (bad_input == BadInput::ZeroQuaternion) {
-    input.world_from_head = {0.0, 0.0, 0.0, 0.0};
+    input.world_from_head_rotation = {0.0, 0.0, 0.0, 0.0};
     return;
   }
   const double value = bad_input == BadInput::Infinite ? kInfinity : kNan;
-  input.world_from_head = {value, value, value, value};
+  input.world_from_head_rotation = {value, value, value, value};
   for (glm::dvec3* vector :
        {&input.head_shift_m, &input.gravity_mps2, &input.groom_gravity_in_head_mps2, &input.wind_mps})
     *vector = glm::dvec3(value);
@@ -43,7 +43,7 @@ StepInput input_of(const StabilityTrial& trial, double begin_s, double h_s) {
   const Pose after = head_at(trial, begin_s + h_s);
   StepInput input;
   input.h_s = h_s;
-  input.world_from_head = after.rotation;
+  input.world_from_head_rotation = after.rotation;
   input.head_shift_m = after.position_m - before.position_m;
   input.gravity_mps2 = trial.gravity_mps2;
   if (trial.is_groom_carried) input.groom_gravity_in_head_mps2 = trial.gravity_mps2;

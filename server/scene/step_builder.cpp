@@ -104,7 +104,7 @@ void StepBuilder::add_colliders() {
   for (StepInput& substep : step_.substeps)
     for (const SphereCollider& collider : colliders_)
       substep.colliders.push_back(
-          {glm::vec3(substep.world_from_head * glm::dvec3(collider.center_m)), collider.radius_m});
+          {glm::vec3(substep.world_from_head_rotation * glm::dvec3(collider.center_m)), collider.radius_m});
 }
 
 const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures& features,
@@ -133,7 +133,7 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s) {
     const Pose pose = i + 1 == step_.substeps.size() ? target : interpolate(from, target, blend);
     StepInput& substep = step_.substeps[i];
     substep.h_s = step_s / count;
-    substep.world_from_head = pose.rotation;
+    substep.world_from_head_rotation = pose.rotation;
     substep.head_shift_m = pose.position_m - previous.position_m;
     substep.gravity_mps2 = scene_.gravity_mps2;
     substep.groom_gravity_in_head_mps2 = groom_gravity_in_head_mps2_;

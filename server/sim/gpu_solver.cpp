@@ -16,8 +16,8 @@ GpuSolver::GpuSolver(const GpuSolverContext& context, const StrandParameters& pa
   shaders_ = *context.shaders;
 }
 
-Status GpuSolver::load(const Groom& groom, const glm::dquat& world_from_head) {
-  RETURN_IF_ERROR(strands_->load(groom, world_from_head));
+Status GpuSolver::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
+  RETURN_IF_ERROR(strands_->load(groom, world_from_head_rotation));
   RETURN_IF_ERROR(prepare());
   begin();
   return {};
@@ -50,8 +50,8 @@ void GpuSolver::write(const SolverState& state) {
   forget(strands_->write(state));
 }
 
-void GpuSolver::rebase(const glm::dquat& world_from_head) {
-  turn_memory(strands_->rebase(world_from_head));
+void GpuSolver::rebase(const glm::dquat& world_from_head_rotation) {
+  turn_memory(strands_->rebase(world_from_head_rotation));
 }
 
 uint64_t GpuSolver::memory_bytes() const {

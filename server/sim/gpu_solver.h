@@ -17,11 +17,11 @@ namespace strandcast {
 
 class GpuSolver : public Solver {
  public:
-  Status load(const Groom& groom, const glm::dquat& world_from_head) final;
+  Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) final;
   void substep(const StepInput& input) final;
   void read(SolverState& state) final { strands_->read(state); }
   void write(const SolverState& state) final;
-  void rebase(const glm::dquat& world_from_head) final;
+  void rebase(const glm::dquat& world_from_head_rotation) final;
   uint64_t memory_bytes() const final;
   const StrandState* strands() const final { return strands_.get(); }
   Status follow() final;

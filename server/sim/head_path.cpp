@@ -11,7 +11,7 @@ HeadPath HeadPath::at_rest(const glm::dquat& world_from_head_rotation) {
 }
 
 void HeadPath::advance(const StepInput& input) {
-  const glm::dquat rotation = limited_rotation(input.world_from_head);
+  const glm::dquat rotation = limited_rotation(input.world_from_head_rotation);
   const glm::dmat3 turned_back = glm::mat3_cast(world_from_head_rotation * glm::conjugate(rotation));
   turn_per_s = (glm::dmat3(1.0) - turned_back) / limited_substep_s(input);
   world_from_head_rotation = rotation;

@@ -10,7 +10,7 @@
 namespace strandcast {
 
 struct HeadPath {
-  glm::dquat world_from_head_rotation{1.0, 0.0, 0.0, 0.0};  // rotation, unit
+  glm::dquat world_from_head_rotation{1.0, 0.0, 0.0, 0.0};  // unit
   glm::dmat3 turn_per_s{0.0};  // velocity of a point by the turn of the last substep
   uint32_t step_index = 0;     // substeps since loading
 

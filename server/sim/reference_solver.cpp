@@ -13,9 +13,9 @@ bool is_sane(const glm::dvec3& value) {
   return glm::dot(value, value) < kBrokenM * kBrokenM;
 }
 
-Status ReferenceSolver::load(const Groom& groom, const glm::dquat& world_from_head) {
+Status ReferenceSolver::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
   ASSIGN_OR_RETURN(layout_, make_strand_layout(groom, most_vertices_));
-  head_ = HeadPath::at_rest(world_from_head);
+  head_ = HeadPath::at_rest(world_from_head_rotation);
   is_at_rest_ = true;
   position_m_.clear();
   for (uint32_t s = 0; s < layout_.strand_count; ++s)
@@ -30,7 +30,7 @@ void ReferenceSolver::substep(const StepInput& input) {
   ReferenceStep step;
   step.input = &input;
   step.h_s = limited_substep_s(input);
-  step.rotation = limited_rotation(input.world_from_head);
+  step.rotation = limited_rotation(input.world_from_head_rotation);
   step.carry = step.rotation * glm::conjugate(head_.world_from_head_rotation);
   step.shift_m = limited(input.head_shift_m, kMaxHeadShiftM);
   step.head_velocity_mps = step.shift_m / step.h_s;
@@ -77,8 +77,8 @@ void ReferenceSolver::write(const SolverState& state) {
   }
 }
 
-void ReferenceSolver::rebase(const glm::dquat& world_from_head) {
-  const glm::dquat turn = head_.rebase(world_from_head);
+void ReferenceSolver::rebase(const glm::dquat& world_from_head_rotation) {
+  const glm::dquat turn = head_.rebase(world_from_head_rotation);
   for (auto* values : {&position_m_, &velocity_mps_})
     for (glm::dvec3& value : *values) value = turn * value;
   turn_memory(turn);

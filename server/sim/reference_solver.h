@@ -30,11 +30,11 @@ bool is_sane(const glm::dvec3& value);
 
 class ReferenceSolver : public Solver {
  public:
-  Status load(const Groom& groom, const glm::dquat& world_from_head) final;
+  Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) final;
   void substep(const StepInput& input) final;
   void read(SolverState& state) final;
   void write(const SolverState& state) final;
-  void rebase(const glm::dquat& world_from_head) final;
+  void rebase(const glm::dquat& world_from_head_rotation) final;
   uint64_t memory_bytes() const final;
 
  protected:

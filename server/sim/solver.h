@@ -31,9 +31,9 @@ inline constexpr uint32_t kMaxGustWaves = 8;
 
 /// Everything one substep needs, at its end time.
 struct StepInput {
-  double h_s = 1.0 / 60.0;                         // substep
-  glm::dquat world_from_head{1.0, 0.0, 0.0, 0.0};  // rotation of the head at the end of the substep
-  glm::dvec3 head_shift_m{0.0};                    // movement of the head joint during the substep, world
+  double h_s = 1.0 / 60.0;                                  // substep
+  glm::dquat world_from_head_rotation{1.0, 0.0, 0.0, 0.0};  // at the end of the substep
+  glm::dvec3 head_shift_m{0.0};  // movement of the head joint during the substep, world
   glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
   /// Gravity under which the groom has its shape, in head space: what a solver with a sag-free groom lets the
   /// pull to the groomed shape carry. Zero: the groom is the shape without gravity.
@@ -57,7 +57,7 @@ class Solver {
  public:
   virtual ~Solver() = default;
   /// Sets every strand to rest under the given head rotation; allocates. `groom` is uniform.
-  virtual Status load(const Groom& groom, const glm::dquat& world_from_head) = 0;
+  virtual Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) = 0;
   /// Advances by input.h_s.
   virtual void substep(const StepInput& input) = 0;
   /// Copies the state out; resizes `state` on first use only.
@@ -67,7 +67,7 @@ class Solver {
   virtual void write(const SolverState& state) = 0;
   /// The head has jumped to this rotation, wherever it is: strands jump along with all that the model knows
   /// of them. Seen from the head nothing has changed.
-  virtual void rebase(const glm::dquat& world_from_head) = 0;
+  virtual void rebase(const glm::dquat& world_from_head_rotation) = 0;
   /// Bytes the solver keeps on its device.
   virtual uint64_t memory_bytes() const = 0;
 
@@ -79,6 +79,6 @@ class Solver {
 
 /// `to` goes on where `from` is, with the same strands: at once when both work on the same strands, else by
 /// way of a copy. On an error `from` is as it was.
-Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head);
+Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head_rotation);
 
 }  // namespace strandcast

@@ -43,11 +43,11 @@ Result<const SolverRow*> find_solver(const std::string& name) {
   return make_error(ErrorCode::NotFound, "unknown solver '{}' (known: {})", name, known);
 }
 
-Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head) {
+Status hand_over(Solver& from, Solver& to, const Groom& groom, const glm::dquat& world_from_head_rotation) {
   if (to.strands() != nullptr && to.strands() == from.strands()) return to.follow();
   SolverState state;
   from.read(state);
-  RETURN_IF_ERROR(to.load(groom, world_from_head));
+  RETURN_IF_ERROR(to.load(groom, world_from_head_rotation));
   to.write(state);
   return {};
 }

@@ -20,7 +20,7 @@ std::array<glm::vec4, 3> block_columns(const glm::dmat3& matrix) {
 StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
                           const StrandLayout& layout, const HeadPath& head) {
   const double h_s = limited_substep_s(input);
-  const glm::dquat rotation = limited_rotation(input.world_from_head);
+  const glm::dquat rotation = limited_rotation(input.world_from_head_rotation);
   const glm::dvec3 head_velocity = limited(input.head_shift_m, kMaxHeadShiftM) / h_s;
   const glm::dvec3 relative_wind = limited(input.wind_mps, kMaxWindMps) - head_velocity;
   const glm::dvec3 acceleration =

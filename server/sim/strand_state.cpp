@@ -53,10 +53,10 @@ void turn_plane(StrandPlane& plane, const glm::dquat& turn) {
   plane.write(values);
 }
 
-Status StrandState::load(const Groom& groom, const glm::dquat& world_from_head) {
+Status StrandState::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
   ASSIGN_OR_RETURN(StrandLayout layout, make_strand_layout(groom));
   RETURN_IF_ERROR(check_size(layout));
-  head_ = HeadPath::at_rest(world_from_head);
+  head_ = HeadPath::at_rest(world_from_head_rotation);
   is_at_rest_ = true;
   rest_ = StrandPlane("strand rest", layout.rest);
   staging_.resize(layout.size());
@@ -125,8 +125,8 @@ void StrandState::write_model(const std::vector<float>& values) {
   velocity_.write(staging_);
 }
 
-glm::dquat StrandState::rebase(const glm::dquat& world_from_head) {
-  const glm::dquat turn = head_.rebase(world_from_head);
+glm::dquat StrandState::rebase(const glm::dquat& world_from_head_rotation) {
+  const glm::dquat turn = head_.rebase(world_from_head_rotation);
   turn_plane(position_, turn);
   turn_plane(velocity_, turn);
   return turn;

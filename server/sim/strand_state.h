@@ -44,7 +44,7 @@ class StrandState {
  public:
   /// Sets every strand to rest under the given head rotation; allocates. BadInput as make_strand_layout(),
   /// Unsupported when the device's buffer textures are too small; the state is then as before.
-  Status load(const Groom& groom, const glm::dquat& world_from_head);
+  Status load(const Groom& groom, const glm::dquat& world_from_head_rotation);
 
   /// Counts, pinned vertices and rest lengths; `rest` of it as well, `arc` is in the buffers only.
   const StrandLayout& layout() const { return layout_; }
@@ -68,7 +68,7 @@ class StrandState {
   void write_model(const std::vector<float>& values);
   /// The head has jumped to this rotation; strands jump along and are in head space what they were. Returns
   /// the turn.
-  glm::dquat rebase(const glm::dquat& world_from_head);
+  glm::dquat rebase(const glm::dquat& world_from_head_rotation);
 
   uint64_t memory_bytes() const {
     return rest_.size_bytes() + position_.size_bytes() + velocity_.size_bytes();

@@ -43,10 +43,10 @@ glm::vec3 outside(const StepBlock& block, uint32_t collider_count, const glm::ve
 
 }  // namespace
 
-Status FloatStrands::load(const Groom& groom, const glm::dquat& world_from_head) {
+Status FloatStrands::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
   ASSIGN_OR_RETURN(layout_, make_strand_layout(groom));
   if (layout_.pinned_tail_count > 0) return make_error(ErrorCode::Unsupported, "free tips only");
-  previous_rotation_ = limited_rotation(world_from_head);
+  previous_rotation_ = limited_rotation(world_from_head_rotation);
   state_.position_m.clear();
   for (const glm::vec4& rest : layout_.rest)
     state_.position_m.emplace_back(previous_rotation_ * glm::dvec3(rest));
@@ -54,16 +54,16 @@ Status FloatStrands::load(const Groom& groom, const glm::dquat& world_from_head)
   return {};
 }
 
-void FloatStrands::rebase(const glm::dquat& world_from_head) {
-  const glm::dquat turn = limited_rotation(world_from_head) * glm::conjugate(previous_rotation_);
+void FloatStrands::rebase(const glm::dquat& world_from_head_rotation) {
+  const glm::dquat turn = limited_rotation(world_from_head_rotation) * glm::conjugate(previous_rotation_);
   for (auto* values : {&state_.position_m, &state_.velocity_mps})
     for (glm::vec3& value : *values) value = glm::vec3(turn * glm::dvec3(value));
-  previous_rotation_ = limited_rotation(world_from_head);
+  previous_rotation_ = limited_rotation(world_from_head_rotation);
 }
 
 void FloatStrands::substep(const StepInput& input) {
   const StepBlock block = make_step_block(input, parameters_, layout_, HeadPath::at_rest(previous_rotation_));
-  previous_rotation_ = limited_rotation(input.world_from_head);
+  previous_rotation_ = limited_rotation(input.world_from_head_rotation);
   const glm::mat3 rotation = glm::mat3(glm::mat3_cast(previous_rotation_));
   const auto collider_count =
       static_cast<uint32_t>(std::min<size_t>(input.colliders.size(), kMaxSphereColliders));

@@ -12,11 +12,11 @@ namespace strandcast {
 class FloatStrands final : public Solver {
  public:
   explicit FloatStrands(const StrandParameters& parameters) : parameters_(parameters) {}
-  Status load(const Groom& groom, const glm::dquat& world_from_head) override;
+  Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) override;
   void substep(const StepInput& input) override;
   void read(SolverState& state) override;
   void write(const SolverState& state) override;
-  void rebase(const glm::dquat& world_from_head) override;
+  void rebase(const glm::dquat& world_from_head_rotation) override;
   uint64_t memory_bytes() const override;
 
  private:

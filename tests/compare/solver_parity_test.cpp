@@ -150,7 +150,7 @@ void SolverParity::compare(const SolverRow& row, const ParityCase& test) {
   auto gpu = row.make_gpu(*parameters, {&shaders_, features_for(test)});
   ASSERT_TRUE(gpu) << gpu.error().to_string();
   const auto reference = row.make_reference(*parameters);
-  const glm::dquat start = moving_input(0, kSubstepS).world_from_head;
+  const glm::dquat start = moving_input(0, kSubstepS).world_from_head_rotation;
   ASSERT_TRUE((*gpu)->load(groom, start));
   ASSERT_TRUE(reference->load(groom, start));
   SolverState from_gpu;

@@ -40,7 +40,7 @@ class Quarantine : public GlTest {
     PublishInput publish_input;
     publish_input.tick = static_cast<uint64_t>(k);
     publish_input.sim_time_ns = std::llround(k * kStepS * 1e9);
-    publish_input.world_from_head.rotation = input.world_from_head;
+    publish_input.world_from_head.rotation = input.world_from_head_rotation;
     auto snapshot = publisher.publish(solver, publish_input);
     if (!publisher.quarantined().empty()) publisher.repair(solver);
     return snapshot;
@@ -110,7 +110,8 @@ TEST_F(Quarantine, APoisonedStrandReturnsAndItsNeighboursKeepTheirBits) {
             is_struck ? std::vector<uint32_t>{kPoisoned} : std::vector<uint32_t>{};
         ASSERT_THAT(publisher.quarantined(), ElementsAreArray(expected)) << row.name << ", step " << k;
         expect_equal_but_poisoned(*snapshot, *clean, row.name);
-        if (is_struck) expect_poisoned_at_rest(*solver, moving_input(k, kStepS).world_from_head, row.name);
+        if (is_struck)
+          expect_poisoned_at_rest(*solver, moving_input(k, kStepS).world_from_head_rotation, row.name);
       }
       EXPECT_EQ(clean_publisher.quarantine_count(), 0u);
     }

@@ -240,7 +240,7 @@ TEST_F(Articulated, AMillionTimesStifferKeepsTheGroom) {
         ASSERT_LE(length_excess_m(groom, state, 1e-5), 0.0) << "step " << step;
         for (uint32_t s = 0; s < groom.strand_count(); ++s) {
           const glm::vec3 tip = groom.rest_position_m[groom.offset[s + 1] - 1];
-          const glm::dvec3 groomed = input.world_from_head * glm::dvec3(tip);
+          const glm::dvec3 groomed = input.world_from_head_rotation * glm::dvec3(tip);
           const size_t at = (groom.vertex_count(s) - 1) * groom.strand_count() + s;
           off_m = std::max(off_m, glm::distance(groomed, glm::dvec3(state.position_m[at])));
         }

@@ -166,7 +166,7 @@ TEST_F(RodTwist, AShakenCurlComesBack) {
       StepInput input = calm_input(1.0 / kRateHz);
       input.head_shift_m = {head_m(t) - head_m(t - input.h_s), 0.0, 0.0};
       if (t < kShakenS) {
-        input.world_from_head = glm::angleAxis(2.0 * std::sin(8.0 * t), glm::dvec3(0.0, 1.0, 0.0));
+        input.world_from_head_rotation = glm::angleAxis(2.0 * std::sin(8.0 * t), glm::dvec3(0.0, 1.0, 0.0));
         swing_m = std::max(swing_m, largest_distance_m(read(*rod).position_m, groomed));
       }
       rod->substep(input);

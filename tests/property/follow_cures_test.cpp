@@ -158,7 +158,7 @@ TEST_F(FollowCures, StrandsOfDifferentThicknessMoveDifferently) {
           squares += 0.5 * (glm::dot(a, a) + glm::dot(b, b));
           const auto way = [&](size_t i) {
             return glm::dvec3(state.position_m[i]) -
-                   input.world_from_head * glm::dvec3(groomed.position_m[i]);
+                   input.world_from_head_rotation * glm::dvec3(groomed.position_m[i]);
           };
           const glm::dvec3 difference = way(tip + s) - way(tip + s + 1);
           apart_m2 += glm::dot(difference, difference);

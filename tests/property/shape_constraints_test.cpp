@@ -92,7 +92,7 @@ TEST_F(ShapeConstraints, LocalShapeSeesAnglesBetweenSegmentsOnly) {
              bare({{"shape_iterations", 1.0}, {"bend_stiffness_m4_per_s2", 1e-3}}), turn);
     put(*untouched, turned_m);
     StepInput input = calm_input();
-    input.world_from_head = turn;
+    input.world_from_head_rotation = turn;
     untouched->substep(input);
     expect_positions(*untouched, expected_m, 1e-7);
     put(*solver, turned_m);
@@ -149,12 +149,12 @@ TEST_F(ShapeConstraints, AFastShockTakesTheStrandAlongRigidly) {
   const Groom groom = make_test_groom(desc);
   StepInput input = calm_input();
   input.head_shift_m = {0.05, 0.0, 0.02};  // in one step: 190 m/s^2
-  input.world_from_head = glm::angleAxis(0.3, glm::normalize(glm::dvec3(1.0, 2.0, 0.5)));
+  input.world_from_head_rotation = glm::angleAxis(0.3, glm::normalize(glm::dvec3(1.0, 2.0, 0.5)));
   for (const SolverKind& kind : kinds()) {
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom, {{"shock_share", 0.0}, {"air_drag_per_s", 0.0}});
     solver->substep(input);
-    auto turned = make(kind, groom, {}, input.world_from_head);
+    auto turned = make(kind, groom, {}, input.world_from_head_rotation);
     EXPECT_LE(largest_distance_m(read(*solver).position_m, read(*turned).position_m), 2e-6);
   }
 }

@@ -17,7 +17,7 @@ class SolverLaws : public SolverTest {
 
 /// Everything of an input turned by one rotation.
 StepInput turned(StepInput input, const glm::dquat& turn) {
-  input.world_from_head = turn * input.world_from_head;
+  input.world_from_head_rotation = turn * input.world_from_head_rotation;
   input.head_shift_m = turn * input.head_shift_m;
   input.gravity_mps2 = turn * input.gravity_mps2;
   input.wind_mps = turn * input.wind_mps;
@@ -39,7 +39,7 @@ TEST_F(SolverLaws, RestStaysAtRestWithoutForces) {
       auto solver = make(kind, groom, {{"style_stiffness_per_s2", stiffness}}, tilted);
       const SolverState before = read(*solver);
       StepInput input = calm_input();
-      input.world_from_head = tilted;
+      input.world_from_head_rotation = tilted;
       for (int step = 0; step < 120; ++step) solver->substep(input);
       // Without a pull nothing takes back a rounding: 120 steps of 16 vertices, each off by a float step of
       // 0.5 m.
@@ -89,7 +89,7 @@ TEST_F(SolverLaws, ATurnedHeadWithItsOwnGravityIsAnUprightHead) {
   const Groom groom = make_test_groom({});
   const glm::dquat tilted = glm::angleAxis(2.0, glm::normalize(glm::dvec3(1.0, 2.0, -1.0)));
   StepInput input = standing_input();
-  input.world_from_head = tilted;
+  input.world_from_head_rotation = tilted;
   input.gravity_mps2 = tilted * input.gravity_mps2;
   for (const SolverKind& kind : sag_free_kinds()) {
     SCOPED_TRACE(kind.name());
@@ -106,7 +106,7 @@ TEST_F(SolverLaws, HairFallsToTheSideOfATiltedHead) {
   const Groom groom = make_test_groom({});
   const glm::dquat on_its_side = glm::angleAxis(1.57, glm::dvec3(0.0, 0.0, 1.0));
   StepInput input = standing_input();
-  input.world_from_head = on_its_side;
+  input.world_from_head_rotation = on_its_side;
   for (const SolverKind& kind : sag_free_kinds()) {
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom, {}, on_its_side);
@@ -182,7 +182,7 @@ TEST_F(SolverLaws, TurnedInputsGiveTheTurnedMotion) {
   const glm::dquat turn = glm::angleAxis(2.1, glm::normalize(glm::dvec3(0.3, -1.0, 0.5)));
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
-    const glm::dquat start = moving_input(0, kSubstepS).world_from_head;
+    const glm::dquat start = moving_input(0, kSubstepS).world_from_head_rotation;
     auto solver = make(kind, groom, {}, start);
     auto other = make(kind, groom, {}, turn * start);
     for (int step = 1; step <= 10; ++step) {

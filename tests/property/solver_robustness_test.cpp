@@ -109,7 +109,7 @@ TEST_F(SolverRobustness, ExtremeInputsStayFiniteAndExact) {
     add("wind", [value](StepInput& input) { input.wind_mps = {value, 0.0, -value}; });
     add("shift", [value](StepInput& input) { input.head_shift_m = {0.0, value, value}; });
     add("substep", [value](StepInput& input) { input.h_s = value; });
-    add("rotation", [value](StepInput& input) { input.world_from_head = {value, value, 0.0, 0.0}; });
+    add("rotation", [value](StepInput& input) { input.world_from_head_rotation = {value, value, 0.0, 0.0}; });
     const float single = static_cast<float>(value);
     add("gust", [single](StepInput& input) {
       for (GustWave& wave : input.gusts) wave = {glm::vec3(single), glm::vec3(single), single};
@@ -119,7 +119,7 @@ TEST_F(SolverRobustness, ExtremeInputsStayFiniteAndExact) {
     });
   }
   add("zero substep", [](StepInput& input) { input.h_s = 0.0; });
-  add("zero rotation", [](StepInput& input) { input.world_from_head = {0.0, 0.0, 0.0, 0.0}; });
+  add("zero rotation", [](StepInput& input) { input.world_from_head_rotation = {0.0, 0.0, 0.0, 0.0}; });
   add("too many colliders", [](StepInput& input) { input.colliders.assign(100, {glm::vec3(0.0f), 0.1f}); });
   add("too many gusts", [](StepInput& input) { input.gusts.assign(100, input.gusts[0]); });
   for (const SolverKind& kind : all_kinds()) {

@@ -64,7 +64,7 @@ class FakeModel : public Solver {
  public:
   using Move = std::function<void(int step, const StepInput& input, SolverState& state)>;
   FakeModel(Groom groom, Move move) : groom_(std::move(groom)), move_(std::move(move)) {}
-  Status load(const Groom& groom, const glm::dquat& world_from_head) override {
+  Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) override {
     groom_ = groom;
     step_ = 0;
     const uint32_t strand_count = groom.strand_count();
@@ -73,7 +73,7 @@ class FakeModel : public Solver {
     for (uint32_t s = 0; s < strand_count; ++s)
       for (uint32_t i = 0; i < groom.vertex_count(s); ++i)
         state_.position_m[i * strand_count + s] =
-            glm::vec3(world_from_head * glm::dvec3(groom.rest_position_m[groom.offset[s] + i]));
+            glm::vec3(world_from_head_rotation * glm::dvec3(groom.rest_position_m[groom.offset[s] + i]));
     return {};
   }
   void substep(const StepInput& input) override { move_(step_++, input, state_); }

@@ -29,7 +29,7 @@ class StrandStates : public SolverTest {
 /// The motion of moving_input() in a world that is turned as a whole.
 StepInput turned_input(int step, const glm::dquat& turn) {
   StepInput input = moving_input(step, kSubstepS);
-  input.world_from_head = turn * input.world_from_head;
+  input.world_from_head_rotation = turn * input.world_from_head_rotation;
   input.head_shift_m = turn * input.head_shift_m;
   input.gravity_mps2 = turn * input.gravity_mps2;
   input.wind_mps = turn * input.wind_mps;
@@ -51,9 +51,9 @@ TEST_F(StrandStates, AJumpOfTheHeadChangesNothingSeenFromTheHead) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
-    auto solver = make(kind, groom, {}, moving_input(0, kSubstepS).world_from_head);
+    auto solver = make(kind, groom, {}, moving_input(0, kSubstepS).world_from_head_rotation);
     for (int step = 1; step <= 6; ++step) solver->substep(moving_input(step, kSubstepS));
-    const glm::dquat before = moving_input(6, kSubstepS).world_from_head;
+    const glm::dquat before = moving_input(6, kSubstepS).world_from_head_rotation;
     const SolverState old = read(*solver);
     solver->rebase(kTurn * before);
     const SolverState now = read(*solver);
@@ -71,7 +71,7 @@ TEST_F(StrandStates, AfterAJumpIntoAWorldTurnedAlikeTheMotionGoesOn) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name());
-    const glm::dquat start = moving_input(0, kSubstepS).world_from_head;
+    const glm::dquat start = moving_input(0, kSubstepS).world_from_head_rotation;
     const SolverParameters given = {{"random_order", 1.0}};
     auto staying = make(kind, groom, given, start);
     auto jumping = make(kind, groom, given, start);
@@ -79,7 +79,7 @@ TEST_F(StrandStates, AfterAJumpIntoAWorldTurnedAlikeTheMotionGoesOn) {
       staying->substep(moving_input(step, kSubstepS));
       jumping->substep(moving_input(step, kSubstepS));
     }
-    jumping->rebase(kTurn * moving_input(8, kSubstepS).world_from_head);
+    jumping->rebase(kTurn * moving_input(8, kSubstepS).world_from_head_rotation);
     for (int step = 9; step <= 12; ++step) {
       staying->substep(moving_input(step, kSubstepS));
       jumping->substep(turned_input(step, kTurn));
@@ -93,7 +93,7 @@ TEST_F(StrandStates, AfterAJumpIntoAWorldTurnedAlikeTheMotionGoesOn) {
 TEST_F(StrandStates, StrandsAsLoadedJumpBeforeTheirFirstStep) {
   const Groom groom = make_test_groom({});
   StepInput standing;
-  standing.world_from_head = kTurn;
+  standing.world_from_head_rotation = kTurn;
   standing.gravity_mps2 = kTurn * standing.gravity_mps2;
   standing.groom_gravity_in_head_mps2 = {0.0, -9.81, 0.0};
   for (const SolverKind& kind : all_kinds()) {
@@ -111,7 +111,7 @@ TEST_F(StrandStates, StrandsAsLoadedJumpBeforeTheirFirstStep) {
 
 TEST_F(StrandStates, ASolverGoesOnWhereAnotherLeftTheStrands) {
   const Groom groom = make_test_groom({});
-  const glm::dquat start = moving_input(0, kSubstepS).world_from_head;
+  const glm::dquat start = moving_input(0, kSubstepS).world_from_head_rotation;
   const std::vector<SolverRow>& table = solver_table();
   for (size_t i = 0; i < table.size(); ++i) {
     const SolverRow& before = table[i];
@@ -132,7 +132,7 @@ TEST_F(StrandStates, ASolverGoesOnWhereAnotherLeftTheStrands) {
     const SolverState left = read(*first);
 
     auto second = make_on(after, strands);
-    ASSERT_TRUE(hand_over(*first, *second, groom, input.world_from_head));
+    ASSERT_TRUE(hand_over(*first, *second, groom, input.world_from_head_rotation));
     first.reset();
     EXPECT_EQ(second->strands(), strands.get());
     EXPECT_EQ(read(*second).position_m, left.position_m);
@@ -140,7 +140,7 @@ TEST_F(StrandStates, ASolverGoesOnWhereAnotherLeftTheStrands) {
 
     // As a solver with strands of its own that is given a copy.
     auto copied = make_on(after, nullptr);
-    ASSERT_TRUE(copied->load(groom, input.world_from_head));
+    ASSERT_TRUE(copied->load(groom, input.world_from_head_rotation));
     copied->write(left);
     for (int step = 9; step <= 12; ++step) {
       second->substep(moving_input(step, kSubstepS));
@@ -159,14 +159,14 @@ TEST_F(StrandStates, SolversWithAndWithoutStrandsOnTheGpuFollowEachOther) {
   auto on_gpu = make_on(kernel, strands);
   ASSERT_TRUE(on_gpu->load(groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   for (int step = 1; step <= 4; ++step) on_gpu->substep(moving_input(step, kSubstepS));
-  const glm::dquat rotation = moving_input(4, kSubstepS).world_from_head;
+  const glm::dquat rotation = moving_input(4, kSubstepS).world_from_head_rotation;
   auto own = make_on(helix, strands);
   ASSERT_TRUE(hand_over(*on_gpu, *own, groom, rotation));
   EXPECT_EQ(own->strands(), nullptr);
   EXPECT_EQ(read(*own).position_m, read(*on_gpu).position_m);
   own->substep(moving_input(5, kSubstepS));
   auto back = make_on(kernel, strands);
-  ASSERT_TRUE(hand_over(*own, *back, groom, moving_input(5, kSubstepS).world_from_head));
+  ASSERT_TRUE(hand_over(*own, *back, groom, moving_input(5, kSubstepS).world_from_head_rotation));
   EXPECT_EQ(read(*back).position_m, read(*own).position_m);
   EXPECT_EQ(read(*back).velocity_mps, read(*own).velocity_mps);
 }

@@ -28,7 +28,7 @@ class TractrixHybrid : public SolverTest {
     parameters["tractrix_sweeps"] = sweeps;
     parameters["tractrix_first"] = is_first;
     const auto solver = row.make_reference(parameters);
-    EXPECT_TRUE(solver->load(groom_, moving_input(0, kSubstepS).world_from_head));
+    EXPECT_TRUE(solver->load(groom_, moving_input(0, kSubstepS).world_from_head_rotation));
     std::vector<SolverState> states;
     for (int step = 1; step <= kSteps; ++step) {
       StepInput input = moving_input(step, kSubstepS);

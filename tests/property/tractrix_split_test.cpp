@@ -70,12 +70,13 @@ TEST_F(TractrixSplit, AllStyleIsARigidStrandAndLessStyleMovesMore) {
     SCOPED_TRACE(kind.name());
     double last_m = 0.0;
     for (const double mix : {1.0, 0.75, 0.5, 0.25, 0.0}) {
-      auto solver = make(kind, groom, {{"style_mix", mix}}, moving_input(0, kSubstepS).world_from_head);
+      auto solver =
+          make(kind, groom, {{"style_mix", mix}}, moving_input(0, kSubstepS).world_from_head_rotation);
       double moved_m = 0.0;
       for (int step = 1; step <= 60; ++step) {
         solver->substep(bare_motion(step));
         const SolverState state = read(*solver);
-        const glm::dquat turn = bare_motion(step).world_from_head;
+        const glm::dquat turn = bare_motion(step).world_from_head_rotation;
         const uint32_t strands = groom.strand_count();
         for (size_t i = 0; i < state.position_m.size(); ++i) {
           const glm::dvec3 rest(groom.rest_position_m[groom.offset[i % strands] + i / strands]);

@@ -192,7 +192,7 @@ TEST_F(TractrixRows, ATurnedHeadShowsTheExactStepForAnyStepSize) {
   }
   const Groom groom = spokes.groom();
   StepInput input = calm_input();
-  input.world_from_head = turn;
+  input.world_from_head_rotation = turn;
   for (const SolverKind& kind : kinds()) {
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom, {{"style_stiffness_per_s2", 0.0}, {"style_mix", 0.0}});

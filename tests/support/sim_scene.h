@@ -77,14 +77,15 @@ inline StepInput moving_input(int k, double h_s) {
   };
   StepInput input;
   input.h_s = h_s;
-  input.world_from_head = glm::angleAxis(0.5 * std::sin(4.0 * t), glm::normalize(glm::dvec3(1.0, 0.4, -0.2)));
+  input.world_from_head_rotation =
+      glm::angleAxis(0.5 * std::sin(4.0 * t), glm::normalize(glm::dvec3(1.0, 0.4, -0.2)));
   input.head_shift_m = head_at(t) - head_at(t - h_s);
   input.groom_gravity_in_head_mps2 = {0.0, -9.81, 0.0};
   input.wind_mps = {2.0, 0.0, -1.0};
   input.gusts = {{{0.8f, 0.2f, 0.0f}, {3.0f, 1.0f, 0.0f}, static_cast<float>(2.0 * t)},
                  {{0.0f, 0.1f, 0.7f}, {0.0f, 2.0f, 4.0f}, static_cast<float>(3.0 * t)}};
   input.colliders = {{glm::vec3(0.0f, 0.0f, 0.0f), 0.099f},
-                     {glm::vec3(input.world_from_head * glm::dvec3(0.0, -0.05, 0.04)), 0.08f}};
+                     {glm::vec3(input.world_from_head_rotation * glm::dvec3(0.0, -0.05, 0.04)), 0.08f}};
   return input;
 }
 

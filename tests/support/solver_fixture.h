@@ -32,7 +32,7 @@ class SolverTest : public GlTest {
 
   /// A loaded solver; `given` holds what differs from the defaults, as far as the row knows it.
   std::unique_ptr<Solver> make(const SolverKind& kind, const Groom& groom, const SolverParameters& given = {},
-                               const glm::dquat& world_from_head = {1.0, 0.0, 0.0, 0.0},
+                               const glm::dquat& world_from_head_rotation = {1.0, 0.0, 0.0, 0.0},
                                const SceneFeatures& features = all_features()) {
     const auto parameters = complete_parameters(*kind.row, known_parameters(*kind.row, given));
     EXPECT_TRUE(parameters) << parameters.error().to_string();
@@ -44,7 +44,7 @@ class SolverTest : public GlTest {
     } else {
       solver = kind.row->make_reference(*parameters);
     }
-    const Status loaded = solver->load(groom, world_from_head);
+    const Status loaded = solver->load(groom, world_from_head_rotation);
     EXPECT_TRUE(loaded) << loaded.error().to_string();
     return solver;
   }

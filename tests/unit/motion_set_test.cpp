@@ -65,7 +65,8 @@ TEST(MotionSet, AllRatesSampleTheSameMotion) {
       EXPECT_NEAR(time_s, 0.2, 1e-9);
       EXPECT_NEAR(glm::distance(way_m, motion->head_at(0.2).position_m - motion->head_at(0.0).position_m),
                   0.0, 1e-9);
-      EXPECT_NEAR(angle_between_rad(inputs.back().world_from_head, motion->head_at(0.2).rotation), 0.0, 1e-6);
+      EXPECT_NEAR(angle_between_rad(inputs.back().world_from_head_rotation, motion->head_at(0.2).rotation),
+                  0.0, 1e-6);
     }
   }
 }

@@ -90,7 +90,9 @@ class RecordingSolver final : public Solver {
   }
   void read(SolverState&) override {}
   void write(const SolverState&) override {}
-  void rebase(const glm::dquat& world_from_head) override { jumps.push_back(world_from_head); }
+  void rebase(const glm::dquat& world_from_head_rotation) override {
+    jumps.push_back(world_from_head_rotation);
+  }
   uint64_t memory_bytes() const override { return 0; }
 
   std::vector<StepInput> steps;
@@ -149,7 +151,7 @@ TEST(SimStages, AStepRunInStagesIsTheStepThatTheFactsAskForBitForBit) {
     ASSERT_EQ(world.solver.steps.size(), expected.size());
     for (size_t i = 0; i < expected.size(); ++i) {
       const StepInput& ran = world.solver.steps[i];
-      EXPECT_EQ(ran.world_from_head, expected[i].world_from_head);
+      EXPECT_EQ(ran.world_from_head_rotation, expected[i].world_from_head_rotation);
       EXPECT_EQ(ran.head_shift_m, expected[i].head_shift_m);
       EXPECT_EQ(ran.wind_mps, expected[i].wind_mps);
       EXPECT_EQ(ran.wind_mps != glm::dvec3(0.0), features.has_wind);

@@ -37,7 +37,7 @@ TEST(StepBuilder, SubstepsAddUpToTheHeadMovement) {
     shift_m += step.substeps[i].head_shift_m;
     time_s += step.substeps[i].h_s;
     const glm::dquat expected = glm::angleAxis(0.1 * static_cast<double>(i + 1), glm::dvec3(0.0, 1.0, 0.0));
-    EXPECT_NEAR(angle_between_rad(step.substeps[i].world_from_head, expected), 0.0, 1e-7);
+    EXPECT_NEAR(angle_between_rad(step.substeps[i].world_from_head_rotation, expected), 0.0, 1e-7);
   }
   EXPECT_NEAR(glm::length(shift_m - glm::dvec3(0.1, 0.02, -0.03)), 0.0, 1e-9);
   EXPECT_NEAR(time_s, 1.0 / scene.step_rate_hz, 1e-12);
@@ -54,7 +54,7 @@ TEST(StepBuilder, JumpsAndTheFirstPoseMoveStrandsRigidly) {
   EXPECT_TRUE(second.has_jumped);
   for (const StepInput& substep : second.substeps) {
     EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
-    EXPECT_NEAR(angle_between_rad(substep.world_from_head, jump.world_from_head.rotation), 0.0, 1e-7)
+    EXPECT_NEAR(angle_between_rad(substep.world_from_head_rotation, jump.world_from_head.rotation), 0.0, 1e-7)
         << "the jump turns nothing within the step";
   }
 }
