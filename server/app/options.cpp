@@ -4,7 +4,9 @@
 #include <variant>
 
 #include "common/base/version.h"
+#include "common/log/log.h"
 #include "common/scene/scene_file.h"
+#include "server/source/scene_change.h"
 
 namespace strandcast {
 namespace {
@@ -193,12 +195,18 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
 }
 
 Result<ServerConfig> load_config(const ServerOptions& options) {
+  const auto load = [&](const std::vector<std::string>& overrides) {
+    return options.scene_path.empty() ? built_in_scene_with(overrides)
+                                      : load_scene(options.scene_path, overrides);
+  };
   ServerConfig config = options.config;
-  if (options.scene_path.empty()) {
-    ASSIGN_OR_RETURN(config.scene, built_in_scene_with(options.overrides));
-  } else {
-    ASSIGN_OR_RETURN(config.scene, load_scene(options.scene_path, options.overrides));
-  }
+  ASSIGN_OR_RETURN(const SceneDesc scene, load(options.overrides));
+  std::vector<std::string> others = options.overrides;
+  std::erase_if(others, [](const std::string& assignment) { return assignment.starts_with("solver"); });
+  ASSIGN_OR_RETURN(const SceneDesc own, load(others));
+  ASSIGN_OR_RETURN(config.scene, choose_solver(scene, own.solver, options.overrides));
+  if (const std::string note = left_out_note(scene.solver, config.scene.solver); !note.empty())
+    log_warn("app", "{}", note);
   return config;
 }
 

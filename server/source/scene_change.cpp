@@ -23,6 +23,43 @@ Status check_solver(const SceneDesc& scene) {
   return check_step(*row, *parameters, 1.0 / (scene.step_rate_hz * scene.substeps));
 }
 
+void fit_parameters(SolverDesc& solver) {
+  const auto row = find_solver(solver.name);
+  if (!row) return;
+  std::erase_if(solver.parameters, [&](const auto& given) {
+    return std::none_of(
+        (*row)->parameters.begin(), (*row)->parameters.end(), [&](const SolverParameterInfo& info) {
+          const bool is_allowed = given.second >= info.minimum && given.second <= info.maximum;
+          return info.name == given.first && is_allowed;
+        });
+  });
+}
+
+std::string left_out_note(const SolverDesc& before, const SolverDesc& after) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : before.parameters)
+    if (!after.parameters.contains(name)) names.push_back(fmt::format("{} {:g}", name, value));
+  if (names.empty()) return {};
+  return fmt::format("solver {} does not take {}: left out", after.name, fmt::join(names, ", "));
+}
+
+Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_solver,
+                                const std::vector<std::string>& overrides) {
+  SceneDesc fitted = scene;
+  if (scene.solver.name == scene_solver.name) return fitted;
+  fit_parameters(fitted.solver);
+  // What was asked for beside the solver is kept, so that a wrong name or value is told.
+  constexpr std::string_view kGroup = "solver.parameters.";
+  for (const std::string& assignment : overrides) {
+    const std::string path = assignment.substr(0, assignment.find('='));
+    if (!path.starts_with(kGroup)) continue;
+    const auto given = scene.solver.parameters.find(path.substr(kGroup.size()));
+    if (given != scene.solver.parameters.end()) fitted.solver.parameters.insert(*given);
+  }
+  RETURN_IF_ERROR(check_solver(fitted));
+  return fitted;
+}
+
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment) {
   const std::string path = assignment.substr(0, assignment.find_first_of("= "));
   const std::vector<std::string>& fields = live_fields();
@@ -33,13 +70,7 @@ Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assign
     return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));
   ASSIGN_OR_RETURN(SceneDesc changed, with_overrides(scene, {assignment}));
-  if (changed.solver.name != scene.solver.name) {
-    ASSIGN_OR_RETURN(const SolverRow* row, find_solver(changed.solver.name));
-    std::erase_if(changed.solver.parameters, [&](const auto& given) {
-      return std::none_of(row->parameters.begin(), row->parameters.end(),
-                          [&](const SolverParameterInfo& info) { return info.name == given.first; });
-    });
-  }
+  if (changed.solver.name != scene.solver.name) fit_parameters(changed.solver);
   RETURN_IF_ERROR(check_solver(changed));
   return changed;
 }

@@ -13,8 +13,19 @@ namespace strandcast {
 const std::vector<std::string>& live_fields();
 
 /// The scene after one assignment to a live field, with the solver's name and parameters checked. Parameters
-/// that a newly chosen solver does not have are dropped. Errors name what is known.
+/// that a newly chosen solver does not take are left out. Errors name what is known.
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment);
+
+/// Takes out the parameters that the solver of this name does not have, or not with this value.
+void fit_parameters(SolverDesc& solver);
+
+/// What fit_parameters took out between the two, as a sentence; empty when nothing.
+std::string left_out_note(const SolverDesc& before, const SolverDesc& after);
+
+/// A scene whose overrides named another solver than its file did, without the parameters of the file's that
+/// the new one does not take. Parameters that the overrides themselves name stay and are checked.
+Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_solver,
+                                const std::vector<std::string>& overrides);
 
 /// Checks the solver's name and parameters of a scene.
 Status check_solver(const SceneDesc& scene);

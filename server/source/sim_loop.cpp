@@ -229,13 +229,15 @@ Notice SimLoop::change(const std::string& assignment) {
   if (is_other_solver || !needs_same_solver(features, solver_features_))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
+  const std::string left_out = left_out_note(config_.scene.solver, scene->solver);
   config_.scene = *scene;
   builder_->change(*scene, colliders_of(*scene, config_.content->groom));
   follow_stream_settings();
   if (has_other_stream())
     return {false, fmt::format("{} soon: the stream changes at most every {} ms.", assignment,
                                kStreamChangeNs / 1'000'000)};
-  return {false, fmt::format("{} from step {} on.", assignment, tick_ + 1)};
+  return {false, fmt::format("{} from step {} on{}{}.", assignment, tick_ + 1, left_out.empty() ? "" : "; ",
+                             left_out)};
 }
 
 /// Publishes the present state once more, so that viewers see the change also while paused. Of many settings

@@ -63,6 +63,17 @@ TEST(SceneChange, EverySolverCanBeChosenFromEveryOtherWithItsParametersSet) {
   }
 }
 
+TEST(SceneChange, SaysWhatANewSolverDoesNotTake) {
+  SceneDesc scene = built_in_scene();
+  scene.solver = {"xpbd", {{"iterations", 20.0}, {"sag_free", 0.5}}};
+  const auto changed = change_scene(scene, "solver.name=dftl");
+  ASSERT_TRUE(changed.ok()) << changed.error().to_string();
+  EXPECT_EQ(changed->solver.parameters, (std::map<std::string, double>{{"sag_free", 0.5}}));
+  EXPECT_EQ(left_out_note(scene.solver, changed->solver),
+            "solver dftl does not take iterations 20: left out");
+  EXPECT_EQ(left_out_note(scene.solver, scene.solver), "");
+}
+
 TEST(SceneChange, StepsOutsideTheStableRangeAreRefusedWhateverChangesThem) {
   SceneDesc scene = built_in_scene();
   scene.solver.name = "mass_spring";
@@ -369,6 +380,43 @@ TEST(Viewers, IsDescribedForTheLogOnOneLine) {
 Result<ServerOptions> parse(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "strandcast-server");
   return parse_options(static_cast<int>(arguments.size()), arguments.data());
+}
+
+// Every scene that ships with every row of the table, as somebody would type it.
+TEST(ServerOptions, EverySceneTakesEverySolver) {
+  const auto folder = std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy" / "scenes";
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    for (const SolverRow& row : solver_table()) {
+      ServerOptions options;
+      options.scene_path = entry.path();
+      options.overrides = {"solver.name=" + row.name};
+      const std::string stem = entry.path().stem().string();
+      if (stem == "mohawk" || stem == "sintel") options.overrides.push_back("groom.file.path=some.tfx");
+      const auto config = load_config(options);
+      ASSERT_TRUE(config.ok()) << stem << ": " << config.error().to_string();
+      EXPECT_EQ(config->scene.solver.name, row.name);
+      EXPECT_TRUE(check_solver(config->scene)) << stem << ", " << row.name;
+    }
+  }
+}
+
+TEST(ServerOptions, ParametersThatWereTypedAreNotLeftOut) {
+  const auto config_for = [](std::vector<std::string> overrides) {
+    ServerOptions options;
+    options.scene_path =
+        std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy/scenes/position_based.textproto";
+    options.overrides = std::move(overrides);
+    return load_config(options);
+  };
+  const auto fitted = config_for({"solver.name=dftl", "solver.parameters.s_damping=0.5"});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().to_string();
+  EXPECT_EQ(fitted->scene.solver.parameters, (std::map<std::string, double>{{"s_damping", 0.5}}));
+  const auto unknown = config_for({"solver.name=dftl", "solver.parameters.iterations=7"});
+  ASSERT_FALSE(unknown.ok());
+  EXPECT_THAT(unknown.error().to_string(), HasSubstr("no parameter 'iterations'"));
+  const auto outside = config_for({"solver.name=dftl", "solver.parameters.s_damping=17"});
+  ASSERT_FALSE(outside.ok());
+  EXPECT_THAT(outside.error().to_string(), HasSubstr("17"));
 }
 
 TEST(ServerMetrics, FollowTheirFormat) {
