@@ -11,10 +11,12 @@ usage: bash deploy/run.sh [options]
   --motion FILE        head motion to feed: BVH                                 (default: built in)
   --motion-unit M      metres per unit of the BVH                               (default: from the body's height)
   --motion-up y|z      up axis of the BVH                                       (default: y)
+  --joint NAME         head joint of the BVH                                    (default: found by its name)
+  --filter-glitches    take steps out of the BVH that are faster than any head moves
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
   --scene FILE         scene as protobuf text, see deploy/scenes
   --set PATH=VALUE     overrides one field of the scene; may be repeated
-  --seconds N          stop after N seconds                                     (default: 6 headless, else never)
+  --seconds N          stop after N seconds; headless, what came is drawn then  (default: 6 headless, else never)
   --out DIR            where picture, clip, report and logs go                  (default: out)
   --headless           no window, even where there is a display
   --help
@@ -29,7 +31,8 @@ while [ $# -gt 0 ]; do
   case "$1" in
     --help|-h) usage; exit 0 ;;
     --headless) headless=1; shift; continue ;;
-    --groom|--motion|--motion-unit|--motion-up|--wind|--scene|--set|--seconds|--out) ;;
+    --filter-glitches) motion_options+=(--filter-glitches); shift; continue ;;
+    --groom|--motion|--motion-unit|--motion-up|--joint|--wind|--scene|--set|--seconds|--out) ;;
     *) usage >&2; fail "unknown option: $1" ;;
   esac
   [ $# -ge 2 ] || fail "$1 needs a value"
@@ -40,6 +43,7 @@ while [ $# -gt 0 ]; do
     --motion) need_file "$1" "$2"; motion=$(realpath "$2") ;;
     --motion-unit) motion_options+=(--unit "$2") ;;
     --motion-up) motion_options+=(--up "$2") ;;
+    --joint) motion_options+=(--joint "$2") ;;
     --wind) need_file "$1" "$2"; wind=$(realpath "$2") ;;
     --seconds) [[ "$2" =~ ^[0-9]+(\.[0-9]+)?$ ]] || fail "--seconds: not a number: $2"; seconds=$2 ;;
     --out) out=$2 ;;
@@ -54,25 +58,40 @@ root=$(realpath "$(dirname "$0")/..")
 cd "$root"
 bash deploy/install_deps.sh
 echo "Building (the first time takes a few minutes) ..."
-cmake --preset release -DBUILD_TESTING=OFF >/dev/null
-cmake --build --preset release --target strandcast-server strandcast-view strandcast-ctl >"$out/build.log" 2>&1 \
-  || { tail -30 "$out/build.log" >&2; fail "the build failed; its whole output is in $out/build.log"; }
-bin=$root/build/release/bin
-
-pids=()
+# From here on everything that takes time runs beside this shell, in a process group of its own, so that Ctrl-C or a
+# signal to this shell alone ends all of it at once.
+set -m
+groups=()
 stop_all() {
   trap - EXIT INT TERM
-  for pid in "${pids[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
-  for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null || true; done
+  for group in "${groups[@]}"; do kill -TERM -- "-$group" 2>/dev/null || true; done
+  for _ in 1 2 3 4 5 6 7 8; do
+    living=
+    for group in "${groups[@]}"; do kill -0 -- "-$group" 2>/dev/null && living=1; done
+    [ -n "$living" ] || break
+    sleep 0.1
+  done
+  for group in "${groups[@]}"; do kill -KILL -- "-$group" 2>/dev/null || true; done
+  wait 2>/dev/null || true
 }
 trap stop_all EXIT
 trap 'stop_all; exit 0' INT TERM
+# Runs a command to its end, as the shell would; a signal is acted on meanwhile.
+run() { "$@" & groups+=("$!"); wait "$!"; }
+
+build() {
+  cmake --preset release -DBUILD_TESTING=OFF >/dev/null \
+    && cmake --build --preset release --target strandcast-server strandcast-view strandcast-ctl
+}
+run build >"$out/build.log" 2>&1 \
+  || { tail -30 "$out/build.log" >&2; fail "the build failed; its whole output is in $out/build.log"; }
+bin=$root/build/release/bin
 
 port_file=$(mktemp)
 : >"$port_file"
 "$bin/strandcast-server" --port 0 --port-file "$port_file" "${server_options[@]}" 2>"$out/server.log" &
 server=$!
-pids+=("$server")
+groups+=("$server")
 for _ in $(seq 600); do
   [ -s "$port_file" ] && break
   kill -0 "$server" 2>/dev/null || { cat "$out/server.log" >&2; exit 2; }
@@ -82,16 +101,21 @@ done
 port=$(cat "$port_file")
 rm -f "$port_file"
 echo "Server on 127.0.0.1:$port (log: $out/server.log)"
+grep -i ' warning ' "$out/server.log" >&2 || true
 
 "$bin/strandcast-ctl" feed --connect "127.0.0.1:$port" --motion "$motion" --wind "$wind" --loop "${motion_options[@]}" \
   >"$out/feed.log" 2>&1 &
 feed=$!
-pids+=("$feed")
-sleep 0.5
-kill -0 "$feed" 2>/dev/null || { cat "$out/feed.log" >&2; exit 2; }
+groups+=("$feed")
+# What was assumed about a person's files stands in front of this line.
+until grep -q '^feeding ' "$out/feed.log"; do
+  kill -0 "$feed" 2>/dev/null || { cat "$out/feed.log" >&2; exit 2; }
+  sleep 0.1
+done
+grep -v '^feeding ' "$out/feed.log" || true
 
 if [ -n "$headless" ]; then
-  "$bin/strandcast-view" --connect "127.0.0.1:$port" --headless --size 1280x720 --seconds "${seconds:-6}" \
+  run "$bin/strandcast-view" --connect "127.0.0.1:$port" --headless --size 1280x720 --seconds "${seconds:-6}" \
     --screenshot "$out/hair.png" --clip "$out/hair.webp" --clip-size 640x360 --report "$out/report.txt"
   echo
   echo "Picture: $out/hair.png"
@@ -99,5 +123,5 @@ if [ -n "$headless" ]; then
   echo "Report:  $out/report.txt"
 else
   echo "Opening the viewer: drag to orbit, wheel to zoom, H for help, Esc to leave."
-  "$bin/strandcast-view" --connect "127.0.0.1:$port" ${seconds:+--seconds "$seconds"}
+  run "$bin/strandcast-view" --connect "127.0.0.1:$port" ${seconds:+--seconds "$seconds"}
 fi

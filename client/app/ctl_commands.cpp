@@ -15,7 +15,6 @@
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
 #include "common/base/text.h"
-#include "common/motion/bvh.h"
 #include "common/motion/wind_csv.h"
 
 namespace strandcast {
@@ -77,19 +76,10 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
     plan.motion = built_in_motion;
     return {};
   }
-  if (options.up != "y" && options.up != "z")
-    return make_error(ErrorCode::BadInput, "unknown up axis '{}' (known: y, z)", options.up);
-  BvhOptions bvh;
-  bvh.unit_m = options.unit_m;
-  bvh.is_z_up = options.up == "z";
-  bvh.head_joint = options.joint;
-  ASSIGN_OR_RETURN(MotionClip loaded, load_bvh(options.motion, bvh));
-  auto clip = std::make_shared<const MotionClip>(std::move(loaded));
+  ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, options.motion_file));
+  for (const std::string& note : loaded.notes) std::cerr << note << '\n';
+  auto clip = std::make_shared<const MotionClip>(std::move(loaded.clip));
   length_s = clip->duration_s();
-  if (options.unit_m == 0.0)
-    std::cerr << fmt::format(
-        "{}: one unit is taken as {:.4g} m, so that the body is {} m tall (change it with --unit)\n",
-        options.motion, clip->file_unit_m, kAssumedBodyHeightM);
   plan.motion = [clip, is_looped = options.is_looped](double t_s) {
     return clip->sample(wrapped(t_s, clip->duration_s(), is_looped));
   };
@@ -105,6 +95,7 @@ Status add_wind(const FeedOptions& options, FeedPlan& plan) {
     return {};
   }
   ASSIGN_OR_RETURN(WindSeries loaded, load_wind_csv(options.wind));
+  for (const std::string& repair : loaded.repairs) std::cerr << options.wind << ": " << repair << '\n';
   auto series = std::make_shared<const WindSeries>(std::move(loaded));
   plan.wind = [series, is_looped = options.is_looped](double t_s) {
     return series->sample(wrapped(t_s, series->duration_s(), is_looped));

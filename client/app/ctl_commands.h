@@ -8,6 +8,7 @@
 #include <string>
 
 #include "client/net/viewer_client.h"
+#include "common/motion/motion_file.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {
@@ -29,9 +30,7 @@ struct CtlTarget {
 struct FeedOptions {
   std::string motion = "builtin";  // "builtin", "none" or a BVH file
   std::string wind = "gusts";      // "gusts", "none" or a CSV file
-  double unit_m = 0.0;             // metres per unit of the BVH file; 0 = guessed
-  std::string up = "y";            // up axis of the BVH file
-  std::string joint;               // head joint; empty = found by name
+  MotionFileOptions motion_file;   // how to read a BVH file
   bool is_looped = false;
   double speed = 1.0;
   double seconds = 0.0;  // 0 = the length of the motion, or without end when looped or built in

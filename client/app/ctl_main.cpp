@@ -31,13 +31,16 @@ void declare_feed(CLI::App& app, CommandLine& line) {
   FeedOptions& feed = line.feed;
   app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
   app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
-  app.add_option("--unit", feed.unit_m, "Metres per unit of the BVH file, 0 = guessed from the body's height")
+  app.add_option("--unit", feed.motion_file.unit_m,
+                 "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
-  app.add_option("--up", feed.up, "Up axis of the BVH file")
+  app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file")
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str();
-  app.add_option("--joint", feed.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_option("--joint", feed.motion_file.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
+               "Take steps out of the BVH file that are faster than any head moves");
   app.add_flag("--loop", feed.is_looped, "Start over at the end of the files");
   app.add_option("--speed", feed.speed, "Playing speed")
       ->check(CLI::Range(1e-3, kMaxSpeed))

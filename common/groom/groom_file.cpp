@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <string>
 
+#include "common/base/text.h"
 #include "common/groom/hair_loader.h"
 #include "common/groom/head_fit.h"
 #include "common/groom/resample.h"
@@ -34,12 +36,41 @@ Status check_options(const GroomFileOptions& options) {
   return {};
 }
 
+/// The beginning of a file that is text, "" for any other.
+std::string text_beginning(const std::filesystem::path& path) {
+  constexpr size_t kLookedAtBytes = 512, kShownChars = 40;
+  std::string begin(kLookedAtBytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(file.gcount()));
+  const bool has_controls = std::any_of(begin.begin(), begin.end(), [](unsigned char c) {
+    return c < ' ' && c != '\t' && c != '\n' && c != '\r';
+  });
+  return has_controls ? std::string() : one_line(begin.substr(0, begin.find('\n')), kShownChars);
+}
+
+/// A file that is text where none is expected is called that, whatever its bytes mean as numbers.
+Error call_text(const std::filesystem::path& path, Error error) {
+  const std::string begin = text_beginning(path);
+  const bool is_text_format = path.extension() == ".tfx" && begin.starts_with("version 2");
+  if (begin.empty() || is_text_format) return error;
+  const char* hint = begin.starts_with("version 2") ? "it looks like a TressFX 2 file: call it .tfx"
+                     : begin.starts_with("version https://git-lfs")
+                         ? "it only stands for a file that Git LFS keeps: fetch that one"
+                         : "a .hair file is binary, a .tfx file too or begins with 'version 2.0'";
+  return at(path.string(), make_error(ErrorCode::BadInput, "this is text, \"{}\", and no {} file: {}", begin,
+                                      path.extension().string(), hint));
+}
+
 Result<Groom> load_by_extension(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".tfx") return load_tfx(path);
-  if (extension == ".hair") return load_hair(path);
+  if (extension == ".tfx" || extension == ".hair") {
+    auto groom = extension == ".tfx" ? load_tfx(path) : load_hair(path);
+    if (groom || groom.error().code == ErrorCode::NotFound) return groom;
+    return call_text(path, groom.error());
+  }
   return at(path.string(), make_error(ErrorCode::Unsupported,
                                       "unknown groom file extension '{}', known: .tfx, .hair", extension));
 }

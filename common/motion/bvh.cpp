@@ -15,7 +15,6 @@ namespace {
 
 constexpr uint32_t kMaxJointChannels = 6;
 constexpr double kMaxChannelValue = 1e9;
-constexpr size_t kMaxListedJoints = 40;
 constexpr uint32_t kNoJoint = UINT32_MAX;
 constexpr glm::dvec3 kAxis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
@@ -182,11 +181,10 @@ Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) 
     if (wanted.empty() ? is_head_name(name) : name == wanted) return i;
   }
   std::string known;
-  for (size_t i = 0; i < std::min(skeleton.joints.size(), kMaxListedJoints); ++i)
-    known += fmt::format("{}{}", i ? ", " : "", shown(skeleton.joints[i].name));
-  return make_error(ErrorCode::NotFound, "no joint named {} (known: {}{})",
-                    wanted.empty() ? "Head or head" : shown(wanted), known,
-                    skeleton.joints.size() > kMaxListedJoints ? ", ..." : "");
+  for (const Joint& joint : skeleton.joints)
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", shown(joint.name));
+  return make_error(ErrorCode::NotFound, "no joint named {} (--joint NAME takes another, known: {})",
+                    wanted.empty() ? "Head or head" : shown(wanted), known);
 }
 
 /// Joints from the root down to the head.
@@ -220,6 +218,25 @@ double body_height(const Skeleton& skeleton, bool is_z_up) {
   const auto [lowest, highest] = std::minmax_element(
       reach.begin(), reach.end(), [](const Reach& a, const Reach& b) { return a.height < b.height; });
   return lowest->bones + highest->bones;
+}
+
+/// Sets the clip's unit to the one that makes a body of `height` file units about as tall as people are.
+void guess_unit(MotionClip& clip, double height) {
+  const double guess_m = kAssumedBodyHeightM / height;
+  for (const LengthUnit& unit : kClipUnits) {
+    if (std::abs(guess_m / unit.m - 1.0) > kUnitSnap) continue;
+    clip.file_unit_m = unit.m;
+    clip.unit_reason = fmt::format(
+        "one unit is taken as {:.4g} m: the bones from foot to crown, {:.4g} units, are {:.2f} m in {}",
+        unit.m, height, height * unit.m, unit.name);
+    return;
+  }
+  clip.file_unit_m = guess_m;
+  clip.unit_reason = fmt::format(
+      "one unit is taken as {:.4g} m, which makes the bones from foot to crown, {:.4g} units, {:g} m long: "
+      "no "
+      "usual unit is near",
+      guess_m, height, kAssumedBodyHeightM);
 }
 
 /// Pose of the last joint of the path in the file's axes and units.
@@ -369,7 +386,10 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   if (is_guessed && !(height > 0.0))
     return at(place, make_error(ErrorCode::BadInput,
                                 "the skeleton has no height to guess the unit from: give the unit"));
-  clip.file_unit_m = is_guessed ? kAssumedBodyHeightM / height : options.unit_m;
+  if (is_guessed)
+    guess_unit(clip, height);
+  else
+    clip.file_unit_m = options.unit_m;
   to_world(clip.world_from_head, clip.file_unit_m, options);
   return clip;
 }

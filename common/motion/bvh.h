@@ -20,8 +20,21 @@ inline constexpr double kMinFrameTimeS = 1e-4, kMaxFrameTimeS = 10.0;
 /// Bones from the lowest to the highest point of a grown-up: the body, and the foot's length.
 inline constexpr double kAssumedBodyHeightM = 1.7;
 
+struct LengthUnit {
+  double m = 1.0;
+  const char* name = "";  // of several, as in "bones of 180 cm"
+};
+/// Units that clips come in. CMU's unit, 1 / 0.45 of an inch, is that of its Acclaim files and of conversions
+/// that keep their numbers.
+inline constexpr LengthUnit kClipUnits[] = {
+    {1e-3, "mm"}, {1e-2, "cm"},     {0.0254, "inches"}, {0.0254 / 0.45, "CMU's units"},
+    {0.1, "dm"},  {0.3048, "feet"}, {1.0, "m"}};
+/// A guess this near to one of them means that one.
+inline constexpr double kUnitSnap = 0.25;
+
 struct BvhOptions {
-  double unit_m = 0.0;       // metres per file unit; 0 = guessed from kAssumedBodyHeightM
+  double unit_m =
+      0.0;  // metres per file unit; 0 = guessed: the one of kClipUnits that kAssumedBodyHeightM suggests
   bool is_z_up = false;      // else +Y is up
   std::string head_joint{};  // empty: "Head" or "head", with or without a prefix ending in ':' or '_'
   bool skip_first_frame_if_t_pose = true;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <string>
 #include <vector>
 
 #include "common/math/pose.h"
@@ -15,6 +16,7 @@ struct MotionClip {
   double frame_s = 1.0 / 60.0;
   std::vector<Pose> world_from_head;  // one per frame
   double file_unit_m = 1.0;           // metres per unit of the file it came from
+  std::string unit_reason;            // why this unit, when nobody stated it; else empty
 
   /// Time of the last pose, s; 0 for an empty clip.
   double duration_s() const;
@@ -26,6 +28,7 @@ struct MotionClip {
 struct WindSeries {
   std::vector<double> time_s;  // increasing, from 0
   std::vector<glm::vec3> velocity_mps;
+  std::vector<std::string> repairs;  // what a file needed to be read, a sentence for each kind
 
   /// Time of the last sample, s; 0 for an empty series.
   double duration_s() const;

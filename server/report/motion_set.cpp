@@ -1,12 +1,14 @@
 #include "server/report/motion_set.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "common/base/check.h"
-#include "common/motion/bvh.h"
 #include "server/scene/step_builder.h"
 
 namespace strandcast {
@@ -92,7 +94,9 @@ glm::dvec3 point_at(const Trajectory& reference, size_t sample, uint32_t strand,
 Result<MotionSet> MotionSet::make(const MotionSetOptions& options) {
   MotionClip clip;
   if (!options.clip.empty()) {
-    ASSIGN_OR_RETURN(clip, load_bvh(options.clip, {}));
+    ASSIGN_OR_RETURN(MotionFile file, load_motion_file(options.clip, options.clip_file));
+    for (const std::string& note : file.notes) fmt::print(stderr, "{}\n", note);
+    clip = std::move(file.clip);
     if (clip.duration_s() < options.duration_s) {
       return at(options.clip.string(),
                 make_error(ErrorCode::BadInput, "the motion lasts {:.2f} s (at least {:g} s are measured)",

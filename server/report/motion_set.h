@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "common/motion/motion_clip.h"
+#include "common/motion/motion_file.h"
 #include "server/report/strand_run.h"
 
 namespace strandcast {
@@ -17,6 +17,7 @@ struct MotionSetOptions {
   std::filesystem::path clip;  // .bvh; empty: the built-in head motion
   double duration_s = 3.0;
   uint32_t strand_count = 8;
+  MotionFileOptions clip_file = {};  // how to read the clip
 };
 
 /// Positions of one run at times that all rates share, kSampleS apart. (vertex_count x strand_count) each,

@@ -12,6 +12,10 @@ class App;
 
 namespace strandcast {
 
+struct MotionFileOptions;
+/// --unit, --up, --joint and --filter-glitches, as those of strandcast-ctl feed.
+void add_motion_file_options(CLI::App& command, MotionFileOptions& options);
+
 /// What the chosen subcommand does once the command line is read; the error ends the program with one
 /// sentence.
 using ReportAction = std::function<Status()>;

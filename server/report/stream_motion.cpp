@@ -1,12 +1,14 @@
 #include "server/report/stream_motion.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <memory>
 
 #include "common/base/check.h"
-#include "common/motion/bvh.h"
 
 namespace strandcast {
 namespace {
@@ -89,9 +91,10 @@ std::vector<StreamMotion> built_in_stream_motions() {
           {"built-in violent", violent_head, kEndless}};
 }
 
-Result<StreamMotion> load_stream_motion(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(MotionClip loaded, load_bvh(path, {}));
-  const auto clip = std::make_shared<const MotionClip>(std::move(loaded));
+Result<StreamMotion> load_stream_motion(const std::filesystem::path& path, const MotionFileOptions& options) {
+  ASSIGN_OR_RETURN(MotionFile file, load_motion_file(path, options));
+  for (const std::string& note : file.notes) fmt::print(stderr, "{}\n", note);
+  const auto clip = std::make_shared<const MotionClip>(std::move(file.clip));
   return StreamMotion{path.stem().string(), [clip](double t_s) { return clip->sample(t_s); },
                       clip->duration_s()};
 }

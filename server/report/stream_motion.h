@@ -9,6 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/math/pose.h"
+#include "common/motion/motion_file.h"
 
 namespace strandcast {
 
@@ -37,6 +38,7 @@ struct StreamMotion {
 
 /// idle, active and violent, built in.
 std::vector<StreamMotion> built_in_stream_motions();
-Result<StreamMotion> load_stream_motion(const std::filesystem::path& path);
+/// What was assumed about the file is said on standard error.
+Result<StreamMotion> load_stream_motion(const std::filesystem::path& path, const MotionFileOptions& options);
 
 }  // namespace strandcast

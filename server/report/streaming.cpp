@@ -115,7 +115,7 @@ Result<Plan> make_plan(const StreamingOptions& options) {
     return make_error(ErrorCode::BadInput, "--seconds is {:g} (allowed: {:g} to {:g})", plan.seconds,
                       kShortestSeconds, kLongestSeconds);
   for (const std::filesystem::path& path : options.motions) {
-    ASSIGN_OR_RETURN(StreamMotion motion, load_stream_motion(path));
+    ASSIGN_OR_RETURN(StreamMotion motion, load_stream_motion(path, options.motion_file));
     plan.motions.push_back(std::move(motion));
   }
   if (plan.motions.empty()) plan.motions = built_in_stream_motions();

@@ -17,6 +17,7 @@ namespace strandcast {
 struct StreamingOptions {
   std::filesystem::path out;                   // folder of the CSV, plots and page
   std::vector<std::filesystem::path> motions;  // .bvh; empty: the built-in ones
+  MotionFileOptions motion_file;               // how to read them
   std::vector<std::string> sizes;              // "STRANDSxVERTICES"; empty: as the grid says
   std::string solver;                          // empty: the built-in scene's
   std::string gl_device = "auto";              // "none": the solver's double-precision version

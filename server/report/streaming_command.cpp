@@ -29,6 +29,7 @@ void add_streaming_command(CLI::App& app, ReportAction& action) {
                    "head motion from this .bvh file; repeatable; default: built in")
       ->expected(1)
       ->take_all();
+  add_motion_file_options(*command, options->motion_file);
   command->add_option("--size", options->sizes, "STRANDSxVERTICES; repeatable; default: 10000x16, 2228x32")
       ->expected(1)
       ->take_all();

@@ -325,8 +325,8 @@ Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options) {
   report.grid = make_work_grid(options);
   RETURN_IF_ERROR(check_grid(report.grid));
   ASSIGN_OR_RETURN(std::vector<const SolverRow*> rows, chosen_rows(options.solvers));
-  ASSIGN_OR_RETURN(const MotionSet motion,
-                   MotionSet::make({options.motion, report.grid.motion_s, report.grid.strand_count}));
+  ASSIGN_OR_RETURN(const MotionSet motion, MotionSet::make({options.motion, report.grid.motion_s,
+                                                            report.grid.strand_count, options.motion_file}));
   report.motion_name = options.motion.empty() ? "built-in head motion" : options.motion.filename().string();
   std::unique_ptr<gl::EglContext> context;
   if (options.gl_device != "none") {

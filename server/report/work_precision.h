@@ -16,6 +16,7 @@ struct WorkPrecisionOptions {
   std::filesystem::path out;         // folder of the CSV, plots and page
   std::vector<std::string> solvers;  // rows of the table; empty = all
   std::filesystem::path motion;      // .bvh; empty: the built-in head motion
+  MotionFileOptions motion_file;     // how to read it
   std::string gl_device = "auto";    // "none": every row as its reference
   bool is_quick = false;
   // Less than the whole grid; empty = all of it.

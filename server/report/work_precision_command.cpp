@@ -24,6 +24,7 @@ void add_work_precision_command(CLI::App& app, ReportAction& action) {
   command->add_option("--out", options->out, "folder for the CSV, plots and page")->required();
   command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
   command->add_option("--motion", options->motion, "head motion from this .bvh file; default: built in");
+  add_motion_file_options(*command, options->motion_file);
   command->add_option("--vertices", options->vertices, "only this many per strand; repeatable")
       ->expected(1)
       ->take_all();

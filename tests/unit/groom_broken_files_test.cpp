@@ -255,5 +255,27 @@ TEST(GroomFile, TurnsMovesAndScalesInThatOrder) {
   EXPECT_EQ(load_groom(options)->pinned, (std::vector<uint8_t>{1, 1, 0, 0, 1, 1, 0, 0}));
 }
 
+TEST(GroomBrokenFiles, TextUnderTheWrongNameIsCalledText) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& text, const std::string& name) {
+    ByteFile file;
+    for (const char c : text) file.bytes.push_back(static_cast<std::byte>(c));
+    return refusal(folder, file, name);
+  };
+  const std::string obj =
+      "# Blender v3.6\nv 0.1 0.2 0.3\nv 0.4 0.5 0.6\nl 1 2\n" + std::string(400, '#') + "\n";
+  for (const char* name : {"a.tfx", "a.hair"})
+    EXPECT_THAT(refused(obj, name),
+                AllOf(HasSubstr("this is text, \"# Blender v3.6\""), HasSubstr("is binary")))
+        << name;
+  EXPECT_THAT(refused("version 2.0\nscale 1.0\nrotation 0 0 0\n", "b.hair"), HasSubstr("call it .tfx"));
+  EXPECT_THAT(refused("version 2.0\nscale x\n", "b.tfx"), ::testing::Not(HasSubstr("this is text")))
+      << "what it may be is read as that";
+  EXPECT_THAT(refused("version https://git-lfs.github.com/spec/v1\noid sha256:00\n", "c.tfx"),
+              HasSubstr("Git LFS"));
+  EXPECT_THAT(refusal(folder, small_v4(), "d.hair"), HasSubstr("does not begin with 'HAIR'"))
+      << "this is no text";
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -214,9 +214,87 @@ TEST(WindCsv, ErrorsNameLineAndKnownColumns) {
   EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,nan,3\n"), HasSubstr("\"nan\""));
   EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,1e9,3\n"), HasSubstr("\"1e9\""));
   EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,,3\n"), HasSubstr("column 3 is \"\""));
-  EXPECT_THAT(wind_error("t_s,u,v,w\n1,0,0,0\n1,0,0,0\n"), StartsWith("w.csv:3: time goes from 1 s to 1 s"));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n1,0,0,0\n0,0,0,0\n"),
+              StartsWith("w.csv:3: time goes back from 1 s to 0 s"));
   EXPECT_THAT(wind_error(std::string(1000, ',')), HasSubstr("more than 256 columns"));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,5,2,3\n1,1,5,2,3\n"), StartsWith("w.csv:2: the row has 5 values"))
+      << "decimal commas between commas cannot be told";
   EXPECT_EQ(load_wind_csv("/no/such/file.csv").error().code, ErrorCode::NotFound);
+}
+
+WindSeries repaired(const std::string& text) {
+  const auto series = parse_wind_csv(text, "w.csv");
+  EXPECT_TRUE(series) << series.error().to_string();
+  // Zeros where there is nothing, so that a failure is no crash.
+  return series ? *series : WindSeries{std::vector<double>(16), std::vector<glm::vec3>(16), {}};
+}
+
+using testing::ElementsAre;
+
+TEST(WindCsv, AGoodFileNeedsNoRepair) {
+  EXPECT_THAT(repaired("t_s,u,v,w\n0,1,2,3\n0.1,1,2,3\n0.2,1,2,3\n").repairs, testing::IsEmpty())
+      << "the same wind at another time repeats nothing";
+}
+
+TEST(WindCsv, ReadsSemicolonsAndDecimalCommas) {
+  const WindSeries series = repaired("t_s;u;v;w\n0,0;1,5;-2;0,25\n0,5;1;-2,5;,5\n");
+  EXPECT_EQ(series.time_s, (std::vector<double>{0.0, 0.5}));
+  EXPECT_EQ(series.velocity_mps[0], glm::vec3(1.5f, 0.25f, 2.0f));
+  EXPECT_EQ(series.velocity_mps[1], glm::vec3(1.0f, 0.5f, 2.5f));
+  EXPECT_THAT(series.repairs,
+              ElementsAre("values are separated by semicolons", "6 numbers with a decimal comma"));
+  const WindSeries quoted = repaired("t_s,u,v,w\n\"0,0\",\"1,5\",\"-2\",0\n\"0,5\",1,2,3\n");
+  EXPECT_EQ(quoted.velocity_mps[0], glm::vec3(1.5f, 0.0f, 2.0f));
+  EXPECT_THAT(quoted.repairs, ElementsAre("3 numbers with a decimal comma"));
+  EXPECT_THAT(repaired("t_s\tu\tv\tw\n0\t1\t2\t3\n").repairs, ElementsAre("values are separated by tabs"));
+}
+
+TEST(WindCsv, LeavesOutRowsThatCannotBeReadAndCountsThem) {
+  const WindSeries series = repaired(
+      "t_s,u,v,w\n0,1,0,0\n0.1,nan,0,0\n0.2,2,0,0\n0.3,,0,0\n0.4,3,0,0\n0.5,-9999,0,0\n0.6,4,0,0\n0.7,5,0,0\n"
+      "0.8,6,0\n");
+  EXPECT_EQ(series.time_s, (std::vector<double>{0.0, 0.2, 0.4, 0.6, 0.7}));
+  EXPECT_NEAR(series.sample(0.3).x, 2.5f, 1e-6f) << "what is missing is bridged";
+  EXPECT_THAT(
+      series.repairs,
+      ElementsAre("4 rows left out: 4 could not be read, 0 go back in time; the first: w.csv:3: column 2 is "
+                  "\"nan\", not a number within 150"));
+  EXPECT_THAT(wind_error("t_s,u,v,w\n0,1,0,0\n1,nan,0,0\n2,1,0,0\n3,nan,0,0\n"), StartsWith("w.csv:3: "))
+      << "half of it is no log";
+}
+
+TEST(WindCsv, LeavesOutRowsThatGoBackAndRepetitions) {
+  const WindSeries series = repaired("t_s,u,v,w\n0,1,0,0\n1,2,0,0\n1,2,0,0\n0.5,9,9,9\n2,3,0,0\n3,4,0,0\n");
+  EXPECT_EQ(series.time_s, (std::vector<double>{0.0, 1.0, 2.0, 3.0}));
+  EXPECT_THAT(
+      series.repairs,
+      ElementsAre(
+          "1 rows left out: 0 could not be read, 1 go back in time; the first: w.csv:5: time goes back "
+          "from 1 s to 0.5 s",
+          "1 rows left out because they repeat the one before"));
+}
+
+TEST(WindCsv, SpreadsRowsThatShareATime) {
+  // A clock of whole seconds, four readings in each.
+  std::string text = "t_s,u,v,w\n";
+  for (int i = 0; i < 12; ++i) text += std::to_string(i / 4) + "," + std::to_string(i) + ",0,0\n";
+  const WindSeries series = repaired(text);
+  ASSERT_EQ(series.time_s.size(), 12u);
+  for (size_t i = 0; i < 12; ++i) {
+    EXPECT_DOUBLE_EQ(series.time_s[i], 0.25 * static_cast<double>(i));
+    EXPECT_EQ(series.velocity_mps[i].x, static_cast<float>(i));
+  }
+  EXPECT_THAT(series.repairs,
+              ElementsAre("9 rows with the time of the one before, spread evenly up to the next time"));
+}
+
+TEST(WindCsv, BridgesGapsAndCountsThem) {
+  const WindSeries series = repaired(
+      "logger_ms,u,v,w\n100,0,0,0\n200,1,0,0\n300,2,0,0\n1400,13,0,0\n1500,14,0,0\n1800,17,0,0\n1900,18,0,"
+      "0\n");
+  EXPECT_NEAR(series.sample(0.7).x, 7.0f, 1e-5f);
+  EXPECT_THAT(series.repairs,
+              ElementsAre("2 gaps, the longest of 1.1 s: the wind goes evenly from one end to the other"));
 }
 
 }  // namespace

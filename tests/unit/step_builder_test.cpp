@@ -148,6 +148,63 @@ TEST(StepBuilder, GustWavesAreDivergenceFreeAndFixedInTheMovingAir) {
     EXPECT_NEAR(std::remainder(after[i] - before[i], 2.0f * std::numbers::pi_v<float>), 0.0f, 1e-3f);
 }
 
+TEST(StepBuilder, TheSceneWindHasItsMean) {
+  SceneDesc scene = still_scene();
+  scene.wind.mean_mps = {0.9f, 0.1f, -1.2f};
+  scene.wind.gust_intensity = 0.0f;
+  StepBuilder builder(scene, {});
+  for (const StepInput& substep : builder.build(InputFrame{}, analyse(scene, {}), 3.0).substeps)
+    EXPECT_EQ(substep.wind_mps, glm::dvec3(scene.wind.mean_mps)) << "steady wind is its mean";
+  // With gusts: within four standard errors of a process with the integral time length / speed.
+  scene.wind.gust_intensity = 0.5f;
+  scene.substeps = 1;
+  builder.change(scene, {});
+  constexpr double kStepS = 0.37, kDurationS = 20'000.0;
+  glm::dvec3 sum_mps(0.0);
+  uint32_t count = 0;
+  for (double t_s = 0.0; t_s < kDurationS; t_s += kStepS, ++count)
+    sum_mps += builder.build(InputFrame{}, analyse(scene, {}), t_s).substeps.back().wind_mps;
+  const double speed_mps = glm::length(scene.wind.mean_mps);
+  const double error_mps =
+      4.0 * 0.5 * speed_mps * std::sqrt(2.0 * scene.wind.gust_length_m / speed_mps / kDurationS);
+  EXPECT_NEAR(glm::distance(sum_mps / static_cast<double>(count), glm::dvec3(scene.wind.mean_mps)), 0.0,
+              error_mps);
+}
+
+TEST(StepBuilder, GustWavesAreThoseOfTheirSeed) {
+  WindDesc wind;
+  wind.mean_mps = {2.0f, 0.0f, 1.0f};
+  wind.gust_intensity = 0.4f;
+  const auto waves_of = [&](uint32_t seed) {
+    wind.seed = seed;
+    return make_gust_waves(wind);
+  };
+  const std::vector<GustWave> first = waves_of(1), again = waves_of(1);
+  ASSERT_EQ(first.size(), again.size());
+  for (size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(first[i].wave_vector_rad_per_m, again[i].wave_vector_rad_per_m);
+    EXPECT_EQ(first[i].amplitude_mps, again[i].amplitude_mps);
+    EXPECT_EQ(first[i].phase_rad, again[i].phase_rad);
+  }
+  for (const uint32_t seed : {2u, 3u, 77u}) {
+    const std::vector<GustWave> other = waves_of(seed);
+    ASSERT_EQ(first.size(), other.size());
+    for (size_t i = 0; i < first.size(); ++i) {
+      // Two random directions are within 0.02 rad of each other once in 10,000 times.
+      EXPECT_GT(glm::distance(glm::normalize(first[i].wave_vector_rad_per_m),
+                              glm::normalize(other[i].wave_vector_rad_per_m)),
+                0.02f)
+          << seed;
+      EXPECT_GT(glm::distance(glm::normalize(first[i].amplitude_mps), glm::normalize(other[i].amplitude_mps)),
+                0.02f)
+          << seed;
+      EXPECT_NE(first[i].phase_rad, other[i].phase_rad) << seed;
+      EXPECT_NEAR(glm::length(first[i].amplitude_mps), glm::length(other[i].amplitude_mps), 1e-6f)
+          << "the spectrum is the same";
+    }
+  }
+}
+
 TEST(StepBuilder, GustWavesVanishWithoutWind) {
   WindDesc wind;
   EXPECT_TRUE(make_gust_waves(wind).empty());

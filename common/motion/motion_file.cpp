@@ -1,0 +1,42 @@
+#include "common/motion/motion_file.h"
+
+#include "common/motion/motion_glitches.h"
+
+namespace strandcast {
+namespace {
+
+std::string glitch_note(const MotionGlitches& glitches) {
+  return fmt::format(
+      "the head makes {} step{} faster than any head moves ({:g} m/s, {:g} degrees/s), the first at {:.2f} "
+      "s; the "
+      "fastest have {:.0f} m/s and {:.0f} degrees/s",
+      glitches.step_count, glitches.step_count == 1 ? "" : "s", kMaxHeadMps, kMaxHeadDegPerS,
+      glitches.first_s, glitches.fastest_mps, glitches.fastest_deg_per_s);
+}
+
+}  // namespace
+
+Result<MotionFile> load_motion_file(const std::filesystem::path& path, const MotionFileOptions& options) {
+  if (options.up != "y" && options.up != "z")
+    return make_error(ErrorCode::BadInput, "unknown up axis '{}' (known: y, z)", options.up);
+  BvhOptions bvh;
+  bvh.unit_m = options.unit_m;
+  bvh.is_z_up = options.up == "z";
+  bvh.head_joint = options.joint;
+  MotionFile file;
+  ASSIGN_OR_RETURN(file.clip, load_bvh(path, bvh));
+  const auto note = [&](const std::string& sentence) {
+    file.notes.push_back(fmt::format("{}: {}", path.string(), sentence));
+  };
+  if (!file.clip.unit_reason.empty()) note(file.clip.unit_reason + " (--unit states another)");
+  const MotionGlitches glitches = find_glitches(file.clip);
+  if (glitches.step_count == 0) return file;
+  if (options.is_filtering_glitches)
+    note(fmt::format("{}: {} frames replaced by what lies between the others", glitch_note(glitches),
+                     filter_glitches(file.clip)));
+  else
+    note(glitch_note(glitches) + " (--filter-glitches takes them out)");
+  return file;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,30 @@
+// Head motion from a person's own file, with what was assumed about it in sentences to be shown once. The
+// feeder and the reports read files by this. Any thread.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/motion/bvh.h"
+
+namespace strandcast {
+
+/// What programs call their option for the same.
+struct MotionFileOptions {
+  double unit_m = 0.0;                 // --unit; 0 = guessed
+  std::string up = "y";                // --up: y or z
+  std::string joint;                   // --joint; empty = found by name
+  bool is_filtering_glitches = false;  // --filter-glitches
+};
+
+struct MotionFile {
+  MotionClip clip;
+  std::vector<std::string> notes;  // each begins with the file's name
+};
+
+/// Errors are those of load_bvh; BadInput for an unknown axis.
+Result<MotionFile> load_motion_file(const std::filesystem::path& path, const MotionFileOptions& options);
+
+}  // namespace strandcast

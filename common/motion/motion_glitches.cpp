@@ -1,0 +1,55 @@
+#include "common/motion/motion_glitches.h"
+
+#include <algorithm>
+
+namespace strandcast {
+namespace {
+
+/// Of a movement that takes `duration_s`.
+struct HeadSpeed {
+  double mps = 0.0;
+  double deg_per_s = 0.0;
+
+  bool is_possible() const { return mps <= kMaxHeadMps && deg_per_s <= kMaxHeadDegPerS; }
+};
+
+HeadSpeed speed_of(const Pose& from, const Pose& to, double duration_s) {
+  return {glm::distance(from.position_m, to.position_m) / duration_s,
+          glm::degrees(angle_between_rad(from.rotation, to.rotation)) / duration_s};
+}
+
+}  // namespace
+
+MotionGlitches find_glitches(const MotionClip& clip) {
+  MotionGlitches glitches;
+  for (size_t i = 1; i < clip.world_from_head.size(); ++i) {
+    const HeadSpeed speed = speed_of(clip.world_from_head[i - 1], clip.world_from_head[i], clip.frame_s);
+    glitches.fastest_mps = std::max(glitches.fastest_mps, speed.mps);
+    glitches.fastest_deg_per_s = std::max(glitches.fastest_deg_per_s, speed.deg_per_s);
+    if (speed.is_possible()) continue;
+    if (glitches.step_count++ == 0) glitches.first_s = static_cast<double>(i - 1) * clip.frame_s;
+  }
+  return glitches;
+}
+
+uint32_t filter_glitches(MotionClip& clip) {
+  // A little below the limit, so that what is put between does not round to above it.
+  constexpr double kRoom = 1.0 + 1e-6;
+  std::vector<Pose>& poses = clip.world_from_head;
+  uint32_t replaced = 0;
+  size_t good = 0;  // the last frame that is as it was
+  for (size_t i = 1; i < poses.size(); ++i) {
+    const double passed_s = clip.frame_s * static_cast<double>(i - good);
+    if (!speed_of(poses[good], poses[i], passed_s / kRoom).is_possible()) continue;
+    for (size_t k = good + 1; k < i; ++k) {
+      const double blend = static_cast<double>(k - good) / static_cast<double>(i - good);
+      poses[k] = interpolate(poses[good], poses[i], blend);
+      ++replaced;
+    }
+    good = i;
+  }
+  for (size_t k = good + 1; k < poses.size(); ++k, ++replaced) poses[k] = poses[good];
+  return replaced;
+}
+
+}  // namespace strandcast
