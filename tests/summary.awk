@@ -86,7 +86,7 @@ in_entry && /^(<system-out>)?\[       OK \] / { last_begun[entry] = "" }
 /^\t<\/testcase>/ { in_entry = 0 }
 
 END {
-  passed = failed = skipped = second_tries = 0
+  passed = failed = skipped = without_data = second_tries = 0
   failures = skips = retries = ""
   for (i = 1; i <= entry_count; ++i) {
     entry = entries[i]
@@ -115,6 +115,7 @@ END {
         if (seen[name] == "passed") ++passed
         if (seen[name] == "skipped") {
           ++skipped
+          if (index(why[name], "needs ../shared/data")) ++without_data
           skips = add(skips, name ": " why[name])
         }
         if (seen[name] == "failed") {
@@ -161,6 +162,7 @@ END {
   if (sorter != "") close(sorter)
   if (retries != "") printf "Tried twice\n%s", retries
   if (skips != "") printf "Skipped\n%s", skips
+  if (without_data > 0) printf "%d of them for want of ../shared/data\n", without_data
   if (failures != "") printf "Failed\n%s", failures
   tail = second_tries > 0 ? sprintf(" (%d tried twice)", second_tries) : ""
   printf "%d passed, %d failed, %d skipped%s\n", passed, failed, skipped, tail

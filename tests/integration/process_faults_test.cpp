@@ -6,6 +6,7 @@
 #include "client/app/live_connection.h"
 #include "tests/support/child_process.h"
 #include "tests/support/eventually.h"
+#include "tests/support/lacks_gl.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/tools/load_viewers.h"
 
@@ -36,7 +37,6 @@ class ProcessFaults : public testing::Test {
     text << file.rdbuf();
     return text.str();
   }
-  bool lacks_gl() const { return output().find("EGL") != std::string::npos; }
   template <class Condition>
   static bool run_until(LoadViewers& viewers, Condition condition) {
     return eventually([&] {
@@ -52,7 +52,7 @@ class ProcessFaults : public testing::Test {
 
 TEST_F(ProcessFaults, TerminationSaysGoodbyeToSixtyFourViewers) {
   const auto server = serve();
-  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
   ASSERT_NE(server, nullptr) << output();
   constexpr size_t kViewers = 64;
   LoadViewers viewers({"127.0.0.1", port_, {}});
@@ -67,7 +67,7 @@ TEST_F(ProcessFaults, TerminationSaysGoodbyeToSixtyFourViewers) {
 
 TEST_F(ProcessFaults, AKilledServerIsFoundAgain) {
   auto server = serve();
-  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
   ASSERT_NE(server, nullptr) << output();
   ClientConfig config;
   config.address.port = port_;
@@ -98,7 +98,7 @@ TEST_F(ProcessFaults, WithoutDescriptorsTheServerServesThoseItHas) {
                   "descriptors for it ends the server";
 #endif
   const auto server = serve();
-  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
   ASSERT_NE(server, nullptr) << output();
   LoadViewers early({"127.0.0.1", port_, {}});
   ASSERT_TRUE(early.join({}).ok());
@@ -122,7 +122,7 @@ TEST_F(ProcessFaults, WithoutDescriptorsTheServerServesThoseItHas) {
 
 TEST_F(ProcessFaults, ASuspendedViewerIsDroppedAndComesBack) {
   const auto server = serve();
-  if (server == nullptr && lacks_gl()) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
   ASSERT_NE(server, nullptr) << output();
   const auto report = folder_.path() / "report.txt";
   ChildProcess viewer(STRANDCAST_VIEW_PROGRAM,

@@ -15,6 +15,7 @@
 #include <sstream>
 
 #include "tests/support/eventually.h"
+#include "tests/support/lacks_gl.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -146,7 +147,7 @@ TEST_F(ServerProgram, PrintsSolversSceneAndPlan) {
 
 TEST_F(ServerProgram, ServesUntilTerminated) {
   const uint16_t port = serve({"--log-level", "off"});
-  if (port == 0 && err().find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  if (port == 0 && test::lacks_gl(err())) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
   ASSERT_NE(port, 0) << err();
   EXPECT_THAT(test::http_get(port, "/healthz"), HasSubstr("ok"));
   ASSERT_EQ(kill(process_, SIGTERM), 0);
@@ -156,7 +157,7 @@ TEST_F(ServerProgram, ServesUntilTerminated) {
 // What `systemctl reload` sends, whether or not there is a certificate to read again.
 TEST_F(ServerProgram, AReloadIsNoEnd) {
   const uint16_t port = serve();
-  if (port == 0 && err().find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  if (port == 0 && test::lacks_gl(err())) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
   ASSERT_NE(port, 0) << err();
   ASSERT_EQ(kill(process_, SIGHUP), 0);
   EXPECT_TRUE(eventually([&] { return err().find("no certificate") != std::string::npos; })) << err();
@@ -183,7 +184,7 @@ TEST_F(ServerProgram, ALogThatNobodyReadsStopsNothing) {
   close(ends[1]);
   std::string log(4'096, '\0');
   if (port == 0) log.resize(static_cast<size_t>(std::max<ssize_t>(read(ends[0], log.data(), log.size()), 0)));
-  if (port == 0 && log.find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << log;
+  if (port == 0 && test::lacks_gl(log)) GTEST_SKIP() << "needs OpenGL 4.5: " << log;
   ASSERT_NE(port, 0) << log;
   join_and_leave(port, 100);  // some 10,000 bytes
   EXPECT_THAT(test::http_get(port, "/metrics"), AllOf(HasSubstr("\nstrandcast_log_dropped_lines_total"),
@@ -239,7 +240,7 @@ TEST_F(ServerProgram, TheUnitAllowsWhatTheServerCalls) {
 
 TEST_F(ServerProgram, LeavesAfterTheGivenTime) {
   const int code = run({"--port", "0", "--seconds", "0.2", "--set", "groom.procedural.strand_count=50"});
-  if (code == 2 && err().find("EGL") != std::string::npos) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  if (code == 2 && test::lacks_gl(err())) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
   EXPECT_EQ(code, 0) << err();
 }
 

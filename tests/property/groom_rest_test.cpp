@@ -4,6 +4,7 @@
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/solver_fixture.h"
 
 namespace strandcast {
@@ -54,7 +55,7 @@ class GroomAtRest : public SolverTest {
 
   void expect_rest_of(const std::string& scene_name, const std::string& groom_file) {
     const std::filesystem::path groom = std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms" / groom_file;
-    if (!std::filesystem::exists(groom)) GTEST_SKIP() << groom << " is not here";
+    REQUIRE_SHARED(groom);
     const auto path =
         std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy/scenes" / (scene_name + ".textproto");
     const auto scene = load_scene(path, {"groom.file.path=" + groom.string()});

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "common/groom/groom_file.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/solver_fixture.h"
 
 namespace strandcast {
@@ -81,7 +82,7 @@ TEST_F(SolverRobustness, StrandsHeldAtBothEndsStayFinite) {
 TEST_F(SolverRobustness, ARealGroomWithTinyStrandsStaysSound) {
   const std::filesystem::path path =
       std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/Ratboy_mohawk.tfx";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here";
+  REQUIRE_SHARED(path);
   GroomFileOptions options;
   options.path = path;
   const auto groom = load_groom(options);

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/shared_data.h"
+
 namespace strandcast::testing {
 
 /// A file that is put together number by number.
@@ -41,6 +43,4 @@ inline std::filesystem::path shared_data() {
 }  // namespace strandcast::testing
 
 /// Skips the test where the shared data folder is not beside the checkout.
-#define REQUIRE_SHARED_DATA()                                       \
-  if (!std::filesystem::exists(strandcast::testing::shared_data())) \
-  GTEST_SKIP() << "no shared data folder at " << strandcast::testing::shared_data().string()
+#define REQUIRE_SHARED_DATA() REQUIRE_SHARED(strandcast::testing::shared_data())

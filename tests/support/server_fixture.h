@@ -14,6 +14,7 @@
 #include "client/app/viewer_session.h"
 #include "server/app/server.h"
 #include "tests/support/eventually.h"
+#include "tests/support/lacks_gl.h"
 
 namespace strandcast::test {
 
@@ -99,7 +100,7 @@ class ServerFixture : public testing::Test {
   void begin(ServerConfig config) {
     config.net.port = 0;
     auto server = Server::start(config);
-    if (!server && server.error().code == ErrorCode::Unavailable)
+    if (!server && lacks_gl(server.error().message))
       GTEST_SKIP() << "needs OpenGL 4.5: " << server.error().to_string();
     ASSERT_TRUE(server) << server.error().to_string();
     server_ = std::move(server).value();

@@ -21,18 +21,19 @@ expect() {
     grep -qxF -- "$line" "$folder/out" || die "no line '$line'"
   done
 }
-# results FILE NAME:RESULT...: GoogleTest's file of a suite `Laws`; RESULT is ok, bad or skip.
+# results FILE NAME:RESULT...: GoogleTest's file of a suite `Laws`; RESULT is ok, bad, skip, or data: skipped without it.
 results() {
   local file="$1" name
   shift
   {
     echo '<testsuites tests="1" name="AllTests">'
     for name in "$@"; do
-      echo "    <testcase name=\"${name%:*}\" status=\"run\" result=\"$([ "${name#*:}" = skip ] && echo skipped ||
+      echo "    <testcase name=\"${name%:*}\" status=\"run\" result=\"$([[ "${name#*:}" =~ ^(skip|data)$ ]] && echo skipped ||
         echo completed)\" time=\"0.25\" classname=\"Laws\">"
       [ "${name#*:}" != bad ] || printf '%s\n' '      <failure message="a.cpp:3&#x0A;1 &lt; 0" type=""><![CDATA[a.cpp:3' \
         '<failure message="part of a text">' '1 < 0]]></failure>'
       [ "${name#*:}" != skip ] || echo '      <skipped message="a.cpp:9&#x0A;no display"><![CDATA[no display]]></skipped>'
+      [ "${name#*:}" != data ] || echo '      <skipped message="a.cpp:7&#x0A;needs ../shared/data: there is no b"></skipped>'
       echo '    </testcase>'
     done
     echo '</testsuites>'
@@ -66,6 +67,12 @@ results net.Laws.Holds.xml Holds:ok
 ctest_log first.junit a.Laws:run a.Kinds/Laws:run net.Laws.Holds:run hardening:run
 expect 0 '6 passed, 0 failed, 1 skipped' '  a.Laws.Three: a.cpp:9: no display' '      0.25 s  a.Laws.One' \
   '       2.5 s  property         2 tests' '       2.5 s  network          1 tests'
+
+# What is skipped because the shared data is not there is counted by itself as well.
+if grep -q 'shared/data' "$folder/out"; then die 'nothing was skipped for want of data'; fi
+results a.Laws.xml One:data Two:data Three:skip
+expect 0 '4 passed, 0 failed, 3 skipped' '2 of them for want of ../shared/data' \
+  '  a.Laws.One: a.cpp:7: needs ../shared/data: there is no b'
 
 # A failure counts once and is named with its first reason.
 results a.Laws.xml One:ok Two:bad Three:skip

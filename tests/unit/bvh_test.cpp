@@ -7,6 +7,7 @@
 #include "common/base/file.h"
 #include "common/motion/motion_file.h"
 #include "common/motion/motion_glitches.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast {
@@ -440,8 +441,7 @@ Peaks peaks_of(const MotionClip& clip) {
 }
 
 TEST(BvhRealFiles, GuessedUnitsAreTheKnownOnes) {
-  if (!std::filesystem::exists(mocap_path(kRealFiles[0].name)))
-    GTEST_SKIP() << "no motion capture data beside the project";
+  REQUIRE_SHARED(mocap_path(kRealFiles[0].name));
   // CMU's unit is published; pirouette is in centimetres. What units the others have nobody says.
   const std::pair<const char*, double> known[] = {{"cmu_01_01_playground_jumps.bvh", 0.0254 / 0.45},
                                                   {"cmu_05_20_mb.bvh", 0.0254 / 0.45},
@@ -456,8 +456,7 @@ TEST(BvhRealFiles, GuessedUnitsAreTheKnownOnes) {
 }
 
 TEST(BvhRealFiles, HaveNoStepsThatNoHeadMakes) {
-  if (!std::filesystem::exists(mocap_path(kRealFiles[0].name)))
-    GTEST_SKIP() << "no motion capture data beside the project";
+  REQUIRE_SHARED(mocap_path(kRealFiles[0].name));
   for (const RealFile& file : kRealFiles) {
     const auto clip = load_bvh(mocap_path(file.name), {.unit_m = file.unit_m, .is_z_up = file.is_z_up});
     ASSERT_TRUE(clip) << clip.error().to_string();
@@ -466,8 +465,7 @@ TEST(BvhRealFiles, HaveNoStepsThatNoHeadMakes) {
 }
 
 TEST(BvhRealFiles, PeaksAndPosesAreThoseOfPeople) {
-  if (!std::filesystem::exists(mocap_path(kRealFiles[0].name)))
-    GTEST_SKIP() << "no motion capture data beside the project";
+  REQUIRE_SHARED(mocap_path(kRealFiles[0].name));
   for (const RealFile& file : kRealFiles) {
     SCOPED_TRACE(file.name);
     const auto clip = load_bvh(mocap_path(file.name), {.unit_m = file.unit_m, .is_z_up = file.is_z_up});
@@ -499,8 +497,7 @@ TEST(BvhRealFiles, PeaksAndPosesAreThoseOfPeople) {
 }
 
 TEST(BvhRealFiles, CalibrationPoseIsKeptOnRequest) {
-  if (!std::filesystem::exists(mocap_path("cmu_05_20_mb.bvh")))
-    GTEST_SKIP() << "no motion capture data beside the project";
+  REQUIRE_SHARED(mocap_path("cmu_05_20_mb.bvh"));
   const auto clip =
       load_bvh(mocap_path("cmu_05_20_mb.bvh"), {.unit_m = 0.0564, .skip_first_frame_if_t_pose = false});
   ASSERT_TRUE(clip);
@@ -508,8 +505,7 @@ TEST(BvhRealFiles, CalibrationPoseIsKeptOnRequest) {
 }
 
 TEST(BvhRealFiles, CutAnywhereIsAnError) {
-  if (!std::filesystem::exists(mocap_path("cmu_131_01.bvh")))
-    GTEST_SKIP() << "no motion capture data beside the project";
+  REQUIRE_SHARED(mocap_path("cmu_131_01.bvh"));
   const auto text = load_text(mocap_path("cmu_131_01.bvh"), kMaxBvhFileBytes);
   ASSERT_TRUE(text);
   for (int tenth = 0; tenth < 10; ++tenth) {

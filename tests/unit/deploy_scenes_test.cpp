@@ -6,6 +6,7 @@
 #include "common/groom/mesh.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_file.h"
+#include "tests/support/shared_data.h"
 
 namespace strandcast {
 namespace {
@@ -100,16 +101,14 @@ std::vector<glm::vec3> real_roots(const std::string& name) {
 }
 
 TEST(DeployScenes, SintelsHeadJointIsTheCentreOfHerSkull) {
-  if (!std::filesystem::exists(data_path(groom_files().at("sintel"))))
-    GTEST_SKIP() << "no grooms beside the project";
+  REQUIRE_SHARED(data_path(groom_files().at("sintel")));
   const FittedSphere skull = fit_sphere(real_roots("sintel"));
   EXPECT_LT(glm::length(skull.center_m), 0.003f);
   EXPECT_NEAR(skull.radius_m, 0.0926f, 0.001f);
 }
 
 TEST(DeployScenes, TheMohawkFitsAHumanHead) {
-  if (!std::filesystem::exists(data_path(groom_files().at("mohawk"))))
-    GTEST_SKIP() << "no grooms beside the project";
+  REQUIRE_SHARED(data_path(groom_files().at("mohawk")));
   const SceneDesc scene = loaded("mohawk", {"groom.file.path=x"});
   std::vector<glm::vec3> crest;  // roots on the skull, not down the back
   for (const glm::vec3& root : real_roots("mohawk"))

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "server/report/motion_set.h"
+#include "tests/support/shared_data.h"
 
 namespace strandcast {
 namespace {
@@ -143,7 +144,7 @@ TEST(MotionSet, RefusesAClipThatIsTooShort) {
 // This clip is sampled 30 times a second; the head moves smoothly in between.
 TEST(MotionSet, RealClipsAreSmooth) {
   const std::filesystem::path clip = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap/fair1_dab.bvh";
-  if (!std::filesystem::exists(clip)) GTEST_SKIP() << "no motion captures beside the project";
+  REQUIRE_SHARED(clip);
   const auto motion = MotionSet::make({clip, 2.0, 2});
   ASSERT_TRUE(motion) << motion.error().to_string();
   constexpr double kStepS = 1e-3;

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 
+#include "tests/support/shared_data.h"
+
 namespace strandcast {
 namespace {
 
@@ -50,7 +52,7 @@ TEST(SceneContent, OwnCollidersReplaceTheFittedOneAndNoneMeansNone) {
 TEST(SceneContent, RealGroomGetsAHeadWhereItsRootsAre) {
   const std::filesystem::path path =
       std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/Ratboy_mohawk.tfx";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "needs the groom " << path;
+  REQUIRE_SHARED(path);
   SceneDesc scene = built_in_scene();
   FileGroomDesc file;
   file.path = path;
@@ -83,7 +85,7 @@ TEST(SceneContent, GroomFileWithoutAnOriginIsCentredOnItsRootsWithItsMesh) {
   const std::filesystem::path data = STRANDCAST_SHARED_DATA;
   FileGroomDesc file;
   file.path = data / "grooms/sintel_11400x16.tfx";
-  if (!std::filesystem::exists(file.path)) GTEST_SKIP() << "needs the groom " << file.path;
+  REQUIRE_SHARED(file.path);
   SceneDesc scene = built_in_scene();
   scene.groom = file;
   scene.head.mesh_path = data / "meshes/sintel.obj";
@@ -103,7 +105,7 @@ TEST(SceneContent, GroomFileWithoutAnOriginIsCentredOnItsRootsWithItsMesh) {
 TEST(SceneContent, ManeDownTheBackDoesNotInflateTheHead) {
   const std::filesystem::path path =
       std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/Ratboy_mohawk.tfx";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "needs the groom " << path;
+  REQUIRE_SHARED(path);
   SceneDesc scene = built_in_scene();
   FileGroomDesc file;
   file.path = path;
