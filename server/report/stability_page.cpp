@@ -124,22 +124,26 @@ HtmlTable table_of(const std::vector<StabilityOutcome>& outcomes, const std::str
 /// What the numbers of a row need said: changed parameters, refusals, reasons for red cells.
 std::vector<std::string> remarks(const std::vector<StabilityOutcome>& outcomes, const std::string& row) {
   std::vector<std::string> lines;
-  const auto add = [&lines](std::string line) {
-    if (std::find(lines.begin(), lines.end(), line) == lines.end()) lines.push_back(std::move(line));
-  };
+  std::vector<std::pair<std::string, std::string>> red;  // reason, and the trials it is given for
   for (const StabilityOutcome& outcome : outcomes) {
     if (outcome.row != row) continue;
-    if (!outcome.note.empty()) add(fmt::format("{} {}: {}.", outcome.group, outcome.setting, outcome.note));
-    if (!outcome.refusal.empty())
-      add(fmt::format("Refused, {} {}: {}", outcome.group, outcome.setting, outcome.refusal));
+    const std::string trial = outcome.group + " " + outcome.setting;
+    if (!outcome.note.empty()) lines.push_back(fmt::format("{}: {}.", trial, outcome.note));
+    if (!outcome.refusal.empty()) lines.push_back(fmt::format("Refused, {}: {}", trial, outcome.refusal));
     for (const auto& cell : outcome.cells) {
-      if (!cell || cell->is_kept()) continue;
-      if (cell->known_break != nullptr)
-        add(fmt::format("Red, {}{}{}, {}: {}.", outcome.group, *cell->known_break->setting != '\0' ? " " : "",
-                        cell->known_break->setting, name_of(cell->known_break->measure),
-                        cell->known_break->reason));
+      if (!cell || cell->is_kept() || cell->known_break == nullptr) continue;
+      const std::string reason =
+          fmt::format("{}: {}.", name_of(cell->known_break->measure), cell->known_break->reason);
+      const auto known =
+          std::find_if(red.begin(), red.end(), [&](const auto& entry) { return entry.first == reason; });
+      if (known == red.end()) {
+        red.emplace_back(reason, trial);
+      } else {
+        known->second += "; " + trial;
+      }
     }
   }
+  for (const auto& [reason, trials] : red) lines.push_back(fmt::format("Red, {}, {}", trials, reason));
   return lines;
 }
 

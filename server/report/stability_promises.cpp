@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "common/base/check.h"
@@ -35,7 +37,7 @@ StabilityPromise stability_promise(const SolverRow& row, const StabilityTrial& t
     case StabilityMeasure::Finite:
       return {0.0};
     case StabilityMeasure::Stretch:
-      return {row.stretch_bound > 0.0 ? overstretch_limit(row.stretch_bound) : kExactStretch};
+      return {row.stretch_bound > 0.0 ? std::max(row.stretch_bound, kLeastOverstretch) : kExactStretch};
     case StabilityMeasure::Speed:
       return {trial.fair_speed_mps};
     case StabilityMeasure::Energy:
@@ -56,10 +58,11 @@ std::string promise_reason(StabilityMeasure measure) {
     case StabilityMeasure::Finite:
       return "Steps after which a position or velocity was no finite number. None may be, whatever comes in.";
     case StabilityMeasure::Stretch:
-      return "Largest change of a segment's length, relative to it. Rows with exact lengths: rounding. "
-             "Others: "
-             "the limit at which a running server would put the strand back to rest, four times the row's "
-             "bound and at least 50 %.";
+      return fmt::format(
+          "Largest change of a segment's length, relative to it. Rows with exact lengths: rounding. Others: "
+          "{:g} %, or the row's bound where that is more. A running server lets up to {:g} times that bound "
+          "pass before it puts a strand back to rest.",
+          100.0 * kLeastOverstretch, kOverstretchPerBound);
     case StabilityMeasure::Speed:
       return "Largest speed of a vertex relative to the head, as seen, m/s. Twice the sum of what a rigid "
              "strand does "
@@ -110,26 +113,51 @@ const std::vector<KnownBreak>& known_breaks() {
       "only the tip has mass; the energy here counts that of the vertices which it drags";
   constexpr const char* kFinishedLengths =
       "sweeps put lengths right where the constraints have left vertices too low, and lift them for nothing";
+  constexpr const char* kTooStiffForFloat =
+      "from a million times the stiffness of hair on, its bending forces leave single precision no room for "
+      "inertia; the double reference moves as a rigid strand";
   static const std::vector<KnownBreak> breaks = {
-      {"dftl", "energy", "buckles from upright", Measure::Energy, kCompressed},
-      {"dftl_parallel", "energy", "buckles from upright", Measure::Energy, kCompressed},
-      {"dftl_parallel", "motion", "", Measure::Jitter, kUnfinishedSweeps},
-      {"ftl", "step", "", Measure::Speed, kStaticFollow},
-      {"ftl", "motion", "", Measure::Jitter, kStaticFollow},
-      {"pbd", "motion", "", Measure::Stretch, kIterationsLeaveStretch},
-      {"pbd", "groom", "64 vertices", Measure::Stretch, kIterationsLeaveStretch},
-      {"pbd", "input", "infinity in everything", Measure::Stretch, kIterationsLeaveStretch},
-      {"xpbd", "motion", "", Measure::Stretch, kIterationsLeaveStretch},
-      {"xpbd", "groom", "64 vertices", Measure::Stretch, kIterationsLeaveStretch},
-      {"xpbd", "input", "infinity in everything", Measure::Stretch, kIterationsLeaveStretch},
-      {"tractrix_emulation", "energy", "", Measure::Energy, kDraggedAlong},
-      {"tractrix_split", "energy", "buckles from upright", Measure::Energy, kOnlyTheTip},
-      {"tractrix_hybrid", "energy", "buckles from upright", Measure::Energy, kFinishedLengths},
-      {"direct_rod", "stiffness", "", Measure::Speed,
-       "from a million times the stiffness of hair on, its bending forces leave single precision no room for "
-       "inertia; the double reference moves as a rigid strand"},
-      {"direct_rod", "input", "", Measure::Style, kUnstableStyle},
-      {"direct_rod", "rest", "", Measure::Style, kUnstableStyle},
+      {"dftl", "energy", "buckles from upright", Measure::Energy, 0.0754, kCompressed},
+      {"dftl_parallel", "energy", "buckles from upright", Measure::Energy, 0.0755, kCompressed},
+      {"dftl_parallel", "motion", "2 m/s, reversed every 50 ms", Measure::Jitter, 61.0, kUnfinishedSweeps},
+      {"ftl", "step", "1/240 s", Measure::Speed, 18.2, kStaticFollow},
+      {"ftl", "motion", "10 g head shake", Measure::Jitter, 1.53, kStaticFollow},
+      {"ftl", "motion", "20 rad/s nod", Measure::Jitter, 5.12, kStaticFollow},
+      {"ftl", "motion", "180-degree turns, 50 ms each", Measure::Jitter, 2.90, kStaticFollow},
+      {"ftl", "motion", "2 m/s, reversed every 50 ms", Measure::Jitter, 2.92, kStaticFollow},
+      {"ftl", "motion", "wind of 80 m/s", Measure::Jitter, 2.19, kStaticFollow},
+      {"pbd", "motion", "10 g head shake", Measure::Stretch, 1.29, kIterationsLeaveStretch},
+      {"pbd", "motion", "20 rad/s nod", Measure::Stretch, 1.71, kIterationsLeaveStretch},
+      {"pbd", "motion", "180-degree turns, 50 ms each", Measure::Stretch, 1.40, kIterationsLeaveStretch},
+      {"pbd", "motion", "1 m teleport in one frame", Measure::Stretch, 6.58, kIterationsLeaveStretch},
+      {"pbd", "motion", "1000 m/s2 at the root", Measure::Stretch, 5.63, kIterationsLeaveStretch},
+      {"pbd", "motion", "wind of 80 m/s", Measure::Stretch, 1.59, kIterationsLeaveStretch},
+      {"pbd", "groom", "zero-length segments", Measure::Stretch, 0.509, kIterationsLeaveStretch},
+      {"pbd", "groom", "segments of 1e-7 m", Measure::Stretch, 0.509, kIterationsLeaveStretch},
+      {"pbd", "groom", "64 vertices", Measure::Stretch, 1.72, kIterationsLeaveStretch},
+      {"pbd", "input", "infinity in everything", Measure::Stretch, 31.3, kIterationsLeaveStretch},
+      {"xpbd", "motion", "10 g head shake", Measure::Stretch, 0.842, kIterationsLeaveStretch},
+      {"xpbd", "motion", "20 rad/s nod", Measure::Stretch, 0.626, kIterationsLeaveStretch},
+      {"xpbd", "motion", "180-degree turns, 50 ms each", Measure::Stretch, 0.993, kIterationsLeaveStretch},
+      {"xpbd", "motion", "1 m teleport in one frame", Measure::Stretch, 3.45, kIterationsLeaveStretch},
+      {"xpbd", "motion", "1000 m/s2 at the root", Measure::Stretch, 2.99, kIterationsLeaveStretch},
+      {"xpbd", "motion", "wind of 80 m/s", Measure::Stretch, 0.586, kIterationsLeaveStretch},
+      {"xpbd", "groom", "64 vertices", Measure::Stretch, 1.01, kIterationsLeaveStretch},
+      {"xpbd", "input", "infinity in everything", Measure::Stretch, 15.3, kIterationsLeaveStretch},
+      {"tractrix_emulation", "energy", "kicked, no gravity", Measure::Energy, 1.23, kDraggedAlong},
+      {"tractrix_emulation", "energy", "buckles from upright", Measure::Energy, 0.0592, kDraggedAlong},
+      {"tractrix_split", "energy", "buckles from upright", Measure::Energy, 0.0564, kOnlyTheTip},
+      {"tractrix_hybrid", "energy", "buckles from upright", Measure::Energy, 0.0322, kFinishedLengths},
+      {"direct_rod", "stiffness", "x1e6", Measure::Speed, 25.7, kTooStiffForFloat},
+      {"direct_rod", "stiffness", "x1e7", Measure::Speed, 15.6, kTooStiffForFloat},
+      {"direct_rod", "stiffness", "x1e8", Measure::Speed, 15.6, kTooStiffForFloat},
+      {"direct_rod", "stiffness", "x1e9", Measure::Speed, 15.6, kTooStiffForFloat},
+      {"direct_rod", "input", "NaN in everything", Measure::Style, 0.185, kUnstableStyle},
+      {"direct_rod", "input", "infinity in everything", Measure::Style, 0.185, kUnstableStyle},
+      {"direct_rod", "input", "zero quaternion", Measure::Style, 0.185, kUnstableStyle},
+      {"direct_rod", "rest", "hanging hair", Measure::Style, 0.185, kUnstableStyle},
+      {"direct_rod", "rest", "standing hair", Measure::Style, 0.410, kUnstableStyle},
+      {"direct_rod", "rest", "hanging hair, many steps", Measure::Style, 0.185, kUnstableStyle},
   };
   return breaks;
 }

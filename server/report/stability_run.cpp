@@ -175,8 +175,8 @@ Result<StabilityOutcome> StabilityRunner::run(const SolverRow& row, const Stabil
     if (!trial.measures(measure)) continue;
     StabilityCell cell{values[i], stability_promise(row, trial, measure), nullptr};
     for (const KnownBreak& known : known_breaks()) {
-      const bool is_here = row.name == known.row && trial.group == known.group && measure == known.measure &&
-                           (*known.setting == '\0' || trial.setting == known.setting);
+      const bool is_here = row.name == known.row && trial.group == known.group &&
+                           trial.setting == known.setting && measure == known.measure;
       if (is_here) cell.known_break = &known;
     }
     outcome.cells[i] = cell;
