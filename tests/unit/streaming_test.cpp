@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/replay/strand_fill.h"
+#include "common/strands/strand_prefix.h"
+#include "server/report/peers/peer_codecs.h"
 #include "server/report/streaming_goals.h"
 #include "server/report/streaming_page.h"
 #include "server/report/svg_bars.h"
+#include "tests/support/claims.h"
+#include "tests/support/shared_data.h"
 
 namespace strandcast {
 namespace {
@@ -47,6 +52,99 @@ TEST(StreamRecording, RefusesWhatDoesNotFit) {
   const auto too_large = record_strands({motion, {200'000, 64}, 60.0, "", nullptr});
   ASSERT_FALSE(too_large.ok());
   EXPECT_EQ(too_large.error().code, ErrorCode::LimitExceeded);
+}
+
+// ---- what the documents say of the strand codec, on strands that the built-in scene's solver moves ----
+
+constexpr StreamSize kClaimedSize = {claims::kStreamStrands, claims::kStreamVertices};
+constexpr double kClaimedSeconds = 0.5;
+
+const StreamRecording& recorded(const StreamMotion& motion) {
+  static std::map<std::string, StreamRecording> known;
+  const auto [found, is_new] = known.try_emplace(motion.name);
+  if (!is_new) return found->second;
+  auto recording = record_strands({motion, kClaimedSize, kClaimedSeconds, "", nullptr});
+  EXPECT_TRUE(recording.ok()) << recording.error().to_string();
+  return found->second = std::move(recording).value();
+}
+
+/// What `tangent`, then `delta` and then every peer make of a recording at the goals' bound.
+StreamingReport coded(const StreamRecording& recording, bool has_peers) {
+  StreamingReport report;
+  std::vector<StreamCodecRow> codecs = own_stream_codecs(kGoalBoundM);
+  std::erase_if(codecs, [](const StreamCodecRow& codec) { return codec.name == "raw"; });
+  std::partition(codecs.begin(), codecs.end(),
+                 [](const StreamCodecRow& codec) { return codec.name == "tangent"; });
+  if (has_peers)
+    for (StreamCodecRow& peer : peer_stream_codecs(kGoalBoundM)) codecs.push_back(std::move(peer));
+  for (const StreamCodecRow& codec : codecs) {
+    const auto row = measure_codec(codec, recording);
+    EXPECT_TRUE(row.ok()) << row.error().to_string();
+    EXPECT_TRUE(row->keeps_bound()) << codec.name;
+    report.rows.push_back(*row);
+  }
+  return report;
+}
+
+/// The documents round up, and by no more than a tenth.
+void expect_claimed(double measured, double claimed, const std::string& what) {
+  EXPECT_LE(measured, claimed) << what;
+  EXPECT_GE(measured, 0.9 * claimed) << what << ": the documents say less than is true";
+  fmt::print("{}: {:.3f} of {:g}\n", what, measured, claimed);
+}
+
+TEST(StreamClaims, BitsOfTheBuiltInMotions) {
+  const std::vector<StreamMotion> motions = built_in_stream_motions();
+  const double claimed[] = {claims::kIdleBits, claims::kActiveBits, claims::kViolentBits};
+  ASSERT_EQ(motions.size(), std::size(claimed));
+  for (size_t i = 0; i < motions.size(); ++i) {
+    const StreamingReport report = coded(recorded(motions[i]), false);
+    expect_claimed(report.rows[0].bits, claimed[i], motions[i].name);
+    const double more = report.rows[1].bits / report.rows[0].bits;
+    EXPECT_GE(more, claims::kLeastDeltaRatio) << motions[i].name;
+    EXPECT_LE(more, claims::kMostDeltaRatio) << motions[i].name;
+    fmt::print("delta: {:.2f} times as many\n", more);
+  }
+}
+
+TEST(StreamClaims, StrandsThatWereLeftOutAreNearTheTruth) {
+  constexpr StreamSize kSize = {claims::kFilledStrands, claims::kStreamVertices};
+  constexpr double kSeconds = 0.2;
+  const auto recording = record_strands({built_in_stream_motions()[1], kSize, kSeconds, "", nullptr});
+  ASSERT_TRUE(recording.ok()) << recording.error().to_string();
+  StrandFill fill(recording->shape.rest_in_head_m, kSize.vertex_count);
+  const uint32_t sent = kSize.strand_count / 4;
+  std::vector<double> off_mm;
+  for (const StreamFrame& frame : recording->frames) {
+    QuantiseInput input;
+    input.strand_count = kSize.strand_count;
+    input.vertex_count = kSize.vertex_count;
+    input.quantum_m = 1e-6f;
+    input.position_in_head_m = frame.position_in_head_m;
+    const auto shown = fill.positions(prefix_of(quantise(input).snapshot, sent));
+    ASSERT_EQ(shown.size(), frame.position_in_head_m.size());
+    for (size_t i = 0; i < shown.size(); ++i)
+      if (i % kSize.strand_count >= sent)
+        off_mm.push_back(1e3 * static_cast<double>(glm::distance(shown[i], frame.position_in_head_m[i])));
+  }
+  std::sort(off_mm.begin(), off_mm.end());
+  expect_claimed(off_mm[off_mm.size() / 2], claims::kFilledMedianMm, "median, mm");
+  expect_claimed(off_mm[off_mm.size() * 95 / 100], claims::kFilledMostMm, "95 %, mm");
+}
+
+TEST(StreamClaims, AWalkOfMotionCaptureBesidePeers) {
+  const std::filesystem::path clip =
+      std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap" / claims::kStreamClip;
+  REQUIRE_SHARED(clip);
+  const auto motion = load_stream_motion(clip, {});
+  ASSERT_TRUE(motion.ok()) << motion.error().to_string();
+  const StreamingReport report = coded(recorded(*motion), true);
+  const StreamingRow& ours = report.rows[0];
+  expect_claimed(ours.bits, claims::kClipBits, "bits");
+  const auto times_fewer = [&](PeerKind kind) { return best_peer(report, ours, kind)->bits / ours.bits; };
+  // Of more times fewer bits the documents round down.
+  expect_claimed(claims::kTimesFewerThanTemporal, times_fewer(PeerKind::Temporal), "temporal peers");
+  expect_claimed(claims::kTimesFewerThanPlain, times_fewer(PeerKind::Plain), "plain peers");
 }
 
 StreamingRow row(const char* codec, MotionLevel motion_level, double bits) {

@@ -1,0 +1,133 @@
+// The numbers in README.md and ARCHITECTURE.md are those that tests hold (tests/support/claims.h) or that the
+// code has, and where README.md speaks of what was measured there is no other.
+#include "tests/support/claims.h"
+
+#include <regex>
+
+#include "common/base/file.h"
+#include "common/scene/scene_fields.h"
+#include "server/app/mode_policy.h"
+#include "server/encode/frame_worker.h"
+#include "server/encode/picture_encoder.h"
+#include "server/net/class_choice.h"
+#include "server/net/send_gate.h"
+#include "server/report/streaming.h"
+#include "server/report/work_precision.h"
+
+namespace strandcast {
+namespace {
+
+std::string text_of(const std::string& document) {
+  return load_text(std::filesystem::path(STRANDCAST_SOURCE_DIR) / document, 1u << 20).value();
+}
+
+std::string on_one_line(const std::string& text) {
+  return std::regex_replace(text, std::regex("\\s+"), " ");
+}
+
+std::string percent(double share) {
+  return fmt::format("{:g} %", 100.0 * share);
+}
+
+constexpr double kNsPerS = 1e9;
+
+std::vector<std::string> readme_claims() {
+  using namespace claims;
+  return {
+      fmt::format("({} vertices, one linear solve per step)", kRodVertices),
+      fmt::format("tip of a cantilever within {} of its length up to Gamma {:g}", percent(kCantileverTip),
+                  kCantileverGamma),
+      fmt::format("within {} up to {:g}", percent(kHeavyCantileverTip), kHeavyCantileverGamma),
+      fmt::format("under an end load within {}", percent(kEndLoadTip)),
+      fmt::format("first swing within {} at {:g} Hz", percent(kFirstSwing), kFirstSwingHz),
+      fmt::format("curls as helical springs within {}", percent(kCurlSpring)),
+      fmt::format("buckling load bracketed within {}", percent(kBuckling)),
+      fmt::format("stretch below {} in a head shake of {:g} g", percent(kShakeStretch), kShakeG),
+      fmt::format("by up to {:.0f} % (`pbd`) and {:.0f} % (`xpbd`)", 100.0 * kPbdViolentStretch,
+                  100.0 * kXpbdViolentStretch),
+      fmt::format(
+          "`tangent` at {:g} mm takes {:g} bits per vertex when idle, {:g} turning and {:g} in violent "
+          "motion",
+          1e3 * kGoalBoundM, kIdleBits, kActiveBits, kViolentBits),
+      fmt::format("{} x {}, `dftl`;", kStreamStrands, kStreamVertices),
+      fmt::format("{:g} in the middle of a walk ({})", kClipBits, kStreamClip),
+      fmt::format("{:g} times fewer than the best of the others with a prediction in time around it",
+                  kTimesFewerThanTemporal),
+      fmt::format("{:g} times fewer than the best on plain positions", kTimesFewerThanPlain),
+      fmt::format("32-bit floats take {}", 3 * 32),
+      fmt::format("{} vertices, steps of 1/{:g} s", WorkGrid().reference_vertices,
+                  WorkGrid().reference_rate_hz),
+      fmt::format("at {:g}, {:g}, {:g} and {:g} mm", 1e3 * kStreamBoundsM[0], 1e3 * kStreamBoundsM[1],
+                  1e3 * kStreamBoundsM[2], 1e3 * kStreamBoundsM[3]),
+      fmt::format("stream.bound_m={:g}", 2e-4),
+      fmt::format("{:.5f}..{:.4f}", scene_fields::kStreamBound.minimum, scene_fields::kStreamBound.maximum),
+  };
+}
+
+std::vector<std::string> architecture_claims() {
+  using namespace claims;
+  return {
+      fmt::format("({:g} mm unless the scene says otherwise)", 1e3 * StreamDesc().bound_m),
+      fmt::format("{:g} to {:g} times the bits", kLeastDeltaRatio, kMostDeltaRatio),
+      fmt::format("a quarter of {} strands of the built-in scene", kFilledStrands),
+      fmt::format("within {:g} mm of the truth (median; {:g} mm for 95 %)", kFilledMedianMm, kFilledMostMm),
+      fmt::format("no more than {} ms of frames wait (a keyframe: {};", kGateQueueNs / kNsPerMs,
+                  kStartDelayNs / kNsPerMs),
+      fmt::format("only the asset, or {} KiB", kFirstBytes >> 10),
+      fmt::format("at most one in {:g} s for all", kKeyframePauseNs / kNsPerS),
+      fmt::format("after {} periods it comes once more", kStillPeriods),
+      fmt::format("frame {} in {:g} s found no place", kTroublingLosses, kLossWindowNs / kNsPerS),
+      fmt::format("worth {:g} times as much as strands, for {:g} s", kFramesGain, kWishNs / kNsPerS),
+      fmt::format("no change follows another within {:g} s", kFirstDwellNs / kNsPerS),
+  };
+}
+
+TEST(Claims, StandInReadme) {
+  const std::string text = on_one_line(text_of("README.md"));
+  for (const std::string& claim : readme_claims()) EXPECT_NE(text.find(claim), std::string::npos) << claim;
+}
+
+TEST(Claims, StandInArchitecture) {
+  const std::string text = on_one_line(text_of("ARCHITECTURE.md"));
+  for (const std::string& claim : architecture_claims())
+    EXPECT_NE(text.find(claim), std::string::npos) << claim;
+}
+
+/// Numbers with a unit of something measured, outside of commands.
+std::vector<std::string> measured_numbers(std::string text) {
+  text = on_one_line(std::regex_replace(text, std::regex("\n    [^\n]*"), "\n"));
+  text = std::regex_replace(text, std::regex("`[^`]*`"), "");
+  const std::regex number(
+      "[0-9][0-9.,]*(e-[0-9]+)? ?"
+      "(%|(times|bits|(M|k)?bit/s|m?s|mm|dB|kB|MiB|micro\\w+|milli\\w+|seconds?|minutes?)\\b)");
+  std::vector<std::string> found;
+  for (auto match = std::sregex_iterator(text.begin(), text.end(), number); match != std::sregex_iterator();
+       ++match)
+    found.push_back(match->str());
+  return found;
+}
+
+TEST(Claims, NumbersAreSeenOutsideOfCommands) {
+  EXPECT_THAT(
+      measured_numbers("takes 2.4 to 2.6 bits,\n    sleep 3 s\n`7 ms`, 1,000 times as `x` 5 % more\n"),
+      testing::ElementsAre("2.6 bits", "1,000 times", "5 %"));
+  EXPECT_THAT(measured_numbers("0.3 microseconds and 3.8 ms"),
+              testing::ElementsAre("0.3 microseconds", "3.8 ms"));
+}
+
+TEST(Claims, AreAllThatReadmeMeasures) {
+  const std::string text = text_of("README.md");
+  const size_t begin = text.find("## What it measures");
+  const size_t end = text.find("## Where to read on");
+  ASSERT_TRUE(begin != std::string::npos && begin < end && end != std::string::npos);
+  std::string rest =
+      on_one_line(std::regex_replace(text.substr(begin, end - begin), std::regex("\n    [^\n]*"), "\n"));
+  for (const std::string& claim : readme_claims())
+    for (size_t at = rest.find(claim); at != std::string::npos; at = rest.find(claim))
+      rest.erase(at, claim.size());
+  EXPECT_THAT(measured_numbers(rest), testing::IsEmpty())
+      << "put them into tests/support/claims.h with a test";
+}
+
+}  // namespace
+}  // namespace strandcast
