@@ -52,7 +52,7 @@ void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAn
       block[part] =
           to_floats(wrapping_differences(load_lanes(positions.last + at), load_lanes(positions.base + at)));
     }
-    for (uint32_t k = 0; k < kRowFeatureCount; ++k)
+    for (uint32_t k = 0; k < kOwnFeatureCount; ++k)
       for (size_t part = 0; part < kParts; ++part)
         block[part] += weights[k] * load_lanes(row[k] + i + part * kLaneCount);
     for (size_t part = 0; part < kParts; ++part) store_lanes(block[part], sum.data() + i + part * kLaneCount);

@@ -68,7 +68,7 @@ constexpr uint32_t first_feature_of(MotionStrand strand) {
   while (k < kMotionFeatures.size() && kMotionFeatures[k].strand < strand) ++k;
   return k;
 }
-inline constexpr uint32_t kRowFeatureCount = first_feature_of(MotionStrand::Neighbour);
+inline constexpr uint32_t kOwnFeatureCount = first_feature_of(MotionStrand::Neighbour);
 inline constexpr uint32_t kHeadFeature = kMotionFeatures.size();
 static_assert(kHeadFeature + kHeadStepCount == kMotionFeatureCount);
 // What is not decoded yet predicts nothing.
