@@ -37,22 +37,8 @@ glm::dquat frame_along(const glm::dvec3& along) {
 
 }  // namespace
 
-glm::dquat smallest_rotation(const glm::dvec3& from, const glm::dvec3& to) {
-  const double cosine = glm::dot(from, to);
-  if (cosine < -1.0 + 1e-12) {
-    const glm::dvec3 other = std::abs(from.x) < 0.6 ? kAxis : glm::dvec3(0.0, 1.0, 0.0);
-    return glm::angleAxis(glm::radians(180.0), glm::normalize(glm::cross(from, other)));
-  }
-  return glm::normalize(glm::dquat(1.0 + cosine, glm::cross(from, to)));
-}
-
 glm::dquat carried_frame(const glm::dquat& frame, const glm::dvec3& along) {
   return smallest_rotation(frame * kAlong, along) * frame;
-}
-
-glm::dvec3 direction_or(const glm::dvec3& edge, const glm::dvec3& otherwise) {
-  const double length = glm::length(edge);
-  return length > kTinyLength ? edge / length : otherwise;
 }
 
 glm::dvec3 bend_between(const glm::dvec3& from, const glm::dvec3& to) {

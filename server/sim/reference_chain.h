@@ -7,17 +7,13 @@
 #include <vector>
 
 #include "server/sim/chain_parameters.h"
+#include "server/sim/directions.h"
 #include "server/sim/reference_strands.h"
 
 namespace strandcast {
 
-/// Smallest rotation from one unit vector to another.
-glm::dquat smallest_rotation(const glm::dvec3& from, const glm::dvec3& to);
-
 /// The frame turned by the smallest rotation that brings it to another direction.
 glm::dquat carried_frame(const glm::dquat& frame, const glm::dvec3& along);
-
-glm::dvec3 direction_or(const glm::dvec3& edge, const glm::dvec3& otherwise);
 
 /// Moment that turns `to` away from `from` over the stiffness: their angle about the axis between them; from
 /// a right angle on it falls again.

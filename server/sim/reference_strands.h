@@ -41,7 +41,7 @@ class ReferenceStrands : public ReferenceSolver {
   virtual void prepare() {}
 
   /// Puts vertex i as near to its prediction as its segment's length from vertex i-1, the colliders and the
-  /// reach of a pinned tail allow. pinned tail.
+  /// reach of a pinned tail allow.
   void place(ReferenceStrand& strand, uint32_t i) const;
   /// Where forces alone take vertex i from old_m.
   virtual glm::dvec3 predict(const ReferenceStrand& strand, uint32_t i) const;

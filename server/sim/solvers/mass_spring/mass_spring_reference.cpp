@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "server/sim/banded_system.h"
+#include "server/sim/directions.h"
 #include "server/sim/reference_contact.h"
 #include "server/sim/reference_solver.h"
 #include "server/sim/solvers/mass_spring/mass_spring.h"
@@ -11,23 +12,8 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLengthM = 1e-10;
-constexpr double kFoldedBack = 1e-6;
+constexpr double kShortestM = 1e-6;
 constexpr double kNearlyReversed = 0.02;  // 1 + cos of 164 degrees
-
-glm::dvec3 direction_of(const glm::dvec3& vector, const glm::dvec3& other) {
-  const double length = glm::length(vector);
-  return length > kTinyLengthM ? vector / length : other;
-}
-
-/// The smallest rotation that takes one unit vector to another.
-glm::dquat smallest_turn(const glm::dvec3& from, const glm::dvec3& to) {
-  const double w = 1.0 + glm::dot(from, to);
-  if (w > kFoldedBack) return glm::normalize(glm::dquat(w, glm::cross(from, to)));
-  const glm::dvec3 side =
-      std::abs(from.x) < 0.6 ? glm::dvec3(0.0, from.z, -from.y) : glm::dvec3(-from.z, 0.0, from.x);
-  return glm::normalize(glm::dquat(0.0, side));
-}
 
 /// A linear form in the positions of consecutive vertices: value = constant part, jacobian[k] on vertex first
 /// + k.
@@ -124,17 +110,17 @@ class SpringMotion {
   /// direction.
   void measure(const std::vector<glm::dvec3>& x) {
     glm::dvec3 groomed = step_.rotation * glm::dvec3(0.0, 1.0, 0.0);
-    if (first_ >= 2) groomed = direction_of(target_[first_ - 1] - target_[first_ - 2], groomed);
+    if (first_ >= 2) groomed = direction_or(target_[first_ - 1] - target_[first_ - 2], groomed);
     direction_.assign(n_, groomed);
     rest_.assign(n_, groomed);
     groomed_.assign(n_, groomed);
     glm::dquat turn(1.0, 0.0, 0.0, 0.0);
     for (uint32_t i = first_; i <= last(); ++i) {
-      groomed = direction_of(target_[i] - target_[i - 1], groomed);
+      groomed = direction_or(target_[i] - target_[i - 1], groomed);
       groomed_[i] = groomed;
       rest_[i] = turn * groomed;
-      direction_[i] = direction_of(x[i] - x[i - 1], rest_[i]);
-      turn = smallest_turn(groomed, direction_[i]);
+      direction_[i] = direction_or(x[i] - x[i - 1], rest_[i]);
+      turn = smallest_rotation(groomed, direction_[i]);
     }
   }
 
@@ -212,14 +198,14 @@ class SpringMotion {
     glm::dquat turn(1.0, 0.0, 0.0, 0.0);
     glm::dvec3 groomed = direction_[0];
     for (uint32_t i = first_; i < n_; ++i) {
-      groomed = direction_of(target_[i] - target_[i - 1], groomed);
+      groomed = direction_or(target_[i] - target_[i - 1], groomed);
       const glm::dvec3 rest = turn * groomed;
       const double slack = springs_.stretch_limit * segment_[i];
       const double length =
           std::clamp(length_before(i), std::max(segment_[i] - slack, 0.0), segment_[i] + slack);
-      const glm::dvec3 direction = direction_of(x_[i] - x_[i - 1], rest);
+      const glm::dvec3 direction = direction_or(x_[i] - x_[i - 1], rest);
       x_[i] = x_[i - 1] + length * direction;
-      turn = smallest_turn(groomed, direction);
+      turn = smallest_rotation(groomed, direction);
     }
   }
 
@@ -257,7 +243,7 @@ class SpringMotion {
     const glm::dvec3& t = direction_[i];
     const double length = glm::dot(x_[i] - x_[i - 1], t);
     const glm::dvec3 pull = (spring * (length - segment_[i]) + damper * (length - length_before(i))) * t;
-    const double across = spring * std::max(length - segment_[i], 0.0) / std::max(length, kFoldedBack);
+    const double across = spring * std::max(length - segment_[i], 0.0) / std::max(length, kShortestM);
     const glm::dmat3 stiffness =
         (spring + damper) * glm::outerProduct(t, t) + across * (glm::dmat3(1.0) - glm::outerProduct(t, t));
     for (const uint32_t a : {i - 1, i}) {
@@ -309,8 +295,8 @@ class SpringMotion {
         const double slack = springs_.stretch_limit * segment_[i];
         length = std::clamp(length, std::max(segment_[i] - slack, 0.0), segment_[i] + slack);
       }
-      const glm::dvec3 groomed = direction_of(target_[i] - target_[i - 1], glm::dvec3(0.0));
-      const glm::dvec3 point = end[i - 1] + length * direction_of(edge, groomed);
+      const glm::dvec3 groomed = direction_or(target_[i] - target_[i - 1], glm::dvec3(0.0));
+      const glm::dvec3 point = end[i - 1] + length * direction_or(edge, groomed);
       end[i] = pushed_out(*step_.input, step_.carry, shared_.collider_friction,
                           {old_[i], end[i - 1], point, length});
     }

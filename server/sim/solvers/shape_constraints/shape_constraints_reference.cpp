@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/sim/directions.h"
 #include "server/sim/reference_contact.h"
 #include "server/sim/reference_strands.h"
 #include "server/sim/solvers/shape_constraints/shape_constraints.h"
@@ -10,12 +11,7 @@
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLengthM = 1e-10;
-
-glm::dvec3 unit_or(const glm::dvec3& vector, const glm::dvec3& otherwise) {
-  const double length = glm::length(vector);
-  return length > kTinyLengthM ? vector / length : otherwise;
-}
+constexpr double kTinySine = 1e-10;
 
 /// The vector turned by the shortest turn between two unit vectors. Opposite ones have no shortest turn: the
 /// vector is mirrored.
@@ -23,7 +19,7 @@ glm::dvec3 turned(const glm::dvec3& from, const glm::dvec3& to, const glm::dvec3
   const glm::dvec3 axis = glm::cross(from, to);
   const double sine = glm::length(axis);
   const double cosine = glm::dot(from, to);
-  if (sine < kTinyLengthM) return cosine > 0.0 ? vector : vector - 2.0 * glm::dot(from, vector) * from;
+  if (sine < kTinySine) return cosine > 0.0 ? vector : vector - 2.0 * glm::dot(from, vector) * from;
   return glm::angleAxis(std::atan2(sine, cosine), axis / sine) * vector;
 }
 
@@ -60,7 +56,7 @@ class ShapeConstraintsReference final : public ReferenceStrands {
     const glm::dvec3 start = before + own + share * change - head_velocity_mps();
 
     // (1 + h^2 s + h D) u = start + h (g + D air) + h s (target - x), D the tensor of the drag.
-    const glm::dvec3 along = unit_or(old - strand.old_m[i - 1], glm::dvec3(0.0));
+    const glm::dvec3 along = direction_or(old - strand.old_m[i - 1], glm::dvec3(0.0));
     const glm::dmat3 drag =
         parameters().air_drag_per_s *
         (glm::dmat3(1.0) - (1.0 - model_.air_along_share) * glm::outerProduct(along, along));
@@ -91,7 +87,7 @@ class ShapeConstraintsReference final : public ReferenceStrands {
   glm::dvec3 groomed(const ReferenceStrand& strand, uint32_t i) const {
     glm::dvec3 direction(0.0, 1.0, 0.0);
     for (uint32_t j = 1; j <= i; ++j)
-      direction = unit_or(strand.target_m[j] - strand.target_m[j - 1], direction);
+      direction = direction_or(strand.target_m[j] - strand.target_m[j - 1], direction);
     return direction;
   }
 
@@ -123,7 +119,7 @@ class ShapeConstraintsReference final : public ReferenceStrands {
         strand.placed_m[i - 1] -= weight(i - 1) * step;
         strand.placed_m[i] += weight(i) * step;
       }
-      before = unit_or(strand.placed_m[i] - strand.placed_m[i - 1], before);
+      before = direction_or(strand.placed_m[i] - strand.placed_m[i - 1], before);
     }
   }
 
@@ -131,7 +127,8 @@ class ShapeConstraintsReference final : public ReferenceStrands {
     const double weights = weight(i - 1) + weight(i);
     if (weights == 0.0) return;
     const glm::dvec3 along = strand.placed_m[i] - strand.placed_m[i - 1];
-    const glm::dvec3 error = (glm::length(along) - strand.segment_m[i]) * unit_or(along, groomed(strand, i));
+    const glm::dvec3 error =
+        (glm::length(along) - strand.segment_m[i]) * direction_or(along, groomed(strand, i));
     strand.placed_m[i - 1] += weight(i - 1) / weights * error;
     strand.placed_m[i] -= weight(i) / weights * error;
   }
@@ -149,7 +146,7 @@ class ShapeConstraintsReference final : public ReferenceStrands {
       segment.old_m = strand.old_m[i];
       segment.start_m = start;
       segment.length_m = within(glm::length(along), strand.segment_m[i]);
-      segment.end_m = start + segment.length_m * unit_or(along, groomed(strand, i));
+      segment.end_m = start + segment.length_m * direction_or(along, groomed(strand, i));
       segment.end_m = pushed_out(input(), carry(), parameters().collider_friction, segment);
       if (layout().pinned_tail_count > 0) {
         const glm::dvec3 anchor = strand.target_m[tail];

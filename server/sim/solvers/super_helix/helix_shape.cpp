@@ -4,12 +4,12 @@
 #include <cmath>
 #include <complex>
 
-#include "server/sim/reference_chain.h"
+#include "server/sim/directions.h"
 
 namespace strandcast {
 namespace {
 
-constexpr double kTinyLength = 1e-10;
+constexpr double kTinyTurnRad = 1e-10;
 constexpr double kMinEdgeM = 1e-5;
 constexpr double kSmallAngle = 1e-4;
 // Abscissa of Gauss's rule with two points, about the middle of an edge, in edges.
@@ -88,9 +88,7 @@ Bends bends_of(std::span<const glm::dvec3> points_m) {
   glm::dvec3 along(0.0, 1.0, 0.0);
   glm::dquat frame(1.0, 0.0, 0.0, 0.0);
   for (size_t k = 0; k + 1 < points_m.size(); ++k) {
-    const glm::dvec3 edge = points_m[k + 1] - points_m[k];
-    const double length = glm::length(edge);
-    const glm::dvec3 next = length > kTinyLength ? edge / length : along;
+    const glm::dvec3 next = direction_or(points_m[k + 1] - points_m[k], along);
     if (k == 0) {
       frame = smallest_rotation(kAlong, next);
       bends.first_frame = frame;
@@ -279,7 +277,7 @@ void settle_helix(const HelixProblem& problem, std::span<glm::dvec3> q) {
     for (size_t i = 0; i < step.size(); ++i)
       most = std::fmax(most, std::abs(step[i]) * line.element_m[i / 3]);
     if (step.empty() || !std::isfinite(most)) return;
-    double share = std::min(1.0, kMaxTurnRad / std::max(most, kTinyLength));
+    double share = std::min(1.0, kMaxTurnRad / std::max(most, kTinyTurnRad));
     bool is_lower = false;
     for (int halving = 0; halving < kMostHalvings && !is_lower; ++halving, share *= 0.5) {
       for (size_t e = 0; e < q.size(); ++e)
