@@ -259,14 +259,16 @@ void SimLoop::follow_stream_settings() {
 Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& features) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  // A solver with strands of its own leaves none behind on the GPU.
-  if (solver_ == nullptr || solver_->strands() == nullptr) strands_ = std::make_shared<StrandState>();
-  const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands_};
+  const bool are_on_gpu = solver_ != nullptr && solver_->strands() != nullptr;
+  const auto strands = are_on_gpu ? strands_ : std::make_shared<StrandState>();
+  const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, gpu));
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
                                      : hand_over(*solver_, *solver, config_.content->groom, rotation));
   solver_ = std::move(solver);
+  // A solver with strands of its own leaves none behind on the GPU.
+  strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
   stages_->plan_step(explain(scene, facts_));

@@ -114,7 +114,7 @@ class SimLoop {
   // Of the simulation thread.
   std::unique_ptr<gl::EglContext> context_;
   gl::ShaderLibrary shaders_;
-  std::shared_ptr<StrandState> strands_;  // what solvers on the GPU work on, one after the other
+  std::shared_ptr<StrandState> strands_;  // of solvers on the GPU, one after the other; else null
   std::unique_ptr<Solver> solver_;
   SceneFeatures solver_features_;  // what the solver was built for
   std::optional<StepBuilder> builder_;

@@ -141,6 +141,15 @@ TEST_F(ServerCost, WhatViewersNeedComesAndGoesWithThem) {
   EXPECT_TRUE(eventually([&] { return decisions(server_->passes()) == decisions(planned(scene, {})); }));
 }
 
+TEST_F(ServerCost, StrandsOfASolverOnTheProcessorAreNotOnTheGpuToo) {
+  ASSERT_TRUE(start(barest_scene()));
+  ASSERT_GT(added_bytes(), 0u);
+  ASSERT_EQ(run_command(ctl_target(), SetParameter{"solver.name=super_helix"}), kDoneExit);
+  EXPECT_EQ(added_bytes(), 0u);
+  ASSERT_EQ(run_command(ctl_target(), SetParameter{"solver.name=dftl"}), kDoneExit);
+  EXPECT_EQ(added_bytes(), server_->counters().sim.solver_bytes);
+}
+
 TEST_F(ServerCost, WhatExplainMeasuresIsWhatItPlansAndAServerRuns) {
   const SceneDesc scene = test::small_scene();
   const auto content = load_scene_content(scene);
