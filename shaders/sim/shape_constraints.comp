@@ -28,6 +28,7 @@ struct Shock {
   vec3 velocity;  // of that point in the substep before
   float fast;     // 0 below the acceleration that is fast, 1 from twice that on
   float share;    // of a change of the head's motion that goes to the whole strand
+  float kept;     // of a velocity against the head's, after damping
 };
 
 float inverse_mass(uint vertex) {
@@ -56,6 +57,7 @@ Shock shock_of(uint strand) {
   const float acceleration = length(now - shock.velocity) * u_step.push.w;
   shock.fast = clamp(acceleration / u_fast - 1.0, 0.0, 1.0);
   shock.share = mix(u_shock_share, 1.0, shock.fast);
+  shock.kept = exp(-u_damping * u_step.head_velocity.w);
   return shock;
 }
 
@@ -64,7 +66,7 @@ Shock shock_of(uint strand) {
 vec3 start_velocity(Vertex vertex, Shock shock) {
   const vec3 before = shock.velocity + previous_turn(vertex.old - shock.root);
   const vec3 now = rigid_velocity(vertex.old);
-  const vec3 own = (vertex.velocity - before) * exp(-u_damping * u_step.head_velocity.w);
+  const vec3 own = (vertex.velocity - before) * shock.kept;
   return mix(own, carried_by_head(own), shock.share) + mix(before, now, shock.share);
 }
 
@@ -100,7 +102,7 @@ vec3 turned_from_to(vec3 from, vec3 to, vec3 vector) {
 
 // Every segment once from root to tip: turned about its middle towards its groomed angle to the segment
 // before it, as placed by then.
-void hold_shape(uint last, float give) {
+void hold_shape(uint last, float give, float relaxation) {
   vec3 a = g_point[0].xyz;
   vec3 groomed_before = g_groomed[1];
   vec3 before = groomed_before;  // the first segment's angle is that to the head
@@ -113,7 +115,7 @@ void hold_shape(uint last, float give) {
     const vec3 wanted = state.w * turned_from_to(groomed_before, before, groomed);
     const vec3 multiplier = g_multiplier[i];
     vec3 push = -(b - a - wanted + give * multiplier) / (w_a + w_b + give);
-    push = w_a + w_b > 0.0 ? u_shape_relaxation * push : vec3(0.0);
+    push = w_a + w_b > 0.0 ? relaxation * push : vec3(0.0);
     g_multiplier[i] = multiplier + push;
     a -= w_a * push;
     b += w_b * push;
@@ -245,7 +247,9 @@ void main() {
   const float segment = total / float(max(vertices - u_step.shape.z, 1u));
   const float stiffness = max(u_bend_stiffness * h * h, kTinySquared);
   const float give = kGiveShare * total * segment * segment * segment / stiffness;
-  for (uint round = 0u; round < u_shape_iterations; ++round) hold_shape(last, min(give, kMostGive));
+  const float relaxation = u_shape_relaxation;
+  for (uint round = 0u; round < u_shape_iterations; ++round)
+    hold_shape(last, min(give, kMostGive), relaxation);
   for (uint iteration = 0u; iteration < u_iterations; ++iteration) hold_lengths(last);
   finish(strand, shock.fast);
 }
