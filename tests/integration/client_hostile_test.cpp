@@ -79,7 +79,8 @@ TEST(HostileServer, NoticesThatNobodyTakesGiveWayToNewerOnes) {
     for (uint32_t i = 0; i < kBatch; ++i) ASSERT_TRUE((*session)->pump(milliseconds(0)));
     ASSERT_TRUE((*session)->client().send(CameraChange{CameraDesc{}}));
   }
-  // A message is counted before it lies in the mailbox: the last ones are there when the connection has ended.
+  // A message is counted before it lies in the mailbox: the last ones are there when the connection has
+  // ended.
   while ((*session)->pump(milliseconds(1))) {
   }
   const std::vector<Notice> notices = (*session)->take_notices();
