@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 
 #include "common/gl/pass_list.h"
@@ -17,17 +18,28 @@ struct RenderSetup {
   const SceneAsset& asset;
 };
 
+/// What of the detail may be missing, and when to give up.
+struct DrawTerms {
+  /// Of the strands that a picture of this size shows, in (0, 1]: fewer, which together are as wide.
+  float strand_share = 1.0f;
+  /// Asked between batches of strands, which are small then: true leaves the picture unfinished. Empty:
+  /// never.
+  std::function<bool()> is_unwanted;
+};
+
 struct RenderTurn : gl::PassTurn {
   using Setup = RenderSetup;
-  RenderTurn(const PosedStrands& drawn, const View& seen, glm::uvec2 size)
-      : strands(drawn), view(seen), size_px(size) {}
+  RenderTurn(const PosedStrands& drawn, const View& seen, glm::uvec2 size, const DrawTerms& wanted)
+      : strands(drawn), view(seen), size_px(size), terms(wanted) {}
 
   const PosedStrands& strands;
   View view;
   glm::uvec2 size_px;  // of the picture; view.target_px counts the samples
+  const DrawTerms& terms;
   // Counted by the passes.
   uint64_t drawn_strands = 0;
   uint64_t drawn_segments = 0;
+  bool is_whole = true;
 };
 
 using RenderPass = gl::Pass<RenderTurn>;

@@ -27,7 +27,8 @@ class PathRenderer final : public Renderer {
     return passes_.prepare(setup);
   }
 
-  Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size) override;
+  Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
+              const DrawTerms& terms) override;
   Image read_image() override { return scene_.picture.read_image(); }
   void blit_to(uint32_t target, RenderSize target_size) override {
     scene_.picture.blit_to(target, {target_size.width, target_size.height});
@@ -43,7 +44,8 @@ class PathRenderer final : public Renderer {
   RenderProfile profile_;
 };
 
-Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size) {
+Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
+                          const DrawTerms& terms) {
   if (strands.position_m.size() != position_count_)
     return make_error(ErrorCode::BadInput, "the strands have {} vertices but the scene has {}",
                       strands.position_m.size(), position_count_);
@@ -53,9 +55,12 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
   const glm::uvec2 pixels(size.width, size.height);
   ASSIGN_OR_RETURN(const View view,
                    make_view(camera, strands.world_from_head.rotation, pixels * kSamplesPerSide));
-  RenderTurn turn(strands, view, pixels);
+  if (!(terms.strand_share > 0.0f && terms.strand_share <= 1.0f))
+    return make_error(ErrorCode::BadInput, "the share of strands to draw is {} but must lie in (0, 1]",
+                      terms.strand_share);
+  RenderTurn turn(strands, view, pixels, terms);
   RETURN_IF_ERROR(passes_.run(turn, &timer_));
-  profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments};
+  profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
   return {};
 }
 

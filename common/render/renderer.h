@@ -13,6 +13,7 @@
 #include "common/gl/program.h"
 #include "common/pictures/image_codec.h"
 #include "common/render/render_path.h"
+#include "common/render/render_turn.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/posed_strands.h"
 #include "common/strands/scene_asset.h"
@@ -24,6 +25,7 @@ struct RenderProfile {
   double total_ms = 0.0;  // of all passes
   uint64_t drawn_strands = 0;
   uint64_t drawn_segments = 0;
+  bool is_whole = true;  // nobody gave it up half-way
 };
 
 class Renderer {
@@ -38,7 +40,8 @@ class Renderer {
   /// Draws into an internal target of the given size with 2 x 2 samples per pixel, resolved to sRGB. Strands
   /// far thinner than a pixel are replaced by fewer and wider ones. BadInput or LimitExceeded for impossible
   /// input.
-  virtual Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size) = 0;
+  virtual Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
+                      const DrawTerms& terms = {}) = 0;
   /// Pixels of the last draw, top row first.
   virtual Image read_image() = 0;
   /// Copies the last draw to the framebuffer object `target` (0 = window), scaled to its size.

@@ -266,6 +266,67 @@ TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {
   EXPECT_NEAR((empty - small) / (empty - large), 1.0, 0.06);
 }
 
+/// 300 key strands and 1,788 followers of a uniform curtain, large enough that all of them are drawn.
+constexpr RenderSize kLarge{1280, 720};
+constexpr uint64_t kCurtainStrands = 300 + 298 * 6;
+LookDesc curtain_look() {
+  LookDesc look;
+  look.followers = 6;
+  look.strand_radius_m = 0.0002f;
+  look.tip_scale = 1.0f;
+  look.ambient = 0.0f;
+  look.light_color = glm::vec3(0.0f);
+  look.background = glm::vec3(0.3f);
+  return look;
+}
+
+TEST_F(RendererTest, AShareOfTheStrandsCoversAsMuchAsAll) {
+  const SceneAsset asset = curtain(300, 8);
+  const auto renderer = make_renderer(asset, curtain_look());
+  ASSERT_TRUE(renderer);
+  const PosedStrands strands{{}, asset.rest_position_m};
+  // What of the background is covered, in linear light; the strands are black.
+  const auto covered = [&](float share) {
+    const Status drawn = renderer->draw(strands, front_camera(), kLarge, {share, {}});
+    EXPECT_TRUE(drawn) << drawn.error().to_string();
+    const Image image = renderer->read_image();
+    double sum = 0.0;
+    for (uint32_t y = 0; y < kLarge.height; ++y)
+      for (uint32_t x = 0; x < kLarge.width; ++x)
+        sum += 0.3 - std::pow((luminance(image, x, y) + 0.055) / 1.055, 2.4);
+    return sum;
+  };
+  const double whole = covered(1.0f);
+  EXPECT_EQ(renderer->profile().drawn_strands, kCurtainStrands);
+  // Of half of 2,088 strands: three followers of each triangle would be 1,194. Then the keys alone.
+  for (const auto& [share, drawn] : {std::pair{0.5f, 300u + 298u * 2u}, {0.2f, 300u}}) {
+    EXPECT_NEAR(covered(share) / whole, 1.0, 0.1) << share;
+    EXPECT_EQ(renderer->profile().drawn_strands, drawn) << share;
+  }
+  // Then the first of the keys, which in this curtain stand side by side and not spread over it.
+  covered(0.05f);
+  EXPECT_EQ(renderer->profile().drawn_strands, 105u);
+  EXPECT_FALSE(renderer->draw(strands, front_camera(), kSmall, {0.0f, {}}));
+  EXPECT_FALSE(renderer->draw(strands, front_camera(), kSmall, {1.5f, {}}));
+}
+
+TEST_F(RendererTest, APictureThatNobodyWantsIsLeftBetweenTwoBatches) {
+  const SceneAsset asset = curtain(300, 8);
+  const auto renderer = make_renderer(asset, curtain_look());
+  ASSERT_TRUE(renderer);
+  const PosedStrands strands{{}, asset.rest_position_m};
+  const Image whole = draw(*renderer, strands, front_camera(), kLarge);
+  int asked = 0;
+  const DrawTerms patient{1.0f, [&] { return ++asked < 0; }};
+  ASSERT_TRUE(renderer->draw(strands, front_camera(), kLarge, patient));
+  EXPECT_EQ(asked, 2) << "2,088 strands are three batches of 1,024 at most";
+  EXPECT_TRUE(renderer->profile().is_whole);
+  EXPECT_EQ(differing_pixels(renderer->read_image(), whole), 0u) << "batches change no pixel";
+  ASSERT_TRUE(renderer->draw(strands, front_camera(), kLarge, {1.0f, [] { return true; }}));
+  EXPECT_FALSE(renderer->profile().is_whole);
+  EXPECT_EQ(renderer->profile().drawn_strands, 1024u);
+}
+
 TEST_F(RendererTest, WrongSizesAreErrorsInWords) {
   const SceneAsset asset = curtain(10, 6);
   const auto renderer = make_renderer(asset);

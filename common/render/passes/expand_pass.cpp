@@ -27,6 +27,8 @@ struct DetailTarget {
 };
 constexpr DetailTarget kHardwareDetail{5.0f, 0.25f};
 constexpr DetailTarget kSoftwareDetail{9.0f, 0.6f};
+// In a batch of a picture that may be given up: some ten of them in a picture that takes a CPU long.
+constexpr uint32_t kInterruptibleStrands = 1024;
 // Strands per patch: enough to fill the lanes of a vector unit, and a whole patch stays far below the limit
 // per draw.
 constexpr uint32_t kLinesPerPatch = shader::kMaxTessellationLevel;
@@ -86,24 +88,34 @@ class ExpandPass final : public RenderPass {
   }
 
   Status run(RenderTurn& turn) override {
-    if (turn.batch_index == 0) begin(turn.view);
+    if (turn.batch_index == 0) begin(turn);
     const uint32_t first = turn.batch_index * batch_strands_;
     const uint32_t count = std::min(batch_strands_, strand_count_ - first);
     expanded_.segment_count = expander_.run(scene_.key_strands, expanded_, first, count, level_);
     turn.drawn_strands += count;
     turn.drawn_segments += expanded_.segment_count;
     turn.has_more_batches = first + count < strand_count_;
+    if (turn.has_more_batches && turn.terms.is_unwanted && turn.terms.is_unwanted())
+      turn.is_whole = turn.has_more_batches = false;
     return {};
   }
 
  private:
-  void begin(const View& view) {
-    level_ = choose_level(view);
+  void begin(const RenderTurn& turn) {
+    level_ = choose_level(turn.view);
     strand_count_ = sizes_.strand_count(level_.followers);
+    if (turn.terms.strand_share < 1.0f) thin_out(turn.terms.strand_share);
     batch_strands_ = sizes_.batch_strands(expanded_.size_bytes(), level_.segments_per_gap);
+    if (turn.terms.is_unwanted) batch_strands_ = std::min(batch_strands_, kInterruptibleStrands);
     expanded_.width_m = 2.0f * scene_.look.strand_radius_m *
                         static_cast<float>(sizes_.strand_count(sizes_.max_followers())) /
                         static_cast<float>(strand_count_);
+  }
+  /// Followers of all triangles first, then key strands: any first so many of those cover the head evenly.
+  void thin_out(float strand_share) {
+    const auto wanted = static_cast<uint32_t>(std::ceil(strand_share * static_cast<float>(strand_count_)));
+    while (level_.followers > 0 && sizes_.strand_count(level_.followers) > wanted) --level_.followers;
+    strand_count_ = std::min(sizes_.strand_count(level_.followers), std::max(wanted, 1u));
   }
   ExpandLevel choose_level(const View& view) const;
 
