@@ -20,6 +20,7 @@ ModeFacts gather_mode_facts(const ModeSources& sources) {
   const double guessed_ms = sources.is_software ? kGuessedSoftwareMsPerPixel * pixels : kGuessedHardwareMs;
   const double one_ms = is_measured ? pictures.paint_median_ms + pictures.encode_median_ms : guessed_ms;
   facts.paint_ms = one_ms * static_cast<double>(sources.view_count);
+  facts.is_paint_guessed = !is_measured && sources.is_software;
   facts.picture_bytes = is_measured
                             ? static_cast<double>(pictures.bytes) / static_cast<double>(pictures.frames)
                             : kGuessedBytesPerPixel * pixels;

@@ -121,8 +121,9 @@ ModeChoice ModePolicy::choose(StreamMode present, const ModeFacts& facts, int64_
   if (!can_draw) return choice(may_try ? StreamMode::Frames : present);
 
   const double frames_worth = predict_frames(facts).worth();
-  const bool is_other_better = present == StreamMode::Strands ? frames_worth > kFramesGain * strands.worth()
-                                                              : strands.worth() > frames_worth;
+  const double gain = facts.is_paint_guessed ? kGuessedFramesGain : kFramesGain;
+  const bool is_other_better =
+      present == StreamMode::Strands ? frames_worth > gain * strands.worth() : strands.worth() > frames_worth;
   if (!is_other_better) {
     wish_since_ns_.reset();
     return choice(present);

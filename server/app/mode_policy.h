@@ -20,6 +20,9 @@ inline constexpr double kHalfWorthMs = 250.0;
 /// Frames must be worth so many times as much as strands; strands only as much as frames, because they need
 /// no server to turn the view and every viewer shares them.
 inline constexpr double kFramesGain = 1.5;
+/// And so many times, about three times as fast, while what a server without a GPU takes for pictures is only
+/// guessed: it may be as busy as this viewer, and a change for a guess that is wrong would be undone.
+inline constexpr double kGuessedFramesGain = 8.0;
 /// The other mode must look better for so long without a break.
 inline constexpr int64_t kWishNs = 1'000'000'000;
 /// Time between two changes; doubles when a change is undone within twice of it.
@@ -39,6 +42,7 @@ struct ModeFacts {
 
   std::string paint_trouble;       // why the server cannot draw; empty = it can
   double paint_ms = 0.0;           // drawn and coded at the server, with its share of the other views
+  bool is_paint_guessed = false;   // nobody has measured that on this processor yet
   double picture_bytes = 0.0;      // of one picture
   double picture_rate_hz = 15.0;   // at most
   double picture_decode_ms = 0.0;  // at the viewer

@@ -15,6 +15,8 @@ using testing::HasSubstr;
 using Limit = ModePrediction::Limit;
 
 constexpr int64_t kS = 1'000'000'000;
+// As ARCHITECTURE.md says: half as much again, eight times.
+static_assert(kFramesGain == 1.5 && kGuessedFramesGain == 8.0);
 
 /// Strands of 1 MB/s at 60 Hz or 0.2 MB/s at 10 Hz; pictures of 10 kB, 15 a second, drawn in 20 ms.
 ModeFacts facts() {
@@ -186,6 +188,57 @@ TEST(ModePolicy, DwellsAndDoublesWhenAChangeIsUndone) {
   EXPECT_EQ(policy.dwell_ns(), kLongestDwellNs);
 }
 
+/// A viewer and a server whose times never change: what it says of itself, what drawing there is guessed to
+/// take, and what it takes, which is known once it was done.
+struct SteadyWorld {
+  double draw_ms, guessed_paint_ms, paint_ms;
+};
+
+/// The times of all changes in ten minutes of this world, with a look each 250 ms.
+std::vector<double> changes_in(const SteadyWorld& world) {
+  ModePolicy policy;
+  StreamMode present = StreamMode::Strands;
+  bool was_painted = false;
+  std::vector<double> changed_s;
+  for (double t_s = 1.0; t_s < 600.0; t_s += 0.25) {
+    ModeFacts known = facts();
+    known.strand_draw_ms = world.draw_ms;
+    known.is_paint_guessed = !was_painted;
+    known.paint_ms = was_painted ? world.paint_ms : world.guessed_paint_ms;
+    const auto time_ns = static_cast<int64_t>(t_s * 1e9);
+    const StreamMode chosen = policy.choose(present, known, time_ns).mode;
+    if (chosen == present) continue;
+    present = chosen;
+    was_painted = was_painted || present == StreamMode::Frames;
+    policy.note_change(time_ns);
+    changed_s.push_back(t_s);
+  }
+  return changed_s;
+}
+
+TEST(ModePolicy, UnderSteadyConditionsItChangesOnceAndOnceBackWhenTheGuessWasWrong) {
+  const std::vector<double> times_ms{5.0, 20.0, 70.0, 150.0, 300.0, 600.0, 1200.0, 2500.0, 10'000.0};
+  for (const double draw_ms : times_ms)
+    for (const double guessed_ms : times_ms)
+      for (const double paint_ms : times_ms) {
+        const auto changes = changes_in({draw_ms, guessed_ms, paint_ms});
+        const std::string world =
+            fmt::format("drawn here {} ms, guessed {}, there {}", draw_ms, guessed_ms, paint_ms);
+        ASSERT_LE(changes.size(), 2u) << world;
+        if (changes.size() < 2) continue;
+        EXPECT_GE(changes[1] - changes[0], 5.0) << world;
+        EXPECT_GT(paint_ms, guessed_ms) << world << ": the guess was right";
+      }
+}
+
+TEST(ModePolicy, AGuessThatIsNotMuchBetterIsNotTried) {
+  // A processor that draws 1.4 pictures a second, and a server on the same processor: guessed 2.2, really
+  // 0.5.
+  EXPECT_TRUE(changes_in({700.0, 450.0, 2000.0}).empty());
+  // The same viewer and a server that is guessed to have a GPU, and has.
+  EXPECT_EQ(changes_in({700.0, 10.0, 12.0}).size(), 1u);
+}
+
 TEST(ModePolicy, WhatIsImpossibleWaitsForNoDwellButAFailureDoes) {
   ModeFacts blind = facts();
   blind.device = DrawingDevice::None;
@@ -220,14 +273,18 @@ TEST(ModeFacts, GuessesUntilSomethingWasMeasured) {
   EXPECT_EQ(known.picture_decode_ms, 3.0);
   EXPECT_EQ(known.device, DrawingDevice::Software);
   EXPECT_NEAR(known.paint_ms, 2 * 200.0, 1e-9);
+  EXPECT_TRUE(known.is_paint_guessed);
   sources.is_software = false;
+  EXPECT_FALSE(gather_mode_facts(sources).is_paint_guessed) << "a GPU is that fast or faster";
   EXPECT_EQ(gather_mode_facts(sources).paint_ms, 2 * kGuessedHardwareMs);
   sources.pictures.frames = 4;
+  sources.is_software = true;
   sources.pictures.bytes = 40'000;
   sources.pictures.paint_median_ms = 30.0;
   sources.pictures.encode_median_ms = 5.0;
   known = gather_mode_facts(sources);
   EXPECT_EQ(known.paint_ms, 70.0);
+  EXPECT_FALSE(known.is_paint_guessed);
   EXPECT_EQ(known.picture_bytes, 10e3);
 }
 
