@@ -1,8 +1,11 @@
 #include "client/app/live_connection.h"
 
+#include <algorithm>
+#include <cmath>
 #include <thread>
 #include <utility>
 
+#include "client/app/way_out.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -12,12 +15,18 @@ Result<std::unique_ptr<LiveConnection>> LiveConnection::open(const ClientConfig&
   return std::unique_ptr<LiveConnection>(new LiveConnection(config, std::move(session)));
 }
 
+std::unique_ptr<LiveConnection> LiveConnection::begin(const ClientConfig& config) {
+  return std::unique_ptr<LiveConnection>(new LiveConnection(config, nullptr));
+}
+
 LiveConnection::LiveConnection(const ClientConfig& config, std::unique_ptr<ViewerSession> session)
     : config_(config),
       modes_(std::make_shared<ModeControl>(config.hello.mode)),
       session_(std::move(session)),
-      policy_(static_cast<uint32_t>(now_ns())) {
-  session_->follow(modes_);
+      policy_(static_cast<uint32_t>(now_ns())),
+      is_connected_(session_ != nullptr) {
+  if (session_ != nullptr) session_->follow(modes_);
+  config_.on_step = [this](ConnectStep step) { step_ = step; };
   config_.cancel = [this, cancel = config.cancel]() -> std::optional<Error> {
     if (is_leaving_) return make_error(ErrorCode::Unavailable, "the viewer is leaving");
     return cancel ? cancel() : std::nullopt;
@@ -46,8 +55,9 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   }
   session_ = std::move(opened).value();
   is_connected_ = true;
+  attempts_ = 0;
   session_->follow(modes_);
-  log_info("net", "connected to {} again", config_.address.to_string());
+  log_info("net", "connected to {}", config_.address.to_string());
   return true;
 }
 
@@ -67,13 +77,25 @@ void LiveConnection::lose(const Error& error) {
 }
 
 void LiveConnection::start_attempt() {
+  ++attempts_;
   config_.hello.mode = modes_->look().wanted;
   attempt_ = std::async(std::launch::async, [config = config_] { return ViewerSession::open(config); });
 }
 
 std::string LiveConnection::trouble() const {
-  if (is_connected_) return {};
-  return last_error_.to_string() + (final_error_ ? "" : " - trying again");
+  return is_connected_ || !last_error_ ? std::string() : last_error_->to_string();
+}
+
+std::string LiveConnection::help() const {
+  return is_connected_ || !last_error_ ? std::string() : way_out(*last_error_, step_, config_.address);
+}
+
+std::string LiveConnection::doing() const {
+  if (is_connected_ || final_error_) return {};
+  const std::string count = attempts_ > 1 ? fmt::format(" (attempt {})", attempts_) : std::string();
+  if (attempt_.valid()) return to_string(step_.load()) + count;
+  const double wait_s = std::chrono::duration<double>(next_attempt_ - Clock::now()).count();
+  return fmt::format("trying again in {:.0f} s{}", std::max(std::ceil(wait_s), 0.0), count);
 }
 
 }  // namespace strandcast

@@ -17,6 +17,8 @@ class LiveConnection {
  public:
   /// The first connection must succeed: its error is the caller's.
   static Result<std::unique_ptr<LiveConnection>> open(const ClientConfig& config);
+  /// Without a session yet: pump() connects.
+  static std::unique_ptr<LiveConnection> begin(const ClientConfig& config);
   /// Gives up an attempt that is under way.
   ~LiveConnection();
   LiveConnection(const LiveConnection&) = delete;
@@ -28,11 +30,17 @@ class LiveConnection {
   /// pump().
   const std::shared_ptr<ModeControl>& modes() const { return modes_; }
 
-  /// The running session, or the last one: its snapshots stay readable while the server is away.
+  bool has_session() const { return session_ != nullptr; }
+  /// The running session, or the last one: its snapshots stay readable while the server is away. There must
+  /// have been one.
   ViewerSession& session() { return *session_; }
   bool is_connected() const { return is_connected_; }
-  /// Why there is no connection, and what happens next; empty while connected.
+  /// Why there is no connection; empty while connected and before the first attempt failed.
   std::string trouble() const;
+  /// What can be done about it, for a person; empty when there is nothing but waiting.
+  std::string help() const;
+  /// What is being done about it; empty while connected and when trying again cannot help.
+  std::string doing() const;
   /// The reason, when trying again cannot help.
   const std::optional<Error>& final_error() const { return final_error_; }
 
@@ -45,12 +53,14 @@ class LiveConnection {
   void start_attempt();
 
   std::atomic<bool> is_leaving_{false};
+  std::atomic<ConnectStep> step_{ConnectStep::FindHost};  // of the attempt that runs, or ran last
   ClientConfig config_;
   const std::shared_ptr<ModeControl> modes_;
   std::unique_ptr<ViewerSession> session_;
   ReconnectPolicy policy_;
-  bool is_connected_ = true;
-  Error last_error_;
+  bool is_connected_;
+  uint64_t attempts_ = 0;  // since there was a connection
+  std::optional<Error> last_error_;
   std::optional<Error> final_error_;
   Clock::time_point next_attempt_;
   Attempt attempt_;  // last: its end waits for what is under way, which reads the others

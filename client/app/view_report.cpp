@@ -122,6 +122,14 @@ void set_render_times(ViewReport& report, const StageTimer& render_timer) {
   }
 }
 
+void add_answer_times(ViewReport& report, const StageTimer& answer_timer) {
+  constexpr double kP99 = 0.99;
+  Builder out;
+  out.number("answer_ms_median", answer_timer.median_ms(), 3);
+  out.number("answer_ms_p99", answer_timer.quantile_ms(kP99), 3);
+  for (ReportEntry& entry : out.take()) report.push_back(std::move(entry));
+}
+
 std::string to_lines(const ViewReport& report) {
   std::string text;
   for (const auto& entry : report) text += fmt::format("{}={}\n", entry.key, entry.text);

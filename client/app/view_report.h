@@ -23,6 +23,8 @@ ViewReport make_report(ViewerSession& session);
 void set_mode_reason(ViewReport& report, const std::string& reason);
 /// Fills in the render times of a report.
 void set_render_times(ViewReport& report, const StageTimer& render_timer);
+/// Adds how long a window took from waking up (a key, say) to the picture that answers.
+void add_answer_times(ViewReport& report, const StageTimer& answer_timer);
 
 /// key=value lines.
 std::string to_lines(const ViewReport& report);

@@ -13,8 +13,11 @@ constexpr double kMsPerNs = 1e-6;
 
 }  // namespace
 
-ViewerThread::ViewerThread(std::unique_ptr<LiveConnection> live)
-    : live_(std::move(live)), modes_(live_->modes()) {
+ViewerThread::ViewerThread(std::unique_ptr<LiveConnection> live, NewsListener listener)
+    : live_(std::move(live)),
+      modes_(live_->modes()),
+      listener_(std::move(listener)),
+      session_number_(live_->has_session() ? 1 : 0) {
   publish();
   thread_ = std::thread([this] { run(); });
 }
@@ -44,68 +47,67 @@ void ViewerThread::fail(const std::string& what) {
   state->trouble = state->final_error->to_string();
   {
     const std::lock_guard lock(mutex_);
-    state_ = std::move(state);
+    state_ = state;
   }
-  published_.notify_one();
+  if (listener_) listener_(state);
 }
 
 void ViewerThread::receive() {
   while (!is_stopping_) {
-    live_->session().replay().set_playout(playout_);
+    if (live_->has_session()) live_->session().replay().set_playout(playout_);
     if (live_->pump(kPumpWait)) ++session_number_;
     publish();
   }
 }
 
 void ViewerThread::publish() {
-  ViewerSession& session = live_->session();
-  const int64_t time_ns = now_ns();
-  const ClockOffset clock = session.client().clock();
   auto state = std::make_shared<ViewerState>();
   state->session_number = session_number_;
   state->is_connected = live_->is_connected();
   state->trouble = live_->trouble();
+  state->help = live_->help();
+  state->doing = live_->doing();
   state->final_error = live_->final_error();
-  state->welcome = session.welcome();
-  state->asset = session.shared_asset();
   state->mode = modes_->look();
-  state->timeline = session.replay().timeline();
-  state->image = session.shared_image();
-  state->image_count = session.image_count();
-  state->quality = session.quality();
-  state->quality_changes = session.quality_changes();
-  state->status = session.status();
-  state->has_status = session.has_status();
-  state->net = session.client().counters();
-  state->decoded_frames = session.decoded_frames();
-  state->missed_frames = session.replay().stats().missed_frames + session.picture_stats().missed_frames;
-  state->strand_decode_ms = session.replay().decode_timer().median_ms();
-  state->picture_decode_ms = session.picture_decode_timer().median_ms();
-  state->motion_to_decoded_ms = session.replay().motion_latency_timer().median_ms();
-  state->playout_delay_ms = session.replay().playout_delay_ms();
-  state->round_trip_ms = clock.has_value() ? 2.0 * static_cast<double>(clock.error_ns()) * kMsPerNs : 0.0;
-  state->state_age_ms = session.replay().state_age_ms(time_ns, clock);
-  state->made_ns = time_ns;
-  std::vector<Notice> notices = session.take_notices();
-
+  if (live_->has_session()) describe(*state);
   {
     const std::lock_guard lock(mutex_);
-    state_ = std::move(state);
-    client_ = session.shared_client();
-    for (Notice& notice : notices) notices_.add(std::move(notice));
+    state_ = state;
+    if (live_->has_session()) {
+      client_ = live_->session().shared_client();
+      for (Notice& notice : live_->session().take_notices()) notices_.add(std::move(notice));
+    }
   }
-  published_.notify_one();
+  if (listener_) listener_(state);
+}
+
+void ViewerThread::describe(ViewerState& state) {
+  ViewerSession& session = live_->session();
+  const int64_t time_ns = now_ns();
+  const ClockOffset clock = session.client().clock();
+  state.welcome = session.welcome();
+  state.asset = session.shared_asset();
+  state.timeline = session.replay().timeline();
+  state.image = session.shared_image();
+  state.image_count = session.image_count();
+  state.quality = session.quality();
+  state.quality_changes = session.quality_changes();
+  state.status = session.status();
+  state.has_status = session.has_status();
+  state.net = session.client().counters();
+  state.decoded_frames = session.decoded_frames();
+  state.missed_frames = session.replay().stats().missed_frames + session.picture_stats().missed_frames;
+  state.strand_decode_ms = session.replay().decode_timer().median_ms();
+  state.picture_decode_ms = session.picture_decode_timer().median_ms();
+  state.motion_to_decoded_ms = session.replay().motion_latency_timer().median_ms();
+  state.playout_delay_ms = session.replay().playout_delay_ms();
+  state.round_trip_ms = clock.has_value() ? 2.0 * static_cast<double>(clock.error_ns()) * kMsPerNs : 0.0;
+  state.state_age_ms = session.replay().state_age_ms(time_ns, clock);
+  state.made_ns = time_ns;
 }
 
 std::shared_ptr<const ViewerState> ViewerThread::look() const {
   const std::lock_guard lock(mutex_);
-  return state_;
-}
-
-std::shared_ptr<const ViewerState> ViewerThread::look(const std::shared_ptr<const ViewerState>& last,
-                                                      std::chrono::milliseconds timeout) {
-  std::unique_lock lock(mutex_);
-  published_.wait_for(lock, timeout, [&] { return state_ != last; });
   return state_;
 }
 
@@ -114,27 +116,26 @@ std::vector<Notice> ViewerThread::take_notices() {
   return notices_.take();
 }
 
+std::shared_ptr<ViewerClient> ViewerThread::client() const {
+  const std::lock_guard lock(mutex_);
+  return client_;
+}
+
 Status ViewerThread::send(const ClientMessage& message) {
-  std::shared_ptr<ViewerClient> client;
-  {
-    const std::lock_guard lock(mutex_);
-    client = client_;
-  }
-  return client->send(message);
+  const auto running = client();
+  if (running == nullptr) return make_error(ErrorCode::Unavailable, "there is no connection yet");
+  return running->send(message);
 }
 
 void ViewerThread::request_mode(StreamMode mode) {
   modes_->want(mode);
-  std::shared_ptr<ViewerClient> client;
-  {
-    const std::lock_guard lock(mutex_);
-    client = client_;
-  }
-  send_mode_request(*modes_, *client);
+  // Without a session the Hello of the first will say it.
+  if (const auto running = client()) send_mode_request(*modes_, *running);
 }
 
-ViewReport ViewerThread::stop_and_report() {
+std::optional<ViewReport> ViewerThread::stop_and_report() {
   stop();
+  if (!live_->has_session()) return std::nullopt;
   return make_report(live_->session());
 }
 

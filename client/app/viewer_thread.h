@@ -4,8 +4,7 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
-#include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -20,9 +19,11 @@ namespace strandcast {
 
 /// What there is to show and to tell, as of one moment.
 struct ViewerState {
-  uint64_t session_number = 0;  // another one after every new connection
+  uint64_t session_number = 0;  // 0 = there has been none; another one after every new connection
   bool is_connected = false;
-  std::string trouble;               // why not, and what happens next
+  std::string trouble;               // why not; empty also before the first attempt has failed
+  std::string help;                  // what a person can do about it
+  std::string doing;                 // what is being done about it
   std::optional<Error> final_error;  // trying again cannot help
   Welcome welcome;
   std::shared_ptr<const SceneAsset> asset;  // null until it came
@@ -46,9 +47,13 @@ struct ViewerState {
   int64_t made_ns = 0;
 };
 
+/// Told on the receiving thread of each new state, at once.
+using NewsListener = std::function<void(const std::shared_ptr<const ViewerState>&)>;
+
 class ViewerThread {
  public:
-  explicit ViewerThread(std::unique_ptr<LiveConnection> live);
+  /// `live` need not have a session yet.
+  explicit ViewerThread(std::unique_ptr<LiveConnection> live, NewsListener listener = {});
   /// Ends the thread.
   ~ViewerThread();
   ViewerThread(const ViewerThread&) = delete;
@@ -56,19 +61,16 @@ class ViewerThread {
 
   /// The newest state; never null.
   std::shared_ptr<const ViewerState> look() const;
-  /// As look(), but waits up to `timeout` for one that is newer than `last`.
-  std::shared_ptr<const ViewerState> look(const std::shared_ptr<const ViewerState>& last,
-                                          std::chrono::milliseconds timeout);
   /// Notices since the last call, the newest kMaxWaitingNotices.
   std::vector<Notice> take_notices();
-  /// As ViewerClient::send, to the running connection.
+  /// As ViewerClient::send, to the running connection; Unavailable before the first.
   Status send(const ClientMessage& message);
   void set_playout(Playout playout) { playout_ = playout; }
   /// Asks the server for this mode, at once, and in later sessions too.
   void request_mode(StreamMode mode);
   StreamMode wanted_mode() const { return modes_->look().wanted; }
-  /// Ends the thread; what it measured.
-  ViewReport stop_and_report();
+  /// Ends the thread; what it measured. Nothing when there was no session.
+  std::optional<ViewReport> stop_and_report();
 
  private:
   void run();
@@ -76,15 +78,17 @@ class ViewerThread {
   void fail(const std::string& what);
   void stop();
   void publish();
+  void describe(ViewerState& state);
+  std::shared_ptr<ViewerClient> client() const;
 
   std::unique_ptr<LiveConnection> live_;  // of the thread while it runs
   const std::shared_ptr<ModeControl> modes_;
-  uint64_t session_number_ = 1;
+  const NewsListener listener_;
+  uint64_t session_number_ = 0;
   std::atomic<bool> is_stopping_{false};
   std::atomic<Playout> playout_{Playout::LowLatency};
 
   mutable std::mutex mutex_;  // guards the block below
-  std::condition_variable published_;
   std::shared_ptr<const ViewerState> state_;
   std::shared_ptr<ViewerClient> client_;
   NoticeList notices_;

@@ -1,13 +1,14 @@
 #include "client/app/windowed_view.h"
 
 #include <algorithm>
+#include <future>
 #include <utility>
 
+#include "client/app/strand_drawer.h"
+#include "client/app/view_hud.h"
 #include "client/app/viewer_thread.h"
 #include "client/window/orbit_camera.h"
 #include "client/window/window.h"
-#include "common/gl/egl_context.h"
-#include "common/gl/program.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -15,108 +16,90 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kRateWindowS = 0.5;  // over which fps and kB/s are counted
-constexpr double kMessageS = 4.0;     // how long a notice stays on the panel
-constexpr int64_t kCameraSendNs = 33'000'000;
-constexpr int64_t kReportNs = 1'000'000'000;
-constexpr milliseconds kNewsWait{4};  // short enough that dragging feels immediate
-constexpr double kNsToMs = 1e-6;
-
-/// Counts per second over kRateWindowS.
-class Rate {
- public:
-  void update(uint64_t total, int64_t time_ns) {
-    const double elapsed_s = static_cast<double>(time_ns - begin_ns_) * 1e-9;
-    if (elapsed_s < kRateWindowS && total >= begin_total_) return;
-    per_s_ =
-        total >= begin_total_ && begin_ns_ != 0 ? static_cast<double>(total - begin_total_) / elapsed_s : 0.0;
-    begin_total_ = total;
-    begin_ns_ = time_ns;
-  }
-  double per_s() const { return per_s_; }
-
- private:
-  uint64_t begin_total_ = 0;
-  int64_t begin_ns_ = 0;
-  double per_s_ = 0.0;
-};
-
-/// What decides the pixels of a strand picture; drawing again is only needed when it changes.
-struct DrawnView {
-  const Snapshot* snapshot = nullptr;
-  CameraDesc camera;
-  RenderSize size{0, 0};
-
-  bool matches(const DrawnView& other) const {
-    return snapshot == other.snapshot && camera.offset_m == other.camera.offset_m &&
-           camera.target_m == other.camera.target_m && camera.fov_y_rad == other.camera.fov_y_rad &&
-           size.width == other.size.width && size.height == other.size.height;
-  }
-};
+constexpr int64_t kNsPerMs = 1'000'000;
+constexpr int64_t kMessageNs = 4000 * kNsPerMs;  // how long a notice stays on the panel
+constexpr int64_t kCameraSendNs = 33 * kNsPerMs;
+constexpr int64_t kReportNs = 1000 * kNsPerMs;
+constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
+constexpr int64_t kPanelNs = 250 * kNsPerMs;          // how often its numbers change
+constexpr milliseconds kLongestWait{50};              // how late a stop is noticed
 
 class WindowedView {
  public:
-  WindowedView(const ViewOptions& options, std::unique_ptr<LiveConnection> live,
-               std::unique_ptr<Window> window, std::optional<gl::DeviceInfo> device)
+  WindowedView(const ViewOptions& options, ClientConfig config, std::unique_ptr<Window> window)
       : options_(options),
+        config_(std::move(config)),
         window_(std::move(window)),
-        device_(std::move(device)),
-        shaders_(options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir)),
-        orbit_(live->session().welcome().camera),
         playout_(options.playout),
-        viewer_(std::move(live)),
-        state_(viewer_.look()) {
-    viewer_.set_playout(playout_);
-    if (!device_) own_reason_ = "frames: " + window_->why_no_strands();
-  }
+        state_(std::make_shared<const ViewerState>()),
+        drawer_({options.shader_dir, options.device, [] { Window::wake(); }}) {}
 
   Result<ViewReport> run(const std::atomic<bool>& stop) {
     const int64_t begin_ns = now_ns();
     while (!stop) {
-      const WindowActions actions = window_->begin_picture();
+      const WindowActions actions = window_->wait(time_to_wait());
+      const int64_t woke_ns = now_ns();
       if (actions.wants_quit) break;
-      const uint64_t session_number = state_->session_number;
-      state_ = viewer_.look(state_, kNewsWait);
-      if (state_->session_number != session_number) begin_session();
-      RETURN_IF_ERROR(prepare_renderer());
+      RETURN_IF_ERROR(follow());
       act(actions);
-      RETURN_IF_ERROR(draw());
-      ++turn_count_;
-      window_->end_picture(hud());
+      tell_drawer();
       report();
-      if (actions.wants_screenshot) save_screenshot();
+      if (is_picture_due(actions)) present(woke_ns);
       if (options_.seconds && static_cast<double>(now_ns() - begin_ns) * 1e-9 >= *options_.seconds) break;
     }
-    if (state_->final_error) return *state_->final_error;
-    ViewReport report = viewer_.stop_and_report();
-    set_render_times(report, render_timer_);
-    if (!own_reason_.empty()) set_mode_reason(report, own_reason_);
-    return report;
+    return finish();
   }
 
  private:
   bool is_frames() const { return state_->mode.shown == StreamMode::Frames; }
+  bool can_draw() const { return drawn_.device && drawn_.device->ok() && !drawn_.trouble; }
 
-  void begin_session() { is_camera_sent_ = false; }
-
-  Status prepare_renderer() {
-    // Groom and look may have changed with the server; until the new ones are here the old picture stays.
-    if (is_frames() || !device_ || state_->asset == nullptr || state_->asset == drawn_asset_) return {};
-    auto made = Renderer::make(shaders_, *device_, *state_->asset, state_->welcome.look);
-    if (made) {
-      renderer_ = std::move(made).value();
-      drawn_asset_ = state_->asset;
-      drawn_ = {};
-      player_.set_fill(StrandFill(state_->asset->rest_position_m, state_->asset->vertex_count));
-      is_first_draw_ = true;
-      return {};
+  /// Takes what the other threads have. The error is one that trying again does not mend.
+  Status follow() {
+    drawn_ = drawer_.look();
+    if (viewer_ == nullptr && drawn_.device) RETURN_IF_ERROR(begin_connecting());
+    if (viewer_ == nullptr) return {};
+    const uint64_t session_number = state_->session_number;
+    state_ = viewer_->look();
+    if (state_->session_number != session_number) begin_session(session_number == 0);
+    if (drawn_.trouble && own_reason_.empty()) RETURN_IF_ERROR(leave_strands());
+    if (wants_whole_ && drawn_.asked_whole >= asked_whole_) {
+      wants_whole_ = false;
+      save(drawn_.image);
     }
-    if (viewer_.wanted_mode() == StreamMode::Strands) return made.error();
-    // Somebody else can draw them.
-    device_.reset();
-    own_reason_ = "frames: strands cannot be drawn here: " + made.error().to_string();
+    for (const Notice& notice : viewer_->take_notices()) show_message(notice.text);
+    return {};
+  }
+
+  /// What this machine can draw decides what to ask for.
+  Status begin_connecting() {
+    if (!drawn_.device->ok()) {
+      const Error& why = drawn_.device->error();
+      if (options_.mode == StreamMode::Strands)
+        return make_error(why.code, "{}; --mode frames shows the server's pictures", why.to_string());
+      config_.hello.mode = StreamMode::Frames;
+      own_reason_ = "frames: strands cannot be drawn here: " + why.to_string();
+      log_warn("render", "{}", own_reason_);
+    }
+    viewer_ = std::make_unique<ViewerThread>(LiveConnection::begin(config_), [this](const auto& state) {
+      drawer_.set_state(state);
+      Window::wake();
+    });
+    viewer_->set_playout(playout_);
+    return {};
+  }
+
+  void begin_session(bool is_first) {
+    if (is_first) orbit_ = OrbitCamera(state_->welcome.camera);
+    is_camera_sent_ = false;
+  }
+
+  /// This scene cannot be drawn here; somebody else can draw it.
+  Status leave_strands() {
+    if (viewer_->wanted_mode() == StreamMode::Strands) return *drawn_.trouble;
+    own_reason_ = "frames: strands cannot be drawn here: " + drawn_.trouble->to_string();
     show_message(own_reason_);
-    viewer_.request_mode(StreamMode::Frames);
+    viewer_->request_mode(StreamMode::Frames);
     return {};
   }
 
@@ -128,6 +111,10 @@ class WindowedView {
     if (actions.zoom_steps != 0.0f) orbit_.zoom(actions.zoom_steps);
     if (actions.wants_view_reset) orbit_.reset();
     if (moves) is_camera_sent_ = false;
+    if (actions.wants_screenshot) ask_screenshot();
+    if (saving_.valid() && saving_.wait_for(milliseconds(0)) == std::future_status::ready)
+      show_message(saving_.get());
+    if (viewer_ == nullptr) return;
 
     if (actions.wants_pause_toggle)
       send(ControlCommand{state_->status.is_paused ? Command::Resume : Command::Pause});
@@ -135,207 +122,177 @@ class WindowedView {
     if (actions.wants_mode_toggle) change_mode();
     if (actions.wants_playout_toggle) {
       playout_ = playout_ == Playout::Smooth ? Playout::LowLatency : Playout::Smooth;
-      viewer_.set_playout(playout_);
+      viewer_->set_playout(playout_);
     }
     // Also while strands are drawn here: the server's first picture then shows what the person sees.
-    if (!is_camera_sent_ && now_ns() - camera_sent_ns_ > kCameraSendNs) {
+    if (!is_camera_sent_ && now_ns() - camera_sent_ns_ > kCameraSendNs && state_->is_connected) {
       camera_sent_ns_ = now_ns();
       is_camera_sent_ = send(CameraChange{orbit_.camera()});
     }
-    for (const Notice& notice : viewer_.take_notices()) show_message(notice.text);
   }
 
   /// Strands, frames, the server's choice, and again.
   void change_mode() {
-    if (!device_) return show_message(own_reason_);
-    const StreamMode last = viewer_.wanted_mode();
-    viewer_.request_mode(last == StreamMode::Auto      ? StreamMode::Strands
-                         : last == StreamMode::Strands ? StreamMode::Frames
-                                                       : StreamMode::Auto);
+    if (!can_draw()) return show_message(own_reason_);
+    const StreamMode last = viewer_->wanted_mode();
+    viewer_->request_mode(last == StreamMode::Auto      ? StreamMode::Strands
+                          : last == StreamMode::Strands ? StreamMode::Frames
+                                                        : StreamMode::Auto);
+  }
+
+  void tell_drawer() {
+    const RenderSize size = window_->framebuffer_size();
+    const bool is_seen = size.width > 0 && size.height > 0;
+    const bool is_wanted = is_seen && state_->session_number > 0 && (!is_frames() || wants_whole_);
+    drawer_.set_view(is_wanted ? std::optional(DrawView{orbit_.camera(), size}) : std::nullopt);
   }
 
   /// Tells the server about once a second what this machine makes of the stream.
   void report() {
     const int64_t time_ns = now_ns();
-    shown_.update(shown_count_, time_ns);
-    if (time_ns - reported_ns_ < kReportNs) return;
+    if (time_ns - reported_ns_ < kReportNs || !state_->is_connected) return;
     reported_ns_ = time_ns;
-    // The newest second counts; while pictures are shown, what strands took when they were drawn last.
-    if (draw_timer_.count() > 0) draw_ms_ = draw_timer_.median_ms();
-    draw_timer_ = StageTimer();
     ViewerReport now;
     now.decode_ms = std::min(state_->strand_decode_ms, kMaxReportedMs);
-    now.draw_ms = std::min(draw_ms_, kMaxReportedMs);
+    now.draw_ms = std::min(drawn_.fair_ms, kMaxReportedMs);
     now.picture_decode_ms = std::min(state_->picture_decode_ms, kMaxReportedMs);
-    now.shown_hz = std::min(shown_.per_s(), kMaxReportedHz);
-    now.device = !device_               ? DrawingDevice::None
-                 : device_->is_software ? DrawingDevice::Software
-                                        : DrawingDevice::Hardware;
+    now.shown_hz = std::min(hud_.shown_hz(), kMaxReportedHz);
+    now.device = !can_draw()                          ? DrawingDevice::None
+                 : drawn_.device->value().is_software ? DrawingDevice::Software
+                                                      : DrawingDevice::Hardware;
     // One that is lost is followed by the next.
-    if (state_->is_connected) (void)viewer_.send(now);
+    (void)viewer_->send(now);
   }
 
   bool send(const ClientMessage& message) {
     if (!state_->is_connected) return false;
-    const auto sent = viewer_.send(message);
+    const auto sent = viewer_->send(message);
     if (!sent) show_message(sent.error().to_string());
     return sent.ok();
   }
 
-  Status draw() {
-    const RenderSize window_size = window_->framebuffer_size();
-    if (window_size.width == 0 || window_size.height == 0) return {};
-    window_->clear();
-    const auto newest = state_->timeline.newest();
-    // What there is already goes on being shown while the renderer for strands is not there.
-    if (is_frames() || !renderer_ || !newest || state_->asset != drawn_asset_) {
-      if (state_->image == nullptr) {
-        if (renderer_ && drawn_.snapshot != nullptr) renderer_->blit_to(0, window_size);
-        return {};
-      }
-      window_->show_image(*state_->image, state_->image_count);
-      if (std::exchange(shown_image_, state_->image_count) != state_->image_count) ++shown_count_;
-      return {};
-    }
-    const RenderSize size{std::min(window_size.width, kMaxImageSide),
-                          std::min(window_size.height, kMaxImageSide)};
-    const DrawnView view{newest.get(), orbit_.camera(), size};
-    const bool is_moving = playout_ == Playout::Smooth && state_->is_connected;
-    if (is_moving || !view.matches(drawn_)) RETURN_IF_ERROR(draw_strands(view, newest));
-    renderer_->blit_to(0, window_size);
-    return {};
+  /// The server's picture in frames mode, else what was drawn here; one of them goes on being shown while the
+  /// other is not there.
+  void choose_image() {
+    std::shared_ptr<const Image> chosen = is_frames() ? state_->image : drawn_.image;
+    fit_ = is_frames() ? PictureFit::Inside : PictureFit::Stretched;
+    if (chosen == nullptr) return;
+    if (chosen != image_) ++shown_count_;
+    image_ = std::move(chosen);
   }
 
-  Status draw_strands(const DrawnView& view, const std::shared_ptr<const Snapshot>& newest) {
-    const auto strands = player_.strands_at(state_->timeline, now_ns());
-    RETURN_IF_ERROR(renderer_->draw(*strands, view.camera, view.size));
-    const double draw_ms = renderer_->profile().total_ms;
-    render_timer_.add_ms(draw_ms);
-    const bool is_other_size = view.size.width != drawn_.size.width || view.size.height != drawn_.size.height;
-    if (is_other_size) draw_timer_ = StageTimer();  // says nothing about this size
-    if (!std::exchange(is_first_draw_, false)) draw_timer_.add_ms(draw_ms);
-    ++shown_count_;
-    drawn_ = view;
-    shown_snapshot_ = newest;  // keeps the pointer in drawn_ from being reused
-    return {};
+  bool is_picture_due(const WindowActions& actions) {
+    const uint64_t shown = shown_count_;
+    choose_image();
+    const int64_t elapsed_ns = now_ns() - presented_ns_;
+    is_due_ = is_due_ || actions.is_touched || shown_count_ != shown || elapsed_ns >= kPanelNs;
+    const RenderSize size = window_->framebuffer_size();
+    return is_due_ && elapsed_ns >= kDisplayNs && size.width > 0 && size.height > 0;
   }
 
-  void save_screenshot() {
-    std::optional<Image> image;
-    if (is_frames()) {
-      if (state_->image) image = *state_->image;
-    } else if (renderer_ && drawn_.snapshot != nullptr) {
-      image = renderer_->read_image();
-    }
-    if (!image) return show_message("nothing to save yet");
-    const std::string path = fmt::format("strandcast-{:04}.png", ++screenshot_count_);
-    const auto saved = save_png(path, *image);
-    show_message(saved ? "saved " + path : saved.error().to_string());
+  milliseconds time_to_wait() const {
+    if (!is_due_) return kLongestWait;
+    const int64_t left_ns = kDisplayNs - (now_ns() - presented_ns_);
+    return std::clamp(milliseconds(left_ns / kNsPerMs + 1), milliseconds(0), kLongestWait);
+  }
+
+  void present(int64_t woke_ns) {
+    const int64_t time_ns = now_ns();
+    is_due_ = false;
+    presented_ns_ = time_ns;
+    window_->present(image_, fit_, hud_.write(*state_, facts(time_ns), time_ns));
+    answer_timer_.add_ms(static_cast<double>(now_ns() - woke_ns) / kNsPerMs);
+  }
+
+  ViewFacts facts(int64_t time_ns) const {
+    ViewFacts facts;
+    facts.address = options_.address;
+    facts.playout = playout_;
+    facts.own_reason = own_reason_;
+    if (time_ns - message_ns_ < kMessageNs) facts.message = message_;
+    facts.is_starting = viewer_ == nullptr;
+    facts.draw_step = drawn_.step;
+    facts.draw_ms = drawn_.draw_timer.median_ms();
+    facts.answer_ms = answer_timer_.median_ms();
+    facts.shown_count = shown_count_;
+    return facts;
+  }
+
+  /// A picture of strands is drawn once more, whole, before it is saved.
+  void ask_screenshot() {
+    wants_whole_ = false;
+    if (is_frames()) return save(state_->image);
+    wants_whole_ = true;
+    asked_whole_ = drawer_.ask_whole();
+  }
+  void save(const std::shared_ptr<const Image>& image) {
+    if (image == nullptr) return show_message("nothing to save yet");
+    if (saving_.valid()) return show_message("the last picture is being saved still");
+    saving_ = std::async(std::launch::async, [image, number = ++screenshot_count_]() -> std::string {
+      const std::string path = fmt::format("strandcast-{:04}.png", number);
+      const auto saved = save_png(path, *image);
+      Window::wake();
+      return saved ? "saved " + path : saved.error().to_string();
+    });
   }
 
   void show_message(std::string text) {
     message_ = std::move(text);
     message_ns_ = now_ns();
+    is_due_ = true;
   }
 
-  HudState hud() {
-    const int64_t time_ns = now_ns();
-    const ViewerState& now = *state_;
-    fps_.update(turn_count_, time_ns);
-    bytes_.update(now.net.received_bytes, time_ns);
-    received_.update(now.decoded_frames, time_ns);
-
-    HudState hud;
-    hud.is_connected = now.is_connected;
-    hud.title = fmt::format("{}: {} strands x {}", now.welcome.scene_name, now.welcome.strand_count,
-                            now.welcome.vertex_count);
-    hud.connection = hud.is_connected ? options_.address.to_string() : now.trouble;
-    hud.mode = is_frames()
-                   ? "server's pictures"
-                   : fmt::format("strands, {}", playout_ == Playout::Smooth ? "smooth" : "newest state");
-    if (!is_frames() && now.quality_changes > 0)
-      hud.mode +=
-          fmt::format(", {:.3g} % of them every {} steps within {:.2g} mm", now.quality.strand_share * 1e2,
-                      now.quality.rate_divisor, now.quality.bound_m * 1e3);
-    hud.mode_wish = now.mode.wish();
-    hud.mode_reason = own_reason_.empty() ? now.mode.reason : own_reason_;
-    if (static_cast<double>(time_ns - message_ns_) * 1e-9 < kMessageS) hud.message = message_;
-    hud.fps = fps_.per_s();
-    hud.render_ms = render_timer_.median_ms();
-    hud.decode_ms = is_frames() ? now.picture_decode_ms : now.strand_decode_ms;
-    hud.sim_ms = now.status.sim_ms;
-    hud.encode_ms = now.status.encode_ms;
-    hud.realtime_factor = now.status.realtime_factor;
-    hud.kilobytes_per_s = bytes_.per_s() * 1e-3;
-    hud.frames_per_s = received_.per_s();
-    if (now.state_age_ms > 0.0)
-      hud.state_age_ms = now.state_age_ms + static_cast<double>(time_ns - now.made_ns) * kNsToMs;
-    hud.motion_to_decoded_ms = now.motion_to_decoded_ms;
-    hud.playout_delay_ms = playout_ == Playout::Smooth && !is_frames() ? now.playout_delay_ms : 0.0;
-    hud.round_trip_ms = now.round_trip_ms;
-    hud.queue_delay_ms = now.status.queue_delay_ms;
-    hud.tick = now.status.tick;
-    hud.dropped_by_server = now.status.dropped_frames;
-    hud.missed_frames = now.missed_frames;
-    hud.dropped_by_client = now.net.dropped_frames;
-    hud.viewer_count = now.status.viewer_count;
-    hud.is_paused = now.status.is_paused;
-    hud.is_motion_stale = now.has_status && now.status.is_motion_stale;
-    return hud;
+  Result<ViewReport> finish() {
+    const auto measured = viewer_ == nullptr ? std::nullopt : viewer_->stop_and_report();
+    if (state_->final_error) return *state_->final_error;
+    if (!measured)
+      return make_error(ErrorCode::Unavailable, "left before the server had answered{}{}",
+                        state_->trouble.empty() ? "" : ": ", state_->trouble);
+    ViewReport report = *measured;
+    set_render_times(report, drawer_.look().draw_timer);
+    add_answer_times(report, answer_timer_);
+    if (!own_reason_.empty()) set_mode_reason(report, own_reason_);
+    return report;
   }
 
   const ViewOptions& options_;
-  std::unique_ptr<Window> window_;
-  std::optional<gl::DeviceInfo> device_;  // none: strands cannot be drawn here
-  gl::ShaderLibrary shaders_;
-  std::unique_ptr<Renderer> renderer_;  // below window_: it needs the window's context to go
-  OrbitCamera orbit_;
+  ClientConfig config_;
+  std::unique_ptr<Window> window_;  // before what wakes it
+  OrbitCamera orbit_{CameraDesc{}};
   std::string own_reason_;  // why this machine needs frames; empty = the server's reason counts
   Playout playout_;
-  TimelinePlayer player_;
-  StageTimer render_timer_;  // of the whole run
-  StageTimer draw_timer_;    // since the last report
-  double draw_ms_ = 0.0;
-  bool is_first_draw_ = true;                      // it compiles and uploads
-  std::shared_ptr<const SceneAsset> drawn_asset_;  // that renderer_ was made for
-  DrawnView drawn_;
-  std::shared_ptr<const Snapshot> shown_snapshot_;
-  uint64_t shown_image_ = 0;
-  uint64_t shown_count_ = 0;  // different pictures
+  HudWriter hud_;
+  StageTimer answer_timer_;
   bool is_camera_sent_ = false;
   int64_t camera_sent_ns_ = 0;
   int64_t reported_ns_ = 0;
-  uint64_t turn_count_ = 0;
+  int64_t presented_ns_ = 0;
+  bool is_due_ = true;                  // a picture
+  std::shared_ptr<const Image> image_;  // that is shown
+  PictureFit fit_ = PictureFit::Stretched;
+  uint64_t shown_count_ = 0;  // different pictures
+  bool wants_whole_ = false;
+  uint64_t asked_whole_ = 0;
   uint32_t screenshot_count_ = 0;
   std::string message_;
   int64_t message_ns_ = 0;
-  Rate fps_, bytes_, received_, shown_;
-  ViewerThread viewer_;
-  std::shared_ptr<const ViewerState> state_;  // what this turn of the loop shows
+  DrawnState drawn_;                          // what this turn of the loop shows
+  std::shared_ptr<const ViewerState> state_;  // likewise
+  std::future<std::string> saving_;
+  StrandDrawer drawer_;
+  std::unique_ptr<ViewerThread> viewer_;  // last: it tells the drawer
 };
 
 }  // namespace
 
 Result<ViewReport> run_windowed(const ViewOptions& options, const std::atomic<bool>& stop) {
-  // The window first, hidden: what it can draw decides what to ask for.
   ASSIGN_OR_RETURN(auto window, Window::open("Strandcast", options.size));
-  std::optional<gl::DeviceInfo> device;
   ClientConfig config = client_config(options);
-  if (window->why_no_strands().empty()) {
-    ASSIGN_OR_RETURN(device, gl::read_device_info());
-  } else if (options.mode == StreamMode::Strands) {
-    return make_error(ErrorCode::Unavailable, "{}; --mode frames shows the server's pictures",
-                      window->why_no_strands());
-  } else {
-    config.hello.mode = StreamMode::Frames;
-  }
   config.cancel = [&stop]() -> std::optional<Error> {
     if (!stop) return std::nullopt;
     return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
   };
-  ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
-  window->show();
-  return WindowedView(options, std::move(live), std::move(window), std::move(device)).run(stop);
+  return WindowedView(options, std::move(config), std::move(window)).run(stop);
 }
 
 }  // namespace strandcast

@@ -34,7 +34,7 @@ ErrorCode code_for(uint16_t close_code) {
 }  // namespace
 
 Error error_from_close(uint16_t close_code, const std::string& reason) {
-  return make_error(code_for(close_code), "the server closed the connection: {}",
+  return make_error(code_for(close_code), "{}{}", kClosedByServer,
                     reason.empty() ? fmt::format("no reason given (code {})", close_code) : reason);
 }
 

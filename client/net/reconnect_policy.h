@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "common/base/result.h"
 
@@ -16,6 +17,9 @@ namespace strandcast {
 /// wrongly, or we it) will not go away by themselves, Unavailable and Timeout may. Close code 0: the
 /// connection broke without one.
 Error error_from_close(uint16_t close_code, const std::string& reason);
+
+/// How its sentence begins: the server said this, and it is no trouble of our own with what it sent.
+inline constexpr std::string_view kClosedByServer = "the server closed the connection: ";
 
 class ReconnectPolicy {
  public:

@@ -6,6 +6,22 @@
 
 namespace strandcast {
 
+const char* to_string(ConnectStep step) {
+  switch (step) {
+    case ConnectStep::FindHost:
+      return "looking for the host";
+    case ConnectStep::Connect:
+      return "connecting";
+    case ConnectStep::BeginTls:
+      return "beginning TLS";
+    case ConnectStep::AskForWebSocket:
+      return "asking for a WebSocket";
+    case ConnectStep::AwaitWelcome:
+      return "waiting for the server's Welcome";
+  }
+  return "connecting";
+}
+
 Result<std::unique_ptr<ViewerClient>> ViewerClient::connect(const ClientConfig& config) {
   TlsContextPtr tls;
   if (config.address.is_tls) {

@@ -22,6 +22,11 @@
 
 namespace strandcast {
 
+/// What a connection is at, in this order.
+enum class ConnectStep { FindHost, Connect, BeginTls, AskForWebSocket, AwaitWelcome };
+/// For a person: "looking for the host".
+const char* to_string(ConnectStep step);
+
 struct ClientConfig {
   Address address;
   std::filesystem::path tls_authorities;  // PEM, for an address with TLS; empty: the system's
@@ -34,6 +39,8 @@ struct ClientConfig {
   /// Asked every kCancelPoll by the thread that waits in ViewerClient::connect(); a sentence ends the wait.
   /// Empty: never.
   std::function<std::optional<Error>()> cancel;
+  /// Told by the connection's own thread what it begins with. Empty: nobody is told.
+  std::function<void(ConnectStep)> on_step;
 };
 
 inline constexpr std::chrono::milliseconds kCancelPoll{20};

@@ -131,7 +131,12 @@ void ViewerClient::Connection::run() {
 
 // ---- opening: name, TCP, WebSocket, Hello ----
 
+void ViewerClient::Connection::note_step(ConnectStep step) const {
+  if (config_.on_step) config_.on_step(step);
+}
+
 void ViewerClient::Connection::resolve() {
+  note_step(ConnectStep::FindHost);
   set_deadline(config_.connect_timeout, "did not answer");
   resolver_.async_resolve(config_.address.host, std::to_string(config_.address.port),
                           [this](error_code failure, const tcp::resolver::results_type& results) {
@@ -144,6 +149,7 @@ void ViewerClient::Connection::resolve() {
 }
 
 void ViewerClient::Connection::connect_tcp(const tcp::resolver::results_type& results) {
+  note_step(ConnectStep::Connect);
   asio::async_connect(ws_.next_layer().socket(), results, [this](error_code failure, const tcp::endpoint&) {
     if (is_finished_) return;
     if (failure)
@@ -157,6 +163,7 @@ void ViewerClient::Connection::connect_tcp(const tcp::resolver::results_type& re
 }
 
 void ViewerClient::Connection::connect_tls() {
+  note_step(ConnectStep::BeginTls);
   ws_.next_layer().async_connect_tls(tls_, config_.address.host, [this](error_code failure) {
     if (is_finished_) return;
     if (failure) return finish(error_from_tls(ws_.next_layer(), failure));
@@ -165,6 +172,7 @@ void ViewerClient::Connection::connect_tls() {
 }
 
 void ViewerClient::Connection::upgrade() {
+  note_step(ConnectStep::AskForWebSocket);
   websocket::stream_base::timeout timeout{};
   timeout.handshake_timeout = config_.connect_timeout;
   timeout.idle_timeout = config_.idle_timeout;
@@ -194,6 +202,7 @@ void ViewerClient::Connection::upgrade() {
 }
 
 void ViewerClient::Connection::greet() {
+  note_step(ConnectStep::AwaitWelcome);
   is_open_ = true;
   const auto chosen = response_[http::field::sec_websocket_protocol];
   if (chosen != kWebSocketProtocol)

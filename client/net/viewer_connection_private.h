@@ -48,6 +48,7 @@ class ViewerClient::Connection {
   void run();
   void set_deadline(std::chrono::milliseconds timeout, const char* complaint);
 
+  void note_step(ConnectStep step) const;
   void resolve();
   void connect_tcp(const tcp::resolver::results_type& results);
   void connect_tls();

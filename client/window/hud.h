@@ -1,39 +1,39 @@
-// What the window's panel shows. Plain data, filled by the application for every picture.
+// What the window's panels say. Plain data, filled by the application for every picture.
 #pragma once
 
-#include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace strandcast {
 
-struct HudState {
-  std::string title;        // scene name and sizes
-  std::string connection;   // "127.0.0.1:7878", or what is wrong with it
-  std::string mode;         // what is shown: strands or frames, playout
-  std::string mode_wish;    // what was asked for, and what became of it
-  std::string mode_reason;  // why, by the server or this machine
-  std::string message;      // newest notice, fades out by the application
-  double fps = 0.0;
-  double render_ms = 0.0;
-  double decode_ms = 0.0;
-  double sim_ms = 0.0;
-  double encode_ms = 0.0;
-  double realtime_factor = 0.0;
-  double kilobytes_per_s = 0.0;
-  double frames_per_s = 0.0;  // received
-  double state_age_ms = 0.0;
-  double motion_to_decoded_ms = 0.0;
-  double playout_delay_ms = 0.0;  // smooth playout only
-  double round_trip_ms = 0.0;
-  double queue_delay_ms = 0.0;  // of data on its way here
-  uint64_t tick = 0;
-  uint64_t dropped_by_server = 0;
-  uint64_t missed_frames = 0;
-  uint64_t dropped_by_client = 0;
-  uint32_t viewer_count = 0;
-  bool is_connected = false;
-  bool is_paused = false;
-  bool is_motion_stale = false;
+struct HudRow {
+  std::string label;
+  std::string value;
 };
+
+/// In the middle of the window while there is no connection.
+struct HudBanner {
+  std::string headline;  // "connecting to 127.0.0.1:7878"
+  std::string trouble;   // why not; may be empty
+  std::string help;      // what a person can do; may be empty
+  std::string doing;     // what is tried, or what the keys do
+};
+
+struct HudState {
+  std::string title;                  // what is seen, in one line
+  std::vector<std::string> warnings;  // what a person should know now, and the newest notice
+  std::vector<HudRow> rows;           // measurements, for the unfolded panel
+  std::optional<HudBanner> banner;
+};
+
+/// How much of the panel is there.
+enum class HudFold { Small, Unfolded, Hidden };
+/// Small, unfolded, hidden, and again.
+constexpr HudFold next_fold(HudFold fold) {
+  return fold == HudFold::Small      ? HudFold::Unfolded
+         : fold == HudFold::Unfolded ? HudFold::Hidden
+                                     : HudFold::Small;
+}
 
 }  // namespace strandcast

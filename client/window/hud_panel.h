@@ -1,16 +1,28 @@
-// The panels over the picture, drawn with Dear ImGui between begin_picture() and end_picture(). Main thread
-// only.
+// The panels over the picture, drawn with Dear ImGui between its NewFrame() and Render(). Main thread only.
 #pragma once
 
 #include "client/window/hud.h"
 
 namespace strandcast {
 
-/// Measurements, top left.
-void draw_hud_panel(const HudState& hud);
-/// Mouse and keys, bottom right.
-void draw_help_panel();
+/// Of the window's width, but never less than so many letters.
+inline constexpr float kMaxPanelShare = 1.0f / 3.0f;
+inline constexpr float kMinPanelLetters = 22.0f;
+
+/// Width and height on the screen, in the window's units.
+struct PanelSize {
+  float width = 0.0f;
+  float height = 0.0f;
+};
+
+/// Colours, corners and letters of all panels, for a screen of so many pixels per unit. Once, before the
+/// first panel.
+void set_panel_style(float content_scale);
+/// Top left: the title and warnings; unfolded, the measurements too.
+PanelSize draw_hud_panel(const HudState& hud, HudFold fold);
+/// Mouse and keys, in the middle, over all else.
+PanelSize draw_help_panel();
 /// What is wrong with the connection, in the middle.
-void draw_connection_banner(const HudState& hud);
+PanelSize draw_banner(const HudBanner& banner);
 
 }  // namespace strandcast

@@ -26,10 +26,10 @@ void remember_glfw_error(int, const char* description) {
   log_debug("window", "GLFW: {}", description);
 }
 
-/// A window with a core context of this version; null when there is none.
-GLFWwindow* make_window(const std::string& title, RenderSize size, int major, int minor) {
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, major);
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, minor);
+/// A window with a core context of what the panels need; null when there is none.
+GLFWwindow* make_window(const std::string& title, RenderSize size) {
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   return glfwCreateWindow(static_cast<int>(size.width), static_cast<int>(size.height), title.c_str(), nullptr,
                           nullptr);
@@ -46,14 +46,13 @@ Error no_window(const char* what) {
 struct Window::State {
   GLFWwindow* window = nullptr;
   bool has_imgui = false;
-  bool is_hud_visible = true;
+  HudFold fold = HudFold::Small;
   bool is_help_visible = false;
   glm::dvec2 cursor{0.0};
   WindowActions actions;
-  std::string why_no_strands;
   GLuint picture = 0;  // plain OpenGL 3.3: it must work where nothing better is to be had
   RenderSize picture_size{0, 0};
-  uint64_t picture_number = 0;
+  std::shared_ptr<const Image> uploaded;  // what is in it
 
   ~State() {
     if (picture != 0) glDeleteTextures(1, &picture);  // needs the context that goes below
@@ -67,6 +66,7 @@ struct Window::State {
   }
 
   void on_key(int key) {
+    actions.is_touched = true;
     switch (key) {
       case GLFW_KEY_ESCAPE:
       case GLFW_KEY_Q:
@@ -91,7 +91,7 @@ struct Window::State {
         actions.wants_playout_toggle = true;
         break;
       case GLFW_KEY_U:
-        is_hud_visible = !is_hud_visible;
+        fold = next_fold(fold);
         break;
       case GLFW_KEY_H:
       case GLFW_KEY_F1:
@@ -113,6 +113,8 @@ struct Window::State {
     const auto is_down = [this](int button) { return glfwGetMouseButton(window, button) == GLFW_PRESS; };
     if (is_down(GLFW_MOUSE_BUTTON_LEFT)) actions.orbit_heights += heights;
     if (is_down(GLFW_MOUSE_BUTTON_MIDDLE) || is_down(GLFW_MOUSE_BUTTON_RIGHT)) actions.pan_heights += heights;
+    actions.is_touched = actions.is_touched || actions.orbit_heights != glm::vec2(0.0f) ||
+                         actions.pan_heights != glm::vec2(0.0f);
   }
 
   void install_callbacks() {
@@ -124,8 +126,25 @@ struct Window::State {
       static_cast<State*>(glfwGetWindowUserPointer(source))->on_cursor({x, y});
     });
     glfwSetScrollCallback(window, [](GLFWwindow* source, double, double steps) {
-      static_cast<State*>(glfwGetWindowUserPointer(source))->actions.zoom_steps += static_cast<float>(steps);
+      WindowActions& wanted = static_cast<State*>(glfwGetWindowUserPointer(source))->actions;
+      wanted.zoom_steps += static_cast<float>(steps);
+      wanted.is_touched = true;
     });
+    // Uncovered, or of another size: the old picture is gone.
+    glfwSetWindowRefreshCallback(window, [](GLFWwindow* source) {
+      static_cast<State*>(glfwGetWindowUserPointer(source))->actions.is_touched = true;
+    });
+    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* source, int, int) {
+      static_cast<State*>(glfwGetWindowUserPointer(source))->actions.is_touched = true;
+    });
+  }
+
+  void upload(const std::shared_ptr<const Image>& image);
+  void add_picture(const Image& image, PictureFit fit) const;
+  void add_panels(const HudState& hud) const {
+    draw_hud_panel(hud, fold);
+    if (hud.banner) draw_banner(*hud.banner);
+    if (is_help_visible) draw_help_panel();
   }
 };
 
@@ -136,13 +155,8 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title, RenderSiz
   glfwSetErrorCallback(remember_glfw_error);
   if (glfwInit() != GLFW_TRUE) return no_window("cannot open a display");
   auto state = std::make_unique<State>();
-  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
-  state->window = make_window(title, size, 4, 5);
-  if (state->window == nullptr) {
-    state->why_no_strands = fmt::format("this machine has no OpenGL 4.5 ({})", last_glfw_error());
-    state->window = make_window(title, size, 3, 3);
-  }
-  if (state->window == nullptr) return no_window("cannot open a window with OpenGL 4.5 or 3.3");
+  state->window = make_window(title, size);
+  if (state->window == nullptr) return no_window("cannot open a window with OpenGL 3.3");
   glfwMakeContextCurrent(state->window);
   glfwSwapInterval(1);
   glfwGetCursorPos(state->window, &state->cursor.x, &state->cursor.y);
@@ -151,28 +165,29 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title, RenderSiz
   state->install_callbacks();
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // leaves no files behind
+  float scale_x = 1.0f;
+  float scale_y = 1.0f;
+  glfwGetWindowContentScale(state->window, &scale_x, &scale_y);
+  set_panel_style(std::max(scale_x, 1.0f));
   ImGui_ImplGlfw_InitForOpenGL(state->window, true);
   ImGui_ImplOpenGL3_Init("#version 330 core");
   state->has_imgui = true;
   return std::unique_ptr<Window>(new Window(std::move(state)));
 }
 
-void Window::show() {
-  glfwShowWindow(state_->window);
-}
-
-const std::string& Window::why_no_strands() const {
-  return state_->why_no_strands;
-}
-
-WindowActions Window::begin_picture() {
-  glfwPollEvents();
-  ImGui_ImplOpenGL3_NewFrame();
-  ImGui_ImplGlfw_NewFrame();
-  ImGui::NewFrame();
+WindowActions Window::wait(std::chrono::milliseconds timeout) {
+  constexpr double kSPerMs = 1e-3;
+  if (timeout.count() > 0)
+    glfwWaitEventsTimeout(static_cast<double>(timeout.count()) * kSPerMs);
+  else
+    glfwPollEvents();
   WindowActions actions = std::exchange(state_->actions, {});
   if (glfwWindowShouldClose(state_->window) == GLFW_TRUE) actions.wants_quit = true;
   return actions;
+}
+
+void Window::wake() {
+  glfwPostEmptyEvent();
 }
 
 RenderSize Window::framebuffer_size() const {
@@ -182,52 +197,59 @@ RenderSize Window::framebuffer_size() const {
   return {static_cast<uint32_t>(std::max(width, 0)), static_cast<uint32_t>(std::max(height, 0))};
 }
 
-void Window::show_image(const Image& image, uint64_t image_number) {
-  const auto width = static_cast<GLsizei>(image.width);
-  const auto height = static_cast<GLsizei>(image.height);
-  if (state_->picture == 0) glGenTextures(1, &state_->picture);
-  glBindTexture(GL_TEXTURE_2D, state_->picture);
-  if (state_->picture_size.width != image.width || state_->picture_size.height != image.height) {
+void Window::State::upload(const std::shared_ptr<const Image>& image) {
+  if (image == uploaded) return;
+  const auto width = static_cast<GLsizei>(image->width);
+  const auto height = static_cast<GLsizei>(image->height);
+  if (picture == 0) glGenTextures(1, &picture);
+  glBindTexture(GL_TEXTURE_2D, picture);
+  if (picture_size.width != image->width || picture_size.height != image->height) {
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    state_->picture_size = {image.width, image.height};
-    state_->picture_number = 0;
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    picture_size = {image->width, image->height};
   }
-  if (state_->picture_number != image_number) {
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
-    state_->picture_number = image_number;
-  }
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image->rgba.data());
   glBindTexture(GL_TEXTURE_2D, 0);
+  uploaded = image;
+}
+
+void Window::State::add_picture(const Image& image, PictureFit fit) const {
   const ImVec2 area = ImGui::GetIO().DisplaySize;
-  const float scale =
-      std::min(area.x / static_cast<float>(image.width), area.y / static_cast<float>(image.height));
-  const ImVec2 shown(scale * static_cast<float>(image.width), scale * static_cast<float>(image.height));
+  ImVec2 shown = area;
+  if (fit == PictureFit::Inside) {
+    const float scale =
+        std::min(area.x / static_cast<float>(image.width), area.y / static_cast<float>(image.height));
+    shown = ImVec2(scale * static_cast<float>(image.width), scale * static_cast<float>(image.height));
+  }
   const ImVec2 corner((area.x - shown.x) * 0.5f, (area.y - shown.y) * 0.5f);
-  ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(uintptr_t{state_->picture}), corner,
+  ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(uintptr_t{picture}), corner,
                                            ImVec2(corner.x + shown.x, corner.y + shown.y));
 }
 
-void Window::end_picture(const HudState& hud) {
-  // The renderer leaves its own target bound; the panel's backend draws into whatever it finds.
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
-  glDisable(GL_FRAMEBUFFER_SRGB);
-  glDisable(GL_RASTERIZER_DISCARD);
-  if (state_->is_hud_visible) draw_hud_panel(hud);
-  if (state_->is_help_visible) draw_help_panel();
-  if (!hud.is_connected) draw_connection_banner(hud);
-  ImGui::Render();
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-  glfwSwapBuffers(state_->window);
-}
-
-void Window::clear() {
+void Window::present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud) {
   const RenderSize size = framebuffer_size();
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  // Panels learn their size from what they held before: the first time is not drawn.
+  ImGui::NewFrame();
+  state_->add_panels(hud);
+  ImGui::EndFrame();
+  ImGui::NewFrame();
+  if (image != nullptr && !image->rgba.empty()) {
+    state_->upload(image);
+    state_->add_picture(*image, fit);
+  }
+  state_->add_panels(hud);
+  ImGui::Render();
   glViewport(0, 0, static_cast<GLsizei>(size.width), static_cast<GLsizei>(size.height));
   constexpr float kDarkGrey = 0.1f;
   glClearColor(kDarkGrey, kDarkGrey, kDarkGrey, 1.0f);
   glClear(GL_COLOR_BUFFER_BIT);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(state_->window);
 }
 
 }  // namespace strandcast

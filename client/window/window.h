@@ -1,20 +1,23 @@
-// Window: a GLFW window with a GL 4.5 core context, its mouse and keys as actions, and the panel drawn with
-// Dear ImGui. Main thread only. Knows nothing of servers or hair: the application draws into its framebuffer.
+// Window: a GLFW window, its mouse and keys as actions, and a picture with panels over it, drawn with Dear
+// ImGui and plain OpenGL 3.3. It draws nothing that takes long. Main thread only but for wake(). Knows
+// nothing of servers or hair.
 #pragma once
 
+#include <chrono>
 #include <glm/glm.hpp>
 #include <memory>
 #include <string>
 
 #include "client/window/hud.h"
+#include "common/base/picture_size.h"
 #include "common/base/result.h"
 #include "common/pictures/image_codec.h"
-#include "common/render/renderer.h"
 
 namespace strandcast {
 
 /// What the person asked for since the last call.
 struct WindowActions {
+  bool is_touched = false;            // what is shown may have to change: a key, a drag, another size
   bool wants_quit = false;            // Esc, Q, or the window was closed
   bool wants_pause_toggle = false;    // Space
   bool wants_step = false;            // N
@@ -27,29 +30,25 @@ struct WindowActions {
   float zoom_steps = 0.0f;            // wheel
 };
 
+/// How a picture of other sides than the window's is shown.
+enum class PictureFit { Inside, Stretched };
+
 class Window {
  public:
-  /// Opens the window, hidden, and makes its context current: OpenGL 4.5, or 3.3 for pictures only.
-  /// Unavailable without a display, and says what to do then.
+  /// Opens the window. Unavailable without a display, and says what to do then.
   static Result<std::unique_ptr<Window>> open(const std::string& title, RenderSize size);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  void show();
-  /// Why strands cannot be drawn in this window; empty when they can.
-  const std::string& why_no_strands() const;
-
-  /// Handles events and begins a picture.
-  WindowActions begin_picture();
+  /// Waits until something happens, wake() was called or the time is over.
+  WindowActions wait(std::chrono::milliseconds timeout);
+  /// Ends the wait. Any thread, while there is a window.
+  static void wake();
   /// Size of the framebuffer, pixels; 0 x 0 while minimised.
   RenderSize framebuffer_size() const;
-  /// Fills the framebuffer with a dark grey, for when there is nothing to show yet.
-  void clear();
-  /// Fills the window with a picture (frames mode), scaled to fit.
-  void show_image(const Image& image, uint64_t image_number);
-  /// Draws the panel and the help over whatever was drawn, and shows the picture; waits for the display.
-  void end_picture(const HudState& hud);
+  /// Shows this picture (dark grey when there is none) with the panels over it; waits for the display.
+  void present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud);
 
  private:
   struct State;

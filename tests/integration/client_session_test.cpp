@@ -198,7 +198,48 @@ TEST(ViewerThread, DecodesAndAcknowledgesEveryFrameWhileNobodyLooks) {
   EXPECT_EQ(state->timeline.snapshots().size(), 1u) << "what nobody looked at does not pile up";
   viewer.request_mode(StreamMode::Auto);
   EXPECT_TRUE(eventually([&] { return viewer.look()->mode.reason == "as before"; }));
-  EXPECT_THAT(to_lines(viewer.stop_and_report()), HasSubstr("decoded_frames=50\n"));
+  EXPECT_THAT(to_lines(*viewer.stop_and_report()), HasSubstr("decoded_frames=50\n"));
+}
+
+TEST(ViewerThread, SaysWhatIsWrongAndTriedBeforeTheFirstConnection) {
+  uint16_t port = 0;
+  {
+    const FakeServer gone([](FakePeer&) {});
+    port = gone.port();
+  }
+  std::atomic<int> told{0};
+  ViewerThread viewer(LiveConnection::begin(config_for(port)), [&](const auto&) { ++told; });
+  ASSERT_TRUE(eventually([&] { return !viewer.look()->trouble.empty(); }));
+  const auto state = viewer.look();
+  EXPECT_THAT(state->trouble, HasSubstr("cannot connect"));
+  EXPECT_THAT(state->help, HasSubstr("start strandcast-server there"));
+  EXPECT_NE(state->doing, "");
+  EXPECT_EQ(state->session_number, 0u);
+  EXPECT_FALSE(state->is_connected);
+  EXPECT_FALSE(state->final_error) << "a server that is started later is found";
+  EXPECT_GT(told, 0);
+  EXPECT_EQ(viewer.send(Ping{}).error().code, ErrorCode::Unavailable);
+  viewer.request_mode(StreamMode::Frames);
+  EXPECT_FALSE(viewer.stop_and_report());
+}
+
+TEST(ViewerThread, AWishFromBeforeTheFirstConnectionIsInItsHello) {
+  std::promise<StreamMode> asked;
+  const FakeServer server([&](FakePeer& peer) {
+    if (const auto hello = peer.welcome(make_welcome(kStrands, kVertices))) asked.set_value(hello->mode);
+    peer.read_to_end();
+  });
+  ClientConfig config = config_for(server.port());
+  config.hello.mode = StreamMode::Auto;
+  auto live = LiveConnection::begin(config);
+  live->modes()->want(StreamMode::Frames);
+  ViewerThread viewer(std::move(live));
+  EXPECT_EQ(asked.get_future().get(), StreamMode::Frames);
+  ASSERT_TRUE(eventually([&] { return viewer.look()->is_connected; }));
+  EXPECT_EQ(viewer.look()->session_number, 1u);
+  EXPECT_EQ(viewer.look()->trouble, "");
+  EXPECT_EQ(viewer.look()->doing, "");
+  EXPECT_TRUE(viewer.stop_and_report());
 }
 
 TEST(ViewerThread, SendsEveryWishForAModeAtOnce) {

@@ -1,0 +1,111 @@
+// StrandDrawer: draws strands with a GL context and a thread of its own, so that a window never waits for
+// hair. What it draws when and how finely, DrawPlan says. It keeps the newest picture in memory; what it is
+// told and what it tells are the newest only. All functions from any thread.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "client/app/draw_plan.h"
+#include "client/app/viewer_thread.h"
+#include "common/base/profile.h"
+#include "common/gl/egl_context.h"
+#include "common/render/renderer.h"
+
+namespace strandcast {
+
+/// What strands are seen through.
+struct DrawView {
+  CameraDesc camera;
+  RenderSize size;  // of the window
+};
+
+/// Newest of all.
+struct DrawnState {
+  std::optional<Result<gl::DeviceInfo>> device;  // nothing while OpenGL starts
+  std::optional<Error> trouble;                  // why the newest scene cannot be drawn
+  std::shared_ptr<const Image> image;            // null before the first
+  size_t step = 0;                               // of image
+  uint64_t count = 0;                            // of pictures
+  uint64_t asked_whole = 0;                      // the last ask_whole() that image answers
+  StageTimer draw_timer;                         // of the whole run
+  double fair_ms = 0.0;                          // DrawPlan::fair_ms
+};
+
+class StrandDrawer {
+ public:
+  struct Config {
+    std::filesystem::path shader_dir;  // empty = the shaders in the program
+    std::string device = "auto";       // as in EglContext::make
+    std::function<void()> on_news;     // called by the drawing thread; must not block
+  };
+  explicit StrandDrawer(Config config);
+  /// Ends the thread; a picture that is being drawn is left.
+  ~StrandDrawer();
+  StrandDrawer(const StrandDrawer&) = delete;
+  StrandDrawer& operator=(const StrandDrawer&) = delete;
+
+  /// What the server sent.
+  void set_state(std::shared_ptr<const ViewerState> state);
+  /// Nothing: no picture is wanted.
+  void set_view(const std::optional<DrawView>& view);
+  /// The next picture is to be the finest, whatever moves; DrawnState says when it is there.
+  uint64_t ask_whole();
+  DrawnState look() const;
+
+ private:
+  struct Job {
+    std::shared_ptr<const ViewerState> state;
+    std::optional<DrawView> view;
+    uint64_t view_number = 0;
+    uint64_t asked_whole = 0;
+  };
+  /// What decides the pixels of the newest picture.
+  struct Drawn {
+    PosedStrands strands;
+    DrawView view;
+    size_t step = 0;
+    uint64_t asked_whole = 0;
+  };
+
+  void run();
+  void draw_until_stopped(const gl::DeviceInfo& device);
+  std::optional<Job> wait_for_job();
+  bool prepare(const gl::DeviceInfo& device, const Job& job);
+  void turn(const Job& job);
+  Status draw(const Job& job, PosedStrands strands, size_t step);
+  void fail(const Error& error);
+
+  const Config config_;
+
+  // Of the thread.
+  const gl::ShaderLibrary shaders_;
+  std::unique_ptr<Renderer> renderer_;
+  std::shared_ptr<const SceneAsset> asset_;  // that renderer_ is made for, or could not be
+  TimelinePlayer player_;
+  DrawPlan plan_{0};
+  std::optional<Drawn> drawn_;
+  bool is_first_draw_ = true;      // it compiles and uploads
+  std::optional<int64_t> due_ns_;  // to look again, though nobody told anything
+  uint64_t done_version_ = 0;
+
+  std::atomic<bool> is_stopping_{false};
+  std::atomic<uint64_t> view_number_{0};
+
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable changed_;
+  uint64_t version_ = 0;  // of job_
+  Job job_;
+  DrawnState newest_;
+
+  std::thread thread_;  // last: starts when everything else is there
+};
+
+}  // namespace strandcast

@@ -1,0 +1,56 @@
+// What the window says in words: of the connection, of what is seen, and what was measured. Pure text, one
+// thread.
+#pragma once
+
+#include <string>
+
+#include "client/app/draw_plan.h"
+#include "client/app/viewer_thread.h"
+#include "client/window/hud.h"
+
+namespace strandcast {
+
+/// Slower than this against real time for so long is said.
+inline constexpr double kSlowMotion = 0.95;
+inline constexpr int64_t kSlowMotionNs = 2'000'000'000;
+
+/// Counts per second, over two seconds.
+class Rate {
+ public:
+  /// `total` may begin again.
+  void update(uint64_t total, int64_t time_ns);
+  double per_s() const { return per_s_; }
+
+ private:
+  uint64_t begin_total_ = 0;
+  int64_t begin_ns_ = 0;
+  double per_s_ = 0.0;
+};
+
+/// What the window knows beside the state of the viewer.
+struct ViewFacts {
+  Address address;
+  Playout playout = Playout::LowLatency;
+  std::string own_reason;    // why this machine needs frames
+  std::string message;       // the newest notice
+  bool is_starting = false;  // OpenGL
+  size_t draw_step = 0;
+  double draw_ms = 0.0;      // median
+  double answer_ms = 0.0;    // median, from waking up to the picture on the display
+  uint64_t shown_count = 0;  // different pictures
+};
+
+class HudWriter {
+ public:
+  HudState write(const ViewerState& now, const ViewFacts& facts, int64_t time_ns);
+  double shown_hz() const { return shown_.per_s(); }
+
+ private:
+  std::vector<std::string> warnings(const ViewerState& now, const ViewFacts& facts, int64_t time_ns);
+  std::vector<HudRow> rows(const ViewerState& now, const ViewFacts& facts, int64_t time_ns) const;
+
+  Rate shown_, bytes_, received_;
+  int64_t real_time_ns_ = 0;  // when the server last kept up
+};
+
+}  // namespace strandcast

@@ -1,0 +1,174 @@
+// How large the panels of the window become, laid out without any OpenGL, and what they say.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <imgui.h>
+
+#include "client/app/view_hud.h"
+#include "client/window/hud_panel.h"
+
+namespace strandcast {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::Field;
+using testing::HasSubstr;
+
+constexpr int64_t kS = 1'000'000'000;
+
+/// Dear ImGui without a window.
+class PanelBench {
+ public:
+  explicit PanelBench(float scale) {
+    ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;
+    set_panel_style(scale);
+    ImGui::GetIO().Fonts->Build();
+  }
+  ~PanelBench() { ImGui::DestroyContext(); }
+  PanelBench(const PanelBench&) = delete;
+  PanelBench& operator=(const PanelBench&) = delete;
+
+  /// The size of a panel on an area of this size, once it knows what it holds.
+  template <class Panel>
+  PanelSize lay_out(const ImVec2& area, const Panel& panel) const {
+    PanelSize size;
+    for (int turn = 0; turn < 3; ++turn) {
+      ImGui::GetIO().DisplaySize = area;
+      ImGui::NewFrame();
+      size = panel();
+      ImGui::EndFrame();
+    }
+    return size;
+  }
+};
+
+/// Everything there is to say, at length.
+HudState talkative_hud() {
+  HudState hud;
+  hud.title = std::string(200, 'W');
+  hud.warnings = {std::string(200, 'w'),
+                  "no head motion arrives at the server and much more is to be said of it"};
+  for (int i = 0; i < 16; ++i)
+    hud.rows.push_back({"because", std::string(30, 'm') + " " + std::string(120, 'n')});
+  return hud;
+}
+
+TEST(HudPanel, TakesNoMoreThanAThirdOfTheWidthWhateverItSays) {
+  for (const float scale : {1.0f, 2.0f}) {
+    PanelBench bench(scale);
+    for (const float width : {1280.0f, 1920.0f, 2560.0f})
+      for (const HudFold fold : {HudFold::Small, HudFold::Unfolded}) {
+        const PanelSize size = bench.lay_out({width * scale, 720.0f * scale},
+                                             [&] { return draw_hud_panel(talkative_hud(), fold); });
+        EXPECT_GT(size.width, 0.0f);
+        EXPECT_LE(size.width, width * scale * kMaxPanelShare);
+      }
+  }
+}
+
+TEST(HudPanel, IsTwoLinesUntilItIsUnfolded) {
+  PanelBench bench(1.0f);
+  HudState hud;
+  hud.title = "default: strands, 10 pictures/s";
+  hud.rows.assign(14, {"label", "value"});
+  const auto lay_out = [&](HudFold fold) {
+    return bench.lay_out({1280.0f, 720.0f}, [&] { return draw_hud_panel(hud, fold); });
+  };
+  const PanelSize small = lay_out(HudFold::Small);
+  // Two lines of 15 px, what is between them and the border of 8 px.
+  EXPECT_LE(small.height, 2 * 15.0f + 4.0f + 2 * 8.0f + 6.0f);
+  EXPECT_LE(small.width, 1280.0f / 4.0f);
+  EXPECT_GT(lay_out(HudFold::Unfolded).height, 15 * 15.0f);
+  EXPECT_EQ(lay_out(HudFold::Hidden).height, 0.0f);
+}
+
+TEST(HudPanel, HelpAndBannerStayInsideASmallWindow) {
+  PanelBench bench(1.0f);
+  const HudBanner banner{"connecting to 127.0.0.1:7878", std::string(300, 'x'), "look there", "trying again"};
+  const PanelSize shown = bench.lay_out({320.0f, 240.0f}, [&] { return draw_banner(banner); });
+  EXPECT_LE(shown.width, 320.0f);
+  EXPECT_LE(bench.lay_out({320.0f, 240.0f}, [] { return draw_help_panel(); }).width, 320.0f);
+}
+
+TEST(HudFold, GoesRound) {
+  HudFold fold = HudFold::Small;
+  fold = next_fold(fold);
+  EXPECT_EQ(fold, HudFold::Unfolded);
+  fold = next_fold(fold);
+  EXPECT_EQ(fold, HudFold::Hidden);
+  EXPECT_EQ(next_fold(fold), HudFold::Small);
+}
+
+ViewFacts facts_of(const char* address) {
+  ViewFacts facts;
+  facts.address = *parse_address(address);
+  return facts;
+}
+
+TEST(ViewHud, SaysWhatIsTriedInsteadOfBlack) {
+  HudWriter writer;
+  ViewerState state;
+  ViewFacts facts = facts_of("127.0.0.1:7878");
+  facts.is_starting = true;
+  auto hud = writer.write(state, facts, kS);
+  ASSERT_TRUE(hud.banner);
+  EXPECT_EQ(hud.banner->headline, "starting");
+  facts.is_starting = false;
+  state.doing = "looking for the host";
+  hud = writer.write(state, facts, kS);
+  EXPECT_EQ(hud.banner->headline, "connecting to 127.0.0.1:7878");
+  EXPECT_THAT(hud.banner->doing, HasSubstr("looking for the host"));
+  EXPECT_EQ(hud.banner->trouble, "");
+  state.trouble = "127.0.0.1:7878: cannot connect: Connection refused";
+  state.help = "start it";
+  hud = writer.write(state, facts, kS);
+  EXPECT_EQ(hud.banner->trouble, "cannot connect: Connection refused");
+  EXPECT_EQ(hud.banner->help, "start it");
+  state.session_number = 1;
+  EXPECT_THAT(writer.write(state, facts, kS).banner->headline, HasSubstr("connection lost"));
+  state.final_error = make_error(ErrorCode::Unauthorized, "The token is wrong or missing.");
+  EXPECT_EQ(writer.write(state, facts, kS).banner->doing, "Esc quits");
+  state.is_connected = true;
+  EXPECT_FALSE(writer.write(state, facts, kS).banner);
+}
+
+TEST(ViewHud, SaysWhatAPersonShouldKnow) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = state.has_status = true;
+  state.session_number = 1;
+  state.welcome.scene_name = "stage";
+  state.status.realtime_factor = 1.0;
+  state.status.is_motion_stale = false;
+  const ViewFacts facts = facts_of("127.0.0.1");
+  EXPECT_TRUE(writer.write(state, facts, kS).warnings.empty());
+  state.status.is_paused = state.status.is_motion_stale = true;
+  EXPECT_THAT(writer.write(state, facts, kS).warnings,
+              AllOf(Contains(HasSubstr("paused")), Contains(HasSubstr("no head motion"))));
+  state.status.is_paused = state.status.is_motion_stale = false;
+  state.status.realtime_factor = 0.6;
+  EXPECT_TRUE(writer.write(state, facts, kS + kSlowMotionNs - 1).warnings.empty()) << "not for long enough";
+  EXPECT_THAT(writer.write(state, facts, kS + kSlowMotionNs).warnings, Contains(HasSubstr("x0.60")));
+  state.status.realtime_factor = kSlowMotion;
+  EXPECT_TRUE(writer.write(state, facts, kS + 2 * kSlowMotionNs).warnings.empty());
+}
+
+TEST(ViewHud, CountsPicturesAndSaysHowTheyAreDrawn) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = true;
+  state.session_number = 1;
+  state.welcome.scene_name = "stage";
+  ViewFacts facts = facts_of("127.0.0.1");
+  EXPECT_EQ(writer.write(state, facts, kS).title, "stage: strands, nothing moves");
+  facts.shown_count = 25;
+  facts.draw_step = kCoarsestFairStep;
+  const HudState hud = writer.write(state, facts, 3 * kS);
+  EXPECT_EQ(hud.title, "stage: strands, 12 pictures/s");
+  EXPECT_THAT(hud.rows, Contains(AllOf(Field(&HudRow::label, "drawn"),
+                                       Field(&HudRow::value, HasSubstr("50 % of the sides")))));
+}
+
+}  // namespace
+}  // namespace strandcast
