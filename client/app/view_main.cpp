@@ -2,6 +2,7 @@
 #include <exception>
 #include <iostream>
 
+#include "client/app/diagnose.h"
 #include "client/app/headless_view.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
@@ -13,6 +14,7 @@ namespace {
 
 using namespace strandcast;
 
+constexpr int kMissingExit = 1;
 constexpr int kBadInputExit = 2;
 
 int fail(const std::string& sentence) {
@@ -29,6 +31,11 @@ int run(int argc, char** argv) {
         fmt::format("unknown log level '{}' (known: error, warn, info, debug, off)", options.log_level));
 
   const auto& stop = catch_stop_signals();
+  if (options.is_diagnosis) {
+    const Diagnosis diagnosis = diagnose(options, stop);
+    std::cout << to_text(diagnosis);
+    return would_work(diagnosis) ? 0 : kMissingExit;
+  }
   auto report = options.is_headless ? run_headless(options, stop) : run_windowed(options, stop);
   if (!report) return fail(report.error().to_string());
   std::cout << to_summary(*report);

@@ -83,6 +83,7 @@ namespace {
 /// Values that need more than CLI11's own conversion.
 struct RawOptions {
   std::string connect = "127.0.0.1:" + std::to_string(kDefaultPort);
+  std::string diagnose;  // instead of connect; empty = no
   std::string mode = "auto";
   std::string pictures = "any";
   std::string size = "960x540";
@@ -95,6 +96,10 @@ struct RawOptions {
 
 void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
+  app.add_option(
+      "--diagnose", raw.diagnose,
+      "Say what a session with the server at HOST:PORT needs and what is missing, and leave: 0 when "
+      "it would work, 1 when something is missing");
   app.add_option("--mode", raw.mode,
                  "strands: drawn here; frames: the server's pictures; auto: whichever is better now")
       ->capture_default_str();
@@ -144,7 +149,8 @@ Status check_folder_of(const std::filesystem::path& file) {
 }
 
 Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
-  ASSIGN_OR_RETURN(options.address, parse_address(raw.connect));
+  options.is_diagnosis = !raw.diagnose.empty();
+  ASSIGN_OR_RETURN(options.address, parse_address(options.is_diagnosis ? raw.diagnose : raw.connect));
   options.address.is_tls = options.address.is_tls || raw.is_tls || !options.tls_authorities.empty();
   ASSIGN_OR_RETURN(options.mode, parse_mode(raw.mode));
   ASSIGN_OR_RETURN(options.size, parse_size(raw.size));

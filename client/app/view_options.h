@@ -20,6 +20,7 @@ struct ViewOptions {
   PictureCodecs picture_codecs = decodable_picture_codecs();  // in frames mode
   std::string token;
   RenderSize size{960, 540};
+  bool is_diagnosis = false;  // say what a session needs, and leave
   bool is_headless = false;
   bool is_view_only = false;         // ask for a viewer's role only; headless never asks for more
   std::filesystem::path screenshot;  // empty = none

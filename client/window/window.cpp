@@ -175,6 +175,13 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title, RenderSiz
   return std::unique_ptr<Window>(new Window(std::move(state)));
 }
 
+Status Window::check_display() {
+  glfwSetErrorCallback(remember_glfw_error);
+  if (glfwInit() != GLFW_TRUE) return no_window("cannot open a display");
+  glfwTerminate();
+  return {};
+}
+
 WindowActions Window::wait(std::chrono::milliseconds timeout) {
   constexpr double kSPerMs = 1e-3;
   if (timeout.count() > 0)

@@ -37,6 +37,8 @@ class Window {
  public:
   /// Opens the window. Unavailable without a display, and says what to do then.
   static Result<std::unique_ptr<Window>> open(const std::string& title, RenderSize size);
+  /// Whether there is a display at all; opens nothing. Not while there is a window.
+  static Status check_display();
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;

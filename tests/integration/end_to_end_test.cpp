@@ -450,6 +450,22 @@ TEST_F(EndToEnd, AWindowWithoutOpenGl45AsksForTheServersPictures) {
   EXPECT_EQ(report.find(nothing), std::string::npos) << report;
 }
 
+TEST_F(EndToEnd, ADiagnosisWithoutADisplayFindsThatASessionWouldWork) {
+  const TemporaryFolder folder;
+  start_feeding();
+  const std::string command =
+      fmt::format("env -u DISPLAY -u WAYLAND_DISPLAY {} --diagnose 127.0.0.1:{} >{} 2>&1",
+                  STRANDCAST_VIEW_PROGRAM, server_->port(), (folder.path() / "log").string());
+  const int status = std::system(command.c_str());
+  const auto log = load_text(folder.path() / "log", 1u << 20);
+  ASSERT_TRUE(log) << log.error().to_string();
+  EXPECT_EQ(WEXITSTATUS(status), 0) << *log;
+  for (const char* part :
+       {"OpenGL", "note     display", "ok       decoders", "ok       server", "ok       role",
+        "ok       stream", "ok       clock", "link", "a session would work\n"})
+    EXPECT_THAT(*log, HasSubstr(part));
+}
+
 TEST_F(EndToEnd, WithoutADisplayTheErrorNamesTheWayOut) {
   const TemporaryFolder folder;
   const std::string command =
