@@ -19,6 +19,9 @@ constexpr double kRampS = 0.5;
 // The built-in motion from shortly before its fast turn.
 constexpr double kBuiltInBeginS = 7.3;
 constexpr double kRingRadiusM = 0.1;
+constexpr double kCurlTurns = 2.0;
+constexpr double kCurlRadiusM = 0.01;
+constexpr double kStyledArcRad = 100.0 / 180.0 * std::numbers::pi;
 // A breeze from the side with gusts as strong as near the ground.
 constexpr glm::vec3 kWindMps(0.9f, 0.0f, 0.5f);
 constexpr float kGustIntensity = 0.4f;
@@ -69,6 +72,29 @@ SceneDesc scene_for(const RunSetting& setting) {
   return scene;
 }
 
+/// Points of a curve of kLengthM from the origin, evenly along it; `out` points away from the head, level.
+std::vector<glm::dvec3> curve_of(MotionHair hair, uint32_t vertex_count, const glm::dvec3& out) {
+  constexpr double kLengthM = MotionSet::kLengthM;
+  constexpr glm::dvec3 kUp(0.0, 1.0, 0.0);
+  if (hair == MotionHair::Straight) return straight_run(vertex_count, kLengthM, -kUp);
+  const glm::dvec3 aside = glm::cross(kUp, out);
+  const double around_m = 2.0 * std::numbers::pi * kCurlTurns * kCurlRadiusM;
+  const double sunk_m = std::sqrt(kLengthM * kLengthM - around_m * around_m);
+  std::vector<glm::dvec3> curve;
+  for (uint32_t i = 0; i < vertex_count; ++i) {
+    const double share = static_cast<double>(i) / (vertex_count - 1);
+    if (hair == MotionHair::Curled) {
+      const double angle = 2.0 * std::numbers::pi * kCurlTurns * share;
+      curve.push_back(kCurlRadiusM * ((1.0 - std::cos(angle)) * out + std::sin(angle) * aside) -
+                      sunk_m * share * kUp);
+    } else {
+      const double angle = kStyledArcRad * share;
+      curve.push_back(kLengthM / kStyledArcRad * (std::sin(angle) * out - (1.0 - std::cos(angle)) * kUp));
+    }
+  }
+  return curve;
+}
+
 /// The reference's curve at a share of its arc: cubic through the four vertices around it.
 glm::dvec3 point_at(const Trajectory& reference, size_t sample, uint32_t strand, double share) {
   const auto vertex = [&](int64_t i) {
@@ -91,6 +117,18 @@ glm::dvec3 point_at(const Trajectory& reference, size_t sample, uint32_t strand,
 
 }  // namespace
 
+const char* to_string(MotionHair hair) {
+  switch (hair) {
+    case MotionHair::Straight:
+      return "straight";
+    case MotionHair::Curled:
+      return "curled";
+    case MotionHair::Styled:
+      return "styled";
+  }
+  return "?";
+}
+
 Result<MotionSet> MotionSet::make(const MotionSetOptions& options) {
   MotionClip clip;
   if (!options.clip.empty()) {
@@ -110,9 +148,9 @@ Groom MotionSet::groom(uint32_t vertex_count, uint32_t strand_count) const {
   std::vector<std::vector<glm::dvec3>> strands;
   for (uint32_t s = 0; s < strand_count; ++s) {
     const double angle = 2.0 * std::numbers::pi * s / strand_count;
-    const glm::dvec3 root(kRingRadiusM * std::cos(angle), 0.0, kRingRadiusM * std::sin(angle));
-    std::vector<glm::dvec3> strand = straight_run(vertex_count, kLengthM, {0.0, -1.0, 0.0});
-    for (glm::dvec3& point : strand) point += root;
+    const glm::dvec3 out(std::cos(angle), 0.0, std::sin(angle));
+    std::vector<glm::dvec3> strand = curve_of(options_.hair, vertex_count, out);
+    for (glm::dvec3& point : strand) point += kRingRadiusM * out;
     strands.push_back(std::move(strand));
   }
   return groom_of(strands, Pinning::Root);
@@ -121,8 +159,9 @@ Groom MotionSet::groom(uint32_t vertex_count, uint32_t strand_count) const {
 RunPhysics MotionSet::physics() const {
   RunPhysics physics;
   physics.length_m = kLengthM;
-  // As direct_rod ships: hair in air, and the damping of its material.
-  physics.given = {{"air_drag_per_s", 4.0}, {"bending_damping_s", 2e-3}};
+  // As direct_rod ships, and the damping of its material.
+  physics.given = {{"air_drag_per_s", kAirDragPerS}, {"bending_damping_s", 2e-3}};
+  if (options_.hair != MotionHair::Straight) physics.given["sag_free"] = 0.0;
   return physics;
 }
 
@@ -156,6 +195,7 @@ void MotionSet::for_each_step(const RunSetting& setting, int step_count,
       const double ramp = eased((end_s - left / setting.rate_hz) / kRampS);
       substeps[i].wind_mps *= ramp;
       for (GustWave& gust : substeps[i].gusts) gust.amplitude_mps *= static_cast<float>(ramp);
+      if (options_.hair != MotionHair::Straight) substeps[i].gravity_mps2 *= ramp;
     }
     take(substeps);
   }
@@ -190,11 +230,16 @@ Result<Trajectory> MotionSet::run(const Workbench& workbench, const RunSetting& 
   return trajectory;
 }
 
-Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz) {
-  ASSIGN_OR_RETURN(const SolverRow* row, find_solver("direct_rod"));
+Result<Trajectory> run_in_double(const MotionSet& motion, const std::string& solver, uint32_t vertex_count,
+                                 double rate_hz) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(solver));
   RunSetting setting{row, Material::Hair, vertex_count, rate_hz};
   setting.is_reference = true;
   return motion.run({}, setting);
+}
+
+Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz) {
+  return run_in_double(motion, "direct_rod", vertex_count, rate_hz);
 }
 
 double relative_rms(const Trajectory& run, const Trajectory& reference) {

@@ -1,7 +1,8 @@
-// MotionSet: strands on a moving head in gusts, the real motion that work-precision measures on. Hair of real
-// constants hangs straight from a ring about the head, so that every model begins in its own equilibrium;
-// head and wind set in smoothly. The inputs of a step are made by the server's own StepBuilder. No colliders:
-// what they add depends on where vertices happen to be. Any thread; immutable.
+// MotionSet: strands on a moving head in gusts, what work-precision measures on besides exact solutions. Hair
+// of real constants grows from a ring about the head: straight and hanging, or curled or styled by nature,
+// which begins without weight, so that every model begins in its own equilibrium; head, wind and that weight
+// set in smoothly. The inputs of a step are made by the server's own StepBuilder. No colliders: what they add
+// depends on where vertices happen to be. Any thread; immutable.
 #pragma once
 
 #include <filesystem>
@@ -13,10 +14,21 @@
 
 namespace strandcast {
 
+/// The shape of the strands without forces.
+enum class MotionHair {
+  Straight,  // hangs straight down
+  Curled,    // helices of two turns, 20 mm wide, about an axis that hangs down
+  Styled     // leaves the head outwards and turns down in one arc of 100 degrees
+};
+inline constexpr MotionHair kMotionHairs[] = {MotionHair::Straight, MotionHair::Curled, MotionHair::Styled};
+/// "straight", "curled", "styled".
+const char* to_string(MotionHair hair);
+
 struct MotionSetOptions {
   std::filesystem::path clip;  // .bvh; empty: the built-in head motion
   double duration_s = 3.0;
   uint32_t strand_count = 8;
+  MotionHair hair = MotionHair::Straight;
   MotionFileOptions clip_file = {};  // how to read the clip
 };
 
@@ -34,6 +46,7 @@ class MotionSet {
  public:
   static constexpr double kSampleS = 1.0 / 30.0;
   static constexpr double kLengthM = 0.25;
+  static constexpr double kAirDragPerS = 4.0;    // as direct_rod ships: hair in air
   static constexpr double kFrameS = 1.0 / 60.0;  // times are given per strand and frame of this length
 
   static Result<MotionSet> make(const MotionSetOptions& options);
@@ -43,6 +56,7 @@ class MotionSet {
   Groom groom(uint32_t vertex_count) const { return groom(vertex_count, options_.strand_count); }
   /// Hair of the reference constants in air, with its material damping.
   RunPhysics physics() const;
+  MotionHair hair() const { return options_.hair; }
   /// Smooth in time to the second derivative; at rest and upright at 0.
   Pose head_at(double t_s) const;
   double duration_s() const { return options_.duration_s; }
@@ -67,6 +81,10 @@ class MotionSet {
   MotionSetOptions options_;
   MotionClip clip_;  // empty: built in
 };
+
+/// A row of hair in double precision at its default effort.
+Result<Trajectory> run_in_double(const MotionSet& motion, const std::string& solver, uint32_t vertex_count,
+                                 double rate_hz);
 
 /// The rod that others are compared with: direct_rod in double precision.
 Result<Trajectory> run_rod(const MotionSet& motion, uint32_t vertex_count, double rate_hz);

@@ -1,5 +1,6 @@
-// strandcast-report recommend: which strand model, at which setting, moves a scene's strands with the least
-// error within a time budget on this machine.
+// strandcast-report recommend: which strand model, at which setting, is the most exact that moves a scene's
+// strands within a time budget on this machine. Times are of the scene's own strands; errors are of the
+// motion set's hair that is nearest to them in shape.
 #pragma once
 
 #include <filesystem>
@@ -24,11 +25,12 @@ struct RecommendOptions {
 struct Candidate {
   RunSetting setting;
   double ms_per_step = 0.0;  // measured on the scene's own strands
-  double error = 0.0;        // relative RMS on the motion set at the scene's vertices and rate
+  double error = 0.0;        // relative RMS on the motion set's hair, at the scene's vertices and rate
 };
 
 struct Recommendation {
   std::string device;
+  MotionHair hair = MotionHair::Straight;  // of the motion set, nearest to the scene's: what errors are of
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   std::vector<Candidate> fitting;  // within the budget, the most exact first

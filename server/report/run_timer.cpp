@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/profile.h"
 #include "common/gl/timer.h"
 
 namespace strandcast {
@@ -18,10 +17,7 @@ constexpr uint32_t kReferenceStrands = 2;  // nothing to share between them
 constexpr int kWarmUpSubsteps = 3;
 constexpr int kTimedSubsteps = 8;
 constexpr double kUsPerMs = 1e3;
-
-double elapsed_ms(const int64_t begin_ns) {
-  return static_cast<double>(now_ns() - begin_ns) * 1e-6;
-}
+constexpr double kMsPerNs = 1e-6;
 
 }  // namespace
 
@@ -53,10 +49,10 @@ Result<StrandTime> RunTimer::measure(const RunSetting& setting) const {
   std::vector<double> sample_us;
   int count = 0;
   for (const StepInput& input : motion_.inputs(setting, kWarmUpSubsteps + kTimedSubsteps)) {
-    const int64_t begin_ns = now_ns();
+    const int64_t begin_ns = clock_ns_();
     if (timer) timer->begin();
     run.substep(input);
-    const double ms = timer ? timer->end_ms() : elapsed_ms(begin_ns);
+    const double ms = timer ? timer->end_ms() : static_cast<double>(clock_ns_() - begin_ns) * kMsPerNs;
     if (++count > kWarmUpSubsteps) sample_us.push_back(ms * kUsPerMs / strands);
   }
   std::sort(sample_us.begin(), sample_us.end());

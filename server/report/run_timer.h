@@ -2,10 +2,13 @@
 // dispatch does not measure its own overhead. Needs the thread's GL context for GPU runs.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <tuple>
 
+#include "common/base/profile.h"
 #include "common/gl/egl_context.h"
 #include "server/report/motion_set.h"
 
@@ -21,9 +24,10 @@ double us_per_frame(double us_per_substep, const RunSetting& setting);
 
 class RunTimer {
  public:
-  /// `device` of the current context; nullptr when there is none.
-  RunTimer(const Workbench& workbench, const gl::DeviceInfo* device, const MotionSet& motion)
-      : workbench_(workbench), device_(device), motion_(motion) {}
+  /// `device` of the current context; nullptr when there is none. `clock_ns` times what does not run on it.
+  RunTimer(const Workbench& workbench, const gl::DeviceInfo* device, const MotionSet& motion,
+           std::function<int64_t()> clock_ns = now_ns)
+      : workbench_(workbench), device_(device), motion_(motion), clock_ns_(std::move(clock_ns)) {}
 
   /// Measured once for every row, vertex count and effort: rate and substeps change nothing in it.
   Result<StrandTime> time(const RunSetting& setting);
@@ -37,6 +41,7 @@ class RunTimer {
   const Workbench& workbench_;
   const gl::DeviceInfo* device_;
   const MotionSet& motion_;
+  std::function<int64_t()> clock_ns_;
   std::map<std::tuple<std::string, uint32_t, double>, StrandTime> measured_;
 };
 

@@ -68,12 +68,16 @@ std::string promise_reason(StabilityMeasure measure) {
              "strand does "
              "in the trial and what a strand gains that falls by twice its length; wind counts as motion.";
     case StabilityMeasure::Energy:
-      return "Largest growth of kinetic energy and height over what the strand began with, relative to its "
-             "weight times its length, or to the kick. Strands are damped and nothing drives them: none. 1 % "
-             "is allowed for mass lumped at vertices.";
+      return fmt::format(
+          "Largest growth of kinetic energy and height over what the strand began with, relative to its "
+          "weight times its length, or to the kick. Strands are damped and nothing drives them: none. {:g} % "
+          "is allowed for mass lumped at vertices.",
+          100.0 * kEnergyGrowth);
     case StabilityMeasure::Rest:
-      return "Seconds after the head stopped until no vertex moves by more than 0.1 mm in 1/60 s: ten, the "
-             "promise of every row that comes to rest.";
+      return fmt::format(
+          "Seconds after the head stopped until no vertex moves by more than 0.1 mm in 1/60 s: {:g}, the "
+          "promise of every row that comes to rest.",
+          kTimeToRestS);
     case StabilityMeasure::Jitter:
       return "Acceleration in the upper half of the frequencies that steps can show, root mean square over "
              "two "
@@ -81,9 +85,10 @@ std::string promise_reason(StabilityMeasure measure) {
              "what a "
              "vertex has that is 0.1 mm to either side in alternate steps.";
     case StabilityMeasure::Style:
-      return "Largest distance from the groomed shape at the end, m: 0.1 mm at rest, the default error of "
-             "the "
-             "strand stream; 1 mm within twelve seconds of a bad input.";
+      return fmt::format(
+          "Largest distance from the groomed shape at the end, m: {:g} mm at rest, the default error of the "
+          "strand stream; {:g} mm within twelve seconds of a bad input.",
+          1e3 * kStyleM, 1e3 * kRecoveredStyleM);
   }
   CHECK(false);
   return {};

@@ -174,19 +174,22 @@ constexpr const char* kPeerText =
     "zstd "
     "3) and Draco (sequential point cloud) code integers on the coarsest cubic lattice that keeps the bound; "
     "zfp runs in accuracy mode on one array per axis with the largest power-of-two tolerance that keeps it, "
-    "found outside its time. \"Temporal\" is our prediction around them: the last movement, its change and, "
-    "on "
-    "integers, what the parent vertex just did, with weights fitted to each frame. Integers lose nothing, so "
+    "found outside its time. \"Temporal\" is a prediction in time around them: the last movement, its change "
+    "and, on "
+    "integers, what the parent vertex just did, with four weights fitted to each frame. It is less than what "
+    "tangent predicts with. Integers lose nothing, so "
     "that chain is closed; zfp's is closed over decoded values. \"zstd 16 bit\" has a box of one metre and "
     "the "
     "error that follows from it; \"zstd float\" loses nothing. At bounds other than 0.1 mm peers run on the "
     "first motion of each class.";
 
-constexpr const char* kClassText =
-    "A motion's class follows from what the hair does, whatever the head did: the root of the mean square "
-    "speed "
-    "of all vertices in head space is below 0.04 m/s when idle, below 0.5 m/s walking and turning, else "
-    "violent.";
+std::string class_text() {
+  return fmt::format(
+      "A motion's class follows from what the hair does, whatever the head did: the root of the mean square "
+      "speed of all vertices in head space is below {:g} m/s when idle, below {:g} m/s walking and turning, "
+      "else violent.",
+      kActiveHairMps, kViolentHairMps);
+}
 
 constexpr const char* kLatencyText =
     "From the motion sample that a step takes to the decoded frame, in one process, one stage after the "
@@ -311,7 +314,7 @@ std::string streaming_page(const StreamingReport& report) {
   page.heading("How it was measured");
   page.paragraph(method_text(report));
   page.paragraph(kPeerText);
-  page.paragraph(kClassText);
+  page.paragraph(class_text());
   page.table(recording_table(report));
   page.heading("Everything");
   for (const StreamRecording& recording : report.recordings) page.table(codec_table(report, recording));

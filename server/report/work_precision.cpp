@@ -26,9 +26,11 @@ double cost_of(const RunSetting& setting, double simulated_s) {
          (1.0 + setting.vertex_count * effort / kVerticesPerStep);
 }
 
-/// What the rows without constants of hair are run with on real motion: as chains, and as they ship.
-std::vector<Material> materials_of(const SolverRow& row) {
+/// What the rows without constants of hair are run with on a moving head: as they ship, and, where the hair
+/// has no shape of its own, as chains.
+std::vector<Material> materials_of(const SolverRow& row, MotionHair hair) {
   if (row.as_hair) return {Material::Hair};
+  if (hair != MotionHair::Straight) return {Material::AsShipped};
   return {Material::Limp, Material::AsShipped};
 }
 
@@ -42,8 +44,7 @@ constexpr uint32_t kRefinedStrands = 2;
 /// The trajectories that runs are compared with. Double precision, so any thread.
 struct References {
   Trajectory rod;
-  double time_self_difference = 0.0;
-  double space_self_difference = 0.0;
+  WorkReport::Converged converged;
   std::map<std::pair<std::string, Material>, Refined> refined;  // none where a row cannot be refined
 };
 
@@ -85,14 +86,15 @@ Result<References> make_references(const MotionSet& motion, const WorkGrid& grid
   });
   auto rod = run_rod(motion, grid.reference_vertices, grid.reference_rate_hz);
   auto coarse = run_rod(motion, grid.reference_vertices / 2, grid.reference_rate_hz);
+  auto check = run_in_double(motion, kCheckModel, grid.reference_vertices, grid.check_rate_hz);
   auto fine = halved.get();
-  for (const auto* result : {&rod, &coarse, &fine})
+  for (const auto* result : {&rod, &coarse, &check, &fine})
     if (!*result) return result->error();
-  references.time_self_difference = relative_rms(*rod, *fine);
-  references.space_self_difference = relative_rms(*coarse, *rod);
+  references.converged = {motion.hair(), relative_rms(*rod, *fine), relative_rms(*coarse, *rod),
+                          relative_rms(*check, *rod)};
   references.rod = std::move(rod).value();
   for (const SolverRow* row : rows) {
-    for (const Material material : materials_of(*row)) {
+    for (const Material material : materials_of(*row, motion.hair())) {
       if (auto refined = run_refined(motion, grid, *row, material))
         references.refined[{row->name, material}] = std::move(refined).value();
     }
@@ -102,61 +104,82 @@ Result<References> make_references(const MotionSet& motion, const WorkGrid& grid
 
 class Measurement {
  public:
-  Measurement(const WorkGrid& grid, const MotionSet& motion, std::vector<const SolverRow*> rows,
+  /// `motions`: of every hair, straight first or alone.
+  Measurement(const WorkGrid& grid, const std::vector<MotionSet>& motions, std::vector<const SolverRow*> rows,
               gl::EglContext* context)
       : grid_(grid),
-        motion_(motion),
         rows_(std::move(rows)),
         workbench_{context != nullptr ? &shaders_ : nullptr},
-        timer_(workbench_, context != nullptr ? &context->info() : nullptr, motion_),
-        progress_({"work-precision"}) {}
+        progress_({"work-precision"}) {
+    for (const MotionSet& motion : motions)
+      sets_.push_back(
+          {&motion, RunTimer(workbench_, context != nullptr ? &context->info() : nullptr, motion)});
+  }
 
   // Times first, while nothing else runs; then tests here and references on another thread; then the motion.
   Status run(WorkReport& report) {
     plan();
-    for (const Planned& planned : motion_runs_) time_run(planned.setting);
-    auto references =
-        std::async(std::launch::async, [this] { return make_references(motion_, grid_, rows_); });
+    for (HairSet& set : sets_)
+      for (const RunSetting& setting : set.runs) time_run(set, setting);
+    auto references = std::async(std::launch::async, [this]() -> Result<std::vector<References>> {
+      std::vector<References> all;
+      for (const HairSet& set : sets_) {
+        ASSIGN_OR_RETURN(References one, make_references(*set.motion, grid_, rows_));
+        all.push_back(std::move(one));
+      }
+      return all;
+    });
     for (const Planned& planned : analytic_runs_) report.records.push_back(run_analytic(planned));
     progress_.begin_run("converged reference");
     const auto converged = references.get();
     if (!converged) return converged.error();
     progress_.end_run(0.0);
-    report.time_self_difference = converged->time_self_difference;
-    report.space_self_difference = converged->space_self_difference;
-    for (const Planned& planned : motion_runs_)
-      report.records.push_back(run_motion(planned.setting, *converged));
-    if (!motion_runs_.empty()) report.timed_strands = timer_.strand_count(motion_runs_.front().setting);
+    for (size_t i = 0; i < sets_.size(); ++i) {
+      report.converged.push_back((*converged)[i].converged);
+      for (const RunSetting& setting : sets_[i].runs)
+        report.records.push_back(run_motion(sets_[i], setting, (*converged)[i]));
+    }
+    const HairSet& first = sets_.front();
+    if (!first.runs.empty()) report.timed_strands = first.timer.strand_count(first.runs.front());
     return {};
   }
 
  private:
   struct Planned {
-    const AnalyticTest* test = nullptr;  // nullptr: the motion set
+    const AnalyticTest* test = nullptr;
     RunSetting setting;
+  };
+  struct HairSet {
+    const MotionSet* motion = nullptr;
+    RunTimer timer;
+    std::vector<RunSetting> runs = {};
   };
 
   void plan() {
     for (const SolverRow* row : rows_) {
-      for (const Material material : materials_of(*row)) plan_motion(*row, material);
+      for (HairSet& set : sets_)
+        for (const Material material : materials_of(*row, set.motion->hair()))
+          plan_motion(set, *row, material);
       for (const AnalyticTest& test : analytic_tests()) {
         if (has_physics(*row, test) && (test.is_quick || grid_.has_every_effort)) plan_analytic(*row, test);
       }
     }
-    for (const auto* runs : {&motion_runs_, &analytic_runs_}) {
-      for (const Planned& planned : *runs)
-        progress_.expect(1,
-                         cost_of(planned.setting, planned.test ? planned.test->simulated_s : grid_.motion_s));
+    uint32_t timed_runs = 0;
+    for (const HairSet& set : sets_) {
+      for (const RunSetting& setting : set.runs) progress_.expect(1, cost_of(setting, grid_.motion_s));
+      timed_runs += static_cast<uint32_t>(set.runs.size());
     }
-    progress_.expect(1 + static_cast<uint32_t>(motion_runs_.size()), 0.0);
+    for (const Planned& planned : analytic_runs_)
+      progress_.expect(1, cost_of(planned.setting, planned.test->simulated_s));
+    progress_.expect(1 + timed_runs, 0.0);
   }
 
-  void plan_motion(const SolverRow& row, Material material) {
+  void plan_motion(HairSet& set, const SolverRow& row, Material material) {
     for (const double effort : effort_values(row, grid_.effort_factors))
       for (const uint32_t vertex_count : grid_.vertices)
         for (const double rate_hz : grid_.rates_hz)
           for (const uint32_t substeps : grid_.substeps)
-            motion_runs_.push_back({nullptr, {&row, material, vertex_count, rate_hz, substeps, effort}});
+            set.runs.push_back({&row, material, vertex_count, rate_hz, substeps, effort});
   }
 
   void plan_analytic(const SolverRow& row, const AnalyticTest& test) {
@@ -178,51 +201,50 @@ class Measurement {
   }
 
   /// Not empty when a row that only runs in double would take too long for it.
-  std::string too_slow(const RunSetting& setting, double simulated_s, uint32_t strand_count) {
+  std::string too_slow(HairSet& set, const RunSetting& setting, double simulated_s, uint32_t strand_count) {
     if (workbench_.runs_on_gpu(setting)) return "";
-    const auto time = timer_.time(setting);
+    const auto time = set.timer.time(setting);
     if (!time) return "";
     const double expected_s =
         time->best_us * 1e-6 * strand_count * simulated_s * setting.rate_hz * setting.substeps;
     return expected_s > grid_.longest_run_s ? fmt::format("left out: {:.0f} s", expected_s) : "";
   }
 
-  void time_run(const RunSetting& setting) {
+  void time_run(HairSet& set, const RunSetting& setting) {
     progress_.begin_run("time of " + to_string(setting));
-    (void)timer_.time(setting);  // asked for again, with its error, when the run is recorded
+    (void)set.timer.time(setting);  // asked for again, with its error, when the run is recorded
     progress_.end_run(0.0);
   }
 
-  void add_time(WorkRecord& record) {
-    const auto time = timer_.time(record.setting);
-    if (!time) return;
-    record.us = us_per_frame(time->best_us, record.setting);
-    record.median_us = us_per_frame(time->median_us, record.setting);
+  void add_time(HairSet& set, WorkRecord& record) {
+    if (const auto time = set.timer.time(record.setting)) strandcast::add_time(record, *time);
   }
 
   WorkRecord run_analytic(const Planned& planned) {
     progress_.begin_run(planned.test->name + ", " + to_string(planned.setting));
     WorkRecord record = record_for(planned.test->name, planned.setting);
-    record.result.note = too_slow(planned.setting, planned.test->simulated_s, 1);
+    record.result.note = too_slow(sets_.front(), planned.setting, planned.test->simulated_s, 1);
     if (record.result.note.empty()) record.result = planned.test->run(workbench_, planned.setting);
     const auto& sizes = grid_.vertices;
-    if (std::find(sizes.begin(), sizes.end(), planned.setting.vertex_count) != sizes.end()) add_time(record);
+    if (std::find(sizes.begin(), sizes.end(), planned.setting.vertex_count) != sizes.end())
+      add_time(sets_.front(), record);
     progress_.end_run(cost_of(planned.setting, planned.test->simulated_s));
     return record;
   }
 
-  WorkRecord run_motion(const RunSetting& setting, const References& references) {
-    progress_.begin_run("motion, " + to_string(setting));
-    WorkRecord record = record_for(kMotionTest, setting);
+  WorkRecord run_motion(HairSet& set, const RunSetting& setting, const References& references) {
+    const MotionSet& motion = *set.motion;
+    WorkRecord record = record_for(motion_test(motion.hair()), setting);
+    progress_.begin_run(record.test + ", " + to_string(setting));
     RunSetting in_double = setting;
     in_double.is_reference = true;
     std::future<Result<Trajectory>> exact;
     const bool is_default_effort =
         std::isnan(setting.effort) || setting.effort == effort_values(*setting.row, {1.0}).front();
     if (record.is_on_gpu && (is_default_effort || grid_.has_every_effort))
-      exact = std::async(std::launch::async, [&] { return motion_.run({}, in_double); });
-    const std::string note = too_slow(setting, grid_.motion_s, grid_.strand_count);
-    const auto run = note.empty() ? motion_.run(workbench_, setting)
+      exact = std::async(std::launch::async, [&] { return motion.run({}, in_double); });
+    const std::string note = too_slow(set, setting, grid_.motion_s, grid_.strand_count);
+    const auto run = note.empty() ? motion.run(workbench_, setting)
                                   : Result<Trajectory>(Error{ErrorCode::LimitExceeded, note, {}});
     if (run) {
       record.result.error = relative_rms(*run, references.rod);
@@ -234,7 +256,7 @@ class Measurement {
         record.model_error = relative_rms(refined->second.trajectory, references.rod);
         record.discretisation_error = relative_rms(*run, refined->second.trajectory);
       }
-      add_time(record);
+      add_time(set, record);
     } else {
       record.result.note = run.error().to_string();
     }
@@ -247,13 +269,11 @@ class Measurement {
   }
 
   const WorkGrid& grid_;
-  const MotionSet& motion_;
   std::vector<const SolverRow*> rows_;
   gl::ShaderLibrary shaders_;
   Workbench workbench_;
-  RunTimer timer_;
   Progress progress_;
-  std::vector<Planned> motion_runs_;
+  std::vector<HairSet> sets_;
   std::vector<Planned> analytic_runs_;
 };
 
@@ -267,6 +287,21 @@ Result<std::vector<const SolverRow*>> chosen_rows(const std::vector<std::string>
     for (const SolverRow& row : solver_table()) rows.push_back(&row);
   }
   return rows;
+}
+
+Result<std::vector<MotionHair>> chosen_hairs(const std::vector<std::string>& names) {
+  std::vector<MotionHair> hairs;
+  for (const MotionHair hair : kMotionHairs)
+    if (names.empty() || std::find(names.begin(), names.end(), to_string(hair)) != names.end())
+      hairs.push_back(hair);
+  for (const std::string& name : names) {
+    const bool is_known = std::any_of(std::begin(kMotionHairs), std::end(kMotionHairs),
+                                      [&](MotionHair hair) { return name == to_string(hair); });
+    if (!is_known)
+      return make_error(ErrorCode::BadInput, "unknown --hair '{}' (known: straight, curled, styled)",
+                        name.substr(0, 32));
+  }
+  return hairs;
 }
 
 Status check_grid(const WorkGrid& grid) {
@@ -293,6 +328,15 @@ Status check_grid(const WorkGrid& grid) {
 
 }  // namespace
 
+std::string motion_test(MotionHair hair) {
+  return fmt::format("motion, {} hair", to_string(hair));
+}
+
+void add_time(WorkRecord& record, const StrandTime& time) {
+  record.us = us_per_frame(time.best_us, record.setting);
+  record.median_us = us_per_frame(time.median_us, record.setting);
+}
+
 WorkGrid make_work_grid(const WorkPrecisionOptions& options) {
   WorkGrid grid;
   if (options.is_quick) {
@@ -303,6 +347,7 @@ WorkGrid make_work_grid(const WorkPrecisionOptions& options) {
     grid.motion_s = 2.0;
     grid.reference_vertices = 64;
     grid.reference_rate_hz = 1920.0;
+    grid.check_rate_hz = 1920.0;
     grid.refined_rate_hz = 1920.0;
     grid.longest_run_s = 4.0;
   } else {
@@ -325,15 +370,21 @@ Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options) {
   report.grid = make_work_grid(options);
   RETURN_IF_ERROR(check_grid(report.grid));
   ASSIGN_OR_RETURN(std::vector<const SolverRow*> rows, chosen_rows(options.solvers));
-  ASSIGN_OR_RETURN(const MotionSet motion, MotionSet::make({options.motion, report.grid.motion_s,
-                                                            report.grid.strand_count, options.motion_file}));
+  ASSIGN_OR_RETURN(report.grid.hairs, chosen_hairs(options.hairs));
+  std::vector<MotionSet> motions;
+  for (const MotionHair hair : report.grid.hairs) {
+    ASSIGN_OR_RETURN(MotionSet motion,
+                     MotionSet::make({options.motion, report.grid.motion_s, report.grid.strand_count, hair,
+                                      options.motion_file}));
+    motions.push_back(std::move(motion));
+  }
   report.motion_name = options.motion.empty() ? "built-in head motion" : options.motion.filename().string();
   std::unique_ptr<gl::EglContext> context;
   if (options.gl_device != "none") {
     ASSIGN_OR_RETURN(context, gl::EglContext::make(options.gl_device));
   }
   report.device = context ? context->info().renderer : "none: every model as its double-precision reference";
-  RETURN_IF_ERROR(Measurement(report.grid, motion, std::move(rows), context.get()).run(report));
+  RETURN_IF_ERROR(Measurement(report.grid, motions, std::move(rows), context.get()).run(report));
   return report;
 }
 

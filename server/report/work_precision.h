@@ -9,6 +9,7 @@
 
 #include "server/report/analytic_tests.h"
 #include "server/report/motion_set.h"
+#include "server/report/run_timer.h"
 
 namespace strandcast {
 
@@ -21,8 +22,9 @@ struct WorkPrecisionOptions {
   bool is_quick = false;
   // Less than the whole grid; empty = all of it.
   std::vector<uint32_t> vertices;
-  std::vector<double> rates_hz;  // multiples of 30
-  double motion_s = 0.0;         // of the motion set; 0 = as the grid says
+  std::vector<double> rates_hz;    // multiples of 30
+  std::vector<std::string> hairs;  // of the motion set, by name
+  double motion_s = 0.0;           // of the motion set; 0 = as the grid says
 };
 
 /// What is run.
@@ -37,9 +39,12 @@ struct WorkGrid {
   bool has_every_effort = false;  // also for float against double
   double motion_s = 3.0;
   uint32_t strand_count = 8;
-  // The converged rod, and each row's own refined version, all in double.
+  std::vector<MotionHair> hairs{std::begin(kMotionHairs), std::end(kMotionHairs)};
+  // The converged rod, the other model that it is checked with, and each row's own refined version, all in
+  // double.
   uint32_t reference_vertices = 128;
   double reference_rate_hz = 7680.0;
+  double check_rate_hz = 3840.0;
   uint32_t refined_vertices = 64;
   double refined_rate_hz = 3840.0;
   double refined_effort_factor = 1.0;
@@ -51,7 +56,7 @@ WorkGrid make_work_grid(const WorkPrecisionOptions& options);
 
 /// NaN: not measured.
 struct WorkRecord {
-  std::string test;  // kMotionTest or the name of an analytic one
+  std::string test;  // motion_test() or the name of an analytic one
   RunSetting setting;
   bool is_on_gpu = false;
   double us = std::numeric_limits<double>::quiet_NaN();  // per strand and frame, best of several
@@ -64,7 +69,13 @@ struct WorkRecord {
   double refined_rate_hz = std::numeric_limits<double>::quiet_NaN();
   AnalyticResult result = {};  // of the motion set: error, stretch and note
 };
-inline constexpr const char* kMotionTest = "motion";
+/// "motion, curled hair".
+std::string motion_test(MotionHair hair);
+/// A model that is not the rod and has all its physics.
+inline constexpr const char* kCheckModel = "articulated";
+
+/// Puts the time of its setting into a record: of a frame, at its rate and substeps.
+void add_time(WorkRecord& record, const StrandTime& time);
 
 struct WorkReport {
   WorkGrid grid;
@@ -72,8 +83,14 @@ struct WorkReport {
   std::string device;  // as GL names it, or why there is none
   std::string motion_name;
   uint32_t timed_strands = 0;
-  double time_self_difference = 0.0;   // of the converged rod: against steps of half the length
-  double space_self_difference = 0.0;  // and against half as many vertices
+  /// How far the converged rod is from others, relative RMS.
+  struct Converged {
+    MotionHair hair = MotionHair::Straight;
+    double time_self_difference = 0.0;   // itself with steps of half the length
+    double space_self_difference = 0.0;  // itself with half as many vertices
+    double check_difference = 0.0;       // kCheckModel with as many vertices at check_rate_hz
+  };
+  std::vector<Converged> converged;
   std::vector<WorkRecord> records;
 };
 

@@ -25,6 +25,9 @@ void add_work_precision_command(CLI::App& app, ReportAction& action) {
   command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
   command->add_option("--motion", options->motion, "head motion from this .bvh file; default: built in");
   add_motion_file_options(*command, options->motion_file);
+  command->add_option("--hair", options->hairs, "only this hair: straight, curled or styled; repeatable")
+      ->expected(1)
+      ->take_all();
   command->add_option("--vertices", options->vertices, "only this many per strand; repeatable")
       ->expected(1)
       ->take_all();
@@ -37,7 +40,7 @@ void add_work_precision_command(CLI::App& app, ReportAction& action) {
       ->add_option("--gl-device", options->gl_device,
                    "auto, software, hardware, a device number, or none: double-precision references only")
       ->capture_default_str();
-  command->add_flag("--quick", options->is_quick, "fewer runs: about two minutes on two cores");
+  command->add_flag("--quick", options->is_quick, "fewer runs: some minutes on two cores");
   command->callback([options, &action] { action = [options] { return run_work_precision(*options); }; });
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "server/report/csv_file.h"
+#include "server/report/exact_solutions.h"
 #include "server/report/html_page.h"
 #include "server/report/report_folder.h"
 #include "server/report/svg_plot.h"
@@ -102,13 +103,22 @@ double error_of(const WorkRecord& record) {
   return record.result.error;
 }
 
-void add_picks(HtmlPage& page, const WorkReport& report) {
-  const std::vector<WorkPoint> points = motion_points(report);
+/// Whether any model beats the champion on this hair, in a sentence.
+std::string hair_summary(const WorkReport& report, MotionHair hair) {
+  return fmt::format(
+      "On {} hair, {}: does any other model beat {}, in error and time, below an error of {:g} %? {}",
+      to_string(hair), report.motion_name, kChampion, 100.0 * kChampionErrorLimit,
+      beaten_sentence(motion_points(report, hair), kChampion, kChampionErrorLimit));
+}
+
+void add_picks(HtmlPage& page, const WorkReport& report, MotionHair hair) {
+  const std::vector<WorkPoint> points = motion_points(report, hair);
   HtmlTable table;
   table.caption = fmt::format(
-      "The most exact setting within a budget for {:.0f} strands at 60 frames per second, simulation only. "
+      "The most exact setting within a budget for {:.0f} {} strands at 60 frames per second, simulation "
+      "only. "
       "\"strandcast-report recommend\" answers for a scene of yours.",
-      kPickStrands);
+      kPickStrands, to_string(hair));
   table.columns = {"budget per frame", "pick", "takes", "error"};
   std::optional<size_t> before;
   for (const double budget_ms : kBudgetsMs) {
@@ -128,21 +138,22 @@ void add_picks(HtmlPage& page, const WorkReport& report) {
 }
 
 /// The three errors of each row: at one common setting, and of its most exact run.
-void add_error_parts(HtmlPage& page, const WorkReport& report) {
+void add_error_parts(HtmlPage& page, const WorkReport& report, MotionHair hair) {
   HtmlTable table;
   table.caption = fmt::format(
-      "Every model's most exact run. Model: the model itself, refined ({} vertices, up to {:g} Hz, in "
+      "{} hair, every model's most exact run. Model: the model itself, refined ({} vertices, up to {:g} Hz, "
+      "in "
       "double), "
       "against the rod. Discretisation: this run against the model refined. Float: this run on the GPU "
       "against "
       "double precision. All are RMS distances of vertices over the strand's length.",
-      report.grid.refined_vertices, report.grid.refined_rate_hz);
+      to_string(hair), report.grid.refined_vertices, report.grid.refined_rate_hz);
   table.columns = {"model", "setting",        "microseconds", "error",
                    "model", "discretisation", "float",        "largest stretch"};
   for (const std::string& method : methods_of(report)) {
     const WorkRecord* best = nullptr;
     for (const WorkRecord& record : report.records) {
-      if (record.test != kMotionTest || record.setting.row->name != method) continue;
+      if (record.test != motion_test(hair) || record.setting.row->name != method) continue;
       if (!std::isfinite(record.result.error)) continue;
       if (best == nullptr || record.result.error < best->result.error) best = &record;
     }
@@ -230,10 +241,14 @@ void add_analytic_plot(HtmlPage& page, const WorkReport& report, const std::stri
 /// T16: how much the droop of the same hair depends on vertices and rate.
 void add_droop_spread(HtmlPage& page, const WorkReport& report) {
   HtmlTable table;
-  table.caption =
-      "T16: the droop of the same hair (T1, Gamma 10; exactly 0.7002 of its length) over all vertex counts "
-      "and "
-      "rates, default effort.";
+  constexpr double kGamma = 10.0;
+  const auto shapes = cantilever_shapes();
+  const auto shape = std::find_if(shapes.begin(), shapes.end(),
+                                  [](const CantileverShape& candidate) { return candidate.gamma == kGamma; });
+  table.caption = fmt::format(
+      "T16: the droop of the same hair (T1, Gamma {:g}; exactly {:.4f} of its length) over all vertex counts "
+      "and rates, default effort.",
+      kGamma, shape->y);
   table.columns = {"model", "least", "most", "spread"};
   for (const std::string& method : methods_of(report)) {
     double least = std::numeric_limits<double>::infinity();
@@ -257,22 +272,35 @@ void add_droop_spread(HtmlPage& page, const WorkReport& report) {
 void add_method(HtmlPage& page, const WorkReport& report) {
   const WorkGrid& grid = report.grid;
   page.heading("How it was measured");
-  page.paragraph(
-      fmt::format("Motion set: {} straight hairs of {:g} m (radius 0.05 mm, 1300 kg/m^3, 3 GPa; air drag "
-                  "4/s) hang from a ring "
-                  "about a head that follows the {} for {:g} s in gusts; no colliders. Errors are root mean "
-                  "squared distances "
-                  "of the vertices over the length, 30 times a second.",
-                  grid.strand_count, MotionSet::kLengthM, report.motion_name, grid.motion_s));
+  const HairConstants hair;
   page.paragraph(fmt::format(
-      "Reference: direct_rod in double precision, {} vertices, steps of 1/{:g} s{}. It differs by {} from "
-      "itself "
-      "with steps of half the length, and by {} from itself with half the vertices. It is of the family of "
-      "one of "
-      "the models measured; the tests against exact solutions are what speaks for it.",
-      grid.reference_vertices, grid.reference_rate_hz,
-      report.is_quick ? " (coarser than without --quick, which takes 128 vertices and 1/7680 s)" : "",
-      percent(report.time_self_difference), percent(report.space_self_difference)));
+      "Motion set: {} hairs of {:g} m (radius {:g} mm, {:g} kg/m^3, {:g} GPa; air drag {:g}/s) grow from a "
+      "ring about a head that follows the {} for {:g} s in gusts; no colliders. Straight hair hangs from the "
+      "start; curled and styled hair begins without weight, which sets in with the motion. Errors are root "
+      "mean squared distances of the vertices over the length, {:g} times a second.",
+      grid.strand_count, MotionSet::kLengthM, 1e3 * hair.radius_m, hair.density_kgpm3,
+      1e-9 * hair.young_modulus_pa, MotionSet::kAirDragPerS, report.motion_name, grid.motion_s,
+      1.0 / MotionSet::kSampleS));
+  const WorkGrid full;
+  page.paragraph(fmt::format(
+      "Reference: {} in double precision, {} vertices, steps of 1/{:g} s{}. It is one of the models "
+      "measured; "
+      "what speaks for it are the tests against exact solutions, and {}, another model with another solver, "
+      "with as many vertices and steps of 1/{:g} s.",
+      kChampion, grid.reference_vertices, grid.reference_rate_hz,
+      report.is_quick ? fmt::format(" (coarser than without --quick, which takes {} vertices and 1/{:g} s)",
+                                    full.reference_vertices, full.reference_rate_hz)
+                      : "",
+      kCheckModel, grid.check_rate_hz));
+  HtmlTable converged;
+  converged.caption = "How far the reference is from";
+  converged.columns = {"hair", "itself with steps of half the length", "itself with half the vertices",
+                       kCheckModel};
+  for (const WorkReport::Converged& set : report.converged)
+    converged.rows.push_back({HtmlCell(to_string(set.hair)), HtmlCell(percent(set.time_self_difference)),
+                              HtmlCell(percent(set.space_self_difference)),
+                              HtmlCell(percent(set.check_difference))});
+  page.table(converged);
   page.paragraph(
       fmt::format("Times: {} strands at once on \"{}\", best of several substeps, the device waited for "
                   "after each; a frame is "
@@ -291,15 +319,15 @@ void add_method(HtmlPage& page, const WorkReport& report) {
 
 }  // namespace
 
-std::vector<WorkPoint> motion_points(const WorkReport& report) {
-  return points_of(report, kMotionTest, error_of);
+std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair) {
+  return points_of(report, motion_test(hair), error_of);
 }
 
 std::string work_precision_summary(const WorkReport& report) {
-  return fmt::format(
-      "Does any other model beat {} on real motion, in error and time, below an error of {:g} %? {}",
-      kChampion, 100.0 * kChampionErrorLimit,
-      beaten_sentence(motion_points(report), kChampion, kChampionErrorLimit));
+  std::string text;
+  for (const MotionHair hair : report.grid.hairs)
+    text += fmt::format("{}{}", text.empty() ? "" : "\n", hair_summary(report, hair));
+  return text;
 }
 
 std::string work_precision_csv(const WorkReport& report) {
@@ -357,12 +385,13 @@ std::string work_precision_csv(const WorkReport& report) {
   return csv.text();
 }
 
-std::string motion_plot(const WorkReport& report) {
+std::string motion_plot(const WorkReport& report, MotionHair hair) {
   PlotDesc desc;
-  desc.title = "Error against time on real motion: below and left is better";
+  desc.title = fmt::format("Error against time, {} hair, {}: below and left is better", to_string(hair),
+                           report.motion_name);
   desc.y.title = "RMS position error over the length";
   desc.guides = {{"1 %", kChampionErrorLimit}};
-  return front_plot(report, motion_points(report), std::move(desc));
+  return front_plot(report, motion_points(report, hair), std::move(desc));
 }
 
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title) {
@@ -378,15 +407,17 @@ std::string work_precision_page(const WorkReport& report) {
   page.paragraph(
       fmt::format("{} runs on {}.{}", report.records.size(), report.device,
                   report.is_quick ? " A quick report: fewer settings and a coarser reference." : ""));
-  page.heading("What to pick");
-  page.answer(work_precision_summary(report));
-  add_picks(page, report);
-  page.figure(
-      motion_plot(report),
-      "Lines join the runs of a model that no other run of it beats; faint marks are all other runs. Rest "
-      "the mouse on a mark for its setting.");
+  for (const MotionHair hair : report.grid.hairs) {
+    page.heading(fmt::format("What to pick for {} hair", to_string(hair)));
+    page.answer(hair_summary(report, hair));
+    add_picks(page, report, hair);
+    page.figure(
+        motion_plot(report, hair),
+        "Lines join the runs of a model that no other run of it beats; faint marks are all other runs. Rest "
+        "the mouse on a mark for its setting.");
+  }
   page.heading("Where the error comes from");
-  add_error_parts(page, report);
+  for (const MotionHair hair : report.grid.hairs) add_error_parts(page, report, hair);
   page.heading("Against exact solutions");
   add_analytic_tables(page, report);
   add_analytic_plot(page, report, "T1 Gamma 10", "T1: where the tip of a horizontal hair comes to rest");
@@ -398,7 +429,9 @@ std::string work_precision_page(const WorkReport& report) {
 
 Status save_work_precision(const WorkReport& report, const std::filesystem::path& folder) {
   RETURN_IF_ERROR(save_text(folder / kWorkPrecisionCsv, work_precision_csv(report)));
-  RETURN_IF_ERROR(save_text(folder / kWorkPrecisionPlot, motion_plot(report)));
+  for (const MotionHair hair : report.grid.hairs)
+    RETURN_IF_ERROR(
+        save_text(folder / fmt::format("work_precision_{}.svg", to_string(hair)), motion_plot(report, hair)));
   RETURN_IF_ERROR(save_text(folder / "cantilever.svg", analytic_plot(report, "T1 Gamma 10", "T1, Gamma 10")));
   RETURN_IF_ERROR(save_text(folder / "pendulum.svg", analytic_plot(report, "T4, T7", "T4: period")));
   return save_text(folder / kWorkPrecisionPage, work_precision_page(report));

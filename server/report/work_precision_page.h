@@ -13,21 +13,20 @@ namespace strandcast {
 
 inline constexpr const char* kWorkPrecisionPage = "work_precision.html";
 inline constexpr const char* kWorkPrecisionCsv = "work_precision.csv";
-inline constexpr const char* kWorkPrecisionPlot = "work_precision.svg";  // the front of the motion set
 inline constexpr const char* kChampion = "direct_rod";
 inline constexpr double kChampionErrorLimit = 0.01;
 
 /// Runs of the motion set as points of time and error, in the order of the records.
-std::vector<WorkPoint> motion_points(const WorkReport& report);
+std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair);
 
-/// Whether any model beats the champion, in a sentence.
+/// Whether any model beats the champion, in a sentence for each kind of hair.
 std::string work_precision_summary(const WorkReport& report);
 
 std::string work_precision_csv(const WorkReport& report);
 std::string work_precision_page(const WorkReport& report);
 
 /// Error against time on the motion set: all runs faint, each model's front as a line.
-std::string motion_plot(const WorkReport& report);
+std::string motion_plot(const WorkReport& report, MotionHair hair);
 /// Error against time of one analytic test.
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title);
 

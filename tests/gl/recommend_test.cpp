@@ -44,6 +44,8 @@ TEST(Recommend, WithTimeEnoughItNamesTheRodInLinesThatASceneTakes) {
   const std::string text = recommendation_text(*found, scene, kAmpleMs);
   EXPECT_THAT(text, HasSubstr("Take direct_rod"));
   EXPECT_THAT(text, HasSubstr(found->scene_lines));
+  EXPECT_EQ(found->hair, MotionHair::Styled) << "the built-in hair falls over the head";
+  EXPECT_THAT(text, HasSubstr("errors are not, but of styled hair of 0.25 m"));
 }
 
 TEST(Recommend, SaysWhatWouldFitWhenNothingDoes) {

@@ -13,6 +13,7 @@
 namespace strandcast {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -79,11 +80,13 @@ TEST_F(ReportProgram, ASmallWorkPrecisionKeepsTheLaws) {
   const auto out = folder_.path() / "report";
   const Outcome outcome =
       run_report(folder_, fmt::format("work-precision --quick --solver direct_rod --vertices 32 --rate 240 "
-                                      "--seconds 0.5 --out '{}'",
+                                      "--seconds 0.5 --hair straight --hair curled --out '{}'",
                                       out.string()));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("run 1 of "));
-  EXPECT_THAT(outcome.output, HasSubstr("Does any other model beat direct_rod"));
+  EXPECT_THAT(outcome.output,
+              AllOf(HasSubstr("On straight hair, built-in head motion: does any other model beat direct_rod"),
+                    HasSubstr("On curled hair, built-in head motion: does any other")));
 
   rows_ = parse_csv(load_text(out / "work_precision.csv", 1u << 20).value());
   for (const auto& row : rows_) {
@@ -98,20 +101,24 @@ TEST_F(ReportProgram, ASmallWorkPrecisionKeepsTheLaws) {
   EXPECT_LE(number(row_of("T9"), "error"), 0.01);
   EXPECT_NEAR(number(row_of("T10"), "value"), 7.83735, 0.08);
 
-  const auto& motion = row_of("motion");
-  EXPECT_GT(number(motion, "us_per_strand_frame"), 0.0);
-  EXPECT_LE(number(motion, "error"), 0.01);
-  EXPECT_GT(number(motion, "error"), 0.0);
-  EXPECT_LE(number(motion, "float_error"), 1e-3);
-  // The distances of a triangle: run, model refined, rod.
-  EXPECT_LE(number(motion, "error"),
-            1.01 * (number(motion, "model_error") + number(motion, "discretisation_error")));
+  for (const char* hair : {"motion, straight hair", "motion, curled hair"}) {
+    SCOPED_TRACE(hair);
+    const auto& motion = row_of(hair);
+    EXPECT_GT(number(motion, "us_per_strand_frame"), 0.0);
+    EXPECT_LE(number(motion, "error"), 0.01);
+    EXPECT_GT(number(motion, "error"), 0.0);
+    EXPECT_LE(number(motion, "float_error"), 1e-3);
+    // The distances of a triangle: run, model refined, rod.
+    EXPECT_LE(number(motion, "error"),
+              1.01 * (number(motion, "model_error") + number(motion, "discretisation_error")));
+  }
 
   const std::string page = load_text(out / "work_precision.html", 1u << 24).value();
+  EXPECT_THAT(page, HasSubstr("How far the reference is from"));
   EXPECT_THAT(page, HasSubstr("</html>"));
   for (const char* loader : {"src=", "href=", "@import", "url(", "<script"})
     EXPECT_THAT(page, Not(HasSubstr(loader)));
-  EXPECT_THAT(load_text(out / "work_precision.svg", 1u << 24).value(), HasSubstr("direct_rod"));
+  EXPECT_THAT(load_text(out / "work_precision_curled.svg", 1u << 24).value(), HasSubstr("direct_rod"));
 }
 
 // Few strands, half a second: every codec at every bound, and none of ours beyond it.
@@ -162,6 +169,7 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
       {"", "subcommand"},
       {"work-precision", "--out"},
       {fmt::format("work-precision --out '{}' --solver nonsense", out), "unknown solver 'nonsense' (known: "},
+      {fmt::format("work-precision --out '{}' --hair red", out), "unknown --hair 'red'"},
       {fmt::format("work-precision --out '{}' --rate 50", out), "--rate is 50 Hz"},
       {fmt::format("work-precision --out '{}' --vertices 65", out), "--vertices is 65"},
       {fmt::format("work-precision --out '{}' --seconds 1e9", out), "--seconds is 1e+09"},

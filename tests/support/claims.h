@@ -29,6 +29,9 @@ inline constexpr double kBuckling = 0.01;
 inline constexpr double kShakeStretch = 1e-4;
 inline constexpr double kShakeG = 10.0;
 
+/// `articulated` and the rod, both converged, on a moving head: RMS distance over the length.
+inline constexpr double kModelsApart = 0.001;
+
 // ---- iterated constraints in the violent motions of the stability report: largest stretch ----
 
 inline constexpr double kPbdViolentStretch = 6.6;

@@ -57,10 +57,13 @@ std::vector<std::string> readme_claims() {
       fmt::format("32-bit floats take {}", 3 * 32),
       fmt::format("{} vertices, steps of 1/{:g} s", WorkGrid().reference_vertices,
                   WorkGrid().reference_rate_hz),
+      fmt::format("from `{}`, another model: within {}", kCheckModel, percent(kModelsApart)),
       fmt::format("at {:g}, {:g}, {:g} and {:g} mm", 1e3 * kStreamBoundsM[0], 1e3 * kStreamBoundsM[1],
                   1e3 * kStreamBoundsM[2], 1e3 * kStreamBoundsM[3]),
       fmt::format("stream.bound_m={:g}", 2e-4),
       fmt::format("{:.5f}..{:.4f}", scene_fields::kStreamBound.minimum, scene_fields::kStreamBound.maximum),
+      fmt::format("states per second, {:g}..{:.0f},000, at most", scene_fields::kStrandRate.minimum,
+                  scene_fields::kStrandRate.maximum / 1000.0),
   };
 }
 

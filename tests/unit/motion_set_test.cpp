@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "server/report/motion_set.h"
+#include "server/report/work_precision.h"
+#include "tests/support/claims.h"
 #include "tests/support/shared_data.h"
 
 namespace strandcast {
@@ -50,6 +52,27 @@ TEST(MotionSet, StrandsHangStraightWithTheirLength) {
   }
 }
 
+// What the page says of the hair: that of direct_rod as it ships, in every material.
+TEST(MotionSet, HairIsInAir) {
+  const auto motion = MotionSet::make({});
+  const SolverRow& rod = **find_solver("direct_rod");
+  const SolverParameters shipped = *complete_parameters(rod, {});
+  int rows_in_air = 0;
+  for (const SolverRow& row : solver_table()) {
+    if (!has_parameter(row, "air_drag_per_s")) continue;
+    for (const Material material : {Material::Hair, Material::Limp, Material::AsShipped}) {
+      const auto parameters = run_parameters({&row, material, 16, 240.0}, motion->physics());
+      ASSERT_TRUE(parameters) << row.name << ": " << parameters.error().to_string();
+      EXPECT_EQ(parameters->at("air_drag_per_s"), shipped.at("air_drag_per_s")) << row.name;
+    }
+    ++rows_in_air;
+  }
+  EXPECT_GE(rows_in_air, 10);
+  const auto rod_parameters = run_parameters({&rod, Material::Hair, 16, 60.0}, motion->physics());
+  EXPECT_EQ(rod_parameters->at("bending_damping_s"), shipped.at("bending_damping_s"));
+  EXPECT_EQ(shipped.at("air_drag_per_s"), MotionSet::kAirDragPerS);
+}
+
 TEST(MotionSet, AllRatesSampleTheSameMotion) {
   const auto motion = MotionSet::make({{}, 0.2, 2});
   for (const double rate_hz : {30.0, 120.0}) {
@@ -87,6 +110,72 @@ TEST(MotionSet, TheRodConvergesInTimeAndSpace) {
   EXPECT_LE(error(32, 1920.0), 0.5 * error(16, 1920.0));
   EXPECT_LE(fine, 1e-3);
   EXPECT_EQ(relative_rms(*exact, *exact), 0.0);
+}
+
+MotionSet motion_of(const MotionSetOptions& options) {
+  auto motion = MotionSet::make(options);
+  EXPECT_TRUE(motion) << motion.error().to_string();
+  return std::move(motion).value();
+}
+
+TEST(MotionSet, HairOfEveryShapeHasItsLengthAndBeginsAtRest) {
+  constexpr uint32_t kVertices = 64;
+  double turn_rad[std::size(kMotionHairs)] = {};
+  for (const MotionHair hair : kMotionHairs) {
+    SCOPED_TRACE(to_string(hair));
+    const MotionSet motion = motion_of({{}, MotionSet::kSampleS, 3, hair});
+    const Groom groom = motion.groom(kVertices);
+    ASSERT_TRUE(validate(groom));
+    for (uint32_t s = 0; s < 3; ++s) EXPECT_NEAR(groom.length_m(s) / MotionSet::kLengthM, 1.0, 0.005);
+    for (uint32_t i = 2; i < kVertices; ++i) {
+      const glm::vec3* point = groom.rest_position_m.data() + i;
+      turn_rad[static_cast<size_t>(hair)] += static_cast<double>(std::acos(std::min(
+          1.0f, glm::dot(glm::normalize(point[0] - point[-1]), glm::normalize(point[-1] - point[-2])))));
+    }
+    // Nothing has set in yet: a full weight would have let it fall by 5 mm.
+    const auto run = motion.run({}, rod_setting(kVertices, 240.0));
+    ASSERT_TRUE(run) << run.error().to_string();
+    for (uint32_t s = 0; s < 3; ++s)
+      for (uint32_t i = 0; i < kVertices; ++i)
+        EXPECT_LT(glm::distance(run->position_m[0][i * 3 + s], groom.rest_position_m[groom.offset[s] + i]),
+                  1e-4f);
+  }
+  EXPECT_NEAR(turn_rad[0], 0.0, 0.02);
+  EXPECT_NEAR(turn_rad[2], 100.0 / 180.0 * 3.14159, 0.05);
+  EXPECT_GT(turn_rad[1], 5.0);
+}
+
+// Another model with another solver, as near as both have converged: what the converged rod is checked with.
+TEST(MotionSet, AnotherModelAgreesWithTheConvergedRod) {
+  for (const MotionHair hair : kMotionHairs) {
+    const MotionSet motion = motion_of({{}, 0.6, 2, hair});
+    const auto rod = run_rod(motion, 64, 1920.0);
+    const auto other = run_in_double(motion, kCheckModel, 64, 1920.0);
+    ASSERT_TRUE(rod && other);
+    const double apart = relative_rms(*other, *rod);
+    EXPECT_LE(apart, claims::kModelsApart) << to_string(hair);
+    fmt::print("{} hair: {} is {:.4f} % of the length from the rod\n", to_string(hair), kCheckModel,
+               100.0 * apart);
+  }
+}
+
+TEST(MotionSet, HairOfEveryShapeConvergesOnAClip) {
+  const std::filesystem::path clip = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap/cmu_131_03.bvh";
+  REQUIRE_SHARED(clip);
+  for (const MotionHair hair : kMotionHairs) {
+    const MotionSet motion = motion_of({clip, 0.6, 2, hair});
+    const auto exact = run_rod(motion, 32, 1920.0);
+    const auto coarse = run_rod(motion, 32, 120.0);
+    const auto fine = run_rod(motion, 32, 480.0);
+    const auto other = run_in_double(motion, kCheckModel, 32, 1920.0);
+    ASSERT_TRUE(exact && coarse && fine && other);
+    // At a quarter of the step of the first order at least, beside what is left of the finest one's error.
+    EXPECT_LE(relative_rms(*fine, *exact), 0.3 * relative_rms(*coarse, *exact)) << to_string(hair);
+    EXPECT_LE(relative_rms(*other, *exact), claims::kModelsApart) << to_string(hair);
+    fmt::print("{} hair on a clip: {:.4f} % at 120 Hz, {:.4f} % at 480 Hz, {} {:.4f} %\n", to_string(hair),
+               100.0 * relative_rms(*coarse, *exact), 100.0 * relative_rms(*fine, *exact), kCheckModel,
+               100.0 * relative_rms(*other, *exact));
+  }
 }
 
 Trajectory straight_trajectory(uint32_t vertex_count, const glm::vec3& begin, const glm::vec3& way) {
