@@ -155,6 +155,34 @@ TEST_F(RenderLook, FairHairGlowsAgainstTheLight) {
   EXPECT_LT(dark, 0.5 * fair);
 }
 
+// Light straight across the strands: what is reflected at once leaves towards the root, what went through and
+// back leaves towards the tip, by 24 degrees (strand_shader_test.cpp). The second is stronger on fair hair.
+TEST_F(RenderLook, FairHairShinesTowardsTheTip) {
+  constexpr float kAwayM = 0.7f;
+  const float tilt_rad = glm::radians(24.0f);
+  SceneAsset asset;  // a curtain, roots above
+  asset.strand_count = 400;
+  asset.vertex_count = 3;
+  for (uint32_t v = 0; v < asset.vertex_count; ++v)
+    for (uint32_t s = 0; s < asset.strand_count; ++s)
+      asset.rest_position_m.emplace_back(5e-4f * static_cast<float>(s) - 0.1f,
+                                         0.1f - 0.1f * static_cast<float>(v), 0.0f);
+  LookDesc look;
+  look.ambient = 0.0f;
+  look.background = glm::vec3(0.0f);
+  look.light_direction = {0.0f, 0.0f, -1.0f};  // from the side of the camera
+  look.root_color = look.tip_color = glm::vec3(0.5f);
+  const auto seen_from = [&](float side) {
+    CameraDesc camera = behind();
+    camera.offset_m = kAwayM * glm::vec3(0.0f, side * std::sin(tilt_rad), std::cos(tilt_rad));
+    return mean(luminance(draw(asset, look, camera), {0.45f, 0.45f}, {0.55f, 0.55f}));
+  };
+  const double from_tips = seen_from(-1.0f);
+  const double from_roots = seen_from(1.0f);
+  EXPECT_GT(from_tips, 1.05 * from_roots);
+  fmt::print("{:.3f} from the tips' side, {:.3f} from the roots'\n", from_tips, from_roots);
+}
+
 TEST_F(RenderLook, BlocksDoNotDependOnTheSizeOfThePicture) {
   // Detail follows the size on the screen; what a block of the picture shows on average does not.
   const SceneAsset asset = grown(make_head(kHeadRadiusM));

@@ -159,6 +159,27 @@ TEST_F(SolverLaws, LengthsAreExactAfterEveryStep) {
   }
 }
 
+// A kernel has the code of the features it was made for and of no others: what a scene lacks costs nothing.
+TEST_F(SolverLaws, WhatASceneLacksIsNotInItsKernel) {
+  const Groom groom = make_test_groom({});
+  for (const SolverKind& kind : all_kinds()) {
+    if (!kind.is_gpu) continue;
+    SCOPED_TRACE(kind.name());
+    SceneFeatures features;
+    features.has_wind = true;
+    auto given_all = make(kind, groom, {}, {1.0, 0.0, 0.0, 0.0}, features);
+    auto given_less = make(kind, groom, {}, {1.0, 0.0, 0.0, 0.0}, features);
+    for (int step = 1; step <= 10; ++step) {
+      StepInput input = moving_input(step, kSubstepS);
+      given_all->substep(input);
+      input.gusts.clear();
+      input.colliders.clear();
+      given_less->substep(input);
+    }
+    EXPECT_EQ(read(*given_all).position_m, read(*given_less).position_m);
+  }
+}
+
 TEST_F(SolverLaws, StretchStaysWithinTheRowsBound) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {

@@ -3,6 +3,7 @@
 #include <limits>
 #include <set>
 
+#include "server/sim/chain_parameters.h"
 #include "server/sim/strand_layout.h"
 #include "tests/support/sim_scene.h"
 #include "tests/support/solver_bounds.h"
@@ -62,6 +63,20 @@ TEST(SolverRegistry, HairHasTheStatedStiffnesses) {
   EXPECT_NEAR(hair.linear_density_kgpm(), 1.0210e-5, 1e-9);
   EXPECT_NEAR(hair.twist_stiffness_nm2() / hair.bending_stiffness_nm2(), 1.0 / 1.45, 1e-12);
   EXPECT_NEAR(hair.stretch_stiffness_n() * 0.09 / hair.bending_stiffness_nm2(), 1.44e8, 1.0);
+}
+
+// A coil has so much that is not twist that two percent of stiffness do not show in it.
+TEST(SolverRegistry, ChainsHaveTheStiffnessesOfTheirHair) {
+  const HairConstants hair;
+  for (const char* name : {"articulated", "super_helix"}) {
+    const SolverRow& row = **find_solver(name);
+    const auto complete = complete_parameters(row, row.as_hair(hair, 0.01, 1.0 / 60.0));
+    ASSERT_TRUE(complete) << complete.error().to_string();
+    const ChainParameters chain = read_chain_parameters(*complete, row.effort_parameter);
+    const double mass_kgpm = hair.linear_density_kgpm();
+    EXPECT_NEAR(chain.bend_stiffness_m4ps2 * mass_kgpm / hair.bending_stiffness_nm2(), 1.0, 1e-9) << name;
+    EXPECT_NEAR(chain.twist_stiffness_m4ps2 * mass_kgpm / hair.twist_stiffness_nm2(), 1.0, 1e-9) << name;
+  }
 }
 
 TEST(SolverRegistry, UnknownSolversListTheKnownOnes) {

@@ -330,6 +330,34 @@ TEST(TangentLayout, EveryStrandHasOnePlaceAndNeighboursComeBefore) {
   }
 }
 
+// The two nearest roots among the strands of the slice that both sides know already, 64 places back at most.
+TEST(TangentLayout, NeighboursAreTheNearestOfThoseBefore) {
+  constexpr uint32_t kWindow = 64;
+  for (const uint32_t strands : {200u, 2047u}) {
+    HairMotion hair({strands, 2, MotionKind::Still});
+    const std::vector<glm::vec3> rest = hair.rest_in_head();
+    const Layout layout = make_layout(strands, 2, rest);
+    const auto away_m = [&](uint32_t place, uint32_t other) {
+      return other == layout.no_neighbour()
+                 ? INFINITY
+                 : glm::distance(rest[layout.strand_at[place]], rest[layout.strand_at[other]]);
+    };
+    for (uint32_t slice = 0; slice < layout.slice_count(); ++slice) {
+      const uint32_t begin = layout.slice_begin[slice];
+      for (uint32_t place = begin; place < layout.slice_begin[slice + 1]; ++place) {
+        if (layout.strand_at[place] == kNoStrand) continue;
+        const uint32_t end = place / kBlockSize * kBlockSize;
+        std::vector<float> nearest_m = {INFINITY, INFINITY};
+        for (uint32_t other = begin; other < end; ++other)
+          if (other + kWindow >= end) nearest_m.push_back(away_m(place, other));
+        std::sort(nearest_m.begin(), nearest_m.end());
+        for (size_t k = 0; k < layout.neighbour.size(); ++k)
+          EXPECT_FLOAT_EQ(away_m(place, layout.neighbour[k][place]), nearest_m[k]) << "place " << place;
+      }
+    }
+  }
+}
+
 // The first slices are an even thinning: an eighth, a quarter, a half of every region.
 TEST(TangentLayout, TheFirstSlicesThinTheGroomEvenly) {
   constexpr uint32_t kStrands = 4096;
