@@ -7,6 +7,7 @@
 
 #include "client/net/address.h"
 #include "client/net/mailbox.h"
+#include "client/net/outbox.h"
 #include "client/net/reconnect_policy.h"
 #include "common/base/file.h"
 #include "common/wire/close_code.h"
@@ -138,6 +139,42 @@ TEST(Mailbox, GivesOneEventAtATimeAndBoundsTheRest) {
   ASSERT_TRUE(status);
   EXPECT_EQ(std::get<ServerStatus>(*status).tick, 2u);
   EXPECT_FALSE(mailbox.next(milliseconds(0)));
+}
+
+// What was taken out is no longer counted, one by one or all at once.
+TEST(Mailbox, WhoKeepsUpLosesNothingHoweverMuchComes) {
+  constexpr size_t kFrameBytes = 400;
+  Mailbox mailbox({.chained_bytes = 1'000});
+  for (uint32_t i = 1; i <= 50; ++i) {
+    EXPECT_EQ(mailbox.push(media(i == 1 ? Opcode::StrandKeyframe : Opcode::StrandDelta, i, kFrameBytes)),
+              Mailbox::Outcome::Kept)
+        << i;
+    if (i % 2 == 0) {
+      EXPECT_EQ(mailbox.take().size(), 1u);
+    } else {
+      EXPECT_TRUE(mailbox.next(milliseconds(0)).has_value());
+      mailbox.push(media(Opcode::StrandDelta, 1'000 + i, kFrameBytes));
+      EXPECT_TRUE(mailbox.next(milliseconds(0)).has_value());
+    }
+  }
+  EXPECT_EQ(mailbox.dropped_frames(), 0u);
+}
+
+TEST(Outbox, HoldsSoManyBytesAtOnceAndAnyNumberInTurn) {
+  Outbox outbox;
+  const std::vector<std::byte> half(kMaxSendQueueBytes / 2);
+  for (int turn = 0; turn < 4; ++turn) {
+    EXPECT_TRUE(outbox.push(half));
+    EXPECT_TRUE(outbox.push(half));
+    EXPECT_EQ(outbox.push({std::byte{1}}).error().code, ErrorCode::LimitExceeded);
+    EXPECT_EQ(outbox.message_count(), 2u);
+    outbox.pop();
+    outbox.pop();
+  }
+  for (size_t i = 0; i < kMaxSendQueueMessages; ++i) EXPECT_TRUE(outbox.push({}));
+  EXPECT_EQ(outbox.push({}).error().code, ErrorCode::LimitExceeded);
+  outbox.close();
+  EXPECT_EQ(outbox.push({}).error().code, ErrorCode::Unavailable);
 }
 
 TEST(Mailbox, EndsWithOneClosedEvent) {

@@ -46,6 +46,8 @@ TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
   ASSERT_TRUE(book.set_demand(reader, states).ok());
   EXPECT_TRUE(book.total().is_watched());
   EXPECT_TRUE(book.strand_classes().empty());
+  (void)book.add({});
+  EXPECT_TRUE(book.total().is_watched()) << "whatever others want";
   Demand inputs;
   inputs.has_inputs = true;
   ASSERT_TRUE(book.set_demand(reader, inputs).ok());

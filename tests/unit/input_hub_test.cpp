@@ -266,6 +266,41 @@ TEST(InputHub, RateAndBuffersAreBounded) {
   EXPECT_EQ(hub.counters().not_owner, kMaxInputSources - 1) << "no memory for sources without end";
 }
 
+TEST(InputHub, AFullBufferForgetsItsOldest) {
+  InputHub hub;
+  constexpr int kSamples = 1'200;  // a millisecond and a millimetre apart
+  static_assert(kSamples > kMaxBufferedSamples);
+  MotionSamples samples;
+  for (int i = 0; i < kSamples; ++i) {
+    samples.samples.push_back({i * kMs, pose_at(1e-3 * i)});
+    if (samples.samples.size() < kSamples / 2) continue;
+    hub.push(1, samples, kStart + i * kMs);
+    samples.samples.clear();
+  }
+  EXPECT_EQ(hub.counters().dropped_oldest, kSamples - kMaxBufferedSamples);
+  EXPECT_EQ(hub.sample(kStart + kSamples * kMs).world_from_head, pose_at(1e-3 * (kSamples - 1)));
+}
+
+// Two samples in one packet may be microseconds apart: that is the network's haste, not the head's.
+TEST(InputHub, SamplesThatAreCloseTogetherAreNoTeleport) {
+  InputHub hub;
+  hub.push(1, motion(0, pose_at(0.0)), kStart);
+  (void)hub.sample(kStart);
+  hub.push(1, motion(10'000, pose_at(2e-3)), kStart + 16 * kMs);
+  hub.push(1, motion(20'000, pose_at(4e-3)), kStart + 16 * kMs);
+  EXPECT_FALSE(hub.sample(kStart + 16 * kMs).has_teleported);
+}
+
+TEST(InputHub, TheWindStaysWithItsSourceUntilThatIsSilentForLong) {
+  InputHub hub;
+  hub.push(1, wind(0, {1.0f, 0.0f, 0.0f}), kStart);
+  hub.push(2, wind(0, {2.0f, 0.0f, 0.0f}), kStart + kWindStaleNs - kMs);
+  EXPECT_EQ(hub.counters().not_owner, 1u);
+  hub.push(2, wind(kMs, {2.0f, 0.0f, 0.0f}), kStart + kWindStaleNs + kMs);
+  EXPECT_EQ(hub.counters().not_owner, 1u);
+  EXPECT_EQ(hub.sample(kStart + kWindStaleNs + kMs).wind_mps, glm::vec3(2.0f, 0.0f, 0.0f));
+}
+
 TEST(InputHub, WindStreamReplacesTheScenesWindWhileItLives) {
   InputHub hub;
   hub.push(7, wind(0, {1, 0, 0}), kStart);

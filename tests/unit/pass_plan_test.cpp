@@ -56,6 +56,8 @@ TEST(PassPlan, KeepsWhatFeedsTheWantedAndNothingElse) {
   EXPECT_EQ(plan->saved_bytes, 1500u);
   ASSERT_EQ(plan->passes.size(), 4u);
   EXPECT_EQ(plan->passes[0].name, "integrate") << "decisions keep the order of declaration";
+  EXPECT_EQ(plan->passes[0].reason, "writes strands for draw");
+  EXPECT_EQ(plan->passes[3].reason, "writes picture for the outside");
   EXPECT_EQ(plan->passes[2].fate, PassFate::Unread);
   EXPECT_THAT(plan->passes[2].reason, HasSubstr("haze"));
 }

@@ -138,6 +138,12 @@ TEST(PictureViews, PixelsAreBoundedForAnAddressForViewersAndInAll) {
   EXPECT_TRUE(views.assign({5, "a", false}, sized(kMaxPictureWidth / 2, kMaxPictureHeight, 2.0f)));
 }
 
+TEST(PictureViews, WhatControllersTakeIsNotOfTheViewersShare) {
+  PictureViews views(scene_view());
+  ASSERT_TRUE(views.assign({1, "a", true}, sized(kMaxPictureWidth, kMaxPictureHeight)));
+  EXPECT_TRUE(views.assign({2, "b", false}, sized(kMaxPictureWidth, kMaxPictureHeight * 3 / 4)));
+}
+
 TEST(PictureViews, ClassesEndWithTheirLastViewerAndNumbersDoNotReturn) {
   PictureViews views(scene_view());
   const uint32_t first = *views.assign(one(1), view_at(0.0f));

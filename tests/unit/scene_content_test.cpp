@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
+#include "tests/support/groom_files.h"
 #include "tests/support/shared_data.h"
+#include "tests/support/temporary_folder.h"
 
 namespace strandcast {
 namespace {
@@ -119,6 +122,44 @@ TEST(SceneContent, ManeDownTheBackDoesNotInflateTheHead) {
   EXPECT_LT(content->colliders[0].radius_m, 0.16f);
   EXPECT_LT(glm::length(content->colliders[0].center_m), 0.01f)
       << "the head joint is in the middle of the head";
+}
+
+/// Strands of two vertices out of a ball about the origin, as a .hair file.
+testing::ByteFile hair_on_a_ball(float radius_m) {
+  constexpr uint32_t kStrands = 40, kPoints = 2;
+  testing::ByteFile file;
+  for (const char c : {'H', 'A', 'I', 'R'}) file.add(c);
+  file.add(kStrands).add(kPoints * kStrands).add(kPoints).add(kPoints - 1);
+  file.add(0.1f).add(0.0f).add(0.5f).add(0.4f).add(0.3f).zeros(88);
+  for (uint32_t s = 0; s < kStrands; ++s) {
+    const float height = 2.0f * (static_cast<float>(s) + 0.5f) / kStrands - 1.0f;
+    const float level = std::sqrt(1.0f - height * height);
+    const float angle = 2.4f * static_cast<float>(s);
+    for (const float away_m : {radius_m, radius_m + 0.1f})
+      file.add(away_m * level * std::cos(angle)).add(away_m * level * std::sin(angle)).add(away_m * height);
+  }
+  return file;
+}
+
+// In a file with +Z up everything is turned alike: what pointed out of the mesh still does.
+TEST(SceneContent, AMeshIsTurnedWithItsNormals) {
+  const TemporaryFolder folder;
+  SceneDesc scene = built_in_scene();
+  FileGroomDesc file;
+  file.path = folder.write("ball.hair", hair_on_a_ball(0.1f).text());
+  file.unit_m = 1.0f;
+  file.up_axis = UpAxis::Z;
+  file.has_origin = true;
+  scene.groom = file;
+  scene.head.mesh_path = folder.write("head.obj",
+                                      "v 0 0 0.1\nv 0.1 0 0\nv 0 0.1 0\n"
+                                      "vn 0 0 1\nvn 1 0 0\nvn 0 1 0\nf 1//1 2//2 3//3\n");
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok()) << content.error().to_string();
+  ASSERT_EQ(content->head.normal.size(), 3u);
+  for (size_t i = 0; i < 3; ++i)
+    EXPECT_GT(glm::dot(glm::normalize(content->head.position_m[i]), content->head.normal[i]), 0.99f);
+  EXPECT_GT(content->head.position_m[0].y, 0.05f) << "what was +Z is up";
 }
 
 TEST(SceneContent, MissingFilesAreNamed) {

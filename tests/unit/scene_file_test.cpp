@@ -212,6 +212,11 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_THAT(error_of("", {"colliders.99999999999999999999.radius_m=1"}), HasSubstr("not an index"));
   EXPECT_THAT(error_of("", {"colliders=1"}), HasSubstr("is a list"));
   EXPECT_THAT(error_of("", {"colliders.0=1"}), HasSubstr("is a list"));
+  std::vector<std::string> too_many;
+  for (uint32_t i = 0; i <= kMaxSphereColliders; ++i)
+    too_many.push_back(fmt::format("colliders.{}.radius_m=0.1", i));
+  EXPECT_THAT(error_of("", too_many),
+              HasSubstr(fmt::format("is not an index of colliders (0 .. {})", kMaxSphereColliders - 1)));
   EXPECT_THAT(error_of("", {"solver.parameters=1"}), HasSubstr("is a list"));
   EXPECT_THAT(error_of("", {"solver.parameters.a=b"}), StartsWith("--set solver.parameters.a=b: "));
   EXPECT_THAT(error_of("", {"name=" + std::string(20'000, 'x')}), HasSubstr("the limit is 16384"));

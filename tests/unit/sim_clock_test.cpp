@@ -59,6 +59,17 @@ TEST(SimClock, ReportsHalfRealTimeWhenEachStepTakesTwoSteps) {
   EXPECT_GT(clock.dropped_steps(), 200u);
 }
 
+// Less than the second that it looks back: of the time since it runs.
+TEST(SimClock, ReportsItsPaceSoonAfterItBegins) {
+  SimClock clock(0.01, kStart);
+  count_steps(clock, kStart, kStart + kSecondNs / 4, kMsNs);
+  EXPECT_NEAR(clock.realtime_factor(kStart + kSecondNs / 4), 1.0, 0.05);
+  clock.pause();
+  clock.resume(kStart + 9 * kSecondNs);
+  count_steps(clock, kStart + 9 * kSecondNs, kStart + 9 * kSecondNs + kSecondNs / 4, kMsNs);
+  EXPECT_NEAR(clock.realtime_factor(kStart + 9 * kSecondNs + kSecondNs / 4), 1.0, 0.05);
+}
+
 TEST(SimClock, PauseStepAndResumeAreExact) {
   SimClock clock(0.01, 0);
   EXPECT_FALSE(clock.step_once()) << "it runs";

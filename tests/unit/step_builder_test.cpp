@@ -205,6 +205,28 @@ TEST(StepBuilder, GustWavesAreThoseOfTheirSeed) {
   }
 }
 
+// Von Karman's spectrum of the along-wind component, 2 L / pi (1 + (1.339 k L)^2)^(-5/6) of the variance per
+// wave number, integrated over wavelengths of 1.2 to 0.14 m. A sine has half the square of its amplitude.
+TEST(StepBuilder, GustWavesHaveTheVarianceOfTheirWavelengths) {
+  WindDesc wind;
+  wind.mean_mps = {2.0f, 0.0f, 1.0f};
+  wind.gust_intensity = 0.4f;
+  const double length_m = wind.gust_length_m;
+  constexpr int kParts = 10'000;
+  const double lowest = 2.0 * std::numbers::pi / 1.2, highest = 2.0 * std::numbers::pi / 0.14;
+  const double width = (highest - lowest) / kParts;
+  double share = 0.0;
+  for (int i = 0; i < kParts; ++i) {
+    const double scaled = 1.339 * (lowest + (i + 0.5) * width) * length_m;
+    share += width * 2.0 * length_m / std::numbers::pi * std::pow(1.0 + scaled * scaled, -5.0 / 6.0);
+  }
+  double variance = 0.0;
+  for (const GustWave& wave : make_gust_waves(wind))
+    variance += 0.5 * static_cast<double>(glm::dot(wave.amplitude_mps, wave.amplitude_mps));
+  const double deviation_mps = static_cast<double>(glm::length(wind.mean_mps) * wind.gust_intensity);
+  EXPECT_NEAR(variance / (deviation_mps * deviation_mps * share), 1.0, 0.02);
+}
+
 TEST(StepBuilder, GustWavesVanishWithoutWind) {
   WindDesc wind;
   EXPECT_TRUE(make_gust_waves(wind).empty());
