@@ -31,20 +31,14 @@ float quantum_for_bound(float bound_m) {
 }
 
 Quantised quantise(const QuantiseInput& input) {
-  const size_t plane_size = static_cast<size_t>(input.strand_count) * input.vertex_count;
+  const size_t plane_size = input.plane_size();
   CHECK(input.position_in_head_m.size() == plane_size);
   CHECK(input.fallback_m.empty() || input.fallback_m.size() == plane_size);
   CHECK(input.quantum_m > 0.0f);
 
   Quantised result;
   Snapshot& snapshot = result.snapshot;
-  snapshot.tick = input.tick;
-  snapshot.sim_time_ns = input.sim_time_ns;
-  snapshot.motion_time_ns = input.motion_time_ns;
-  snapshot.world_from_head = input.world_from_head;
-  snapshot.strand_count = input.strand_count;
-  snapshot.vertex_count = input.vertex_count;
-  snapshot.quantum_m = input.quantum_m;
+  static_cast<SnapshotInfo&>(snapshot) = input;
   snapshot.lattice.resize(3 * plane_size);
 
   // Double keeps the rounding exact: a float quotient of 1 m by 0.1 mm is already off by a thousandth of a

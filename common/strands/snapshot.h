@@ -13,17 +13,21 @@
 
 namespace strandcast {
 
-struct Snapshot {
+/// What a state is of, and how its positions are kept: all but the positions themselves.
+struct SnapshotInfo {
   uint64_t tick = 0;           // simulation step number
   int64_t sim_time_ns = 0;     // tick x step, from 0
   int64_t motion_time_ns = 0;  // server clock at arrival of the newest motion sample in this state, 0 = none
   Pose world_from_head;
   uint32_t strand_count = 0;
-  uint32_t vertex_count = 0;     // per strand
-  float quantum_m = 0.0f;        // lattice step; error of a vertex <= quantum * sqrt(3) / 2
-  std::vector<int32_t> lattice;  // (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest
+  uint32_t vertex_count = 0;  // per strand
+  float quantum_m = 0.0f;     // lattice step; error of a vertex <= quantum * sqrt(3) / 2
 
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
+};
+
+struct Snapshot : SnapshotInfo {
+  std::vector<int32_t> lattice;  // (3 x vertex_count x strand_count) axis-major, then vertex, strand fastest
 };
 
 /// |lattice| stays below this, so that sums of three of them fit in 32 bits; positions outside are clamped.
@@ -40,14 +44,7 @@ inline constexpr float kMinBoundM = 1e-6f;
 /// the rounding of float positions within kBoundReachM. `bound_m` is at least kMinBoundM.
 float quantum_for_bound(float bound_m);
 
-struct QuantiseInput {
-  uint64_t tick = 0;
-  int64_t sim_time_ns = 0;
-  int64_t motion_time_ns = 0;
-  Pose world_from_head;
-  uint32_t strand_count = 0;
-  uint32_t vertex_count = 0;
-  float quantum_m = 0.0f;
+struct QuantiseInput : SnapshotInfo {
   std::span<const glm::vec3>
       position_in_head_m;                 // (vertex_count x strand_count) vertex-major, strand fastest
   std::span<const glm::vec3> fallback_m;  // same shape, or empty: zero; used where a position is not finite

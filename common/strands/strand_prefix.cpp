@@ -30,14 +30,8 @@ uint32_t prefix_count(uint32_t strand_count, float share) {
 Snapshot prefix_of(const Snapshot& snapshot, uint32_t count) {
   if (count >= snapshot.strand_count) return snapshot;
   CHECK(count > 0);
-  Snapshot prefix;
-  prefix.tick = snapshot.tick;
-  prefix.sim_time_ns = snapshot.sim_time_ns;
-  prefix.motion_time_ns = snapshot.motion_time_ns;
-  prefix.world_from_head = snapshot.world_from_head;
+  Snapshot prefix{snapshot, {}};
   prefix.strand_count = count;
-  prefix.vertex_count = snapshot.vertex_count;
-  prefix.quantum_m = snapshot.quantum_m;
   prefix.lattice = prefix_of_rows(std::span(snapshot.lattice), snapshot.strand_count, count);
   return prefix;
 }

@@ -38,15 +38,8 @@ SceneDesc scene_of(const SimulatedMotion& motion, const SolverRow& row) {
 
 Snapshot on_lattice(const Snapshot& state, float quantum_m) {
   const std::vector<glm::vec3> points = positions_in_head(state);
-  QuantiseInput input;
-  input.tick = state.tick;
-  input.sim_time_ns = state.sim_time_ns;
-  input.motion_time_ns = state.motion_time_ns;
-  input.world_from_head = state.world_from_head;
-  input.strand_count = state.strand_count;
-  input.vertex_count = state.vertex_count;
+  QuantiseInput input{state, points, {}};
   input.quantum_m = quantum_m;
-  input.position_in_head_m = points;
   return quantise(input).snapshot;
 }
 

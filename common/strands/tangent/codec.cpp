@@ -89,18 +89,6 @@ void set_lattice(const Layout& layout, const Planes<int32_t>& planes, uint32_t s
   }
 }
 
-Snapshot without_lattice(const Snapshot& snapshot) {
-  Snapshot copy;
-  copy.tick = snapshot.tick;
-  copy.sim_time_ns = snapshot.sim_time_ns;
-  copy.motion_time_ns = snapshot.motion_time_ns;
-  copy.world_from_head = snapshot.world_from_head;
-  copy.strand_count = snapshot.strand_count;
-  copy.vertex_count = snapshot.vertex_count;
-  copy.quantum_m = snapshot.quantum_m;
-  return copy;
-}
-
 class Encoder final : public StrandEncoder {
  public:
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
@@ -163,7 +151,7 @@ class Encoder final : public StrandEncoder {
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     fit_motion(layout_, chain_.history, target_, frame_);
     writers_.resize(layout_.slice_count());
-    Snapshot decoded = without_lattice(snapshot);
+    Snapshot decoded{snapshot, {}};
     decoded.lattice = std::move(lattice_);
     decoded.lattice.resize(3 * snapshot.plane_size());
     return decoded;
