@@ -15,21 +15,6 @@ class SolverLaws : public SolverTest {
   static std::vector<SolverKind> sag_free_kinds();
 };
 
-/// Everything of an input turned by one rotation.
-StepInput turned(StepInput input, const glm::dquat& turn) {
-  input.world_from_head_rotation = turn * input.world_from_head_rotation;
-  input.head_shift_m = turn * input.head_shift_m;
-  input.gravity_mps2 = turn * input.gravity_mps2;
-  input.wind_mps = turn * input.wind_mps;
-  for (GustWave& wave : input.gusts) {
-    wave.amplitude_mps = glm::vec3(turn * glm::dvec3(wave.amplitude_mps));
-    wave.wave_vector_rad_per_m = glm::vec3(turn * glm::dvec3(wave.wave_vector_rad_per_m));
-  }
-  for (SphereCollider& sphere : input.colliders)
-    sphere.center_m = glm::vec3(turn * glm::dvec3(sphere.center_m));
-  return input;
-}
-
 TEST_F(SolverLaws, RestStaysAtRestWithoutForces) {
   const Groom groom = make_test_groom({});
   const glm::dquat tilted = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1.0, 2.0, -1.0)));

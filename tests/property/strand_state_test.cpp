@@ -26,22 +26,6 @@ class StrandStates : public SolverTest {
   }
 };
 
-/// The motion of moving_input() in a world that is turned as a whole.
-StepInput turned_input(int step, const glm::dquat& turn) {
-  StepInput input = moving_input(step, kSubstepS);
-  input.world_from_head_rotation = turn * input.world_from_head_rotation;
-  input.head_shift_m = turn * input.head_shift_m;
-  input.gravity_mps2 = turn * input.gravity_mps2;
-  input.wind_mps = turn * input.wind_mps;
-  for (GustWave& wave : input.gusts) {
-    wave.amplitude_mps = glm::vec3(turn * glm::dvec3(wave.amplitude_mps));
-    wave.wave_vector_rad_per_m = glm::vec3(turn * glm::dvec3(wave.wave_vector_rad_per_m));
-  }
-  for (SphereCollider& sphere : input.colliders)
-    sphere.center_m = glm::vec3(turn * glm::dvec3(sphere.center_m));
-  return input;
-}
-
 std::vector<glm::vec3> turned(std::vector<glm::vec3> values, const glm::dquat& turn) {
   for (glm::vec3& value : values) value = glm::vec3(turn * glm::dvec3(value));
   return values;
@@ -82,7 +66,7 @@ TEST_F(StrandStates, AfterAJumpIntoAWorldTurnedAlikeTheMotionGoesOn) {
     jumping->rebase(kTurn * moving_input(8, kSubstepS).world_from_head_rotation);
     for (int step = 9; step <= 12; ++step) {
       staying->substep(moving_input(step, kSubstepS));
-      jumping->substep(turned_input(step, kTurn));
+      jumping->substep(turned(moving_input(step, kSubstepS), kTurn));
     }
     const std::vector<glm::vec3> expected = turned(read(*staying).position_m, kTurn);
     // As for a world that is turned from the start (solver_laws_test.cpp), over fewer steps.

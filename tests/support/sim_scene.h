@@ -89,6 +89,21 @@ inline StepInput moving_input(int k, double h_s) {
   return input;
 }
 
+/// Everything of an input turned by one rotation.
+inline StepInput turned(StepInput input, const glm::dquat& turn) {
+  input.world_from_head_rotation = turn * input.world_from_head_rotation;
+  input.head_shift_m = turn * input.head_shift_m;
+  input.gravity_mps2 = turn * input.gravity_mps2;
+  input.wind_mps = turn * input.wind_mps;
+  for (GustWave& wave : input.gusts) {
+    wave.amplitude_mps = glm::vec3(turn * glm::dvec3(wave.amplitude_mps));
+    wave.wave_vector_rad_per_m = glm::vec3(turn * glm::dvec3(wave.wave_vector_rad_per_m));
+  }
+  for (SphereCollider& sphere : input.colliders)
+    sphere.center_m = glm::vec3(turn * glm::dvec3(sphere.center_m));
+  return input;
+}
+
 /// Largest distance between two states' vertices, m; infinity when anything is not finite or the sizes
 /// differ.
 inline double largest_distance_m(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
