@@ -1,3 +1,8 @@
+#include <filesystem>
+#include <set>
+#include <sstream>
+
+#include "common/base/file.h"
 #include "common/gl/program.h"
 #include "tests/support/gl_fixture.h"
 #include "tests/support/temporary_folder.h"
@@ -29,8 +34,32 @@ TEST_F(CompileAll, EveryEmbeddedStageCompilesInEveryVariant) {
 
 TEST_F(CompileAll, TheSourceFolderHoldsTheSameStages) {
   const ShaderLibrary folder(std::filesystem::path(STRANDCAST_SOURCE_DIR) / "shaders");
-  EXPECT_EQ(folder.stage_files(), ShaderLibrary().stage_files())
-      << "a file is missing in shaders/CMakeLists.txt";
+  EXPECT_EQ(folder.stage_files(), ShaderLibrary().stage_files()) << "the program was built from other files";
+}
+
+/// Rows of the table of files in shaders/README.md: "sim/dftl.comp", "render/head.*".
+std::set<std::string> rows_of_readme(const std::filesystem::path& shaders) {
+  std::set<std::string> rows;
+  std::istringstream lines(load_text(shaders / "README.md", 1u << 20).value());
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("| `")) rows.insert(line.substr(3, line.find('`', 3) - 3));
+  return rows;
+}
+
+TEST(ShaderFiles, HaveARowEachInTheReadme) {
+  const auto shaders = std::filesystem::path(STRANDCAST_SOURCE_DIR) / "shaders";
+  std::set<std::string> unused = rows_of_readme(shaders);
+  const std::set<std::string> rows = unused;
+  const std::set<std::string> kKinds = {".h", ".glsl", ".comp", ".vert", ".tesc", ".tese", ".geom", ".frag"};
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(shaders)) {
+    if (!kKinds.contains(entry.path().extension().string())) continue;
+    const std::filesystem::path file = std::filesystem::relative(entry.path(), shaders);
+    const std::string all_stages = std::filesystem::path(file).replace_extension(".*").string();
+    EXPECT_TRUE(rows.contains(file.string()) || rows.contains(all_stages)) << file << " has no row";
+    unused.erase(file.string());
+    unused.erase(all_stages);
+  }
+  EXPECT_THAT(unused, testing::IsEmpty());
 }
 
 TEST_F(CompileAll, FindsTheOneVariantThatIsBroken) {
