@@ -130,12 +130,6 @@ void Buffer::bind_storage(uint32_t binding) const {
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, name());
 }
 
-void Buffer::bind_storage_range(uint32_t binding, size_t offset_bytes, size_t size_bytes) const {
-  CHECK(offset_bytes <= size_bytes_ && size_bytes <= size_bytes_ - offset_bytes);
-  glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, name(), static_cast<GLintptr>(offset_bytes),
-                    static_cast<GLsizeiptr>(size_bytes));
-}
-
 void Buffer::bind_uniform(uint32_t binding) const {
   glBindBufferBase(GL_UNIFORM_BUFFER, binding, name());
 }

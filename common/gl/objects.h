@@ -112,7 +112,6 @@ class Buffer {
     return values;
   }
   void bind_storage(uint32_t binding) const;
-  void bind_storage_range(uint32_t binding, size_t offset_bytes, size_t size_bytes) const;
   void bind_uniform(uint32_t binding) const;
 
   uint32_t name() const { return handle_.name(); }

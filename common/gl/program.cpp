@@ -223,9 +223,6 @@ void Program::set(std::string_view uniform, const glm::vec2& value) const {
 void Program::set(std::string_view uniform, const glm::vec3& value) const {
   glProgramUniform3fv(name(), location(uniform, "vec3"), 1, &value[0]);
 }
-void Program::set(std::string_view uniform, const glm::vec4& value) const {
-  glProgramUniform4fv(name(), location(uniform, "vec4"), 1, &value[0]);
-}
 void Program::set(std::string_view uniform, const glm::mat4& value) const {
   glProgramUniformMatrix4fv(name(), location(uniform, "mat4"), 1, GL_FALSE, &value[0][0]);
 }

@@ -93,7 +93,6 @@ class Program {
   void set(std::string_view name, float value) const;
   void set(std::string_view name, const glm::vec2& value) const;
   void set(std::string_view name, const glm::vec3& value) const;
-  void set(std::string_view name, const glm::vec4& value) const;
   void set(std::string_view name, const glm::mat4& value) const;
 
  private:
@@ -106,8 +105,5 @@ class Program {
   std::string label_;
   std::map<std::string, Uniform, std::less<>> uniforms_;
 };
-
-/// Largest dispatch group count per dimension that every GL 4.5 device accepts.
-inline constexpr uint32_t kMaxGroupCount = 65'535;
 
 }  // namespace strandcast::gl

@@ -52,7 +52,6 @@ class TextScan {
   }
 
   uint32_t line() const { return line_; }  // 1-based
-  uint64_t left_bytes() const { return begin_ >= text_.size() ? 0 : text_.size() - begin_; }
 
  private:
   static constexpr std::string_view kSpace = " \t,\v\f";

@@ -53,8 +53,6 @@ class ExpandSizes {
   uint64_t buffer_bytes(uint32_t max_segments_per_gap) const;
   /// Strands that fit in a buffer of so many bytes.
   uint32_t batch_strands(uint64_t size_bytes, uint32_t segments_per_gap) const;
-  uint32_t vertex_count() const { return vertex_count_; }
-  uint32_t key_count() const { return key_count_; }
 
  private:
   uint32_t key_count_;

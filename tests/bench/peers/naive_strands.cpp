@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include "common/base/profile.h"
+#include "common/gl/device_limits.h"
 
 namespace strandcast {
 namespace {
@@ -21,9 +22,8 @@ static_assert(sizeof(Particle) == kBytesPerParticle);
 
 Result<NaiveStrands> NaiveStrands::make(const Groom& groom, const StrandParameters& parameters,
                                         const gl::ShaderLibrary& shaders) {
-  if (groom.rest_position_m.size() > gl::kMaxGroupCount)
-    return make_error(ErrorCode::Unsupported, "{} particles are more than {} work groups",
-                      groom.rest_position_m.size(), gl::kMaxGroupCount);
+  RETURN_IF_ERROR(gl::check_device_limit(gl::read_device_limits(), gl::DeviceLimit::GroupCount,
+                                         groom.rest_position_m.size(), "a solver with a group per particle"));
   NaiveStrands strands;
   strands.strand_count_ = groom.strand_count();
   strands.vertex_count_ = groom.uniform_vertex_count();
