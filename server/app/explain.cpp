@@ -82,7 +82,8 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
 
 /// Follows the strands, paints and codes pictures.
 Status measure_pictures(Bench& bench) {
-  const PictureView view = assumed_view(bench.scene);
+  PictureView view = assumed_view(bench.scene);
+  view.size = fit_picture(view.size, bench.device.is_software ? kSoftwareBudget : kHardwareBudget);
   ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(bench.scene.stream.codec,
                                                      {bench.asset.strand_count, bench.asset.vertex_count}));
   decoder->set_rest_shape(bench.asset.rest_position_m);

@@ -80,13 +80,15 @@ Status Server::State::start() {
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   ASSIGN_OR_RETURN(EncodedFramePtr asset_frame, encode_asset(*asset));
   const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset, scene.look};
-  const RenderSize size{scene.stream.frame_width, scene.stream.frame_height};
-  ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream, scene.step_rate_hz, make_scene_view(scene, size, 0),
-                                          asset, config_.make_painter(painter)}));
+  ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream, scene.step_rate_hz,
+                                          make_scene_view(scene, scene_picture_size(scene), 0), asset,
+                                          config_.make_painter(painter)}));
   ASSIGN_OR_RETURN(idle_picture_passes_, plan_picture_passes(*asset, scene.look, true, 0));
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
   RETURN_IF_ERROR(source_->start(*hub_));
+  // Pictures are drawn by the device that simulates.
+  hub_->set_picture_budget(source_->stats().is_software ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   net_->start();
   status_thread_ = std::thread([this] { run_status(); });

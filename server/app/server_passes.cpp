@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/app/viewers.h"
 #include "server/encode/picture_passes.h"
 #include "server/encode/strand_encode_worker.h"
 
 namespace strandcast {
 namespace {
-
-/// As for viewers that decode everything: H.264 has even sizes only, and the ladder halves them.
-constexpr uint32_t kH264SizeStep = 4;
 
 uint64_t sum_bytes(const gl::PassReports& passes, bool is_kept) {
   uint64_t bytes = 0;
@@ -40,13 +38,7 @@ StageSizes stage_sizes(const SceneDesc& scene, const SceneAsset& asset) {
 }
 
 PictureView assumed_view(const SceneDesc& scene) {
-  PictureView view;
-  view.camera = scene.camera;
-  view.size = {scene.stream.frame_width, scene.stream.frame_height};
-  const bool has_h264 = (encodable_picture_codecs() & codec_bit(PictureCodec::H264)) != 0;
-  const bool fits = view.size.width % kH264SizeStep == 0 && view.size.height % kH264SizeStep == 0;
-  view.codec = has_h264 && fits ? PictureCodec::H264 : PictureCodec::Vp8;
-  return view;
+  return make_scene_view(scene, scene_picture_size(scene), kAllPictureCodecs);
 }
 
 Result<gl::PassReports> plan_server(const SceneDesc& scene, const SceneAsset& asset,

@@ -29,7 +29,7 @@ gl::PassReports join_passes(ThreadPasses threads, bool is_watched_as_pictures);
 Result<gl::PassReports> plan_server(const SceneDesc& scene, const SceneAsset& asset,
                                     const RuntimeFacts& facts);
 
-/// The scene's own view, coded as the best codec that is there.
+/// The scene's own view, in the best codec that is there.
 PictureView assumed_view(const SceneDesc& scene);
 
 /// Lines for /metrics in Prometheus text form: passes with their times and bytes, and what OpenGL holds.

@@ -23,10 +23,6 @@ PictureCodec best_codec(PictureCodecs decodable, const RenderSize& size) {
   return PictureCodec::Jpeg;
 }
 
-RenderSize size_of(const SceneDesc& scene) {
-  return {scene.stream.frame_width, scene.stream.frame_height};
-}
-
 std::vector<double> costs_of(const std::vector<PictureStep>& ladder) {
   std::vector<double> costs;
   for (const PictureStep& step : ladder) costs.push_back(step.relative_cost);
@@ -34,6 +30,10 @@ std::vector<double> costs_of(const std::vector<PictureStep>& ladder) {
 }
 
 }  // namespace
+
+RenderSize scene_picture_size(const SceneDesc& scene) {
+  return {scene.stream.frame_width, scene.stream.frame_height};
+}
 
 PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, PictureCodecs decodable) {
   PictureView view;
@@ -77,9 +77,10 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
   viewer.reader = reader;
   viewer.subscription = &subscription;
   viewer.wanted = hello.mode;
-  place.size = size_of(scene_);
-  if (hello.frame_width > 0) place.size.width = hello.frame_width;
-  if (hello.frame_height > 0) place.size.height = hello.frame_height;
+  RenderSize wished = scene_picture_size(scene_);
+  if (hello.frame_width > 0) wished.width = hello.frame_width;
+  if (hello.frame_height > 0) wished.height = hello.frame_height;
+  place.size = fit_picture(wished, desk_.picture_budget());
   viewer.size = place.size;
   viewer.view = make_scene_view(scene_, place.size, hello.picture_codecs);
   viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
@@ -91,6 +92,9 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
   } else if (hello.mode == StreamMode::Frames) {
     wanted.start_with(StreamMode::Frames);
     place.reason = "frames were asked for";
+    if (place.size.width != wished.width)
+      place.reason += fmt::format("; without a GPU this server draws {} x {} instead of {} x {} pixels",
+                                  place.size.width, place.size.height, wished.width, wished.height);
   } else {
     place.reason = hello.mode == StreamMode::Strands
                        ? "strands were asked for"

@@ -23,6 +23,7 @@ inline constexpr int64_t kModeRequestNs = 1'000'000'000;
 /// A change whose first frame does not come in this time is given up.
 inline constexpr int64_t kModeChangeNs = 20'000'000'000;
 
+RenderSize scene_picture_size(const SceneDesc& scene);
 /// The scene's camera and quality at this size, in the best codec of those that are decodable.
 PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, PictureCodecs decodable);
 

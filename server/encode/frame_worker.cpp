@@ -222,7 +222,7 @@ void FrameWorker::share_time() {
   for (size_t i = 0; i < alike.size(); ++i)
     for (Drawn* drawn : alike[i]) {
       const auto spacing_ns = static_cast<int64_t>(turns[i].spacing_ms / kMsPerNs);
-      drawn->spacing_ns = std::max(spacing_ns, drawn->view.rate_divisor * frame_interval_ns_);
+      drawn->spacing_ns = std::max(spacing_ns, period_ns(*drawn));
       drawn->is_blocking = turns[i].is_blocking;
     }
 }
@@ -294,7 +294,7 @@ std::optional<FrameWorker::Due> FrameWorker::next_due_of(uint32_t picture_class,
 }
 
 int64_t FrameWorker::paint_due_ns(const Drawn& drawn) const {
-  const int64_t due_ns = drawn.begin_ns == 0 ? 0 : drawn.begin_ns + drawn.spacing_ns;
+  const int64_t due_ns = drawn.schedule.due_ns(drawn.spacing_ns, period_ns(drawn));
   return drawn.is_blocking ? std::max(due_ns, blocking_rest_ns_) : due_ns;
 }
 
@@ -312,7 +312,7 @@ void FrameWorker::paint_alike(const PictureView& view) {
                         paint_due_ns(drawn) <= begin_ns + frame_interval_ns_ / 2;
     if (!is_due || !look_alike(drawn.view, view)) continue;
     drawn.decode_count = decode_count_;
-    drawn.begin_ns = begin_ns;
+    drawn.schedule.begin(begin_ns, drawn.spacing_ns);
     classes.push_back(picture_class);
   }
   const bool had_painter = painter_ != nullptr;

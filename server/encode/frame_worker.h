@@ -96,12 +96,12 @@ class FrameWorker {
     std::unique_ptr<PictureEncoder> encoder;  // null until the first picture of this size and codec
     uint32_t last_sequence = 0;               // of the encoders before it
     uint64_t decode_count = 0;                // when last drawn, 0 = never with this view
-    int64_t begin_ns = 0;                     // when that drawing began; 0 = never
-    int64_t change_ns = 0;                    // when the picture last changed
-    double cost_ms = 0.0;                     // smoothed, of drawing and encoding this view; 0 = not known
-    int64_t spacing_ns = 0;                   // between the beginnings of two drawings
-    bool is_blocking = false;                 // as in PictureTurn
-    bool is_still = false;                    // and was sent finely since
+    PictureSchedule schedule;
+    int64_t change_ns = 0;     // when the picture last changed
+    double cost_ms = 0.0;      // smoothed, of drawing and encoding this view; 0 = not known
+    int64_t spacing_ns = 0;    // between the beginnings of two drawings
+    bool is_blocking = false;  // as in PictureTurn
+    bool is_still = false;     // and was sent finely since
     bool is_whole_wanted = false;
     bool is_refused = false;  // this view cannot be drawn
   };
@@ -130,6 +130,7 @@ class FrameWorker {
   void note_cost(const std::vector<uint32_t>& classes, double cost_ms);
   std::optional<Due> next_due() const;
   std::optional<Due> next_due_of(uint32_t picture_class, const Drawn& drawn) const;
+  int64_t period_ns(const Drawn& drawn) const { return drawn.view.rate_divisor * frame_interval_ns_; }
   int64_t paint_due_ns(const Drawn& drawn) const;
   void serve(const Due& due);
   void paint_alike(const PictureView& view);

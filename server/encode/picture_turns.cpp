@@ -7,11 +7,14 @@
 namespace strandcast {
 namespace {
 
-/// The shortest period of a view that one drawing does not outlast; infinite when there is none.
-double shortest_kept_period_ms(std::span<const PictureLoad> loads) {
+/// No view makes up for more than so many drawings: one that had nothing to show for long is owed nothing.
+constexpr int64_t kMaxOwedDrawings = 4;
+
+/// Of the view that alone would be drawn most often.
+double shortest_period_ms(std::span<const PictureLoad> loads) {
   double shortest_ms = std::numeric_limits<double>::infinity();
   for (const PictureLoad& load : loads)
-    if (load.cost_ms <= load.period_ms) shortest_ms = std::min(shortest_ms, load.period_ms);
+    shortest_ms = std::min(shortest_ms, std::max(load.period_ms, load.cost_ms));
   return shortest_ms;
 }
 
@@ -30,7 +33,7 @@ double fair_level(std::vector<double> demands, double capacity) {
 
 std::vector<PictureTurn> share_drawing_time(std::span<const PictureLoad> loads) {
   std::vector<PictureTurn> turns(loads.size());
-  const double longest_ms = kBlockingPeriods * shortest_kept_period_ms(loads);
+  const double longest_ms = kBlockingPeriods * shortest_period_ms(loads);
   std::vector<double> all, blocking, others;
   for (size_t i = 0; i < loads.size(); ++i) {
     turns[i].is_blocking = loads[i].cost_ms > longest_ms;
@@ -48,6 +51,16 @@ std::vector<PictureTurn> share_drawing_time(std::span<const PictureLoad> loads) 
     turns[i].spacing_ms = std::max(loads[i].period_ms, loads[i].cost_ms / most);
   }
   return turns;
+}
+
+void PictureSchedule::begin(int64_t time_ns, int64_t spacing_ns) {
+  const int64_t late_ns = begin_ns_ == 0 ? 0 : time_ns - (begin_ns_ + spacing_ns - owed_ns_);
+  owed_ns_ = std::clamp<int64_t>(late_ns, 0, kMaxOwedDrawings * spacing_ns);
+  begin_ns_ = time_ns;
+}
+
+int64_t PictureSchedule::due_ns(int64_t spacing_ns, int64_t period_ns) const {
+  return begin_ns_ == 0 ? 0 : begin_ns_ + std::max(period_ns, spacing_ns - owed_ns_);
 }
 
 bool goes_before(const PictureWait& a, const PictureWait& b, int64_t time_ns) {

@@ -9,7 +9,8 @@
 namespace strandcast {
 
 /// A drawing that takes longer than so many periods of another view holds that one up: nothing interrupts it.
-inline constexpr double kBlockingPeriods = 4.0;
+/// A view that cannot be drawn at its rate even alone has the period at which it can.
+inline constexpr double kBlockingPeriods = 2.0;
 /// Share of the time that such drawings take together while others need less.
 inline constexpr double kBlockingShare = 0.25;
 
@@ -28,6 +29,20 @@ struct PictureTurn {
 /// is left evenly, whatever one drawing of theirs costs. Where some block others, they divide kBlockingShare.
 /// One turn for each load.
 std::vector<PictureTurn> share_drawing_time(std::span<const PictureLoad> loads);
+
+/// When one view was drawn, and when it is due again.
+class PictureSchedule {
+ public:
+  /// A drawing begins; times between two of them as in PictureTurn.
+  void begin(int64_t time_ns, int64_t spacing_ns);
+  /// 0 before the first drawing. A view that had to wait for others makes up for it as far as its period
+  /// allows.
+  int64_t due_ns(int64_t spacing_ns, int64_t period_ns) const;
+
+ private:
+  int64_t begin_ns_ = 0;
+  int64_t owed_ns_ = 0;  // by how much the newest drawing was late
+};
 
 /// Something that waits to be drawn or encoded.
 struct PictureWait {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "common/base/check.h"
+
 namespace strandcast {
 namespace {
 
@@ -13,6 +15,8 @@ constexpr float kMinViewDistanceM = 1e-3f;
 constexpr float kMaxViewDistanceM = 1e4f;
 constexpr int kMaxQuality = 100;
 constexpr uint32_t kMaxPictureRateDivisor = 64;
+/// H.264 has even sizes only, and the ladder halves them.
+constexpr uint32_t kFittedSideStep = 4;
 
 bool is_finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -35,6 +39,17 @@ Error no_room(const std::string& why) {
 }
 
 }  // namespace
+
+RenderSize fit_picture(const RenderSize& size, const PictureBudget& budget) {
+  const uint64_t pixels = uint64_t{size.width} * size.height;
+  if (pixels <= budget.picture_pixels) return size;
+  const double scale = std::sqrt(static_cast<double>(budget.picture_pixels) / static_cast<double>(pixels));
+  const auto fit_side = [&](uint32_t side) {
+    const auto fitted = static_cast<uint32_t>(scale * side);
+    return std::max(fitted - fitted % kFittedSideStep, kMinPictureSide);
+  };
+  return {fit_side(size.width), fit_side(size.height)};
+}
 
 bool operator==(const PictureView& a, const PictureView& b) {
   return look_alike(a, b) && a.quality == b.quality && a.rate_divisor == b.rate_divisor && a.codec == b.codec;
@@ -70,6 +85,17 @@ Status validate(const PictureView& view) {
   return {};
 }
 
+PictureViews::PictureViews(PictureView reserved, const PictureBudget& budget)
+    : reserved_size_(reserved.size), reserved_(std::move(reserved)) {
+  set_budget(budget);
+}
+
+void PictureViews::set_budget(const PictureBudget& budget) {
+  CHECK(view_of_class_.empty());
+  budget_ = budget;
+  reserved_.size = fit_picture(reserved_size_, budget);
+}
+
 size_t PictureViews::member_count(uint32_t picture_class) const {
   return static_cast<size_t>(std::count_if(members_.begin(), members_.end(), [&](const auto& entry) {
     return entry.second.picture_class == picture_class;
@@ -85,6 +111,9 @@ bool PictureViews::is_reserved(const PictureView& view) const {
 
 Result<uint32_t> PictureViews::assign(const PictureOwner& owner, const PictureView& view) {
   RETURN_IF_ERROR(validate(view));
+  if (pixels_of(view) > budget_.picture_pixels)
+    return make_error(ErrorCode::BadInput, "a picture of {} x {} pixels is more than is drawn here",
+                      view.size.width, view.size.height);
   const auto held = members_.find(owner.viewer);
   const uint32_t held_class = held != members_.end() ? held->second.picture_class : 0;
   const bool is_alone = held_class != 0 && member_count(held_class) == 1;
@@ -142,12 +171,12 @@ Status PictureViews::check_room(const PictureOwner& owner, const PictureView& vi
   if (of_peer.views > kMaxPictureViewsOfPeer || of_peer.classes > kMaxPictureClassesOfPeer)
     return no_room(
         fmt::format("{} different pictures are being drawn for this address already", of_peer.classes - 1));
-  if (of_peer.pixels > kMaxPeerPixels)
-    return no_room(pixels_text("one address", of_peer.pixels, kMaxPeerPixels));
-  if (!owner.is_controller && of_viewers.pixels > kMaxViewerPixels)
-    return no_room(pixels_text("viewers", of_viewers.pixels, kMaxViewerPixels));
-  if (all.pixels > kMaxPicturePixels)
-    return no_room(pixels_text("all together", all.pixels, kMaxPicturePixels));
+  if (of_peer.pixels > budget_.peer_pixels())
+    return no_room(pixels_text("one address", of_peer.pixels, budget_.peer_pixels()));
+  if (!owner.is_controller && of_viewers.pixels > budget_.viewer_pixels())
+    return no_room(pixels_text("viewers", of_viewers.pixels, budget_.viewer_pixels()));
+  if (all.pixels > budget_.all_pixels)
+    return no_room(pixels_text("all together", all.pixels, budget_.all_pixels));
   return {};
 }
 

@@ -19,18 +19,42 @@ namespace strandcast {
 
 inline constexpr size_t kMaxPictureViews = 8;     // different cameras and sizes
 inline constexpr size_t kMaxPictureClasses = 16;  // encoders
-/// Pixels of all classes together. Each class keeps its picture and what its encoder refers to, by estimate
-/// 20 to 40 bytes a pixel; drawing it without a GPU takes about 100 more (2 x 2 samples of colour and depth).
-inline constexpr uint64_t kLargestPicturePixels = uint64_t{kMaxPictureWidth} * kMaxPictureHeight;
-inline constexpr uint64_t kMaxPicturePixels = 2 * kLargestPicturePixels;
-/// Of those, what viewers may take; the rest is kept for whoever controls.
-inline constexpr uint64_t kMaxViewerPixels = kMaxPicturePixels * 3 / 4;
+/// Kept for the scene's own picture: one class for each codec. Nobody's wishes take it from the others.
+inline constexpr size_t kReservedPictureClasses = std::size(kPictureCodecs);
 /// What one address may take, whatever its roles.
 inline constexpr size_t kMaxPictureViewsOfPeer = kMaxPictureViews / 2;
 inline constexpr size_t kMaxPictureClassesOfPeer = kMaxPictureClasses / 2;
-inline constexpr uint64_t kMaxPeerPixels = kMaxPicturePixels / 2;
-/// Kept for the scene's own picture: one class for each codec. Nobody's wishes take it from the others.
-inline constexpr size_t kReservedPictureClasses = std::size(kPictureCodecs);
+
+/// What a pixel takes while it is drawn: 2 x 2 samples of colour and depth, and the driver's copies of the
+/// picture. Of the one view that is being drawn. Measured with llvmpipe.
+inline constexpr uint64_t kDrawnPixelBytes = 110;
+/// And in each class: its picture and what its encoder refers to, by estimate 20 to 40 by codec.
+inline constexpr uint64_t kClassPixelBytes = 40;
+
+/// How many pixels a device is good for.
+struct PictureBudget {
+  uint64_t picture_pixels = 0;  // of one picture; a larger one is drawn smaller
+  uint64_t all_pixels = 0;      // of all classes but the reserved ones
+  /// Of those, what viewers may take; the rest is kept for whoever controls.
+  constexpr uint64_t viewer_pixels() const { return all_pixels * 3 / 4; }
+  /// What one address may take, whatever its roles.
+  constexpr uint64_t peer_pixels() const { return all_pixels / 2; }
+  /// What all this takes, the reserved classes included, by estimate.
+  constexpr uint64_t most_bytes() const {
+    return picture_pixels * kDrawnPixelBytes +
+           (all_pixels + kReservedPictureClasses * picture_pixels) * kClassPixelBytes;
+  }
+};
+
+/// Every picture that can be asked for, and two of the largest at once.
+inline constexpr PictureBudget kHardwareBudget{uint64_t{kMaxPictureWidth} * kMaxPictureHeight,
+                                               2 * uint64_t{kMaxPictureWidth} * kMaxPictureHeight};
+/// Without a GPU the processor draws, in its own memory, and finishes what it has begun: pictures are no
+/// larger than what it draws in a fraction of a second.
+inline constexpr PictureBudget kSoftwareBudget{1280 * 720, 6 * 1280 * 720};
+
+/// The size, or where it has more pixels a smaller one of that shape. Its sides are then multiples of 4.
+RenderSize fit_picture(const RenderSize& size, const PictureBudget& budget);
 
 struct PictureView {
   CameraDesc camera;
@@ -64,11 +88,14 @@ struct PictureUse {
 class PictureViews {
  public:
   /// `reserved` is the scene's own picture: in any codec there is always room for it.
-  explicit PictureViews(PictureView reserved) : reserved_(std::move(reserved)) {}
+  PictureViews(PictureView reserved, const PictureBudget& budget);
+  const PictureBudget& budget() const { return budget_; }
+  /// Before the first class.
+  void set_budget(const PictureBudget& budget);
 
   /// Gives the viewer a class: that of an equal view, else a new one. Call again when its camera changes: a
   /// viewer alone in its class keeps the class. Unavailable while a limit above is reached, and the viewer
-  /// then keeps what it had; BadInput for a view that cannot be drawn.
+  /// then keeps what it had; BadInput for a view that cannot be drawn, or has not been made to fit.
   Result<uint32_t> assign(const PictureOwner& owner, const PictureView& view);
   /// Ignored for unknown viewers.
   void remove(uint64_t viewer);
@@ -89,7 +116,9 @@ class PictureViews {
   PictureUse use_with(const PictureView& view, IsCounted is_counted) const;
   Status check_room(const PictureOwner& owner, const PictureView& view, uint32_t left_class) const;
 
-  const PictureView reserved_;
+  const RenderSize reserved_size_;  // as wished for
+  PictureView reserved_;
+  PictureBudget budget_;
   std::map<uint32_t, PictureView> view_of_class_;
   std::map<uint64_t, Member> members_;  // by viewer
   uint32_t next_class_ = 1;

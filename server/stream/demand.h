@@ -30,6 +30,8 @@ class DemandDesk {
   /// Unavailable or BadInput as PictureViews::assign, and NotFound for an unknown reader: then the demand of
   /// before stays.
   virtual Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) = 0;
+  /// What pictures are made to fit (fit_picture) before they are asked for.
+  virtual PictureBudget picture_budget() const = 0;
 };
 
 }  // namespace strandcast

@@ -27,10 +27,13 @@ struct SourceDemand {
 class DemandBook : public DemandDesk {
  public:
   /// `scene_view`: as PictureViews.
-  explicit DemandBook(PictureView scene_view) : views_(std::move(scene_view)) {}
+  DemandBook(PictureView scene_view, const PictureBudget& budget) : views_(std::move(scene_view), budget) {}
 
   ReaderId add(const ReaderTraits& traits);
   Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) override;
+  PictureBudget picture_budget() const override { return views_.budget(); }
+  /// Before the first demand for pictures.
+  void set_picture_budget(const PictureBudget& budget) { views_.set_budget(budget); }
   /// Ignored for unknown readers.
   void remove(ReaderId reader);
 

@@ -37,7 +37,7 @@ struct SimStats {
   uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
   uint64_t solver_builds = 0;
   uint64_t solver_bytes = 0;
-  bool is_software = false;  // OpenGL runs on processor cores
+  bool is_software = true;  // OpenGL runs on processor cores, as far as is known
   std::string solver_name;
   int64_t last_step_ns = 0;  // server clock at the end of the newest step; 0 = none yet
 };

@@ -18,7 +18,7 @@ bool is_alike(const SourceDemand& a, const SourceDemand& b) {
 }  // namespace
 
 StreamHub::StreamHub(StreamHubConfig config)
-    : config_(std::move(config)), stream_(config_.stream), book_(config_.scene_view) {}
+    : config_(std::move(config)), stream_(config_.stream), book_(config_.scene_view, kSoftwareBudget) {}
 
 Result<std::unique_ptr<StreamHub>> StreamHub::make(StreamHubConfig config) {
   std::unique_ptr<StreamHub> hub(new StreamHub(std::move(config)));
@@ -89,6 +89,16 @@ Result<PictureClass> StreamHub::set_demand(ReaderId reader, const Demand& demand
   }
   follow_demand();
   return picture_class;
+}
+
+PictureBudget StreamHub::picture_budget() const {
+  const std::lock_guard lock(mutex_);
+  return book_.picture_budget();
+}
+
+void StreamHub::set_picture_budget(const PictureBudget& budget) {
+  const std::lock_guard lock(mutex_);
+  book_.set_picture_budget(budget);
 }
 
 void StreamHub::remove(ReaderId reader) {

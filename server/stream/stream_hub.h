@@ -43,6 +43,9 @@ class StreamHub : public StateSink, public DemandDesk {
   /// shares of its own; it then gets what any of them asks for, once.
   ReaderId add(StreamReader& reader, const ReaderTraits& traits = {});
   Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) override;
+  PictureBudget picture_budget() const override;
+  /// Before the first demand for pictures; until then it is that of a machine without a GPU.
+  void set_picture_budget(const PictureBudget& budget);
   /// Nothing is given for this demand any more from the return on. Not from within the reader.
   void remove(ReaderId reader);
   /// Told whenever the demands have changed, and at once.

@@ -17,7 +17,7 @@ Demand wants(std::optional<uint16_t> strand_class, std::optional<PictureView> pi
 }
 
 TEST(DemandBook, WhatRunsIsTheUnionOfWhatIsWanted) {
-  DemandBook book(sized(640));
+  DemandBook book(sized(640), kHardwareBudget);
   const ReaderId a = book.add({}), b = book.add({}), c = book.add({});
   EXPECT_FALSE(book.total().is_watched());
   EXPECT_TRUE(book.strand_classes().empty());
@@ -39,7 +39,7 @@ TEST(DemandBook, WhatRunsIsTheUnionOfWhatIsWanted) {
 }
 
 TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
-  DemandBook book(sized(640));
+  DemandBook book(sized(640), kHardwareBudget);
   const ReaderId reader = book.add({});
   Demand states;
   states.has_states = true;
@@ -55,7 +55,7 @@ TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
 }
 
 TEST(DemandBook, ARefusedDemandLeavesTheOneBefore) {
-  DemandBook book(sized(640));
+  DemandBook book(sized(640), kHardwareBudget);
   const ReaderId reader = book.add({});
   ASSERT_TRUE(book.set_demand(reader, wants(1, sized(100))).ok());
   const PictureClass picture_class = book.picture_class_of(reader);
@@ -67,7 +67,7 @@ TEST(DemandBook, ARefusedDemandLeavesTheOneBefore) {
 }
 
 TEST(DemandBook, SharesGoByTheReadersAddress) {
-  DemandBook book(sized(640));
+  DemandBook book(sized(640), kHardwareBudget);
   ReaderId last = 0;
   for (uint32_t i = 0; i < kMaxPictureViewsOfPeer; ++i) {
     last = book.add({"a", true});

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <string>
 
 namespace strandcast {
@@ -28,7 +29,7 @@ PictureOwner one(uint64_t viewer) {
 }
 
 TEST(PictureViews, EqualViewsShareAClassAndOthersDoNot) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   const auto a = views.assign(one(1), view_at(0.0f));
   const auto b = views.assign(one(2), view_at(0.0f));
   const auto c = views.assign(one(3), view_at(0.5f));
@@ -43,7 +44,7 @@ TEST(PictureViews, EqualViewsShareAClassAndOthersDoNot) {
 }
 
 TEST(PictureViews, AViewerAloneKeepsItsClassWhenItsCameraMoves) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   const uint32_t first = *views.assign(one(1), view_at(0.0f));
   for (int i = 1; i < 100; ++i)
     EXPECT_EQ(*views.assign(one(1), view_at(0.125f * static_cast<float>(i))), first);
@@ -52,7 +53,7 @@ TEST(PictureViews, AViewerAloneKeepsItsClassWhenItsCameraMoves) {
 }
 
 TEST(PictureViews, AViewerLeavesASharedClassToTheOthers) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   const uint32_t shared = *views.assign(one(1), view_at(0.0f));
   ASSERT_TRUE(views.assign(one(2), view_at(0.0f)));
   const uint32_t own = *views.assign(one(1), view_at(0.3f));
@@ -63,7 +64,7 @@ TEST(PictureViews, AViewerLeavesASharedClassToTheOthers) {
 }
 
 TEST(PictureViews, ThereAreOnlyAFewClassesAndRefusalChangesNothing) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   for (uint64_t viewer = 0; viewer + 1 < kMaxPictureViews; ++viewer)
     ASSERT_TRUE(views.assign(one(viewer), view_at(static_cast<float>(viewer))));
   const auto refused = views.assign(one(99), view_at(9.0f));
@@ -84,7 +85,7 @@ PictureView sized(uint32_t width, uint32_t height, float x_m = 0.0f) {
 }
 
 TEST(PictureViews, ThePictureOfTheSceneHasRoomInEveryCodecWhateverOthersTake) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   uint64_t viewer = 0;
   // As many classes as there can be, of as many addresses.
   for (int quality = 1; quality <= 100; ++quality) {
@@ -102,7 +103,7 @@ TEST(PictureViews, ThePictureOfTheSceneHasRoomInEveryCodecWhateverOthersTake) {
 }
 
 TEST(PictureViews, OneAddressCannotTakeAllViews) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   uint64_t viewer = 0;
   const auto of_crowd = [&](const PictureView& view) {
     return views.assign({viewer++, "crowd", true}, view);
@@ -117,9 +118,9 @@ TEST(PictureViews, OneAddressCannotTakeAllViews) {
 }
 
 TEST(PictureViews, PixelsAreBoundedForAnAddressForViewersAndInAll) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   // Of one address: exactly one picture of the largest size.
-  ASSERT_EQ(kMaxPeerPixels, kLargestPicturePixels);
+  ASSERT_EQ(kHardwareBudget.peer_pixels(), uint64_t{kMaxPictureWidth} * kMaxPictureHeight);
   ASSERT_TRUE(views.assign({1, "a", true}, sized(kMaxPictureWidth, kMaxPictureHeight)));
   EXPECT_FALSE(views.assign({2, "a", true}, sized(16, 16)));
   // In all: a second one of another address, and then nothing.
@@ -139,13 +140,75 @@ TEST(PictureViews, PixelsAreBoundedForAnAddressForViewersAndInAll) {
 }
 
 TEST(PictureViews, WhatControllersTakeIsNotOfTheViewersShare) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   ASSERT_TRUE(views.assign({1, "a", true}, sized(kMaxPictureWidth, kMaxPictureHeight)));
   EXPECT_TRUE(views.assign({2, "b", false}, sized(kMaxPictureWidth, kMaxPictureHeight * 3 / 4)));
 }
 
+// Two addresses may have three each of the largest, and viewers four of these six.
+TEST(PictureViews, WithoutAGpuTheBudgetIsThatOfTheProcessor) {
+  PictureViews views(scene_view(), kSoftwareBudget);
+  const auto refused = views.assign({1, "a", true}, sized(1284, 720));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadInput) << "it has to be made to fit";
+  const auto large = [&](uint64_t viewer, const char* peer, bool is_controller) {
+    return views.assign({viewer, peer, is_controller}, sized(1280, 720, static_cast<float>(viewer))).ok();
+  };
+  for (uint64_t viewer = 1; viewer <= 3; ++viewer) ASSERT_TRUE(large(viewer, "a", false));
+  EXPECT_FALSE(large(4, "a", false)) << "of one address";
+  ASSERT_TRUE(large(4, "b", false));
+  EXPECT_FALSE(large(5, "b", false)) << "of all viewers";
+  ASSERT_TRUE(large(5, "b", true));
+  ASSERT_TRUE(large(6, "b", true));
+  EXPECT_FALSE(views.assign({7, "c", true}, sized(16, 16))) << "in all";
+  EXPECT_TRUE(views.assign({7, "c", false}, scene_view())) << "but the scene's own";
+}
+
+// The figures of SECURITY.md.
+TEST(PictureViews, TheBudgetsAreAsPromised) {
+  EXPECT_EQ(kHardwareBudget.picture_pixels, 3840u * 2160u);
+  EXPECT_EQ(kHardwareBudget.all_pixels, 16'588'800u);
+  EXPECT_EQ(kHardwareBudget.viewer_pixels(), 12'441'600u);
+  EXPECT_EQ(kHardwareBudget.peer_pixels(), 8'294'400u);
+  EXPECT_EQ(kSoftwareBudget.picture_pixels, 1280u * 720u);
+  EXPECT_EQ(kSoftwareBudget.all_pixels, 5'529'600u);
+  EXPECT_EQ(kSoftwareBudget.viewer_pixels(), 4'147'200u);
+  EXPECT_EQ(kSoftwareBudget.peer_pixels(), 2'764'800u);
+  EXPECT_EQ(kDrawnPixelBytes, 110u);
+  EXPECT_EQ(kClassPixelBytes, 40u);
+  EXPECT_LE(kSoftwareBudget.most_bytes(), 480'000'000u);
+}
+
+TEST(PictureViews, WhatDoesNotFitIsDrawnSmallerInTheSameShape) {
+  std::mt19937 random(1);
+  std::uniform_int_distribution<uint32_t> width(kMinPictureSide, kMaxPictureWidth);
+  std::uniform_int_distribution<uint32_t> height(kMinPictureSide, kMaxPictureHeight);
+  for (int round = 0; round < 2'000; ++round) {
+    const RenderSize wished{width(random), height(random)};
+    const RenderSize on_hardware = fit_picture(wished, kHardwareBudget);
+    EXPECT_EQ(on_hardware.width, wished.width);
+    EXPECT_EQ(on_hardware.height, wished.height);
+    const RenderSize fitted = fit_picture(wished, kSoftwareBudget);
+    const uint64_t pixels = uint64_t{fitted.width} * fitted.height;
+    ASSERT_LE(pixels, kSoftwareBudget.picture_pixels);
+    ASSERT_TRUE(validate(sized(fitted.width, fitted.height)));
+    if (uint64_t{wished.width} * wished.height <= kSoftwareBudget.picture_pixels) {
+      EXPECT_EQ(fitted.width, wished.width);
+      EXPECT_EQ(fitted.height, wished.height);
+      continue;
+    }
+    EXPECT_EQ(fitted.width % 4, 0u);
+    EXPECT_EQ(fitted.height % 4, 0u);
+    // Each side loses less than 4 pixels to that.
+    const double shape = static_cast<double>(wished.width) / wished.height;
+    EXPECT_LE(fitted.width, shape * (fitted.height + 4.0));
+    EXPECT_GE(fitted.width + 4.0, shape * fitted.height);
+    EXPECT_GT((fitted.width + 4.0) * (fitted.height + 4.0), kSoftwareBudget.picture_pixels);
+  }
+}
+
 TEST(PictureViews, ClassesEndWithTheirLastViewerAndNumbersDoNotReturn) {
-  PictureViews views(scene_view());
+  PictureViews views(scene_view(), kHardwareBudget);
   const uint32_t first = *views.assign(one(1), view_at(0.0f));
   ASSERT_TRUE(views.assign(one(2), view_at(0.0f)));
   views.remove(1);

@@ -109,7 +109,9 @@ Hello hello(Role role, StreamMode mode, uint32_t width = 0, uint32_t height = 0)
 /// Viewers of a scene, and what they want of the stream.
 class Viewing {
  public:
-  Viewing() : viewers(scene_, book) {}
+  explicit Viewing(const PictureBudget& budget = kHardwareBudget)
+      : book(make_scene_view(scene_, scene_picture_size(scene_), PictureCodecs{0}), budget),
+        viewers(scene_, book) {}
   Result<Viewers::Place> add(SessionId session, const Hello& hello, const std::string& peer = "10.0.0.1") {
     return viewers.add(session, book.add({peer, hello.role == Role::Controller}), subscriptions[session],
                        hello);
@@ -126,8 +128,7 @@ class Viewing {
   const SceneDesc scene_ = built_in_scene();
 
  public:
-  DemandBook book{
-      make_scene_view(scene_, {scene_.stream.frame_width, scene_.stream.frame_height}, PictureCodecs{0})};
+  DemandBook book;
   std::map<SessionId, Subscription> subscriptions;
   Viewers viewers;
 };
@@ -255,6 +256,28 @@ TEST(Viewers, AControllerFindsPixelsThatViewersCannotTake) {
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.error().message, HasSubstr("million pixels"));
   EXPECT_TRUE(large(session, Role::Controller, "late").ok());
+}
+
+TEST(Viewers, WithoutAGpuALargePictureIsDrawnSmallerAndThatIsSaid) {
+  Viewing viewing(kSoftwareBudget);
+  Hello large = hello(Role::Viewer, StreamMode::Frames, 3840, 2160);
+  large.picture_codecs = kAllPictureCodecs;
+  const auto place = viewing.add(1, large);
+  ASSERT_TRUE(place.ok()) << place.error().to_string();
+  EXPECT_EQ(place->size.width, 1280u);
+  EXPECT_EQ(place->size.height, 720u);
+  EXPECT_THAT(place->reason, HasSubstr("without a GPU this server draws 1280 x 720 instead of 3840 x 2160"));
+  EXPECT_EQ(viewing.viewers.picture_size(1).width, 1280u);
+  EXPECT_EQ(viewing.book.picture_views().begin()->second.size.width, 1280u);
+  // And half of that at the last step of its ladder.
+  ASSERT_TRUE(viewing.viewers.set_picture_step(1, viewing.subscriptions[1].pictures.costs.size() - 1));
+  EXPECT_EQ(viewing.viewers.picture_size(1).width, 640u);
+  // On a GPU all is drawn as it is asked for.
+  Viewing fast(kHardwareBudget);
+  const auto whole = fast.add(1, large);
+  ASSERT_TRUE(whole.ok());
+  EXPECT_EQ(whole->size.width, 3840u);
+  EXPECT_EQ(whole->reason, "frames were asked for");
 }
 
 /// Facts under which both modes work and strands are the better ones.
