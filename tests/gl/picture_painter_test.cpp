@@ -4,16 +4,19 @@
 
 #include <array>
 #include <atomic>
+#include <fstream>
 #include <mutex>
 
 #include "common/groom/groom_asset.h"
 #include "common/groom/procedural.h"
 #include "common/render/renderer.h"
 #include "common/strands/strand_codec.h"
+#include "common/wire/messages.h"
 #include "server/encode/frame_worker.h"
 #include "server/encode/picture_passes.h"
 #include "tests/support/eventually.h"
 #include "tests/support/gl_fixture.h"
+#include "tests/support/sample_messages.h"
 
 namespace strandcast {
 namespace {
@@ -61,7 +64,13 @@ class GlPainting : public GlTest {
 };
 
 TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
-  auto renderer = Renderer::make(gl::ShaderLibrary(), context_->info(), *asset_, config_.look);
+  // What a client knows of the look is what came in the Welcome, and this one has no default in it.
+  const ServerMessage welcome = sample_server_messages().front();
+  config_.look = std::get<Welcome>(welcome).look;
+  const auto told = decode_server_message(encode(welcome));
+  ASSERT_TRUE(told) << told.error().to_string();
+  auto renderer =
+      Renderer::make(gl::ShaderLibrary(), context_->info(), *asset_, std::get<Welcome>(*told).look);
   ASSERT_TRUE(renderer) << renderer.error().to_string();
   auto encoder = std::move(*make_strand_encoder("delta"));
   auto server_decoder =
@@ -218,6 +227,46 @@ TEST_F(GlPainting, AnUnknownDeviceIsAnErrorThatNamesTheKnownOnes) {
   const auto painter = gl_picture_painter(config_)();
   ASSERT_FALSE(painter);
   EXPECT_THAT(painter.error().message, testing::HasSubstr("known: auto, software, hardware"));
+}
+
+/// Bytes of this process that are in memory, at most so far.
+uint64_t most_resident_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;)
+    if (uint64_t kilobytes = 0; word == "VmHWM:" && status >> kilobytes) return kilobytes << 10;
+  ADD_FAILURE() << "/proc/self/status does not tell VmHWM";
+  return 0;
+}
+
+class PaintingMemory : public GlTest {};
+
+// By how much the largest picture raises the peak beyond that of a small one, full of hair as the built-in
+// scene is.
+TEST_F(PaintingMemory, APixelTakesWithoutAGpuWhatTheBudgetCounts) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's allocator takes memory of its own";
+#endif
+  if (!context_->info().is_software)
+    GTEST_SKIP() << "on a GPU pictures are not drawn in the process's memory";
+  ProceduralGroomOptions options;
+  options.strand_count = 2'000;
+  options.vertex_count = 16;
+  const auto groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadRadiusM, 4'000), options);
+  GlPainterConfig config;
+  config.asset = std::make_shared<SceneAsset>(make_scene_asset(groom.value(), make_head(kHeadRadiusM)));
+  auto painter = gl_picture_painter(config)();
+  ASSERT_TRUE(painter) << painter.error().to_string();
+  const auto state = std::make_shared<const Snapshot>(make_state(*config.asset, 1));
+  const auto paint = [&](uint32_t width, uint32_t height) {
+    PictureView view;
+    view.size = {width, height};
+    const auto image = (*painter)->paint(state, view);
+    ASSERT_TRUE(image) << image.error().to_string();
+  };
+  paint(32, 18);
+  const uint64_t before = most_resident_bytes();
+  paint(1280, 720);
+  EXPECT_LE(most_resident_bytes() - before, kDrawnPixelBytes * 1280 * 720);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "shaders/shared/bindings.h"
 
@@ -23,6 +24,28 @@ std::vector<uint16_t> make_quad_indices() {
       index.push_back(static_cast<uint16_t>(kCornersPerSegment * segment + corner));
   return index;
 }
+
+/// A software renderer keeps the triangles of all draws until it gets to them, hundreds of megabytes for a
+/// picture full of hair. It gets one draw while it works at the one before.
+class DrawQueue {
+ public:
+  explicit DrawQueue(bool is_software) : is_software_(is_software) {}
+  ~DrawQueue() { glDeleteSync(before_); }
+  DrawQueue(const DrawQueue&) = delete;
+  DrawQueue& operator=(const DrawQueue&) = delete;
+  /// Call behind every draw.
+  void wait_for_the_one_before() {
+    if (!is_software_) return;
+    const GLsync now = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (before_ != nullptr) glClientWaitSync(before_, GL_SYNC_FLUSH_COMMANDS_BIT, kLongestWaitNs);
+    glDeleteSync(std::exchange(before_, now));
+  }
+
+ private:
+  static constexpr GLuint64 kLongestWaitNs = 10'000'000'000;
+  const bool is_software_;
+  GLsync before_ = nullptr;
+};
 
 class StrandPass final : public RenderPass {
  public:
@@ -66,10 +89,12 @@ class StrandPass final : public RenderPass {
     program_.set("u_root_color", look.root_color);
     program_.set("u_tip_color", look.tip_color);
     const uint32_t segments = expanded_.segment_count;
+    DrawQueue queue(scene_.is_software);
     for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
       const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
       glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
                                GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
+      queue.wait_for_the_one_before();
     }
     return {};
   }
