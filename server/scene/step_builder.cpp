@@ -107,6 +107,12 @@ void StepBuilder::add_colliders() {
           {glm::vec3(substep.world_from_head_rotation * glm::dvec3(collider.center_m)), collider.radius_m});
 }
 
+glm::dvec3 StepBuilder::head_velocity_mps() const {
+  if (step_.substeps.empty()) return glm::dvec3(0.0);
+  const StepInput& last = step_.substeps.back();
+  return last.head_shift_m / last.h_s;
+}
+
 const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures& features,
                                     double end_time_s) {
   begin(input, end_time_s);

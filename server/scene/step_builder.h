@@ -41,6 +41,8 @@ class StepBuilder {
   const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
 
   const Pose& world_from_head() const { return world_from_head_; }
+  /// Of the head joint during the last substep of the newest step, world.
+  glm::dvec3 head_velocity_mps() const;
 
  private:
   SceneDesc scene_;

@@ -315,7 +315,6 @@ void SimLoop::step(int64_t time_ns) {
   turn.is_stopping = &is_stopping_;
   CHECK(stages_->step(turn, &*timer_).ok());  // stages of a step cannot fail
   if (is_stopping_) return;
-  head_velocity_mps_ = turn.head_velocity_mps;
   step_times_.add_ms(stages_->last_step_ms());
   last_step_ns_ = now_ns();
   if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
@@ -328,7 +327,6 @@ void SimLoop::publish() {
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
   input.motion_time_ns = input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
-  input.head_velocity_mps = head_velocity_mps_;
   CHECK(stages_->publish(turn).ok());  // likewise
   std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
   if (config_.on_publish) config_.on_publish(snapshot);

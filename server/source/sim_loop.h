@@ -126,7 +126,6 @@ class SimLoop {
   bool has_state_readers_ = false;
   Histogram step_times_;
   InputFrame input_;
-  glm::dvec3 head_velocity_mps_{0.0};     // during the last substep
   uint64_t next_quarantine_report_ = 1;   // at so many broken strands since start
   uint64_t next_overstretch_report_ = 1;  // at so many over-stretched ones
   uint64_t tick_ = 0;

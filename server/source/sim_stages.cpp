@@ -33,7 +33,6 @@ void run_substeps(StageTurn& turn) {
   for (const StepInput& substep : step.substeps) {
     if (turn.is_stopping != nullptr && *turn.is_stopping) return;  // many of a slow solver take long
     turn.solver.substep(substep);
-    turn.head_velocity_mps = substep.head_shift_m / substep.h_s;
   }
 }
 
@@ -57,8 +56,10 @@ SimStages::SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& 
   };
   add({"publish/read", {state_.get()}, {&host_state_}, true, {}},
       [](StageTurn& turn) { turn.publisher.read(turn.solver); });
-  add({"publish/quantise", {&host_state_}, {&snapshot_}, true, {}},
-      [](StageTurn& turn) { turn.snapshot = turn.publisher.quantise(turn.publish); });
+  add({"publish/quantise", {&host_state_}, {&snapshot_}, true, {}}, [](StageTurn& turn) {
+    turn.publish.head_velocity_mps = turn.builder.head_velocity_mps();
+    turn.snapshot = turn.publisher.quantise(turn.publish);
+  });
   CHECK(publish_.plan({state_.get()}, {&snapshot_}).ok());
   plan_step(reasons);
 }

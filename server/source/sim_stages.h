@@ -35,9 +35,7 @@ struct StageTurn : gl::PassTurn {
   InputFrame input;
   double end_time_s = 0.0;                         // of the step, simulated
   const std::atomic<bool>* is_stopping = nullptr;  // looked at between substeps; may be null
-  // and gives
-  glm::dvec3 head_velocity_mps{0.0};  // during its last substep
-  // Publishing takes
+  // Publishing takes, besides how the head moved in the newest step,
   PublishInput publish;
   // and gives
   std::shared_ptr<const Snapshot> snapshot;

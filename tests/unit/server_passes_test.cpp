@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "common/groom/groom_asset.h"
 #include "server/app/explain.h"
 #include "server/scene/scene_content.h"
@@ -88,13 +90,14 @@ class RecordingSolver final : public Solver {
     steps.push_back(input);
     if (steps.size() == stop_after) is_stopping = true;
   }
-  void read(SolverState&) override {}
-  void write(const SolverState&) override {}
+  void read(SolverState& out) override { out = state; }
+  void write(const SolverState& in) override { state = in; }
   void rebase(const glm::dquat& world_from_head_rotation) override {
     jumps.push_back(world_from_head_rotation);
   }
   uint64_t memory_bytes() const override { return 0; }
 
+  SolverState state;
   std::vector<StepInput> steps;
   std::vector<glm::dquat> jumps;
   size_t stop_after = 0;
@@ -190,6 +193,28 @@ TEST(SimStages, AStepEndsBetweenSubstepsWhenItIsToldToStop) {
   world.solver.stop_after = 3;
   ASSERT_TRUE(world.step(1));
   EXPECT_EQ(world.solver.steps.size(), 3u);
+}
+
+// So that it is at rest seen from the head: what it is told when it is written back.
+TEST(SimStages, AStrandThatIsPutBackMovesWithTheHeadOfTheNewestStep) {
+  for (const uint32_t substeps : {1u, 4u}) {
+    SceneDesc scene = bare_scene();
+    scene.substeps = substeps;
+    StageWorld world(scene);
+    const size_t vertices = world.content.groom.rest_position_m.size();
+    world.solver.state.position_m.assign(vertices, glm::vec3(std::numeric_limits<float>::quiet_NaN()));
+    world.solver.state.velocity_mps.assign(vertices, glm::vec3(0.0f));
+    ASSERT_TRUE(world.step(1));
+    ASSERT_TRUE(world.step(2));  // 0.01 m to the side and 0.002 m up
+    StageTurn turn(world.builder, world.solver, world.publisher);
+    ASSERT_TRUE(world.stages.publish(turn));
+    ASSERT_FALSE(world.publisher.quarantined().empty());
+    world.publisher.repair(world.solver);
+    const glm::dvec3 head_mps = glm::dvec3(0.01, 0.002, 0.0) * scene.step_rate_hz;
+    ASSERT_EQ(world.solver.state.velocity_mps.size(), vertices);
+    for (const glm::vec3& velocity_mps : world.solver.state.velocity_mps)
+      EXPECT_LT(glm::distance(glm::dvec3(velocity_mps), head_mps), 1e-5);
+  }
 }
 
 TEST(Explain, NamesEverySolverAndPrintsTheListAsItIs) {
