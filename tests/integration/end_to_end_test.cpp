@@ -19,6 +19,7 @@
 #include "common/motion/motion_clip.h"
 #include "common/render/renderer.h"
 #include "tests/support/raw_client.h"
+#include "tests/support/sample_look.h"
 #include "tests/support/server_fixture.h"
 #include "tests/support/temporary_folder.h"
 
@@ -87,6 +88,8 @@ class EndToEnd : public test::ServerFixture {
   void SetUp() override {
     ServerConfig config;
     config.scene = test::small_scene(kStrands, kVertices);
+    config.scene.look = sample_look();  // all of it has to reach the viewers
+    config.scene.camera = sample_camera();
     config.scene.stream.frame_width = 96;
     config.scene.stream.frame_height = 64;
     config.on_publish = [this](const auto& snapshot) { observer_.saw(*snapshot); };

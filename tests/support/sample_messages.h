@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/wire/messages.h"
+#include "tests/support/sample_look.h"
 
 namespace strandcast {
 
@@ -42,11 +43,8 @@ inline std::vector<ServerMessage> sample_server_messages() {
   welcome.vertex_count = 16;
   welcome.bound_m = 2e-5f;
   welcome.step_rate_hz = 120.0;
-  welcome.look.root_color = {0.5f, 0.25f, 0.0f};
-  welcome.look.followers = 7;
-  welcome.look.light_direction = {0.0f, -1.0f, 0.0f};
-  welcome.look.ambient = 0.0f;
-  welcome.camera.offset_m = {0.0f, 0.0f, 2.0f};
+  welcome.look = sample_look();
+  welcome.camera = sample_camera();
   welcome.frame_width = 1280;
   welcome.frame_height = 720;
   welcome.role = Role::Admin;

@@ -41,13 +41,20 @@ TEST(SendGate, BeforeTheFirstAcknowledgementAFewBytesGo) {
 
 TEST(SendGate, WhatIsOnItsWayIsBoundedWhateverTheLinkSeemed) {
   LinkEstimate link;
-  link.on_acked({kMaxInFlightBytes, kBeginNs - 2 * kNsPerMs, true, true}, kBeginNs);  // without end
-  for (const size_t bytes : {size_t{1}, size_t{100'000}}) {
+  link.on_acked({1'000'000, kBeginNs - 2 * kNsPerMs, true, true}, kBeginNs);  // without end
+  // 512 frames, and no other once there are 4 MiB.
+  constexpr size_t kFourMiB = 4'194'304;
+  for (const auto& [bytes, most] : std::vector<std::pair<size_t, uint32_t>>{{1, 512},
+                                                                            {8'192, 512},
+                                                                            {8'193, 512},
+                                                                            {8'209, 511},
+                                                                            {100'000, 42},
+                                                                            {kFourMiB, 1},
+                                                                            {10 * kFourMiB, 1}}) {
     SendGate gate(link);
     uint32_t count = 0;
     while (count < 2'000 && gate.may_send(kUsual, kBeginNs)) gate.on_sent(frame(++count), bytes, kBeginNs);
-    EXPECT_LE(count, kMaxInFlightFrames);
-    EXPECT_LT(gate.in_flight_bytes(), kMaxInFlightBytes + bytes);
+    EXPECT_EQ(count, most) << bytes;
     EXPECT_EQ(gate.in_flight_bytes(), count * bytes);
   }
 }

@@ -1,8 +1,10 @@
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 
 #include "common/replay/clock_offset.h"
+#include "common/scene/scene_fields.h"
 #include "common/strands/frame_header.h"
 #include "common/wire/messages.h"
 #include "tests/support/sample_messages.h"
@@ -56,6 +58,36 @@ TEST(WireMessages, EveryFieldComesBack) {
     const auto decoded = decode_server_message(encode(message));
     EXPECT_TRUE(decoded && *decoded == message) << "server message " << message.index();
   }
+}
+
+/// The values of a look or camera by name.
+struct FieldValues {
+  template <class Value>
+  void number(const char* name, Value& value, const scene_fields::Range&) {
+    values[name] = {static_cast<double>(value)};
+  }
+  void vector(const char* name, const glm::vec3& value, const scene_fields::Range&) {
+    values[name] = {value.x, value.y, value.z};
+  }
+  void color(const char* name, const glm::vec3& value, const scene_fields::Range& range) {
+    vector(name, value, range);
+  }
+  void require(const char* name, bool holds, const char* what) { EXPECT_TRUE(holds) << name << " " << what; }
+  std::map<std::string, std::vector<double>> values;
+};
+
+// A field that is lost on its way comes back as the default: the sample has none of these.
+TEST(WireMessages, TheSampleOfALookHasNoDefaultInIt) {
+  LookDesc look = sample_look(), usual_look;
+  CameraDesc camera = sample_camera(), usual_camera;
+  FieldValues sample, usual;
+  scene_fields::visit_look(sample, look);
+  scene_fields::visit_look(usual, usual_look);
+  scene_fields::visit_camera(sample, camera);
+  scene_fields::visit_camera(usual, usual_camera);
+  EXPECT_EQ(sample.values.size(), 14u);
+  for (const auto& [name, values] : sample.values)
+    for (size_t i = 0; i < values.size(); ++i) EXPECT_NE(values[i], usual.values.at(name)[i]) << name;
 }
 
 TEST(WireMessages, EveryEnumeratorComesBack) {
