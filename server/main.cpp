@@ -1,6 +1,7 @@
 // strandcast-server: reads the command line, serves until a signal. Exit code 0 after a clean stop, 2 for bad
 // input.
 #include <pthread.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdio>
@@ -9,6 +10,7 @@
 #include "common/base/file.h"
 #include "common/base/profile.h"
 #include "common/groom/groom_asset.h"
+#include "common/log/line_writer.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
@@ -24,8 +26,13 @@ constexpr int kExitFailure = 1;
 constexpr long kPollNs = 100'000'000;
 constexpr double kNsPerS = 1e9;
 
+/// Where nobody reads, the program ends all the same.
+void tell(std::string_view sentence) {
+  LineWriter(STDERR_FILENO).write(fmt::format("strandcast-server: {}\n", sentence));
+}
+
 int fail(const Error& error) {
-  fmt::print(stderr, "strandcast-server: {}\n", error.to_string());
+  tell(error.to_string());
   return kExitBadInput;
 }
 
@@ -109,7 +116,7 @@ int serve(const ServerOptions& options, ServerConfig config) {
   const std::optional<Error> failure = (*server)->failure();
   (*server)->stop();
   if (failure) {
-    fmt::print(stderr, "strandcast-server: {}\n", failure->to_string());
+    tell(failure->to_string());
     return kExitFailure;
   }
   return 0;
@@ -139,7 +146,7 @@ int main(int argc, char** argv) {
   try {
     return strandcast::run(argc, argv);
   } catch (const std::exception& exception) {
-    std::fprintf(stderr, "strandcast-server: %s\n", exception.what());
+    strandcast::tell(exception.what());
     return strandcast::kExitFailure;
   }
 }

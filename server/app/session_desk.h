@@ -45,7 +45,6 @@ class SessionDesk : public NetHandler {
   void on_command(SessionId session, const ControlCommand& command) override;
   void on_parameter(SessionId session, const SetParameter& parameter) override;
   void on_camera(SessionId session, const CameraChange& camera) override;
-  void on_ack(SessionId, const FrameAck&) override {}
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }
   void on_picture_request(SessionId, PictureClass picture_class) override {

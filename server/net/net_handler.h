@@ -64,7 +64,6 @@ class NetHandler {
   virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
   /// May change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
-  virtual void on_ack(SessionId session, const FrameAck& ack) = 0;
   /// An admin wants the server to end.
   virtual void on_shut_down(SessionId) {}
   /// The session waits for a keyframe of this strand class given to publish_strands(). Repeated until one

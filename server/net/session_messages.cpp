@@ -109,10 +109,7 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                           follow_picture_class(before);
                         },
                         [&](const KeyframeRequest&) { start_again(arrival_ns); },
-                        [&](const FrameAck& ack) {
-                          on_ack(ack, arrival_ns);
-                          handler.on_ack(id_, ack);
-                        },
+                        [&](const FrameAck& ack) { on_ack(ack, arrival_ns); },
                         [&](const Ping& ping) {
                           queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
                         },

@@ -6,6 +6,7 @@
 #include "client/net/http_get.h"
 #include "client/net/viewer_client.h"
 #include "common/wire/close_code.h"
+#include "tests/support/client_config.h"
 #include "tests/support/eventually.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_messages.h"
@@ -14,6 +15,7 @@ namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
+using test::config_for;
 using test::FakePeer;
 using test::FakeServer;
 using test::make_welcome;
@@ -22,13 +24,6 @@ using testing::HasSubstr;
 constexpr uint32_t kStrands = 20;
 constexpr uint32_t kVertices = 8;
 constexpr milliseconds kLong{20'000};  // never reached by code that works
-
-ClientConfig config_for(uint16_t port) {
-  ClientConfig config;
-  config.address = {"127.0.0.1", port};
-  config.hello.name = "test";
-  return config;
-}
 
 /// The error of connecting to a server that runs this script.
 Error refusal(const FakeServer::Script& script, milliseconds timeout = kLong) {

@@ -12,6 +12,7 @@
 #include "client/app/stream_check.h"
 #include "common/pictures/image_codec.h"
 #include "common/pictures/video_codec.h"
+#include "tests/support/client_config.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/temporary_folder.h"
@@ -21,19 +22,13 @@ namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
+using test::config_for;
 using test::FakePeer;
 using test::FakeServer;
 using test::make_welcome;
 using testing::HasSubstr;
 
 constexpr milliseconds kLong{20'000};  // never reached by code that works
-
-ClientConfig config_for(uint16_t port) {
-  ClientConfig config;
-  config.address = {"127.0.0.1", port};
-  config.hello.name = "test";
-  return config;
-}
 
 ViewOptions headless_options(uint16_t port) {
   ViewOptions options;

@@ -7,6 +7,7 @@
 
 #include "client/app/viewer_session.h"
 #include "client/app/viewer_thread.h"
+#include "tests/support/client_config.h"
 #include "tests/support/eventually.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/hair_motion.h"
@@ -15,6 +16,7 @@ namespace strandcast {
 namespace {
 
 using std::chrono::milliseconds;
+using test::config_for;
 using test::FakePeer;
 using test::FakeServer;
 using test::make_welcome;
@@ -23,13 +25,6 @@ using testing::HasSubstr;
 constexpr uint32_t kStrands = 20;
 constexpr uint32_t kVertices = 8;
 constexpr milliseconds kLong{20'000};  // never reached by code that works
-
-ClientConfig config_for(uint16_t port) {
-  ClientConfig config;
-  config.address = {"127.0.0.1", port};
-  config.hello.name = "test";
-  return config;
-}
 
 /// Zeros that zstd makes a thousandth of.
 std::vector<std::byte> zstd_bomb(size_t zeros) {

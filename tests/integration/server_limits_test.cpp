@@ -7,20 +7,12 @@ namespace strandcast {
 namespace {
 
 using test::code;
+using test::kToken;
 using test::RawClient;
-
-constexpr const char* kToken = "0123456789abcdef";
+using test::strict_config;
 
 class ServerLimits : public test::ServerNet {
  protected:
-  /// Loopback treated like any other address, which the limits per address are for.
-  static NetConfig strict() {
-    NetConfig config;
-    config.tokens = {{kToken, Grant::AllButAdmin}};
-    config.loopback_trust = LoopbackTrust::LikeAllOthers;
-    config.limits.connections_per_s = 1e6;
-    return config;
-  }
   uint16_t port() const { return server_->port(); }
 };
 
@@ -88,7 +80,7 @@ void expect_connection_limit(uint16_t port, size_t limit) {
 }
 
 TEST_F(ServerLimits, ConnectionsOfOneAddress) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.handshake_ms = 60'000;
   start(config);
   expect_connection_limit(port(), 16);
@@ -113,7 +105,7 @@ std::unique_ptr<RawClient> connect_for(uint16_t port, int last) {
 
 // From 80 addresses, some silent and some behind the upgrade: more than there are places without a Hello.
 TEST_F(ServerLimits, StrangersFillNeitherTheHallNorHealthz) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.handshake_ms = 60'000;
   config.limits.sessions = 2;
   config.trusted_proxies = {*parse_address_range("127.0.0.1")};
@@ -147,7 +139,7 @@ TEST_F(ServerLimits, StrangersFillNeitherTheHallNorHealthz) {
 
 // One address with many connections loses one of its own to a newcomer.
 TEST_F(ServerLimits, WhoHasMostGivesAPlace) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.handshake_ms = 60'000;
   config.trusted_proxies = {*parse_address_range("127.0.0.1")};
   config.proxy_protocol = ProxyProtocol::Version2;
@@ -206,7 +198,7 @@ TEST(NetLimitsByDefault, AreAsPromised) {
 }
 
 TEST_F(ServerLimits, ConnectionsPerSecond) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.connections_per_s = 1.0;
   start(config);
   // A place comes back every second; unit tests have the exact figures.
@@ -243,7 +235,7 @@ uint16_t close_code_with(uint16_t port, const std::string& token) {
 }
 
 TEST_F(ServerLimits, WrongTokensOfOneAddress) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.wrong_token_window_ms = config.limits.wrong_token_block_ms = 3'600'000;
   start(config);
   for (uint32_t i = 0; i < config.limits.wrong_tokens; ++i)
@@ -258,7 +250,7 @@ TEST_F(ServerLimits, WrongTokensOfOneAddress) {
 }
 
 TEST_F(ServerLimits, WrongTokensForMetricsCountToo) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.wrong_tokens = 0;
   config.limits.wrong_token_block_ms = 3'600'000;
   start(config);
@@ -275,7 +267,7 @@ TEST_F(ServerLimits, WrongTokensForMetricsCountToo) {
 }
 
 TEST_F(ServerLimits, ABlockEnds) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.wrong_tokens = 0;
   config.limits.wrong_token_block_ms = 50;
   start(config);
@@ -284,7 +276,7 @@ TEST_F(ServerLimits, ABlockEnds) {
 }
 
 TEST_F(ServerLimits, WrongTokensOnTrustedLoopbackDoNotBlock) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.loopback_trust = LoopbackTrust::Trusted;
   config.limits.wrong_tokens = 0;
   config.limits.wrong_token_block_ms = 3'600'000;

@@ -9,19 +9,12 @@ namespace strandcast {
 namespace {
 
 using test::code;
+using test::kToken;
 using test::RawClient;
-
-constexpr const char* kToken = "0123456789abcdef";
+using test::strict_config;
 
 class ServerLog : public test::ServerNet {
  protected:
-  static NetConfig strict() {
-    NetConfig config;
-    config.tokens = {{kToken, Grant::AllButAdmin}};
-    config.loopback_trust = LoopbackTrust::LikeAllOthers;
-    config.limits.connections_per_s = 1e6;
-    return config;
-  }
   void request(const std::string& text) {
     RawClient client(server_->port());
     client.send_raw(text);
@@ -45,7 +38,7 @@ class ServerLog : public test::ServerNet {
 };
 
 TEST_F(ServerLog, EveryRefusalHasItsLine) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.sessions = 1;
   config.limits.handshake_ms = 60'000;
   config.limits.refusal_lines_per_address = 100;
@@ -80,7 +73,7 @@ TEST_F(ServerLog, EveryRefusalHasItsLine) {
 }
 
 TEST_F(ServerLog, SilenceHasItsLine) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.handshake_ms = 50;
   start(config);
   RawClient silent(server_->port());
@@ -89,7 +82,7 @@ TEST_F(ServerLog, SilenceHasItsLine) {
 }
 
 TEST_F(ServerLog, ABlockAndARateHaveTheirLines) {
-  NetConfig config = strict();
+  NetConfig config = strict_config();
   config.limits.wrong_tokens = 0;
   config.limits.connections_per_s = 3.0;
   start(config);
@@ -103,7 +96,7 @@ TEST_F(ServerLog, ABlockAndARateHaveTheirLines) {
 }
 
 TEST_F(ServerLog, NobodyFillsIt) {
-  start(strict());
+  start(strict_config());
   for (int i = 0; i < 30; ++i) request("GET /secret HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
   EXPECT_EQ(refused("path"), 10u);
   EXPECT_EQ(server_->counters().refused_http, 30u) << "all are counted";
@@ -111,7 +104,7 @@ TEST_F(ServerLog, NobodyFillsIt) {
 
 // Such a line would have fail2ban shut out whom the attacker names.
 TEST_F(ServerLog, TextsOfStrangersMakeNoLines) {
-  start(strict());
+  start(strict_config());
   const std::string forged = "x 12:00:00.000 warning [net] refused 198.51.100.1 token: x";
   request("GET /healthz HTTP/1.1\r\nHost: " + forged + "\r\n\r\n");
   request("GET /\xc2\x85\xe2\x80\xa8\xe2\x80\xae HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");

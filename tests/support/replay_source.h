@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/profile.h"
 #include "server/stream/state_source.h"
 
 namespace strandcast::test {
@@ -31,6 +32,7 @@ class ReplaySource : public StateSource {
   SimStats stats() const override {
     SimStats stats;
     stats.tick = stats.published = next_;
+    stats.last_step_ns = now_ns();  // it can put the next one at any time
     return stats;
   }
   std::optional<Error> failure() const override { return std::nullopt; }

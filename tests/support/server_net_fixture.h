@@ -30,6 +30,16 @@ inline EncodedFramePtr media(Opcode opcode, uint32_t sequence, uint32_t base_seq
   return make_encoded_frame(header, std::vector<std::byte>(payload_bytes, std::byte{0x5a}));
 }
 
+inline constexpr const char* kToken = "0123456789abcdef";
+/// Needs that token, and treats loopback like any other address, which the limits per address are for.
+inline NetConfig strict_config() {
+  NetConfig config;
+  config.tokens = {{kToken, Grant::AllButAdmin}};
+  config.loopback_trust = LoopbackTrust::LikeAllOthers;
+  config.limits.connections_per_s = 1e6;
+  return config;
+}
+
 /// A chain of strand frames like an encoder's; also the handler that counts what reached the application.
 class FakeApp : public NetHandler {
  public:
@@ -60,7 +70,6 @@ class FakeApp : public NetHandler {
   }
   void on_parameter(SessionId, const SetParameter&) override { ++parameters; }
   void on_camera(SessionId, const CameraChange&) override { ++cameras; }
-  void on_ack(SessionId, const FrameAck& ack) override { last_ack = ack.sequence; }
   void on_shut_down(SessionId) override { ++shut_downs; }
   Status readiness() override {
     if (is_stepping) return {};
@@ -98,7 +107,6 @@ class FakeApp : public NetHandler {
   size_t asset_bytes = 1'000;
   std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0},
       shut_downs{0};
-  std::atomic<uint32_t> last_ack{0};
   std::atomic<bool> left_twice{false}, is_stepping{true};
 
  private:

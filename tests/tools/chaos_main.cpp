@@ -2,6 +2,7 @@
 // server.
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <csignal>
 #include <iostream>
 #include <thread>
 
@@ -117,6 +118,7 @@ Status run(const CommandLine& line) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);  // whoever read what is printed may have gone
   CLI::App app("Strandcast chaos: relays TCP connections to a server over a link that is bad on purpose.",
                "strandcast-chaos");
   CommandLine line;
