@@ -186,12 +186,8 @@ void StreamHub::change_stream(const StreamDesc& stream) {
   const std::vector<StrandClass> classes = classes_of(stream);
   const std::shared_ptr<void> until_told(nullptr,
                                          [this, stream, classes](void*) { begin_stream(stream, classes); });
-  std::set<StreamReader*> readers;
-  {
-    const std::lock_guard lock(mutex_);
-    for (const auto& [id, entry] : entries_) readers.insert(entry.reader);
-  }
-  for (StreamReader* reader : readers) reader->on_stream_change(classes, until_told);
+  give([](const Entry&) { return true; },
+       [&](StreamReader& reader) { reader.on_stream_change(classes, until_told); });
 }
 
 void StreamHub::begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes) {

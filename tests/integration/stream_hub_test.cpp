@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <thread>
 
 #include "common/strands/strand_codec.h"
 #include "tests/support/frame_recorder.h"
@@ -173,6 +174,35 @@ TEST_F(StreamOfARecording, TheNetworkHearsOfAChangeOfTheStreamWhileNobodyIsConne
   const auto viewer = open(client_config());
   ASSERT_NE(viewer, nullptr);
   EXPECT_TRUE(pump_until({viewer.get()}, [&] { return viewer->quality().rate_divisor == 3; }));
+}
+
+/// Takes its time to hear of a change.
+class SlowReader : public StreamReader {
+ public:
+  void on_stream_change(const std::vector<StrandClass>&, std::shared_ptr<void>) override {
+    is_being_told = true;
+    (void)eventually([this] { return may_go.load(); });
+    is_being_told = false;
+  }
+  std::atomic<bool> is_being_told{false}, may_go{false};
+};
+
+TEST_F(StreamOfARecording, AReaderThatWasRemovedIsNotBeingToldOfAChange) {
+  SlowReader reader;
+  const ReaderId id = server_->hub().add(reader);
+  std::thread changing([&] { server_->hub().change_stream(server_->hub().stream()); });
+  ASSERT_TRUE(eventually([&] { return reader.is_being_told.load(); }));
+  std::atomic<bool> is_removed{false};
+  std::thread removing([&] {
+    server_->hub().remove(id);
+    EXPECT_FALSE(reader.is_being_told);
+    is_removed = true;
+  });
+  give_time_to_misbehave();
+  EXPECT_FALSE(is_removed) << "it may end its life then";
+  reader.may_go = true;
+  changing.join();
+  removing.join();
 }
 
 /// Asks for what it needs from within what it is given, as a recorder that begins a file does.
