@@ -106,10 +106,6 @@ const std::vector<KnownBreak>& known_breaks() {
   constexpr const char* kStaticFollow =
       "static Follow-The-Leader takes velocities from projected positions and gives the leader no share: it "
       "feeds itself (Mueller et al. 2012, section 3)";
-  constexpr const char* kUnstableStyle =
-      "a hair of real constants and 0.25 m is too limp for this style: the style is an equilibrium, as "
-      "sag_free asks, but not a stable one, and rounding is enough to leave it; the double reference leaves "
-      "it too";
   constexpr const char* kDraggedAlong =
       "a vertex that moves drags the others along by geometry, with no mass behind it: a kick or a push "
       "along "
@@ -157,12 +153,6 @@ const std::vector<KnownBreak>& known_breaks() {
       {"direct_rod", "stiffness", "x1e7", Measure::Speed, 15.6, kTooStiffForFloat},
       {"direct_rod", "stiffness", "x1e8", Measure::Speed, 15.6, kTooStiffForFloat},
       {"direct_rod", "stiffness", "x1e9", Measure::Speed, 15.6, kTooStiffForFloat},
-      {"direct_rod", "input", "NaN in everything", Measure::Style, 0.185, kUnstableStyle},
-      {"direct_rod", "input", "infinity in everything", Measure::Style, 0.185, kUnstableStyle},
-      {"direct_rod", "input", "zero quaternion", Measure::Style, 0.185, kUnstableStyle},
-      {"direct_rod", "rest", "hanging hair", Measure::Style, 0.185, kUnstableStyle},
-      {"direct_rod", "rest", "standing hair", Measure::Style, 0.410, kUnstableStyle},
-      {"direct_rod", "rest", "hanging hair, many steps", Measure::Style, 0.185, kUnstableStyle},
   };
   return breaks;
 }

@@ -1,5 +1,7 @@
 #include "server/report/stability_run.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -156,6 +158,10 @@ Result<StabilityOutcome> StabilityRunner::run(const SolverRow& row, const Stabil
   if (const Status allowed = check_step(row, complete, longest_substep_s(trial)); !allowed) {
     outcome.refusal = allowed.error().message;
     return outcome;
+  }
+  if (row.prepare && trial.is_groom_carried) {
+    ASSIGN_OR_RETURN(const auto notes, row.prepare(*trial.groom, complete, trial.gravity_mps2, {}));
+    outcome.note += fmt::format("{}{}", outcome.note.empty() ? "" : "; ", fmt::join(notes, "; "));
   }
   ASSIGN_OR_RETURN(Solver * solver, solver_for(row, complete));
   const glm::dquat first_rotation = head_at(trial, 0.0).rotation;

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct GpuSolverContext {
   KernelForm form = KernelForm::Auto;
   /// The strands to work on, which outlive the solver as the caller likes; nullptr = the solver's own.
   std::shared_ptr<StrandState> strands = {};
+  /// Gravity that the steps will say the groom has its shape under, as far as it is known: what follows from
+  /// it is then found by load() and not by the first step.
+  glm::dvec3 groom_gravity_in_head_mps2 = {};
 };
 
 struct SolverRow {
@@ -56,6 +60,13 @@ struct SolverRow {
   /// False: there is no kernel. make_gpu then makes the double-precision solver as well, which runs on one
   /// thread of the processor, slowly, through the same interface.
   bool has_kernel = true;
+  /// Does ahead what takes long of loading a groom under this gravity, so that load() finds it done, and
+  /// gives what a person should know of the groom under this model, a sentence each. Any thread; ends early,
+  /// with nothing, when told to stop. Empty = loading takes no time.
+  std::function<Result<std::vector<std::string>>(const Groom&, const SolverParameters&,
+                                                 const glm::dvec3& groom_gravity_in_head_mps2,
+                                                 const std::stop_token&)>
+      prepare;
   std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const GpuSolverContext&)> make_gpu;
   std::function<std::unique_ptr<Solver>(const SolverParameters&)>
       make_reference;  // double precision, one thread

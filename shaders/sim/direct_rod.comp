@@ -41,21 +41,21 @@ void add_edge(Rod rod, Edge edge, float excess, vec3 force0, vec3 force1, float 
 void add_joint_between(Rod rod, uint vertex, Edge before, Edge edge, vec3 joint_tangent, inout Row row0,
                        inout Row row1, inout Row row2) {
   float per_length = 2.0 / (before.length_m + edge.length_m);
-  float bending = u_stiffness * per_length;
+  float bending = rod.stiffness * per_length;
   Side start = edge_side(before.direction, before.axis, joint_tangent, 1.0, before.rate, before.length_m);
   Side end = edge_side(edge.direction, edge.axis, joint_tangent, -1.0, edge.rate, edge.length_m);
   if (vertex == rod.first) {
     start = clamp_side(rod.clamp_direction, rod.clamp_axis);
-    bending = clamp_stiffness(edge.tension, edge.length_m);
+    bending = clamp_stiffness(rod, edge.tension, edge.length_m);
   }
 #if HAS_PINNED_TAIL
   if (vertex > rod.tail) {
     end = clamp_side(rod.tail_direction, rod.tail_axis);
     per_length = 2.0 / before.length_m;
-    bending = clamp_stiffness(before.tension, before.length_m);
+    bending = clamp_stiffness(rod, before.tension, before.length_m);
   }
 #endif
-  add_joint(rod, start, end, bending, u_twist_stiffness * per_length, row0, row1, row2);
+  add_joint(rod, start, end, bending, rod.twist_stiffness * per_length, row0, row1, row2);
 }
 
 void forward(Rod rod, uint solve) {
@@ -361,9 +361,13 @@ Rod make_rod(uint strand) {
   rod.clamp_turn = 0.5 * rod.inverse_h *
                    vec3(u_step.carry[1].z - u_step.carry[2].y, u_step.carry[2].x - u_step.carry[0].z,
                         u_step.carry[0].y - u_step.carry[1].x);
+  const vec4 tail_and_stiffness = texelFetch(u_strand, int(2u * rod.stride + strand));
+  rod.stiffness = tail_and_stiffness.w;
+  const vec4 tail_axis_and_twist = texelFetch(u_strand, int(3u * rod.stride + strand));
+  rod.twist_stiffness = tail_axis_and_twist.w;
 #if HAS_PINNED_TAIL
-  rod.tail_direction = turned_with_head(texelFetch(u_strand, int(2u * rod.stride + strand)).xyz);
-  rod.tail_axis = turned_with_head(texelFetch(u_strand, int(3u * rod.stride + strand)).xyz);
+  rod.tail_direction = turned_with_head(tail_and_stiffness.xyz);
+  rod.tail_axis = turned_with_head(tail_axis_and_twist.xyz);
 #endif
   rod.mean_segment = clamp_and_mean.w;
 

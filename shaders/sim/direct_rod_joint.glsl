@@ -2,8 +2,8 @@
 // system.
 #include "sim/direct_rod_band.glsl"
 
-float clamp_stiffness(float tension, float segment) {
-  const float b = u_stiffness;
+float clamp_stiffness(Rod rod, float tension, float segment) {
+  const float b = rod.stiffness;
   const float pull = max(tension, 0.0) * segment * segment;
   return (b + 0.5 * sqrt(b * pull) + sqrt(b * (b + 0.25 * pull))) / segment;
 }

@@ -10,7 +10,8 @@ layout(binding = kUnitVelocityChange) uniform samplerBuffer u_velocity_change;  
 layout(binding = kUnitRodEdge) uniform samplerBuffer u_edge;
 // Planes of one vector per strand: direction of the clamp, w = mean length of a free edge; its axis, w =
 // length of the shortest edge with a direction;
-// direction of a clamp at the tip and its axis. Head space.
+// direction of a clamp at the tip, w = EI / (rho A) of the strand, m^4/s^2; axis of that clamp, w = GJ / (rho A).
+// Head space.
 layout(binding = kUnitRodStrand) uniform samplerBuffer u_strand;
 layout(binding = kUnitRodAxis) uniform samplerBuffer u_axis;  // material axes, world; w = spin, rad
 layout(std430, binding = kBindingDisplacement) writeonly restrict buffer DisplacementBlock {
@@ -22,8 +23,6 @@ layout(std430, binding = kBindingVelocityChange) writeonly restrict buffer Veloc
 layout(std430, binding = kBindingRodAxis) writeonly restrict buffer AxisBlock { vec4 value[]; } b_axis;
 layout(std430, binding = kBindingRodScratch) restrict buffer RodScratchBlock { vec4 value[]; } b_scratch;
 
-uniform float u_stiffness;        // EI / (rho A), m^4/s^2
-uniform float u_twist_stiffness;  // GJ / (rho A), m^4/s^2
 uniform float u_spin_inertia;     // of the section about the tangent, over its area, m^2
 uniform float u_tip_length;       // of hair as heavy as the bead at the tip, m
 uniform float u_bending_damping;  // s
@@ -62,6 +61,8 @@ struct Rod {
   vec3 tail_axis;
 #endif
   float mean_segment;
+  float stiffness;  // EI / (rho A), m^4/s^2
+  float twist_stiffness;
   float shortest;   // edges shorter at rest continue the one before
   float penalty;
   vec3 force;       // gravity and drag towards the mean wind, world

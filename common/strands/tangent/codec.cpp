@@ -9,7 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/strands/byte_io.h"
-#include "common/strands/side_by_side.h"
+#include "common/base/side_by_side.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/symbols.h"
 #include "common/strands/zstd_block.h"

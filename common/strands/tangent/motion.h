@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/strands/side_by_side.h"
+#include "common/base/side_by_side.h"
 #include "common/strands/tangent/head.h"
 #include "common/strands/tangent/layout.h"
 

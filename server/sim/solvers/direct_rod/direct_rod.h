@@ -12,6 +12,9 @@
 //     Bergou et al. 2008, section 5, for rods of any rest shape).
 //   time: second-order backward differences (order 2, with steps of any length) or backward Euler.
 //
+//   style: a groom is an equilibrium with sag_free, but not always a stable one. Strands that would leave it
+//     have bending and twist times a factor found once (direct_rod_style.h), the same along the strand.
+//
 // After each solve every edge gets its exact length back. The twist of a straight rod with a free tip is
 // zero: the kernel has a variant without. Vertices that coincide at rest are a hinge.
 #pragma once
@@ -33,6 +36,7 @@ struct RodParameters {
   uint32_t solves = 1;         // linear solves per step
   uint32_t order = 2;          // of the time integration
   double sag_free = 0.0;       // share of the groom's weight that its rest shape carries
+  double style_margin = 0.0;   // of the groomed shape's stability, see direct_rod_style.h; 0 = none is sought
 };
 
 RodParameters read_rod_parameters(const SolverParameters& parameters);

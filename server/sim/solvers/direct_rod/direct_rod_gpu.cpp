@@ -4,6 +4,7 @@
 
 #include "server/sim/gpu_solver.h"
 #include "server/sim/solvers/direct_rod/direct_rod_rest.h"
+#include "server/sim/solvers/direct_rod/direct_rod_style.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 
@@ -42,15 +43,15 @@ glm::dvec3 rest_direction(const glm::dvec3& joint_tangent) {
 class DirectRodGpu final : public GpuSolver {
  public:
   DirectRodGpu(const RodParameters& parameters, const GpuSolverContext& context)
-      : GpuSolver(context, shared_parameters(parameters)), parameters_(parameters) {}
+      : GpuSolver(context, shared_parameters(parameters)),
+        parameters_(parameters),
+        known_gravity_in_head_mps2_(limited(context.groom_gravity_in_head_mps2, kMaxGravityMps2)) {}
 
   Status compile(const RodVariant& wanted) {
     const KernelDesc kernel = {
         "sim/direct_rod.comp",
         {{"HAS_PINNED_TAIL", wanted.has_pinned_tail ? 1 : 0}, {"HAS_TWIST", wanted.has_twist ? 1 : 0}},
-        {{"u_stiffness", parameters_.stiffness_m4ps2},
-         {"u_tip_length", parameters_.tip_length_m},
-         {"u_twist_stiffness", parameters_.twist_stiffness_m4ps2},
+        {{"u_tip_length", parameters_.tip_length_m},
          {"u_spin_inertia", parameters_.spin_inertia_m2},
          {"u_bending_damping", parameters_.bending_damping_s},
          {"u_solves", parameters_.solves},
@@ -62,7 +63,7 @@ class DirectRodGpu final : public GpuSolver {
 
  private:
   Status prepare() override {
-    groom_gravity_in_head_mps2_ = glm::dvec3(0.0);
+    groom_gravity_in_head_mps2_ = known_gravity_in_head_mps2_;
     rest_shape_ = make_rest_arrays();
     // Under weight that is known later even a straight rod has a bent rest shape.
     const bool can_twist = parameters_.twist_stiffness_m4ps2 > 0.0;
@@ -141,13 +142,16 @@ class DirectRodGpu final : public GpuSolver {
     arrays.strand.resize(size_t{kStrandPlanes} * strand_count);
     arrays.axis.resize(size);
     arrays.tension_m2ps2.assign(size, 0.0f);
+    const auto fit = fit_rod_style(layout(), parameters_, groom_gravity_in_head_mps2_);
     for (uint32_t s = 0; s < strand_count; ++s) {
-      const RodRest rest = make_rod_rest(layout(), s, parameters_, groom_gravity_in_head_mps2_);
+      const RodShape shape = make_rod_shape(layout(), s, parameters_, groom_gravity_in_head_mps2_);
+      const RodRest rest = make_rod_rest(shape, parameters_, static_cast<double>(fit->stiffening[s]));
       arrays.most_turn_rad = std::max(arrays.most_turn_rad, rest.turn_rad);
       arrays.strand[s] = glm::vec4(glm::dvec4(rest.clamp_direction, rest.mean_segment_m));
       arrays.strand[strand_count + s] = glm::vec4(glm::dvec4(rest.clamp_axis, rest.shortest_m));
-      arrays.strand[2 * strand_count + s] = glm::vec4(glm::dvec4(rest.tail_direction, 0.0));
-      arrays.strand[3 * strand_count + s] = glm::vec4(glm::dvec4(rest.tail_axis, 0.0));
+      const RodParameters rod = stiffened(parameters_, rest.stiffening);
+      arrays.strand[2 * strand_count + s] = glm::vec4(glm::dvec4(rest.tail_direction, rod.stiffness_m4ps2));
+      arrays.strand[3 * strand_count + s] = glm::vec4(glm::dvec4(rest.tail_axis, rod.twist_stiffness_m4ps2));
       for (uint32_t i = 0; i < layout().vertex_count; ++i) {
         const size_t at = layout().index(i, s);
         const bool is_clamp = i == layout().pinned_root_count || i > layout().tail_begin();
@@ -223,11 +227,12 @@ class DirectRodGpu final : public GpuSolver {
   RodParameters parameters_;
   StrandPrograms programs_;
   RodVariant variant_;
+  glm::dvec3 known_gravity_in_head_mps2_;       // before any step tells
   glm::dvec3 groom_gravity_in_head_mps2_{0.0};  // under which the rest shape was found
   RestArrays rest_shape_;                       // on its way to the planes
   uint32_t batch_ = 0;                          // strands per dispatch
   StrandPlane edge_;    // (vertex_count x strand_count) joint in the frame before it; length, m
-  StrandPlane strand_;  // (kStrandPlanes x strand_count) clamps at root and tip
+  StrandPlane strand_;  // (kStrandPlanes x strand_count) clamps at root and tip, stiffness
   StrandPlane axis_;    // (vertex_count x strand_count) material axis, world; spin in the last step, rad
   StrandPlane displacement_;     // (vertex_count x strand_count) world, m, during the last step
   StrandPlane velocity_change_;  // (vertex_count x strand_count) world, m/s, during the last step

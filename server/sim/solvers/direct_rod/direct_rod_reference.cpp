@@ -6,6 +6,7 @@
 #include "server/sim/reference_contact.h"
 #include "server/sim/reference_solver.h"
 #include "server/sim/solvers/direct_rod/direct_rod_rest.h"
+#include "server/sim/solvers/direct_rod/direct_rod_style.h"
 
 namespace strandcast {
 namespace {
@@ -97,7 +98,7 @@ class RodMotion {
  public:
   RodMotion(const RodParameters& parameters, const StrandLayout& layout, uint32_t strand_index,
             const ReferenceStep& step, RodStrand& strand)
-      : parameters_(parameters),
+      : parameters_(stiffened(parameters, strand.rest.stiffening)),
         step_(step),
         strand_(strand),
         n_(layout.vertex_count),
@@ -433,7 +434,7 @@ class RodMotion {
     strand_.history_step_s = 0.0;
   }
 
-  const RodParameters& parameters_;
+  const RodParameters parameters_;  // of this strand
   const ReferenceStep& step_;
   RodStrand& strand_;
   uint32_t n_;
@@ -508,9 +509,11 @@ class DirectRodReference final : public ReferenceSolver {
 
   /// The rest shape; what has not moved yet starts in it, with the tensions and frames it has as loaded.
   void set_rest() {
+    const auto fit = fit_rod_style(layout(), parameters_, groom_gravity_in_head_mps2_);
     for (uint32_t s = 0; s < layout().strand_count; ++s) {
       RodStrand& strand = strands_[s];
-      strand.rest = make_rod_rest(layout(), s, parameters_, groom_gravity_in_head_mps2_);
+      const RodShape shape = make_rod_shape(layout(), s, parameters_, groom_gravity_in_head_mps2_);
+      strand.rest = make_rod_rest(shape, parameters_, static_cast<double>(fit->stiffening[s]));
       for (uint32_t i = 0; i < layout().vertex_count && is_at_rest(); ++i) {
         strand.vertex[i].tension_m2ps2 = strand.rest.tension_m2ps2[i];
         strand.vertex[i].axis = head().world_from_head_rotation * strand.rest.axis[i];

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "server/sim/solvers/direct_rod/direct_rod_style.h"
+
 namespace strandcast {
 namespace {
 
@@ -14,14 +16,6 @@ constexpr double kShortestShare = 1e-3;
 constexpr double kShortestM = 1e-6;
 // 1 + cos below this: the edge folds back, any rotation will do.
 constexpr double kFoldedBack = 1e-6;
-// A joint that would have to turn further than this holds no more load.
-constexpr double kMaxRestAngleRad = 2.5;
-
-glm::dvec3 any_perpendicular(const glm::dvec3& direction) {
-  const glm::dvec3 other =
-      std::abs(direction.x) < 0.6 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
-  return glm::normalize(glm::cross(direction, other));
-}
 
 /// Directions of all edges; an edge too short for one continues the one before it.
 std::vector<glm::dvec3> edge_directions(const StrandLayout& layout, uint32_t strand_index,
@@ -43,14 +37,6 @@ std::vector<glm::dvec3> edge_directions(const StrandLayout& layout, uint32_t str
 glm::dvec3 rotated(const glm::dvec3& vector, const glm::dvec3& axis, double angle_rad) {
   return glm::angleAxis(angle_rad, axis) * vector;
 }
-
-/// Strain of a joint that carries a moment: a bend about an axis at right angles to the mean tangent, and a
-/// twist about the mean tangent.
-struct JointStrain {
-  glm::dvec3 bend_axis{1.0, 0.0, 0.0};
-  double bend_rad = 0.0;
-  double twist_rad = 0.0;
-};
 
 /// The stiffnesses are moments per angle over mass per length.
 JointStrain strain_under(const glm::dvec3& moment, const glm::dvec3& tangent, double bend_stiffness,
@@ -80,11 +66,6 @@ glm::dvec3 half_strained(const JointStrain& strain, const glm::dvec3& tangent, c
                  sign * 0.5 * strain.twist_rad);
 }
 
-struct RestJoint {
-  JointStrain strain;
-  glm::dvec3 tangent{0.0};  // mean tangent, as loaded
-};
-
 struct JointEdges {
   glm::dvec3 before{0.0};
   glm::dvec3 after{0.0};
@@ -95,45 +76,40 @@ struct JointEdges {
 /// The strain under which a joint between two directions carries a moment. Its axes stand relative to the
 /// mean tangent, which in turn depends on the strain: found by repetition. A clamp (no edge before) has the
 /// edge's direction for the tangent. `side` is the tangent of edges that fold back onto each other.
-RestJoint joint_under(const glm::dvec3& moment, const JointEdges& edges, double bend_stiffness,
-                      double twist_stiffness) {
+RodJoint joint_under(const glm::dvec3& moment, const JointEdges& edges, double bend_stiffness,
+                     double twist_stiffness) {
   const auto& [before, after, side, is_clamp] = edges;
   constexpr int kRounds = 60;
-  RestJoint joint;
+  RodJoint joint;
+  joint.bend_stiffness = bend_stiffness;
+  joint.twist_stiffness = twist_stiffness;
   const glm::dvec3 sum = is_clamp ? after : before + after;
   joint.tangent = glm::dot(sum, sum) > 2.0 * kFoldedBack ? glm::normalize(sum) : side;
+  glm::dvec3 last_but_one(0.0);
   for (int round = 0; round < kRounds; ++round) {
     joint.strain = strain_under(moment, joint.tangent, bend_stiffness, twist_stiffness);
     const glm::dvec3 end = half_strained(joint.strain, joint.tangent, after, -1.0);
     const glm::dvec3 start = half_strained(joint.strain, joint.tangent, before, 1.0);
     const glm::dvec3 middle = is_clamp ? end : start + end;
     if (glm::dot(middle, middle) <= 2.0 * kFoldedBack) break;
-    joint.tangent = glm::normalize(middle);
+    const glm::dvec3 tangent = glm::normalize(middle);
+    // What repeats itself has settled, into one value or two that differ by a rounding: nothing new comes.
+    const bool is_settled = tangent == joint.tangent;
+    const bool ends_here = tangent == last_but_one && (kRounds - 1 - round) % 2 == 0;
+    last_but_one = joint.tangent;
+    joint.tangent = tangent;
+    if (is_settled || ends_here) break;
   }
   // The bend axis of the last round, at right angles to the last tangent.
   joint.strain = strain_under(moment, joint.tangent, bend_stiffness, twist_stiffness);
   return joint;
 }
 
-/// Moment of every joint of the shape as loaded, from the tip: what the edge after it and the next joint
-/// leave over.
-std::vector<glm::dvec3> moments_of(const StrandLayout& layout, const std::vector<glm::dvec3>& direction,
-                                   const std::vector<glm::dvec3>& load, const RodRest& rest) {
-  std::vector<glm::dvec3> moment(layout.vertex_count + 1, glm::dvec3(0.0));
-  for (uint32_t i = layout.vertex_count - 1; i >= layout.pinned_root_count; --i) {
-    const double length = soft_length_m(rest.segment_m[i], rest.mean_segment_m);
-    moment[i] = moment[i + 1] + length * glm::cross(direction[i], load[i]);
-  }
-  return moment;
-}
-
-/// Tangents and frames of all joints behind the clamp's direction, for the given moments.
-void set_joints(const StrandLayout& layout, const RodParameters& parameters,
-                const std::vector<glm::dvec3>& direction, const std::vector<glm::dvec3>& moment,
-                RodRest& rest) {
-  const uint32_t n = layout.vertex_count;
-  const uint32_t first = layout.pinned_root_count;
-  const auto soft = [&rest](uint32_t i) { return soft_length_m(rest.segment_m[i], rest.mean_segment_m); };
+/// Tangents and frames of all joints behind the clamp's direction.
+void set_joints(const RodShape& shape, const RodParameters& parameters, RodRest& rest) {
+  const uint32_t n = shape.vertex_count();
+  const uint32_t first = shape.first;
+  const std::vector<glm::dvec3>& direction = shape.direction;
   rest.joint_tangent.assign(n, glm::dvec3(0.0, 0.0, 1.0));
   rest.axis.assign(n, glm::dvec3(1.0, 0.0, 0.0));
   if (first >= n) {
@@ -141,15 +117,8 @@ void set_joints(const StrandLayout& layout, const RodParameters& parameters,
     rest.clamp_axis = any_perpendicular(rest.clamp_direction);
     return;
   }
-  const double b = parameters.stiffness_m4ps2;
-  const double c = parameters.twist_stiffness_m4ps2;
   for (uint32_t i = first; i < n; ++i) {
-    const bool is_clamp = i == first;
-    const double per_length = is_clamp ? 2.0 / soft(i) : 2.0 / (soft(i - 1) + soft(i));
-    const double bend = is_clamp ? clamp_stiffness(b, rest.tension_m2ps2[i], soft(i)) : b * per_length;
-    const JointEdges edges = {direction[i - 1], direction[i], glm::cross(direction[i - 1], rest.axis[i - 1]),
-                              is_clamp};
-    const RestJoint joint = joint_under(moment[i], edges, bend, c * per_length);
+    const RodJoint joint = joint_at(shape, i, parameters, glm::cross(direction[i - 1], rest.axis[i - 1]));
     const JointStrain& strain = joint.strain;
     // Half a bend, the twist, half a bend: from the frame on one side of the joint to that on the other.
     const auto strained = [&](const glm::dvec3& vector, double sign) {
@@ -158,7 +127,7 @@ void set_joints(const StrandLayout& layout, const RodParameters& parameters,
                      sign * 0.5 * strain.bend_rad);
     };
     const glm::dvec3 start_tangent = rotated(joint.tangent, strain.bend_axis, -0.5 * strain.bend_rad);
-    if (is_clamp) {
+    if (i == first) {
       rest.clamp_direction = start_tangent;
       rest.clamp_axis = any_perpendicular(start_tangent);
       rest.axis[i] = strained(rest.clamp_axis, 1.0);
@@ -170,7 +139,7 @@ void set_joints(const StrandLayout& layout, const RodParameters& parameters,
                                glm::dot(start_tangent, before)};
       const glm::dvec3 unstrained = strained(direction[i], -1.0);
       rest.axis[i] = strained(carried_axis(axis, before, unstrained), 1.0);
-      if (i < layout.tail_begin() + 1)
+      if (i < shape.tail_begin + 1)
         rest.turn_rad += 2.0 * std::acos(std::clamp(rest.joint_tangent[i].z, -1.0, 1.0));
     }
     // Roundings of the rotations above.
@@ -198,7 +167,18 @@ RodParameters read_rod_parameters(const SolverParameters& parameters) {
   result.solves = read_count(parameters, "solves");
   result.order = read_count(parameters, "order");
   result.sag_free = parameters.at("sag_free");
+  result.style_margin = parameters.at("style_margin");
   return result;
+}
+
+glm::dvec3 any_perpendicular(const glm::dvec3& direction) {
+  const glm::dvec3 other =
+      std::abs(direction.x) < 0.6 ? glm::dvec3(1.0, 0.0, 0.0) : glm::dvec3(0.0, 1.0, 0.0);
+  return glm::normalize(glm::cross(direction, other));
+}
+
+double RodShape::soft_m(uint32_t i) const {
+  return soft_length_m(segment_m[i], mean_segment_m);
 }
 
 double soft_length_m(double segment_m, double mean_segment_m) {
@@ -226,36 +206,66 @@ glm::dvec3 untwisted_axis(const glm::dvec3& axis, const glm::dvec3& from, const 
   return carried_axis(carried_axis(axis, from, unstrained), unstrained, to);
 }
 
-RodRest make_rod_rest(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
-                      const glm::dvec3& groom_gravity_in_head_mps2) {
-  const uint32_t n = layout.vertex_count;
-  const uint32_t first = layout.pinned_root_count;
-  RodRest rest;
-  rest.segment_m.assign(n, 0.0);
-  double free_length = 0.0;
-  for (uint32_t i = 1; i < n; ++i) {
-    rest.segment_m[i] = static_cast<double>(layout.rest[layout.index(i, strand_index)].w);
-    if (i >= first) free_length += rest.segment_m[i];
-  }
-  rest.mean_segment_m = first < n ? std::max(free_length / (n - first), kMinSoftLengthM) : kMinSoftLengthM;
+RodParameters stiffened(const RodParameters& parameters, double factor) {
+  RodParameters result = parameters;
+  result.stiffness_m4ps2 *= factor;
+  result.twist_stiffness_m4ps2 *= factor;
+  return result;
+}
 
-  rest.shortest_m = std::max(kShortestShare * rest.mean_segment_m, kShortestM);
-  const std::vector<glm::dvec3> direction = edge_directions(layout, strand_index, rest.shortest_m);
+RodShape make_rod_shape(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
+                        const glm::dvec3& groom_gravity_in_head_mps2) {
+  const uint32_t n = layout.vertex_count;
+  RodShape shape;
+  const uint32_t first = shape.first = layout.pinned_root_count;
+  shape.tail_begin = layout.tail_begin();
+  shape.segment_m.assign(n, 0.0);
+  for (uint32_t i = 1; i < n; ++i) {
+    shape.segment_m[i] = static_cast<double>(layout.rest[layout.index(i, strand_index)].w);
+    if (i >= first) shape.free_length_m += shape.segment_m[i];
+  }
+  shape.mean_segment_m =
+      first < n ? std::max(shape.free_length_m / (n - first), kMinSoftLengthM) : kMinSoftLengthM;
+  shape.shortest_m = std::max(kShortestShare * shape.mean_segment_m, kShortestM);
+  shape.direction = edge_directions(layout, strand_index, shape.shortest_m);
 
   const double share = layout.pinned_tail_count == 0 ? parameters.sag_free : 0.0;
-  // Weight beyond each edge, per mass per length; half of every edge's mass at either end.
-  std::vector<glm::dvec3> load(n, glm::dvec3(0.0));
-  rest.tension_m2ps2.assign(n, 0.0);
+  shape.load.assign(n, glm::dvec3(0.0));
+  shape.tension_m2ps2.assign(n, 0.0);
   double beyond = parameters.tip_length_m;
   for (uint32_t i = n - 1; i >= first && i > 0; --i) {
-    const double length = soft_length_m(rest.segment_m[i], rest.mean_segment_m);
-    load[i] = share * (beyond + 0.5 * length) * groom_gravity_in_head_mps2;
-    beyond += length;
-    rest.tension_m2ps2[i] = glm::dot(load[i], direction[i]);
+    shape.load[i] = share * (beyond + 0.5 * shape.soft_m(i)) * groom_gravity_in_head_mps2;
+    beyond += shape.soft_m(i);
+    shape.tension_m2ps2[i] = glm::dot(shape.load[i], shape.direction[i]);
   }
-  set_joints(layout, parameters, direction, moments_of(layout, direction, load, rest), rest);
-  const uint32_t tail = std::min(layout.tail_begin(), n - 1);
-  rest.tail_direction = direction[tail];
+  // From the tip: what the edge after a joint and the next joint leave over.
+  shape.moment.assign(n + 1, glm::dvec3(0.0));
+  for (uint32_t i = n - 1; i >= first && i > 0; --i)
+    shape.moment[i] = shape.moment[i + 1] + shape.soft_m(i) * glm::cross(shape.direction[i], shape.load[i]);
+  return shape;
+}
+
+RodJoint joint_at(const RodShape& shape, uint32_t i, const RodParameters& parameters,
+                  const glm::dvec3& side_when_folded) {
+  const bool is_clamp = i == shape.first;
+  const double b = parameters.stiffness_m4ps2;
+  const double soft = shape.soft_m(i);
+  const double per_length = is_clamp ? 2.0 / soft : 2.0 / (shape.soft_m(i - 1) + soft);
+  const double bend = is_clamp ? clamp_stiffness(b, shape.tension_m2ps2[i], soft) : b * per_length;
+  const JointEdges edges = {shape.direction[i - 1], shape.direction[i], side_when_folded, is_clamp};
+  return joint_under(shape.moment[i], edges, bend, parameters.twist_stiffness_m4ps2 * per_length);
+}
+
+RodRest make_rod_rest(const RodShape& shape, const RodParameters& parameters, double stiffening) {
+  RodRest rest;
+  rest.stiffening = stiffening;
+  rest.segment_m = shape.segment_m;
+  rest.tension_m2ps2 = shape.tension_m2ps2;
+  rest.mean_segment_m = shape.mean_segment_m;
+  rest.shortest_m = shape.shortest_m;
+  set_joints(shape, stiffened(parameters, stiffening), rest);
+  const uint32_t tail = std::min(shape.tail_begin, shape.vertex_count() - 1);
+  rest.tail_direction = shape.direction[tail];
   rest.tail_axis = rest.axis[tail];
   return rest;
 }
@@ -284,6 +294,10 @@ SolverRow direct_rod_row() {
        "rate at which strands take on the velocity of the air; a single hair has about 10"},
       {"sag_free", 0.0, 0.0, 1.0, "",
        "share of the groom's weight that its rest shape carries: 1 = the groom as loaded is the equilibrium"},
+      {"style_margin", kHangingMargin, 0.0, 10.0, "",
+       "strands whose groomed shape would not last get the least stiffness with which it does: its softest "
+       "motion then has this times g / length for its frequency squared; 1.446 = as a chain that hangs, 0 = "
+       "real hair, which may leave its style"},
       {"solves", 1.0, 1.0, 4.0, "", "linear solves per step (rounded)"},
       {"order", 2.0, 1.0, 2.0, "", "order of the time integration: 1 = backward Euler (rounded)"},
       {"collider_friction", 0.3, 0.0, 10.0, "", "Coulomb friction of strands on colliders"},
@@ -299,6 +313,7 @@ SolverRow direct_rod_row() {
                             {"bending_damping_s", 0.0},
                             {"air_drag_per_s", 0.0}};
   };
+  row.prepare = prepare_rod_style;
   row.make_gpu = make_direct_rod_gpu;
   row.make_reference = make_direct_rod_reference;
   return row;

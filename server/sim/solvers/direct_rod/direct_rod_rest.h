@@ -22,6 +22,7 @@ struct RodRest {
   double mean_segment_m = 0.0;  // of the free edges
   double shortest_m = 0.0;      // edges shorter at rest continue the one before them
   double turn_rad = 0.0;        // natural bending angles of the joints between free edges, added up
+  double stiffening = 1.0;      // of bending and twist, to hold the style; see direct_rod_style.h
   /// Rest tangent at the joint before the edge, in the frame (axis, direction x axis, direction) of the edge
   /// before; in the frame of the edge after it is (-x, -y, z).
   std::vector<glm::dvec3> joint_tangent;
@@ -30,10 +31,53 @@ struct RodRest {
   std::vector<double> tension_m2ps2;  // to start with: of a sag-free shape, else 0
 };
 
+/// A strand as loaded and what weighs on it, whatever its stiffness. Head space; entry i of a vector belongs
+/// to the edge that ends at vertex i.
+struct RodShape {
+  uint32_t first = 1;  // free vertices are first .. tail_begin - 1
+  uint32_t tail_begin = 0;
+  double free_length_m = 0.0;
+  double mean_segment_m = 0.0;  // of the free edges
+  double shortest_m = 0.0;      // edges shorter at rest continue the one before them
+  std::vector<double> segment_m;
+  std::vector<glm::dvec3> direction;
+  std::vector<glm::dvec3> load;       // weight that pulls at it, over mass per length; half of its own
+  std::vector<glm::dvec3> moment;     // that the joint before it carries; one more, 0
+  std::vector<double> tension_m2ps2;  // of that load
+  uint32_t vertex_count() const { return static_cast<uint32_t>(segment_m.size()); }
+  double soft_m(uint32_t i) const;  // soft_length_m() of the edge
+};
+
 /// `groom_gravity_in_head_mps2` counts for a sag-free shape only. A strand pinned at both ends is never
 /// sag-free.
-RodRest make_rod_rest(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
-                      const glm::dvec3& groom_gravity_in_head_mps2);
+RodShape make_rod_shape(const StrandLayout& layout, uint32_t strand_index, const RodParameters& parameters,
+                        const glm::dvec3& groom_gravity_in_head_mps2);
+
+/// Strain of a joint that carries a moment: a bend about an axis at right angles to the mean tangent, and a
+/// twist about the mean tangent.
+struct JointStrain {
+  glm::dvec3 bend_axis{1.0, 0.0, 0.0};
+  double bend_rad = 0.0;
+  double twist_rad = 0.0;
+};
+
+/// A joint as loaded.
+struct RodJoint {
+  JointStrain strain;
+  glm::dvec3 tangent{0.0};      // mean tangent
+  double bend_stiffness = 0.0;  // moment per angle over mass per length
+  double twist_stiffness = 0.0;
+};
+
+/// The joint before edge i, under the moment that the shape puts on it. Edges that fold back onto each other
+/// have no mean tangent: it is `side_when_folded`.
+RodJoint joint_at(const RodShape& shape, uint32_t i, const RodParameters& parameters,
+                  const glm::dvec3& side_when_folded);
+
+/// The parameters with bending and twist so many times as stiff.
+RodParameters stiffened(const RodParameters& parameters, double factor);
+
+RodRest make_rod_rest(const RodShape& shape, const RodParameters& parameters, double stiffening);
 
 /// The axis of an edge's frame on the next edge: turned by the smallest rotation from one direction to the
 /// other. All unit vectors, `axis` at right angles to `from`.
@@ -42,6 +86,9 @@ glm::dvec3 carried_axis(const glm::dvec3& axis, const glm::dvec3& from, const gl
 /// The axis behind a joint without twist: turned by the rest rotation, then by the smallest one to `to`.
 glm::dvec3 untwisted_axis(const glm::dvec3& axis, const glm::dvec3& from, const glm::dvec3& to,
                           const glm::dvec3& joint_tangent);
+
+/// A unit vector at right angles to one.
+glm::dvec3 any_perpendicular(const glm::dvec3& direction);
 
 /// Length that stiffness and mass of an edge are computed from: no shorter than a share of the mean, so that
 /// zero-length edges divide nothing by zero.
@@ -64,6 +111,8 @@ inline constexpr double kMaxTrendPerSegment = 0.1;
 // A rod whose joints turn by less than this in all, at rest, bends as a straight one: twist could move its
 // tip by the square of it.
 inline constexpr double kStraightTurnRad = 1e-3;
+// A joint that would have to turn further than this at rest holds no more load.
+inline constexpr double kMaxRestAngleRad = 2.5;
 // theta / sin(theta) is held where sin^2(theta / 2) passes this (a right angle in one joint).
 inline constexpr double kMaxHalfSineSquared = 0.5;
 // A step of more than this times the one before starts with backward Euler. With ratio r order 2 multiplies

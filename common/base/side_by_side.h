@@ -1,5 +1,4 @@
-// Work in parts that know nothing of each other, on as many threads as there are processors. Private to
-// common/strands.
+// Work in parts that know nothing of each other, on as many threads as there are processors.
 #pragma once
 
 #include <algorithm>
