@@ -58,7 +58,9 @@ int explain_command(const ServerOptions& options, const ServerConfig& config) {
   if (unmeasured && unmeasured->code == ErrorCode::Unavailable)
     passes = plan_server(config.scene, asset, facts);
   if (!passes) return fail(passes.error());
-  const auto text = explain_scene(config.scene, asset, facts, *passes);
+  const auto notes = explain_groom(config.scene, content->groom);
+  if (!notes) return fail(notes.error());
+  const auto text = explain_scene(config.scene, asset, facts, *passes, *notes);
   if (!text) return fail(text.error());
   fmt::print("{}", *text);
   if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());

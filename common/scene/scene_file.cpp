@@ -4,6 +4,7 @@
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/text_format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -325,9 +326,24 @@ v1::Scene to_message(const SceneDesc& scene) {
   return message;
 }
 
+/// A groom from a file comes with a style, and keeps it: its shape carries all of its weight, unless the
+/// scene of that file or an override says otherwise. What a scene says of grown hair is not said of a file's.
+void keep_style(v1::Scene& message, bool had_file, const std::vector<std::string>& overrides) {
+  constexpr const char* kSagFree = "sag_free";
+  if (!message.groom().has_file()) return;
+  const bool is_told = std::any_of(overrides.begin(), overrides.end(), [](const std::string& given) {
+    return given.starts_with("solver.parameters.sag_free=");
+  });
+  auto& parameters = *message.mutable_solver()->mutable_parameters();
+  if (is_told || (had_file && parameters.contains(kSagFree))) return;
+  parameters[kSagFree] = 1.0;
+}
+
 Result<SceneDesc> from_message(v1::Scene& message, const pb::TextFormat::ParseInfoTree* tree,
                                const std::string& place, const std::vector<std::string>& overrides) {
+  const bool had_file = message.groom().has_file();
   for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
+  keep_style(message, had_file, overrides);
   Reader reader(message, tree, {place, &overrides});
   SceneDesc scene;
   scene_fields::visit_scene(reader, scene);

@@ -53,7 +53,10 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
   const SceneFeatures features = analyse(scene, bench.facts);
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  ASSIGN_OR_RETURN(auto solver, row->make_gpu(parameters, {&bench.shaders, features}));
+  ASSIGN_OR_RETURN(auto solver,
+                   row->make_gpu(parameters, {.shaders = &bench.shaders,
+                                              .features = features,
+                                              .groom_gravity_in_head_mps2 = scene.gravity_mps2}));
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
   encoder->set_rest_shape(bench.asset.rest_position_m);
@@ -151,8 +154,13 @@ Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneConten
   return join_passes(std::move(bench.passes), facts.frame_viewers > 0);
 }
 
+Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom) {
+  return prepare_solver(scene, groom, scene.gravity_mps2);
+}
+
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
-                                  const gl::PassReports& passes) {
+                                  const gl::PassReports& passes,
+                                  const std::vector<std::string>& groom_notes) {
   RETURN_IF_ERROR(check_solver(scene));
   std::string text = fmt::format(
       "Scene '{}': {} strands x {} vertices, solver {}, {:g} steps of {} substeps per s\n", scene.name,
@@ -161,6 +169,8 @@ Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asse
                       facts.frame_viewers);
   for (const FeatureReason& reason : explain(scene, facts)) text += fact_text(reason);
   for (const FeatureReason& reason : explain(analyse_picture(asset, scene.look))) text += fact_text(reason);
+  if (!groom_notes.empty()) text += "\nGroom\n";
+  for (const std::string& note : groom_notes) text += fmt::format("  {}\n", note);
   text += "\nPasses\n" + to_text(passes);
   text += fmt::format("\nMemory: {} allocated, {} saved\n", size_text(kept_bytes(passes)),
                       size_text(saved_bytes(passes)));

@@ -26,8 +26,13 @@ struct MeasureConfig {
 Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneContent& content,
                                        const RuntimeFacts& facts, const MeasureConfig& config);
 
-/// Facts with reasons, then the passes: kept, not requested or unread, with bytes and milliseconds.
+/// What the scene's solver says of the groom, a sentence each.
+Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom);
+
+/// Facts with reasons, what its solver says of the groom, then the passes: kept, not requested or unread,
+/// with bytes and milliseconds.
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
-                                  const gl::PassReports& passes);
+                                  const gl::PassReports& passes,
+                                  const std::vector<std::string>& groom_notes = {});
 
 }  // namespace strandcast

@@ -43,6 +43,8 @@ class StepBuilder {
   const Pose& world_from_head() const { return world_from_head_; }
   /// Of the head joint during the last substep of the newest step, world.
   glm::dvec3 head_velocity_mps() const;
+  /// Gravity that the groom has its shape under, head space.
+  const glm::dvec3& groom_gravity_in_head_mps2() const { return groom_gravity_in_head_mps2_; }
 
  private:
   SceneDesc scene_;

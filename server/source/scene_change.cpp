@@ -23,6 +23,15 @@ Status check_solver(const SceneDesc& scene) {
   return check_step(*row, *parameters, 1.0 / (scene.step_rate_hz * scene.substeps));
 }
 
+Result<std::vector<std::string>> prepare_solver(const SceneDesc& scene, const Groom& groom,
+                                                const glm::dvec3& groom_gravity_in_head_mps2,
+                                                const std::stop_token& stop) {
+  ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
+  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
+  if (!row->prepare) return std::vector<std::string>{};
+  return row->prepare(groom, parameters, groom_gravity_in_head_mps2, stop);
+}
+
 void fit_parameters(SolverDesc& solver) {
   const auto row = find_solver(solver.name);
   if (!row) return;

@@ -1,10 +1,13 @@
 // What of a scene may change while it runs, and how. Pure functions, any thread.
 #pragma once
 
+#include <glm/glm.hpp>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/groom/groom.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast {
@@ -26,6 +29,12 @@ std::string left_out_note(const SolverDesc& before, const SolverDesc& after);
 /// the new one does not take. Parameters that the overrides themselves name stay and are checked.
 Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_solver,
                                 const std::vector<std::string>& overrides);
+
+/// SolverRow::prepare of the scene's solver, for a groom that has its shape under this gravity: what a person
+/// should know of it, a sentence each. Takes long where it is new, and ends early when told to stop.
+Result<std::vector<std::string>> prepare_solver(const SceneDesc& scene, const Groom& groom,
+                                                const glm::dvec3& groom_gravity_in_head_mps2,
+                                                const std::stop_token& stop = {});
 
 /// Checks the solver's name and parameters of a scene.
 Status check_solver(const SceneDesc& scene);

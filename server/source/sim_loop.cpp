@@ -57,6 +57,7 @@ void SimLoop::stop() {
   }
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
+  preparation_ = {};  // told to stop, and waited for
 }
 
 void SimLoop::run(std::function<void(Status)> on_ready) {
@@ -120,7 +121,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   std::unique_lock lock(mutex_);
   const auto is_awake = [this] {
     const auto is_demand = [](const Job& job) { return std::holds_alternative<SourceDemand>(job.what); };
-    const bool has_turn = !jobs_.empty() && now_ns() >= jobs_rest_ns_;
+    const bool has_turn = !jobs_.empty() && !is_preparing_ && now_ns() >= jobs_rest_ns_;
     return is_stopping_ || has_turn || clock_->has_single_steps() ||
            std::any_of(jobs_.begin(), jobs_.end(), is_demand);
   };
@@ -140,7 +141,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
 /// All news of viewers, and the next command when it has its turn. mutex_ is held.
 std::deque<SimLoop::Job> SimLoop::take_jobs() {
   std::deque<Job> taken;
-  bool has_command = now_ns() < jobs_rest_ns_;
+  bool has_command = is_preparing_ || now_ns() < jobs_rest_ns_;
   for (auto job = jobs_.begin(); job != jobs_.end();) {
     const bool is_command = !std::holds_alternative<SourceDemand>(job->what);
     if (is_command && std::exchange(has_command, true)) {
@@ -155,12 +156,42 @@ std::deque<SimLoop::Job> SimLoop::take_jobs() {
 
 /// After a command others wait, the longer the more it took.
 void SimLoop::carry_out_in_turn(const Job& job) {
+  if (starts_to_prepare(job)) return;
   const int64_t begin_ns = now_ns();
   carry_out(job);
   if (std::holds_alternative<SourceDemand>(job.what)) return;
   const int64_t end_ns = now_ns();
   const double rest_ns = static_cast<double>(end_ns - begin_ns) * (1.0 / kJobShare - 1.0);
   jobs_rest_ns_ = end_ns + static_cast<int64_t>(rest_ns);
+}
+
+/// A change whose solver takes long to load is prepared beside the loop, where hair goes on; it is carried
+/// out, in its place, when that is done.
+bool SimLoop::starts_to_prepare(const Job& job) {
+  const auto* parameter = std::get_if<SetParameter>(&job.what);
+  if (parameter == nullptr || job.is_prepared) return false;
+  const Result<SceneDesc> scene = change_scene(config_.scene, parameter->assignment);
+  if (!scene || scene->solver == config_.scene.solver) return false;
+  const Result<const SolverRow*> row = find_solver(scene->solver.name);
+  if (!row || !(*row)->prepare) return false;
+  {
+    const std::lock_guard lock(mutex_);
+    is_preparing_ = true;
+  }
+  preparation_ =
+      std::jthread([this, job, scene = *scene, content = config_.content,
+                    gravity = builder_->groom_gravity_in_head_mps2()](const std::stop_token& stop) {
+        // Its error comes again, and is told, when the change is carried out.
+        static_cast<void>(prepare_solver(scene, content->groom, gravity, stop));
+        {
+          const std::lock_guard lock(mutex_);
+          jobs_.push_front(job);
+          jobs_.front().is_prepared = true;
+          is_preparing_ = false;
+        }
+        changed_.notify_all();
+      });
+  return true;
 }
 
 void SimLoop::push(Job job) {
@@ -261,7 +292,9 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
   const bool are_on_gpu = solver_ != nullptr && solver_->strands() != nullptr;
   const auto strands = are_on_gpu ? strands_ : std::make_shared<StrandState>();
-  const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands};
+  const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
+  ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
+  const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands, groom_gravity};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, gpu));
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
@@ -277,6 +310,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   log_info("sim", "solver {}: {} strands x {} vertices, {} kB", row->name,
            config_.content->groom.strand_count(), config_.content->groom.uniform_vertex_count(),
            solver_->memory_bytes() / 1000);
+  for (const std::string& note : notes) log_info("sim", "{}", note);
   if (!row->has_kernel)
     log_warn("sim", "solver {} is a reference: it runs in double on one thread of the processor", row->name);
   return {};

@@ -83,6 +83,7 @@ class SimLoop {
   struct Job {
     std::variant<ControlCommand, SetParameter, SourceDemand> what;
     Reply reply;
+    bool is_prepared = false;  // what takes long of it is done
   };
 
   SimLoop(SimLoopConfig config, InputHub& hub, StateSink& sink);
@@ -93,6 +94,7 @@ class SimLoop {
   std::deque<Job> wait_for_jobs();
   std::deque<Job> take_jobs();
   void carry_out_in_turn(const Job& job);
+  bool starts_to_prepare(const Job& job);
   void carry_out(const Job& job);
   Notice command(Command command);
   Notice change(const std::string& assignment);
@@ -140,11 +142,13 @@ class SimLoop {
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable changed_;
   std::deque<Job> jobs_;
+  bool is_preparing_ = false;  // no command is carried out before the one that is being prepared
   std::atomic<bool> is_stopping_{false};
   SimStats stats_;
   std::optional<Error> failure_;
 
-  std::thread thread_;  // last: starts when everything else is there
+  std::jthread preparation_;  // of the command that comes next; started by thread_
+  std::thread thread_;        // last: starts when everything else is there
 };
 
 }  // namespace strandcast

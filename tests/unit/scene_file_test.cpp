@@ -40,7 +40,7 @@ SceneDesc unusual_scene() {
             .is_visible = false,
             .center_m = {0.1f, 0, -0.1f},
             .has_center = true};
-  s.solver = {.name = "other", .parameters = {{"damping", 0.1}, {"k", 1e-300}}};
+  s.solver = {.name = "other", .parameters = {{"damping", 0.1}, {"k", 1e-300}, {"sag_free", 0.25}}};
   s.step_rate_hz = 59.94005994005994;
   s.substeps = 3;
   s.gravity_mps2 = {0.1, -1.0 / 3.0, 2.0};
@@ -260,6 +260,28 @@ TEST(SceneFile, BuiltInSceneIsValidAndTakesOverrides) {
   ASSERT_TRUE(again) << again.error().to_string();
   EXPECT_EQ(again->stream.codec, "delta");
   EXPECT_EQ(again->solver, unusual_scene().solver);
+}
+
+// What the grown hair lets sag says nothing of a groom from a file: that one keeps its style, unless told.
+TEST(SceneFile, AGroomFromAFileKeepsItsStyle) {
+  ASSERT_LT(built_in_scene().solver.parameters.at("sag_free"), 1.0);
+  const auto file = built_in_scene_with({"groom.file.path=hair.tfx"});
+  ASSERT_TRUE(file) << file.error().to_string();
+  EXPECT_EQ(file->solver.parameters.at("sag_free"), 1.0);
+  const auto told = built_in_scene_with({"groom.file.path=hair.tfx", "solver.parameters.sag_free=0.4"});
+  ASSERT_TRUE(told) << told.error().to_string();
+  EXPECT_EQ(told->solver.parameters.at("sag_free"), 0.4);
+  const auto grown = built_in_scene_with({"groom.procedural.strand_count=100"});
+  EXPECT_EQ(grown->solver, built_in_scene().solver);
+  const auto unsaid = parse_scene("groom { file { path: 'a.tfx' } }", "scene", {});
+  ASSERT_TRUE(unsaid) << unsaid.error().to_string();
+  EXPECT_EQ(unsaid->solver.parameters.at("sag_free"), 1.0);
+  // A scene of a file says itself what that file gets.
+  const std::string text =
+      "groom { file { path: 'a.tfx' } } solver { parameters { key: 'sag_free' value: 0.2 } }";
+  const auto stated = parse_scene(text, "scene", {"groom.file.path=b.tfx"});
+  ASSERT_TRUE(stated) << stated.error().to_string();
+  EXPECT_EQ(stated->solver.parameters.at("sag_free"), 0.2);
 }
 
 TEST(SceneFile, BrokenTextNeverCrashesAndAlwaysHasAPlace) {
