@@ -15,8 +15,12 @@ constexpr float kStrandOpacity = 0.30f;
 constexpr float kSurroundingShare = 0.45f;
 // Optical depth per metre inside the skull.
 constexpr float kSkullPerM = 400.0f;
-// More vertices than this are sampled strand by strand in even steps: the sum keeps its mean.
+// More pieces than this are sampled strand by strand in even steps: the sum keeps its mean.
 constexpr size_t kMaxSplats = 60'000;
+// A segment is summed in pieces of at most half a cell: two splats further apart leave less in the cells
+// between them, which shows as dark bands a segment apart. No more pieces than cross half of the volume.
+constexpr float kPiecesPerCell = 2.0f;
+constexpr int kMaxPieces = kMaxLightCells;
 // Coordinates further out, in cells, or not a number say nothing about where the hair is.
 constexpr float kFarCells = 1e6f;
 constexpr int kSizeStep = 4;  // cells; the texture is not made anew for every small movement
@@ -32,6 +36,11 @@ constexpr std::array<Sweep, 6> kSurroundings{{{{0, 1, 0}, 0.3f},
                                               {{-1, 0, 0}, 0.15f},
                                               {{0, 0, 1}, 0.15f},
                                               {{0, 0, -1}, 0.15f}}};
+
+int pieces_of(float length_m, float cell_m) {
+  const float pieces = kPiecesPerCell * length_m / cell_m;
+  return pieces > 1.0f ? static_cast<int>(std::ceil(std::min(pieces, static_cast<float>(kMaxPieces)))) : 1;
+}
 
 uint16_t to_unorm(float value) {
   return static_cast<uint16_t>(std::lround(std::clamp(value, 0.0f, 1.0f) * 65535.0f));
@@ -93,7 +102,8 @@ void LightVolume::add_strands(const std::vector<glm::vec3>& position_m) {
   const size_t keys = desc_.strand_count;
   const uint32_t gaps = desc_.vertex_count < 2 ? 0 : desc_.vertex_count - 1;
   if (keys == 0 || gaps == 0) return;
-  const size_t stride = keys * gaps / kMaxSplats + 1;
+  const auto usual_pieces = static_cast<size_t>(pieces_of(desc_.segment_m, desc_.cell_m));
+  const size_t stride = keys * gaps * usual_pieces / kMaxSplats + 1;
   const float cell_volume = desc_.cell_m * desc_.cell_m * desc_.cell_m;
   const float per_length = desc_.strands_per_key * static_cast<float>(stride) * desc_.strand_width_m *
                            kMeanCrossing * kStrandOpacity / cell_volume;
@@ -101,24 +111,32 @@ void LightVolume::add_strands(const std::vector<glm::vec3>& position_m) {
     for (size_t strand = gap % stride; strand < keys; strand += stride) {
       const glm::vec3& a = position_m[gap * keys + strand];
       const glm::vec3& b = position_m[(gap + 1) * keys + strand];
-      const float amount = per_length * glm::length(b - a);
-      const glm::vec3 cell = (0.5f * (a + b) - origin_m_) / desc_.cell_m - 0.5f;
-      const glm::vec3 low = glm::floor(cell);
-      if (!(glm::all(glm::greaterThanEqual(low, glm::vec3(0.0f))) &&
-            glm::all(glm::lessThan(low, glm::vec3(size_ - 1)))))
-        continue;
-      const glm::vec3 f = cell - low;
-      const size_t base = index(static_cast<int>(low.x), static_cast<int>(low.y), static_cast<int>(low.z));
-      const size_t dy = static_cast<size_t>(size_.x);
-      const size_t dz = dy * static_cast<size_t>(size_.y);
-      for (int corner = 0; corner < 8; ++corner) {
-        const float wx = (corner & 1) ? f.x : 1.0f - f.x;
-        const float wy = (corner & 2) ? f.y : 1.0f - f.y;
-        const float wz = (corner & 4) ? f.z : 1.0f - f.z;
-        crossings_per_m_[base + (corner & 1) + ((corner >> 1) & 1) * dy + (corner >> 2) * dz] +=
-            amount * wx * wy * wz;
-      }
+      const float length_m = glm::length(b - a);
+      const int pieces = pieces_of(length_m, desc_.cell_m);
+      const auto share = 1.0f / static_cast<float>(pieces);
+      for (int piece = 0; piece < pieces; ++piece)
+        splat(glm::mix(a, b, (static_cast<float>(piece) + 0.5f) * share), per_length * length_m * share);
     }
+  }
+}
+
+// Spreads an amount over the eight cells round a point.
+void LightVolume::splat(const glm::vec3& point_m, float amount) {
+  const glm::vec3 cell = (point_m - origin_m_) / desc_.cell_m - 0.5f;
+  const glm::vec3 low = glm::floor(cell);
+  if (!(glm::all(glm::greaterThanEqual(low, glm::vec3(0.0f))) &&
+        glm::all(glm::lessThan(low, glm::vec3(size_ - 1)))))
+    return;
+  const glm::vec3 f = cell - low;
+  const size_t base = index(static_cast<int>(low.x), static_cast<int>(low.y), static_cast<int>(low.z));
+  const size_t dy = static_cast<size_t>(size_.x);
+  const size_t dz = dy * static_cast<size_t>(size_.y);
+  for (int corner = 0; corner < 8; ++corner) {
+    const float wx = (corner & 1) ? f.x : 1.0f - f.x;
+    const float wy = (corner & 2) ? f.y : 1.0f - f.y;
+    const float wz = (corner & 4) ? f.z : 1.0f - f.z;
+    crossings_per_m_[base + (corner & 1) + ((corner >> 1) & 1) * dy + (corner >> 2) * dz] +=
+        amount * wx * wy * wz;
   }
 }
 

@@ -18,6 +18,7 @@ struct LightVolumeDesc {
   float cell_m = 0.012f;
   float strands_per_key = 1.0f;  // drawn strands that one key strand stands for
   float strand_width_m = 0.0002f;
+  float segment_m = 0.0f;  // mean length between two vertices of a strand; 0 = below a cell
   bool has_skull = false;  // an opaque ball under the hair
   FittedSphere skull;
 };
@@ -43,6 +44,7 @@ class LightVolume {
  private:
   void fit_lattice(const std::vector<glm::vec3>& position_m);
   void add_strands(const std::vector<glm::vec3>& position_m);
+  void splat(const glm::vec3& point_m, float amount);
   void add_skull();
   void sweep(const glm::vec3& to_light, std::vector<float>& depth) const;
   size_t index(int x, int y, int z) const { return (static_cast<size_t>(z) * size_.y + y) * size_.x + x; }

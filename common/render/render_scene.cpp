@@ -54,6 +54,8 @@ LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, co
   desc.vertex_count = asset.vertex_count;
   desc.cell_m = std::max(rest.extent_m / kLightCells, kMinLightCellM);
   desc.strand_width_m = 2.0f * look.strand_radius_m;
+  if (asset.vertex_count > 1)
+    desc.segment_m = rest.mean_length_m / static_cast<float>(asset.vertex_count - 1);
   if (asset.strand_count > 0)
     desc.strands_per_key = 1.0f + static_cast<float>(asset.triangle.size() * look.followers) /
                                       static_cast<float>(asset.strand_count);

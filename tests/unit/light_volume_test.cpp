@@ -73,6 +73,34 @@ TEST(LightVolume, SlantedLightGoesAProportionallyLongerWay) {
   EXPECT_NEAR(direct, std::exp(-kPerMetre * depth_m / to_light.y), 0.02);
 }
 
+/// Straight hair along x whose segments are so many cells long, from end to end of the cube.
+Slab make_slab_of_segments(int cells_per_segment) {
+  const Slab fine = make_slab();
+  Slab slab = fine;
+  slab.position_m.clear();
+  slab.desc.segment_m = kCellM * static_cast<float>(cells_per_segment);
+  for (uint32_t i = 0; i < fine.desc.vertex_count; i += static_cast<uint32_t>(cells_per_segment)) {
+    const auto row = fine.position_m.begin() + static_cast<std::ptrdiff_t>(i) * fine.desc.strand_count;
+    slab.position_m.insert(slab.position_m.end(), row, row + fine.desc.strand_count);
+  }
+  slab.desc.vertex_count = (fine.desc.vertex_count - 1) / static_cast<uint32_t>(cells_per_segment) + 1;
+  return slab;
+}
+
+// However long the segments are, hair that is the same along its length shadows the same along its length.
+TEST(LightVolume, LongSegmentsLeaveNoBands) {
+  for (const int cells : {1, 2, 4, 5, 10}) {
+    const Slab slab = make_slab_of_segments(cells);
+    ASSERT_EQ(slab.position_m.size(), size_t{slab.desc.strand_count} * slab.desc.vertex_count);
+    LightVolume volume(slab.desc);
+    volume.build(slab.position_m, {0, 1, 0});
+    const float expected = std::exp(-static_cast<float>(kPerMetre) * 0.105f);
+    for (float x_m = 0.025f; x_m < kSideM - 0.02f; x_m += kCellM)
+      EXPECT_NEAR(direct_at(volume, {x_m, kSideM - 0.105f, 0.5f * kSideM}), expected, 0.02)
+          << cells << " cells a segment, x = " << x_m;
+  }
+}
+
 TEST(LightVolume, NoHairLetsAllLightThrough) {
   LightVolumeDesc desc;
   LightVolume volume(desc);
