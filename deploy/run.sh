@@ -7,7 +7,8 @@ usage() {
   cat <<'TEXT'
 usage: bash deploy/run.sh [options]
 
-  --groom FILE         hair to simulate: TressFX .tfx (v2, v3, v4) or .hair     (default: grown on the spot)
+  --groom FILE         hair to simulate: TressFX .tfx (v2, v3, v4) or .hair     (default: grown on the spot);
+                       hair in several files: the option repeated, or FILE,FILE
   --motion FILE        head motion to feed: BVH                                 (default: built in)
   --motion-unit M      metres per unit of the BVH                               (default: from the body's height)
   --motion-up y|z      up axis of the BVH                                       (default: y)
@@ -37,7 +38,9 @@ while [ $# -gt 0 ]; do
   esac
   [ $# -ge 2 ] || fail "$1 needs a value"
   case "$1" in
-    --groom) need_file "$1" "$2"; server_options+=(--groom "$(realpath "$2")") ;;
+    --groom)
+      if [ -f "$2" ]; then files=("$2"); else IFS=, read -r -a files <<<"$2"; fi
+      for file in "${files[@]}"; do need_file "$1" "$file"; server_options+=(--groom "$(realpath "$file")"); done ;;
     --scene) need_file "$1" "$2"; server_options+=(--scene "$(realpath "$2")") ;;
     --set) server_options+=(--set "$2") ;;
     --motion) need_file "$1" "$2"; motion=$(realpath "$2") ;;

@@ -14,6 +14,7 @@
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
 #include "server/app/explain.h"
+#include "server/app/groom_check.h"
 #include "server/app/options.h"
 #include "server/app/server_passes.h"
 #include "server/net/token_file.h"
@@ -64,6 +65,13 @@ int explain_command(const ServerOptions& options, const ServerConfig& config) {
   if (!text) return fail(text.error());
   fmt::print("{}", *text);
   if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());
+  return 0;
+}
+
+int check_command(const ServerOptions& options, const ServerConfig& config) {
+  const auto text = check_groom(config.scene, options.check_folder, {config.gl_device, config.shader_folder});
+  if (!text) return fail(text.error());
+  fmt::print("{}", *text);
   return 0;
 }
 
@@ -131,12 +139,13 @@ int run(int argc, const char* const* argv) {
   if (options->is_listing_solvers) return fmt::print("{}", list_solvers()), 0;
   init_log(options->log_level);
   // Before anything takes time: a reload of the service may come right after its start.
-  const bool is_serving = !options->is_printing_scene && !options->is_explaining;
+  const bool is_serving = !options->is_printing_scene && !options->is_explaining && !options->is_checking;
   const sigset_t signals = handled_signals();
   if (is_serving) pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   const Result<ServerConfig> config = load_config(*options);
   if (!config) return fail(config.error());
   if (options->is_printing_scene) return fmt::print("{}", to_text(config->scene)), 0;
+  if (options->is_checking) return check_command(*options, *config);
   if (options->is_explaining) return explain_command(*options, *config);
   return serve(*options, *config);
 }

@@ -7,16 +7,11 @@
 
 #include "common/base/text.h"
 #include "common/groom/hair_loader.h"
-#include "common/groom/head_fit.h"
 #include "common/groom/resample.h"
 #include "common/groom/tfx_loader.h"
 
 namespace strandcast {
 namespace {
-
-/// Radii of the sphere through the roots of a human head, child to large adult with a wide hairline.
-constexpr float kSmallestHeadRadiusM = 0.07f, kTypicalHeadRadiusM = 0.1f, kLargestHeadRadiusM = 0.12f;
-constexpr float kCommonUnitsM[] = {1.0f, 0.01f, 0.001f, 0.0254f};  // metre, centimetre, millimetre, inch
 
 Status check_options(const GroomFileOptions& options) {
   if (!std::isfinite(options.unit_m) || options.unit_m < 0.0f) {
@@ -27,6 +22,9 @@ Status check_options(const GroomFileOptions& options) {
       !std::isfinite(options.origin.z)) {
     return make_error(ErrorCode::BadInput, "origin is ({}, {}, {}), it has to be finite", options.origin.x,
                       options.origin.y, options.origin.z);
+  }
+  if (options.yaw_deg && !std::isfinite(*options.yaw_deg)) {
+    return make_error(ErrorCode::BadInput, "yaw_deg is {}, it has to be finite", *options.yaw_deg);
   }
   const uint32_t count = options.vertex_count;
   if (count != 0 && (count < kMinVertexCount || count > kMaxVertexCount)) {
@@ -84,32 +82,135 @@ uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
   return std::clamp(largest, kMinVertexCount, kMaxVertexCount);
 }
 
+/// All parts of the hair in one, one behind the other. Strand coordinates stay when all parts have them.
+Groom join(std::vector<Groom> parts) {
+  Groom whole = std::move(parts.front());
+  for (size_t i = 1; i < parts.size(); ++i) {
+    const Groom& part = parts[i];
+    const auto first = static_cast<uint32_t>(whole.rest_position_m.size());
+    const bool has_uv = !whole.root_uv.empty() && !part.root_uv.empty();
+    whole.name += " + " + part.name;
+    for (size_t strand = 1; strand < part.offset.size(); ++strand)
+      whole.offset.push_back(first + part.offset[strand]);
+    whole.rest_position_m.insert(whole.rest_position_m.end(), part.rest_position_m.begin(),
+                                 part.rest_position_m.end());
+    whole.pinned.insert(whole.pinned.end(), part.pinned.begin(), part.pinned.end());
+    if (has_uv) {
+      whole.root_uv.insert(whole.root_uv.end(), part.root_uv.begin(), part.root_uv.end());
+    } else {
+      whole.root_uv.clear();
+    }
+  }
+  return whole;
+}
+
+/// All files of the options in file units.
+Result<Groom> load_parts(const GroomFileOptions& options) {
+  if (options.more_paths.size() + 1 > kMaxGroomFiles)
+    return make_error(ErrorCode::LimitExceeded, "{} groom files, at most {} make one head of hair",
+                      options.more_paths.size() + 1, kMaxGroomFiles);
+  std::vector<Groom> parts(1);
+  ASSIGN_OR_RETURN(parts.front(), load_by_extension(options.path));
+  uint64_t vertex_total = parts.front().rest_position_m.size();
+  for (const std::filesystem::path& path : options.more_paths) {
+    ASSIGN_OR_RETURN(Groom part, load_by_extension(path));
+    vertex_total += part.rest_position_m.size();
+    if (vertex_total > kMaxGroomVertices)
+      return at(path.string(), make_error(ErrorCode::LimitExceeded,
+                                          "{} vertices with the files before it, at most {} are allowed",
+                                          vertex_total, kMaxGroomVertices));
+    parts.push_back(std::move(part));
+  }
+  return join(std::move(parts));
+}
+
+std::string unit_text(float unit_m) {
+  constexpr float kMmPerM = 1e3f;
+  return unit_m < 0.5f ? fmt::format("{:.4g} mm", unit_m * kMmPerM) : fmt::format("{:.4g} m", unit_m);
+}
+
+std::string size_text(const Groom& groom) {
+  glm::vec3 low = groom.rest_position_m.front(), high = low;
+  for (const glm::vec3& point : groom.rest_position_m) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  const glm::vec3 size_m = high - low;
+  return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
+}
+
+/// Turns, moves and scales a groom in file units.
+PlacedGroom place(Groom groom, const GroomFileOptions& options) {
+  PlacedGroom placed;
+  GroomPlacement& placement = placed.placement;
+  const auto note = [&](const std::string& what, const std::string& reason, const char* setting) {
+    placed.notes.push_back(fmt::format("{}: {} (groom.file.{} states it)", what, reason, setting));
+  };
+  if (options.is_z_up) {
+    placement.is_z_up = *options.is_z_up;
+  } else {
+    const Guess<bool> guess = guess_z_up(groom);
+    placement.is_z_up = guess.value;
+    if (guess.value) note("+Z of the file is up", guess.reason, "up_axis");
+  }
+  GroomPlacement upright;
+  upright.is_z_up = placement.is_z_up;
+  for (glm::vec3& point : groom.rest_position_m) point = upright.place(point);
+  if (options.yaw_deg) {
+    placement.yaw_deg = *options.yaw_deg;
+  } else {
+    const Guess<float> guess = guess_yaw_deg(groom);
+    placement.yaw_deg = guess.value;
+    if (guess.reason.empty()) {
+      note("the face is taken to be at +Z", "the hairline is as high all around", "yaw_deg");
+    } else if (guess.value == 0.0f) {
+      note("it faces +Z", guess.reason, "yaw_deg");
+    } else {
+      note(fmt::format("turned by {} degrees to face +Z", guess.value), guess.reason, "yaw_deg");
+    }
+  }
+  if (options.unit_m > 0.0f) {
+    placement.unit_m = options.unit_m;
+  } else {
+    const Guess<float> guess = guess_unit(groom);
+    placement.unit_m = guess.value;
+    note(fmt::format("1 unit = {}", unit_text(guess.value)),
+         guess.reason.empty() ? "the roots say nothing of a head" : guess.reason, "unit_m");
+  }
+  placement.origin = options.origin;
+  GroomPlacement rest = placement;  // upright by now
+  rest.is_z_up = false;
+  for (glm::vec3& point : groom.rest_position_m) point = rest.place(point);
+  groom.file_unit_m = placement.unit_m;
+  placed.groom = std::move(groom);
+  return placed;
+}
+
 }  // namespace
 
 float guess_unit_m(const Groom& groom) {
-  const float radius = fit_head_sphere(groom).radius_m;
-  if (!std::isfinite(radius) || radius <= 0.0f) return 1.0f;
-  for (const float unit_m : kCommonUnitsM) {
-    if (radius * unit_m >= kSmallestHeadRadiusM && radius * unit_m <= kLargestHeadRadiusM) return unit_m;
-  }
-  return kTypicalHeadRadiusM / radius;
+  return guess_unit(groom).value;
+}
+
+Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
+  const std::string place_name = options.path.string();
+  if (const Status checked = check_options(options); !checked) return at(place_name, checked.error());
+  ASSIGN_OR_RETURN(Groom loaded, load_parts(options));
+  PlacedGroom placed = place(std::move(loaded), options);
+  // Before resampling, so that overflown coordinates never enter its sums.
+  if (const Status checked = validate(placed.groom); !checked) return at(place_name, checked.error());
+  const uint32_t vertex_count = target_vertex_count(placed.groom, options.vertex_count);
+  if (placed.groom.uniform_vertex_count() != vertex_count)
+    placed.groom = resample(placed.groom, vertex_count);
+  if (options.pinning) placed.groom = with_pinning(std::move(placed.groom), *options.pinning);
+  placed.notes.push_back(fmt::format("{} strands x {} vertices, {}", placed.groom.strand_count(),
+                                     placed.groom.uniform_vertex_count(), size_text(placed.groom)));
+  return placed;
 }
 
 Result<Groom> load_groom(const GroomFileOptions& options) {
-  if (const Status checked = check_options(options); !checked)
-    return at(options.path.string(), checked.error());
-  ASSIGN_OR_RETURN(Groom groom, load_by_extension(options.path));
-  for (glm::vec3& point : groom.rest_position_m) {
-    if (options.is_z_up) point = glm::vec3(point.x, point.z, -point.y);
-  }
-  groom.file_unit_m = options.unit_m > 0.0f ? options.unit_m : guess_unit_m(groom);
-  for (glm::vec3& point : groom.rest_position_m) point = (point - options.origin) * groom.file_unit_m;
-  // Before resampling, so that overflown coordinates never enter its sums.
-  if (const Status checked = validate(groom); !checked) return at(options.path.string(), checked.error());
-  const uint32_t vertex_count = target_vertex_count(groom, options.vertex_count);
-  if (groom.uniform_vertex_count() != vertex_count) groom = resample(groom, vertex_count);
-  if (options.pinning) groom = with_pinning(std::move(groom), *options.pinning);
-  return groom;
+  ASSIGN_OR_RETURN(PlacedGroom placed, load_placed_groom(options));
+  return std::move(placed.groom);
 }
 
 }  // namespace strandcast

@@ -1,4 +1,4 @@
-// load_groom: a groom file of any known kind into head space: loader by extension, axes, origin, unit,
+// load_groom: groom files of any known kind into head space: loader by extension, axes, origin, unit,
 // resampling, pinning, validation. Any thread.
 #pragma once
 
@@ -6,29 +6,44 @@
 #include <filesystem>
 #include <glm/glm.hpp>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/groom/groom.h"
+#include "common/groom/placement.h"
 
 namespace strandcast {
 
+inline constexpr size_t kMaxGroomFiles = 8;  // that one head of hair comes in
+
 struct GroomFileOptions {
-  std::filesystem::path path;  // .tfx or .hair
-  float unit_m = 0.0f;         // metres per file unit; 0 = guessed from the size of the head
-  bool is_z_up = false;        // +Z up and -Y forward in the file; turned to +Y up and +Z forward
-  glm::vec3 origin{0.0f};      // point that becomes the head joint: file units, after the axes are turned
+  std::filesystem::path path;                     // .tfx or .hair
+  std::vector<std::filesystem::path> more_paths;  // further parts of the same hair: the same unit and axes
+  float unit_m = 0.0f;                  // metres per file unit; 0 = guessed from the size of the head
+  std::optional<bool> is_z_up = false;  // as GroomPlacement; empty = guessed
+  std::optional<float> yaw_deg = 0.0f;  // as GroomPlacement; empty = guessed
+  glm::vec3 origin{0.0f};               // as GroomPlacement
   // Resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can.
   uint32_t vertex_count = 0;
   std::optional<Pinning> pinning;  // empty: as the file says
 };
 
-/// The first of metre, centimetre, millimetre and inch in which the sphere through the roots has the size of
-/// a human head, else whatever makes it one. `groom` is in file units, +Y up.
+struct PlacedGroom {
+  Groom groom;
+  GroomPlacement placement;
+  std::vector<std::string> notes;  // a sentence for each thing that was guessed, with the reason
+};
+
+/// The value of guess_unit().
 float guess_unit_m(const Groom& groom);
 
-/// Loads, turns, moves, scales and checks a groom; the result is uniform. With vertex_count 0 a ragged groom,
-/// or one outside of 2..kMaxVertexCount, is resampled to its largest vertex count clamped into these limits.
-/// Errors name the file and the offending value.
+/// Loads, joins, turns, moves, scales and checks a groom; the result is uniform. With vertex_count 0 a ragged
+/// groom, or one outside of 2..kMaxVertexCount, is resampled to its largest vertex count clamped into these
+/// limits. Errors name the file and the offending value.
+Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options);
+
+/// The groom alone.
 Result<Groom> load_groom(const GroomFileOptions& options);
 
 }  // namespace strandcast

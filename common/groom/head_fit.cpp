@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace strandcast {
 namespace {
@@ -10,6 +11,28 @@ namespace {
 /// nothing.
 constexpr std::array kUpperParts = {1.0, 0.75, 0.5, 0.35, 0.25};
 constexpr size_t kMinFittedRoots = 16;
+
+/// A head that roots say nothing of, and the sizes that a fitted one may have.
+constexpr float kUsualRadiusM = 0.095f, kSmallestRadiusM = 0.06f, kLargestRadiusM = 0.14f;
+/// Strands that grow in all directions, less than this share together, say nothing of which side they stand
+/// on.
+constexpr double kMinTogether = 0.3;
+
+/// Mean direction in which strands leave their roots, at most 1 long.
+glm::dvec3 growth_direction(const Groom& groom) {
+  glm::dvec3 sum(0.0);
+  double count = 0.0;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const uint32_t root = groom.offset[strand];
+    const glm::dvec3 out =
+        glm::dvec3(groom.rest_position_m[root + 1]) - glm::dvec3(groom.rest_position_m[root]);
+    const double length = glm::length(out);
+    if (!std::isfinite(length) || !(length > 0.0)) continue;
+    sum += out / length;
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : sum;
+}
 
 float extent_m(const std::vector<glm::vec3>& points_m) {
   glm::vec3 low = points_m.front(), high = points_m.front();
@@ -41,6 +64,20 @@ FittedSphere fit_head_sphere(const Groom& groom) {
     if (extent_m(roots) >= 2.0f * fitted.radius_m) return fitted;
   }
   return of_all;
+}
+
+FittedSphere fit_head(const Groom& groom) {
+  const FittedSphere fitted = fit_head_sphere(groom);
+  if (groom.strand_count() >= kMinFittedRoots && fitted.radius_m >= kSmallestRadiusM &&
+      fitted.radius_m <= kLargestRadiusM)
+    return fitted;
+  glm::dvec3 middle(0.0);
+  for (const glm::vec3& root : roots_of(groom))
+    middle += glm::dvec3(root) / static_cast<double>(groom.strand_count());
+  const glm::dvec3 growth = growth_direction(groom);
+  const double together = glm::length(growth);
+  const glm::dvec3 outwards = together >= kMinTogether ? growth / together : glm::dvec3(0.0, 1.0, 0.0);
+  return {glm::vec3(middle - static_cast<double>(kUsualRadiusM) * outwards), kUsualRadiusM};
 }
 
 }  // namespace strandcast

@@ -16,4 +16,8 @@ std::vector<glm::vec3> roots_of(const Groom& groom);
 /// fitted sphere; then only its upper roots count. Falls back to all roots. +Y is up.
 FittedSphere fit_head_sphere(const Groom& groom);
 
+/// The head of a groom in metres, whatever the groom: the sphere under the hair where that has the size of a
+/// person's, else one of the usual size, which the roots stand on the way they grow.
+FittedSphere fit_head(const Groom& groom);
+
 }  // namespace strandcast

@@ -23,7 +23,7 @@ Fact decide_turbulence(const SceneDesc& scene, const RuntimeFacts& facts) {
 
 Fact decide_colliders(const SceneDesc& scene, const RuntimeFacts&) {
   if (!scene.colliders.empty()) return {true, "the scene lists colliders"};
-  if (scene.has_auto_collider) return {true, "has_auto_collider fits one sphere to the roots"};
+  if (scene.has_auto_collider) return {true, "has_auto_collider makes the head as it is drawn collide"};
   return {false, "the scene lists no colliders and has_auto_collider is false"};
 }
 

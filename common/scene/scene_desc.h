@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/groom/groom.h"
+#include "common/groom/groom_file.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -33,10 +34,15 @@ struct ProceduralGroomDesc {
 
 struct FileGroomDesc {
   std::filesystem::path path;  // .tfx or .hair
-  float unit_m = 0.0f;         // metres per file unit; 0 = guessed from the size of the head
+  std::vector<std::filesystem::path>
+      more_paths;       // further parts of the same hair, at most kMaxGroomFiles - 1
+  float unit_m = 0.0f;  // metres per file unit; 0 = guessed from the size of the head
   UpAxis up_axis = UpAxis::Y;
+  bool has_up_axis = false;  // false: guessed from the hair
+  float yaw_deg = 0.0f;      // about the up axis, counter-clockwise seen from above
+  bool has_yaw = false;      // false: guessed from the hairline
   glm::vec3 origin{0.0f};  // point of the file (in file units, after the up axis) that becomes the head joint
-  bool has_origin = false;    // false: the centre of the sphere fitted to the roots
+  bool has_origin = false;    // false: the middle of the head under the roots
   uint32_t vertex_count = 0;  // resample to this many; 0 = keep (rounded into the limits)
   Pinning pinning = Pinning::RootPair;
   bool has_pinning = false;  // false: as the file says
@@ -51,6 +57,7 @@ struct SphereCollider {
   bool operator==(const SphereCollider&) const = default;
 };
 inline constexpr uint32_t kMaxSphereColliders = 16;
+inline constexpr size_t kMaxMeshFiles = 8;  // that one head is drawn from
 
 /// Wind from the scene itself; a wind stream, once one is connected, replaces it.
 struct WindDesc {
@@ -71,7 +78,8 @@ struct SolverDesc {
 
 struct HeadDesc {
   std::filesystem::path mesh_path;  // OBJ in the groom's units and axes; empty = built-in head
-  float radius_m = 0.095f;          // of the built-in cranium; 0 = fitted to the roots
+  std::vector<std::filesystem::path> more_mesh_paths;  // further parts, at most kMaxMeshFiles - 1
+  float radius_m = 0.095f;                             // of the built-in cranium; 0 = fitted to the roots
   bool is_visible = true;
   glm::vec3 center_m{0.0f};  // of the built-in cranium, head space
   bool has_center = false;   // false: at the head joint, or fitted to the roots of a groom file
@@ -124,7 +132,7 @@ struct SceneDesc {
   uint32_t substeps = 1;       // 1 .. 64
   glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
   std::vector<SphereCollider> colliders;
-  bool has_auto_collider = true;  // one sphere fitted to the roots, when `colliders` is empty
+  bool has_auto_collider = true;  // the head as it is drawn, when `colliders` is empty
   WindDesc wind;
   LookDesc look;
   CameraDesc camera;

@@ -32,6 +32,7 @@ inline constexpr Range kCurlRadius{0.0, kMaxCurlRadiusM, "m"};
 inline constexpr Range kCurlTurns{0.0, kMaxCurlTurns, "turns"};
 inline constexpr Range kSeed{0, std::numeric_limits<uint32_t>::max(), ""};
 inline constexpr Range kUnit{0.0, 1e3, "m"};
+inline constexpr Range kYaw{-360.0, 360.0, "degrees"};
 inline constexpr Range kFileOrigin{-1e6, 1e6, "file units"};
 inline constexpr Range kHeadRadius{0.0, 1.0, "m"};
 inline constexpr Range kSolverParameter{-std::numeric_limits<double>::max(),
@@ -82,7 +83,8 @@ void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& g
     v.require("path", !file->path.empty(),
               "is empty: name the groom file, for example --set groom.file.path=FILE.tfx");
     v.number("unit_m", file->unit_m, kUnit);
-    v.choice("up_axis", file->up_axis, UpAxis::Z);
+    file->has_up_axis = v.chooses("up_axis", file->has_up_axis);
+    if (file->has_up_axis) v.choice("up_axis", file->up_axis, UpAxis::Z);
     file->has_origin = v.chooses("origin", file->has_origin);
     if (file->has_origin) v.vector("origin", file->origin, kFileOrigin);
     v.number("vertex_count", file->vertex_count, kResampledVertexCount);
@@ -90,6 +92,9 @@ void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& g
               "is 1, it must be 0 (keep) or within 2 .. 64");
     file->has_pinning = v.chooses("pinning", file->has_pinning);
     if (file->has_pinning) v.choice("pinning", file->pinning, Pinning::BothEnds);
+    file->has_yaw = v.chooses("yaw_deg", file->has_yaw);
+    if (file->has_yaw) v.number("yaw_deg", file->yaw_deg, kYaw);
+    v.paths("more_paths", file->more_paths, kMaxGroomFiles - 1);
   });
 }
 
@@ -143,6 +148,9 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.flag("is_visible", scene.head.is_visible);
     scene.head.has_center = v.chooses("center_m", scene.head.has_center);
     if (scene.head.has_center) v.vector("center_m", scene.head.center_m, kColliderCenter);
+    v.paths("more_mesh_paths", scene.head.more_mesh_paths, kMaxMeshFiles - 1);
+    v.require("more_mesh_paths", scene.head.more_mesh_paths.empty() || !scene.head.mesh_path.empty(),
+              "needs mesh_path, the first of them");
   });
   v.group("solver", [&] {
     v.text("name", scene.solver.name, kMaxNameBytes);

@@ -83,11 +83,19 @@ class Reader {
   void path(const char* name, std::filesystem::path& value) {
     const auto& field = field_of(*message_, name);
     if (!has(name)) return;
-    const std::string given = message_->GetReflection()->GetString(*message_, &field);
-    if (given.size() > scene_fields::kMaxPathBytes || !is_printable(given))
-      return fail(name,
-                  fmt::format("must be at most {} bytes of printable text", scene_fields::kMaxPathBytes));
-    value = given;
+    check_path(name, message_->GetReflection()->GetString(*message_, &field), value);
+  }
+  void paths(const char* name, std::vector<std::filesystem::path>& values, size_t limit) {
+    const auto& field = field_of(*message_, name);
+    const int size = message_->GetReflection()->FieldSize(*message_, &field);
+    if (static_cast<size_t>(size) > limit)
+      return fail(name, fmt::format("has {} entries, the limit is {}", size, limit));
+    values.assign(static_cast<size_t>(size), {});
+    for (int i = 0; i < size; ++i) {
+      const std::string given = message_->GetReflection()->GetRepeatedString(*message_, &field, i);
+      if (given.empty()) return fail(name, "has an empty entry: name the file");
+      check_path(name, given, values[static_cast<size_t>(i)]);
+    }
   }
   template <class Vector>
   void vector(const char* name, Vector& value, const Range& range) {
@@ -136,6 +144,13 @@ class Reader {
  private:
   bool has(const char* name) const {
     return message_->GetReflection()->HasField(*message_, &field_of(*message_, name));
+  }
+
+  void check_path(const char* name, const std::string& given, std::filesystem::path& value) {
+    if (given.size() > scene_fields::kMaxPathBytes || !is_printable(given))
+      return fail(name,
+                  fmt::format("must be at most {} bytes of printable text", scene_fields::kMaxPathBytes));
+    value = given;
   }
 
   template <class T>
@@ -242,6 +257,11 @@ class Writer {
   }
   void path(const char* name, const std::filesystem::path& value) {
     if (!value.empty()) text(name, value.generic_string(), 0);
+  }
+  void paths(const char* name, const std::vector<std::filesystem::path>& values, size_t) {
+    const auto& field = field_of(*message_, name);
+    for (const std::filesystem::path& value : values)
+      message_->GetReflection()->AddString(message_, &field, value.generic_string());
   }
   template <class Vector>
   void vector(const char* name, const Vector& value, const Range& range) {
@@ -371,7 +391,12 @@ Result<SceneDesc> parse(const std::string& text, const std::string& place,
   // Before the overrides: a path typed on the command line starts at the current folder, as everywhere else.
   if (message.groom().has_file() && message.groom().file().has_path())
     resolve(*message.mutable_groom()->mutable_file()->mutable_path(), folder);
+  if (message.groom().has_file())
+    for (std::string& path : *message.mutable_groom()->mutable_file()->mutable_more_paths())
+      resolve(path, folder);
   if (message.head().has_mesh_path()) resolve(*message.mutable_head()->mutable_mesh_path(), folder);
+  if (message.has_head())
+    for (std::string& path : *message.mutable_head()->mutable_more_mesh_paths()) resolve(path, folder);
   return from_message(message, &tree, place, overrides);
 }
 

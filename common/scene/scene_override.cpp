@@ -108,6 +108,23 @@ Status set_map_entry(Cursor& cursor, const pb::FieldDescriptor& field, std::stri
   return set_value(inside, *field.message_type()->map_value(), value);
 }
 
+/// Sets element `part` of a list of texts; the element after the last one is added.
+Status set_text_of_list(Cursor& cursor, const pb::FieldDescriptor& field, std::string_view part,
+                        const std::string& value) {
+  const auto* reflection = cursor.message->GetReflection();
+  const int size = reflection->FieldSize(*cursor.message, &field);
+  const auto index = parse_index(part);
+  if (!index || *index > size)
+    return make_error(ErrorCode::BadInput, "\"{}\" is not an index of {} (0 .. {})", part, cursor.walked,
+                      size);
+  if (*index == size) {
+    reflection->AddString(cursor.message, &field, value);
+  } else {
+    reflection->SetRepeatedString(cursor.message, &field, *index, value);
+  }
+  return {};
+}
+
 Status assign(Cursor cursor, std::string_view path, const std::string& value) {
   for (;;) {
     const size_t dot = path.find('.');
@@ -119,6 +136,8 @@ Status assign(Cursor cursor, std::string_view path, const std::string& value) {
                         known_fields(cursor.type()));
     cursor.step(part);
     if (field->is_map() && !rest.empty()) return set_map_entry(cursor, *field, rest, value);
+    if (field->is_repeated() && field->cpp_type() == pb::FieldDescriptor::CPPTYPE_STRING)
+      return set_text_of_list(cursor, *field, rest, value);
     if (field->is_repeated()) {
       const size_t end = rest.find('.');
       if (rest.empty() || end == std::string_view::npos)

@@ -70,15 +70,53 @@ void add_limit_options(CLI::App& app, NetLimits& limits) {
         row.limit);
 }
 
-void add_scene_options(CLI::App& app, ServerOptions& options, std::string& groom, std::string& explained) {
+/// Sets the files of a groom; "a.tfx,b.tfx" names two, unless one file has that name.
+std::vector<std::string> groom_overrides(const std::vector<std::string>& given) {
+  std::vector<std::string> files;
+  for (const std::string& names : given) {
+    if (std::filesystem::exists(names)) {
+      files.push_back(names);
+      continue;
+    }
+    for (size_t begin = 0; begin <= names.size();) {
+      const size_t end = std::min(names.find(',', begin), names.size());
+      files.push_back(names.substr(begin, end - begin));
+      begin = end + 1;
+    }
+  }
+  std::vector<std::string> overrides = {fmt::format("groom.file.path={}", files.front())};
+  for (size_t i = 1; i < files.size(); ++i)
+    overrides.push_back(fmt::format("groom.file.more_paths.{}={}", i - 1, files[i]));
+  return overrides;
+}
+
+/// Files and scenes that options name besides the scene itself.
+struct NamedFiles {
+  std::vector<std::string> grooms;
+  std::string checked;
+  std::string explained;
+};
+
+void add_scene_options(CLI::App& app, ServerOptions& options, NamedFiles& named) {
   app.add_option("--scene", options.scene_path, "scene file (protobuf text); default: the built-in scene");
   app.add_option("--set", options.overrides, "path=value: override a field of the scene; repeatable")
       ->expected(1)
       ->take_all();
-  app.add_option("--groom", groom, "hair from this .tfx or .hair file: short for --set groom.file.path=FILE");
+  app.add_option("--groom", named.grooms,
+                 "hair from this .tfx or .hair file; hair in several files: FILE,FILE or the option repeated")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--check", named.checked,
+                 "hair file as for --groom: draw it as loaded, from the front, the side and above, say what "
+                 "was guessed, "
+                 "and leave; without a file: the hair of the scene")
+      ->expected(0, 1);
+  app.add_option("--out", options.check_folder, "folder for what --check leaves: groom.png and groom.txt")
+      ->capture_default_str();
   app.add_flag("--list-solvers", options.is_listing_solvers,
                "print the solvers and their parameters, and leave");
-  app.add_option("--explain", explained, "print what runs for the scene and why, and leave")->expected(0, 1);
+  app.add_option("--explain", named.explained, "print what runs for the scene and why, and leave")
+      ->expected(0, 1);
   app.add_option("--frame-viewers", options.explained_frame_viewers,
                  "with --explain: assume so many frame viewers")
       ->check(in_range(0, kMaxExplainedViewers));
@@ -150,12 +188,11 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
 
 Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   ServerOptions options;
-  std::string groom;
-  std::string explained;
+  NamedFiles named;
   RawRunOptions raw;
   CLI::App app("Simulates hair and streams it to viewers.", "strandcast-server");
   app.set_version_flag("--version", version_text());
-  add_scene_options(app, options, groom, explained);
+  add_scene_options(app, options, named);
   add_run_options(app, options, raw);
   try {
     app.parse(argc, argv);
@@ -177,15 +214,19 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   }
   if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;
   options.is_explaining = app.count("--explain") > 0;
-  if (!explained.empty()) {
+  if (!named.explained.empty()) {
     if (!options.scene_path.empty())
-      return make_error(ErrorCode::BadInput, "give the scene once: --explain {} or --scene {}", explained,
-                        options.scene_path.string());
-    options.scene_path = explained;
+      return make_error(ErrorCode::BadInput, "give the scene once: --explain {} or --scene {}",
+                        named.explained, options.scene_path.string());
+    options.scene_path = named.explained;
   }
+  options.is_checking = app.count("--check") > 0;
+  if (app.count("--out") > 0 && !options.is_checking)
+    return make_error(ErrorCode::BadInput, "--out is the folder of --check, which is missing");
+  if (!named.checked.empty()) named.grooms.insert(named.grooms.begin(), named.checked);
   // First, so that --set can still change what belongs to the file (its unit, its axes).
-  if (!groom.empty()) {
-    std::vector<std::string> first = {"groom.file.path=" + groom};
+  if (!named.grooms.empty()) {
+    std::vector<std::string> first = groom_overrides(named.grooms);
     // A groom without a scene of its own brings no head: the built-in one is made to fit under it.
     if (options.scene_path.empty()) first.push_back("head.radius_m=0");
     options.overrides.insert(options.overrides.begin(), first.begin(), first.end());

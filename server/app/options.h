@@ -23,8 +23,10 @@ struct ServerOptions {
   bool is_listing_solvers = false;
   bool is_explaining = false;
   bool is_printing_scene = false;
-  std::string help;     // not empty: print and leave
-  ServerConfig config;  // all but scene and tokens
+  bool is_checking = false;                      // --check: draw the scene as loaded and leave
+  std::filesystem::path check_folder = "check";  // for its pictures
+  std::string help;                              // not empty: print and leave
+  ServerConfig config;                           // all but scene and tokens
 };
 
 /// BadInput names the option; `help` is set for --help and --version.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/groom/head_spheres.h"
 #include "server/app/viewers.h"
 #include "server/encode/picture_passes.h"
 #include "server/encode/strand_encode_worker.h"
@@ -33,7 +34,8 @@ gl::PassReports join_passes(ThreadPasses threads, bool is_watched_as_pictures) {
 }
 
 StageSizes stage_sizes(const SceneDesc& scene, const SceneAsset& asset) {
-  const size_t colliders = scene.colliders.empty() && scene.has_auto_collider ? 1 : scene.colliders.size();
+  const size_t colliders =
+      scene.colliders.empty() && scene.has_auto_collider ? kHeadSpheres : scene.colliders.size();
   return {asset.strand_count, asset.vertex_count, scene.substeps, static_cast<uint32_t>(colliders)};
 }
 

@@ -15,6 +15,9 @@
 namespace strandcast {
 namespace {
 
+/// Just under the built-in groom's roots.
+constexpr float kSkullRadiusM = 0.0931f;
+
 // Strands swing into the motion before anything is recorded.
 constexpr double kSettleS = 1.5;
 constexpr double kNsPerMs = 1e6;
@@ -26,6 +29,7 @@ SceneDesc scene_for(const RecordingDesc& desc) {
   groom.vertex_count = desc.size.vertex_count;
   if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
   scene.step_rate_hz = 1.0 / kStreamFrameS;
+  scene.colliders = {{glm::vec3(0.0f), kSkullRadiusM}};
   return scene;
 }
 

@@ -46,8 +46,9 @@ inline constexpr double kStreamFrameS = 1.0 / 60.0;
 /// BadInput when the motion is too short, LimitExceeded when the recording would be too large.
 Status check_recording(const RecordingDesc& desc);
 
-/// Records the middle of the motion, after strands have settled into it. The built-in scene's groom, wind and
-/// collider; 60 steps a second.
+/// Records the middle of the motion, after strands have settled into it. The built-in scene's groom and
+/// wind; the skull alone collides, so that what is measured does not follow the shape of the head that is
+/// drawn; 60 steps a second.
 Result<StreamRecording> record_strands(const RecordingDesc& desc);
 
 }  // namespace strandcast

@@ -1,10 +1,13 @@
 #include "server/scene/scene_content.h"
 
-#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "common/groom/groom_file.h"
 #include "common/groom/head_fit.h"
+#include "common/groom/head_measure.h"
+#include "common/groom/head_shape.h"
+#include "common/groom/head_spheres.h"
 #include "common/groom/procedural.h"
 
 namespace strandcast {
@@ -13,27 +16,33 @@ namespace {
 /// Cranium when neither the scene nor a groom gives one: an adult head.
 constexpr float kDefaultHeadRadiusM = 0.095f;
 constexpr uint32_t kScalpVertices = 2'000;
-/// This part of the roots may lie inside the fitted collider (ears, neck, stray roots).
-constexpr double kInsideQuantile = 0.05;
-/// Collider radius over the radius at that quantile.
-constexpr float kColliderScale = 0.98f;
-
 glm::vec3 head_center(const HeadDesc& head) {
   return head.has_center ? head.center_m : glm::vec3(0.0f);
 }
 
-Result<Groom> make_groom(const SceneDesc& scene) {
-  if (const auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
-    GroomFileOptions options;
-    options.path = file->path;
-    options.unit_m = file->unit_m;
-    options.is_z_up = file->up_axis == UpAxis::Z;
-    if (file->has_origin) options.origin = file->origin;
-    options.vertex_count = file->vertex_count;
-    if (file->has_pinning) options.pinning = file->pinning;
-    ASSIGN_OR_RETURN(Groom groom, load_groom(options));
-    return reorder(groom, make_prefix_order(groom));
+/// Hair of files; without an origin its head is moved to the head joint, which a head turns about much more
+/// nearly than about a file's origin between the feet.
+Result<PlacedGroom> load_hair_of(const FileGroomDesc& file) {
+  GroomFileOptions options;
+  options.path = file.path;
+  options.more_paths = file.more_paths;
+  options.unit_m = file.unit_m;
+  options.is_z_up = file.has_up_axis ? std::optional(file.up_axis == UpAxis::Z) : std::nullopt;
+  options.yaw_deg = file.has_yaw ? std::optional(file.yaw_deg) : std::nullopt;
+  if (file.has_origin) options.origin = file.origin;
+  options.vertex_count = file.vertex_count;
+  if (file.has_pinning) options.pinning = file.pinning;
+  ASSIGN_OR_RETURN(PlacedGroom hair, load_placed_groom(options));
+  if (!file.has_origin) {
+    const glm::vec3 shift_m = -fit_head(hair.groom).center_m;
+    for (glm::vec3& position : hair.groom.rest_position_m) position += shift_m;
+    hair.placement.shift_m = shift_m;
   }
+  hair.groom = reorder(hair.groom, make_prefix_order(hair.groom));
+  return hair;
+}
+
+Result<Groom> grow_hair_of(const SceneDesc& scene) {
   const auto& procedural = std::get<ProceduralGroomDesc>(scene.groom);
   const float radius_m = scene.head.radius_m > 0.0f ? scene.head.radius_m : kDefaultHeadRadiusM;
   ProceduralGroomOptions options;
@@ -48,66 +57,85 @@ Result<Groom> make_groom(const SceneDesc& scene) {
   return grow_groom(make_scalp_cap(head_center(scene.head), radius_m, kScalpVertices), options);
 }
 
-/// A mesh of the groom's file: the same unit, axes and origin. `shift_m` is what the groom was moved by.
-Result<Mesh> load_head_mesh(const SceneDesc& scene, float unit_m, const glm::vec3& shift_m) {
-  const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
-  ASSIGN_OR_RETURN(Mesh mesh, load_obj(scene.head.mesh_path, 1.0f));
-  if (file == nullptr) return mesh;
-  const bool is_z_up = file->up_axis == UpAxis::Z;
-  const auto turn = [&](const glm::vec3& v) { return is_z_up ? glm::vec3(v.x, v.z, -v.y) : v; };
-  const glm::vec3 origin = file->has_origin ? file->origin : glm::vec3(0.0f);
-  for (glm::vec3& position : mesh.position_m) position = (turn(position) - origin) * unit_m + shift_m;
-  for (glm::vec3& normal : mesh.normal) normal = turn(normal);
-  return mesh;
+/// Meshes of the groom's file: the same unit, axes and origin. Several are joined.
+Result<Mesh> load_head_meshes(const HeadDesc& head, const GroomPlacement& placement) {
+  std::vector<std::filesystem::path> paths = {head.mesh_path};
+  paths.insert(paths.end(), head.more_mesh_paths.begin(), head.more_mesh_paths.end());
+  Mesh whole;
+  for (const std::filesystem::path& path : paths) {
+    ASSIGN_OR_RETURN(const Mesh part, load_obj(path, 1.0f));
+    if (whole.triangle.size() + part.triangle.size() > kMaxMeshTriangles)
+      return at(path.string(), make_error(ErrorCode::LimitExceeded,
+                                          "{} triangles with the meshes before it, at most {} are allowed",
+                                          whole.triangle.size() + part.triangle.size(), kMaxMeshTriangles));
+    const auto first = static_cast<uint32_t>(whole.position_m.size());
+    for (const glm::vec3& position : part.position_m) whole.position_m.push_back(placement.place(position));
+    for (const glm::vec3& normal : part.normal) whole.normal.push_back(placement.turn(normal));
+    for (const glm::uvec3& triangle : part.triangle) whole.triangle.push_back(triangle + first);
+  }
+  return whole;
 }
 
-/// Moves a groom whose file and scene do not say where the head joint is: the middle of the head, which a
-/// head turns about much more nearly than about a file's origin between the feet. Returns the shift, m.
-glm::vec3 centre_on_roots(Groom& groom) {
-  const glm::vec3 shift_m = -fit_head_sphere(groom).center_m;
-  for (glm::vec3& position : groom.rest_position_m) position += shift_m;
-  return shift_m;
+/// What is drawn under the hair, and as spheres what collides.
+struct Head {
+  Mesh mesh;
+  std::vector<FittedSphere> spheres;
+};
+
+/// The built-in head as it is.
+Head make_head_at(const glm::vec3& center_m, float radius_m) {
+  Head head{make_head(radius_m), built_in_head_spheres(radius_m)};
+  for (glm::vec3& position : head.mesh.position_m) position += center_m;
+  for (FittedSphere& sphere : head.spheres) sphere.center_m += center_m;
+  return head;
 }
 
-Result<Mesh> make_head_mesh(const SceneDesc& scene, const Groom& groom, const glm::vec3& shift_m) {
-  if (!scene.head.is_visible) return Mesh{};
-  if (!scene.head.mesh_path.empty()) return load_head_mesh(scene, groom.file_unit_m, shift_m);
-  // Under a groom from a file the built-in head is put where its roots are, unless the scene says where.
-  const bool is_fitted = std::holds_alternative<FileGroomDesc>(scene.groom);
-  const FittedSphere fitted = is_fitted ? fit_head_sphere(groom) : FittedSphere{{}, kDefaultHeadRadiusM};
-  const glm::vec3 center_m = scene.head.has_center ? scene.head.center_m : fitted.center_m;
-  Mesh mesh = make_head(scene.head.radius_m > 0.0f ? scene.head.radius_m : fitted.radius_m);
-  for (glm::vec3& position : mesh.position_m) position += center_m;
-  return mesh;
+/// The head under the hair, drawn or not.
+Result<Head> make_head_under(const SceneDesc& scene, const Groom& groom, const GroomPlacement& placement) {
+  const HeadDesc& desc = scene.head;
+  Head head;
+  if (!desc.mesh_path.empty()) {
+    ASSIGN_OR_RETURN(head.mesh, load_head_meshes(desc, placement));
+  } else if (!std::holds_alternative<FileGroomDesc>(scene.groom)) {
+    return make_head_at(head_center(desc), desc.radius_m > 0.0f ? desc.radius_m : kDefaultHeadRadiusM);
+  } else {
+    // Under a groom from a file the built-in head is fitted, but for what the scene says of it.
+    FittedSphere fitted = fit_head(groom);
+    if (desc.has_center) fitted.center_m = desc.center_m;
+    if (desc.radius_m > 0.0f) return make_head_at(fitted.center_m, desc.radius_m);
+    head.mesh = HeadShape(groom, fitted).mesh();
+  }
+  head.spheres = fit_spheres(head.mesh, kHeadSpheres, groom.rest_position_m);
+  return head;
 }
 
 }  // namespace
 
-SphereCollider fit_head_collider(const Groom& groom) {
-  const std::vector<glm::vec3> roots = roots_of(groom);
-  const FittedSphere fitted = fit_head_sphere(groom);
-  std::vector<float> distance_m(roots.size());
-  std::transform(roots.begin(), roots.end(), distance_m.begin(),
-                 [&](const glm::vec3& root) { return glm::length(root - fitted.center_m); });
-  std::sort(distance_m.begin(), distance_m.end());
-  const auto index = static_cast<size_t>(kInsideQuantile * static_cast<double>(distance_m.size() - 1));
-  return {fitted.center_m, std::min(distance_m[index], fitted.radius_m) * kColliderScale};
-}
-
-std::vector<SphereCollider> colliders_of(const SceneDesc& scene, const Groom& groom) {
+std::vector<SphereCollider> colliders_of(const SceneDesc& scene,
+                                         const std::vector<SphereCollider>& head_colliders) {
   if (!scene.colliders.empty()) return scene.colliders;
-  if (!scene.has_auto_collider) return {};
-  return {fit_head_collider(groom)};
+  return scene.has_auto_collider ? head_colliders : std::vector<SphereCollider>{};
 }
 
 Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   SceneContent content;
-  ASSIGN_OR_RETURN(content.groom, make_groom(scene));
-  const auto* file = std::get_if<FileGroomDesc>(&scene.groom);
-  const bool is_centred = file != nullptr && !file->has_origin;
-  const glm::vec3 shift_m = is_centred ? centre_on_roots(content.groom) : glm::vec3(0.0f);
-  ASSIGN_OR_RETURN(content.head, make_head_mesh(scene, content.groom, shift_m));
-  content.colliders = colliders_of(scene, content.groom);
+  GroomPlacement placement;
+  if (const auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
+    ASSIGN_OR_RETURN(PlacedGroom hair, load_hair_of(*file));
+    content.groom = std::move(hair.groom);
+    content.notes = std::move(hair.notes);
+    placement = hair.placement;
+  } else {
+    ASSIGN_OR_RETURN(content.groom, grow_hair_of(scene));
+  }
+  ASSIGN_OR_RETURN(Head head, make_head_under(scene, content.groom, placement));
+  const std::vector<FittedSphere> spheres = shrink_under(std::move(head.spheres), content.groom);
+  for (const FittedSphere& sphere : spheres)
+    content.head_colliders.push_back({sphere.center_m, sphere.radius_m});
+  if (std::holds_alternative<FileGroomDesc>(scene.groom))
+    content.notes.push_back(to_sentence(measure_head(head.mesh, spheres, content.groom), spheres.size()));
+  content.colliders = colliders_of(scene, content.head_colliders);
+  if (scene.head.is_visible) content.head = std::move(head.mesh);
   return content;
 }
 

@@ -1,6 +1,7 @@
 // SceneContent: what a SceneDesc refers to, loaded: groom, head mesh and colliders. Any thread, no GL.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -11,18 +12,18 @@
 namespace strandcast {
 
 struct SceneContent {
-  Groom groom;                            // uniform, every prefix covers the head evenly
-  Mesh head;                              // empty when not visible
-  std::vector<SphereCollider> colliders;  // head space: the scene's own, or the one fitted to the roots
+  Groom groom;                                 // uniform, every prefix covers the head evenly
+  Mesh head;                                   // empty when not visible
+  std::vector<SphereCollider> head_colliders;  // head space: the head as spheres, visible or not
+  std::vector<SphereCollider> colliders;       // head space: the scene's own, or those of the head
+  std::vector<std::string> notes;              // a sentence for each thing that was guessed or fitted
 };
 
 /// Loads or grows the groom and the head. Errors name the file or the option.
 Result<SceneContent> load_scene_content(const SceneDesc& scene);
 
-/// One sphere just inside the roots, so that hair rests on it without being pushed off its own root.
-SphereCollider fit_head_collider(const Groom& groom);
-
-/// Those of the scene; without any the fitted head, unless the scene wants none. Head space.
-std::vector<SphereCollider> colliders_of(const SceneDesc& scene, const Groom& groom);
+/// Those of the scene; without any the head's, unless the scene wants none. Head space.
+std::vector<SphereCollider> colliders_of(const SceneDesc& scene,
+                                         const std::vector<SphereCollider>& head_colliders);
 
 }  // namespace strandcast

@@ -262,7 +262,7 @@ Notice SimLoop::change(const std::string& assignment) {
       return {true, status.error().to_string()};
   const std::string left_out = left_out_note(config_.scene.solver, scene->solver);
   config_.scene = *scene;
-  builder_->change(*scene, colliders_of(*scene, config_.content->groom));
+  builder_->change(*scene, colliders_of(*scene, config_.content->head_colliders));
   follow_stream_settings();
   if (has_other_stream())
     return {false, fmt::format("{} soon: the stream changes at most every {} ms.", assignment,

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/groom/groom_asset.h"
+#include "common/log/log.h"
 #include "server/source/scene_change.h"
 
 namespace strandcast {
@@ -45,6 +46,7 @@ class SimulationSource : public StateSource {
 Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, InputHub& inputs) {
   RETURN_IF_ERROR(check_solver(config.scene));
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(config.scene));
+  for (const std::string& note : content.notes) log_info("scene", "{}", note);
   return std::unique_ptr<StateSource>(std::make_unique<SimulationSource>(
       std::move(config), std::make_shared<const SceneContent>(std::move(content)), inputs));
 }

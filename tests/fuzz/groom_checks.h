@@ -1,6 +1,8 @@
 // What every groom that a loader gives must stand, hostile files included.
 #pragma once
 
+#include <cmath>
+
 #include "common/base/check.h"
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
@@ -21,6 +23,8 @@ inline void check_loaded_groom(const Groom& groom) {
   if (groom.rest_position_m.size() > kManyVertices) return;
   const float unit_m = guess_unit_m(groom);
   CHECK(unit_m > 0.0f);
+  CHECK(std::abs(guess_yaw_deg(groom).value) <= 180.0f);
+  (void)guess_z_up(groom);
   if (!validate(groom)) return;
   const Groom uniform = resample(groom, 5);
   CHECK(uniform.uniform_vertex_count() == 5 && validate(uniform).ok());

@@ -3,6 +3,8 @@
 #include <set>
 
 #include "common/groom/groom_file.h"
+#include "common/groom/head_fit.h"
+#include "common/groom/head_shape.h"
 #include "common/groom/mesh.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_file.h"
@@ -81,28 +83,26 @@ TEST(DeployScenes, ScenesForFilesSayHowToNameTheFile) {
   }
 }
 
-/// Roots in head space of a shipped scene with its real file.
-std::vector<glm::vec3> real_roots(const std::string& name) {
+/// Hair in head space of a shipped scene with its real file.
+Groom real_groom(const std::string& name) {
   const SceneDesc scene = loaded(name, {"groom.file.path=" + data_path(groom_files().at(name)).string()});
   const auto& file = std::get<FileGroomDesc>(scene.groom);
   GroomFileOptions options;
   options.path = file.path;
   options.unit_m = file.unit_m;
   options.is_z_up = file.up_axis == UpAxis::Z;
-  EXPECT_TRUE(file.has_origin);
+  EXPECT_TRUE(file.has_up_axis && file.has_yaw && file.has_origin) << "nothing of it is guessed";
+  options.yaw_deg = file.yaw_deg;
   options.origin = file.origin;
   options.vertex_count = file.vertex_count;
   const auto groom = load_groom(options);
   EXPECT_TRUE(groom) << groom.error().to_string();
-  std::vector<glm::vec3> roots;
-  for (uint32_t strand = 0; groom && strand < groom->strand_count(); ++strand)
-    roots.push_back(groom->rest_position_m[groom->offset[strand]]);
-  return roots;
+  return groom ? *groom : Groom{};
 }
 
 TEST(DeployScenes, SintelsHeadJointIsTheCentreOfHerSkull) {
   REQUIRE_SHARED(data_path(groom_files().at("sintel")));
-  const FittedSphere skull = fit_sphere(real_roots("sintel"));
+  const FittedSphere skull = fit_sphere(roots_of(real_groom("sintel")));
   EXPECT_LT(glm::length(skull.center_m), 0.003f);
   EXPECT_NEAR(skull.radius_m, 0.0926f, 0.001f);
 }
@@ -111,16 +111,19 @@ TEST(DeployScenes, TheMohawkFitsAHumanHead) {
   REQUIRE_SHARED(data_path(groom_files().at("mohawk")));
   const SceneDesc scene = loaded("mohawk", {"groom.file.path=x"});
   std::vector<glm::vec3> crest;  // roots on the skull, not down the back
-  for (const glm::vec3& root : real_roots("mohawk"))
+  const Groom groom = real_groom("mohawk");
+  for (const glm::vec3& root : roots_of(groom))
     if (root.y > 0.005f) crest.push_back(root);
   ASSERT_GT(crest.size(), 500u);
   const FittedSphere skull = fit_sphere(crest);
   EXPECT_LT(glm::length(skull.center_m), 0.005f);
   EXPECT_NEAR(skull.radius_m, 0.095f, 0.005f) << "an adult head";
-  // The head that is drawn and the collider lie under the roots.
+  EXPECT_TRUE(scene.colliders.empty() && scene.has_auto_collider) << "what is drawn is what collides";
+  // The head that is drawn lies under the roots.
+  const HeadShape head(groom, fit_head(groom));
   for (const glm::vec3& root : crest) {
-    EXPECT_GT(glm::length(root), scene.colliders[0].radius_m);
-    EXPECT_LT(glm::length(root), scene.head.radius_m + 0.02f);
+    EXPECT_GT(head.distance_m(root), -0.004);
+    EXPECT_LT(head.distance_m(root), 0.02);
   }
 }
 

@@ -3,9 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
+#include "common/base/quantile.h"
+#include "common/groom/head_fit.h"
+#include "common/groom/head_measure.h"
+#include "common/groom/head_spheres.h"
 #include "tests/support/groom_files.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_folder.h"
@@ -13,16 +18,24 @@
 namespace strandcast {
 namespace {
 
-/// Part of the roots that lie inside the collider.
-double part_inside(const SceneContent& content) {
-  const SphereCollider& sphere = content.colliders.front();
-  uint32_t inside = 0;
-  for (uint32_t strand = 0; strand < content.groom.strand_count(); ++strand)
-    if (glm::length(content.groom.rest_position_m[content.groom.offset[strand]] - sphere.center_m) <
-        sphere.radius_m)
-      ++inside;
-  return static_cast<double>(inside) / content.groom.strand_count();
+/// How deep the deepest vertex of the hair as loaded lies in what collides, m.
+double deepest_m(const SceneContent& content) {
+  double deepest_m = 0.0;
+  for (const glm::vec3& point : content.groom.rest_position_m)
+    for (const SphereCollider& sphere : content.colliders)
+      deepest_m = std::max(deepest_m, static_cast<double>(sphere.radius_m) -
+                                          glm::length(glm::dvec3(point) - glm::dvec3(sphere.center_m)));
+  return deepest_m;
 }
+
+std::vector<FittedSphere> spheres_of(const SceneContent& content) {
+  std::vector<FittedSphere> spheres;
+  for (const SphereCollider& collider : content.colliders)
+    spheres.push_back({collider.center_m, collider.radius_m});
+  return spheres;
+}
+
+const double kMostSwallowedM = 1.001 * static_cast<double>(kSwallowedM);  // but for rounding
 
 TEST(SceneContent, BuiltInSceneIsUniformAndRestsOnItsCollider) {
   const SceneDesc scene = built_in_scene();
@@ -32,9 +45,21 @@ TEST(SceneContent, BuiltInSceneIsUniformAndRestsOnItsCollider) {
   EXPECT_EQ(content->groom.strand_count(), procedural.strand_count);
   EXPECT_EQ(content->groom.uniform_vertex_count(), procedural.vertex_count);
   EXPECT_FALSE(content->head.triangle.empty());
-  ASSERT_EQ(content->colliders.size(), 1u);
+  ASSERT_EQ(content->colliders.size(), kHeadSpheres);
   EXPECT_NEAR(content->colliders[0].radius_m, scene.head.radius_m, 0.1f * scene.head.radius_m);
-  EXPECT_LT(part_inside(*content), 0.06);
+  EXPECT_LE(deepest_m(*content), kMostSwallowedM);
+  const HeadMeasure measure = measure_head(content->head, spheres_of(*content), content->groom);
+  EXPECT_LT(measure.root_most_m, 0.003);
+  EXPECT_LT(measure.sphere_median_m, 0.003);
+  // Where hair lies on it, at the back without the ears and the rim of the neck, skin and spheres are one.
+  std::vector<double> apart_m;
+  for (const glm::vec3& point : content->head.position_m)
+    if (point.z < 0.0f && std::abs(point.x) < 0.085f && point.y > -0.18f)
+      apart_m.push_back(std::abs(distance_to_spheres_m(spheres_of(*content), point)));
+  ASSERT_GT(apart_m.size(), 200u);
+  EXPECT_LT(quantile(apart_m, 0.95), 0.008);
+  // The neck collides: its middle lies 120 mm below that of the skull.
+  EXPECT_LT(distance_to_spheres_m(spheres_of(*content), {0.0, -0.12, -0.025}), -0.02);
 }
 
 TEST(SceneContent, OwnCollidersReplaceTheFittedOneAndNoneMeansNone) {
@@ -65,8 +90,8 @@ TEST(SceneContent, RealGroomGetsAHeadWhereItsRootsAre) {
   const auto content = load_scene_content(scene);
   ASSERT_TRUE(content.ok()) << content.error().to_string();
   EXPECT_EQ(content->groom.strand_count(), 2'228u);
-  ASSERT_EQ(content->colliders.size(), 1u);
-  EXPECT_LT(part_inside(*content), 0.06);
+  EXPECT_FALSE(content->colliders.empty());
+  EXPECT_LE(deepest_m(*content), kMostSwallowedM);
   ASSERT_FALSE(content->head.position_m.empty());
 }
 
@@ -94,7 +119,7 @@ TEST(SceneContent, GroomFileWithoutAnOriginIsCentredOnItsRootsWithItsMesh) {
   scene.head.mesh_path = data / "meshes/sintel.obj";
   const auto content = load_scene_content(scene);
   ASSERT_TRUE(content.ok()) << content.error().to_string();
-  EXPECT_LT(glm::length(content->colliders[0].center_m), 1e-4f);
+  EXPECT_LT(glm::length(fit_head(content->groom).center_m), 1e-4f);
   // With the origin that is written into the file's own scene, everything lies in the same place.
   file.has_origin = true;
   file.origin = {0.0f, 1.5646f, -0.0041f};
@@ -118,10 +143,58 @@ TEST(SceneContent, ManeDownTheBackDoesNotInflateTheHead) {
   const auto content = load_scene_content(scene);
   ASSERT_TRUE(content.ok()) << content.error().to_string();
   // Measured by hand on the roots of the head alone: radius 0.151 file units, against 0.528 for all roots.
-  EXPECT_GT(content->colliders[0].radius_m, 0.1f);
-  EXPECT_LT(content->colliders[0].radius_m, 0.16f);
-  EXPECT_LT(glm::length(content->colliders[0].center_m), 0.01f)
-      << "the head joint is in the middle of the head";
+  const FittedSphere head = fit_head(content->groom);
+  EXPECT_GT(head.radius_m, 0.1f);
+  EXPECT_LT(head.radius_m, 0.16f);
+  EXPECT_LT(glm::length(head.center_m), 0.01f) << "the head joint is in the middle of the head";
+}
+
+TEST(SceneContent, SeveralMeshesAreOneHead) {
+  const std::filesystem::path data = STRANDCAST_SHARED_DATA;
+  FileGroomDesc file;
+  file.path = data / "grooms/sintel_11400x16.tfx";
+  REQUIRE_SHARED(file.path);
+  SceneDesc scene = built_in_scene();
+  scene.groom = file;
+  scene.head.mesh_path = data / "meshes/sintel.obj";
+  const auto one = load_scene_content(scene);
+  scene.head.more_mesh_paths = {data / "meshes/sintel-eyes.obj", data / "meshes/sintel-eyelashes.obj"};
+  const auto all = load_scene_content(scene);
+  ASSERT_TRUE(one && all);
+  EXPECT_GE(all->head.position_m.size(), one->head.position_m.size() + 708u + 144u);
+  EXPECT_TRUE(
+      std::equal(one->head.position_m.begin(), one->head.position_m.end(), all->head.position_m.begin()))
+      << "where they were";
+  EXPECT_LE(deepest_m(*all), kMostSwallowedM);
+  scene.head.more_mesh_paths = {"no/such/eyes.obj"};
+  EXPECT_NE(load_scene_content(scene).error().to_string().find("eyes.obj"), std::string::npos);
+}
+
+TEST(SceneContent, WhatWasGuessedIsSaid) {
+  const std::filesystem::path path =
+      std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/ponytail_side.tfx";
+  REQUIRE_SHARED(path);
+  SceneDesc scene = built_in_scene();
+  FileGroomDesc file;
+  file.path = path;
+  scene.groom = file;
+  scene.head.radius_m = 0.0f;
+  const auto guessed = load_scene_content(scene);
+  ASSERT_TRUE(guessed) << guessed.error().to_string();
+  ASSERT_GE(guessed->notes.size(), 2u);
+  EXPECT_EQ(guessed->notes[0],
+            "turned by 180 degrees to face +Z: the hairline is highest at -Z (groom.file.yaw_deg states it)");
+  EXPECT_EQ(guessed->notes[1].find("1 unit = 3.3"), 0u) << guessed->notes[1];
+  // Stated, it is done and not said.
+  file.yaw_deg = 180.0f;
+  file.has_yaw = true;
+  file.has_up_axis = true;
+  file.unit_m = guessed->groom.file_unit_m;
+  scene.groom = file;
+  const auto stated = load_scene_content(scene);
+  ASSERT_TRUE(stated);
+  EXPECT_EQ(stated->notes.size(), guessed->notes.size() - 2);
+  EXPECT_EQ(stated->groom.rest_position_m, guessed->groom.rest_position_m);
 }
 
 /// Strands of two vertices out of a ball about the origin, as a .hair file.
@@ -149,6 +222,7 @@ TEST(SceneContent, AMeshIsTurnedWithItsNormals) {
   file.path = folder.write("ball.hair", hair_on_a_ball(0.1f).text());
   file.unit_m = 1.0f;
   file.up_axis = UpAxis::Z;
+  file.has_up_axis = true;
   file.has_origin = true;
   scene.groom = file;
   scene.head.mesh_path = folder.write("head.obj",

@@ -27,8 +27,12 @@ SceneDesc unusual_scene() {
   SceneDesc s;
   s.name = "Zöpfe 2";
   FileGroomDesc file{.path = "../a folder/x.tfx",
+                     .more_paths = {"b.tfx", "/c.hair"},
                      .unit_m = 0.1f,
                      .up_axis = UpAxis::Z,
+                     .has_up_axis = true,
+                     .yaw_deg = -37.5f,
+                     .has_yaw = true,
                      .origin = {1.5f, -2, 1e-3f},
                      .has_origin = true};
   file.vertex_count = 24;
@@ -36,6 +40,7 @@ SceneDesc unusual_scene() {
   file.has_pinning = true;
   s.groom = file;
   s.head = {.mesh_path = "head.obj",
+            .more_mesh_paths = {"eyes.obj"},
             .radius_m = 0.11f,
             .is_visible = false,
             .center_m = {0.1f, 0, -0.1f},
@@ -117,7 +122,9 @@ TEST(SceneFile, MissingFieldsAndComponentsKeepTheirDefaults) {
   ASSERT_TRUE(scene);
   EXPECT_EQ(scene->gravity_mps2, glm::dvec3(0, -1.62, 0));
   EXPECT_EQ(scene->camera.offset_m, glm::vec3(CameraDesc{}.offset_m.x, CameraDesc{}.offset_m.y, 2.0f));
-  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom), FileGroomDesc{.path = "x"});
+  FileGroomDesc named;
+  named.path = "x";
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom), named);
 }
 
 TEST(SceneFile, ErrorsNameLineColumnAndWhatIsKnown) {
@@ -218,21 +225,41 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_THAT(error_of("", too_many),
               HasSubstr(fmt::format("is not an index of colliders (0 .. {})", kMaxSphereColliders - 1)));
   EXPECT_THAT(error_of("", {"solver.parameters=1"}), HasSubstr("is a list"));
+  EXPECT_THAT(error_of("", {"groom.file.more_paths=b.tfx"}),
+              HasSubstr("is not an index of groom.file.more_paths"));
+  EXPECT_THAT(error_of("", {"groom.file.more_paths.1=b.tfx"}), HasSubstr("(0 .. 0)"));
   EXPECT_THAT(error_of("", {"solver.parameters.a=b"}), StartsWith("--set solver.parameters.a=b: "));
   EXPECT_THAT(error_of("", {"name=" + std::string(20'000, 'x')}), HasSubstr("the limit is 16384"));
   // A field set in the file is blamed on the file even when something else is overridden.
   EXPECT_THAT(error_of("substeps: 0", {"name=x"}), StartsWith("s.textproto:1:1: substeps"));
 }
 
+TEST(SceneFile, FurtherFilesAreListedAndCounted) {
+  const auto scene = parse_scene("groom { file { path: 'a.tfx' more_paths: 'b.tfx' } }", "s",
+                                 {"groom.file.more_paths.0=c.tfx", "groom.file.more_paths.1=d.tfx"});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom).more_paths,
+            (std::vector<std::filesystem::path>{"c.tfx", "d.tfx"}));
+  std::string many = "groom { file { path: 'a' ";
+  for (size_t i = 0; i < kMaxGroomFiles; ++i) many += "more_paths: 'b' ";
+  EXPECT_THAT(error_of(many + "} }"), HasSubstr("groom.file.more_paths has 8 entries, the limit is 7"));
+  EXPECT_THAT(error_of("groom { file { path: 'a' more_paths: '' } }"), HasSubstr("has an empty entry"));
+  EXPECT_THAT(error_of("head { more_mesh_paths: 'eyes.obj' }"), HasSubstr("needs mesh_path"));
+  EXPECT_THAT(error_of("groom { file { path: 'a' yaw_deg: 361 } }"), HasSubstr("-360 .. 360 degrees"));
+}
+
 TEST(SceneFile, RelativePathsStartAtTheScenesFolder) {
   const auto folder = std::filesystem::temp_directory_path() / fmt::format("strandcast_scene_{}", getpid());
   std::filesystem::create_directories(folder);
   const auto path = folder / "s.textproto";
-  std::ofstream(path) << "groom { file { path: '../hair.tfx' } } head { mesh_path: '/abs/head.obj' }";
+  std::ofstream(path) << "groom { file { path: '../hair.tfx' more_paths: 'x.tfx' } } "
+                         "head { mesh_path: '/abs/head.obj' more_mesh_paths: 'eyes.obj' }";
   const auto scene = load_scene(path, {});
   ASSERT_TRUE(scene) << scene.error().to_string();
   EXPECT_EQ(std::get<FileGroomDesc>(scene->groom).path, folder.parent_path() / "hair.tfx");
+  EXPECT_EQ(std::get<FileGroomDesc>(scene->groom).more_paths.at(0), folder / "x.tfx");
   EXPECT_EQ(scene->head.mesh_path, "/abs/head.obj");
+  EXPECT_EQ(scene->head.more_mesh_paths.at(0), folder / "eyes.obj");
   const auto typed = load_scene(path, {"groom.file.path=here.tfx"});
   ASSERT_TRUE(typed);
   EXPECT_EQ(std::get<FileGroomDesc>(typed->groom).path, "here.tfx");

@@ -486,6 +486,16 @@ TEST(ServerOptions, ReadsWhatTheCommandLineSays) {
               testing::ElementsAre("groom.file.path=a.tfx", "head.radius_m=0", "substeps=2", "wind.seed=7"));
   EXPECT_EQ(options->run_s, 2.5);
   EXPECT_EQ(options->config.net.limits.viewer_bytes_per_s, 0.0) << "no cap unless asked for";
+  const auto parts = parse({"--groom", "a.tfx,b.tfx", "--groom", "c.hair"});
+  ASSERT_TRUE(parts) << parts.error().to_string();
+  EXPECT_THAT(parts->overrides, testing::ElementsAre("groom.file.path=a.tfx", "groom.file.more_paths.0=b.tfx",
+                                                     "groom.file.more_paths.1=c.hair", "head.radius_m=0"));
+  const auto check = parse({"--check", "a.tfx", "--out", "seen"});
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_TRUE(check->is_checking);
+  EXPECT_EQ(check->check_folder, "seen");
+  EXPECT_THAT(check->overrides, testing::ElementsAre("groom.file.path=a.tfx", "head.radius_m=0"));
+  EXPECT_FALSE(parse({"--out", "seen"})) << "of what?";
   EXPECT_EQ(parse({"--viewer-mbit", "8"})->config.net.limits.viewer_bytes_per_s, 1e6);
   EXPECT_TRUE(parse({"--explain"})->is_explaining);
   EXPECT_EQ(parse({"--explain", "x.textproto"})->scene_path, "x.textproto");

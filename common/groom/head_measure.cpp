@@ -1,0 +1,89 @@
+#include "common/groom/head_measure.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "common/base/quantile.h"
+#include "common/groom/head_fit.h"
+#include "common/groom/head_spheres.h"
+#include "common/math/point_tree.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kHalf = 0.5, kMost = 0.95;
+
+/// Distance from the plane of the nearest vertex, or from the vertex where it lies at an edge of the mesh.
+std::vector<double> root_distances(const Mesh& head, const Groom& groom) {
+  std::vector<double> distances;
+  if (head.position_m.empty()) return distances;
+  const PointTree tree(head.position_m);
+  for (const glm::vec3& root : roots_of(groom)) {
+    const uint32_t nearest = tree.nearest(root, 1).front().index;
+    const glm::dvec3 offset = glm::dvec3(root) - glm::dvec3(head.position_m[nearest]);
+    distances.push_back(std::abs(glm::dot(offset, glm::dvec3(head.normal[nearest]))));
+  }
+  return distances;
+}
+
+/// Distances of the middles of triangles under hair: of half and of most of their area.
+std::pair<double, double> sphere_distances(const Mesh& head, const std::vector<FittedSphere>& spheres,
+                                           const Groom& groom) {
+  constexpr size_t kHairPoints = 50'000;  // more of them say nothing new
+  std::vector<glm::vec3> hair_m;
+  const size_t step = groom.rest_position_m.size() / kHairPoints + 1;
+  for (size_t i = 0; i < groom.rest_position_m.size(); i += step) hair_m.push_back(groom.rest_position_m[i]);
+  const PointTree hair(hair_m);
+  std::vector<std::pair<double, double>> parts;  // distance, area
+  double total = 0.0;
+  for (const glm::uvec3& corner : head.triangle) {
+    const glm::dvec3 a = head.position_m[corner.x], b = head.position_m[corner.y],
+                     c = head.position_m[corner.z];
+    const glm::dvec3 middle = (a + b + c) / 3.0;
+    if (hair.nearest(glm::vec3(middle), 1).front().distance_squared > kUnderHairM * kUnderHairM) continue;
+    const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
+    parts.emplace_back(std::abs(distance_to_spheres_m(spheres, middle)), area);
+    total += area;
+  }
+  std::sort(parts.begin(), parts.end());
+  double half = 0.0, most = 0.0, below = 0.0;
+  for (const auto& [distance, area] : parts) {
+    if (below <= kHalf * total) half = distance;
+    if (below <= kMost * total) most = distance;
+    below += area;
+  }
+  return {half, most};
+}
+
+}  // namespace
+
+HeadMeasure measure_head(const Mesh& head, const std::vector<FittedSphere>& spheres, const Groom& groom) {
+  HeadMeasure measure;
+  const std::vector<double> roots = root_distances(head, groom);
+  measure.root_median_m = quantile(roots, kHalf);
+  measure.root_most_m = quantile(roots, kMost);
+  if (!spheres.empty())
+    std::tie(measure.sphere_median_m, measure.sphere_most_m) = sphere_distances(head, spheres, groom);
+  for (const glm::vec3& point : groom.rest_position_m)
+    measure.deepest_vertex_m = std::max(measure.deepest_vertex_m, -distance_to_spheres_m(spheres, point));
+  return measure;
+}
+
+std::string to_sentence(const HeadMeasure& measure, size_t sphere_count) {
+  constexpr double kMmPerM = 1e3;
+  return fmt::format(
+      "head: half of the roots lie within {:.1f} mm of the drawn skin, 95 % within {:.1f} mm; {} spheres "
+      "collide, half "
+      "of the skin under hair is within {:.1f} mm of them, 95 % within {:.1f} mm; the hair as loaded is at "
+      "most {:.1f} "
+      "mm deep in "
+      "them",
+      measure.root_median_m * kMmPerM, measure.root_most_m * kMmPerM, sphere_count,
+      measure.sphere_median_m * kMmPerM, measure.sphere_most_m * kMmPerM, measure.deepest_vertex_m * kMmPerM);
+}
+
+}  // namespace strandcast

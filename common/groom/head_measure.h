@@ -1,0 +1,28 @@
+// How well a drawn head, what collides and the hair agree. Pure function, any thread.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/groom/groom.h"
+#include "common/groom/mesh.h"
+
+namespace strandcast {
+
+/// Skin is under hair when a vertex of the groom as loaded is so near.
+inline constexpr float kUnderHairM = 0.02f;
+
+struct HeadMeasure {
+  double root_median_m = 0.0, root_most_m = 0.0;  // from the roots to the drawn skin: half, 95 %
+  // From the drawn skin under hair to the spheres, either way: of half, of 95 % of its area.
+  double sphere_median_m = 0.0, sphere_most_m = 0.0;
+  double deepest_vertex_m = 0.0;  // of the groom inside the spheres; 0 when none is
+};
+
+/// `spheres` are those of `head` (head_spheres.h).
+HeadMeasure measure_head(const Mesh& head, const std::vector<FittedSphere>& spheres, const Groom& groom);
+
+/// "half of the roots lie within 1.2 mm of the skin ..."
+std::string to_sentence(const HeadMeasure& measure, size_t sphere_count);
+
+}  // namespace strandcast

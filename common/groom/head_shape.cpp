@@ -1,0 +1,407 @@
+#include "common/groom/head_shape.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "common/base/quantile.h"
+#include "common/groom/head_field.h"
+#include "common/groom/head_fit.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kSkull = 0.985;  // radius of the built-in cranium, in skull radii
+/// Roots nearer to or further from the middle than this, in skull radii, are not on the head: a mane's on the
+/// back.
+constexpr double kNearestRoot = 0.7, kFurthestRoot = 1.35;
+/// How uncertain things are before any root is looked at, for the least squares of the ellipsoid.
+constexpr double kRootNoiseM = 0.004, kCenterNoiseM = 0.02, kStretchNoise = 0.08;
+constexpr int kStretchRounds = 8;
+/// Of the roots in one direction, so many may lie below the skin.
+constexpr double kRootQuantile = 0.3;
+/// Angles over which skin follows roots, first far around, then near; what the built-in shape weighs against
+/// roots that fill that angle.
+constexpr std::array kRootReachRad = {0.5, 0.10};
+constexpr double kBuiltInWeight = 0.08;
+/// How steeply skin may give way to hair, in radii per radian, and how the dents are rounded.
+constexpr double kDentSlope = 0.8, kDentReachRad = 0.07;
+constexpr int kDentRounds = 3;
+/// A vertex deeper than this share of the radius is a stray: skin does not give way.
+constexpr double kStrayPull = 0.6;
+/// How far the built-in surface may rise between the centres of two directions (ears, nose), in skull radii.
+constexpr double kCellSpread = 0.3;
+// The neck below this height, in skull radii, gives way to hair sideways. Its axis is that of head_field.cpp.
+constexpr double kNeckTop = -0.72, kNeckEnd = -2.45;
+constexpr double kNeckAxisZ = -0.14, kNeckAxisY = -0.70, kNeckLean = 0.19;
+constexpr int kNeckRows = 16, kNeckColumns = 24;
+/// No thinner than this share.
+constexpr double kThinnestNeck = 0.45;
+constexpr double kFurthest = 3.2;  // beyond the built-in head, in skull radii
+
+// Directions are the cells of a cube's six faces, evenly spaced in angle along both edges.
+constexpr int kSide = 16;
+constexpr int kCells = 6 * kSide * kSide;
+
+struct FacePoint {
+  int face = 0;
+  double x = 0.0, y = 0.0;  // -1..1 across the face
+};
+
+FacePoint face_point(const glm::dvec3& d) {
+  const glm::dvec3 size = glm::abs(d);
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+  const double along = std::max(size[axis], 1e-300);
+  const auto even = [&](double value) { return std::atan(value / along) * 4.0 / std::numbers::pi; };
+  return {2 * axis + (d[axis] < 0.0 ? 1 : 0), even(d[(axis + 1) % 3]), even(d[(axis + 2) % 3])};
+}
+
+glm::dvec3 direction_of(const FacePoint& at) {
+  glm::dvec3 d;
+  const int axis = at.face / 2;
+  d[axis] = at.face % 2 == 0 ? 1.0 : -1.0;
+  d[(axis + 1) % 3] = std::tan(at.x * std::numbers::pi / 4.0);
+  d[(axis + 2) % 3] = std::tan(at.y * std::numbers::pi / 4.0);
+  return glm::normalize(d);
+}
+
+double center_of_row(int row) {
+  return 2.0 * (row + 0.5) / kSide - 1.0;
+}
+
+int cell_of(const glm::dvec3& direction) {
+  const FacePoint at = face_point(direction);
+  const auto row = [](double value) {
+    return std::clamp(static_cast<int>((value + 1.0) / 2.0 * kSide), 0, kSide - 1);
+  };
+  return (at.face * kSide + row(at.y)) * kSide + row(at.x);
+}
+
+const std::vector<glm::dvec3>& cell_directions() {
+  static const std::vector<glm::dvec3> kDirections = [] {
+    std::vector<glm::dvec3> directions;
+    for (int cell = 0; cell < kCells; ++cell)
+      directions.push_back(direction_of(
+          {cell / (kSide * kSide), center_of_row(cell % kSide), center_of_row(cell / kSide % kSide)}));
+    return directions;
+  }();
+  return kDirections;
+}
+
+/// A field on the directions, between the centres of its cells; neighbours across an edge of the cube
+/// included.
+double blend(const std::vector<double>& field, const glm::dvec3& direction) {
+  const FacePoint at = face_point(direction);
+  const double x = (at.x + 1.0) / 2.0 * kSide - 0.5, y = (at.y + 1.0) / 2.0 * kSide - 0.5;
+  const double low_x = std::floor(x), low_y = std::floor(y);
+  const auto value = [&](double column, double row) {
+    if (column >= 0.0 && row >= 0.0 && column < kSide && row < kSide)
+      return field[static_cast<size_t>((at.face * kSide + static_cast<int>(row)) * kSide +
+                                       static_cast<int>(column))];
+    const FacePoint beyond{at.face, 2.0 * (column + 0.5) / kSide - 1.0, 2.0 * (row + 0.5) / kSide - 1.0};
+    return field[static_cast<size_t>(cell_of(direction_of(beyond)))];
+  };
+  return std::lerp(std::lerp(value(low_x, low_y), value(low_x + 1.0, low_y), x - low_x),
+                   std::lerp(value(low_x, low_y + 1.0), value(low_x + 1.0, low_y + 1.0), x - low_x),
+                   y - low_y);
+}
+
+/// Visits every cell within `reach_rad` of a direction with its angle to it.
+template <class Visit>
+void near_cells(const glm::dvec3& direction, double reach_rad, const Visit& visit) {
+  const std::vector<glm::dvec3>& cells = cell_directions();
+  const double least = std::cos(std::min(reach_rad, std::numbers::pi));
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const double cosine = glm::dot(cells[i], direction);
+    if (cosine >= least) visit(i, std::acos(std::clamp(cosine, -1.0, 1.0)));
+  }
+}
+
+double bell(double angle_rad, double reach_rad) {
+  return std::exp(-0.5 * angle_rad * angle_rad / (reach_rad * reach_rad));
+}
+
+/// Distance from the skull's centre to the surface of the built-in head, in skull radii: the outermost.
+double built_in_radius(const glm::dvec3& direction) {
+  constexpr int kSteps = 200;
+  constexpr double kStep = kFurthest / kSteps;
+  const auto distance = [&](double along) { return head_distance(glm::vec3(along * direction)); };
+  for (double outside = kFurthest; outside > kStep;) {
+    // The field is no true distance: half of it is a safe step.
+    const double inside = outside - std::max(kStep, 0.5 * static_cast<double>(distance(outside)));
+    if (distance(inside) < 0.0f) {
+      double low = inside, high = outside;
+      for (int i = 0; i < 20; ++i) (distance(0.5 * (low + high)) < 0.0f ? low : high) = 0.5 * (low + high);
+      return 0.5 * (low + high);
+    }
+    outside = inside;
+  }
+  return kSkull;
+}
+
+const std::vector<double>& built_in_radii() {
+  static const std::vector<double> kRadii = [] {
+    std::vector<double> radii;
+    for (const glm::dvec3& direction : cell_directions()) radii.push_back(built_in_radius(direction));
+    return radii;
+  }();
+  return kRadii;
+}
+
+glm::dvec3 neck_axis(double y) {
+  return {0.0, y, kNeckAxisZ + kNeckLean * (y - kNeckAxisY)};
+}
+
+/// Row and column of a point of the neck on its grid of heights and azimuths.
+glm::dvec2 neck_grid(const glm::dvec3& u) {
+  const glm::dvec3 offset = u - neck_axis(u.y);
+  const double turns = std::atan2(offset.x, offset.z) / (2.0 * std::numbers::pi) + 1.0;
+  const double row = (kNeckTop - u.y) / (kNeckTop - kNeckEnd) * (kNeckRows - 1);
+  return {std::clamp(row, 0.0, kNeckRows - 1.0), turns * kNeckColumns};
+}
+
+size_t neck_cell(int row, int column) {
+  return static_cast<size_t>(std::clamp(row, 0, kNeckRows - 1) * kNeckColumns +
+                             (column + kNeckColumns) % kNeckColumns);
+}
+
+/// Gauss elimination of six normal equations, which the priors keep positive definite.
+std::array<double, 6> solve(std::array<std::array<double, 7>, 6> rows) {
+  for (size_t column = 0; column < 6; ++column)
+    for (size_t row = column + 1; row < 6; ++row) {
+      const double factor = rows[row][column] / rows[column][column];
+      for (size_t k = column; k < 7; ++k) rows[row][k] -= factor * rows[column][k];
+    }
+  std::array<double, 6> solution{};
+  for (size_t row = 6; row-- > 0;) {
+    solution[row] = rows[row][6];
+    for (size_t k = row + 1; k < 6; ++k) solution[row] -= rows[row][k] * solution[k];
+    solution[row] /= rows[row][row];
+  }
+  return solution;
+}
+
+}  // namespace
+
+HeadShape::HeadShape(const Groom& groom, const FittedSphere& about)
+    : center_m_(about.center_m),
+      radius_m_(static_cast<double>(about.radius_m) / kSkull),
+      pull_(kCells, 1.0),
+      neck_width_(kNeckRows * kNeckColumns, 1.0) {
+  stretch_to_roots(groom);
+  pull_to_roots(groom);
+  give_way_to_hair(groom);
+  narrow_neck(groom);
+}
+
+glm::dvec3 HeadShape::in_skull_radii(const glm::vec3& point_m) const {
+  return (glm::dvec3(point_m) - center_m_) / radius_m_;
+}
+
+double HeadShape::pull_at(const glm::dvec3& direction) const {
+  return blend(pull_, direction);
+}
+
+// Least squares of an ellipsoid through the mean root of each direction, with what is known of heads as
+// prior.
+void HeadShape::stretch_to_roots(const Groom& groom) {
+  std::vector<glm::dvec4> cells(kCells, glm::dvec4(0.0));
+  for (const glm::vec3& root : roots_of(groom)) {
+    const glm::dvec3 u = in_skull_radii(root);
+    const double length = glm::length(u);
+    if (length >= kNearestRoot && length <= kFurthestRoot)
+      cells[static_cast<size_t>(cell_of(u / length))] += glm::dvec4(glm::dvec3(root), 1.0);
+  }
+  std::vector<glm::dvec3> points;
+  for (const glm::dvec4& cell : cells)
+    if (cell.w > 0.0) points.push_back(glm::dvec3(cell) / cell.w);
+  const glm::dvec3 center_m = center_m_, radius_m = radius_m_;
+  glm::dvec3 stretch(0.0);  // logarithm of the factor on the radius
+  for (int round = 0; round < kStretchRounds; ++round) {
+    std::array<std::array<double, 7>, 6> rows{};
+    const double root_weight = 1.0 / (kRootNoiseM * kRootNoiseM);
+    for (const glm::dvec3& point : points) {
+      const glm::dvec3 q = (point - center_m_) / radius_m_;
+      const double length = glm::length(q);
+      if (!(length > 0.0)) continue;
+      const glm::dvec3 n = q / length;
+      const double error_m = (length - kSkull) * radius_m.x;
+      const glm::dvec3 by_center = -n / radius_m_ * radius_m.x, by_stretch = -n * q * radius_m.x;
+      const std::array<double, 6> slope = {by_center.x,  by_center.y,  by_center.z,
+                                           by_stretch.x, by_stretch.y, by_stretch.z};
+      // Huber: beyond the noise a root pulls no harder.
+      const double weight =
+          root_weight * std::min(1.0, 2.0 * kRootNoiseM / std::max(std::abs(error_m), 1e-12));
+      for (size_t i = 0; i < 6; ++i) {
+        for (size_t k = 0; k < 6; ++k) rows[i][k] += weight * slope[i] * slope[k];
+        rows[i][6] -= weight * slope[i] * error_m;
+      }
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const double center_weight = 1.0 / (kCenterNoiseM * kCenterNoiseM);
+      const double stretch_weight = 1.0 / (kStretchNoise * kStretchNoise);
+      const auto c = static_cast<size_t>(axis), s = static_cast<size_t>(axis + 3);
+      rows[c][c] += center_weight;
+      rows[c][6] -= center_weight * (center_m_[axis] - center_m[axis]);
+      rows[s][s] += stretch_weight;
+      rows[s][6] -= stretch_weight * stretch[axis];
+    }
+    const std::array<double, 6> step = solve(rows);
+    for (int axis = 0; axis < 3; ++axis) {
+      center_m_[axis] += step[static_cast<size_t>(axis)];
+      stretch[axis] = std::clamp(stretch[axis] + step[static_cast<size_t>(axis + 3)], -0.3, 0.3);
+      radius_m_[axis] = radius_m[axis] * std::exp(stretch[axis]);
+    }
+  }
+}
+
+void HeadShape::pull_to_roots(const Groom& groom) {
+  std::vector<std::vector<double>> wanted(kCells);
+  for (const glm::vec3& root : roots_of(groom)) {
+    const glm::dvec3 u = in_skull_radii(root);
+    const double length = glm::length(u);
+    if (!(length > 0.0)) continue;
+    const double pull = length / blend(built_in_radii(), u / length);
+    if (length <= kFurthestRoot && pull >= kNearestRoot && pull <= kFurthestRoot)
+      wanted[static_cast<size_t>(cell_of(u / length))].push_back(pull);
+  }
+  for (std::vector<double>& pulls : wanted)
+    if (!pulls.empty()) pulls = {quantile(std::move(pulls), kRootQuantile)};
+  for (const double reach_rad : kRootReachRad) {
+    // What roots in every direction would weigh.
+    const double full = 0.5 * kCells * reach_rad * reach_rad;
+    std::vector<double> sum(kCells, 0.0), weight(kCells, kBuiltInWeight * full);
+    for (size_t cell = 0; cell < wanted.size(); ++cell) {
+      if (wanted[cell].empty()) continue;
+      const double missing = wanted[cell].front() - pull_[cell];
+      near_cells(cell_directions()[cell], 3.0 * reach_rad, [&](size_t near, double angle_rad) {
+        const double here = bell(angle_rad, reach_rad);
+        sum[near] += here * missing;
+        weight[near] += here;
+      });
+    }
+    for (size_t cell = 0; cell < pull_.size(); ++cell) pull_[cell] += sum[cell] / weight[cell];
+  }
+}
+
+void HeadShape::give_way_to_hair(const Groom& groom) {
+  for (int round = 0; round < kDentRounds; ++round) {
+    std::vector<double> most(kCells, std::numeric_limits<double>::max());
+    bool is_clear = true;
+    for (const glm::vec3& point : groom.rest_position_m) {
+      const glm::dvec3 u = in_skull_radii(point);
+      const double length = glm::length(u);
+      if (!(length > 0.0) || length > kFurthest) continue;
+      const double pull = pull_at(u / length);
+      if (u.y < kNeckTop * pull) continue;
+      if (length > pull * (blend(built_in_radii(), u / length) + kCellSpread)) continue;
+      if (!(head_distance(glm::vec3(u / pull)) < 0.0f)) continue;
+      const double wanted = length / built_in_radius(u / length);
+      if (wanted < kStrayPull) continue;
+      double& least = most[static_cast<size_t>(cell_of(u / length))];
+      least = std::min(least, wanted - (pull - wanted) * 0.25 * round);
+      is_clear = false;
+    }
+    if (is_clear) return;
+    std::vector<double> dented = pull_;
+    for (size_t cell = 0; cell < most.size(); ++cell) {
+      if (most[cell] >= pull_[cell]) continue;
+      const double reach_rad = (pull_[cell] - most[cell]) / kDentSlope + 0.1;
+      near_cells(cell_directions()[cell], reach_rad, [&](size_t near, double angle_rad) {
+        dented[near] = std::min(dented[near], most[cell] + kDentSlope * angle_rad);
+      });
+    }
+    // Rounded where something was dented, and nowhere above it.
+    for (size_t cell = 0; cell < dented.size(); ++cell) {
+      double sum = 0.0, weight = 0.0;
+      near_cells(cell_directions()[cell], 2.5 * kDentReachRad, [&](size_t near, double angle_rad) {
+        const double here = bell(angle_rad, kDentReachRad);
+        sum += here * dented[near];
+        weight += here;
+      });
+      pull_[cell] = std::min(pull_[cell], sum / weight);
+    }
+  }
+}
+
+double HeadShape::neck_width_at(const glm::dvec3& u) const {
+  if (u.y >= kNeckTop) return 1.0;
+  const glm::dvec2 at = neck_grid(u);
+  const int row = static_cast<int>(at.x), column = static_cast<int>(at.y);
+  const auto value = [&](int r, int c) { return neck_width_[neck_cell(r, c % kNeckColumns)]; };
+  return std::lerp(std::lerp(value(row, column), value(row, column + 1), at.y - column),
+                   std::lerp(value(row + 1, column), value(row + 1, column + 1), at.y - column), at.x - row);
+}
+
+// Each vertex inside of the neck makes it as thin there as it has to be; then the widths are evened out.
+void HeadShape::narrow_neck(const Groom& groom) {
+  for (int round = 0; round < kDentRounds; ++round) {
+    std::vector<double> wanted = neck_width_;
+    for (const glm::vec3& point : groom.rest_position_m) {
+      const glm::dvec3 u = in_skull_radii(point);
+      const double length = glm::length(u);
+      if (!(length > 0.0) || length > kFurthest || u.y >= kNeckTop || !(distance_in_radii(u) < 0.0)) continue;
+      // By how much wider the point would have to lie to be on the skin.
+      double low = 1.0, high = 1.0 / kThinnestNeck;
+      const glm::dvec3 axis = neck_axis(u.y);
+      if (distance_in_radii(axis + high * (u - axis)) < 0.0) continue;
+      for (int i = 0; i < 16; ++i) {
+        const double middle = 0.5 * (low + high);
+        (distance_in_radii(axis + middle * (u - axis)) < 0.0 ? low : high) = middle;
+      }
+      const glm::dvec2 at = neck_grid(u);
+      for (int corner = 0; corner < 4; ++corner) {
+        const size_t cell = neck_cell(static_cast<int>(at.x) + corner % 2,
+                                      (static_cast<int>(at.y) + corner / 2) % kNeckColumns);
+        wanted[cell] = std::min(wanted[cell], neck_width_[cell] / high);
+      }
+    }
+    for (int row = 0; row < kNeckRows; ++row)
+      for (int column = 0; column < kNeckColumns; ++column) {
+        double sum = 0.0, weight = 0.0;
+        for (int dr = -2; dr <= 2; ++dr)
+          for (int dc = -2; dc <= 2; ++dc) {
+            const double here = std::exp(-0.5 * (dr * dr + dc * dc));
+            sum += here * wanted[neck_cell(row + dr, column + dc)];
+            weight += here;
+          }
+        double& width = neck_width_[neck_cell(row, column)];
+        width = std::clamp(std::min(wanted[neck_cell(row, column)], sum / weight), kThinnestNeck, 1.0);
+      }
+    for (int column = 0; column < kNeckColumns; ++column) neck_width_[neck_cell(0, column)] = 1.0;
+  }
+}
+
+/// About the distance of a point in (stretched) skull radii.
+double HeadShape::distance_in_radii(const glm::dvec3& u) const {
+  const double length = glm::length(u);
+  const double pull = length > 0.0 ? pull_at(u / length) : 1.0;
+  glm::dvec3 v = u / pull;
+  // The width belongs to the place before it was made thin, which lies in the same direction from the axis.
+  const glm::dvec3 axis = neck_axis(v.y);
+  v = axis + (v - axis) / neck_width_at(v);
+  return static_cast<double>(head_distance(glm::vec3(v))) * pull;
+}
+
+double HeadShape::distance_m(const glm::dvec3& point_m) const {
+  const double mean_radius_m = (radius_m_.x + radius_m_.y + radius_m_.z) / 3.0;
+  return distance_in_radii((point_m - center_m_) / radius_m_) * mean_radius_m;
+}
+
+Mesh HeadShape::mesh() const {
+  Mesh mesh = make_head(1.0f);
+  for (glm::vec3& point : mesh.position_m) {
+    glm::dvec3 u(point);
+    const glm::dvec3 axis = neck_axis(u.y);
+    u = axis + (u - axis) * neck_width_at(u);
+    const double length = glm::length(u);
+    const double pull = length > 0.0 ? pull_at(u / length) : 1.0;
+    point = glm::vec3(center_m_ + radius_m_ * u * pull);
+  }
+  mesh.normal = compute_normals(mesh.position_m, mesh.triangle);
+  return mesh;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,144 @@
+#include "common/groom/placement.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "common/base/quantile.h"
+#include "common/groom/head_fit.h"
+
+namespace strandcast {
+namespace {
+
+/// Radii of the sphere through the roots of a human head, child to large adult with a wide hairline.
+constexpr float kSmallestHeadRadiusM = 0.07f, kTypicalHeadRadiusM = 0.1f, kLargestHeadRadiusM = 0.12f;
+struct CommonUnit {
+  float unit_m;
+  const char* name;
+};
+constexpr std::array<CommonUnit, 4> kCommonUnits = {
+    CommonUnit{1.0f, "metres"}, {0.01f, "centimetres"}, {0.001f, "millimetres"}, {0.0254f, "inches"}};
+
+/// Fewer roots say nothing of a head.
+constexpr uint32_t kMinRoots = 64;
+/// +Z is up only when it is better than +Y by this much: -1 to 1 for how far the roots cover that side, and
+/// as much for how far the hair hangs from it.
+constexpr double kClearlyBetter = 0.5;
+/// Roots that lie on that side of the head, and how far from the middle roots of a head are, in radii.
+constexpr double kOnTop = 0.1, kNearestRoot = 0.7, kFurthestRoot = 1.35;
+enum class RootReach { Head, Everywhere };
+/// The hairline is looked at in so many directions round the head.
+constexpr size_t kSectors = 8;
+/// A few stray roots are no hairline.
+constexpr double kHairlineShare = 0.05;
+/// A hairline that rises and falls by less, in head radii, has no front.
+constexpr double kMinHairlineSwing = 0.15;
+constexpr int kQuarterTurn_deg = 90;
+
+double angle_of(const glm::dvec3& direction) {
+  return std::atan2(direction.x, direction.z);
+}
+
+/// Unit directions from the middle of the head to the roots. RootReach::Head leaves out those far from its
+/// surface, as of a mane that goes on down the back.
+std::vector<glm::dvec3> root_directions(const Groom& groom, RootReach reach) {
+  const FittedSphere head = fit_head_sphere(groom);
+  std::vector<glm::dvec3> directions;
+  for (const glm::vec3& root : roots_of(groom)) {
+    const glm::dvec3 offset = glm::dvec3(root) - glm::dvec3(head.center_m);
+    const double length = glm::length(offset), radii = length / static_cast<double>(head.radius_m);
+    if (!std::isfinite(length) || !(length > 0.0)) continue;
+    if (reach == RootReach::Head && !(radii > kNearestRoot && radii < kFurthestRoot)) continue;
+    directions.push_back(offset / length);
+  }
+  return directions;
+}
+
+/// What speaks for +Y being up.
+struct Uprightness {
+  double top = 0.0;   // 1 for roots that all lie on top of the head
+  double fall = 0.0;  // 1 for hair that hangs straight down
+};
+
+Uprightness uprightness(const Groom& groom) {
+  Uprightness result;
+  const std::vector<glm::dvec3> directions = root_directions(groom, RootReach::Head);
+  for (const glm::dvec3& direction : directions)
+    result.top += direction.y / static_cast<double>(directions.size());
+  double length = 0.0;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const float length_here = groom.length_m(strand);
+    if (!std::isfinite(length_here)) continue;
+    length += length_here;
+    result.fall += static_cast<double>(groom.rest_position_m[groom.offset[strand]].y) -
+                   groom.rest_position_m[groom.offset[strand + 1] - 1].y;
+  }
+  result.fall = length > 0.0 ? result.fall / length : 0.0;
+  return result;
+}
+
+}  // namespace
+
+glm::vec3 GroomPlacement::turn(const glm::vec3& direction) const {
+  return yawed(upright(direction));
+}
+
+glm::vec3 GroomPlacement::yawed(const glm::vec3& v) const {
+  // Quarter turns are exact.
+  if (yaw_deg == 0.0f) return v;
+  if (yaw_deg == 90.0f) return {v.z, v.y, -v.x};
+  if (yaw_deg == -90.0f) return {-v.z, v.y, v.x};
+  if (std::abs(yaw_deg) == 180.0f) return {-v.x, v.y, -v.z};
+  const double angle = static_cast<double>(yaw_deg) * std::numbers::pi / 180.0;
+  const double c = std::cos(angle), s = std::sin(angle);
+  return {static_cast<float>(c * v.x + s * v.z), v.y, static_cast<float>(c * v.z - s * v.x)};
+}
+
+Guess<bool> guess_z_up(const Groom& groom) {
+  if (groom.strand_count() < kMinRoots) return {};
+  Groom turned = groom;
+  for (glm::vec3& point : turned.rest_position_m) point = {point.x, point.z, -point.y};
+  const Uprightness y = uprightness(groom), z = uprightness(turned);
+  if (!(z.top > kOnTop && z.top + z.fall > y.top + y.fall + kClearlyBetter)) return {false, {}};
+  return {true, "the hair covers that side and hangs from it"};
+}
+
+Guess<float> guess_yaw_deg(const Groom& groom) {
+  if (groom.strand_count() < kMinRoots) return {};
+  std::array<std::vector<double>, kSectors> heights;
+  for (const glm::dvec3& direction : root_directions(groom, RootReach::Everywhere)) {
+    const double turns = angle_of(direction) / (2.0 * std::numbers::pi) + 1.0;
+    heights[static_cast<size_t>(turns * kSectors + 0.5) % kSectors].push_back(direction.y);
+  }
+  // The first harmonic of the hairline's height; a sector without roots is bare up to the crown.
+  glm::dvec3 rise(0.0);
+  for (size_t sector = 0; sector < kSectors; ++sector) {
+    const double height =
+        heights[sector].empty() ? 1.0 : quantile(std::move(heights[sector]), kHairlineShare);
+    const double angle = 2.0 * std::numbers::pi * static_cast<double>(sector) / kSectors;
+    rise += 2.0 / kSectors * height * glm::dvec3(std::sin(angle), 0.0, std::cos(angle));
+  }
+  if (!(glm::length(rise) >= kMinHairlineSwing)) return {};
+  const double face_deg = angle_of(rise) * 180.0 / std::numbers::pi;
+  const int quarters = static_cast<int>(std::lround(face_deg / kQuarterTurn_deg));
+  constexpr std::array kNames = {"-Z", "-X", "+Z", "+X", "-Z"};
+  const int yaw_deg = -quarters * kQuarterTurn_deg;
+  return {static_cast<float>(yaw_deg == -180 ? 180 : yaw_deg),
+          fmt::format("the hairline is highest at {}", kNames[static_cast<size_t>(quarters + 2)])};
+}
+
+Guess<float> guess_unit(const Groom& groom) {
+  const float radius = fit_head_sphere(groom).radius_m;
+  if (!std::isfinite(radius) || radius <= 0.0f) return {1.0f, {}};
+  for (const CommonUnit& unit : kCommonUnits) {
+    if (radius * unit.unit_m < kSmallestHeadRadiusM || radius * unit.unit_m > kLargestHeadRadiusM) continue;
+    return {unit.unit_m, fmt::format("in {} the head has the size of a person's", unit.name)};
+  }
+  return {kTypicalHeadRadiusM / radius, "that gives the head the size of a person's"};
+}
+
+}  // namespace strandcast

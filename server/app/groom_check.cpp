@@ -1,0 +1,139 @@
+#include "server/app/groom_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <system_error>
+
+#include "common/base/file.h"
+#include "common/gl/egl_context.h"
+#include "common/groom/groom_asset.h"
+#include "common/pictures/image_codec.h"
+#include "common/render/renderer.h"
+#include "server/scene/scene_content.h"
+
+namespace strandcast {
+namespace {
+
+constexpr uint32_t kPictureSide = 480;
+constexpr float kFieldOfViewRad = 0.3f;  // from afar: nearly without perspective
+constexpr float kMargin = 1.1f;
+// Strands are drawn alone and as wide as a pixel: the picture shows where they are, not how they look.
+constexpr float kPixelsPerStrand = 0.6f;
+constexpr uint32_t kSphereRings = 12;
+
+/// From the front, from the left side of the head, from above.
+constexpr std::array kDirections = {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)};
+
+struct Box {
+  glm::vec3 low{0.0f}, high{0.0f};
+  void add(const glm::vec3& point) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+};
+
+Box box_of(const SceneContent& content, const Mesh& head) {
+  Box box{content.groom.rest_position_m.front(), content.groom.rest_position_m.front()};
+  for (const glm::vec3& point : content.groom.rest_position_m) box.add(point);
+  for (const glm::vec3& point : head.position_m) box.add(point);
+  return box;
+}
+
+/// Appends a ball of triangles.
+void add_ball(const SphereCollider& sphere, Mesh& mesh) {
+  constexpr uint32_t kColumns = 2 * kSphereRings;
+  const auto first = static_cast<uint32_t>(mesh.position_m.size());
+  for (uint32_t ring = 0; ring <= kSphereRings; ++ring)
+    for (uint32_t column = 0; column < kColumns; ++column) {
+      const double down = 3.14159265358979 * ring / kSphereRings,
+                   around = 6.28318530717959 * column / kColumns;
+      const glm::vec3 normal(
+          glm::dvec3(std::sin(down) * std::sin(around), std::cos(down), std::sin(down) * std::cos(around)));
+      mesh.normal.push_back(normal);
+      mesh.position_m.push_back(sphere.center_m + sphere.radius_m * normal);
+    }
+  for (uint32_t ring = 0; ring < kSphereRings; ++ring)
+    for (uint32_t column = 0; column < kColumns; ++column) {
+      const uint32_t here = first + ring * kColumns + column,
+                     next = first + ring * kColumns + (column + 1) % kColumns;
+      mesh.triangle.emplace_back(here, here + kColumns, next);
+      mesh.triangle.emplace_back(next, here + kColumns, next + kColumns);
+    }
+}
+
+Mesh balls_of(const std::vector<SphereCollider>& spheres) {
+  Mesh mesh;
+  for (const SphereCollider& sphere : spheres) add_ball(sphere, mesh);
+  return mesh;
+}
+
+/// Copies a picture into the sheet.
+void paste(const Image& picture, uint32_t column, uint32_t row, Image& sheet) {
+  for (uint32_t y = 0; y < picture.height; ++y)
+    std::copy_n(picture.rgba.begin() + 4 * size_t{y} * picture.width, 4 * size_t{picture.width},
+                sheet.rgba.begin() +
+                    4 * ((size_t{row} * kPictureSide + y) * sheet.width + size_t{column} * kPictureSide));
+}
+
+/// One row of the sheet: a head (or none) under the hair (or none), from all sides.
+Status draw_row(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device, const SceneAsset& asset,
+                const SceneDesc& scene, const Box& box, uint32_t row, Image& sheet) {
+  const glm::vec3 size_m = box.high - box.low;
+  const float reach_m = std::max({size_m.x, size_m.y, size_m.z, 1e-3f});
+  CameraDesc camera;
+  camera.fov_y_rad = kFieldOfViewRad;
+  camera.target_m = 0.5f * (box.low + box.high);
+  const float away_m = 0.5f * kMargin * reach_m / std::tan(0.5f * kFieldOfViewRad) + 0.5f * reach_m;
+  LookDesc look = scene.look;
+  look.followers = 0;
+  look.tip_scale = 1.0f;
+  look.strand_radius_m = 0.5f * kPixelsPerStrand * kMargin * reach_m / kPictureSide;
+  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, device, asset, look));
+  PosedStrands strands;
+  strands.position_m = asset.rest_position_m;
+  for (uint32_t view = 0; view < kDirections.size(); ++view) {
+    camera.offset_m = away_m * kDirections[view];
+    RETURN_IF_ERROR(renderer->draw(strands, camera, {kPictureSide, kPictureSide}));
+    paste(renderer->read_image(), view, row, sheet);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
+                                const MeasureConfig& config) {
+  ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure)
+    return make_error(ErrorCode::Unavailable, "cannot make the folder {}: {}", folder.string(),
+                      failure.message());
+  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(config.gl_device));
+  const gl::ShaderLibrary shaders =
+      config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
+  // Hair alone, hair on its head, hair on what collides.
+  const std::array<Mesh, 3> heads = {Mesh{}, content.head, balls_of(content.colliders)};
+  const Box box = box_of(content, content.head);
+  Image sheet{kPictureSide * static_cast<uint32_t>(kDirections.size()),
+              kPictureSide * static_cast<uint32_t>(heads.size()),
+              {}};
+  sheet.rgba.resize(4 * size_t{sheet.width} * sheet.height);
+  for (uint32_t row = 0; row < heads.size(); ++row)
+    RETURN_IF_ERROR(draw_row(shaders, context->info(), make_scene_asset(content.groom, heads[row]), scene,
+                             box, row, sheet));
+  std::string text;
+  for (const std::string& note : content.notes) text += note + "\n";
+  const std::filesystem::path picture = folder / "groom.png";
+  RETURN_IF_ERROR(save_png(picture, sheet));
+  text += fmt::format(
+      "{}: from the front, from its left side and from above; hair alone, on the head, on the {} spheres "
+      "that collide\n",
+      picture.string(), content.colliders.size());
+  RETURN_IF_ERROR(save_file(folder / "groom.txt", std::as_bytes(std::span(text))));
+  return text;
+}
+
+}  // namespace strandcast
