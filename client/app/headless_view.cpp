@@ -8,6 +8,7 @@
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
 #include "common/log/log.h"
+#include "common/log/progress.h"
 
 namespace strandcast {
 namespace {
@@ -199,11 +200,17 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
   }
   if (options.clip.empty()) return {};
   ASSIGN_OR_RETURN(ClipWriter clip, ClipWriter::make(options.clip, options.clip_fps));
-  for (const auto& snapshot : collected.clip.snapshots()) {
+  const auto& snapshots = collected.clip.snapshots();
+  Progress progress({"drawing the clip"});
+  progress.expect(static_cast<uint32_t>(snapshots.size()), static_cast<double>(snapshots.size()));
+  for (const auto& snapshot : snapshots) {
     if (stop) return {};
+    progress.begin_run(options.clip.string());
     ASSIGN_OR_RETURN(const Image image, draw(*snapshot, options.clip_size));
     RETURN_IF_ERROR(clip.add(image));
+    progress.end_run(1.0);
   }
+  if (stop) return {};
   return clip.finish();
 }
 

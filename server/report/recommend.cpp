@@ -9,8 +9,8 @@
 
 #include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
+#include "common/log/progress.h"
 #include "common/scene/scene_file.h"
-#include "server/report/progress.h"
 #include "server/report/report_commands.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"

@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "common/gl/egl_context.h"
+#include "common/log/progress.h"
 #include "server/report/csv_file.h"
-#include "server/report/progress.h"
 #include "server/report/report_commands.h"
 #include "server/report/report_folder.h"
 

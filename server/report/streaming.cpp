@@ -13,7 +13,7 @@
 #include "common/base/profile.h"
 #include "common/gl/egl_context.h"
 #include "server/report/peers/peer_codecs.h"
-#include "server/report/progress.h"
+#include "common/log/progress.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {

@@ -11,7 +11,7 @@
 
 #include "common/base/profile.h"
 #include "common/gl/egl_context.h"
-#include "server/report/progress.h"
+#include "common/log/progress.h"
 #include "server/report/run_timer.h"
 
 namespace strandcast {

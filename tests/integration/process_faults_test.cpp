@@ -1,5 +1,9 @@
 // Programs that are killed, stopped, starved of descriptors or told to end, with viewers attached.
+#include <netinet/in.h>
+#include <sys/socket.h>
+
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -31,11 +35,22 @@ class ProcessFaults : public testing::Test {
     std::ifstream(port_path_) >> port_;
     return server;
   }
-  std::string output() const {
-    std::ifstream file(folder_.path() / "server.txt");
+  std::string text_of(const char* file_name) const {
+    std::ifstream file(folder_.path() / file_name);
     std::ostringstream text;
     text << file.rdbuf();
     return text.str();
+  }
+  std::string output() const { return text_of("server.txt"); }
+  static bool is_listening(uint16_t port) {
+    const int handle = socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int connected = connect(handle, reinterpret_cast<const sockaddr*>(&address), sizeof address);
+    close(handle);
+    return connected == 0;
   }
   template <class Condition>
   static bool run_until(LoadViewers& viewers, Condition condition) {
@@ -143,6 +158,70 @@ TEST_F(ProcessFaults, ASuspendedViewerIsDroppedAndComesBack) {
   viewer.send_signal(SIGTERM);
   EXPECT_EQ(viewer.wait(), 0) << "a stop is no failure, and leaves a report";
   EXPECT_TRUE(std::filesystem::exists(report));
+}
+
+TEST_F(ProcessFaults, ASignalEndsAViewerThatDrawsItsClip) {
+  const auto server = serve();
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  const auto clip = folder_.path() / "clip.webp";
+  // More pictures than are drawn in the time that eventually() waits, on a processor.
+  ChildProcess viewer(
+      STRANDCAST_VIEW_PROGRAM,
+      {"--connect", "127.0.0.1:" + std::to_string(port_), "--headless", "--mode", "strands", "--seconds", "2",
+       "--clip", clip.string(), "--clip-seconds", "30", "--clip-fps", "60", "--clip-size", "1920x1080"},
+      folder_.path() / "viewer.txt");
+  const auto said = [&] { return text_of("viewer.txt"); };
+  ASSERT_TRUE(eventually(
+      [&] { return viewer.has_ended() || said().find("drawing the clip: run 1 of ") != std::string::npos; }));
+  viewer.send_signal(SIGINT);
+  EXPECT_TRUE(eventually([&] { return viewer.has_ended(); })) << said();
+  EXPECT_FALSE(std::filesystem::exists(clip)) << "a clip is whole or not there";
+}
+
+TEST_F(ProcessFaults, ASignalEndsTheFeeder) {
+  const auto server = serve();
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  ChildProcess feeder(STRANDCAST_CTL_PROGRAM,
+                      {"feed", "--connect", "127.0.0.1:" + std::to_string(port_), "--seconds", "600"},
+                      folder_.path() / "feeder.txt");
+  ASSERT_TRUE(eventually([&] { return text_of("feeder.txt").find("feeding ") != std::string::npos; }));
+  feeder.send_signal(SIGINT);
+  EXPECT_EQ(feeder.wait(), 0) << text_of("feeder.txt");
+  EXPECT_THAT(text_of("feeder.txt"), testing::HasSubstr("motion and"));
+}
+
+// A tree with the script of this one and the programs of this build, so that nothing is installed or built.
+TEST_F(ProcessFaults, ASignalToTheRunScriptEndsAllThatItStarted) {
+  namespace fs = std::filesystem;
+  const fs::path tree = folder_.path() / "tree", bin = tree / "build" / "release" / "bin",
+                 stubs = tree / "stubs";
+  for (const fs::path& folder : {tree / "deploy", bin, stubs}) fs::create_directories(folder);
+  fs::copy_file(fs::path(STRANDCAST_SOURCE_DIR) / "deploy" / "run.sh", tree / "deploy" / "run.sh");
+  std::ofstream(tree / "deploy" / "install_deps.sh") << "exit 0\n";
+  std::ofstream(stubs / "cmake") << "#!/bin/sh\nexit 0\n";
+  fs::permissions(stubs / "cmake", fs::perms::owner_all);
+  for (const char* program : {STRANDCAST_SERVER_PROGRAM, STRANDCAST_VIEW_PROGRAM, STRANDCAST_CTL_PROGRAM})
+    fs::create_symlink(program, bin / fs::path(program).filename());
+  setenv("PATH", (stubs.string() + ":" + getenv("PATH")).c_str(), 1);
+  ChildProcess script("/bin/bash",
+                      {(tree / "deploy" / "run.sh").string(), "--headless", "--seconds", "4", "--set",
+                       "groom.procedural.strand_count=50", "--out", (tree / "out").string()},
+                      folder_.path() / "script.txt");
+  const auto said = [&] { return text_of("script.txt"); };
+  const auto has_said = [&](const char* what) { return said().find(what) != std::string::npos; };
+  ASSERT_TRUE(eventually([&] { return script.has_ended() || has_said("drawing the clip: run 1 of "); }))
+      << said();
+  if (test::lacks_gl(said())) GTEST_SKIP() << "needs OpenGL 4.5: " << said();
+  script.send_signal(SIGTERM);
+  EXPECT_EQ(script.wait(), 0) << said();
+  const std::string text = said();
+  const std::string before = "Server on 127.0.0.1:";
+  const size_t at = text.find(before);
+  ASSERT_NE(at, std::string::npos) << text;
+  const int port = std::stoi(text.substr(at + before.size()));
+  EXPECT_FALSE(is_listening(static_cast<uint16_t>(port))) << "the server is gone too";
 }
 
 }  // namespace

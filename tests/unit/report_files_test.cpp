@@ -2,9 +2,9 @@
 #include <cmath>
 #include <limits>
 
+#include "common/log/progress.h"
 #include "server/report/csv_file.h"
 #include "server/report/html_page.h"
-#include "server/report/progress.h"
 #include "server/report/report_folder.h"
 #include "server/report/svg_plot.h"
 #include "tests/support/temporary_folder.h"
@@ -113,6 +113,18 @@ TEST(HtmlPage, IsSelfContainedAndEscapes) {
   EXPECT_EQ(count_of(text, "://"), 1u);
   for (const char* loader : {"src=", "href=", "@import", "url("}) EXPECT_THAT(text, Not(HasSubstr(loader)));
   EXPECT_EQ(count_of(text, "<tr>"), count_of(text, "</tr>"));
+}
+
+TEST(HtmlPage, SentencesInTablesWrapAndNumbersDoNot) {
+  const std::string text = HtmlPage("t").text();
+  size_t found = 0;
+  for (size_t at = text.find("nowrap"); at != std::string::npos; at = text.find("nowrap", at + 1)) {
+    const size_t rule = text.rfind('}', at) + 1;
+    EXPECT_THAT(text.substr(rule, at - rule), HasSubstr("td.number {"))
+        << "a column of sentences pushes others off";
+    ++found;
+  }
+  EXPECT_EQ(found, 1u);
 }
 
 TEST(Progress, ExpectsTheRestAtThePaceSoFar) {

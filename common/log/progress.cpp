@@ -1,4 +1,4 @@
-#include "server/report/progress.h"
+#include "common/log/progress.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
