@@ -22,8 +22,9 @@ figcaption, .caption { color: var(--soft); font-size: .9rem; }
 .wide { overflow-x: auto; margin: 0 0 1.2rem; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid var(--line); padding: .25rem .7rem .25rem 0; text-align: left;
-  white-space: nowrap; vertical-align: top; }
-th { color: var(--soft); font-weight: 600; white-space: normal; vertical-align: bottom; } td.number { text-align: right; }
+  vertical-align: top; }
+th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
+td.number { text-align: right; white-space: nowrap; }
 td.good { background: var(--good); } td.bad { background: var(--bad); }
 pre { background: var(--panel); padding: .7rem 1rem; overflow-x: auto; font-size: .88rem; }
 )";

@@ -13,6 +13,9 @@
 namespace strandcast {
 namespace {
 
+/// Of motions without end; the built-in one's fast turn comes later.
+constexpr double kSurveyedBuiltInS = 6.0;
+
 // The built-in motion where it walks and looks around, before its fast turn.
 constexpr double kWalkBeginS = 0.5;
 
@@ -66,9 +69,8 @@ const char* to_string(MotionLevel motion_level) {
   return "";
 }
 
-MotionLevel motion_level_of(double hair_rms_mps) {
-  if (hair_rms_mps < kActiveHairMps) return MotionLevel::Idle;
-  return hair_rms_mps < kViolentHairMps ? MotionLevel::Active : MotionLevel::Violent;
+const char* to_string(MotionPart part) {
+  return part == MotionPart::Median ? "median" : "wildest";
 }
 
 HeadMeasure measure_head(const std::vector<Pose>& world_from_head, double frame_s) {
@@ -82,6 +84,61 @@ HeadMeasure measure_head(const std::vector<Pose>& world_from_head, double frame_
     measure.mean_turn_rad_per_s += angle_between_rad(before.rotation, now.rotation) / total_s;
   }
   return measure;
+}
+
+namespace {
+
+/// Speed at which each frame's movement of the head drives hair.
+std::vector<double> frame_drives_mps(const StreamMotion& motion) {
+  const double length_s = std::isinf(motion.duration_s) ? kSurveyedBuiltInS : motion.duration_s;
+  const auto count = static_cast<int>(std::floor(length_s / kStreamFrameS + 1e-6)) + 1;
+  std::vector<Pose> poses;
+  for (int i = 0; i < count; ++i) poses.push_back(motion.head_at(i * kStreamFrameS));
+  std::vector<double> drives;
+  for (size_t i = 2; i < poses.size(); ++i) {
+    const double turn_rad_per_s = angle_between_rad(poses[i - 1].rotation, poses[i].rotation) / kStreamFrameS;
+    const glm::dvec3 change = poses[i].position_m - 2.0 * poses[i - 1].position_m + poses[i - 2].position_m;
+    const double acceleration_mps2 = glm::length(change) / (kStreamFrameS * kStreamFrameS);
+    drives.push_back(kDriveLengthM * turn_rad_per_s + kDriveLagS * acceleration_mps2);
+  }
+  return drives;
+}
+
+struct Part {
+  double drive_mps = 0.0;
+  size_t first_frame = 0;
+};
+
+/// All parts of so many seconds, the tamest first. At least one.
+std::vector<Part> parts_of(const std::vector<double>& drives_mps, double seconds) {
+  const auto length = std::clamp<size_t>(static_cast<size_t>(std::lround(seconds / kStreamFrameS)), 1,
+                                         std::max<size_t>(1, drives_mps.size()));
+  std::vector<Part> parts;
+  double sum_mps = 0.0;
+  for (size_t i = 0; i < drives_mps.size(); ++i) {
+    sum_mps += drives_mps[i];
+    if (i >= length) sum_mps -= drives_mps[i - length];
+    if (i + 1 >= length) parts.push_back({sum_mps / static_cast<double>(length), i + 1 - length});
+  }
+  if (parts.empty()) parts.push_back({});
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const Part& a, const Part& b) { return a.drive_mps < b.drive_mps; });
+  return parts;
+}
+
+}  // namespace
+
+MotionSurvey survey_motion(const StreamMotion& motion, double seconds) {
+  const std::vector<double> drives_mps = frame_drives_mps(motion);
+  const std::vector<Part> halves = parts_of(drives_mps, kSurveyPartS);
+  MotionSurvey survey;
+  survey.median_drive_mps = halves[halves.size() / 2].drive_mps;
+  if (survey.median_drive_mps >= kActiveDriveMps) survey.level = MotionLevel::Active;
+  if (survey.median_drive_mps >= kViolentDriveMps) survey.level = MotionLevel::Violent;
+  const std::vector<Part> parts = parts_of(drives_mps, seconds);
+  survey.begin_s[0] = static_cast<double>(parts[parts.size() / 2].first_frame) * kStreamFrameS;
+  survey.begin_s[1] = static_cast<double>(parts.back().first_frame) * kStreamFrameS;
+  return survey;
 }
 
 std::vector<StreamMotion> built_in_stream_motions() {

@@ -13,16 +13,20 @@
 
 namespace strandcast {
 
-/// How much hair moves; decides which goals a recording is held to.
+/// Recordings have 60 frames a second.
+inline constexpr double kStreamFrameS = 1.0 / 60.0;
+
+/// How much a motion asks of hair; decides which goals it is held to. By the head alone, so that a clip is
+/// the same with every strand model.
 enum class MotionLevel { Idle, Active, Violent };
 /// "idle", "walking and turning", "violent".
 const char* to_string(MotionLevel motion_level);
 
-/// By the root of the mean square speed of all vertices in head space. Standing has about 0.02 m/s, recorded
-/// and built-in walking 0.07 to 0.45, jumps, spins and salsa 0.56 to 1.2.
-MotionLevel motion_level_of(double hair_rms_mps);
-inline constexpr double kActiveHairMps = 0.04;
-inline constexpr double kViolentHairMps = 0.5;
+/// The parts of a motion that are recorded: what it mostly is, and its worst.
+enum class MotionPart { Median, Wildest };
+inline constexpr MotionPart kMotionParts[] = {MotionPart::Median, MotionPart::Wildest};
+/// "median", "wildest".
+const char* to_string(MotionPart part);
 
 struct HeadMeasure {
   double mean_speed_mps = 0.0;  // of the head joint
@@ -35,6 +39,23 @@ struct StreamMotion {
   std::function<Pose(double)> head_at;  // s from its beginning
   double duration_s = 0.0;              // infinite for a built-in one
 };
+
+/// A motion as a whole. The *drive* of a part is about how fast its head makes hair move: its mean rate of
+/// turn at the length of a hair, and its mean acceleration during the time in which hair follows.
+struct MotionSurvey {
+  MotionLevel level = MotionLevel::Idle;  // by the median drive of all half seconds
+  double median_drive_mps = 0.0;
+  double begin_s[2] = {0.0, 0.0};  // of each of kMotionParts
+};
+inline constexpr double kSurveyPartS = 0.5;
+// Drive of a head: by its turns at this length, and by its accelerations for this long.
+inline constexpr double kDriveLengthM = 0.25;
+inline constexpr double kDriveLagS = 0.03;
+/// Standing has 0.02 m/s, walking and dancing at hand 0.22 to 0.46, salsa and spins 0.76 to 0.93.
+inline constexpr double kActiveDriveMps = 0.1;
+inline constexpr double kViolentDriveMps = 0.6;
+/// Looks at all parts of `seconds`, one frame apart; of a motion without end at those in its first seconds.
+MotionSurvey survey_motion(const StreamMotion& motion, double seconds);
 
 /// idle, active and violent, built in.
 std::vector<StreamMotion> built_in_stream_motions();

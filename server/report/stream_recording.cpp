@@ -105,8 +105,10 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   recording.motion_name = desc.motion.name;
   recording.shape = {desc.size.strand_count, desc.size.vertex_count,
                      make_scene_asset(content.groom, {}).rest_position_m};
-  const bool is_endless = std::isinf(desc.motion.duration_s);
-  const double begin_s = is_endless ? kSettleS : 0.5 * (desc.motion.duration_s - desc.seconds);
+  const MotionSurvey survey = survey_motion(desc.motion, desc.seconds);
+  recording.motion_level = survey.level;
+  recording.part = desc.part;
+  const double begin_s = survey.begin_s[static_cast<size_t>(desc.part)];
   // Before the clip's own beginning the head rests in its first pose.
   const auto head_at = [&](double t_s) { return desc.motion.head_at(std::max(0.0, begin_s + t_s)); };
 
@@ -134,7 +136,6 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   }
   recording.head = measure_head(poses, kStreamFrameS);
   recording.hair_rms_mps = hair_rms_mps(recording.frames);
-  recording.motion_level = motion_level_of(recording.hair_rms_mps);
   return recording;
 }
 

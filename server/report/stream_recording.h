@@ -29,24 +29,24 @@ struct RecordingDesc {
   double seconds = 3.0;
   std::string solver;                          // empty: the built-in scene's
   const gl::ShaderLibrary* shaders = nullptr;  // nullptr: the double-precision solver
+  MotionPart part = MotionPart::Median;
 };
 
 struct StreamRecording {
   std::string motion_name;
-  HeadMeasure head;           // of the recorded part
-  double hair_rms_mps = 0.0;  // of all vertices, in head space
-  MotionLevel motion_level = MotionLevel::Idle;
+  HeadMeasure head;                              // of the recorded part
+  double hair_rms_mps = 0.0;                     // of all vertices, in head space
+  MotionLevel motion_level = MotionLevel::Idle;  // of the whole motion
+  MotionPart part = MotionPart::Median;
   StreamShape shape;
   std::vector<StreamFrame> frames;
   std::vector<double> step_ms;  // (frames) wall time of solving and reading back
 };
 
-inline constexpr double kStreamFrameS = 1.0 / 60.0;
-
 /// BadInput when the motion is too short, LimitExceeded when the recording would be too large.
 Status check_recording(const RecordingDesc& desc);
 
-/// Records the middle of the motion, after strands have settled into it. The built-in scene's groom and
+/// Records one part of the motion, after strands have settled into it. The built-in scene's groom and
 /// wind; the skull alone collides, so that what is measured does not follow the shape of the head that is
 /// drawn; 60 steps a second.
 Result<StreamRecording> record_strands(const RecordingDesc& desc);

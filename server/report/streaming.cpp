@@ -12,8 +12,8 @@
 #include "common/base/check.h"
 #include "common/base/profile.h"
 #include "common/gl/egl_context.h"
-#include "server/report/peers/peer_codecs.h"
 #include "common/log/progress.h"
+#include "server/report/peers/peer_codecs.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {
@@ -21,8 +21,7 @@ namespace {
 
 constexpr StreamSize kFullSizes[] = {{10'000, 16}, {2'228, 32}};
 constexpr StreamSize kQuickSizes[] = {{1'000, 16}, {300, 32}};
-constexpr double kFullSeconds = 3.0;
-constexpr double kQuickSeconds = 1.0;
+constexpr double kPartSeconds = kSurveyPartS;
 constexpr double kShortestSeconds = 0.2;  // more than kStartFrames
 constexpr double kLongestSeconds = 60.0;
 constexpr const char* kLatencyCodec = "tangent";
@@ -109,7 +108,7 @@ Result<Plan> make_plan(const StreamingOptions& options) {
   if (plan.sizes.empty() && options.is_quick)
     plan.sizes.assign(std::begin(kQuickSizes), std::end(kQuickSizes));
   if (plan.sizes.empty()) plan.sizes.assign(std::begin(kFullSizes), std::end(kFullSizes));
-  plan.seconds = options.is_quick ? kQuickSeconds : kFullSeconds;
+  plan.seconds = kPartSeconds;
   if (options.seconds != 0.0) plan.seconds = options.seconds;
   if (!(plan.seconds >= kShortestSeconds && plan.seconds <= kLongestSeconds))
     return make_error(ErrorCode::BadInput, "--seconds is {:g} (allowed: {:g} to {:g})", plan.seconds,
@@ -144,10 +143,11 @@ class StreamingRun {
   StreamingRun(StreamingReport& report, const gl::ShaderLibrary* shaders, const StreamingOptions& options)
       : report_(report), shaders_(shaders), solver_(options.solver), progress_({"streaming"}) {}
 
-  Status add(const StreamMotion& motion, const StreamSize& size) {
+  Status add(const StreamMotion& motion, const StreamSize& size, MotionPart part) {
+    const std::string name = fmt::format("{}, {} part, {}", motion.name, to_string(part), to_string(size));
     progress_.expect(1, 0.0);
-    progress_.begin_run(fmt::format("{}, {}: recording", motion.name, to_string(size)));
-    auto recorded = record_strands({motion, size, report_.seconds, solver_, shaders_});
+    progress_.begin_run(name + ": recording");
+    auto recorded = record_strands({motion, size, report_.seconds, solver_, shaders_, part});
     if (!recorded) return at(motion.name, recorded.error());
     progress_.end_run(0.0);
     StreamRecording& recording = *recorded;
@@ -157,7 +157,7 @@ class StreamingRun {
     const auto cost = static_cast<double>(size.vertices() * recording.frames.size());
     progress_.expect(static_cast<uint32_t>(codecs.size()), cost * static_cast<double>(codecs.size()));
     for (const StreamCodecRow& codec : codecs) {
-      progress_.begin_run(fmt::format("{}, {}: {}", motion.name, to_string(size), codec.name));
+      progress_.begin_run(fmt::format("{}: {}", name, codec.name));
       ASSIGN_OR_RETURN(StreamingRow row, measure_codec(codec, recording));
       report_.rows.push_back(std::move(row));
       progress_.end_run(cost);
@@ -213,6 +213,7 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
   StreamingRow row;
   row.motion = recording.motion_name;
   row.motion_level = recording.motion_level;
+  row.part = recording.part;
   row.size = {recording.shape.strand_count, recording.shape.vertex_count};
   row.codec = codec.name;
   row.is_ours = codec.is_ours;
@@ -249,8 +250,10 @@ Result<StreamingReport> measure_streaming(const StreamingOptions& options,
   StreamingRun run(report, context ? &shaders : nullptr, options);
   for (const StreamSize& size : plan.sizes)
     for (const StreamMotion& motion : plan.motions) {
-      RETURN_IF_ERROR(run.add(motion, size));
-      RETURN_IF_ERROR(on_recording(report));
+      for (const MotionPart part : kMotionParts) {
+        RETURN_IF_ERROR(run.add(motion, size, part));
+        RETURN_IF_ERROR(on_recording(report));
+      }
     }
   return report;
 }

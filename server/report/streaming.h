@@ -21,7 +21,7 @@ struct StreamingOptions {
   std::vector<std::string> sizes;              // "STRANDSxVERTICES"; empty: as the grid says
   std::string solver;                          // empty: the built-in scene's
   std::string gl_device = "auto";              // "none": the solver's double-precision version
-  double seconds = 0.0;                        // recorded of each motion; 0 = as the grid says
+  double seconds = 0.0;                        // recorded of each part of a motion; 0 = half a second
   bool is_quick = false;
 };
 
@@ -35,6 +35,7 @@ inline constexpr size_t kStartFrames = 9;
 struct StreamingRow {
   std::string motion;
   MotionLevel motion_level = MotionLevel::Idle;
+  MotionPart part = MotionPart::Median;
   StreamSize size;
   std::string codec;
   bool is_ours = false;
@@ -52,6 +53,12 @@ struct StreamingRow {
   double decode_cpu_ms = 0.0;
   double decode_wall_ms = 0.0;
 
+  /// "94_01, wildest part".
+  std::string motion_and_part() const { return motion + ", " + to_string(part) + " part"; }
+  bool is_same_recording(const StreamingRow& other) const {
+    return motion == other.motion && part == other.part && size.strand_count == other.size.strand_count &&
+           size.vertex_count == other.size.vertex_count;
+  }
   double mbit_per_s() const { return bits * static_cast<double>(size.vertices()) / kStreamFrameS * 1e-6; }
   /// A little room for the rounding of what was recorded to floats, half a step below 1 m.
   bool keeps_bound() const { return max_error_m <= bound_m + 0x1p-25; }

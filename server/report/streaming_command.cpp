@@ -34,7 +34,10 @@ void add_streaming_command(CLI::App& app, ReportAction& action) {
       ->expected(1)
       ->take_all();
   command->add_option("--solver", options->solver, "what moves the strands; default: the built-in scene's");
-  command->add_option("--seconds", options->seconds, "recorded of each motion")->check(CLI::PositiveNumber);
+  command
+      ->add_option("--seconds", options->seconds,
+                   "recorded of each part of a motion, the median and the wildest; default: 0.5")
+      ->check(CLI::PositiveNumber);
   command
       ->add_option("--gl-device", options->gl_device,
                    "auto, software, hardware, a device number, or none: the solver in double precision")

@@ -42,20 +42,16 @@ double mm(double m) {
   return 1e3 * m;
 }
 
-bool is_same_recording(const StreamingRow& a, const StreamingRow& b) {
-  return a.motion == b.motion && a.size.strand_count == b.size.strand_count &&
-         a.size.vertex_count == b.size.vertex_count;
-}
-
 /// The recording that plots of one recording are of: walking and turning where there is any.
 const StreamingRow* shown_recording(const StreamingReport& report) {
   for (const StreamingRow& row : report.rows)
-    if (row.motion_level == MotionLevel::Active) return &row;
+    if (row.motion_level == MotionLevel::Active && row.part == MotionPart::Median) return &row;
   return report.rows.empty() ? nullptr : &report.rows.front();
 }
 
 std::string recording_words(const StreamingRow& row) {
-  return fmt::format("{} ({}), {} vertices", row.motion, to_string(row.motion_level), to_string(row.size));
+  return fmt::format("{} ({}), {} vertices", row.motion_and_part(), to_string(row.motion_level),
+                     to_string(row.size));
 }
 
 /// The names of a report's codecs, in the order of kCodecStyles.
@@ -90,6 +86,7 @@ HtmlTable goal_table(const StreamingReport& report) {
 HtmlTable recording_table(const StreamingReport& report) {
   HtmlTable table;
   table.columns = {"motion",
+                   "part",
                    "class",
                    "hair, RMS m/s in head space",
                    "head, mean m/s",
@@ -98,7 +95,7 @@ HtmlTable recording_table(const StreamingReport& report) {
                    "frames of 1/60 s"};
   for (const StreamRecording& recording : report.recordings) {
     table.rows.push_back(
-        {recording.motion_name, to_string(recording.motion_level),
+        {recording.motion_name, to_string(recording.part), to_string(recording.motion_level),
          fmt::format("{:.2f}", recording.hair_rms_mps), fmt::format("{:.2f}", recording.head.mean_speed_mps),
          fmt::format("{:.0f}", recording.head.mean_turn_rad_per_s * 180.0 / std::numbers::pi),
          to_string(StreamSize{recording.shape.strand_count, recording.shape.vertex_count}),
@@ -110,8 +107,8 @@ HtmlTable recording_table(const StreamingReport& report) {
 HtmlTable codec_table(const StreamingReport& report, const StreamRecording& recording) {
   const StreamSize size{recording.shape.strand_count, recording.shape.vertex_count};
   HtmlTable table;
-  table.caption =
-      fmt::format("{}, {}, {}", recording.motion_name, to_string(recording.motion_level), to_string(size));
+  table.caption = fmt::format("{}, {} part, {}, {}", recording.motion_name, to_string(recording.part),
+                              to_string(recording.motion_level), to_string(size));
   table.columns = {"codec",
                    "bound, mm",
                    "bits/vertex",
@@ -124,8 +121,8 @@ HtmlTable codec_table(const StreamingReport& report, const StreamRecording& reco
                    "decode, ms of one core",
                    "encode, ms by the clock"};
   for (const StreamingRow& row : report.rows) {
-    if (row.motion != recording.motion_name || row.size.strand_count != size.strand_count ||
-        row.size.vertex_count != size.vertex_count)
+    if (row.motion != recording.motion_name || row.part != recording.part ||
+        row.size.strand_count != size.strand_count || row.size.vertex_count != size.vertex_count)
       continue;
     const bool keeps = row.keeps_bound();
     table.rows.push_back({row.codec,
@@ -159,8 +156,9 @@ HtmlTable latency_table(const StreamLatency& latency) {
 
 std::string method_text(const StreamingReport& report) {
   return fmt::format(
-      "Strands are the built-in scene's, moved by {} on {} at 60 Hz in its breeze; the middle {:g} s of each "
-      "motion are kept as 32-bit floats in head space, and every codec gets the same frames. Errors are "
+      "Strands are the built-in scene's, moved by {} on {} at 60 Hz in its breeze; of each "
+      "motion the wildest {:g} s and those that are the median of its parts, by its head, are kept as 32-bit "
+      "floats in head space, and every codec gets the same frames. Errors are "
       "Euclidean, of every vertex of every frame, against those floats. Bits leave out the first {} frames "
       "(\"with start\" has them). Times are processor time of the whole process, the median over frames, on "
       "a "
@@ -185,10 +183,14 @@ constexpr const char* kPeerText =
 
 std::string class_text() {
   return fmt::format(
-      "A motion's class follows from what the hair does, whatever the head did: the root of the mean square "
-      "speed of all vertices in head space is below {:g} m/s when idle, below {:g} m/s walking and turning, "
-      "else violent.",
-      kActiveHairMps, kViolentHairMps);
+      "A motion's class and parts follow from the head alone, so that they are the same with every strand "
+      "model: "
+      "its mean rate of turn times {:g} m plus its mean acceleration times {:g} s is the drive of a part; "
+      "the "
+      "median half second of what is idle has less than {:g} m/s, of walking and turning less than {:g} m/s, "
+      "of "
+      "violent motion more.",
+      kDriveLengthM, kDriveLagS, kActiveDriveMps, kViolentDriveMps);
 }
 
 constexpr const char* kLatencyText =
@@ -201,21 +203,21 @@ constexpr const char* kLatencyText =
 }  // namespace
 
 std::string streaming_csv(const StreamingReport& report) {
-  CsvFile csv({"clip", "class", "strands", "vertices", "codec", "kind", "bound_mm", "bits_per_vertex",
+  CsvFile csv({"clip", "part", "class", "strands", "vertices", "codec", "kind", "bound_mm", "bits_per_vertex",
                "bits_per_vertex_with_start", "keyframe_bits_per_vertex", "mbit_per_s", "max_error_mm",
                "rms_error_mm", "keeps_bound", "encode_cpu_ms", "decode_cpu_ms", "encode_wall_ms",
                "decode_wall_ms"});
   for (const StreamingRow& row : report.rows) {
-    csv.add_row({row.motion, to_string(row.motion_level), fmt::format("{}", row.size.strand_count),
-                 fmt::format("{}", row.size.vertex_count), row.codec,
-                 row.is_ours       ? "ours"
-                 : row.is_temporal ? "peer, temporal"
-                                   : "peer, positions",
-                 csv_number(mm(row.bound_m)), csv_number(row.bits), csv_number(row.all_bits),
-                 csv_number(row.join_bits), csv_number(row.mbit_per_s()), csv_number(mm(row.max_error_m)),
-                 csv_number(mm(row.rms_error_m)), row.keeps_bound() ? "yes" : "no",
-                 csv_number(row.encode_cpu_ms), csv_number(row.decode_cpu_ms), csv_number(row.encode_wall_ms),
-                 csv_number(row.decode_wall_ms)});
+    csv.add_row(
+        {row.motion, to_string(row.part), to_string(row.motion_level),
+         fmt::format("{}", row.size.strand_count), fmt::format("{}", row.size.vertex_count), row.codec,
+         row.is_ours       ? "ours"
+         : row.is_temporal ? "peer, temporal"
+                           : "peer, positions",
+         csv_number(mm(row.bound_m)), csv_number(row.bits), csv_number(row.all_bits),
+         csv_number(row.join_bits), csv_number(row.mbit_per_s()), csv_number(mm(row.max_error_m)),
+         csv_number(mm(row.rms_error_m)), row.keeps_bound() ? "yes" : "no", csv_number(row.encode_cpu_ms),
+         csv_number(row.decode_cpu_ms), csv_number(row.encode_wall_ms), csv_number(row.decode_wall_ms)});
   }
   return csv.text();
 }
@@ -231,7 +233,7 @@ std::string streaming_bound_plot(const StreamingReport& report) {
     series.name = name;
     series.style = static_cast<int>(style_of(name));
     for (const StreamingRow& row : report.rows)
-      if (row.codec == name && is_same_recording(row, *shown) && !row.is_bound_free)
+      if (row.codec == name && row.is_same_recording(*shown) && !row.is_bound_free)
         series.points.push_back({mm(row.bound_m), row.bits, row_note(row)});
     if (!series.points.empty()) desc.series.push_back(std::move(series));
   }
@@ -250,7 +252,7 @@ std::string streaming_time_plot(const StreamingReport& report) {
     series.style = static_cast<int>(style_of(name));
     series.mark = PlotMark::Dots;
     for (const StreamingRow& row : report.rows)
-      if (row.codec == name && is_same_recording(row, *shown) &&
+      if (row.codec == name && row.is_same_recording(*shown) &&
           (row.is_bound_free || row.bound_m == kGoalBoundM))
         series.points.push_back({row.encode_cpu_ms + row.decode_cpu_ms, row.bits, row_note(row)});
     desc.series.push_back(std::move(series));
@@ -272,12 +274,12 @@ std::string streaming_motion_plot(const StreamingReport& report) {
         row.size.strand_count != first->size.strand_count ||
         row.size.vertex_count != first->size.vertex_count)
       continue;
-    desc.groups.push_back(row.motion);
+    desc.groups.push_back(row.part == MotionPart::Median ? row.motion : "its wildest");
     tangent.value.push_back(row.bits);
     const auto other =
         std::find_if(report.rows.begin(), report.rows.end(), [&](const StreamingRow& candidate) {
           return candidate.codec == "delta" && candidate.bound_m == row.bound_m &&
-                 is_same_recording(candidate, row);
+                 candidate.is_same_recording(row);
         });
     delta.value.push_back(other != report.rows.end() ? other->bits : kNone);
     const StreamingRow* peer = best_peer(report, row, PeerKind::Temporal);
@@ -306,8 +308,9 @@ std::string streaming_page(const StreamingReport& report) {
   page.heading("Plots");
   page.figure(streaming_bound_plot(report), "Lower is better. The slope is what a finer bound costs.");
   page.figure(streaming_time_plot(report), "Lower left is better.");
-  page.figure(streaming_motion_plot(report),
-              "Peers: the one with the fewest bits that keeps the bound, per motion.");
+  page.figure(
+      streaming_motion_plot(report),
+      "Peers: the one with the fewest bits that keeps the bound, per motion; beside each its wildest part.");
   page.heading("From motion to decoded frame");
   page.paragraph(kLatencyText);
   page.table(latency_table(report.latency));
