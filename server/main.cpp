@@ -13,6 +13,7 @@
 #include "common/log/line_writer.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
+#include "server/app/codec_choice.h"
 #include "server/app/explain.h"
 #include "server/app/groom_check.h"
 #include "server/app/options.h"
@@ -47,13 +48,16 @@ sigset_t handled_signals() {
   return signals;
 }
 
-int explain_command(const ServerOptions& options, const ServerConfig& config) {
+int explain_command(const ServerOptions& options, ServerConfig config) {
   const Result<SceneContent> content = load_scene_content(config.scene);
   if (!content) return fail(content.error());
   RuntimeFacts facts;
   facts.strand_viewers = 1;
   facts.frame_viewers = options.explained_frame_viewers;
   const SceneAsset asset = make_scene_asset(content->groom, content->head);
+  const auto choice = choose_codec(config.scene, asset);
+  if (!choice) return fail(choice.error());
+  config.scene.stream.codec = choice->codec;
   auto passes = measure_passes(config.scene, *content, facts, {config.gl_device, config.shader_folder});
   const std::optional<Error> unmeasured = passes ? std::nullopt : std::optional(passes.error());
   if (unmeasured && unmeasured->code == ErrorCode::Unavailable)
@@ -63,7 +67,7 @@ int explain_command(const ServerOptions& options, const ServerConfig& config) {
   if (!notes) return fail(notes.error());
   const auto text = explain_scene(config.scene, asset, facts, *passes, *notes);
   if (!text) return fail(text.error());
-  fmt::print("{}", *text);
+  fmt::print("{}{}\n", *text, choice->reason);
   if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());
   return 0;
 }

@@ -90,7 +90,10 @@ std::vector<std::string> HudWriter::warnings(const ViewerState& now, const ViewF
   if (!is_slow) real_time_ns_ = time_ns;
   if (now.has_status && now.status.is_paused) all.emplace_back("paused: Space resumes, N steps");
   if (now.has_status && now.status.is_motion_stale) all.emplace_back("no head motion arrives at the server");
-  if (time_ns - real_time_ns_ >= kSlowMotionNs)
+  // The server knows what helps; older ones leave it at that.
+  if (now.is_connected && !now.status.slow_motion.empty())
+    all.push_back(now.status.slow_motion);
+  else if (time_ns - real_time_ns_ >= kSlowMotionNs)
     all.push_back(
         fmt::format("slow motion: x{:.2f} of real time; fewer strands or a cheaper solver help", factor));
   if (!facts.message.empty()) all.push_back(facts.message);

@@ -106,6 +106,7 @@ ViewReport make_report(ViewerSession& session) {
   out.number("server_encode_ms", server.encode_ms, 3);
   out.number("server_render_ms", server.render_ms, 3);
   out.number("server_realtime_factor", server.realtime_factor, 3);
+  out.word("server_slow_motion", session.last_slow_motion().empty() ? "none" : session.last_slow_motion());
   out.count("server_tick", server.tick);
   return out.take();
 }
@@ -155,6 +156,7 @@ std::string to_summary(const ViewReport& report) {
   const auto v = [&](const char* key) { return find(report, key); };
   const std::string dropped = fmt::format("{} by the server, {} missed, {} by this viewer",
                                           v("dropped_by_server"), v("missed_frames"), v("dropped_by_client"));
+  const std::string slow = v("server_slow_motion");
   return fmt::format(
       "scene {} ({} strands x {}), {} by {}\n"
       "  mode            {}\n"
@@ -163,12 +165,13 @@ std::string to_summary(const ViewReport& report) {
       "  render          {} ms ({} frames)\n"
       "  motion->decoded {} ms median, {} ms p99 ({} samples, clock +-{} ms)\n"
       "  dropped         {}\n"
-      "  server          {} ms per step, realtime factor {}\n",
+      "  server          {} ms per step, realtime factor {}\n{}",
       v("scene"), v("strands"), v("vertices_per_strand"), v("mode"), v("codec"), v("mode_reason"),
       v("decoded_frames"), v("seconds"), v("frames_per_s"), v("bytes_per_frame"), v("mbit_per_s"),
       v("decode_ms_median"), v("decode_ms_p99"), v("render_ms_median"), v("rendered_pictures"),
       v("motion_to_decoded_ms_median"), v("motion_to_decoded_ms_p99"), v("motion_samples_seen"),
-      v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"));
+      v("clock_error_ms"), dropped, v("server_sim_ms"), v("server_realtime_factor"),
+      slow == "none" || slow == "?" ? std::string() : fmt::format("  {}\n", slow));
 }
 
 }  // namespace strandcast

@@ -60,6 +60,7 @@ Status ViewerSession::handle(ClientEvent& event) {
   if (const auto* status = std::get_if<ServerStatus>(&event)) {
     status_ = *status;
     has_status_ = true;
+    if (!status_.slow_motion.empty()) last_slow_motion_ = status_.slow_motion;
   } else if (auto* notice = std::get_if<Notice>(&event)) {
     notices_.add(std::move(*notice));
   } else if (auto* quality = std::get_if<StreamQuality>(&event)) {

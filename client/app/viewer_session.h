@@ -86,6 +86,8 @@ class ViewerSession {
 
   const ServerStatus& status() const { return status_; }
   bool has_status() const { return has_status_; }
+  /// What the server said when it last ran in slow motion; empty if it never did.
+  const std::string& last_slow_motion() const { return last_slow_motion_; }
   /// Notices since the last call, the newest kMaxWaitingNotices.
   std::vector<Notice> take_notices() { return notices_.take(); }
   const PictureStats& picture_stats() const { return picture_stats_; }
@@ -125,6 +127,7 @@ class ViewerSession {
   uint64_t quality_changes_ = 0;
   ServerStatus status_;
   bool has_status_ = false;
+  std::string last_slow_motion_;
   NoticeList notices_;
   LineBudget log_lines_;  // that the server's messages cause
   PictureStats picture_stats_;

@@ -126,7 +126,9 @@ void visit_camera(Visitor& v, CameraDesc& camera) {
 
 template <class Visitor>
 void visit_stream(Visitor& v, StreamDesc& stream) {
-  v.text("codec", stream.codec, kMaxNameBytes);
+  // What is not the default was chosen by somebody.
+  stream.has_codec = v.chooses("codec", stream.has_codec || stream.codec != StreamDesc().codec);
+  if (stream.has_codec) v.text("codec", stream.codec, kMaxNameBytes);
   v.require("codec", stream.codec == "delta" || stream.codec == "raw" || stream.codec == "tangent",
             "is unknown (known: delta, raw, tangent)");
   v.number("bound_m", stream.bound_m, kStreamBound);

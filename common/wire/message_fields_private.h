@@ -201,6 +201,7 @@ void visit(Visitor& v, ServerStatus& m) {
   v.measure("queue_delay_ms", m.queue_delay_ms);
   v.value("quarantined_strands", m.quarantined_strands);
   v.value("overstretched_strands", m.overstretched_strands);
+  v.text("slow_motion", m.slow_motion, kMaxTextChars);
 }
 
 template <>

@@ -157,6 +157,7 @@ struct ServerStatus {  // about twice a second to every viewer
   // Strands put back to rest so far; one may count many times.
   uint64_t quarantined_strands = 0;    // without usable numbers
   uint64_t overstretched_strands = 0;  // stretched too far
+  std::string slow_motion = {};        // for a person: how slow, and the cheapest ways out; empty = real time
   bool operator==(const ServerStatus&) const = default;
 };
 struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on

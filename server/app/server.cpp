@@ -1,17 +1,21 @@
 #include "server/app/server.h"
 
 #include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "common/base/profile.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/strands/scene_asset.h"
+#include "server/app/codec_choice.h"
 #include "server/app/server_metrics.h"
 #include "server/app/server_passes.h"
 #include "server/app/session_desk.h"
+#include "server/app/slow_motion.h"
 #include "server/encode/picture_passes.h"
 
 namespace strandcast {
@@ -53,11 +57,13 @@ class Server::State {
   bool is_shut_down_wanted() const { return desk_->is_shut_down_wanted(); }
 
  private:
+  Status choose_stream(const SceneAsset& asset);
   Status connect(EncodedFramePtr asset_frame);
   void run_status();
+  void watch_speed(const ServerCounters& now);
   std::string metrics() const;
 
-  const ServerConfig config_;
+  ServerConfig config_;
   InputHub inputs_;
   gl::PassReports idle_picture_passes_;  // what the frame thread would run
   // In the order in which each is used by those below it.
@@ -70,14 +76,20 @@ class Server::State {
   std::condition_variable changed_;
   bool has_stopped_ = false;
   std::thread status_thread_;
+  // Of the status thread, but for the two that metrics read.
+  SlowMotionWatch slow_watch_;
+  std::string slow_motion_;  // what viewers are told; empty = real time
+  std::atomic<bool> is_slow_{false};
+  std::atomic<uint64_t> slow_motions_{0};
 };
 
 Status Server::State::start() {
-  const SceneDesc& scene = config_.scene;
+  SceneDesc& scene = config_.scene;
   // A wrong codec is told before anything is loaded.
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
+  RETURN_IF_ERROR(choose_stream(*asset));
   ASSIGN_OR_RETURN(EncodedFramePtr asset_frame, encode_asset(*asset));
   const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset, scene.look};
   ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream, scene.step_rate_hz,
@@ -86,13 +98,26 @@ Status Server::State::start() {
   ASSIGN_OR_RETURN(idle_picture_passes_, plan_picture_passes(*asset, scene.look, true, 0));
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
-  RETURN_IF_ERROR(source_->start(*hub_));
+  RETURN_IF_ERROR(source_->start(*hub_, scene.stream));
   // Pictures are drawn by the device that simulates.
   hub_->set_picture_budget(source_->stats().is_software ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   net_->start();
   status_thread_ = std::thread([this] { run_status(); });
   log_info("app", "serving scene '{}' on {} port {}", scene.name, config_.net.address, net_->port());
+  return {};
+}
+
+/// The codec of a scene that names none.
+Status Server::State::choose_stream(const SceneAsset& asset) {
+  StreamDesc& stream = config_.scene.stream;
+  ASSIGN_OR_RETURN(const CodecChoice choice, choose_codec(config_.scene, asset));
+  if (choice.codec != stream.codec)
+    log_warn("app", "{}", choice.reason);
+  else
+    log_info("app", "{}", choice.reason);
+  stream.codec = choice.codec;
+  stream.has_codec = true;
   return {};
 }
 
@@ -130,6 +155,7 @@ void Server::State::run_status() {
   while (!changed_.wait_for(lock, kStatusInterval, [this] { return has_stopped_; })) {
     lock.unlock();
     const ServerCounters now = counters();
+    watch_speed(now);
     ServerStatus status;
     status.tick = now.sim.tick;
     status.sim_ms = now.sim.step_median_ms;
@@ -142,13 +168,35 @@ void Server::State::run_status() {
     status.rejected_samples = now.input.rejected();
     status.quarantined_strands = now.sim.quarantined;
     status.overstretched_strands = now.sim.overstretched;
+    status.slow_motion = slow_motion_;
     net_->broadcast(status);
     lock.lock();
   }
 }
 
+void Server::State::watch_speed(const ServerCounters& now) {
+  if (now.sim.substeps == 0) return;
+  const auto change = slow_watch_.update(now.sim.realtime_factor, now.sim.is_paused, now_ns());
+  is_slow_ = slow_watch_.is_slow();
+  if (!is_slow_) slow_motion_.clear();
+  if (change == SlowMotionWatch::Change::Ended) log_info("sim", "The simulation runs in real time again.");
+  if (!is_slow_) return;
+  SceneDesc scene = config_.scene;
+  scene.substeps = now.sim.substeps;
+  scene.stream.strand_rate_hz = now.sim.strand_rate_hz;
+  scene.solver.name = now.sim.solver_name;
+  StepWork work = work_per_step(scene, now);
+  work.vertices = source_->asset()->rest_position_m.size();
+  slow_motion_ = slow_motion_text(now.sim.realtime_factor, scene, work);
+  if (change != SlowMotionWatch::Change::Began) return;
+  ++slow_motions_;
+  log_warn("sim", "{}", slow_motion_);
+}
+
 ServerCounters Server::State::counters() const {
   ServerCounters counters;
+  counters.is_slow = is_slow_;
+  counters.slow_motions = slow_motions_;
   counters.net = net_->counters();
   const RuntimeFacts facts = hub_->total().facts;
   counters.strand_viewers = facts.strand_viewers;

@@ -48,6 +48,8 @@ struct ServerCounters {
   uint32_t frame_viewers = 0;
   uint32_t viewers = 0;
   uint32_t strand_classes_in_use = 0;
+  bool is_slow = false;       // slow motion, now
+  uint64_t slow_motions = 0;  // times that it began
 };
 
 class Server {

@@ -17,6 +17,7 @@ namespace {
 constexpr double kNsPerS = 1e9;
 /// Medians cost a sort of the window; viewers are told twice a second.
 constexpr uint64_t kStatsInterval = 8;
+constexpr int64_t kStatsNs = 250'000'000;  // when steps take long
 
 /// Whether a solver built for one set of facts serves another: only what it compiles for counts.
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
@@ -110,7 +111,8 @@ void SimLoop::loop() {
     follow_stream_settings();
     const auto time_ns = clock_->take_step(now_ns());
     if (time_ns) step(*time_ns);
-    const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0);
+    const bool is_old = now_ns() - stats_ns_ >= kStatsNs;
+    const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0 || is_old);
     if (has_news) update_stats();
   }
 }
@@ -390,6 +392,7 @@ void SimLoop::report_quarantine() {
 }
 
 void SimLoop::update_stats() {
+  stats_ns_ = now_ns();
   SimStats stats;
   stats.tick = tick_;
   stats.step_times = step_times_;
@@ -409,6 +412,8 @@ void SimLoop::update_stats() {
   stats.solver_builds = solver_builds_;
   stats.solver_bytes = solver_->memory_bytes();
   stats.solver_name = config_.scene.solver.name;
+  stats.substeps = config_.scene.substeps;
+  stats.strand_rate_hz = config_.scene.stream.strand_rate_hz;
   stats.is_software = context_->info().is_software;
   const std::lock_guard lock(mutex_);
   stats_ = std::move(stats);

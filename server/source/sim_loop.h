@@ -134,6 +134,7 @@ class SimLoop {
   uint64_t published_tick_ = 0;
   uint64_t published_count_ = 0;
   uint64_t solver_builds_ = 0;
+  int64_t stats_ns_ = 0;           // when they were made
   StreamDesc stream_;              // as it is published; the scene's is what it is to be
   int64_t stream_changed_ns_ = 0;  // 0 = never
   int64_t jobs_rest_ns_ = 0;       // no command is carried out before

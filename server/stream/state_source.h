@@ -39,7 +39,9 @@ struct SimStats {
   uint64_t solver_bytes = 0;
   bool is_software = true;  // OpenGL runs on processor cores, as far as is known
   std::string solver_name;
-  int64_t last_step_ns = 0;  // server clock at the end of the newest step; 0 = none yet
+  uint32_t substeps = 0;        // of now; 0 = nothing is simulated
+  double strand_rate_hz = 0.0;  // of now; 0 = every step
+  int64_t last_step_ns = 0;     // server clock at the end of the newest step; 0 = none yet
 };
 
 /// Takes what a source makes. Any thread; nothing waits for a reader.
@@ -60,8 +62,9 @@ class StateSource {
   virtual ~StateSource() = default;
   /// The strands at rest and what else viewers draw; the same all the time.
   virtual std::shared_ptr<const SceneAsset> asset() const = 0;
-  /// Returns when the first state was put, or with the error. `sink` outlives the source. Call once.
-  virtual Status start(StateSink& sink) = 0;
+  /// Returns when the first state was put, or with the error. States are on the lattice of `stream`. `sink`
+  /// outlives the source. Call once.
+  virtual Status start(StateSink& sink, const StreamDesc& stream) = 0;
   /// Puts nothing more from its return on.
   virtual void stop() = 0;
 

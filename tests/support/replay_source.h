@@ -20,7 +20,7 @@ class ReplaySource : public StateSource {
       : asset_(std::move(asset)), states_(std::move(states)) {}
 
   std::shared_ptr<const SceneAsset> asset() const override { return asset_; }
-  Status start(StateSink& sink) override {
+  Status start(StateSink& sink, const StreamDesc&) override {
     sink_ = &sink;
     play_next();
     return {};

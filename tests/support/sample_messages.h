@@ -62,6 +62,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.quarantined_strands = 23;
   status.overstretched_strands = 29;
   status.queue_delay_ms = 31.5;
+  status.slow_motion = "half of real time; substeps=1 takes a third of the work away";
   return {
       welcome,
       Pong{1, -2, INT64_MAX},

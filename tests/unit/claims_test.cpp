@@ -50,7 +50,7 @@ std::vector<std::string> readme_claims() {
           "motion",
           1e3 * kGoalBoundM, kIdleBits, kActiveBits, kViolentBits),
       fmt::format("{} x {}, `dftl`;", kStreamStrands, kStreamVertices),
-      fmt::format("{:g} in the middle of a walk ({})", kClipBits, kStreamClip),
+      fmt::format("{:g} in the median half second of a walk ({})", kClipBits, kStreamClip),
       fmt::format("{:g} times fewer than the best of the others with a prediction in time around it",
                   kTimesFewerThanTemporal),
       fmt::format("{:g} times fewer than the best on plain positions", kTimesFewerThanPlain),

@@ -65,6 +65,7 @@ SceneDesc unusual_scene() {
             .skin_color = {1, 0, 0.5f}};
   s.camera = {.offset_m = {0, 0, 2}, .target_m = {0.1f, 0.2f, 0.3f}, .fov_y_rad = 1.0f};
   s.stream = {.codec = "raw",
+              .has_codec = true,
               .bound_m = 2e-5f,
               .frame_width = 320,
               .frame_height = 200,

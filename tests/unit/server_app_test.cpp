@@ -5,9 +5,11 @@
 #include "common/base/version.h"
 #include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
+#include "server/app/codec_choice.h"
 #include "server/app/control_budget.h"
 #include "server/app/options.h"
 #include "server/app/server_metrics.h"
+#include "server/app/slow_motion.h"
 #include "server/app/viewers.h"
 #include "server/sim/solver_registry.h"
 #include "server/source/scene_change.h"
@@ -440,6 +442,157 @@ TEST(ServerOptions, ParametersThatWereTypedAreNotLeftOut) {
   const auto outside = config_for({"solver.name=dftl", "solver.parameters.s_damping=17"});
   ASSERT_FALSE(outside.ok());
   EXPECT_THAT(outside.error().to_string(), HasSubstr("17"));
+}
+
+using Change = SlowMotionWatch::Change;
+
+TEST(SlowMotion, IsWhatLastsTwoSeconds) {
+  SlowMotionWatch watch;
+  int64_t now = 5;
+  const auto after = [&](int64_t ms, double factor, bool is_paused = false) {
+    now += ms * 1'000'000;
+    return watch.update(factor, is_paused, now);
+  };
+  EXPECT_EQ(after(0, 0.94), Change::None);
+  EXPECT_EQ(after(1'999, 0.5), Change::None);
+  EXPECT_FALSE(watch.is_slow());
+  EXPECT_EQ(after(1, 0.949), Change::Began) << "two seconds below";
+  EXPECT_EQ(after(10'000, 0.5), Change::None) << "said once";
+  EXPECT_EQ(after(0, 0.95), Change::None);
+  EXPECT_EQ(after(1'500, 1.0), Change::None);
+  EXPECT_EQ(after(100, 0.9), Change::None) << "not over yet";
+  EXPECT_EQ(after(100, 1.0), Change::None);
+  EXPECT_EQ(after(1'999, 1.0), Change::None);
+  EXPECT_TRUE(watch.is_slow());
+  EXPECT_EQ(after(1, 1.0), Change::Ended);
+  // A short slow moment is none.
+  EXPECT_EQ(after(0, 0.1), Change::None);
+  EXPECT_EQ(after(1'900, 0.1), Change::None);
+  EXPECT_EQ(after(50, 1.0), Change::None);
+  EXPECT_EQ(after(100, 0.1), Change::None);
+  EXPECT_EQ(after(1'999, 0.1), Change::None);
+  EXPECT_EQ(after(1, 0.1), Change::Began);
+  EXPECT_EQ(after(1, 0.0, true), Change::None) << "a pause is no slow motion";
+  EXPECT_FALSE(watch.is_slow());
+}
+
+TEST(SlowMotion, WorkOfAStepIsWhatRunsForIt) {
+  SceneDesc scene = built_in_scene();
+  scene.step_rate_hz = 60.0;
+  scene.stream.frame_rate_hz = 15.0;
+  ServerCounters now;
+  now.sim.step_median_ms = 8.0;
+  now.sim.read_median_ms = 1.0;
+  now.sim.quantise_median_ms = 2.0;
+  now.encode.encode_median_ms = 4.0;
+  now.frames.paint_median_ms = 100.0;
+  now.frames.encode_median_ms = 20.0;
+  EXPECT_EQ(work_per_step(scene, now).total_ms(), 8.0) << "nobody watches";
+  now.strand_viewers = 1;
+  EXPECT_EQ(work_per_step(scene, now).total_ms(), 15.0);
+  scene.stream.strand_rate_hz = 15.0;
+  EXPECT_EQ(work_per_step(scene, now).encode_ms, 1.0) << "every fourth state";
+  now.frame_viewers = 1;
+  EXPECT_EQ(work_per_step(scene, now).picture_ms, 30.0) << "a quarter as many pictures as steps";
+}
+
+TEST(SlowMotion, WaysOutSaveWhatTheySay) {
+  SceneDesc scene = built_in_scene();
+  scene.step_rate_hz = 60.0;
+  scene.substeps = 4;
+  const auto settings = [&](const StepWork& work) {
+    std::vector<std::pair<std::string, double>> all;
+    for (const WayOut& way : ways_out(scene, work)) all.emplace_back(way.setting, way.saved_ms);
+    return all;
+  };
+  using Ways = std::vector<std::pair<std::string, double>>;
+  EXPECT_EQ(settings({30.0, 1.0, 10.0, 0.0, 0}),
+            (Ways{{"stream.strand_rate_hz=30", 5.0}, {"substeps=2", 15.0}}))
+      << "those that are seen least, where none is enough";
+  EXPECT_EQ(settings({20.0, 1.0, 10.0, 0.0, 0})[0],
+            (std::pair<std::string, double>{"groom.procedural.vertex_count=8", 15.5}))
+      << "what is enough alone stands first: 31 - 15.5 ms fit into 16.7";
+  EXPECT_EQ(settings({20.0, 1.0, 0.5, 0.0, 0}),
+            (Ways{{"substeps=2", 10.0}, {"groom.procedural.vertex_count=8", 10.75}}))
+      << "encoding costs too little to save by it";
+  scene.substeps = 1;
+  EXPECT_EQ(settings({2.0, 1.0, 1.0, 60.0, 0})[0],
+            (std::pair<std::string, double>{"stream.frame_rate_hz=7.5", 30.0}));
+  scene.groom = FileGroomDesc{};
+  EXPECT_EQ(settings({20.0, 0.0, 0.0, 0.0, 0}),
+            (Ways{{"groom.file.vertex_count=8", 10.0}, {"step_rate_hz=30", 10.0}}));
+  // A model that takes everything: another one alone brings real time back, and stands first.
+  SceneDesc rods = built_in_scene();
+  rods.solver.name = "direct_rod";
+  const auto ways = ways_out(rods, {600.0, 1.0, 4.0, 0.0, 320'000});
+  ASSERT_EQ(ways.size(), 2u);
+  EXPECT_EQ(ways[0].setting, "solver.name=dftl");
+  EXPECT_NEAR(ways[0].saved_ms, 595.5, 1e-9);
+  EXPECT_TRUE(ways[0].is_live);
+  EXPECT_TRUE(change_scene(rods, ways[0].setting).ok());
+  EXPECT_EQ(ways[1].setting, "groom.procedural.vertex_count=8");
+  // Each of them is a setting that a scene takes.
+  for (const StepWork& work : {StepWork{20.0, 1.0, 10.0, 0.0, 0}, StepWork{2.0, 1.0, 1.0, 60.0, 0},
+                               StepWork{20.0, 0.0, 0.0, 0.0, 0}})
+    for (const WayOut& way : ways_out(built_in_scene(), work))
+      EXPECT_TRUE(way.is_live ? change_scene(built_in_scene(), way.setting).ok()
+                              : with_overrides(built_in_scene(), {way.setting}).ok())
+          << way.setting;
+  const std::string text = slow_motion_text(0.574, scene, {20.0, 0.0, 0.0, 0.0, 0});
+  EXPECT_THAT(text, HasSubstr("0.57 of real time; its work takes 20.0 ms a step"));
+  EXPECT_THAT(text, HasSubstr("groom.file.vertex_count=8 (10.0 ms less, --set at start); step_rate_hz=30"));
+  EXPECT_LE(text.size(), kMaxTextChars);
+}
+
+TEST(CodecChoice, TangentUnlessItTakesTooMuchOfTheTime) {
+  // Two processors have 33.3 ms between two states of 60 a second, two thirds of which are 22.2.
+  EXPECT_EQ(choose_codec(EncodeCost{22.2, 2, 60.0}).codec, "tangent");
+  const CodecChoice dear = choose_codec(EncodeCost{22.3, 2, 60.0});
+  EXPECT_EQ(dear.codec, "delta");
+  EXPECT_THAT(dear.reason,
+              HasSubstr("22.3 ms of processor time a state here, 22.2 ms are there (2 processors"));
+  EXPECT_THAT(dear.reason, HasSubstr("--set stream.codec=tangent"));
+  EXPECT_THAT(dear.reason, HasSubstr("stream.strand_rate_hz=30"));
+  EXPECT_EQ(choose_codec(EncodeCost{44.4, 2, 30.0}).codec, "tangent") << "half as often, twice the time";
+  EXPECT_EQ(choose_codec(EncodeCost{44.4, 4, 60.0}).codec, "tangent");
+}
+
+TEST(CodecChoice, WhatASceneNamesStays) {
+  SceneAsset asset;
+  asset.strand_count = 2;
+  asset.vertex_count = 2;
+  asset.rest_position_m.resize(4);
+  const auto chosen = [&](const SceneDesc& scene) { return choose_codec(scene, asset).value().codec; };
+  EXPECT_EQ(chosen(built_in_scene()), "tangent") << "few vertices are not measured";
+  EXPECT_EQ(chosen(parse_scene("", "empty", {}).value()), "tangent") << "scene files too";
+  for (const char* codec : {"delta", "raw", "tangent"}) {
+    const auto named = built_in_scene_with({std::string("stream.codec=") + codec});
+    EXPECT_TRUE(named->stream.has_codec);
+    EXPECT_EQ(chosen(*named), codec);
+    EXPECT_EQ(with_overrides(*named, {"wind.mean_mps.x=1"})->stream.codec, codec)
+        << "through changes of others";
+  }
+}
+
+// Large enough to be measured; whichever wins, it is one of the two, with its figures.
+TEST(CodecChoice, MeasuresLargeScenes) {
+  SceneDesc scene = built_in_scene();
+  std::get<ProceduralGroomDesc>(scene.groom).strand_count = 4'100;
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  const auto choice = choose_codec(scene, make_scene_asset(content->groom, {}));
+  ASSERT_TRUE(choice.ok()) << choice.error().to_string();
+  EXPECT_THAT(choice->codec, testing::AnyOf("tangent", "delta"));
+  EXPECT_THAT(choice->reason, HasSubstr("ms of processor time a state here"));
+}
+
+TEST(ServerMetrics, SayThatItIsSlow) {
+  ServerCounters counters;
+  EXPECT_THAT(format_server_metrics(counters, "1"), HasSubstr("\nstrandcast_sim_slow_motion 0\n"));
+  counters.is_slow = true;
+  counters.slow_motions = 3;
+  EXPECT_THAT(format_server_metrics(counters, "1"), HasSubstr("\nstrandcast_sim_slow_motion 1\n"));
+  EXPECT_THAT(format_server_metrics(counters, "1"), HasSubstr("\nstrandcast_sim_slow_motions_total 3\n"));
 }
 
 TEST(ServerMetrics, FollowTheirFormat) {
