@@ -400,13 +400,15 @@ TEST_F(ServerNet, SlowReaderSkipsToKeyframesAndOthersGetEveryDelta) {
 }
 
 TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
-  app_.frame_bytes = 10'000;
+  // The asset shows that the link carries far more than the frames take.
+  app_.asset_bytes = 4'000'000;
+  app_.frame_bytes = 1'000;
   NetConfig config;
   StrandClass cheaper;
   cheaper.strand_share = 0.25f;
   cheaper.relative_cost = 0.25;
   config.strand_classes = {StrandClass{}, cheaper};
-  config.limits.viewer_bytes_per_s = 0.5 * 10'000 * StrandClass{}.frame_rate_hz;
+  config.limits.viewer_bytes_per_s = 0.5 * 1'000 * StrandClass{}.frame_rate_hz;
   start(config);
   app_.publish_next();
   Hello viewer = hello();
