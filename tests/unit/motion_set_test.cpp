@@ -148,7 +148,7 @@ TEST(MotionSet, HairOfEveryShapeHasItsLengthAndBeginsAtRest) {
 // Another model with another solver, as near as both have converged: what the converged rod is checked with.
 TEST(MotionSet, AnotherModelAgreesWithTheConvergedRod) {
   for (const MotionHair hair : kMotionHairs) {
-    const MotionSet motion = motion_of({{}, 0.6, 2, hair});
+    const MotionSet motion = motion_of({{}, 0.6, 1, hair});
     const auto rod = run_rod(motion, 64, 1920.0);
     const auto other = run_in_double(motion, kCheckModel, 64, 1920.0);
     ASSERT_TRUE(rod && other);
@@ -163,7 +163,7 @@ TEST(MotionSet, HairOfEveryShapeConvergesOnAClip) {
   const std::filesystem::path clip = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap/cmu_131_03.bvh";
   REQUIRE_SHARED(clip);
   for (const MotionHair hair : kMotionHairs) {
-    const MotionSet motion = motion_of({clip, 0.6, 2, hair});
+    const MotionSet motion = motion_of({clip, 0.4, 1, hair});
     const auto exact = run_rod(motion, 32, 1920.0);
     const auto coarse = run_rod(motion, 32, 120.0);
     const auto fine = run_rod(motion, 32, 480.0);
