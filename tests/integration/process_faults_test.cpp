@@ -206,7 +206,7 @@ TEST_F(ProcessFaults, ASignalToTheRunScriptEndsAllThatItStarted) {
     fs::create_symlink(program, bin / fs::path(program).filename());
   setenv("PATH", (stubs.string() + ":" + getenv("PATH")).c_str(), 1);
   ChildProcess script("/bin/bash",
-                      {(tree / "deploy" / "run.sh").string(), "--headless", "--seconds", "4", "--set",
+                      {(tree / "deploy" / "run.sh").string(), "--headless", "--seconds", "2", "--set",
                        "groom.procedural.strand_count=50", "--out", (tree / "out").string()},
                       folder_.path() / "script.txt");
   const auto said = [&] { return text_of("script.txt"); };
@@ -216,6 +216,7 @@ TEST_F(ProcessFaults, ASignalToTheRunScriptEndsAllThatItStarted) {
   if (test::lacks_gl(said())) GTEST_SKIP() << "needs OpenGL 4.5: " << said();
   script.send_signal(SIGTERM);
   EXPECT_EQ(script.wait(), 0) << said();
+  EXPECT_FALSE(fs::exists(tree / "out" / "hair.webp")) << "nobody waited for the clip";
   const std::string text = said();
   const std::string before = "Server on 127.0.0.1:";
   const size_t at = text.find(before);

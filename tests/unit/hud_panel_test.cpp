@@ -150,6 +150,11 @@ TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   state.status.realtime_factor = 0.6;
   EXPECT_TRUE(writer.write(state, facts, kS + kSlowMotionNs - 1).warnings.empty()) << "not for long enough";
   EXPECT_THAT(writer.write(state, facts, kS + kSlowMotionNs).warnings, Contains(HasSubstr("x0.60")));
+  state.status.slow_motion = "Slow motion: this helps.";
+  EXPECT_THAT(writer.write(state, facts, kS + kSlowMotionNs).warnings,
+              testing::ElementsAre("Slow motion: this helps."))
+      << "the server knows more";
+  state.status.slow_motion.clear();
   state.status.realtime_factor = kSlowMotion;
   EXPECT_TRUE(writer.write(state, facts, kS + 2 * kSlowMotionNs).warnings.empty());
 }
