@@ -52,6 +52,10 @@ class WindowedView {
 
  private:
   bool is_frames() const { return state_->mode.shown == StreamMode::Frames; }
+  bool is_visible() const {
+    const RenderSize size = window_->framebuffer_size();
+    return size.width > 0 && size.height > 0;
+  }
   bool can_draw() const { return drawn_.device && drawn_.device->ok() && !drawn_.trouble; }
 
   /// Takes what the other threads have. The error is one that trying again does not mend.
@@ -141,10 +145,9 @@ class WindowedView {
   }
 
   void tell_drawer() {
-    const RenderSize size = window_->framebuffer_size();
-    const bool is_seen = size.width > 0 && size.height > 0;
-    const bool is_wanted = is_seen && state_->session_number > 0 && (!is_frames() || wants_whole_);
-    drawer_.set_view(is_wanted ? std::optional(DrawView{orbit_.camera(), size}) : std::nullopt);
+    const bool is_wanted = is_visible() && state_->session_number > 0 && (!is_frames() || wants_whole_);
+    drawer_.set_view(is_wanted ? std::optional(DrawView{orbit_.camera(), window_->framebuffer_size()})
+                               : std::nullopt);
   }
 
   /// Tells the server about once a second what this machine makes of the stream.
@@ -186,12 +189,11 @@ class WindowedView {
     choose_image();
     const int64_t elapsed_ns = now_ns() - presented_ns_;
     is_due_ = is_due_ || actions.is_touched || shown_count_ != shown || elapsed_ns >= kPanelNs;
-    const RenderSize size = window_->framebuffer_size();
-    return is_due_ && elapsed_ns >= kDisplayNs && size.width > 0 && size.height > 0;
+    return is_due_ && elapsed_ns >= kDisplayNs && is_visible();
   }
 
   milliseconds time_to_wait() const {
-    if (!is_due_) return kLongestWait;
+    if (!is_due_ || !is_visible()) return kLongestWait;
     const int64_t left_ns = kDisplayNs - (now_ns() - presented_ns_);
     return std::clamp(milliseconds(left_ns / kNsPerMs + 1), milliseconds(0), kLongestWait);
   }
