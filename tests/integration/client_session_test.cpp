@@ -218,6 +218,16 @@ TEST(ViewerThread, SaysWhatIsWrongAndTriedBeforeTheFirstConnection) {
   EXPECT_FALSE(viewer.stop_and_report());
 }
 
+TEST(ViewerThread, SaysWhatAConnectionIsAt) {
+  const FakeServer server([](FakePeer& peer) {
+    peer.upgrade();
+    peer.read_to_end();  // no Welcome
+  });
+  ViewerThread viewer(LiveConnection::begin(config_for(server.port())));
+  EXPECT_TRUE(eventually([&] { return viewer.look()->doing == to_string(ConnectStep::AwaitWelcome); }));
+  EXPECT_EQ(viewer.look()->trouble, "") << "nothing has failed yet";
+}
+
 TEST(ViewerThread, AWishFromBeforeTheFirstConnectionIsInItsHello) {
   std::promise<StreamMode> asked;
   const FakeServer server([&](FakePeer& peer) {
