@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "client/app/view_hud.h"
 #include "client/app/viewer_session.h"
 #include "client/app/way_out.h"
 #include "client/window/window.h"
@@ -19,8 +20,7 @@ using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
 constexpr milliseconds kPumpWait{20};
-constexpr double kFarMs = 150.0;      // of a round trip: turning the server's pictures feels late
-constexpr double kSlowMotion = 0.95;  // of real time
+constexpr double kFarMs = 150.0;  // of a round trip: turning the server's pictures feels late
 
 class Examination {
  public:

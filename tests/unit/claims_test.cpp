@@ -81,6 +81,8 @@ std::vector<std::string> architecture_claims() {
       fmt::format("after {} periods it comes once more", kStillPeriods),
       fmt::format("frame {} in {:g} s found no place", kTroublingLosses, kLossWindowNs / kNsPerS),
       fmt::format("worth {:g} times as much as strands, for {:g} s", kFramesGain, kWishNs / kNsPerS),
+      fmt::format("({:g} times while the time of a server without a GPU is only guessed)",
+                  kGuessedFramesGain),
       fmt::format("no change follows another within {:g} s", kFirstDwellNs / kNsPerS),
   };
 }

@@ -73,6 +73,7 @@ TEST(SizeOfStep, KeepsTheWindowsShapeAndIsNeverNothing) {
   EXPECT_EQ(size_of_step(0, {1280, 720}).width, 1280u);
   EXPECT_EQ(size_of_step(kCoarsestFairStep, {1280, 720}).width, 640u);
   EXPECT_EQ(size_of_step(kCoarsestFairStep, {1280, 720}).height, 360u);
+  EXPECT_EQ(size_of_step(0, {1280, 720}).height, 720u);
   EXPECT_EQ(size_of_step(kLast, {1, 2}).width, 1u);
 }
 

@@ -88,6 +88,8 @@ TEST(HudPanel, HelpAndBannerStayInsideASmallWindow) {
   const HudBanner banner{"connecting to 127.0.0.1:7878", std::string(300, 'x'), "look there", "trying again"};
   const PanelSize shown = bench.lay_out({320.0f, 240.0f}, [&] { return draw_banner(banner); });
   EXPECT_LE(shown.width, 320.0f);
+  const PanelSize wide = bench.lay_out({1280.0f, 720.0f}, [&] { return draw_banner(banner); });
+  EXPECT_GT(shown.height, wide.height) << "what does not fit in a line goes on in the next";
   EXPECT_LE(bench.lay_out({320.0f, 240.0f}, [] { return draw_help_panel(); }).width, 320.0f);
 }
 

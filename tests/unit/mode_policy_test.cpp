@@ -15,8 +15,6 @@ using testing::HasSubstr;
 using Limit = ModePrediction::Limit;
 
 constexpr int64_t kS = 1'000'000'000;
-// As ARCHITECTURE.md says: half as much again, eight times.
-static_assert(kFramesGain == 1.5 && kGuessedFramesGain == 8.0);
 
 /// Strands of 1 MB/s at 60 Hz or 0.2 MB/s at 10 Hz; pictures of 10 kB, 15 a second, drawn in 20 ms.
 ModeFacts facts() {
