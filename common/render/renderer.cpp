@@ -30,9 +30,6 @@ class PathRenderer final : public Renderer {
   Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
               const DrawTerms& terms) override;
   Image read_image() override { return scene_.picture.read_image(); }
-  void blit_to(uint32_t target, RenderSize target_size) override {
-    scene_.picture.blit_to(target, {target_size.width, target_size.height});
-  }
   const RenderProfile& profile() const override { return profile_; }
   const gl::PassListBase& passes() const override { return passes_; }
 

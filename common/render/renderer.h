@@ -44,8 +44,6 @@ class Renderer {
                       const DrawTerms& terms = {}) = 0;
   /// Pixels of the last draw, top row first.
   virtual Image read_image() = 0;
-  /// Copies the last draw to the framebuffer object `target` (0 = window), scaled to its size.
-  virtual void blit_to(uint32_t target, RenderSize target_size) = 0;
   virtual const RenderProfile& profile() const = 0;
   /// The passes as they run, and those that do not.
   virtual const gl::PassListBase& passes() const = 0;

@@ -349,25 +349,5 @@ TEST_F(RendererTest, WrongSizesAreErrorsInWords) {
   EXPECT_FALSE(Renderer::make(gl::ShaderLibrary(), context_->info(), bad, {}));
 }
 
-TEST_F(RendererTest, BlitsTheRightWayUp) {
-  LookDesc look;
-  look.background = {0.2f, 0.2f, 0.2f};
-  const auto renderer = make_renderer(empty_asset(), look);
-  ASSERT_TRUE(renderer);
-  const Image image = draw(*renderer, {}, front_camera());
-  const gl::Texture color("window", GL_RGBA8, kSmall.width, kSmall.height, 1);
-  const gl::Texture* const colors[] = {&color};
-  const gl::Framebuffer window("window", colors, nullptr);
-  renderer->blit_to(window.name(), kSmall);
-  // A window's first row is its bottom.
-  std::vector<uint8_t> rows(image.rgba.size());
-  glGetTextureImage(color.name(), 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(rows.size()),
-                    rows.data());
-  const size_t row_bytes = 4 * kSmall.width;
-  for (size_t y = 0; y < kSmall.height; ++y)
-    ASSERT_TRUE(std::equal(&rows[y * row_bytes], &rows[y * row_bytes] + row_bytes,
-                           &image.rgba[(kSmall.height - 1 - y) * row_bytes]));
-}
-
 }  // namespace
 }  // namespace strandcast

@@ -11,7 +11,7 @@
 namespace strandcast {
 namespace {
 
-// A window's user interface shares the context and leaves its own state behind.
+// Whoever else uses the context may leave its own state behind.
 void set_plain_state(glm::uvec2 viewport) {
   for (const GLenum off : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_FRAMEBUFFER_SRGB,
                            GL_RASTERIZER_DISCARD, GL_PRIMITIVE_RESTART, GL_SAMPLE_ALPHA_TO_COVERAGE})
@@ -86,16 +86,6 @@ Image PictureTarget::read_image() const {
   glReadPixels(0, 0, static_cast<GLsizei>(size_px_.x), static_cast<GLsizei>(size_px_.y), GL_RGBA,
                GL_UNSIGNED_BYTE, image.rgba.data());
   return image;
-}
-
-void PictureTarget::blit_to(uint32_t framebuffer, glm::uvec2 size) const {
-  const auto width = static_cast<GLint>(size_px_.x);
-  const auto height = static_cast<GLint>(size_px_.y);
-  glDisable(GL_SCISSOR_TEST);
-  // The picture's first row is its top, the framebuffer's its bottom.
-  glBlitNamedFramebuffer(framebuffer_.name(), framebuffer, 0, height, width, 0, 0, 0,
-                         static_cast<GLint>(size.x), static_cast<GLint>(size.y), GL_COLOR_BUFFER_BIT,
-                         size == size_px_ ? GL_NEAREST : GL_LINEAR);
 }
 
 }  // namespace strandcast

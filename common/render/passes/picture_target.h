@@ -46,7 +46,6 @@ class PictureTarget final : public gl::Resource {
   void begin() const;
   /// Top row first.
   Image read_image() const;
-  void blit_to(uint32_t framebuffer, glm::uvec2 size) const;
   glm::uvec2 size_px() const { return size_px_; }
   uint64_t size_bytes() const override { return color_.size_bytes(); }
 
