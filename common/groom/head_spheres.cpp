@@ -229,12 +229,15 @@ std::vector<FittedSphere> built_in_head_spheres(float radius_m) {
 
 std::vector<FittedSphere> shrink_under(std::vector<FittedSphere> spheres, const Groom& groom) {
   for (FittedSphere& sphere : spheres) {
-    double nearest_squared = std::numeric_limits<double>::max();
-    for (const glm::vec3& point : groom.rest_position_m) {
-      const glm::dvec3 offset = glm::dvec3(point) - glm::dvec3(sphere.center_m);
-      nearest_squared = std::min(nearest_squared, glm::dot(offset, offset));
+    constexpr double kFar = std::numeric_limits<double>::max();
+    double nearest_squared[2] = {kFar, kFar};  // of free and of pinned vertices
+    for (size_t i = 0; i < groom.rest_position_m.size(); ++i) {
+      const glm::dvec3 offset = glm::dvec3(groom.rest_position_m[i]) - glm::dvec3(sphere.center_m);
+      double& nearest = nearest_squared[groom.pinned[i] != 0 ? 1 : 0];
+      nearest = std::min(nearest, glm::dot(offset, offset));
     }
-    const double largest = std::sqrt(nearest_squared) + static_cast<double>(kSwallowedM);
+    const double largest = std::min(std::sqrt(nearest_squared[0]),
+                                    std::sqrt(nearest_squared[1]) + static_cast<double>(kSwallowedM));
     sphere.radius_m = std::min(sphere.radius_m, static_cast<float>(largest));
   }
   std::erase_if(spheres, [](const FittedSphere& sphere) { return sphere.radius_m <= 2.0f * kSwallowedM; });
