@@ -12,8 +12,8 @@ namespace strandcast {
 
 /// Spheres of a head: as many as strands can be tested against.
 inline constexpr size_t kHeadSpheres = 16;
-/// No pinned vertex of a groom as loaded lies deeper inside of the spheres that are fitted under it. Free ones
-/// do not lie inside at all: they would be pushed out of their style.
+/// No pinned vertex of a groom as loaded lies deeper inside of the spheres that are fitted under it. Free
+/// ones do not lie inside at all: they would be pushed out of their style.
 inline constexpr float kSwallowedM = 0.002f;
 
 /// At most `count` spheres inside of a mesh that together come as near to its surface as greedy choice finds:
@@ -26,8 +26,8 @@ std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, std::span<
 /// The spheres of make_head(radius_m), without regard to hair; fitted once and kept.
 std::vector<FittedSphere> built_in_head_spheres(float radius_m);
 
-/// The spheres, each made smaller until no free vertex of the groom lies inside of it and no pinned one deeper
-/// than kSwallowedM; those of which nothing is left are gone.
+/// The spheres, each made smaller until no free vertex of the groom lies inside of it and no pinned one
+/// deeper than kSwallowedM; those of which nothing is left are gone.
 std::vector<FittedSphere> shrink_under(std::vector<FittedSphere> spheres, const Groom& groom);
 
 /// How far a point lies outside of all spheres, m; negative inside of one. Huge without spheres.

@@ -56,7 +56,8 @@ TEST_F(RodShapes, AnEndLoadBendsAsTheElastica) {
   for (const bool is_gpu : {false, true}) {
     for (const TipOfLoad& tip : tips) {
       SCOPED_TRACE(fmt::format("{}, load {}", name(is_gpu), tip.alpha));
-      const glm::dvec3 got = glm::dvec3(under_end_load(is_gpu, claims::kRodVertices, tip.alpha).position_m.back()) / kLengthM;
+      const glm::dvec3 got =
+          glm::dvec3(under_end_load(is_gpu, claims::kRodVertices, tip.alpha).position_m.back()) / kLengthM;
       const double off = std::hypot(got.x - tip.x, got.y + tip.y);
       EXPECT_LE(off, claims::kEndLoadTip);
       fmt::print("{}, load {}: tip off by {:.3f} % of the length\n", name(is_gpu), tip.alpha, 100.0 * off);

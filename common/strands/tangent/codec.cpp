@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/strands/byte_io.h"
 #include "common/base/side_by_side.h"
+#include "common/strands/byte_io.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/symbols.h"
 #include "common/strands/zstd_block.h"
