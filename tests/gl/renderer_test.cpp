@@ -237,9 +237,10 @@ TEST_F(RendererTest, TheProfileCountsWhatWasDrawn) {
   EXPECT_GT(renderer->profile().total_ms, renderer->passes().last_ms("render/strands"));
 }
 
-TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {
-  // Far away fewer are drawn; the mean of the picture stays.
-  SceneAsset asset = curtain(300, 8);
+/// 300 key strands and 1,788 followers of a uniform curtain, large enough that all of them are drawn.
+constexpr RenderSize kLarge{1280, 720};
+constexpr uint64_t kCurtainStrands = 300 + 298 * 6;
+LookDesc curtain_look() {
   LookDesc look;
   look.followers = 6;
   look.strand_radius_m = 0.0002f;
@@ -247,7 +248,13 @@ TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {
   look.ambient = 0.0f;
   look.light_color = glm::vec3(0.0f);
   look.background = glm::vec3(0.3f);
-  const auto renderer = make_renderer(asset, look);
+  return look;
+}
+
+TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {
+  // Far away fewer are drawn; the mean of the picture stays.
+  SceneAsset asset = curtain(300, 8);
+  const auto renderer = make_renderer(asset, curtain_look());
   ASSERT_TRUE(renderer);
   const auto mean_luminance = [&](RenderSize size) {
     const Image image = draw(*renderer, {{}, asset.rest_position_m}, front_camera(), size);
@@ -264,20 +271,6 @@ TEST_F(RendererTest, FewerAndWiderStrandsCoverAsMuchAsAllOfThem) {
   EXPECT_EQ(renderer->profile().drawn_strands, 300u + 298u * 6u);
   const double empty = 0.3;
   EXPECT_NEAR((empty - small) / (empty - large), 1.0, 0.06);
-}
-
-/// 300 key strands and 1,788 followers of a uniform curtain, large enough that all of them are drawn.
-constexpr RenderSize kLarge{1280, 720};
-constexpr uint64_t kCurtainStrands = 300 + 298 * 6;
-LookDesc curtain_look() {
-  LookDesc look;
-  look.followers = 6;
-  look.strand_radius_m = 0.0002f;
-  look.tip_scale = 1.0f;
-  look.ambient = 0.0f;
-  look.light_color = glm::vec3(0.0f);
-  look.background = glm::vec3(0.3f);
-  return look;
 }
 
 TEST_F(RendererTest, AShareOfTheStrandsCoversAsMuchAsAll) {
