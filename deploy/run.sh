@@ -104,6 +104,7 @@ done
 port=$(cat "$port_file")
 rm -f "$port_file"
 echo "Server on 127.0.0.1:$port (log: $out/server.log)"
+sed -n 's/^[^ ]* info \[scene\] //p' "$out/server.log"  # how files were read: turned, scaled, which head
 grep -i ' warning ' "$out/server.log" >&2 || true
 
 "$bin/strandcast-ctl" feed --connect "127.0.0.1:$port" --motion "$motion" --wind "$wind" --loop "${motion_options[@]}" \

@@ -58,8 +58,10 @@ Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
   return config;
 }
 
+/// To say or to hear something, not to watch: no strand is sent for it.
 Result<std::unique_ptr<ViewerClient>> connect(const CtlTarget& target, Role role) {
-  ASSIGN_OR_RETURN(const ClientConfig config, config_for(target, role));
+  ASSIGN_OR_RETURN(ClientConfig config, config_for(target, role));
+  config.hello.gets_no_stream = true;
   return ViewerClient::connect(config);
 }
 
@@ -112,14 +114,17 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   RETURN_IF_ERROR(add_wind(options, plan));
   if (!plan.motion && !plan.wind)
     return make_error(ErrorCode::BadInput, "nothing to feed: both --motion and --wind are none");
+  plan.is_live = options.is_live;
   plan.duration_s = options.seconds;
-  if (plan.duration_s == 0.0 && !options.is_looped) plan.duration_s = length_s / options.speed;
+  if (plan.duration_s == 0.0 && !options.is_looped) plan.motion_s = length_s;
   return plan;
 }
 
 void print_progress(const FeedProgress& progress) {
-  std::cerr << fmt::format("\r  {:7.1f} s, {} motion and {} wind samples", progress.elapsed_s,
-                           progress.motion_samples, progress.wind_samples)
+  const std::string pace =
+      progress.pace < 1.0 ? fmt::format(", at {:.2f} of real time with the simulation", progress.pace) : "";
+  std::cerr << fmt::format("\r  {:7.1f} s, {} motion and {} wind samples{:<46}", progress.elapsed_s,
+                           progress.motion_samples, progress.wind_samples, pace)
             << std::flush;
 }
 
@@ -175,6 +180,11 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
   const auto done = feed(**client, *plan, stop, is_terminal ? FeedListener(print_progress) : FeedListener());
   if (is_terminal) std::cerr << '\n';
   if (!done) return fail(done.error(), kRefusedExit);
+  if (done->motion_s < 0.99 * done->elapsed_s * plan->speed)
+    std::cout << fmt::format(
+        "slow motion: {:.1f} s of the motion in {:.1f} s, as slowly as the simulation (--live feeds in real "
+        "time)\n",
+        done->motion_s, done->elapsed_s);
   std::cout << fmt::format(
       "fed {:.1f} s: {} motion and {} wind samples, at most {:.1f} ms late, {} skipped, {} unsent, {} "
       "rejected\n",

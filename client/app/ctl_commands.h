@@ -32,6 +32,7 @@ struct FeedOptions {
   std::string wind = "gusts";      // "gusts", "none" or a CSV file
   MotionFileOptions motion_file;   // how to read a BVH file
   bool is_looped = false;
+  bool is_live = false;  // does not wait for a slow simulation
   double speed = 1.0;
   double seconds = 0.0;  // 0 = the length of the motion, or without end when looped or built in
   double rate_hz = 120.0;

@@ -42,6 +42,9 @@ void declare_feed(CLI::App& app, CommandLine& line) {
   app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
                "Take steps out of the BVH file that are faster than any head moves");
   app.add_flag("--loop", feed.is_looped, "Start over at the end of the files");
+  app.add_flag(
+      "--live", feed.is_live,
+      "Go on in real time when the simulation is slower, as a stage does (default: as slowly as it)");
   app.add_option("--speed", feed.speed, "Playing speed")
       ->check(CLI::Range(1e-3, kMaxSpeed))
       ->capture_default_str();

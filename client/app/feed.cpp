@@ -46,12 +46,14 @@ class Feeder {
         sample_ns += skipped * period_ns;
       }
       const double t_s = static_cast<double>(sample_ns - begin_ns) * 1e-9;
+      progress_.motion_s += (t_s - progress_.elapsed_s) * plan_.speed * progress_.pace;
+      progress_.elapsed_s = t_s;
       if (plan_.duration_s > 0.0 && t_s >= plan_.duration_s) break;
+      if (plan_.motion_s > 0.0 && progress_.motion_s >= plan_.motion_s) break;
       if (!sleep_until_ns(sample_ns, stop)) break;
       const double lateness_ms = static_cast<double>(now_ns() - sample_ns) * 1e-6;
       progress_.worst_lateness_ms = std::max(progress_.worst_lateness_ms, lateness_ms);
-      progress_.elapsed_s = t_s;
-      send_sample(sample_ns, t_s * plan_.speed);
+      send_sample(sample_ns);
       RETURN_IF_ERROR(read_events());
       if (now_ns() < next_report_ns) continue;
       next_report_ns += kSecondNs;
@@ -62,13 +64,13 @@ class Feeder {
   }
 
  private:
-  void send_sample(int64_t sample_ns, double motion_t_s) {
+  void send_sample(int64_t sample_ns) {
     if (plan_.motion) {
-      const MotionSamples message{{{sample_ns, plan_.motion(motion_t_s)}}};
+      const MotionSamples message{{{sample_ns, plan_.motion(progress_.motion_s)}}, 1.0 - progress_.pace};
       count(client_.send(message), progress_.motion_samples);
     }
     if (plan_.wind) {
-      const WindSamples message{{{sample_ns, plan_.wind(motion_t_s)}}};
+      const WindSamples message{{{sample_ns, plan_.wind(progress_.motion_s)}}};
       count(client_.send(message), progress_.wind_samples);
     }
   }
@@ -79,8 +81,10 @@ class Feeder {
     for (ClientEvent& event : client_.poll()) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
       if (auto* notice = std::get_if<Notice>(&event)) progress_.last_notice = std::move(notice->text);
-      if (const auto* status = std::get_if<ServerStatus>(&event))
+      if (const auto* status = std::get_if<ServerStatus>(&event)) {
         progress_.rejected_samples = status->rejected_samples;
+        if (!plan_.is_live) progress_.pace = follow_pace(progress_.pace, *status);
+      }
     }
     return {};
   }
@@ -96,6 +100,13 @@ class Feeder {
 };
 
 }  // namespace
+
+double follow_pace(double present, const ServerStatus& status) {
+  if (status.is_paused) return 0.0;
+  const double wanted = status.realtime_factor >= kSteadyPace ? 1.0 : status.realtime_factor;
+  const double next = 0.5 * (present + wanted);
+  return next >= kSteadyPace ? 1.0 : next;
+}
 
 Result<FeedProgress> feed(ViewerClient& client, const FeedPlan& plan, const std::atomic<bool>& stop,
                           const FeedListener& listener) {

@@ -1,5 +1,7 @@
-// Feeds a running server with head motion and wind as a network source, in real time: one sample per message,
-// sent when its time has come. Motion and wind are functions of time here; files are loaded by the caller.
+// Feeds a running server with head motion and wind as a network source: one sample per message, sent when its
+// time has come. Motion and wind are functions of time here; files are loaded by the caller. A simulation
+// that is slower than real time, or paused, is fed as slowly, so that the hair feels what the file says: slow
+// motion, not a head that is too fast for it.
 #pragma once
 
 #include <atomic>
@@ -20,13 +22,24 @@ struct FeedPlan {
   double rate_hz = 120.0;                     // samples per second of each
   double speed = 1.0;                         // motion time per real time
   double duration_s = 0.0;                    // real time; 0 = until stopped
+  double motion_s = 0.0;                      // motion time; 0 = without end
+  bool is_live = false;                       // in real time whatever the simulation does
 };
+
+/// A simulation that is slower than real time by less than this is not followed.
+inline constexpr double kSteadyPace = 0.97;
+
+/// How fast to play after what the server says: `present` is moved half of the way to its pace, at once to 0
+/// when it pauses. 1 = in real time.
+double follow_pace(double present, const ServerStatus& status);
 
 inline constexpr double kMinFeedRateHz = 1.0;
 inline constexpr double kMaxFeedRateHz = 400.0;
 
 struct FeedProgress {
-  double elapsed_s = 0.0;
+  double elapsed_s = 0.0;  // real time
+  double motion_s = 0.0;   // motion time
+  double pace = 1.0;       // of the simulation, as it is followed
   uint64_t motion_samples = 0;
   uint64_t wind_samples = 0;
   uint64_t skipped_samples = 0;    // their time had passed: this process was held up

@@ -25,6 +25,7 @@ inline constexpr Range kRateDivisor{1, kMaxRateDivisor, "steps"};
 inline constexpr Range kStrandShare{1e-6, 1.0, ""};
 inline constexpr Range kReportedTime{0.0, kMaxReportedMs, "ms"};
 inline constexpr Range kReportedRate{0.0, kMaxReportedHz, "Hz"};
+inline constexpr Range kHeldBack{0.0, 1.0, ""};
 inline constexpr int kBehindNone = 1;  // number of the first enumerator where 0 stands for none on the wire
 
 /// Name of a kind of message: its field in ClientMessage or ServerMessage.
@@ -45,6 +46,7 @@ void visit(Visitor& v, Hello& m) {
   v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
   v.value("acknowledges", m.acknowledges);
   v.value("picture_codecs", m.picture_codecs);  // bits that this version does not know mean nothing
+  v.value("gets_no_stream", m.gets_no_stream);
 }
 
 template <>
@@ -61,6 +63,7 @@ void visit(Visitor& v, MotionSamples& m) {
     v.value("rotation_y", sample.world_from_head.rotation.y);
     v.value("rotation_z", sample.world_from_head.rotation.z);
   });
+  v.number("held_back", m.held_back, kHeldBack);
 }
 
 template <>

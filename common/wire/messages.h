@@ -48,6 +48,7 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   uint32_t frame_width = 0, frame_height = 0;  // frames mode; 0 = server's choice
   bool acknowledges = false;                   // will send a FrameAck for every media message it can use
   PictureCodecs picture_codecs = 0;            // what it decodes besides whole JPEG pictures
+  bool gets_no_stream = false;                 // neither strands nor frames: it came to say something
   bool operator==(const Hello&) const = default;
 };
 struct MotionSamples {  // from a Source
@@ -57,6 +58,9 @@ struct MotionSamples {  // from a Source
     bool operator==(const Sample&) const = default;
   };
   std::vector<Sample> samples;  // oldest first, at most kMaxSamplesPerMessage
+  // How much slower than real time the source plays what it sends, to go with a slow simulation: 0 = not at
+  // all (whatever is live), 0.75 = at a quarter of the speed, 1 = it stands still.
+  double held_back = 0.0;
   bool operator==(const MotionSamples&) const = default;
 };
 struct WindSamples {  // from a Source
@@ -104,7 +108,7 @@ struct AdminCommand {  // from an Admin; answered by a SessionList or a Notice
 enum class DrawingDevice { Unknown, None, Software, Hardware };
 struct ViewerReport {      // about once a second: what this machine makes of what it gets; 0 = not measured
   double decode_ms = 0.0;  // median per state of strands
-  double draw_ms = 0.0;    // median per picture of strands
+  double draw_ms = 0.0;    // median per picture of strands, of the size that is drawn in motion
   double picture_decode_ms = 0.0;  // median per picture of the server's
   double shown_hz = 0.0;           // different pictures shown per second
   DrawingDevice device = DrawingDevice::Unknown;

@@ -15,6 +15,7 @@ struct InputFrame {
   bool has_wind_stream = false;
   bool is_motion_stale = true;    // none accepted for kMotionStaleNs (input_hub.h)
   bool has_teleported = false;    // the pose jumped since the last frame: strands follow rigidly
+  double motion_speed = 1.0;      // played at this share of real time, to go with a slow simulation
   int64_t motion_time_ns = 0;     // server clock at arrival of the newest sample used, 0 = none
   uint64_t rejected_samples = 0;  // since start
 

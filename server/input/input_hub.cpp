@@ -115,6 +115,7 @@ void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t ar
       accept(motion_, source_id, {sample.time_ns, newest_arrival_ns_, pose}, kMotionStaleNs);
     }
   }
+  if (motion_.owner == source_id) motion_speed_ = 1.0 - std::clamp(samples.held_back, 0.0, 1.0);
 }
 
 void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
@@ -186,6 +187,7 @@ InputFrame InputHub::sample(int64_t server_time_ns) {
   const bool is_first = !frame_.has_motion && !motion_.track.samples().empty();
   const bool has_jumped = update_pose(now_ns);
   frame_.has_motion = frame_.has_motion || is_first;
+  frame_.motion_speed = motion_speed_;
   // The first pose replaces none: strands must not be dragged there from the origin.
   finish_teleport_check(before, now_ns, has_jumped || is_first);
   frame_.is_motion_stale = !motion_.owner || now_ns - motion_.accepted_ns > kMotionStaleNs;

@@ -14,6 +14,8 @@
 // * Refused and counted: samples not newer than the newest one used, duplicates, impossible values, more than
 //   kMaxSampleRateHz per source and kind, more than kMaxInputSources sources. Buffers are bounded; the oldest
 //   samples go first.
+// * A source that slows its motion to go with a slow simulation says how much; the frame has what it said
+//   last.
 // * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples, or between frames, is carried
 //   out in one frame, flagged as a teleport and never interpolated.
 #pragma once
@@ -107,7 +109,8 @@ class InputHub {
   Stream<glm::dvec3> wind_;
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;
-  InputFrame frame_;  // the last one given out
+  double motion_speed_ = 1.0;  // as the owner said last
+  InputFrame frame_;           // the last one given out
   InputCounters counters_;
 };
 

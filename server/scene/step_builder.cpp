@@ -64,6 +64,10 @@ std::vector<GustWave> make_gust_waves(const WindDesc& wind) {
   return waves;
 }
 
+double felt_share(double rate) {
+  return rate <= 1.0 ? 1.0 : 1.0 / (rate * rate);
+}
+
 StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders)
     : groom_gravity_in_head_mps2_(scene.gravity_mps2) {
   change(scene, std::move(colliders));
@@ -122,13 +126,19 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
   return step_;
 }
 
-void StepBuilder::begin(const InputFrame& input, double end_time_s) {
+void StepBuilder::begin(const InputFrame& input, double end_time_s, double input_rate) {
   input_ = input;
   const Pose target = input.has_motion ? input.world_from_head : world_from_head_;
-  Pose from = world_from_head_;
   // The first pose is a jump too: until then the head stood at the origin.
-  step_.has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
-  if (step_.has_jumped) from = target;
+  const bool has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
+  const double felt = has_jumped ? 0.0 : felt_share(input_rate * input.motion_speed);
+  Pose from = world_from_head_;
+  if (has_jumped)
+    from = target;
+  else if (felt < 1.0)
+    from = interpolate(world_from_head_, target, 1.0 - felt);
+  step_.carried_to_rotation.reset();
+  if (input.has_motion && felt < 1.0) step_.carried_to_rotation = from.rotation;
   has_motion_ = has_motion_ || input.has_motion;
 
   const auto count = static_cast<double>(step_.substeps.size());

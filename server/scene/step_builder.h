@@ -16,9 +16,17 @@ namespace strandcast {
 struct SceneStep {
   Pose world_from_head;             // at the end of the step
   std::vector<StepInput> substeps;  // scene.substeps of them
-  /// The head jumped to this pose: strands go along as they are (Solver::rebase) before the first substep.
-  bool has_jumped = false;
+  /// Strands go along as they are to this rotation of the head (Solver::rebase) before the first substep: the
+  /// head jumped, or inputs pass faster than the simulation. World from head.
+  std::optional<glm::dquat> carried_to_rotation;
 };
+
+/// What part of the head's way in a step the strands feel; they go along as they are with the rest. 1 where
+/// motion passes no faster than simulated time. Where `rate` times as much motion passes, 1 / rate^2: a step
+/// stands for `rate` steps, and so large is the head's acceleration as it was (its speed is 1 / rate of what
+/// it was, and changes in 1 / rate of the time). With the whole way it would be rate^2 times as large, and
+/// hair stands on end.
+double felt_share(double rate);
 
 class StepBuilder {
  public:
@@ -29,7 +37,8 @@ class StepBuilder {
   void change(const SceneDesc& scene, std::vector<SphereCollider> colliders);
 
   /// The step that ends at `end_time_s` of simulated time: how the head moves, without wind and colliders.
-  void begin(const InputFrame& input, double end_time_s);
+  /// `input_rate`: time of the inputs since the last step per simulated time (InputClock).
+  void begin(const InputFrame& input, double end_time_s, double input_rate = 1.0);
   // What the facts add to it.
   void add_wind();
   void add_gusts();

@@ -99,6 +99,7 @@ Status SimLoop::begin() {
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
+  input_clock_.emplace(1.0 / config_.scene.step_rate_hz);
   update_stats();
   return {};
 }
@@ -239,6 +240,7 @@ Notice SimLoop::command(Command command) {
       return {false, fmt::format("Paused at step {}.", tick_)};
     case Command::Resume:
       clock_->resume(now_ns());
+      input_clock_->restart();
       return {false, fmt::format("Running from step {}.", tick_)};
     case Command::StepOnce:
       if (!clock_->step_once()) return {true, "StepOnce needs a paused simulation: send Pause first."};
@@ -298,6 +300,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
   const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands, groom_gravity};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, gpu));
+  const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
                                      : hand_over(*solver_, *solver, config_.content->groom, rotation));
@@ -309,6 +312,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   stages_->plan_step(explain(scene, facts_));
   stages_->set_solver_bytes(solver_->memory_bytes());
   ++solver_builds_;
+  // The same model, built for other facts, says nothing new.
+  if (!is_first && scene.solver == config_.scene.solver) return {};
   log_info("sim", "solver {}: {} strands x {} vertices, {} kB", row->name,
            config_.content->groom.strand_count(), config_.content->groom.uniform_vertex_count(),
            solver_->memory_bytes() / 1000);
@@ -337,7 +342,9 @@ void SimLoop::apply_facts(const RuntimeFacts& facts) {
 }
 
 void SimLoop::step(int64_t time_ns) {
-  input_ = hub_.sample(time_ns);
+  // A pause is not caught up.
+  if (clock_->is_paused()) input_clock_->restart();
+  input_ = hub_.sample(input_clock_->next(time_ns));
   if (input_.has_wind_stream != facts_.has_wind_stream) {
     RuntimeFacts facts = facts_;
     facts.has_wind_stream = input_.has_wind_stream;
@@ -348,6 +355,7 @@ void SimLoop::step(int64_t time_ns) {
   StageTurn turn(*builder_, *solver_, *publisher_);
   turn.input = input_;
   turn.end_time_s = end_time_s;
+  turn.input_rate = input_clock_->rate();
   turn.is_stopping = &is_stopping_;
   CHECK(stages_->step(turn, &*timer_).ok());  // stages of a step cannot fail
   if (is_stopping_) return;

@@ -26,6 +26,7 @@
 #include "common/wire/messages.h"
 #include "server/input/input_hub.h"
 #include "server/publish/publisher.h"
+#include "server/scene/input_clock.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/sim_clock.h"
 #include "server/scene/step_builder.h"
@@ -122,6 +123,7 @@ class SimLoop {
   std::optional<StepBuilder> builder_;
   std::optional<Publisher> publisher_;
   std::optional<SimClock> clock_;
+  std::optional<InputClock> input_clock_;
   std::optional<gl::GpuTimer> timer_;
   std::optional<SimStages> stages_;
   RuntimeFacts facts_;

@@ -29,7 +29,7 @@ class Stage final : public gl::Pass<StageTurn> {
 
 void run_substeps(StageTurn& turn) {
   const SceneStep& step = turn.builder.step();
-  if (step.has_jumped) turn.solver.rebase(step.world_from_head.rotation);
+  if (step.carried_to_rotation) turn.solver.rebase(*step.carried_to_rotation);
   for (const StepInput& substep : step.substeps) {
     if (turn.is_stopping != nullptr && *turn.is_stopping) return;  // many of a slow solver take long
     turn.solver.substep(substep);
@@ -83,7 +83,7 @@ void SimStages::plan_step(const std::vector<FeatureReason>& reasons) {
                                 gl::PassClock::Host, work));
   };
   add("scene/motion", motion, {"", true, ""},
-      [](StageTurn& turn) { turn.builder.begin(turn.input, turn.end_time_s); });
+      [](StageTurn& turn) { turn.builder.begin(turn.input, turn.end_time_s, turn.input_rate); });
   add("scene/wind", wind, fact(reasons, "has_wind"), [](StageTurn& turn) { turn.builder.add_wind(); });
   add("scene/gusts", gusts, fact(reasons, "has_turbulence"),
       [](StageTurn& turn) { turn.builder.add_gusts(); });

@@ -34,6 +34,7 @@ struct StageTurn : gl::PassTurn {
   // A step takes
   InputFrame input;
   double end_time_s = 0.0;                         // of the step, simulated
+  double input_rate = 1.0;                         // InputClock::rate()
   const std::atomic<bool>* is_stopping = nullptr;  // looked at between substeps; may be null
   // Publishing takes, besides how the head moved in the newest step,
   PublishInput publish;

@@ -15,9 +15,10 @@ inline std::vector<ClientMessage> sample_client_messages() {
     motion.samples.push_back({1'000 + i, {{0.1 * i, -2.0, 1e5}, {0.5, 0.5, -0.5, 0.5}}});
     wind.samples.push_back({-7 + i, {1.5f * static_cast<float>(i), -3.0f, 0.25f}});
   }
+  motion.held_back = 0.75;
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
-  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs},
+  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true},
           motion,
           wind,
           camera,

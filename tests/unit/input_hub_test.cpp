@@ -46,6 +46,20 @@ TEST(InputHub, HoldsTheNewestSampleWithoutDelay) {
   EXPECT_EQ(hub.sample(kStart + 300 * kMs).motion_time_ns, kStart + 10 * kMs);
 }
 
+TEST(InputHub, SaysHowFastItsOwnerPlaysTheMotion) {
+  InputHub hub;
+  EXPECT_EQ(hub.sample(kStart).motion_speed, 1.0);
+  MotionSamples slowed = motion(0, pose_at(0.0));
+  slowed.held_back = 0.75;
+  hub.push(1, slowed, kStart);
+  EXPECT_EQ(hub.sample(kStart).motion_speed, 0.25);
+  slowed.held_back = 0.5;
+  hub.push(2, slowed, kStart + kMs);
+  EXPECT_EQ(hub.sample(kStart + kMs).motion_speed, 0.25) << "another source drives the head";
+  hub.push(1, motion(10 * kMs, pose_at(0.0)), kStart + 10 * kMs);
+  EXPECT_EQ(hub.sample(kStart + 10 * kMs).motion_speed, 1.0);
+}
+
 TEST(InputHub, InterpolatesBetweenSamples) {
   InputHub hub;
   hub.push(1, motion(0, pose_at(0.0, 0.0)), kStart);

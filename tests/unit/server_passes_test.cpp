@@ -147,7 +147,7 @@ TEST(SimStages, AStepRunInStagesIsTheStepThatTheFactsAskForBitForBit) {
       ASSERT_TRUE(world.step(step));
       const SceneStep& whole = other.build(turned(step), features, step / scene.step_rate_hz);
       expected.insert(expected.end(), whole.substeps.begin(), whole.substeps.end());
-      jumps += whole.has_jumped ? 1 : 0;
+      jumps += whole.carried_to_rotation ? 1 : 0;
     }
     EXPECT_EQ(jumps, 2u) << "the first pose, and a teleport";
     EXPECT_EQ(world.solver.jumps.size(), jumps);

@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace strandcast {
 namespace {
@@ -30,7 +32,7 @@ TEST(StepBuilder, SubstepsAddUpToTheHeadMovement) {
   builder.build(moved({1000.0, 0.0, 0.0}, 0.0), {}, 0.0);
   const SceneStep& step = builder.build(moved({1000.1, 0.02, -0.03}, 0.4), {}, 1.0 / 60.0);
   ASSERT_EQ(step.substeps.size(), 4u);
-  EXPECT_FALSE(step.has_jumped);
+  EXPECT_FALSE(step.carried_to_rotation.has_value());
   glm::dvec3 shift_m(0.0);
   double time_s = 0.0;
   for (size_t i = 0; i < 4; ++i) {
@@ -46,17 +48,64 @@ TEST(StepBuilder, SubstepsAddUpToTheHeadMovement) {
 TEST(StepBuilder, JumpsAndTheFirstPoseMoveStrandsRigidly) {
   StepBuilder builder(still_scene(), {});
   const SceneStep& first = builder.build(moved({5.0, 0.0, 0.0}, 1.0), {}, 0.0);
-  EXPECT_TRUE(first.has_jumped);
+  EXPECT_TRUE(first.carried_to_rotation.has_value());
   for (const StepInput& substep : first.substeps) EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
   InputFrame jump = moved({-50.0, 3.0, 0.0}, 2.5);
   jump.has_teleported = true;
   const SceneStep& second = builder.build(jump, {}, 0.0);
-  EXPECT_TRUE(second.has_jumped);
+  EXPECT_TRUE(second.carried_to_rotation.has_value());
   for (const StepInput& substep : second.substeps) {
     EXPECT_EQ(substep.head_shift_m, glm::dvec3(0.0));
     EXPECT_NEAR(angle_between_rad(substep.world_from_head_rotation, jump.world_from_head.rotation), 0.0, 1e-7)
         << "the jump turns nothing within the step";
   }
+}
+
+/// What the strands feel of a head that swings to and fro, when in each step `rate` steps of its motion pass:
+/// its shift in the steps, and how it was carried.
+struct Felt {
+  std::vector<double> shift_m;
+  int carried = 0;
+};
+constexpr double kSwingM = 0.1, kSwingRadPerS = 6.0;
+
+Felt feel(double rate, double motion_speed) {
+  SceneDesc scene = still_scene();
+  scene.substeps = 1;
+  StepBuilder builder(scene, {});
+  Felt felt;
+  for (int i = 0; i < 60; ++i) {
+    const double t_s = i * rate * motion_speed / scene.step_rate_hz;
+    InputFrame input = moved({kSwingM * std::sin(kSwingRadPerS * t_s), 0.0, 0.0}, 0.0);
+    input.motion_speed = motion_speed;
+    builder.begin(input, 0.0, rate);
+    EXPECT_EQ(builder.step().world_from_head, input.world_from_head) << "the head is where it is";
+    felt.shift_m.push_back(builder.step().substeps[0].head_shift_m.x);
+    felt.carried += builder.step().carried_to_rotation ? 1 : 0;
+  }
+  return felt;
+}
+
+// x = A sin(w t): the speed that is felt is 1 / rate of the head's, and changes `rate` times as fast.
+TEST(StepBuilder, AHeadThatIsTooFastForTheSimulationIsFeltWithItsOwnAcceleration) {
+  const double h_s = 1.0 / still_scene().step_rate_hz;
+  for (const double rate : {1.0, 1.5, 2.5}) {
+    const Felt felt = feel(rate, 1.0);
+    for (size_t i = 2; i + 1 < felt.shift_m.size(); ++i) {
+      const double acceleration_mps2 = (felt.shift_m[i + 1] - felt.shift_m[i]) / (h_s * h_s);
+      const double t_s = static_cast<double>(i) * rate * h_s;
+      const double expected_mps2 = -kSwingM * kSwingRadPerS * kSwingRadPerS * std::sin(kSwingRadPerS * t_s);
+      EXPECT_NEAR(acceleration_mps2, expected_mps2, 0.02 * kSwingM * kSwingRadPerS * kSwingRadPerS) << rate;
+    }
+  }
+}
+
+TEST(StepBuilder, AHeadThatIsSlowedWithTheSimulationIsFeltAsItIs) {
+  const Felt slowed = feel(4.0, 0.25);
+  const Felt real = feel(1.0, 1.0);
+  EXPECT_EQ(slowed.carried, 1) << "the first pose";
+  for (size_t i = 0; i < real.shift_m.size(); ++i) EXPECT_NEAR(slowed.shift_m[i], real.shift_m[i], 1e-12);
+  EXPECT_EQ(feel(4.0, 0.5).carried, 60) << "slowed, but not enough";
 }
 
 TEST(StepBuilder, WithoutMotionTheHeadStaysWhereItWas) {

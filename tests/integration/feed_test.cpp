@@ -1,0 +1,146 @@
+// What a source of files makes of a simulation that is slower than real time: slow motion, unless it is live.
+#include "client/app/feed.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <vector>
+
+#include "tests/support/client_config.h"
+#include "tests/support/fake_server.h"
+
+namespace strandcast {
+namespace {
+
+using test::config_for;
+using test::FakePeer;
+using test::FakeServer;
+
+constexpr size_t kSamples = 60;
+
+ServerStatus status_of(double realtime_factor, bool is_paused = false) {
+  ServerStatus status;
+  status.realtime_factor = realtime_factor;
+  status.is_paused = is_paused;
+  return status;
+}
+
+/// A head that is t metres along x at time t.
+FeedPlan plan_of(bool is_live) {
+  FeedPlan plan;
+  plan.motion = [](double t_s) { return Pose{{t_s, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}}; };
+  plan.rate_hz = 200.0;
+  plan.is_live = is_live;
+  return plan;
+}
+
+struct Fed {
+  std::vector<MotionSamples> heard;
+  FeedProgress progress;
+};
+
+/// Feeds a server that says this of itself after each sample.
+Fed feed_to(const ServerStatus& status, const FeedPlan& plan) {
+  std::promise<std::vector<MotionSamples>> heard;
+  std::atomic<bool> stop = false;
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(test::make_welcome(2, 4));
+    std::vector<MotionSamples> samples;
+    while (samples.size() < kSamples) {
+      const auto motion = peer.read_until<MotionSamples>();
+      if (!motion) break;
+      samples.push_back(*motion);
+      peer.send(status);
+    }
+    heard.set_value(samples);
+    stop = true;
+    peer.read_to_end();
+  });
+  ClientConfig config = config_for(server.port());
+  config.hello.role = Role::Source;
+  Fed fed;
+  auto client = ViewerClient::connect(config);
+  EXPECT_TRUE(client) << client.error().to_string();
+  if (!client) return fed;
+  const auto done = feed(**client, plan, stop, {});
+  EXPECT_TRUE(done) << done.error().to_string();
+  if (done) fed.progress = *done;
+  (*client).reset();
+  fed.heard = heard.get_future().get();
+  return fed;
+}
+
+double x_m(const MotionSamples& motion) {
+  return motion.samples.front().world_from_head.position_m.x;
+}
+
+double seconds_between(const MotionSamples& a, const MotionSamples& b) {
+  return static_cast<double>(b.samples.front().time_ns - a.samples.front().time_ns) * 1e-9;
+}
+
+// The speed of what is played and what is said of it are the same thing.
+void expect_as_said(const Fed& fed) {
+  ASSERT_EQ(fed.heard.size(), kSamples);
+  for (size_t i = 1; i < kSamples; ++i) {
+    const double passed_s = seconds_between(fed.heard[i - 1], fed.heard[i]);
+    EXPECT_NEAR(x_m(fed.heard[i]) - x_m(fed.heard[i - 1]), passed_s * (1.0 - fed.heard[i].held_back), 1e-9);
+  }
+}
+
+TEST(Feed, ASlowSimulationIsFedInSlowMotion) {
+  const Fed fed = feed_to(status_of(0.25), plan_of(false));
+  expect_as_said(fed);
+  EXPECT_NEAR(fed.heard.back().held_back, 0.75, 1e-3);
+  EXPECT_NEAR(fed.progress.pace, 0.25, 1e-3);
+  EXPECT_LT(fed.progress.motion_s, 0.9 * fed.progress.elapsed_s);
+}
+
+TEST(Feed, APausedSimulationHoldsTheMotion) {
+  const Fed fed = feed_to(status_of(0.0, true), plan_of(false));
+  expect_as_said(fed);
+  EXPECT_EQ(fed.heard.back().held_back, 1.0);
+  EXPECT_EQ(x_m(fed.heard.back()), x_m(fed.heard[kSamples - 2]));
+}
+
+TEST(Feed, AStageGoesOnInRealTime) {
+  const Fed fed = feed_to(status_of(0.25), plan_of(true));
+  expect_as_said(fed);
+  EXPECT_EQ(fed.heard.back().held_back, 0.0);
+  EXPECT_NEAR(fed.progress.motion_s, fed.progress.elapsed_s, 1e-9);
+}
+
+TEST(Feed, AFileEndsWithItsMotionHoweverSlowlyItIsPlayed) {
+  FeedPlan plan = plan_of(false);
+  plan.motion_s = 0.05;
+  std::promise<size_t> heard;
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(test::make_welcome(2, 4));
+    size_t count = 0;
+    for (; peer.read_until<MotionSamples>(); ++count) peer.send(status_of(0.5));
+    heard.set_value(count);
+  });
+  ClientConfig config = config_for(server.port());
+  config.hello.role = Role::Source;
+  auto client = ViewerClient::connect(config);
+  ASSERT_TRUE(client) << client.error().to_string();
+  const std::atomic<bool> stop = false;
+  const auto done = feed(**client, plan, stop, {});
+  ASSERT_TRUE(done) << done.error().to_string();
+  EXPECT_GE(done->motion_s, 0.05);
+  EXPECT_LT(done->motion_s, 0.05 + 2.0 / plan.rate_hz);
+  EXPECT_GT(done->elapsed_s, 0.06);
+  (*client).reset();
+  EXPECT_GT(heard.get_future().get(), 10u);
+}
+
+TEST(Feed, FollowsAPaceHalfwayWithEveryWordAndIsExactInRealTime) {
+  EXPECT_EQ(follow_pace(1.0, status_of(0.2)), 0.6);
+  EXPECT_EQ(follow_pace(0.6, status_of(0.2)), 0.4);
+  EXPECT_EQ(follow_pace(1.0, status_of(0.98)), 1.0);
+  EXPECT_EQ(follow_pace(0.98, status_of(1.02)), 1.0) << "and not for ever nearly";
+  EXPECT_EQ(follow_pace(0.7, status_of(0.7, true)), 0.0);
+}
+
+}  // namespace
+}  // namespace strandcast
