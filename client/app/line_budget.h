@@ -1,6 +1,7 @@
 // LineBudget: how many lines a server may make a program write. Pure logic on given times, one thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <utility>
 
@@ -10,29 +11,26 @@ inline constexpr uint32_t kMaxForeignLinesPerS = 20;
 
 class LineBudget {
  public:
-  /// Whether a line may be written at `time_ns`, which does not run backwards: as many in any second as the
-  /// limit, at once or spread.
+  /// Whether a line may be written at `time_ns`, which does not run backwards: no second, wherever it begins,
+  /// has more lines than the limit.
   bool take(int64_t time_ns) {
     constexpr int64_t kSecondNs = 1'000'000'000;
-    if (!is_started_ || time_ns - second_ns_ >= kSecondNs) {
-      is_started_ = true;
-      second_ns_ = time_ns;
-      taken_ = 0;
+    int64_t& oldest_ns = written_ns_[count_ % kMaxForeignLinesPerS];
+    if (count_ >= kMaxForeignLinesPerS && time_ns - oldest_ns < kSecondNs) {
+      ++left_out_;
+      return false;
     }
-    if (taken_ < kMaxForeignLinesPerS) {
-      ++taken_;
-      return true;
-    }
-    ++left_out_;
-    return false;
+    oldest_ns = time_ns;
+    ++count_;
+    return true;
   }
   /// Lines that were not written since the last call.
   uint64_t take_left_out() { return std::exchange(left_out_, 0); }
 
  private:
-  bool is_started_ = false;
-  int64_t second_ns_ = 0;  // when the present second began
-  uint32_t taken_ = 0;     // in it
+  std::array<int64_t, kMaxForeignLinesPerS>
+      written_ns_{};    // when the last lines were, the next place is the oldest
+  uint64_t count_ = 0;  // of lines written
   uint64_t left_out_ = 0;
 };
 

@@ -40,7 +40,7 @@ void SessionDesk::connect(NetServer& net) {
 }
 
 Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hello) {
-  if (hello.mode == StreamMode::Frames && hello.role != Role::Source)
+  if (hello.mode == StreamMode::Frames && !visitor.subscription.is_empty())
     if (const std::optional<Error> error = parts_.hub.picture_failure())
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
@@ -52,8 +52,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   }
   Admission admission;
   admission.welcome = make_welcome(*place);
-  if (hello.role != Role::Source && visitor.subscription.mode() == StreamMode::Strands)
-    admission.asset = parts_.asset;
+  if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = parts_.asset;
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;

@@ -45,9 +45,8 @@ PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, Pict
 }
 
 /// What the viewer gets, and during a change what it is about to get as well.
-Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view) {
+Demand Viewers::demand_of(const Subscription& wanted, const PictureView& view) {
   Demand demand;
-  if (viewer.role == Role::Source) return demand;
   if (wanted.gets(StreamMode::Strands)) demand.strand_class = wanted.strand_class;
   if (wanted.gets(StreamMode::Frames)) demand.picture = view;
   return demand;
@@ -55,8 +54,7 @@ Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, cons
 
 /// On an error the viewer stays as it was.
 Status Viewers::change(Viewer& viewer, Subscription wanted, const PictureView& view) {
-  ASSIGN_OR_RETURN(wanted.pictures.picture_class,
-                   desk_.set_demand(viewer.reader, demand_of(viewer, wanted, view)));
+  ASSIGN_OR_RETURN(wanted.pictures.picture_class, desk_.set_demand(viewer.reader, demand_of(wanted, view)));
   *viewer.subscription = std::move(wanted);
   viewer.view = view;
   return {};
@@ -84,11 +82,11 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
   viewer.size = place.size;
   viewer.view = make_scene_view(scene_, place.size, hello.picture_codecs);
   viewer.ladder = make_picture_ladder(viewer.view.codec, viewer.view.quality);
-  Subscription wanted;
+  Subscription wanted = subscription;
   wanted.pictures.costs = costs_of(viewer.ladder);
   wanted.pictures.step = find_step(viewer.ladder, viewer.view.quality);
-  if (hello.role == Role::Source) {
-    place.reason = "a source gets no stream";
+  if (wanted.is_empty()) {
+    place.reason = hello.gets_no_stream ? "no stream was asked for" : "a source gets no stream";
   } else if (hello.mode == StreamMode::Frames) {
     wanted.start_with(StreamMode::Frames);
     place.reason = "frames were asked for";
@@ -123,7 +121,7 @@ std::string Viewers::describe(SessionId session) const {
 
 Status Viewers::set_camera(SessionId session, const CameraDesc& camera) {
   const auto found = viewers_.find(session);
-  if (found == viewers_.end() || found->second.role == Role::Source)
+  if (found == viewers_.end() || found->second.subscription->is_empty())
     return make_error(ErrorCode::NotFound, "only viewers have a camera");
   PictureView view = found->second.view;
   view.camera = camera;
@@ -142,7 +140,7 @@ ViewerReport Viewers::report(SessionId session) const {
 
 void Viewers::request_mode(SessionId session, StreamMode mode) {
   const auto found = viewers_.find(session);
-  if (found != viewers_.end()) found->second.request = mode;
+  if (found != viewers_.end() && !found->second.subscription->is_empty()) found->second.request = mode;
 }
 
 bool Viewers::has_request(SessionId session) const {
@@ -152,7 +150,7 @@ bool Viewers::has_request(SessionId session) const {
 
 std::optional<ModeChange> Viewers::consider(SessionId session, const ModeFacts& facts, int64_t time_ns) {
   const auto found = viewers_.find(session);
-  if (found == viewers_.end() || found->second.role == Role::Source) return std::nullopt;
+  if (found == viewers_.end() || found->second.subscription->is_empty()) return std::nullopt;
   Viewer& viewer = found->second;
   if (viewer.request && (viewer.request_ns == 0 || time_ns - viewer.request_ns >= kModeRequestNs)) {
     viewer.wanted = *std::exchange(viewer.request, std::nullopt);
@@ -252,8 +250,10 @@ RenderSize Viewers::picture_size(SessionId session) const {
 }
 
 void Viewers::count() {
-  viewer_count_ = static_cast<uint32_t>(std::count_if(
-      viewers_.begin(), viewers_.end(), [](const auto& entry) { return entry.second.role != Role::Source; }));
+  viewer_count_ =
+      static_cast<uint32_t>(std::count_if(viewers_.begin(), viewers_.end(), [](const auto& entry) {
+        return !entry.second.subscription->is_empty();
+      }));
 }
 
 }  // namespace strandcast

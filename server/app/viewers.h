@@ -95,9 +95,9 @@ class Viewers {
     int64_t request_ns = 0;             // when the one before was; 0 = never
     bool is_answer_due = false;
 
-    bool gets(StreamMode kind) const { return role != Role::Source && subscription->gets(kind); }
+    bool gets(StreamMode kind) const { return subscription->gets(kind); }
   };
-  static Demand demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view);
+  static Demand demand_of(const Subscription& wanted, const PictureView& view);
   Status change(Viewer& viewer, Subscription wanted, const PictureView& view);
   void change_surely(Viewer& viewer, const Subscription& wanted);
   ModeChoice choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns);

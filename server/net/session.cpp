@@ -248,7 +248,7 @@ void Session::check_deadlines(int64_t time_ns) {
   }
   if (state_ != State::Joined) return;
   guarded([&] {
-    if (hello_.role != Role::Source) probe(time_ns);
+    if (!subscription_.is_empty()) probe(time_ns);
     adapt(time_ns);
     report_link(time_ns);
     ask_for_keyframe(time_ns);

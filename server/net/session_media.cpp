@@ -163,7 +163,7 @@ void Session::announce_quality(const std::string& reason) {
 void Session::follow_strand_classes(const std::string& reason) {
   const bool is_concerned =
       subscription_.mode() == StreamMode::Strands || subscription_.changes_to(StreamMode::Strands);
-  if (state_ != State::Joined || !is_concerned || hello_.role == Role::Source) return;
+  if (state_ != State::Joined || !is_concerned || subscription_.is_empty()) return;
   guarded([&] {
     const size_t last = context_.strands.classes().size() - 1;
     if (subscription_.strand_class > last) change_strand_class(last);
@@ -175,7 +175,7 @@ void Session::follow_strand_classes(const std::string& reason) {
 
 void Session::report_link(int64_t time_ns) {
   const bool is_due = time_ns - link_reported_ns_ >= context_.config.limits.link_interval_ms * kNsPerMs;
-  if (hello_.role == Role::Source || !(is_due || is_mode_request_waiting_)) return;
+  if (subscription_.is_empty() || !(is_due || is_mode_request_waiting_)) return;
   link_reported_ns_ = time_ns;
   LinkState link;
   link.mode = subscription_.mode();

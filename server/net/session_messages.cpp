@@ -76,6 +76,7 @@ bool Session::check_token(const Hello& hello) {
 void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
+  subscription_.begin(hello);
   Result<Admission> admission = context_.handler.on_hello({id_, peer_.key, subscription_}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
@@ -87,9 +88,10 @@ void Session::join(const Hello& hello) {
   state_since_ns_ = now_ns();
   context_.update_session_counts();
   context_.note(fmt::format("session {} from {} joined: {} '{}', {}", id_, peer_.address,
-                            to_string(hello.role), hello.name, to_string(subscription_.mode())));
+                            to_string(hello.role), hello.name,
+                            subscription_.is_empty() ? "no stream" : to_string(subscription_.mode())));
   // Everything is set before anything is written, and strands start only behind the asset.
-  if (hello.role != Role::Source) begin_media(hello, admission->asset);
+  if (!subscription_.is_empty()) begin_media(hello, admission->asset);
   queue_control(std::move(admission->welcome));
   // The Welcome says nothing about a rate below that of the simulation.
   if (subscription_.mode() == StreamMode::Strands && flow_.expects_acks() &&

@@ -10,7 +10,7 @@
 namespace strandcast::net {
 
 bool Session::watches(PictureClass picture_class) const {
-  return state_ == State::Joined && hello_.role != Role::Source && subscription_.watches(picture_class);
+  return state_ == State::Joined && !subscription_.is_empty() && subscription_.watches(picture_class);
 }
 
 /// The pictures of another class begin with a whole one.
@@ -22,7 +22,7 @@ void Session::follow_picture_class(PictureClass before) {
 }
 
 void Session::answer_mode(const ModeAnswer& answer) {
-  if (state_ != State::Joined || hello_.role == Role::Source) return;
+  if (state_ != State::Joined || subscription_.is_empty()) return;
   if (!subscription_.next()) {
     if (std::exchange(untold_change_, std::nullopt)) {
       if (subscription_.mode() == StreamMode::Strands)

@@ -25,17 +25,21 @@ class Subscription {
   uint16_t strand_class = 0;
   PictureChoice pictures;
 
-  /// Strands or Frames: what it gets now.
+  /// Whether it gets anything: a source does not, nor who came to say something.
+  bool is_empty() const { return is_empty_; }
+  /// Strands or Frames: what it gets now, if anything.
   StreamMode mode() const { return mode_; }
   /// What it is about to get: strands or frames go on until the first of the others is there.
   std::optional<StreamMode> next() const { return next_; }
   int64_t changing_since_ns() const { return changing_since_ns_; }
-  bool gets(StreamMode kind) const { return mode_ == kind || next_ == kind; }
+  bool gets(StreamMode kind) const { return !is_empty_ && (mode_ == kind || next_ == kind); }
   bool changes_to(StreamMode kind) const { return next_ == kind; }
   bool watches(PictureClass picture_class) const {
     return gets(StreamMode::Frames) && picture_class == pictures.picture_class;
   }
 
+  /// First of all: who gets nothing will never get anything.
+  void begin(const Hello& hello) { is_empty_ = hello.role == Role::Source || hello.gets_no_stream; }
   /// Before anything is sent.
   void start_with(StreamMode mode) { mode_ = mode; }
   void begin_change(StreamMode next, int64_t time_ns) {
@@ -50,6 +54,7 @@ class Subscription {
   }
 
  private:
+  bool is_empty_ = false;
   StreamMode mode_ = StreamMode::Strands;
   std::optional<StreamMode> next_;
   int64_t changing_since_ns_ = 0;

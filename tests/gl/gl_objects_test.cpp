@@ -58,15 +58,17 @@ TEST_F(GlObjects, AreCountedByKindWithTheirBytes) {
     const Texture plain("plain", GL_RGBA8, 4, 2, 1);
     const Texture samples("samples", GL_RGBA8, 4, 2, 4);
     const Texture volume = Texture::volume("volume", GL_RG16, 2, 3, 5);
+    const Texture depths("depths", GL_DEPTH_COMPONENT32F, 4, 2, 1);
+    const Texture stencils("stencils", GL_DEPTH24_STENCIL8, 2, 2, 4);
     const Framebuffer target = Framebuffer::without_attachments("target");
     const VertexArray vertices("vertices");
     EXPECT_EQ(more(ObjectKind::Buffer), 1u) << "an empty one has no name";
-    EXPECT_EQ(more(ObjectKind::Texture), 3u);
+    EXPECT_EQ(more(ObjectKind::Texture), 5u);
     EXPECT_EQ(more(ObjectKind::Framebuffer), 1u);
     EXPECT_EQ(more(ObjectKind::VertexArray), 1u);
     EXPECT_EQ(more(ObjectKind::Program), 0u);
     EXPECT_EQ(object_counts().size_bytes - before.size_bytes,
-              100u + 4u * 2 * 4 + 4u * 2 * 4 * 4 + 2u * 3 * 5 * 4);
+              100u + 4u * 2 * 4 + 4u * 2 * 4 * 4 + 2u * 3 * 5 * 4 + 4u * 2 * 4 + 2u * 2 * 4 * 4);
     const Buffer moved = std::move(buffer);
     EXPECT_EQ(more(ObjectKind::Buffer), 1u);
     buffer = Buffer("another", 60);

@@ -187,6 +187,32 @@ TEST_F(ServerNet, JoinOrderIsWelcomeAssetKeyframeDeltas) {
   EXPECT_EQ(order[2], Opcode::StrandKeyframe);
 }
 
+TEST_F(ServerNet, WhoWantsNoStreamIsHeardAndGetsNone) {
+  start();
+  for (int i = 0; i < 5; ++i) app_.publish_next();
+  RawClient client(server_->port());
+  ASSERT_TRUE(client.handshake());
+  Hello quiet = hello(Role::Controller);
+  quiet.gets_no_stream = true;
+  client.send(quiet);
+  ASSERT_TRUE(client.read_control<Welcome>().has_value());
+  const uint64_t asked = app_.keyframe_requests;
+  client.send(KeyframeRequest{});
+  client.send(ModeRequest{StreamMode::Frames});
+  // What would be media stands before the answer.
+  client.send(ControlCommand{Command::Pause});
+  for (bool is_answered = false; !is_answered;) {
+    app_.publish_next();
+    const test::Received received = client.read();
+    ASSERT_FALSE(received.is_end) << "closed with " << received.close_code;
+    ASSERT_EQ(received.opcode(), Opcode::Control);
+    const auto message = decode_server_message(received.bytes);
+    ASSERT_TRUE(message) << message.error().to_string();
+    is_answered = std::holds_alternative<Notice>(*message);
+  }
+  EXPECT_EQ(app_.keyframe_requests, asked) << "it costs the others nothing";
+}
+
 TEST_F(ServerNet, RolesReachTheirHandlersAndPingIsAnswered) {
   start();
   app_.publish_next();

@@ -11,10 +11,13 @@
 #include "server/scene/scene_content.h"
 #include "server/sim/solvers/direct_rod/direct_rod_style.h"
 #include "tests/property/direct_rod_fixture.h"
+#include "tests/support/some_strands.h"
 #include "tests/support/test_grid.h"
 
 namespace strandcast {
 namespace {
+
+using test::some_strands;
 
 class RodStyle : public DirectRod {
  protected:
@@ -272,23 +275,6 @@ class GroomLasts : public RodStyle {
   static constexpr double kStepS = 1.0 / 60.0;
   static constexpr double kOffM = 2e-3;
 
-  /// Every n-th strand, as many as asked for.
-  static Groom some_of(const Groom& groom, uint32_t strand_count) {
-    Groom some;
-    some.name = groom.name;
-    some.offset.push_back(0);
-    const uint32_t taken = std::min(strand_count, groom.strand_count());
-    for (uint32_t k = 0; k < taken; ++k) {
-      const auto s = static_cast<uint32_t>(uint64_t{k} * groom.strand_count() / taken);
-      for (uint32_t i = groom.offset[s]; i < groom.offset[s + 1]; ++i) {
-        some.rest_position_m.push_back(groom.rest_position_m[i]);
-        some.pinned.push_back(groom.pinned[i]);
-      }
-      some.offset.push_back(static_cast<uint32_t>(some.rest_position_m.size()));
-    }
-    return some;
-  }
-
   class Run {
    public:
     Run(GroomLasts& test, bool is_gpu, const Groom& groom, const SolverParameters& given)
@@ -457,12 +443,12 @@ TEST_F(GroomLasts, CurlsAndStubble) {
 
 TEST_F(GroomLasts, BuiltInHair) {
   const Groom groom = groom_of_scene(built_in_scene());
-  expect_lasting(true, some_of(groom, static_cast<uint32_t>(on_grid(24, 2000))));
+  expect_lasting(true, some_strands(groom, static_cast<uint32_t>(on_grid(24, 2000))));
 }
 
 // Held hair still swings: measured 0.91; the strands that are stiffened by themselves 0.76.
 TEST_F(GroomLasts, HeldStrandsSwingAlmostAsHairDoes) {
-  const double share = swing_share(true, some_of(groom_of_scene(built_in_scene()), 48));
+  const double share = swing_share(true, some_strands(groom_of_scene(built_in_scene()), 48));
   EXPECT_GE(share, 0.8);
   EXPECT_LE(share, 1.1);
   fmt::print("swing {:.2f} of that without style\n", share);
@@ -470,7 +456,7 @@ TEST_F(GroomLasts, HeldStrandsSwingAlmostAsHairDoes) {
 
 // Without what holds them they are lost: it is the stiffness that does it, not the test that cannot see.
 TEST_F(GroomLasts, WithoutStiffnessStylesAreLost) {
-  const Groom groom = some_of(groom_of_scene(built_in_scene()), 24);
+  const Groom groom = some_strands(groom_of_scene(built_in_scene()), 24);
   Run run(*this, true, groom, {{"sag_free", 1.0}, {"style_margin", 0.0}});
   run.rest(10.0);
   EXPECT_GT(run.lost_share(), 0.1);

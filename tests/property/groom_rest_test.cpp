@@ -1,4 +1,6 @@
 // Scenes as they ship, on an upright head in still air: hair stays as it was groomed.
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "common/scene/scene_file.h"
@@ -6,6 +8,7 @@
 #include "server/scene/step_builder.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/solver_fixture.h"
+#include "tests/support/some_strands.h"
 
 namespace strandcast {
 namespace {
@@ -68,6 +71,46 @@ TEST_F(GroomAtRest, BuiltInHair) {
   SceneDesc scene = built_in_scene();
   scene.solver.parameters.clear();  // the rows' defaults: the groomed shape carries all of the weight
   expect_rest(scene);
+}
+
+// Whoever lets the groomed shape carry the weight keeps it, not for a second only.
+TEST_F(GroomAtRest, EveryModelKeepsItsStyleForTwentySeconds) {
+  constexpr double kMostM = 2e-3;
+  constexpr double kRestS = 20.0;
+  constexpr uint32_t kStrands = 64;
+  const SceneDesc scene = built_in_scene();
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content) << content.error().to_string();
+  const Groom groom = test::some_strands(content->groom, kStrands);
+  int models = 0;
+  for (const SolverKind& kind : all_kinds()) {
+    const auto& known = kind.row->parameters;
+    const bool has_style =
+        std::ranges::any_of(known, [](const auto& info) { return info.name == "sag_free"; });
+    if (!kind.is_gpu || !has_style) continue;
+    ++models;
+    SCOPED_TRACE(kind.name());
+    auto solver = make(kind, groom, {{"sag_free", 1.0}});
+    StepBuilder builder(scene, content->colliders);
+    SceneFeatures still;
+    still.has_colliders = true;
+    const int steps = static_cast<int>(kRestS * scene.step_rate_hz);
+    for (int step = 1; step <= steps; ++step)
+      for (const StepInput& substep : builder.build(InputFrame{}, still, step / scene.step_rate_hz).substeps)
+        solver->substep(substep);
+    const SolverState state = read(*solver);
+    double sum_m2 = 0.0;
+    for (uint32_t s = 0; s < kStrands; ++s)
+      for (uint32_t i = 0; i < groom.vertex_count(s); ++i) {
+        const glm::vec3 off_m =
+            state.position_m[i * kStrands + s] - groom.rest_position_m[groom.offset[s] + i];
+        sum_m2 += glm::dot(off_m, off_m);
+      }
+    const double rms_m = std::sqrt(sum_m2 / static_cast<double>(groom.rest_position_m.size()));
+    EXPECT_LE(rms_m, kMostM);
+    RecordProperty(kind.row->name, fmt::format("{:.2e}", rms_m));
+  }
+  EXPECT_GE(models, 8);
 }
 
 // Rods find the shape that is the groom under gravity themselves.

@@ -67,6 +67,18 @@ TEST(LineBudget, LetsSoManyLinesThroughInASecondAndCountsTheOthers) {
   EXPECT_TRUE(lines.take(1000 * kMs)) << "the next second";
 }
 
+TEST(LineBudget, NoSecondHasMoreWhereverItBegins) {
+  LineBudget lines;
+  std::vector<int64_t> written_ns;
+  // Nothing for long, then all at once: at the end of one second of a clock and the begin of the next.
+  for (int64_t i = 0; i < 3000; ++i)
+    if (i % 1000 >= 900 || i % 1000 < 100)
+      if (lines.take(i * kMs)) written_ns.push_back(i * kMs);
+  ASSERT_GT(written_ns.size(), kMaxForeignLinesPerS);
+  for (size_t i = kMaxForeignLinesPerS; i < written_ns.size(); ++i)
+    EXPECT_GE(written_ns[i] - written_ns[i - kMaxForeignLinesPerS], 1000 * kMs);
+}
+
 TEST(NoticeList, TheOldestGiveWay) {
   NoticeList list;
   for (size_t i = 0; i < kMaxWaitingNotices + 3; ++i) list.add({false, std::to_string(i)});

@@ -115,6 +115,7 @@ class Viewing {
       : book(make_scene_view(scene_, scene_picture_size(scene_), PictureCodecs{0}), budget),
         viewers(scene_, book) {}
   Result<Viewers::Place> add(SessionId session, const Hello& hello, const std::string& peer = "10.0.0.1") {
+    subscriptions[session].begin(hello);
     return viewers.add(session, book.add({peer, hello.role == Role::Controller}), subscriptions[session],
                        hello);
   }
