@@ -11,7 +11,7 @@ usage: bash deploy/run.sh [options]
                        hair in several files: the option repeated, or FILE,FILE
   --motion FILE        head motion to feed: BVH                                 (default: built in)
   --motion-unit M      metres per unit of the BVH                               (default: from the body's height)
-  --motion-up y|z      up axis of the BVH                                       (default: y)
+  --motion-up y|z      up axis of the BVH                                       (default: guessed from the rest pose)
   --joint NAME         head joint of the BVH                                    (default: found by its name)
   --filter-glitches    take steps out of the BVH that are faster than any head moves
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)

@@ -35,9 +35,8 @@ void declare_feed(CLI::App& app, CommandLine& line) {
                  "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
-  app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->capture_default_str();
+  app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file (default: guessed from the rest pose)")
+      ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--joint", feed.motion_file.joint, "Head joint of the BVH file (default: found by name)");
   app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
                "Take steps out of the BVH file that are faster than any head moves");

@@ -196,6 +196,13 @@ std::vector<const Joint*> path_to(const Skeleton& skeleton, uint32_t joint_index
   return path;
 }
 
+/// Whether the head is along +Z from the hips with all rotations zero. What is not clear counts as +Y up.
+bool guess_z_up(const std::vector<const Joint*>& path) {
+  glm::dvec3 head(0.0);
+  for (size_t i = 1; i < path.size(); ++i) head += path[i]->offset;
+  return head.z > kUpClearly * std::abs(head.y);
+}
+
 /// Body height, file units: the bones from the hips down to the lowest point and up to the highest one, as
 /// long as they are; rest poses often spread the legs. 0 for a skeleton without extent.
 double body_height(const Skeleton& skeleton, bool is_z_up) {
@@ -335,16 +342,16 @@ bool begins_with_t_pose(const std::vector<Pose>& poses, double rest_share_first,
 }
 
 /// From the file's axes and units to world axes and metres.
-void to_world(std::vector<Pose>& poses, double unit_m, const BvhOptions& options) {
+void to_world(std::vector<Pose>& poses, double unit_m, bool is_z_up, bool recentre) {
   const double quarter_turn_rad = glm::radians(90.0);
   const glm::dquat world_from_file =
-      options.is_z_up ? glm::angleAxis(-quarter_turn_rad, kAxis[0]) : glm::dquat(1, 0, 0, 0);
+      is_z_up ? glm::angleAxis(-quarter_turn_rad, kAxis[0]) : glm::dquat(1, 0, 0, 0);
   for (Pose& pose : poses) {
     pose.position_m = world_from_file * (pose.position_m * unit_m);
     // On both sides: the file's rest pose is turned upright too, so that it becomes the identity.
     pose.rotation = glm::normalize(world_from_file * pose.rotation * glm::conjugate(world_from_file));
   }
-  if (!options.recentre) return;
+  if (!recentre) return;
   const glm::dvec3 start = poses.front().position_m * glm::dvec3(1, 0, 1);
   for (Pose& pose : poses) pose.position_m -= start;
 }
@@ -381,7 +388,10 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   if (options.skip_first_frame_if_t_pose &&
       begins_with_t_pose(clip.world_from_head, rest_share[0], rest_share[1]))
     clip.world_from_head.erase(clip.world_from_head.begin());
-  const double height = body_height(skeleton, options.is_z_up);
+  const bool is_z_up = options.is_z_up.value_or(guess_z_up(path));
+  if (is_z_up && !options.is_z_up)
+    clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
+  const double height = body_height(skeleton, is_z_up);
   const bool is_guessed = options.unit_m == 0.0;
   if (is_guessed && !(height > 0.0))
     return at(place, make_error(ErrorCode::BadInput,
@@ -390,7 +400,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     guess_unit(clip, height);
   else
     clip.file_unit_m = options.unit_m;
-  to_world(clip.world_from_head, clip.file_unit_m, options);
+  to_world(clip.world_from_head, clip.file_unit_m, is_z_up, options.recentre);
   return clip;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "common/base/result.h"
@@ -32,10 +33,14 @@ inline constexpr LengthUnit kClipUnits[] = {
 /// A guess this near to one of them means that one.
 inline constexpr double kUnitSnap = 0.25;
 
+/// The head of a resting body is so many times as far above the hips as it is beside them.
+inline constexpr double kUpClearly = 2.0;
+
 struct BvhOptions {
   double unit_m =
       0.0;  // metres per file unit; 0 = guessed: the one of kClipUnits that kAssumedBodyHeightM suggests
-  bool is_z_up = false;      // else +Y is up
+  std::optional<bool>
+      is_z_up{};             // else +Y is up; empty = guessed: +Z where the head is above the hips at rest
   std::string head_joint{};  // empty: "Head" or "head", with or without a prefix ending in ':' or '_'
   bool skip_first_frame_if_t_pose = true;
   bool recentre = true;  // subtract the first pose's horizontal position

@@ -17,6 +17,7 @@ struct MotionClip {
   std::vector<Pose> world_from_head;  // one per frame
   double file_unit_m = 1.0;           // metres per unit of the file it came from
   std::string unit_reason;            // why this unit, when nobody stated it; else empty
+  std::string up_reason;              // likewise why not +Y, of a file with another up axis
 
   /// Time of the last pose, s; 0 for an empty clip.
   double duration_s() const;

@@ -17,17 +17,18 @@ std::string glitch_note(const MotionGlitches& glitches) {
 }  // namespace
 
 Result<MotionFile> load_motion_file(const std::filesystem::path& path, const MotionFileOptions& options) {
-  if (options.up != "y" && options.up != "z")
+  if (!options.up.empty() && options.up != "y" && options.up != "z")
     return make_error(ErrorCode::BadInput, "unknown up axis '{}' (known: y, z)", options.up);
   BvhOptions bvh;
   bvh.unit_m = options.unit_m;
-  bvh.is_z_up = options.up == "z";
+  if (!options.up.empty()) bvh.is_z_up = options.up == "z";
   bvh.head_joint = options.joint;
   MotionFile file;
   ASSIGN_OR_RETURN(file.clip, load_bvh(path, bvh));
   const auto note = [&](const std::string& sentence) {
     file.notes.push_back(fmt::format("{}: {}", path.string(), sentence));
   };
+  if (!file.clip.up_reason.empty()) note(file.clip.up_reason + " (--up states another)");
   if (!file.clip.unit_reason.empty()) note(file.clip.unit_reason + " (--unit states another)");
   const MotionGlitches glitches = find_glitches(file.clip);
   if (glitches.step_count == 0) return file;

@@ -14,7 +14,7 @@ namespace strandcast {
 /// What programs call their option for the same.
 struct MotionFileOptions {
   double unit_m = 0.0;                 // --unit; 0 = guessed
-  std::string up = "y";                // --up: y or z
+  std::string up;                      // --up: y or z; empty = guessed
   std::string joint;                   // --joint; empty = found by name
   bool is_filtering_glitches = false;  // --filter-glitches
 };

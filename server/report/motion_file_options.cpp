@@ -10,9 +10,8 @@ void add_motion_file_options(CLI::App& command, MotionFileOptions& options) {
       .add_option("--unit", options.unit_m, "metres per unit of the .bvh file; 0 = guessed from the bones")
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
-  command.add_option("--up", options.up, "up axis of the .bvh file")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->capture_default_str();
+  command.add_option("--up", options.up, "up axis of the .bvh file; default: guessed from the rest pose")
+      ->check(CLI::IsMember({"y", "z"}));
   command.add_option("--joint", options.joint, "head joint of the .bvh file; default: found by name");
   command.add_flag("--filter-glitches", options.is_filtering_glitches,
                    "take steps out of the .bvh file that are faster than any head moves");

@@ -8,7 +8,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   FuzzInput input(data, size);
   const auto settings = input.take<uint8_t>();
   BvhOptions options;
-  options.is_z_up = (settings & 1) != 0;
+  if ((settings & 16) == 0) options.is_z_up = (settings & 1) != 0;
   options.skip_first_frame_if_t_pose = (settings & 2) != 0;
   options.recentre = (settings & 4) != 0;
   if ((settings & 8) != 0) options.unit_m = 0.01;

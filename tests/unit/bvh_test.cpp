@@ -455,6 +455,33 @@ TEST(BvhRealFiles, GuessedUnitsAreTheKnownOnes) {
   }
 }
 
+TEST(Bvh, TheUpAxisIsWhereTheHeadIsAboveTheHipsAtRest) {
+  const auto up_of = [](const std::string& head_offset, std::optional<bool> stated = {}) {
+    std::string text = kSmall;
+    constexpr std::string_view kHeadOffset = "OFFSET 0 1 .5";
+    text.replace(text.find(kHeadOffset), kHeadOffset.size(), "OFFSET " + head_offset);
+    BvhOptions options = kPlain;
+    options.is_z_up = stated;
+    return parsed(text + "0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 0\n", options).up_reason;
+  };
+  EXPECT_EQ(up_of("0 10 1"), "");
+  EXPECT_THAT(up_of("0 1 20"), HasSubstr("+Z is taken as up"));
+  EXPECT_EQ(up_of("0 10 12"), "") << "a bent body";
+  EXPECT_EQ(up_of("0 1 20", false), "") << "stated";
+  EXPECT_EQ(up_of("0 1 20", true), "") << "stated";
+}
+
+TEST(BvhRealFiles, GuessedUpAxesAreTheKnownOnes) {
+  REQUIRE_SHARED(mocap_path(kRealFiles[0].name));
+  for (const RealFile& file : kRealFiles) {
+    const auto guessed = load_bvh(mocap_path(file.name), {.unit_m = file.unit_m});
+    const auto stated = load_bvh(mocap_path(file.name), {.unit_m = file.unit_m, .is_z_up = file.is_z_up});
+    ASSERT_TRUE(guessed && stated);
+    EXPECT_EQ(guessed->world_from_head, stated->world_from_head) << file.name;
+    EXPECT_EQ(!guessed->up_reason.empty(), file.is_z_up) << file.name;
+  }
+}
+
 TEST(BvhRealFiles, HaveNoStepsThatNoHeadMakes) {
   REQUIRE_SHARED(mocap_path(kRealFiles[0].name));
   for (const RealFile& file : kRealFiles) {
