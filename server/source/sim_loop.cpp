@@ -264,6 +264,7 @@ Notice SimLoop::change(const std::string& assignment) {
   if (is_other_solver || !needs_same_solver(features, solver_features_))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
+  if (scene->substeps != config_.scene.substeps) stages_->plan_step(scene->substeps, explain(*scene, facts_));
   const std::string left_out = left_out_note(config_.scene.solver, scene->solver);
   config_.scene = *scene;
   builder_->change(*scene, colliders_of(*scene, config_.content->head_colliders));
@@ -309,7 +310,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
-  stages_->plan_step(explain(scene, facts_));
+  stages_->plan_step(scene.substeps, explain(scene, facts_));
   stages_->set_solver_bytes(solver_->memory_bytes());
   ++solver_builds_;
   // The same model, built for other facts, says nothing new.

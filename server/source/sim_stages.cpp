@@ -61,10 +61,11 @@ SimStages::SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& 
     turn.snapshot = turn.publisher.quantise(turn.publish);
   });
   CHECK(publish_.plan({state_.get()}, {&snapshot_}).ok());
-  plan_step(reasons);
+  plan_step(sizes.substeps, reasons);
 }
 
-void SimStages::plan_step(const std::vector<FeatureReason>& reasons) {
+void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& reasons) {
+  sizes_.substeps = substeps;
   step_ = std::make_unique<gl::PassList<StageTurn>>();
   const auto resource = [this](const char* name, uint64_t size_bytes) {
     return &step_->keep(std::make_unique<gl::Resource>(name, size_bytes));

@@ -54,8 +54,8 @@ class SimStages {
  public:
   /// `reasons` are explain()'s for the facts that decide.
   SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& reasons);
-  /// Other facts, or another solver: the step is planned and timed anew.
-  void plan_step(const std::vector<FeatureReason>& reasons);
+  /// Other facts, another solver or other substeps: the step is planned and timed anew.
+  void plan_step(uint32_t substeps, const std::vector<FeatureReason>& reasons);
   /// What the solver really keeps.
   void set_solver_bytes(uint64_t size_bytes) { state_->bytes = size_bytes; }
   /// Whether anybody reads what is published; only for the report, the loop decides when to publish.

@@ -403,7 +403,15 @@ TEST_F(LiveServer, SolverAndWindChangeWhileRunning) {
     ASSERT_NE(snapshot, nullptr) << "states keep coming with " << row.name;
   }
   EXPECT_FALSE(controller.ask(SetParameter{"wind.mean_mps.x=3"}).is_error);
-  EXPECT_FALSE(controller.ask(SetParameter{"substeps=2"}).is_error);
+  const auto motion_bytes = [&] {
+    for (const gl::PassReport& pass : server_->counters().sim.passes)
+      if (pass.name == "scene/motion") return pass.size_bytes;
+    return uint64_t{0};
+  };
+  const uint64_t before = motion_bytes() / server_->counters().sim.substeps;
+  ASSERT_GT(before, 0u);
+  EXPECT_FALSE(controller.ask(SetParameter{"substeps=5"}).is_error);
+  EXPECT_EQ(motion_bytes(), 5 * before) << "what is printed is what runs";
   EXPECT_EQ(server_->counters().sim.quarantined, 0u);
 }
 

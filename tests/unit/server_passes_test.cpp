@@ -181,7 +181,7 @@ TEST(SimStages, WhatTheListSaysRanAndNothingElse) {
     EXPECT_EQ(pass.fate == PassFate::NotRequested, is_off) << pass.name;
   }
   // A wind stream connects.
-  world.stages.plan_step(explain(world.scene, {.has_wind_stream = true}));
+  world.stages.plan_step(world.scene.substeps, explain(world.scene, {.has_wind_stream = true}));
   EXPECT_THAT(kept(world.stages.report()),
               ElementsAre("scene/motion", "scene/wind", "sim/step", "publish/read", "publish/quantise"));
 }
