@@ -199,6 +199,17 @@ TEST(SceneFile, OverridesReplaceWhatTheFileSays) {
   EXPECT_FALSE(scene->has_auto_collider);
 }
 
+TEST(SceneFile, OfTwoOverridesOfOneParameterTheLastCounts) {
+  const auto scene = parse_scene(
+      "solver { name: 'dftl' parameters { key: 'damping' value: 0.5 } parameters { key: 'sag_free' value: 1 "
+      "} }",
+      "s",
+      {"solver.parameters.damping=0.25", "solver.parameters.sag_free=0.5",
+       "solver.parameters.damping=0.125"});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  EXPECT_EQ(scene->solver.parameters, (std::map<std::string, double>{{"damping", 0.125}, {"sag_free", 0.5}}));
+}
+
 TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_EQ(error_of("", {"stream.bound=1"}),
             "--set stream.bound=1: stream has no field \"bound\" (known: codec, bound_m, frame_width, "
