@@ -5,6 +5,8 @@
 namespace strandcast {
 namespace {
 
+constexpr double kFreeFollicleDeg = 180.0;
+
 // Facts carry their cause, so that analyse() and explain() cannot disagree.
 Fact decide_wind(const SceneDesc& scene, const RuntimeFacts& facts) {
   if (facts.has_wind_stream) return {true, "a wind stream is connected"};
@@ -25,6 +27,11 @@ Fact decide_colliders(const SceneDesc& scene, const RuntimeFacts&) {
   if (!scene.colliders.empty()) return {true, "the scene lists colliders"};
   if (scene.has_auto_collider) return {true, "has_auto_collider makes the head as it is drawn collide"};
   return {false, "the scene lists no colliders and has_auto_collider is false"};
+}
+
+Fact decide_follicle_limit(const SceneDesc& scene, const RuntimeFacts&) {
+  if (scene.follicle_limit_deg < kFreeFollicleDeg) return {true, "follicle_limit_deg is below 180"};
+  return {false, "follicle_limit_deg is 180: roots are free"};
 }
 
 Fact decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
@@ -63,6 +70,7 @@ constexpr std::array kFacts{
     FactRow{"has_wind", &SceneFeatures::has_wind, decide_wind},
     FactRow{"has_turbulence", &SceneFeatures::has_turbulence, decide_turbulence},
     FactRow{"has_colliders", &SceneFeatures::has_colliders, decide_colliders},
+    FactRow{"has_follicle_limit", &SceneFeatures::has_follicle_limit, decide_follicle_limit},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},
     FactRow{"has_frame_viewers", &SceneFeatures::has_frame_viewers, decide_frame_viewers},
 };

@@ -132,6 +132,7 @@ struct SceneDesc {
   double step_rate_hz = 60.0;  // 10 .. 1000
   uint32_t substeps = 1;       // 1 .. 64
   glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
+  double follicle_limit_deg = 20.0;  // most that a root leans from its groomed direction, 1 .. 180 (= free)
   std::vector<SphereCollider> colliders;
   bool has_auto_collider = true;  // the head as it is drawn, when `colliders` is empty
   WindDesc wind;

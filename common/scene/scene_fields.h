@@ -40,6 +40,7 @@ inline constexpr Range kSolverParameter{-std::numeric_limits<double>::max(),
 inline constexpr Range kStepRate{10.0, 1000.0, "Hz"};
 inline constexpr Range kSubsteps{1, 64, ""};
 inline constexpr Range kGravity{-1000.0, 1000.0, "m/s^2"};
+inline constexpr Range kFollicleLimit{1.0, 180.0, "degrees"};  // 180 = free
 inline constexpr Range kColliderCenter{-kMaxGroomExtentM, kMaxGroomExtentM, "m"};
 inline constexpr Range kColliderRadius{1e-4, 10.0, "m"};
 inline constexpr Range kWindSpeed{-100.0, 100.0, "m/s"};
@@ -175,6 +176,7 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
   v.group("look", [&] { visit_look(v, scene.look); });
   v.group("camera", [&] { visit_camera(v, scene.camera); });
   v.group("stream", [&] { visit_stream(v, scene.stream); });
+  v.number("follicle_limit_deg", scene.follicle_limit_deg, kFollicleLimit);
 }
 
 }  // namespace strandcast::scene_fields

@@ -69,6 +69,7 @@ SceneDesc scene_for(const RunSetting& setting) {
   scene.wind.mean_mps = kWindMps;
   scene.wind.gust_intensity = kGustIntensity;
   scene.has_auto_collider = false;
+  scene.follicle_limit_deg = 180.0;  // models by themselves
   return scene;
 }
 

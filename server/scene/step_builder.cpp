@@ -111,6 +111,11 @@ void StepBuilder::add_colliders() {
           {glm::vec3(substep.world_from_head_rotation * glm::dvec3(collider.center_m)), collider.radius_m});
 }
 
+void StepBuilder::add_follicle_limit() {
+  for (StepInput& substep : step_.substeps)
+    substep.follicle_limit_rad = glm::radians(scene_.follicle_limit_deg);
+}
+
 glm::dvec3 StepBuilder::head_velocity_mps() const {
   if (step_.substeps.empty()) return glm::dvec3(0.0);
   const StepInput& last = step_.substeps.back();
@@ -123,6 +128,7 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
   if (features.has_wind) add_wind();
   if (features.has_turbulence) add_gusts();
   add_colliders();
+  if (features.has_follicle_limit) add_follicle_limit();
   return step_;
 }
 
@@ -156,6 +162,7 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
     substep.wind_mps = glm::dvec3(0.0);
     substep.gusts.clear();
     substep.colliders.clear();
+    substep.follicle_limit_rad = kFreeFollicleRad;
     end_time_s_[i] = end_time_s - step_s * (1.0 - blend);
     head_position_m_[i] = pose.position_m;
     previous = pose;

@@ -43,10 +43,11 @@ class StepBuilder {
   void add_wind();
   void add_gusts();
   void add_colliders();
+  void add_follicle_limit();
   /// Valid until the next begin().
   const SceneStep& step() const { return step_; }
 
-  /// All of that; wind and gusts for these facts.
+  /// All of that; wind, gusts and the limit of the roots for these facts.
   const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
 
   const Pose& world_from_head() const { return world_from_head_; }

@@ -16,15 +16,32 @@ GpuSolver::GpuSolver(const GpuSolverContext& context, const StrandParameters& pa
   shaders_ = *context.shaders;
 }
 
+namespace {
+
+// The next kernel fetches what this one stored; read() copies it.
+void show_strands() {
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
+                  GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
+}  // namespace
+
+Status GpuSolver::prepare_all() {
+  RETURN_IF_ERROR(prepare());
+  if (!features_.has_follicle_limit) return {};
+  ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(shaders_, features_, layout(), carried()));
+  return {};
+}
+
 Status GpuSolver::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
   RETURN_IF_ERROR(strands_->load(groom, world_from_head_rotation));
-  RETURN_IF_ERROR(prepare());
+  RETURN_IF_ERROR(prepare_all());
   begin();
   return {};
 }
 
 Status GpuSolver::follow() {
-  RETURN_IF_ERROR(prepare());
+  RETURN_IF_ERROR(prepare_all());
   strands_->forget_model();
   begin();
   return {};
@@ -39,9 +56,11 @@ void GpuSolver::substep(const StepInput& input) {
   const gl::Program& program = programs().fitting(input.colliders.size());
   program.use();
   run(program);
-  // The next substep fetches what this one stored; read() copies it.
-  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT |
-                  GL_BUFFER_UPDATE_BARRIER_BIT);
+  show_strands();
+  if (follicle_limit_ && FollicleLimit::holds(input, layout())) {
+    follicle_limit_->run(layout(), carried());
+    show_strands();
+  }
   strands_->advance(input);
 }
 

@@ -4,10 +4,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/gl/objects.h"
+#include "server/sim/follicle_limit.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/step_block.h"
 #include "server/sim/strand_programs.h"
@@ -39,6 +41,9 @@ class GpuSolver : public Solver {
   virtual void adapt(const StepInput&) {}
   /// Strands that somebody else moved start without a history.
   virtual void forget(const std::vector<bool>&) {}
+  /// What is kept beside the state of where vertices were and how segments are turned, to go along when a
+  /// substep's strands are moved once more.
+  virtual CarriedPlanes carried() const { return {}; }
   /// What is kept beside the state turns with it.
   virtual void turn_memory(const glm::dquat&) {}
   virtual const StrandPrograms& programs() const = 0;
@@ -51,11 +56,14 @@ class GpuSolver : public Solver {
   const gl::ShaderLibrary& shaders() const { return shaders_; }
 
  private:
+  Status prepare_all();
+
   std::shared_ptr<StrandState> strands_;
   StrandParameters parameters_;
   SceneFeatures features_;
   gl::ShaderLibrary shaders_;
-  gl::Buffer step_;  // StepBlock
+  std::optional<FollicleLimit> follicle_limit_;  // where the scene has one
+  gl::Buffer step_;                              // StepBlock
 };
 
 }  // namespace strandcast

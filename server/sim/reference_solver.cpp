@@ -1,6 +1,7 @@
 #include "server/sim/reference_solver.h"
 
 #include "common/base/check.h"
+#include "server/sim/reference_follicle.h"
 
 namespace strandcast {
 namespace {
@@ -40,8 +41,28 @@ void ReferenceSolver::substep(const StepInput& input) {
   for (uint32_t s = 0; s < layout_.strand_count; ++s)
     step_strand(step, s, std::span(position_m_).subspan(s * n, n),
                 std::span(velocity_mps_).subspan(s * n, n));
+  if (has_follicle_limit(input)) hold_roots(step);
   head_.advance(input);
   is_at_rest_ = false;
+}
+
+// Where a tip is held too, lengths could not be kept.
+void ReferenceSolver::hold_roots(const ReferenceStep& step) {
+  const uint32_t first = layout_.pinned_root_count;
+  const size_t n = layout_.vertex_count;
+  if (layout_.pinned_tail_count > 0 || first >= n) return;
+  for (uint32_t s = 0; s < layout_.strand_count; ++s) {
+    ReferenceRoot root;
+    root.groomed = step.rotation * (glm::dvec3(layout_.rest[layout_.index(first, s)]) -
+                                    glm::dvec3(layout_.rest[layout_.index(first - 1, s)]));
+    root.first = first;
+    root.position_m = std::span(position_m_).subspan(s * n, n);
+    root.velocity_mps = std::span(velocity_mps_).subspan(s * n, n);
+    const glm::dvec3& end = root.position_m[first];
+    root.follicle_mps = step.head_velocity_mps + (end - glm::conjugate(step.carry) * end) / step.h_s;
+    unheld_m_.assign(root.position_m.begin(), root.position_m.end());
+    if (hold_root(*step.input, root)) go_along(s, unheld_m_);
+  }
 }
 
 void ReferenceSolver::read(SolverState& state) {

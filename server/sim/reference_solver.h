@@ -50,6 +50,9 @@ class ReferenceSolver : public Solver {
   virtual void on_step(const ReferenceStep&) {}
   /// The strand was put somewhere else: what is kept of its past goes.
   virtual void forget(uint32_t /*strand_index*/) {}
+  /// After its substep the strand was moved from here to position_m(): what is kept of its way and of its
+  /// segments' directions goes along.
+  virtual void go_along(uint32_t /*strand_index*/, std::span<const glm::dvec3> /*before_m*/) {}
   /// What is kept beside the state turns with it.
   virtual void turn_memory(const glm::dquat&) {}
   virtual uint64_t model_bytes() const { return 0; }
@@ -63,6 +66,8 @@ class ReferenceSolver : public Solver {
   bool is_at_rest() const { return is_at_rest_; }
 
  private:
+  void hold_roots(const ReferenceStep& step);
+
   uint32_t most_vertices_;
   StrandLayout layout_;
   HeadPath head_;
@@ -70,6 +75,7 @@ class ReferenceSolver : public Solver {
   // (strand_count x vertex_count)
   std::vector<glm::dvec3> position_m_;
   std::vector<glm::dvec3> velocity_mps_;
+  std::vector<glm::dvec3> unheld_m_;  // of the strand in progress
 };
 
 }  // namespace strandcast

@@ -10,6 +10,7 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <map>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ struct GustWave {
 };
 inline constexpr uint32_t kMaxGustWaves = 8;
 
+/// No angle of a root is larger.
+inline constexpr double kFreeFollicleRad = std::numbers::pi;
+
 /// Everything one substep needs, at its end time.
 struct StepInput {
   double h_s = 1.0 / 60.0;                                  // substep
@@ -38,8 +42,10 @@ struct StepInput {
   /// Gravity under which the groom has its shape, in head space: what a solver with a sag-free groom lets the
   /// pull to the groomed shape carry. Zero: the groom is the shape without gravity.
   glm::dvec3 groom_gravity_in_head_mps2{0.0};
-  glm::dvec3 wind_mps{0.0};               // mean wind at the head, world
-  std::vector<GustWave> gusts;            // at most kMaxGustWaves; x is relative to the head joint
+  glm::dvec3 wind_mps{0.0};     // mean wind at the head, world
+  std::vector<GustWave> gusts;  // at most kMaxGustWaves; x is relative to the head joint
+  /// Most that the first free segment leans from its groomed direction, turned with the head; pi = free.
+  double follicle_limit_rad = kFreeFollicleRad;
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
 };
 

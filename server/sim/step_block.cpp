@@ -1,6 +1,7 @@
 #include "server/sim/step_block.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace strandcast {
 namespace {
@@ -39,6 +40,8 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
                                        1.0 - parameters.thrust_share, parameters.thickness_spread));
   block.wind = pack(relative_wind, 0.0);
   block.step_index = head.step_index;
+  block.follicle_cosine = static_cast<float>(std::cos(input.follicle_limit_rad));
+  block.follicle_sine = static_cast<float>(std::sin(input.follicle_limit_rad));
   block.previous_turn = block_columns(head.turn_per_s);
   block.shape = {layout.strand_count, layout.vertex_count, layout.pinned_root_count, layout.tail_begin()};
   const size_t wave_count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);

@@ -22,7 +22,9 @@ struct StepBlock {
   glm::vec4 contact;
   glm::uvec4 shape;
   uint32_t step_index;
-  std::array<uint32_t, 3> unused;
+  float follicle_cosine;
+  float follicle_sine;
+  uint32_t unused;
   std::array<glm::vec4, 3> previous_turn;
   glm::vec4 wind;
   std::array<glm::vec4, shader::kMaxGustWaves> gust_amplitude;

@@ -35,6 +35,11 @@ struct StrandLayout {
 /// Vertices per strand of a reference that no GPU has to follow: converged solutions of reports.
 inline constexpr uint32_t kMaxReferenceVertexCount = 256;
 
+/// Whether roots are held in this substep; no number, and no angle, is no limit.
+inline bool has_follicle_limit(const StepInput& input) {
+  return input.follicle_limit_rad >= 0.0 && input.follicle_limit_rad < kFreeFollicleRad;
+}
+
 /// BadInput unless all strands have the same vertex count (2..most_vertices) and the same pinned vertices: a
 /// run at the root, optionally a run at the tip, nothing between.
 Result<StrandLayout> make_strand_layout(const Groom& groom, uint32_t most_vertices = kMaxVertexCount);

@@ -10,9 +10,15 @@
 namespace strandcast {
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {
-      "solver", "substeps",       "gravity_mps2",         "colliders", "has_auto_collider",
-      "wind",   "stream.bound_m", "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",
+                                                   "substeps",
+                                                   "gravity_mps2",
+                                                   "follicle_limit_deg",
+                                                   "colliders",
+                                                   "has_auto_collider",
+                                                   "wind",
+                                                   "stream.bound_m",
+                                                   "stream.strand_rate_hz"};
   return kFields;
 }
 

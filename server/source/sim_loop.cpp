@@ -22,7 +22,7 @@ constexpr int64_t kStatsNs = 250'000'000;  // when steps take long
 /// Whether a solver built for one set of facts serves another: only what it compiles for counts.
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
   return a.has_wind == b.has_wind && a.has_turbulence == b.has_turbulence &&
-         a.has_colliders == b.has_colliders;
+         a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit;
 }
 
 double median_ms(const gl::PassReports& passes, std::string_view name) {

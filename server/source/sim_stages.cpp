@@ -75,6 +75,7 @@ void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& r
   const gl::Resource* gusts = resource("gusts", sizes_.substeps * kMaxGustWaves * sizeof(GustWave));
   const gl::Resource* colliders =
       resource("colliders", sizes_.substeps * sizes_.collider_count * sizeof(SphereCollider));
+  const gl::Resource* limits = resource("follicle limits", sizes_.substeps * sizeof(double));
   gl::Resources read_by_solver = {motion};
   const auto add = [&](const char* name, const gl::Resource* written, const FeatureReason& reason,
                        Stage::Work work) {
@@ -90,6 +91,8 @@ void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& r
       [](StageTurn& turn) { turn.builder.add_gusts(); });
   add("scene/colliders", colliders, fact(reasons, "has_colliders"),
       [](StageTurn& turn) { turn.builder.add_colliders(); });
+  add("scene/follicle_limit", limits, fact(reasons, "has_follicle_limit"),
+      [](StageTurn& turn) { turn.builder.add_follicle_limit(); });
   step_->add(
       std::make_unique<Stage>(gl::PassDeclaration{"sim/step", read_by_solver, {state_.get()}, true, {}},
                               gl::PassClock::Device, run_substeps));

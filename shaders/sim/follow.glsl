@@ -1,13 +1,9 @@
 // Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Document 003,
 // sections 2.1.4 and 4.2.3.
 #pragma variant HAS_TURBULENCE 0 1
-#pragma variant COLLIDERS 0 1 4 16
 #pragma variant HAS_PINNED_TAIL 0 1
 #include "lib/hash.glsl"
-#include "sim/step.glsl"
-
-// Times a vertex inside several colliders is pushed, out of the deepest first.
-const int kPushRounds = COLLIDERS > 1 ? 2 : 1;
+#include "sim/collider.glsl"
 
 struct Vertex {
   vec3 target;     // groomed shape, turned with the head
@@ -101,26 +97,6 @@ Vertex predict_from(uint at, vec3 stored, vec3 stored_velocity) {
   return predicted_from(vertex_from(at, stored, texelFetch(u_position, int(at)).w, stored_velocity));
 }
 
-// The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at
-// once, by the law of cosines; the nearest end that can be had when there is none. `direction` is the
-// segment's now.
-vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, float radius) {
-  const vec3 to_center = center - start;
-  const float squared = dot(to_center, to_center);
-  const float inverse = inversesqrt(max(squared, kTinySquared));
-  const vec3 axis = to_center * inverse;
-  const float along = (segment * segment + squared - radius * radius) * inverse;
-  const float cosine = clamp(along / max(2.0 * segment, kTinySquared), -1.0, 1.0);
-  vec3 side = direction - axis * dot(direction, axis);
-  // Straight at the centre: any side will do.
-  const vec3 other = abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
-  side = dot(side, side) > 1e-12 ? side : other;
-  side -= axis * dot(side, axis);  // once more: a short side is made of roundings along the axis
-  const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
-  const vec3 end = start + segment * (cosine * axis + sine * side);
-  return squared > kTinySquared ? end : start + segment * direction;
-}
-
 // Coulomb friction in displacements: sliding over the collider, which turns rigidly with the head, is undone
 // up to the friction coefficient times the depth that the collider has to push back.
 vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
@@ -133,23 +109,6 @@ vec3 held_by_friction(vec3 old, vec3 end, vec4 sphere) {
   const float most = u_step.contact.x * (sphere.w - squared * inverse);
   return end - sliding * min(1.0, most * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
 }
-
-#if COLLIDERS >= 1
-// The sphere that a point is deepest inside of, by r^2 - d^2; its radius is 0 when the point is in none.
-vec4 deepest_collider(vec3 point) {
-  vec4 deepest = vec4(0.0);
-  float most = 0.0;
-  // Constant count and indices: uniform loads stay scalar on llvmpipe.
-  for (uint i = 0u; i < uint(COLLIDERS); ++i) {
-    const vec4 sphere = u_step.collider[i];
-    const vec3 outward = point - sphere.xyz;
-    const float inside = sphere.w * sphere.w - dot(outward, outward);
-    deepest = inside > most ? sphere : deepest;
-    most = max(inside, most);
-  }
-  return deepest;
-}
-#endif
 
 // The end of a vertex's segment: as near to its prediction as the segment's length from `start`, the
 // colliders and, with a pinned tail, the distance `reach` to `anchor` allow (exactly there for the last free

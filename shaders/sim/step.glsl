@@ -14,6 +14,8 @@ layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 contact;             // friction, air drag 1/s, share of thrusts that is not kept, thickness spread
   uvec4 shape;              // strands, vertices of each, pinned at the root, first vertex of the pinned tail
   uint step_index;          // substeps since loading
+  float follicle_cosine;    // of the most that a root leans from its groomed direction
+  float follicle_sine;
   vec4 previous_turn[3];    // columns: velocity of a point by the head's turn in the step before, 1/s; w unused
   vec4 wind;                // mean wind relative to the head joint, m/s; w unused
   vec4 gust_amplitude[kMaxGustWaves];  // m/s; w = phase, rad

@@ -8,6 +8,7 @@ namespace {
 TEST(Features, EmptySceneNeedsNothing) {
   SceneDesc scene;
   scene.has_auto_collider = false;
+  scene.follicle_limit_deg = 180.0;
   EXPECT_EQ(analyse(scene, {}), SceneFeatures{});
 }
 
@@ -29,6 +30,12 @@ TEST(Features, EachFactFollowsItsOwnCause) {
       << "a stream replaces the scene's wind";
   scene.wind = {};
   EXPECT_TRUE(analyse(scene, {.has_wind_stream = true}).has_wind);
+
+  EXPECT_TRUE(analyse(scene, {}).has_follicle_limit);
+  scene.follicle_limit_deg = 179.0;
+  EXPECT_TRUE(analyse(scene, {}).has_follicle_limit);
+  scene.follicle_limit_deg = 180.0;
+  EXPECT_FALSE(analyse(scene, {}).has_follicle_limit);
 
   EXPECT_TRUE(analyse(scene, {.strand_viewers = 1}).has_strand_viewers);
   EXPECT_FALSE(analyse(scene, {.strand_viewers = 1}).has_frame_viewers);
@@ -71,12 +78,14 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.colliders.resize(coin() ? 0 : 2);
     scene.wind.mean_mps.x = coin() ? 0.0f : 1.0f;
     scene.wind.gust_intensity = coin() ? 0.0f : 0.5f;
+    scene.follicle_limit_deg = coin() ? 180.0 : 20.0;
     const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u};
     const SceneFeatures features = analyse(scene, facts);
     SceneFeatures explained;
     const std::map<std::string, bool*> fact{{"has_wind", &explained.has_wind},
                                             {"has_turbulence", &explained.has_turbulence},
                                             {"has_colliders", &explained.has_colliders},
+                                            {"has_follicle_limit", &explained.has_follicle_limit},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
                                             {"has_frame_viewers", &explained.has_frame_viewers}};
     const auto reasons = explain(scene, facts);
@@ -93,6 +102,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
 TEST(Features, ReasonsDifferWithTheValue) {
   SceneDesc bare;
   bare.has_auto_collider = false;
+  bare.follicle_limit_deg = 180.0;
   SceneDesc full;
   full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1};
   const auto off = explain(bare, {});

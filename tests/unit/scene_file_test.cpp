@@ -72,6 +72,7 @@ SceneDesc unusual_scene() {
               .jpeg_quality = 33,
               .frame_rate_hz = 7.5,
               .strand_rate_hz = 30.0};
+  s.follicle_limit_deg = 33.5;
   return s;
 }
 
@@ -222,6 +223,9 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   EXPECT_THAT(error_of("", {"substeps="}), StartsWith("--set substeps=: "));
   EXPECT_THAT(error_of("", {"substeps=0"}), StartsWith("--set substeps=0: substeps is 0"));
   EXPECT_THAT(error_of("", {"substeps.x=0"}), HasSubstr("single value"));
+  for (const char* limit : {"0", "0.99", "180.5", "-20", "nan"})
+    EXPECT_THAT(error_of("", {std::string("follicle_limit_deg=") + limit}), HasSubstr("1 .. 180 degrees"))
+        << limit;
   EXPECT_THAT(error_of("", {"camera=3"}), HasSubstr("known: offset_m, target_m, fov_y_rad"));
   EXPECT_THAT(error_of("", {"camera={ fov_y_rad: 9 }"}),
               StartsWith("--set camera={ fov_y_rad: 9 }: camera.fov_y_rad"));

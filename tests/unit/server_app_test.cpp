@@ -34,6 +34,10 @@ TEST(SceneChange, ChangesLiveFieldsOnly) {
   const auto coarser = change_scene(scene, "stream.bound_m=0.0002");
   ASSERT_TRUE(coarser.ok()) << coarser.error().to_string();
   EXPECT_EQ(coarser->stream.bound_m, 0.0002f);
+  const auto freer = change_scene(scene, "follicle_limit_deg=180");
+  ASSERT_TRUE(freer) << freer.error().to_string();
+  EXPECT_EQ(freer->follicle_limit_deg, 180.0);
+  EXPECT_FALSE(change_scene(scene, "follicle_limit_deg=181"));
   const auto rarer = change_scene(scene, "stream.strand_rate_hz=20");
   ASSERT_TRUE(rarer.ok()) << rarer.error().to_string();
   EXPECT_EQ(rarer->stream.strand_rate_hz, 20.0);

@@ -36,6 +36,7 @@ SceneDesc bare_scene() {
   SceneDesc scene = full_scene();
   scene.wind = {};
   scene.has_auto_collider = false;
+  scene.follicle_limit_deg = 180.0;
   return scene;
 }
 
@@ -164,6 +165,7 @@ TEST(SimStages, AStepRunInStagesIsTheStepThatTheFactsAskForBitForBit) {
         EXPECT_EQ(ran.gusts[g].phase_rad, expected[i].gusts[g].phase_rad);
       ASSERT_EQ(ran.colliders.size(), expected[i].colliders.size());
       EXPECT_EQ(!ran.colliders.empty(), features.has_colliders);
+      EXPECT_EQ(ran.follicle_limit_rad < kFreeFollicleRad, features.has_follicle_limit);
       for (size_t c = 0; c < ran.colliders.size(); ++c)
         EXPECT_EQ(ran.colliders[c].center_m, expected[i].colliders[c].center_m);
     }

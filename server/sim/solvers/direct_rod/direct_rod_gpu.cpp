@@ -113,6 +113,9 @@ class DirectRodGpu final : public GpuSolver {
     if (variant_.has_twist && is_any) untwist(is_changed);
   }
 
+  // Its history is of the way that strands really went; velocity changes are without impulses.
+  CarriedPlanes carried() const override { return {&displacement_, variant_.has_twist ? &axis_ : nullptr}; }
+
   void turn_memory(const glm::dquat& turn) override {
     turn_plane(displacement_, turn);
     turn_plane(velocity_change_, turn);

@@ -495,6 +495,19 @@ class DirectRodReference final : public ReferenceSolver {
     set_untwisted(strand, layout().pinned_root_count, head().world_from_head_rotation);
   }
 
+  // The history is of the way that the strand really went; velocity changes are without impulses.
+  void go_along(uint32_t strand_index, std::span<const glm::dvec3> before_m) override {
+    const std::span<const glm::dvec3> now_m = position_m(strand_index);
+    for (uint32_t i = layout().pinned_root_count; i < layout().vertex_count; ++i) {
+      RodVertex& vertex = strands_[strand_index].vertex[i];
+      vertex.displacement_m += now_m[i] - before_m[i];
+      const glm::dvec3 from = before_m[i] - before_m[i - 1];
+      const glm::dvec3 to = now_m[i] - now_m[i - 1];
+      if (std::min(glm::length(from), glm::length(to)) > kTinyLength)
+        vertex.axis = carried_axis(vertex.axis, glm::normalize(from), glm::normalize(to));
+    }
+  }
+
   void turn_memory(const glm::dquat& turn) override {
     for (RodStrand& strand : strands_) {
       for (RodVertex& vertex : strand.vertex) {

@@ -1,0 +1,151 @@
+// Follicles hold roots: after a substep of any model, the first free segment of a strand is turned back into the
+// cone about its groomed direction, and what hangs on it goes along, so that no segment but the first changes its
+// direction and none its length. The segment's end loses the velocity that drives it out of the cone, seen from the
+// follicle; the vertices beyond are told by the strand's own tensions in the next substep. (Velocities that went along
+// with the shift would make the strand weightless where the cone carries it: rods then swing for ever.) Nothing gains
+// speed. One invocation per strand; strands inside the cone are read only.
+//
+// MEMORY: what else of a model goes along. 0 = nothing, 1 = the way of every vertex in the last substep, 2 = that and
+// the material axis of every segment.
+#pragma variant MEMORY 0 1 2
+#include "sim/collider.glsl"
+
+layout(local_size_x = kStrandLocalSize) in;
+
+#if MEMORY >= 1
+layout(binding = kUnitDisplacement) uniform samplerBuffer u_way;  // world, m
+layout(std430, binding = kBindingDisplacement) writeonly restrict buffer WayBlock {
+  vec4 value[];
+} b_way;
+#endif
+#if MEMORY == 2
+layout(binding = kUnitRodAxis) uniform samplerBuffer u_axis;  // world
+layout(std430, binding = kBindingRodAxis) writeonly restrict buffer AxisBlock { vec4 value[]; } b_axis;
+#endif
+
+const float kFoldedBack = 1e-6;
+
+vec3 any_side(vec3 axis) {
+  return abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
+}
+
+// Cosine and sine of the angle from `axis` towards `side` at which a segment may stand: the limit, or less where a
+// collider is in the way that the groomed direction itself is outside of. In the plane of both, a collider takes
+// an arc of directions; the end of the arc next to the axis is where the law of cosines puts the segment's end on
+// the sphere.
+vec2 held_angle(vec3 start, vec3 axis, vec3 side, float segment) {
+  vec2 angle = vec2(u_step.follicle_cosine, u_step.follicle_sine);
+#if COLLIDERS >= 1
+  for (uint i = 0u; i < uint(COLLIDERS); ++i) {
+    const vec4 sphere = u_step.collider[i];
+    const vec3 away = start - sphere.xyz;
+    const vec2 part = vec2(dot(away, axis), dot(away, side));
+    // The end is outside where dot(direction, part) is at least this.
+    const float least = (sphere.w * sphere.w - dot(away, away) - segment * segment) / (2.0 * segment);
+    if (!(sphere.w > 0.0) || part.x < least || dot(angle, part) >= least) continue;
+    const float reach = max(dot(part, part), kTinySquared);
+    const float along = clamp(least * inversesqrt(reach), -1.0, 1.0);
+    const vec2 turned = vec2(along, sqrt(1.0 - along * along));
+    angle = vec2(part.x * turned.x - part.y * turned.y, part.y * turned.x + part.x * turned.y) *
+            inversesqrt(reach);
+  }
+#endif
+  return angle;
+}
+
+// `next` out of the colliders, at its distance from the vertex before it.
+vec3 outside(vec3 start, vec3 next) {
+#if COLLIDERS >= 1
+  for (int round = 0; round < kPushRounds; ++round) {
+    const vec4 deepest = deepest_collider(next);
+    if (!(deepest.w > 0.0)) break;
+    const vec3 edge = next - start;
+    const float segment = sqrt(max(dot(edge, edge), kTinySquared));
+    next = turned_onto_sphere(start, edge / segment, segment, deepest.xyz, deepest.w);
+  }
+#endif
+  return next;
+}
+
+#if MEMORY == 2
+void turn_axis(uint at, vec3 from, vec3 to) {
+  const float squared = min(dot(from, from), dot(to, to));
+  if (!(squared > kTinySquared)) return;
+  from = normalize(from);
+  to = normalize(to);
+  const vec4 axis = texelFetch(u_axis, int(at));
+  const float sum = max(1.0 + dot(from, to), kFoldedBack);
+  vec3 turned = axis.xyz - (dot(axis.xyz, to) / sum) * (from + to);
+  turned -= to * dot(turned, to);
+  b_axis.value[at] = vec4(normalize(turned), axis.w);
+}
+#endif
+
+void move_vertex(uint at, vec4 position, vec3 way) {
+  b_position.position[at] = vec4(position.xyz + way, position.w);
+#if MEMORY >= 1
+  const vec4 before = texelFetch(u_way, int(at));
+  b_way.value[at] = vec4(before.xyz + way, before.w);
+#endif
+}
+
+// Takes from the velocity of a vertex what runs against its way, seen from the follicle's cone, which turns with the
+// head.
+void take_velocity(uint at, vec3 position, vec3 way) {
+  const vec3 carried_back = vec3(dot(u_step.carry[0].xyz, position), dot(u_step.carry[1].xyz, position),
+                                 dot(u_step.carry[2].xyz, position));
+  const vec3 cone_velocity = u_step.head_velocity.xyz + (position - carried_back) * u_step.push.w;
+  const vec4 velocity = texelFetch(u_velocity, int(at));
+  const vec3 along = way * inversesqrt(max(dot(way, way), kTinySquared));
+  const float outward = max(-dot(velocity.xyz - cone_velocity, along), 0.0);
+  b_velocity.velocity[at] = vec4(velocity.xyz + outward * along, velocity.w);
+}
+
+void main() {
+  const uint stride = u_step.shape.x;
+  const uint strand = gl_GlobalInvocationID.x;
+  if (strand >= stride) return;
+  uint at = u_step.shape.z * stride + strand;
+  const vec3 start = texelFetch(u_position, int(at - stride)).xyz;
+  vec4 position = texelFetch(u_position, int(at));
+  const vec3 edge = position.xyz - start;
+  const vec3 groomed =
+      turned_with_head(texelFetch(u_rest, int(at)).xyz - texelFetch(u_rest, int(at - stride)).xyz);
+  const float squared = dot(edge, edge);
+  const float groomed_squared = dot(groomed, groomed);
+  // No length has no direction, and what is no number is not this pass's to mend.
+  const bool is_outside = dot(edge, groomed) < u_step.follicle_cosine * sqrt(squared * groomed_squared);
+  if (!is_outside || !(min(squared, groomed_squared) > kTinySquared) || is_broken(edge)) return;
+
+  const vec3 axis = groomed * inversesqrt(groomed_squared);
+  vec3 side = edge - axis * dot(edge, axis);
+  side = dot(side, side) > 1e-12 * squared ? normalize(side) : any_side(axis);
+  side = normalize(side - axis * dot(side, axis));  // once more: a short side is made of roundings along the axis
+  const float segment = sqrt(squared);
+  const vec2 angle = held_angle(start, axis, side, segment);
+  vec3 shift = start + segment * (angle.x * axis + angle.y * side) - position.xyz;
+
+  take_velocity(at, position.xyz, shift);
+#if MEMORY == 2
+  turn_axis(at, edge, edge + shift);
+#endif
+  vec3 before = position.xyz;
+  vec3 now = before + shift;
+  move_vertex(at, position, shift);
+  for (uint i = u_step.shape.z + 1u; i < u_step.shape.y; ++i) {
+    at += stride;
+    position = texelFetch(u_position, int(at));
+    const vec3 next = position.xyz + shift;
+    const vec3 end = outside(now, next);
+    // Without contact nothing turns, not by a rounding either.
+    if (end != next) {
+      shift = end - position.xyz;
+#if MEMORY == 2
+      turn_axis(at, position.xyz - before, end - now);
+#endif
+    }
+    move_vertex(at, position, shift);
+    before = position.xyz;
+    now = end;
+  }
+}
