@@ -1,12 +1,13 @@
-// Follicles hold roots: after a substep of any model, the first free segment of a strand is turned back into the
-// cone about its groomed direction, and what hangs on it goes along, so that no segment but the first changes its
-// direction and none its length. The segment's end loses the velocity that drives it out of the cone, seen from the
-// follicle; the vertices beyond are told by the strand's own tensions in the next substep. (Velocities that went along
-// with the shift would make the strand weightless where the cone carries it: rods then swing for ever.) Nothing gains
-// speed. One invocation per strand; strands inside the cone are read only.
+// Follicles hold roots: after a substep of any model, the first free segment of a strand is turned back into
+// the cone about its groomed direction, and what hangs on it goes along, so that no segment but the first
+// changes its direction and none its length. The segment's end loses the velocity that drives it out of the
+// cone, seen from the follicle; the vertices beyond are told by the strand's own tensions in the next
+// substep. (Velocities that went along with the shift would make the strand weightless where the cone carries
+// it: rods then swing for ever.) Nothing gains speed. One invocation per strand; strands inside the cone are
+// read only.
 //
-// MEMORY: what else of a model goes along. 0 = nothing, 1 = the way of every vertex in the last substep, 2 = that and
-// the material axis of every segment.
+// MEMORY: what else of a model goes along. 0 = nothing, 1 = the way of every vertex in the last substep, 2 =
+// that and the material axis of every segment.
 #pragma variant MEMORY 0 1 2
 #include "sim/collider.glsl"
 
@@ -29,10 +30,10 @@ vec3 any_side(vec3 axis) {
   return abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
 }
 
-// Cosine and sine of the angle from `axis` towards `side` at which a segment may stand: the limit, or less where a
-// collider is in the way that the groomed direction itself is outside of. In the plane of both, a collider takes
-// an arc of directions; the end of the arc next to the axis is where the law of cosines puts the segment's end on
-// the sphere.
+// Cosine and sine of the angle from `axis` towards `side` at which a segment may stand: the limit, or less
+// where a collider is in the way that the groomed direction itself is outside of. In the plane of both, a
+// collider takes an arc of directions; the end of the arc next to the axis is where the law of cosines puts
+// the segment's end on the sphere.
 vec2 held_angle(vec3 start, vec3 axis, vec3 side, float segment) {
   vec2 angle = vec2(u_step.follicle_cosine, u_step.follicle_sine);
 #if COLLIDERS >= 1
@@ -89,8 +90,8 @@ void move_vertex(uint at, vec4 position, vec3 way) {
 #endif
 }
 
-// Takes from the velocity of a vertex what runs against its way, seen from the follicle's cone, which turns with the
-// head.
+// Takes from the velocity of a vertex what runs against its way, seen from the follicle's cone, which turns
+// with the head.
 void take_velocity(uint at, vec3 position, vec3 way) {
   const vec3 carried_back = vec3(dot(u_step.carry[0].xyz, position), dot(u_step.carry[1].xyz, position),
                                  dot(u_step.carry[2].xyz, position));
@@ -120,7 +121,7 @@ void main() {
   const vec3 axis = groomed * inversesqrt(groomed_squared);
   vec3 side = edge - axis * dot(edge, axis);
   side = dot(side, side) > 1e-12 * squared ? normalize(side) : any_side(axis);
-  side = normalize(side - axis * dot(side, axis));  // once more: a short side is made of roundings along the axis
+  side = normalize(side - axis * dot(side, axis));  // a short side is made of roundings
   const float segment = sqrt(squared);
   const vec2 angle = held_angle(start, axis, side, segment);
   vec3 shift = start + segment * (angle.x * axis + angle.y * side) - position.xyz;

@@ -73,6 +73,33 @@ Sample time_steps(Solver& solver, const Options& options, int steps, bool has_co
   return {samples_ms[samples_ms.size() / 2], samples_ms.front()};
 }
 
+/// What holding the roots adds to a step: two solvers of a row side by side, step by step, so that both meet
+/// the same machine. Minima.
+struct Held {
+  double free_ms = 0.0;
+  double held_ms = 0.0;
+};
+Held time_held(Solver& free, Solver& held, const Options& options, bool has_colliders) {
+  constexpr double kLimitRad = 20.0 * 3.14159265358979 / 180.0;
+  Held best{1e9, 1e9};
+  for (int step = 1; step <= options.warm_up + options.steps; ++step) {
+    StepInput input = moving_input(step, kSubstepS);
+    input.gusts.clear();
+    if (!has_colliders) input.colliders.clear();
+    for (const bool is_held : {false, true}) {
+      input.follicle_limit_rad = is_held ? kLimitRad : kFreeFollicleRad;
+      glFinish();
+      const int64_t begin_ns = now_ns();
+      (is_held ? held : free).substep(input);
+      glFinish();
+      double& least_ms = is_held ? best.held_ms : best.free_ms;
+      if (step > options.warm_up)
+        least_ms = std::min(least_ms, static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    }
+  }
+  return best;
+}
+
 /// Bytes per second of a large copy on all threads, reads and writes counted.
 double measure_copy_speed() {
   constexpr size_t kBytes = 64u << 20;
@@ -131,26 +158,28 @@ struct Row {
   double reference_ms = 0.0;  // double, one thread
   double floor_ms = 0.0;
   uint64_t memory_bytes = 0;
+  Held held;
 };
 
 const char* kCsvHeader =
     "set,solver,colliders,vertices,gpu_median_ms,gpu_minimum_ms,vertices_per_s,cpu_float_ms,reference_ms,"
     "floor_ms,"
-    "memory_bytes\n";
+    "memory_bytes,held_over_free\n";
 
 std::string to_csv(const Row& row) {
-  return fmt::format("{},{},{},{},{:.4f},{:.4f},{:.0f},{:.4f},{:.4f},{:.4f},{}\n", row.set, row.solver,
+  return fmt::format("{},{},{},{},{:.4f},{:.4f},{:.0f},{:.4f},{:.4f},{:.4f},{},{:.3f}\n", row.set, row.solver,
                      row.has_colliders ? 2 : 0, row.vertices, row.gpu.median_ms, row.gpu.minimum_ms,
                      static_cast<double>(row.vertices) / (row.gpu.median_ms * 1e-3), row.cpu_ms,
-                     row.reference_ms, row.floor_ms, row.memory_bytes);
+                     row.reference_ms, row.floor_ms, row.memory_bytes, row.held.held_ms / row.held.free_ms);
 }
 
 void print(const Row& row) {
   const double rate = static_cast<double>(row.vertices) / (row.gpu.median_ms * 1e-3) * 1e-6;
-  fmt::print("{:22} {:14} {:>9} {:9.3f} {:9.3f} {:8.1f} {:>9} {:9.2f} {:8.1f} {:9.3f} {:8.1f}\n", row.set,
-             row.solver, row.has_colliders ? "2 spheres" : "-", row.gpu.median_ms, row.gpu.minimum_ms, rate,
-             row.cpu_ms > 0.0 ? fmt::format("{:.3f}", row.cpu_ms) : "-", row.reference_ms,
-             row.reference_ms / row.gpu.median_ms, row.floor_ms, row.gpu.median_ms / row.floor_ms);
+  fmt::print("{:22} {:14} {:>9} {:9.3f} {:9.3f} {:8.1f} {:>9} {:9.2f} {:8.1f} {:9.3f} {:8.1f} {:8.3f}\n",
+             row.set, row.solver, row.has_colliders ? "2 spheres" : "-", row.gpu.median_ms,
+             row.gpu.minimum_ms, rate, row.cpu_ms > 0.0 ? fmt::format("{:.3f}", row.cpu_ms) : "-",
+             row.reference_ms, row.reference_ms / row.gpu.median_ms, row.floor_ms,
+             row.gpu.median_ms / row.floor_ms, row.held.held_ms / row.held.free_ms);
 }
 
 class Bench {
@@ -162,13 +191,14 @@ class Bench {
         "{}; {} threads; copy {:.1f} GB/s; {} steps after {} to warm up; other programs may share the "
         "machine:\n"
         "the minimum is nearer to a quiet machine than the median\n"
+        "x held: a step with roots held at 20 degrees over one without, side by side\n"
         "per free vertex: about {} flop + 8 per collider, {} bytes; floor = those bytes at the copy "
         "speed\n\n",
         info.renderer, std::thread::hardware_concurrency(), copy_speed_ * 1e-9, options_.steps,
         options_.warm_up, kFlopsPerVertex, kBytesPerVertex);
-    fmt::print("{:22} {:14} {:>9} {:>9} {:>9} {:>8} {:>9} {:>9} {:>8} {:>9} {:>8}\n", "set", "solver",
+    fmt::print("{:22} {:14} {:>9} {:>9} {:>9} {:>8} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8}\n", "set", "solver",
                "colliders", "median ms", "min ms", "Mvert/s", "float ms", "double ms", "x double", "floor ms",
-               "x floor");
+               "x floor", "x held");
   }
 
   /// False when a solver cannot be made; the error is printed.
@@ -187,6 +217,10 @@ class Bench {
     row.solver = solver_row.name;
     row.has_colliders = has_colliders;
     row.vertices = set.groom.rest_position_m.size();
+    features.has_follicle_limit = true;
+    auto held = solver_row.make_gpu(*parameters, {&shaders_, features});
+    if (held && (*held)->load(set.groom, {1.0, 0.0, 0.0, 0.0}))
+      row.held = time_held(**gpu, **held, options_, has_colliders);
     row.gpu = time_steps(**gpu, options_, options_.steps, has_colliders);
     row.memory_bytes = (*gpu)->memory_bytes();
     row.floor_ms = static_cast<double>(row.vertices) * kBytesPerVertex / copy_speed_ * 1e3;

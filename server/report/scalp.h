@@ -1,0 +1,86 @@
+// ScalpView: how much of the scalp a camera sees between the hair, as a number; and the run of
+// strandcast-report scalp that takes it during a head motion. Needs the thread's GL context.
+//
+// Scalp is the skin of the head that is drawn with at least half of the root density of the middle of the
+// hair (common/render/scalp_cover.h). Visible is the share of its pixels on the bald head that still show
+// skin through the hair as it is drawn; a pixel with both counts half. The camera is the scene's, carried
+// along with the head, position and rotation, so that it always sees the same scalp and only hair changes;
+// and that camera turned about the head by a quarter, a half and three quarters.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/motion/motion_file.h"
+#include "common/pictures/image_codec.h"
+#include "common/render/renderer.h"
+#include "server/report/stream_motion.h"
+
+namespace strandcast {
+
+/// The scene's camera, then that from the other sides of the head.
+inline constexpr size_t kScalpViews = 4;
+using ScalpShares = std::array<double, kScalpViews>;
+
+class ScalpView {
+ public:
+  /// BadInput for a scene without a head that is drawn, or with no scalp in any view.
+  static Result<ScalpView> make(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device,
+                                const SceneAsset& asset, const SceneDesc& scene, RenderSize size);
+
+  /// Visible shares, 0..1, of hair in head space, (vertex_count x strand_count); 0 where a view has no scalp.
+  Result<ScalpShares> visible(const std::vector<glm::vec3>& position_in_head_m);
+  /// The hair as the scene draws it, by its own camera.
+  Result<Image> picture(const std::vector<glm::vec3>& position_in_head_m);
+
+ private:
+  ScalpView() = default;
+  Status find_scalp(Renderer& bald, const std::vector<glm::vec3>& hair_away_m);
+
+  std::array<CameraDesc, kScalpViews> cameras_;
+  RenderSize size_;
+  std::unique_ptr<Renderer> marked_;  // skin in one colour, hair in another, bright
+  std::unique_ptr<Renderer> shown_;
+  std::array<std::vector<bool>, kScalpViews> is_scalp_;  // by pixel
+};
+
+struct ScalpRunDesc {
+  SceneDesc scene;
+  StreamMotion motion;
+  double seconds = 6.0;   // of the motion, from its beginning
+  double every_s = 0.25;  // between two measurements
+  RenderSize size{640, 360};
+};
+
+/// Of one moment.
+struct ScalpSample {
+  double time_s = 0.0;
+  ScalpShares visible{};
+  double root_p95_deg = 0.0;  // of the angles between first free segments and where they are groomed
+};
+
+struct ScalpRun {
+  ScalpShares groomed{};  // visible share of hair as loaded
+  std::vector<ScalpSample> samples;
+  Image groomed_picture;
+  Image worst_picture;  // of the moment with most scalp from all around
+
+  /// Mean of all samples over what the groomed hair shows, less 1; by the scene's camera, and from all
+  /// around.
+  double growth() const;
+  double growth_around() const;
+  /// The same for the 95 % quantile of the samples.
+  double growth_p95() const;
+};
+
+/// The scene's solver under the motion, on the GPU where it has a kernel; colliders, no wind.
+Result<ScalpRun> run_scalp(const ScalpRunDesc& desc, const gl::ShaderLibrary& shaders,
+                           const gl::DeviceInfo& device);
+
+std::string scalp_text(const ScalpRunDesc& desc, const ScalpRun& run);
+std::string scalp_csv(const ScalpRun& run);
+
+}  // namespace strandcast
