@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/hash.h"
+#include "common/groom/head_field.h"
 
 namespace strandcast {
 namespace {
@@ -22,6 +23,10 @@ constexpr float kClearanceArc = 0.35f;  // arc length over which a strand rises 
 // The face and jaw as a sphere that hair does not enter either.
 constexpr glm::vec3 kFaceCenter{0.0f, -0.42f, 0.22f};
 constexpr float kFaceRadius = 0.86f;
+// Below this height hair keeps clear of neck and shoulders, at first little, then as on the head.
+constexpr float kBustTop = -0.75f;
+constexpr float kBustClearance = 0.03f;
+constexpr int kBustRounds = 3;
 
 struct Ramp {
   float low, high;
@@ -39,9 +44,10 @@ constexpr float kFrontAside = 1.5f, kTopAside = 1.3f;
 constexpr float kFrontBack = 0.55f, kTopBack = 0.45f, kCheekBack = 0.8f;
 constexpr float kGather = 0.14f;
 constexpr float kNeckZ = -0.35f;
-constexpr float kHangingSway = 0.25f;      // sway is stronger where hair lies on the head
-constexpr Ramp kHeight = {-0.5f, 1.0f};    // of the root, for the clearance
-constexpr Ramp kFromRoot = {0.0f, 0.05f};  // arc over which a root below the sphere comes up to it
+constexpr float kHangingSway = 0.25f;       // sway is stronger where hair lies on the head
+constexpr Ramp kHeight = {-0.5f, 1.0f};     // of the root, for the clearance
+constexpr Ramp kBustBelow = {0.75f, 1.1f};  // depth over which that clearance comes
+constexpr Ramp kFromRoot = {0.0f, 0.05f};   // arc over which a root below the sphere comes up to it
 
 float smooth(const Ramp& ramp, float value) {
   const float t = std::clamp((value - ramp.low) / (ramp.high - ramp.low), 0.0f, 1.0f);
@@ -124,6 +130,17 @@ glm::vec3 keep_outside(const glm::vec3& point, float arc, const StrandCharacter&
   // A scalp that itself reaches into the face sphere keeps its roots where they are.
   const float face_radius = std::min(kFaceRadius, 0.99f * glm::distance(character.root, kFaceCenter));
   return push_out(outside, kFaceCenter, face_radius + 0.5f * character.clearance * risen);
+}
+
+glm::vec3 keep_off_bust(const glm::vec3& point, const StrandCharacter& character) {
+  const float clearance = kBustClearance + character.clearance;
+  glm::vec3 outside = point;
+  for (int round = 0; round < kBustRounds && outside.y < kBustTop; ++round) {
+    const float missing = clearance * smooth(kBustBelow, -outside.y) - bust_distance(outside);
+    if (missing <= 0.0f) break;
+    outside += missing * bust_normal(outside);
+  }
+  return outside;
 }
 
 }  // namespace strandcast

@@ -25,4 +25,7 @@ glm::vec3 combed_direction(const glm::vec3& point, const StrandCharacter& charac
 /// Moves a point at arc length `arc` (in skull radii) out of the skull, the face and the neck.
 glm::vec3 keep_outside(const glm::vec3& point, float arc, const StrandCharacter& character);
 
+/// Moves a point out of the built-in head's neck and shoulders.
+glm::vec3 keep_off_bust(const glm::vec3& point, const StrandCharacter& character);
+
 }  // namespace strandcast

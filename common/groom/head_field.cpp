@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <span>
 
 namespace strandcast {
 namespace {
 
 enum class Shape { Ellipsoid, Capsule };
-enum class Blend { Add, Cut };
+enum class Blend { Add, Cut, Within };
 
 /// One part of the head. Parts off the middle are given once and mirrored.
 struct Part {
@@ -29,33 +31,51 @@ Part capsule(Blend blend, float softness, const glm::vec3& from, float from_radi
   return {Shape::Capsule, blend, softness, from, to, from_radius, to_radius};
 }
 
-// Proportions of an adult head: eyes at half of its height, nose down to half of the rest, mouth at a third
-// of that.
-const std::array kParts = {
-    ellipsoid(Blend::Add, 0.00f, {0.00f, 0.00f, 0.00f}, {0.985f, 0.985f, 0.985f}),               // cranium
-    capsule(Blend::Add, 0.14f, {0.00f, -0.70f, -0.14f}, 0.52f, {0.00f, -1.75f, -0.34f}, 0.52f),  // neck
-    capsule(Blend::Add, 0.30f, {0.00f, -2.25f, -0.38f}, 0.54f, {0.45f, -2.60f, -0.40f}, 0.50f),  // its base
-    ellipsoid(Blend::Add, 0.22f, {0.00f, -0.50f, 0.28f}, {0.74f, 0.84f, 0.62f}),                 // face
-    ellipsoid(Blend::Add, 0.26f, {0.00f, -0.86f, 0.26f}, {0.60f, 0.44f, 0.58f}),                 // jaw
-    ellipsoid(Blend::Add, 0.16f, {0.00f, -1.22f, 0.64f}, {0.24f, 0.17f, 0.20f}),                 // chin
-    ellipsoid(Blend::Add, 0.20f, {0.46f, -0.42f, 0.60f}, {0.20f, 0.16f, 0.20f}),                 // cheekbone
-    ellipsoid(Blend::Add, 0.16f, {0.00f, -0.84f, 0.70f}, {0.30f, 0.26f, 0.24f}),  // round the mouth
-    ellipsoid(Blend::Cut, 0.18f, {0.34f, -0.20f, 1.03f}, {0.24f, 0.15f, 0.24f}),  // eye socket
-    capsule(Blend::Add, 0.14f, {0.00f, -0.03f, 0.88f}, 0.07f, {0.44f, 0.00f, 0.76f}, 0.05f),  // brow
-    ellipsoid(Blend::Add, 0.05f, {0.33f, -0.20f, 0.755f}, {0.165f, 0.115f, 0.145f}),          // closed eye
-    capsule(Blend::Add, 0.14f, {0.00f, -0.08f, 0.88f}, 0.07f, {0.00f, -0.50f, 1.08f},
-            0.10f),                                                                // bridge of the nose
-    ellipsoid(Blend::Add, 0.08f, {0.00f, -0.53f, 1.11f}, {0.12f, 0.10f, 0.11f}),   // its tip
-    ellipsoid(Blend::Add, 0.07f, {0.13f, -0.56f, 1.00f}, {0.08f, 0.075f, 0.11f}),  // its wing
-    capsule(Blend::Add, 0.10f, {0.05f, -0.805f, 0.925f}, 0.055f, {0.25f, -0.87f, 0.79f}, 0.01f),  // upper lip
-    capsule(Blend::Add, 0.10f, {0.00f, -0.93f, 0.925f}, 0.06f, {0.24f, -0.87f, 0.78f}, 0.01f),    // lower lip
-    capsule(Blend::Cut, 0.08f, {0.00f, -0.868f, 1.025f}, 0.02f, {0.25f, -0.87f, 0.885f}, 0.005f),  // mouth
-    ellipsoid(Blend::Cut, 0.12f, {0.00f, -1.05f, 0.99f}, {0.16f, 0.05f, 0.10f}),   // below the lips
-    ellipsoid(Blend::Add, 0.06f, {0.965f, -0.28f, 0.02f}, {0.09f, 0.28f, 0.16f}),  // ear
-    ellipsoid(Blend::Cut, 0.06f, {1.07f, -0.26f, 0.05f}, {0.05f, 0.17f, 0.08f}),   // its shell
+// Proportions of an adult: eyes at half of the head's height, nose down to half of the rest, mouth at a third
+// of that; the sternum a third of a head's height below the chin, shoulders twice as wide as the head.
+const std::array kBust = {
+    capsule(Blend::Add, 0.00f, {0.20f, -1.75f, -0.50f}, 0.30f, {1.25f, -2.55f, -0.48f},
+            0.30f),                                                                // nape to shoulder
+    ellipsoid(Blend::Add, 0.30f, {1.48f, -2.78f, -0.42f}, {0.46f, 0.46f, 0.46f}),  // shoulder
+    ellipsoid(Blend::Add, 0.45f, {0.00f, -3.20f, -0.36f}, {1.45f, 0.95f, 0.82f}),  // chest and back
+    capsule(Blend::Add, 0.20f, {0.14f, -2.47f, 0.06f}, 0.06f, {1.25f, -2.44f, -0.22f}, 0.06f),  // collarbone
+    ellipsoid(Blend::Within, 0.20f, {0.00f, -2.10f, -0.40f}, {2.05f, 1.75f, 1.45f}),  // down to where it ends
+    capsule(Blend::Add, 0.30f, {0.00f, -0.70f, -0.14f}, 0.51f, {0.00f, -2.10f, -0.38f}, 0.50f),  // neck
+    capsule(Blend::Add, 0.14f, {0.52f, -0.95f, -0.12f}, 0.09f, {0.13f, -2.20f, 0.10f},
+            0.07f),  // throat's side
 };
-constexpr float kNeckCutAt = -2.35f;
-constexpr float kNeckCutSoftness = 0.25f;
+const std::array kHead = {
+    ellipsoid(Blend::Add, 0.16f, {0.00f, 0.00f, 0.00f}, {0.985f, 0.985f, 0.985f}),             // cranium
+    ellipsoid(Blend::Add, 0.20f, {0.00f, -0.52f, 0.30f}, {0.76f, 0.82f, 0.63f}),               // face
+    capsule(Blend::Add, 0.34f, {0.46f, -0.82f, 0.04f}, 0.15f, {0.12f, -1.21f, 0.70f}, 0.14f),  // jaw
+    ellipsoid(Blend::Add, 0.20f, {0.00f, -0.90f, 0.36f}, {0.44f, 0.38f, 0.48f}),               // its floor
+    ellipsoid(Blend::Add, 0.20f, {0.00f, -1.23f, 0.76f}, {0.17f, 0.15f, 0.17f}),               // chin
+    ellipsoid(Blend::Add, 0.24f, {0.50f, -0.38f, 0.60f}, {0.20f, 0.13f, 0.22f}),               // cheekbone
+    ellipsoid(Blend::Add, 0.18f, {0.00f, -0.84f, 0.70f}, {0.37f, 0.27f, 0.26f}),  // round the mouth
+    ellipsoid(Blend::Cut, 0.16f, {0.35f, -0.19f, 1.02f}, {0.23f, 0.13f, 0.22f}),  // eye socket
+    capsule(Blend::Add, 0.16f, {0.08f, 0.00f, 0.89f}, 0.06f, {0.46f, 0.03f, 0.75f}, 0.05f),  // brow
+    ellipsoid(Blend::Add, 0.04f, {0.345f, -0.20f, 0.705f}, {0.180f, 0.150f, 0.185f}),        // closed eye
+    capsule(Blend::Cut, 0.05f, {0.19f, -0.245f, 0.865f}, 0.016f, {0.345f, -0.275f, 0.895f},
+            0.020f),  // lashes
+    capsule(Blend::Cut, 0.05f, {0.345f, -0.275f, 0.895f}, 0.020f, {0.50f, -0.24f, 0.820f}, 0.016f),
+    capsule(Blend::Add, 0.12f, {0.00f, -0.16f, 0.86f}, 0.055f, {0.00f, -0.50f, 1.07f}, 0.080f),  // nose
+    ellipsoid(Blend::Add, 0.08f, {0.00f, -0.555f, 1.09f}, {0.100f, 0.085f, 0.11f}),              // its tip
+    ellipsoid(Blend::Add, 0.06f, {0.12f, -0.585f, 0.98f}, {0.070f, 0.068f, 0.11f}),              // its wing
+    ellipsoid(Blend::Cut, 0.03f, {0.06f, -0.65f, 1.03f}, {0.030f, 0.022f, 0.05f}),               // nostril
+    capsule(Blend::Cut, 0.07f, {0.00f, -0.69f, 1.005f}, 0.02f, {0.00f, -0.77f, 1.01f}, 0.02f),   // philtrum
+    capsule(Blend::Add, 0.08f, {0.060f, -0.825f, 0.945f}, 0.046f, {0.24f, -0.885f, 0.850f},
+            0.030f),  // upper lip
+    capsule(Blend::Add, 0.08f, {0.06f, -0.955f, 0.930f}, 0.060f, {0.23f, -0.908f, 0.850f},
+            0.030f),  // lower lip
+    capsule(Blend::Cut, 0.07f, {0.00f, -0.888f, 1.010f}, 0.024f, {0.25f, -0.896f, 0.925f}, 0.012f),  // mouth
+    ellipsoid(Blend::Cut, 0.12f, {0.00f, -1.07f, 0.97f}, {0.15f, 0.04f, 0.07f}),      // below the lips
+    ellipsoid(Blend::Add, 0.05f, {0.970f, -0.24f, 0.00f}, {0.075f, 0.27f, 0.155f}),   // ear
+    ellipsoid(Blend::Cut, 0.05f, {1.060f, -0.21f, 0.02f}, {0.050f, 0.18f, 0.090f}),   // its shell
+    ellipsoid(Blend::Add, 0.04f, {0.985f, -0.30f, 0.115f}, {0.045f, 0.06f, 0.045f}),  // its flap
+};
+
+/// Mirrored parts meet round, not in a crease, over this width.
+constexpr float kSeam = 0.04f;
 
 float ellipsoid_distance(const glm::vec3& point, const glm::vec3& radii) {
   const float scaled = glm::length(point / radii);
@@ -69,6 +89,10 @@ float capsule_distance(const glm::vec3& point, const Part& part) {
   return glm::length(offset - along * axis) - glm::mix(part.from_radius, part.to_radius, along);
 }
 
+bool is_in_the_middle(const Part& part) {
+  return part.from.x == 0.0f && (part.shape == Shape::Ellipsoid || part.to.x == 0.0f);
+}
+
 /// Smaller of two distances with a rounded seam (polynomial smooth minimum).
 float smooth_min(float a, float b, float softness) {
   if (softness <= 0.0f) return std::min(a, b);
@@ -76,30 +100,57 @@ float smooth_min(float a, float b, float softness) {
   return std::min(a, b) - near * near * softness * 0.25f;
 }
 
-}  // namespace
-
-float head_distance(const glm::vec3& point) {
-  const glm::vec3 mirrored(std::abs(point.x), point.y, point.z);
-  float distance = std::numeric_limits<float>::max();
-  for (const Part& part : kParts) {
-    const float own = part.shape == Shape::Ellipsoid ? ellipsoid_distance(mirrored - part.from, part.to)
-                                                     : capsule_distance(mirrored, part);
-    distance = part.blend == Blend::Add ? smooth_min(distance, own, part.softness)
-                                        : -smooth_min(-distance, own, part.softness);
+/// `distance` is that of what there is already.
+float with_parts(float distance, std::span<const Part> parts, const glm::vec3& point) {
+  const glm::vec3 mirrored(std::hypot(point.x, kSeam), point.y, point.z);
+  for (const Part& part : parts) {
+    const glm::vec3& here = is_in_the_middle(part) ? point : mirrored;
+    const float own = part.shape == Shape::Ellipsoid ? ellipsoid_distance(here - part.from, part.to)
+                                                     : capsule_distance(here, part);
+    switch (part.blend) {
+      case Blend::Add:
+        distance = smooth_min(distance, own, part.softness);
+        break;
+      case Blend::Cut:
+        distance = -smooth_min(-distance, own, part.softness);
+        break;
+      case Blend::Within:
+        distance = -smooth_min(-distance, -own, part.softness);
+        break;
+    }
   }
-  return -smooth_min(-distance, point.y - kNeckCutAt, kNeckCutSoftness);
+  return distance;
 }
 
-glm::vec3 head_normal(const glm::vec3& point) {
+template <class Distance>
+glm::vec3 normal_of(const Distance& distance, const glm::vec3& point) {
   constexpr float kStep = 2e-3f;
   glm::vec3 slope;
   for (int axis = 0; axis < 3; ++axis) {
     glm::vec3 step(0.0f);
     step[axis] = kStep;
-    slope[axis] = head_distance(point + step) - head_distance(point - step);
+    slope[axis] = distance(point + step) - distance(point - step);
   }
   const float length = glm::length(slope);
   return length > 0.0f ? slope / length : glm::vec3(0.0f, 1.0f, 0.0f);
+}
+
+}  // namespace
+
+float bust_distance(const glm::vec3& point) {
+  return with_parts(std::numeric_limits<float>::max(), kBust, point);
+}
+
+glm::vec3 bust_normal(const glm::vec3& point) {
+  return normal_of(bust_distance, point);
+}
+
+float head_distance(const glm::vec3& point) {
+  return with_parts(bust_distance(point), kHead, point);
+}
+
+glm::vec3 head_normal(const glm::vec3& point) {
+  return normal_of(head_distance, point);
 }
 
 }  // namespace strandcast

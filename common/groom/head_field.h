@@ -6,14 +6,18 @@
 
 namespace strandcast {
 
-/// About the distance to the head's surface, negative inside. Closed: the neck ends in a flat cut.
+/// About the distance to the surface of head and bust, negative inside. Closed.
 float head_distance(const glm::vec3& point);
 
 /// Unit normal of the surface through `point`, outwards.
 glm::vec3 head_normal(const glm::vec3& point);
 
+/// The same of neck and bust alone.
+float bust_distance(const glm::vec3& point);
+glm::vec3 bust_normal(const glm::vec3& point);
+
 // Box that holds the whole surface.
-inline constexpr glm::vec3 kHeadLow{-1.25f, -2.45f, -1.15f};
-inline constexpr glm::vec3 kHeadHigh{1.25f, 1.1f, 1.4f};
+inline constexpr glm::vec3 kHeadLow{-2.15f, -4.0f, -1.95f};
+inline constexpr glm::vec3 kHeadHigh{2.15f, 1.1f, 1.4f};
 
 }  // namespace strandcast

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "common/groom/head_field.h"
 #include "common/groom/mesh.h"
@@ -11,23 +12,34 @@
 namespace strandcast {
 namespace {
 
-constexpr float kCoarse = 0.105f;  // cell width in skull radii
-constexpr float kFine = 0.037f;
+constexpr float kCoarse = 0.125f;  // cell width in skull radii
+constexpr float kFine = 0.032f;
 constexpr int kProjections = 4;  // of each vertex onto the surface
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 struct Range {
   float low, high;
 };
-constexpr std::array<Range, 3> kDetail = {Range{-0.55f, 0.55f}, Range{-1.12f, 0.06f}, Range{0.62f, 1.25f}};
+/// Where lines are fine: face and ears, of both sides.
+constexpr std::array<Range, 2> kDetailX = {Range{-0.01f, 0.55f}, Range{0.84f, 1.07f}};
+constexpr std::array<Range, 1> kDetailY = {Range{-1.12f, 0.06f}};
+constexpr std::array<Range, 2> kDetailZ = {Range{-0.20f, 0.20f}, Range{0.62f, 1.25f}};
+constexpr std::array<std::span<const Range>, 3> kDetail = {kDetailX, kDetailY, kDetailZ};
 
-/// Grid coordinates of one axis: fine inside of its detail range, coarse outside.
+/// Grid coordinates of one axis: fine inside of its detail ranges, coarse outside.
 std::vector<float> grid_line(int axis) {
   const bool is_mirrored = axis == 0;
   std::vector<float> line{is_mirrored ? 0.0f : kHeadLow[axis]};
+  const auto is_fine = [&](float at) {
+    return std::any_of(kDetail[axis].begin(), kDetail[axis].end(),
+                       [&](const Range& range) { return at >= range.low - kFine && at < range.high; });
+  };
   while (line.back() < kHeadHigh[axis]) {
-    const bool is_fine = line.back() >= kDetail[axis].low - kFine && line.back() < kDetail[axis].high;
-    line.push_back(line.back() + (is_fine ? kFine : kCoarse));
+    // A coarse step ends where lines become fine.
+    float step = is_fine(line.back()) ? kFine : kCoarse;
+    for (const Range& range : kDetail[axis])
+      if (line.back() < range.low - kFine) step = std::min(step, range.low - line.back());
+    line.push_back(line.back() + step);
   }
   if (!is_mirrored) return line;
   std::vector<float> whole;
@@ -126,7 +138,8 @@ class HeadMesher {
 }  // namespace
 
 Mesh make_head(float radius_m) {
-  Mesh mesh = HeadMesher().build();
+  static const Mesh kUnitHead = HeadMesher().build();
+  Mesh mesh = kUnitHead;
   for (glm::vec3& point : mesh.position_m) point *= radius_m;
   return mesh;
 }

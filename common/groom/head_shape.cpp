@@ -29,17 +29,31 @@ constexpr double kBuiltInWeight = 0.08;
 /// How steeply skin may give way to hair, in radii per radian, and how the dents are rounded.
 constexpr double kDentSlope = 0.8, kDentReachRad = 0.07;
 constexpr int kDentRounds = 3;
-/// A vertex deeper than this share of the radius is a stray: skin does not give way.
+/// A vertex deeper than this share of the radius is a stray: skin does not give way. Nor does it leave roots
+/// within this angle by more: hair that goes deeper there was made to end in the head, as that of a ponytail
+/// under its band.
 constexpr double kStrayPull = 0.6;
+constexpr double kMostDentM = 0.003, kRootedRad = 0.15;
 /// How far the built-in surface may rise between the centres of two directions (ears, nose), in skull radii.
 constexpr double kCellSpread = 0.3;
-// The neck below this height, in skull radii, gives way to hair sideways. Its axis is that of head_field.cpp.
-constexpr double kNeckTop = -0.72, kNeckEnd = -2.45;
-constexpr double kNeckAxisZ = -0.14, kNeckAxisY = -0.70, kNeckLean = 0.19;
-constexpr int kNeckRows = 16, kNeckColumns = 24;
+// The neck and the bust below this height, in skull radii, give way to hair sideways. Their axis is that of
+// head_field.cpp: along the neck, then straight down.
+constexpr double kNeckTop = -0.72, kBustEnd = -3.95;
+constexpr double kNeckAxisZ = -0.14, kNeckAxisY = -0.70, kNeckLean = 0.19, kBustAxisZ = -0.40;
+constexpr int kNeckRows = 32, kNeckColumns = 24;
 /// No thinner than this share.
 constexpr double kThinnestNeck = 0.45;
-constexpr double kFurthest = 3.2;  // beyond the built-in head, in skull radii
+/// Before that the shoulders sink, and the neck between these heights gets longer: at most by so much, in
+/// such steps, and only if that keeps clear of more of the hair than it costs in looks.
+constexpr double kStretchTop = -1.45, kStretchEnd = -2.05;
+constexpr double kMostDrop = 0.7, kDropStep = 0.05, kDropCost = 0.5;
+/// Fewer vertices than this share of the hair's count as if they were so many.
+constexpr double kDropLeast = 0.02;
+/// Roots pull the head, down to here in full and from there on not at all.
+constexpr double kPullEnd = -1.4, kNoPull = -2.1;
+constexpr double kFurthestHead =
+    1.95;                          // no part of the head without the bust is further away, in skull radii
+constexpr double kFurthest = 5.5;  // nor any part of the bust
 
 // Directions are the cells of a cube's six faces, evenly spaced in angle along both edges.
 constexpr int kSide = 16;
@@ -123,12 +137,13 @@ double bell(double angle_rad, double reach_rad) {
   return std::exp(-0.5 * angle_rad * angle_rad / (reach_rad * reach_rad));
 }
 
-/// Distance from the skull's centre to the surface of the built-in head, in skull radii: the outermost.
+/// Distance from the skull's centre to the surface of the built-in head, in skull radii: the outermost, but
+/// for the bust.
 double built_in_radius(const glm::dvec3& direction) {
   constexpr int kSteps = 200;
-  constexpr double kStep = kFurthest / kSteps;
+  constexpr double kStep = kFurthestHead / kSteps;
   const auto distance = [&](double along) { return head_distance(glm::vec3(along * direction)); };
-  for (double outside = kFurthest; outside > kStep;) {
+  for (double outside = kFurthestHead; outside > kStep;) {
     // The field is no true distance: half of it is a safe step.
     const double inside = outside - std::max(kStep, 0.5 * static_cast<double>(distance(outside)));
     if (distance(inside) < 0.0f) {
@@ -151,14 +166,14 @@ const std::vector<double>& built_in_radii() {
 }
 
 glm::dvec3 neck_axis(double y) {
-  return {0.0, y, kNeckAxisZ + kNeckLean * (y - kNeckAxisY)};
+  return {0.0, y, std::max(kNeckAxisZ + kNeckLean * (y - kNeckAxisY), kBustAxisZ)};
 }
 
 /// Row and column of a point of the neck on its grid of heights and azimuths.
 glm::dvec2 neck_grid(const glm::dvec3& u) {
   const glm::dvec3 offset = u - neck_axis(u.y);
   const double turns = std::atan2(offset.x, offset.z) / (2.0 * std::numbers::pi) + 1.0;
-  const double row = (kNeckTop - u.y) / (kNeckTop - kNeckEnd) * (kNeckRows - 1);
+  const double row = (kNeckTop - u.y) / (kNeckTop - kBustEnd) * (kNeckRows - 1);
   return {std::clamp(row, 0.0, kNeckRows - 1.0), turns * kNeckColumns};
 }
 
@@ -185,14 +200,18 @@ std::array<double, 6> solve(std::array<std::array<double, 7>, 6> rows) {
 
 }  // namespace
 
-HeadShape::HeadShape(const Groom& groom, const FittedSphere& about)
+HeadShape::HeadShape(const Groom& groom, const FittedSphere& about, HeadFit fit)
     : center_m_(about.center_m),
-      radius_m_(static_cast<double>(about.radius_m) / kSkull),
+      radius_m_(about.radius_m),
       pull_(kCells, 1.0),
       neck_width_(kNeckRows * kNeckColumns, 1.0) {
-  stretch_to_roots(groom);
-  pull_to_roots(groom);
-  give_way_to_hair(groom);
+  if (fit == HeadFit::Whole) {
+    radius_m_ /= kSkull;
+    stretch_to_roots(groom);
+    pull_to_roots(groom);
+    give_way_to_hair(groom);
+  }
+  lower_shoulders(groom);
   narrow_neck(groom);
 }
 
@@ -200,8 +219,40 @@ glm::dvec3 HeadShape::in_skull_radii(const glm::vec3& point_m) const {
   return (glm::dvec3(point_m) - center_m_) / radius_m_;
 }
 
-double HeadShape::pull_at(const glm::dvec3& direction) const {
-  return blend(pull_, direction);
+double HeadShape::pull_at(const glm::dvec3& u) const {
+  const double length = glm::length(u);
+  const double share = std::clamp((u.y - kNoPull) / (kPullEnd - kNoPull), 0.0, 1.0);
+  if (!(length > 0.0) || share == 0.0) return 1.0;
+  return std::lerp(1.0, blend(pull_, u / length), share * share * (3.0 - 2.0 * share));
+}
+
+/// The built-in head's height that comes to lie at `y` when the neck is longer, and the other way round.
+double HeadShape::before_the_drop(double y) const {
+  const double stretched = kStretchTop - kStretchEnd + drop_;
+  const double below = kStretchTop - y;
+  return y + drop_ * std::clamp(below / stretched, 0.0, 1.0);
+}
+double HeadShape::after_the_drop(double y) const {
+  return y - drop_ * std::clamp((kStretchTop - y) / (kStretchTop - kStretchEnd), 0.0, 1.0);
+}
+
+// The least drop that pays: its share of kDropCost against the share of the hair that it keeps clear of.
+void HeadShape::lower_shoulders(const Groom& groom) {
+  std::vector<glm::dvec3> near;
+  for (const glm::vec3& point : groom.rest_position_m) {
+    const glm::dvec3 u = in_skull_radii(point);
+    if (u.y < kStretchTop && glm::length(u) < kFurthest && distance_in_radii(u) < 0.0) near.push_back(u);
+  }
+  const double before = std::max(static_cast<double>(near.size()),
+                                 kDropLeast * static_cast<double>(groom.rest_position_m.size()));
+  double best = 0.0, least_cost = static_cast<double>(near.size()) / before;
+  for (drop_ = kDropStep; drop_ < kMostDrop + 0.5 * kDropStep; drop_ += kDropStep) {
+    const auto inside = static_cast<double>(std::count_if(
+        near.begin(), near.end(), [&](const glm::dvec3& u) { return distance_in_radii(u) < 0.0; }));
+    const double cost = inside / before + kDropCost * drop_ / kMostDrop;
+    if (cost < least_cost) least_cost = cost, best = drop_;
+  }
+  drop_ = best;
 }
 
 // Least squares of an ellipsoid through the mean root of each direction, with what is known of heads as
@@ -286,7 +337,28 @@ void HeadShape::pull_to_roots(const Groom& groom) {
   }
 }
 
+/// How far the skin may give way, by direction.
+std::vector<double> HeadShape::deepest_dents(const Groom& groom) const {
+  std::vector<double> floor(kCells, kStrayPull);
+  const double dent = kMostDentM / ((radius_m_.x + radius_m_.y + radius_m_.z) / 3.0);
+  std::vector<bool> has_roots(kCells, false);
+  for (const glm::vec3& root : roots_of(groom)) {
+    const glm::dvec3 u = in_skull_radii(root);
+    const double length = glm::length(u);
+    if (!(length > 0.0) || length > kFurthestRoot) continue;
+    const double pull = length / blend(built_in_radii(), u / length);
+    if (pull >= kNearestRoot && pull <= kFurthestRoot)
+      has_roots[static_cast<size_t>(cell_of(u / length))] = true;
+  }
+  for (size_t cell = 0; cell < has_roots.size(); ++cell)
+    if (has_roots[cell])
+      near_cells(cell_directions()[cell], kRootedRad,
+                 [&](size_t near, double) { floor[near] = std::max(kStrayPull, pull_[near] - dent); });
+  return floor;
+}
+
 void HeadShape::give_way_to_hair(const Groom& groom) {
+  const std::vector<double> floor = deepest_dents(groom);
   for (int round = 0; round < kDentRounds; ++round) {
     std::vector<double> most(kCells, std::numeric_limits<double>::max());
     bool is_clear = true;
@@ -294,12 +366,12 @@ void HeadShape::give_way_to_hair(const Groom& groom) {
       const glm::dvec3 u = in_skull_radii(point);
       const double length = glm::length(u);
       if (!(length > 0.0) || length > kFurthest) continue;
-      const double pull = pull_at(u / length);
+      const double pull = pull_at(u);
       if (u.y < kNeckTop * pull) continue;
       if (length > pull * (blend(built_in_radii(), u / length) + kCellSpread)) continue;
       if (!(head_distance(glm::vec3(u / pull)) < 0.0f)) continue;
       const double wanted = length / built_in_radius(u / length);
-      if (wanted < kStrayPull) continue;
+      if (wanted < blend(floor, u / length)) continue;
       double& least = most[static_cast<size_t>(cell_of(u / length))];
       least = std::min(least, wanted - (pull - wanted) * 0.25 * round);
       is_clear = false;
@@ -341,17 +413,20 @@ void HeadShape::narrow_neck(const Groom& groom) {
     std::vector<double> wanted = neck_width_;
     for (const glm::vec3& point : groom.rest_position_m) {
       const glm::dvec3 u = in_skull_radii(point);
-      const double length = glm::length(u);
-      if (!(length > 0.0) || length > kFurthest || u.y >= kNeckTop || !(distance_in_radii(u) < 0.0)) continue;
+      if (!(glm::length(u) <= kFurthest) || u.y >= kNeckTop) continue;
+      const glm::dvec3 v = before_the_fit(u), axis = neck_axis(v.y);
+      const glm::dvec3 offset = (v - axis) / neck_width_at(v);
+      const auto is_inside = [&](double width) {
+        return head_distance(glm::vec3(axis + width * offset)) < 0.0f;
+      };
       // By how much wider the point would have to lie to be on the skin.
       double low = 1.0, high = 1.0 / kThinnestNeck;
-      const glm::dvec3 axis = neck_axis(u.y);
-      if (distance_in_radii(axis + high * (u - axis)) < 0.0) continue;
+      if (!is_inside(low) || is_inside(high)) continue;
       for (int i = 0; i < 16; ++i) {
         const double middle = 0.5 * (low + high);
-        (distance_in_radii(axis + middle * (u - axis)) < 0.0 ? low : high) = middle;
+        (is_inside(middle) ? low : high) = middle;
       }
-      const glm::dvec2 at = neck_grid(u);
+      const glm::dvec2 at = neck_grid(v);
       for (int corner = 0; corner < 4; ++corner) {
         const size_t cell = neck_cell(static_cast<int>(at.x) + corner % 2,
                                       (static_cast<int>(at.y) + corner / 2) % kNeckColumns);
@@ -374,15 +449,18 @@ void HeadShape::narrow_neck(const Groom& groom) {
   }
 }
 
+/// Where the built-in head has the point, but for the widths.
+glm::dvec3 HeadShape::before_the_fit(const glm::dvec3& u) const {
+  glm::dvec3 v = u / pull_at(u);
+  v.y = before_the_drop(v.y);
+  return v;
+}
+
 /// About the distance of a point in (stretched) skull radii.
 double HeadShape::distance_in_radii(const glm::dvec3& u) const {
-  const double length = glm::length(u);
-  const double pull = length > 0.0 ? pull_at(u / length) : 1.0;
-  glm::dvec3 v = u / pull;
+  const glm::dvec3 v = before_the_fit(u), axis = neck_axis(v.y);
   // The width belongs to the place before it was made thin, which lies in the same direction from the axis.
-  const glm::dvec3 axis = neck_axis(v.y);
-  v = axis + (v - axis) / neck_width_at(v);
-  return static_cast<double>(head_distance(glm::vec3(v))) * pull;
+  return static_cast<double>(head_distance(glm::vec3(axis + (v - axis) / neck_width_at(v)))) * pull_at(u);
 }
 
 double HeadShape::distance_m(const glm::dvec3& point_m) const {
@@ -396,9 +474,8 @@ Mesh HeadShape::mesh() const {
     glm::dvec3 u(point);
     const glm::dvec3 axis = neck_axis(u.y);
     u = axis + (u - axis) * neck_width_at(u);
-    const double length = glm::length(u);
-    const double pull = length > 0.0 ? pull_at(u / length) : 1.0;
-    point = glm::vec3(center_m_ + radius_m_ * u * pull);
+    u.y = after_the_drop(u.y);
+    point = glm::vec3(center_m_ + radius_m_ * u * pull_at(u));
   }
   mesh.normal = compute_normals(mesh.position_m, mesh.triangle);
   return mesh;

@@ -15,16 +15,20 @@ constexpr uint32_t kCandidateStep = 3;   // every third of them gives a ball
 constexpr int kBallRounds = 32;          // of a ball that shrinks until it is inside
 constexpr double kTouching = 1e-3;       // of its radius: no longer shrunk
 constexpr double kMinSeparation = 0.87;  // cosine between its two touching points: nearer ones are noise
-constexpr double kSmallestShare = 0.02;  // of the mesh's size: smaller balls are not worth a test per vertex
+constexpr double kSmallestShare = 0.06;  // of the mesh's size: smaller balls are not worth a test per vertex
 constexpr double kHiddenShare =
     0.25;  // of the mesh's size: a surface that faces another one so near is inside
 constexpr uint64_t kMaxRayTests = 200'000'000;
 // A sample further away than this share of the mesh's size counts as if it were so far: noses and ears do not
 // draw the spheres away from where hair lies.
-constexpr double kFarShare = 0.03;
+constexpr double kFarShare = 0.10;
+/// Nearer than this is as good as there, m: below it the next sphere is worth more elsewhere.
+constexpr double kNearEnoughM = 0.002;
+constexpr int kChoiceRounds = 2;
 // Surface so far from all hair, m, counts e times less, and no less than the least weight.
 constexpr double kHairReachM = 0.04, kLeastWeight = 0.05;
 constexpr size_t kHairPoints = 10'000;  // more of them say nothing new
+constexpr double kReachSpareM = 0.02;   // samples stand that far apart, and strands stretch a little
 
 struct Sample {
   glm::dvec3 point;
@@ -143,13 +147,14 @@ std::vector<Sample> keep_outer(const std::vector<Sample>& samples, const Mesh& m
   return outer;
 }
 
-/// The largest ball that touches the surface at the sample from inside and holds no other sample.
-Ball ball_at(const Sample& sample, const std::vector<Sample>& samples, const PointTree& tree,
-             double largest_radius) {
+/// The largest ball that touches the surface at the sample from inside and holds no other of `points`, of
+/// which the first `sample_count` are samples and the others free vertices of the hair.
+Ball ball_at(const Sample& sample, const std::vector<glm::vec3>& points, size_t sample_count,
+             const PointTree& tree, double largest_radius) {
   Ball ball{sample.point - largest_radius * sample.normal, largest_radius};
   for (int round = 0; round < kBallRounds; ++round) {
-    const auto nearest = tree.nearest(glm::vec3(ball.center), 1);
-    const glm::dvec3 other = samples[nearest.front().index].point;
+    const uint32_t nearest = tree.nearest(glm::vec3(ball.center), 1).front().index;
+    const glm::dvec3 other(points[nearest]);
     const glm::dvec3 offset = sample.point - other;
     const double beside = glm::dot(sample.normal, offset);
     if (glm::length(other - ball.center) >= ball.radius * (1.0 - kTouching) || !(beside > 0.0)) break;
@@ -157,20 +162,58 @@ Ball ball_at(const Sample& sample, const std::vector<Sample>& samples, const Poi
     const glm::dvec3 center = sample.point - radius * sample.normal;
     if (radius >= ball.radius) break;
     const glm::dvec3 to_other = other - center;
-    if (glm::dot(to_other, sample.normal) > kMinSeparation * glm::length(to_other)) break;
+    const bool is_noise = glm::dot(to_other, sample.normal) > kMinSeparation * glm::length(to_other);
+    if (is_noise && nearest < sample_count) break;
     ball = {center, radius};
   }
   return ball;
 }
 
+/// Balls inside of the surface that hold no free vertex of the hair: those that touch the surface, and, where
+/// hair cuts these short, those about the middle that they would have without it.
+std::vector<Ball> candidates_of(const std::vector<Sample>& samples, const Groom& groom, double size) {
+  std::vector<glm::vec3> surface;
+  for (const Sample& sample : samples) surface.emplace_back(sample.point);
+  std::vector<glm::vec3> all = surface;
+  for (size_t i = 0; i < groom.rest_position_m.size(); ++i)
+    if (groom.pinned[i] == 0) all.push_back(groom.rest_position_m[i]);
+  const PointTree surface_tree(surface), all_tree(all);
+  std::vector<Ball> balls;
+  const auto add = [&](const Ball& ball) {
+    if (ball.radius >= kSmallestShare * size) balls.push_back(ball);
+  };
+  for (size_t i = 0; i < samples.size(); i += kCandidateStep) {
+    const Ball bald = ball_at(samples[i], surface, surface.size(), surface_tree, 0.5 * size);
+    const auto nearest = all_tree.nearest(glm::vec3(bald.center), 1).front();
+    const double clear =
+        nearest.index < surface.size() ? bald.radius : std::sqrt(double{nearest.distance_squared});
+    add({bald.center, std::min(bald.radius, clear)});
+    if (clear < bald.radius) add(ball_at(samples[i], all, surface.size(), all_tree, 0.5 * size));
+  }
+  return balls;
+}
+
+/// Whether any strand is long enough to come within kReachSpareM of a point.
+bool is_reached(const glm::dvec3& point, const std::vector<FittedSphere>& reach) {
+  return std::any_of(reach.begin(), reach.end(), [&](const FittedSphere& strand) {
+    const glm::dvec3 offset = point - glm::dvec3(strand.center_m);
+    const double radius = static_cast<double>(strand.radius_m) + kReachSpareM;
+    return glm::dot(offset, offset) <= radius * radius;
+  });
+}
+
 /// How much each sample counts.
-std::vector<double> weights_of(const std::vector<Sample>& samples, std::span<const glm::vec3> hair_m) {
-  std::vector<double> weights(samples.size(), 1.0);
-  if (hair_m.empty()) return weights;
+std::vector<double> weights_of(const std::vector<Sample>& samples, const Groom& groom) {
+  std::vector<double> weights(samples.size(), 0.0);
+  std::vector<FittedSphere> reach;  // about each root, as far as its strand
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
+    reach.push_back({groom.rest_position_m[groom.offset[strand]], groom.length_m(strand)});
   std::vector<glm::vec3> points;
+  const std::vector<glm::vec3>& hair_m = groom.rest_position_m;
   for (size_t i = 0; i < hair_m.size(); i += hair_m.size() / kHairPoints + 1) points.push_back(hair_m[i]);
   const PointTree tree(points);
   for (size_t i = 0; i < samples.size(); ++i) {
+    if (!is_reached(samples[i].point, reach)) continue;
     const double distance_m =
         std::sqrt(static_cast<double>(tree.nearest(glm::vec3(samples[i].point), 1).front().distance_squared));
     weights[i] = std::max(std::exp(-distance_m / kHairReachM), kLeastWeight);
@@ -178,53 +221,93 @@ std::vector<double> weights_of(const std::vector<Sample>& samples, std::span<con
   return weights;
 }
 
-}  // namespace
+/// Which balls together come nearest to the samples, by the sum of squared distances.
+class BallChoice {
+ public:
+  BallChoice(const std::vector<Ball>& balls, const std::vector<Sample>& samples, std::vector<double> weights,
+             double far_off)
+      : sample_count_(samples.size()), weights_(std::move(weights)), far_off_(static_cast<float>(far_off)) {
+    for (const Ball& ball : balls) {
+      auto& row = distance_.emplace_back();
+      for (const Sample& sample : samples)
+        row.push_back(static_cast<float>(
+            std::clamp(glm::length(sample.point - ball.center) - ball.radius - kNearEnoughM, 0.0, far_off)));
+    }
+  }
 
-std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, std::span<const glm::vec3> hair_m) {
+  /// Each in turn takes most off what is left; then each is looked for once more, among the others.
+  std::vector<size_t> choose(size_t count) const {
+    std::vector<size_t> chosen;
+    while (chosen.size() < count) {
+      const size_t best = best_beside(chosen, chosen.size());
+      if (best == distance_.size()) break;
+      chosen.push_back(best);
+    }
+    for (int round = 0; round < kChoiceRounds; ++round)
+      for (size_t i = 0; i < chosen.size(); ++i) {
+        const size_t best = best_beside(chosen, i);
+        if (best != distance_.size()) chosen[i] = best;
+      }
+    return chosen;
+  }
+
+ private:
+  /// The ball that takes most off what the chosen ones but for number `open` leave; none: as many as there
+  /// are.
+  size_t best_beside(const std::vector<size_t>& chosen, size_t open) const {
+    std::vector<float> left(sample_count_, far_off_);
+    for (size_t i = 0; i < chosen.size(); ++i)
+      for (size_t k = 0; i != open && k < sample_count_; ++k)
+        left[k] = std::min(left[k], distance_[chosen[i]][k]);
+    double best_gain = 0.0;
+    size_t best = distance_.size();
+    for (size_t ball = 0; ball < distance_.size(); ++ball) {
+      double gain = 0.0;
+      for (size_t k = 0; k < sample_count_; ++k) {
+        const auto before = static_cast<double>(left[k]);
+        const double after = std::min(before, static_cast<double>(distance_[ball][k]));
+        gain += weights_[k] * (before * before - after * after);
+      }
+      if (gain > best_gain) best_gain = gain, best = ball;
+    }
+    return best;
+  }
+
+  size_t sample_count_;
+  std::vector<double> weights_;
+  float far_off_;
+  std::vector<std::vector<float>> distance_;  // (ball x sample) held to what counts
+};
+
+/// The spheres for samples that count as much as `weigh` says of them.
+template <class Weigh>
+std::vector<FittedSphere> fit_weighed(const Mesh& mesh, size_t count, const Groom& groom,
+                                      const Weigh& weigh) {
   std::vector<FittedSphere> spheres;
   if (mesh.triangle.empty()) return spheres;
   const double size = size_of(mesh);
   const std::vector<Sample> samples = keep_outer(sample_surface(mesh), mesh, kHiddenShare * size);
   if (samples.empty() || !(size > 0.0)) return spheres;
-  std::vector<glm::vec3> points;
-  for (const Sample& sample : samples) points.emplace_back(sample.point);
-  const PointTree tree(points);
-  std::vector<Ball> candidates;
-  for (size_t i = 0; i < samples.size(); i += kCandidateStep) {
-    const Ball ball = ball_at(samples[i], samples, tree, 0.5 * size);
-    if (ball.radius >= kSmallestShare * size) candidates.push_back(ball);
-  }
-  const std::vector<double> weights = weights_of(samples, hair_m);
-  // Each choice takes most off the squared distances that are left.
-  const double far_off = kFarShare * size;
-  std::vector<double> left(samples.size(), far_off);
-  while (spheres.size() < count) {
-    double best_gain = 0.0;
-    const Ball* best = nullptr;
-    for (const Ball& ball : candidates) {
-      double gain = 0.0;
-      for (size_t i = 0; i < samples.size(); ++i) {
-        const double distance = std::max(glm::length(samples[i].point - ball.center) - ball.radius, 0.0);
-        if (distance < left[i]) gain += weights[i] * (left[i] * left[i] - distance * distance);
-      }
-      if (gain > best_gain) best_gain = gain, best = &ball;
-    }
-    if (best == nullptr) break;
-    for (size_t i = 0; i < samples.size(); ++i)
-      left[i] = std::min(left[i], std::max(glm::length(samples[i].point - best->center) - best->radius, 0.0));
-    spheres.push_back({glm::vec3(best->center), static_cast<float>(best->radius)});
+  const std::vector<Ball> candidates = candidates_of(samples, groom, size);
+  const BallChoice choice(candidates, samples, weigh(samples), kFarShare * size);
+  for (const size_t index : choice.choose(count)) {
+    const Ball& ball = candidates[index];
+    spheres.push_back({glm::vec3(ball.center), static_cast<float>(ball.radius)});
   }
   return spheres;
 }
 
-std::vector<FittedSphere> built_in_head_spheres(float radius_m) {
-  static const std::vector<FittedSphere> kOfUnitHead = fit_spheres(make_head(1.0f), kHeadSpheres);
-  std::vector<FittedSphere> spheres = kOfUnitHead;
-  for (FittedSphere& sphere : spheres) {
-    sphere.center_m *= radius_m;
-    sphere.radius_m *= radius_m;
-  }
-  return spheres;
+}  // namespace
+
+std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, const Groom& groom) {
+  return fit_weighed(mesh, count, groom,
+                     [&](const std::vector<Sample>& samples) { return weights_of(samples, groom); });
+}
+
+std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count) {
+  return fit_weighed(mesh, count, {}, [](const std::vector<Sample>& samples) {
+    return std::vector<double>(samples.size(), 1.0);
+  });
 }
 
 std::vector<FittedSphere> shrink_under(std::vector<FittedSphere> spheres, const Groom& groom) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "common/groom/groom.h"
@@ -19,12 +18,12 @@ inline constexpr float kSwallowedM = 0.002f;
 /// At most `count` spheres inside of a mesh that together come as near to its surface as greedy choice finds:
 /// balls that touch the surface at two points (Ma, Bae and Choi 2012, "3D medial axis point approximation
 /// using nearest neighbors and the normal field"). Parts of the surface that face another part nearby, such
-/// as the inside of a mouth or the back of an eye, do not count, and what is far from all of `hair_m` counts
-/// little; without hair all counts alike. Empty for a mesh without area; deterministic.
-std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, std::span<const glm::vec3> hair_m = {});
-
-/// The spheres of make_head(radius_m), without regard to hair; fitted once and kept.
-std::vector<FittedSphere> built_in_head_spheres(float radius_m);
+/// as the inside of a mouth or the back of an eye, do not count, nor does what no strand of the groom is long
+/// enough to reach; what is far from all of its hair counts little. Empty for a mesh without area;
+/// deterministic.
+std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, const Groom& groom);
+/// The same without hair: all of the surface counts alike.
+std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count);
 
 /// The spheres, each made smaller until no free vertex of the groom lies inside of it and no pinned one
 /// deeper than kSwallowedM; those of which nothing is left are gone.

@@ -71,7 +71,7 @@ class Grower {
       const glm::vec3 here = strand.curve.back();
       direction = unit_or(glm::mix(direction, combed_direction(here, strand.character), i == 1 ? 0.0f : turn),
                           direction);
-      const glm::vec3 next = keep_outside(here + step_ * direction, arc_at(i), strand.character);
+      const glm::vec3 next = next_point(here, direction, i, strand.character);
       direction = unit_or(next - here, direction);
       strand.curve.push_back(next);
     }
@@ -110,7 +110,7 @@ class Grower {
   /// length.
   void append_vertices(GrownStrand& strand, std::vector<glm::vec3>& positions_m) const {
     for (uint32_t i = 1; i <= step_count_; ++i) {
-      strand.curve[i] = keep_outside(strand.curve[i], arc_at(i), strand.character);
+      strand.curve[i] = kept_outside(strand.curve[i], i, strand.character);
     }
     const float vary = 2.0f * unit_float(mix_u32(strand.hash + 13)) - 1.0f;
     const float length_m = options_.length_m * (1.0f + options_.length_variation * vary);
@@ -119,13 +119,40 @@ class Grower {
     positions_m.push_back(skull_.center_m + skull_.radius_m * here);
     size_t segment = 0;
     for (uint32_t vertex = 1; vertex < options_.vertex_count; ++vertex) {
-      here = walk(strand.curve, here, chord, segment);
+      here = beside_bust(here, walk(strand.curve, here, chord, segment), strand.character);
       positions_m.push_back(skull_.center_m + skull_.radius_m * here);
     }
   }
 
  private:
   float arc_at(uint32_t i) const { return step_ * static_cast<float>(i); }
+
+  /// One step on. Where the bust stops it, it goes on as far along the skin: the curve gets no shorter.
+  glm::vec3 next_point(const glm::vec3& here, const glm::vec3& direction, uint32_t i,
+                       const StrandCharacter& character) const {
+    const glm::vec3 next = keep_outside(here + step_ * direction, arc_at(i), character);
+    if (!options_.has_bust) return next;
+    const glm::vec3 kept = keep_off_bust(next, character);
+    return kept == next ? next : keep_off_bust(here + step_ * unit_or(kept - here, direction), character);
+  }
+
+  /// A vertex as far from the one before it, turned out of the bust where the chord cuts across a shoulder.
+  glm::vec3 beside_bust(const glm::vec3& before, const glm::vec3& point,
+                        const StrandCharacter& character) const {
+    constexpr int kTurns = 8;
+    glm::vec3 here = point;
+    for (int turn = 0; options_.has_bust && turn < kTurns; ++turn) {
+      const glm::vec3 kept = keep_off_bust(here, character);
+      if (kept == here) break;
+      here = before + glm::distance(before, point) * unit_or(kept - before, point - before);
+    }
+    return here;
+  }
+
+  glm::vec3 kept_outside(const glm::vec3& point, uint32_t i, const StrandCharacter& character) const {
+    const glm::vec3 outside = keep_outside(point, arc_at(i), character);
+    return options_.has_bust ? keep_off_bust(outside, character) : outside;
+  }
 
   static glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& fallback) {
     const float squared = glm::dot(v, v);

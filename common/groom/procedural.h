@@ -22,6 +22,7 @@ struct ProceduralGroomOptions {
   float curl_radius_m = 0.004f;    // 0 = straight, at most kMaxCurlRadiusM
   float curl_turns = 3.0f;         // along the strand, at most kMaxCurlTurns
   uint32_t seed = 1;
+  bool has_bust = false;  // hair that is long enough lies on the built-in head's shoulders
 };
 
 /// Exactly strand_count strands, roots spread evenly over the scalp by area, all segments of a strand equally

@@ -22,6 +22,7 @@ constexpr float kMargin = 1.1f;
 // Strands are drawn alone and as wide as a pixel: the picture shows where they are, not how they look.
 constexpr float kPixelsPerStrand = 0.6f;
 constexpr uint32_t kSphereRings = 12;
+constexpr float kBelowHairM = 0.06f;  // so much of the head is shown below the hair
 
 /// From the front, from the left side of the head, from above.
 constexpr std::array kDirections = {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)};
@@ -34,10 +35,13 @@ struct Box {
   }
 };
 
+/// The hair and the head; of neck and shoulders only what is beside the hair.
 Box box_of(const SceneContent& content, const Mesh& head) {
   Box box{content.groom.rest_position_m.front(), content.groom.rest_position_m.front()};
   for (const glm::vec3& point : content.groom.rest_position_m) box.add(point);
-  for (const glm::vec3& point : head.position_m) box.add(point);
+  const float lowest_m = box.low.y - kBelowHairM;
+  for (const glm::vec3& point : head.position_m)
+    if (point.y >= lowest_m) box.add(point);
   return box;
 }
 

@@ -29,6 +29,8 @@ SceneDesc scene_for(const RecordingDesc& desc) {
   groom.vertex_count = desc.size.vertex_count;
   if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
   scene.step_rate_hz = 1.0 / kStreamFrameS;
+  // The skull alone: hair hangs and swings beside it.
+  scene.head.is_visible = false;
   scene.colliders = {{glm::vec3(0.0f), kSkullRadiusM}};
   return scene;
 }

@@ -53,6 +53,8 @@ Result<Groom> grow_hair_of(const SceneDesc& scene) {
   options.curl_radius_m = procedural.curl_radius_m;
   options.curl_turns = procedural.curl_turns;
   options.seed = procedural.seed;
+  // Where no head is seen or felt hair just hangs.
+  options.has_bust = scene.head.is_visible || (scene.colliders.empty() && scene.has_auto_collider);
   // Grown strands come in prefix order already.
   return grow_groom(make_scalp_cap(head_center(scene.head), radius_m, kScalpVertices), options);
 }
@@ -82,14 +84,6 @@ struct Head {
   std::vector<FittedSphere> spheres;
 };
 
-/// The built-in head as it is.
-Head make_head_at(const glm::vec3& center_m, float radius_m) {
-  Head head{make_head(radius_m), built_in_head_spheres(radius_m)};
-  for (glm::vec3& position : head.mesh.position_m) position += center_m;
-  for (FittedSphere& sphere : head.spheres) sphere.center_m += center_m;
-  return head;
-}
-
 /// The head under the hair, drawn or not.
 Result<Head> make_head_under(const SceneDesc& scene, const Groom& groom, const GroomPlacement& placement) {
   const HeadDesc& desc = scene.head;
@@ -97,15 +91,17 @@ Result<Head> make_head_under(const SceneDesc& scene, const Groom& groom, const G
   if (!desc.mesh_path.empty()) {
     ASSIGN_OR_RETURN(head.mesh, load_head_meshes(desc, placement));
   } else if (!std::holds_alternative<FileGroomDesc>(scene.groom)) {
-    return make_head_at(head_center(desc), desc.radius_m > 0.0f ? desc.radius_m : kDefaultHeadRadiusM);
+    const FittedSphere skull{head_center(desc), desc.radius_m > 0.0f ? desc.radius_m : kDefaultHeadRadiusM};
+    head.mesh = HeadShape(groom, skull, HeadFit::BustOnly).mesh();
   } else {
     // Under a groom from a file the built-in head is fitted, but for what the scene says of it.
     FittedSphere fitted = fit_head(groom);
     if (desc.has_center) fitted.center_m = desc.center_m;
-    if (desc.radius_m > 0.0f) return make_head_at(fitted.center_m, desc.radius_m);
-    head.mesh = HeadShape(groom, fitted).mesh();
+    const HeadFit fit = desc.radius_m > 0.0f ? HeadFit::BustOnly : HeadFit::Whole;
+    if (fit == HeadFit::BustOnly) fitted.radius_m = desc.radius_m;
+    head.mesh = HeadShape(groom, fitted, fit).mesh();
   }
-  head.spheres = fit_spheres(head.mesh, kHeadSpheres, groom.rest_position_m);
+  head.spheres = fit_spheres(head.mesh, kHeadSpheres, groom);
   return head;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common/groom/head_field.h"
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
@@ -130,6 +131,75 @@ TEST_F(GroomAtRest, SintelsHair) {
 
 TEST_F(GroomAtRest, TheMohawk) {
   expect_rest_of("mohawk", "Ratboy_mohawk.tfx");
+}
+
+/// Strands that stand out level from the sides of the head, on which they fall.
+Groom level_hair() {
+  constexpr uint32_t kStrands = 48, kVertices = 24;
+  constexpr float kLengthM = 0.34f, kRadiusM = 0.096f;
+  std::vector<std::vector<glm::vec3>> strands;
+  for (uint32_t s = 0; s < kStrands; ++s) {
+    const float side = s % 2 == 0 ? 1.0f : -1.0f;
+    const float angle = 0.5f * static_cast<float>(s / 2) / (0.5f * kStrands) - 0.1f;  // behind the ear
+    const glm::vec3 out(side * std::cos(angle), 0.0f, -std::sin(angle));
+    std::vector<glm::vec3> strand;
+    for (uint32_t i = 0; i < kVertices; ++i)
+      strand.push_back(out * (kRadiusM + kLengthM * static_cast<float>(i) / (kVertices - 1)));
+    strands.push_back(strand);
+  }
+  return groom_from(strands, Pinning::RootPair);
+}
+
+/// How deep the deepest vertex lies in the built-in neck and shoulders, m.
+double deepest_in_bust_m(const SolverState& state, const glm::dquat& world_from_head) {
+  constexpr float kRadiusM = 0.095f;
+  double deepest_m = 0.0;
+  for (const glm::vec3& point : state.position_m) {
+    const glm::vec3 in_head(glm::conjugate(world_from_head) * glm::dvec3(point));
+    deepest_m = std::fmax(deepest_m, static_cast<double>(-kRadiusM * bust_distance(in_head / kRadiusM)));
+  }
+  return deepest_m;
+}
+
+// Hair longer than the way to the shoulders lies on them when it has fallen, and does not hang through them;
+// nor do they cut into it while the head turns by 60 degrees in half a second, and nods.
+TEST_F(GroomAtRest, LongHairFallsOntoTheShoulders) {
+  SceneDesc scene = built_in_scene();
+  const SceneContent content = load_scene_content(scene).value();
+  const auto deepest_m = [&](const std::vector<SphereCollider>& colliders) {
+    const Groom groom = level_hair();
+    const SolverParameters limp = {
+        {"style_stiffness_per_s2", 0.0}, {"sag_free", 0.0}, {"air_drag_per_s", 4.0}};
+    auto solver = make({*find_solver("dftl"), true}, groom, limp);
+    StepBuilder builder(scene, colliders);
+    SceneFeatures still;
+    still.has_colliders = true;
+    for (int step = 1; step <= 4 * kSteps; ++step)
+      for (const StepInput& substep : builder.build(InputFrame{}, still, step / scene.step_rate_hz).substeps)
+        solver->substep(substep);
+    double lowest_m = 0.0;
+    for (const glm::vec3& point : read(*solver).position_m)
+      lowest_m = std::fmin(lowest_m, static_cast<double>(point.y));
+    EXPECT_LT(lowest_m, -0.2) << "it fell";
+    double deepest = deepest_in_bust_m(read(*solver), glm::dquat(1, 0, 0, 0));
+    InputFrame turn;
+    turn.has_motion = true;
+    for (int step = 1; step <= kSteps; ++step) {
+      const double turned_rad = 1.05 * std::fmin(step / 30.0, 1.0), nodded_rad = 0.2 * std::sin(0.1 * step);
+      turn.world_from_head.rotation =
+          glm::angleAxis(turned_rad, glm::dvec3(0, 1, 0)) * glm::angleAxis(nodded_rad, glm::dvec3(1, 0, 0));
+      const double end_s = (4 * kSteps + step) / scene.step_rate_hz;
+      for (const StepInput& substep : builder.build(turn, still, end_s).substeps) solver->substep(substep);
+      deepest = std::fmax(deepest, deepest_in_bust_m(read(*solver), turn.world_from_head.rotation));
+    }
+    return deepest;
+  };
+  EXPECT_LT(deepest_m(content.colliders), 0.02);
+  // As it was: the skull and the neck alone.
+  std::vector<SphereCollider> head;
+  for (const SphereCollider& sphere : content.colliders)
+    if (std::abs(sphere.center_m.x) < 0.02f && sphere.center_m.y > -0.2f) head.push_back(sphere);
+  EXPECT_GT(deepest_m(head), 0.03);
 }
 
 }  // namespace

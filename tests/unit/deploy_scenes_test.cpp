@@ -120,7 +120,7 @@ TEST(DeployScenes, TheMohawkFitsAHumanHead) {
   EXPECT_NEAR(skull.radius_m, 0.095f, 0.005f) << "an adult head";
   EXPECT_TRUE(scene.colliders.empty() && scene.has_auto_collider) << "what is drawn is what collides";
   // The head that is drawn lies under the roots.
-  const HeadShape head(groom, fit_head(groom));
+  const HeadShape head(groom, fit_head(groom), HeadFit::Whole);
   for (const glm::vec3& root : crest) {
     EXPECT_GT(head.distance_m(root), -0.004);
     EXPECT_LT(head.distance_m(root), 0.02);

@@ -154,21 +154,30 @@ TEST(Head, IsClosedSmoothAndOfHumanSize) {
   constexpr float kRadiusM = 0.095f;
   const Mesh head = make_head(kRadiusM);
   EXPECT_GE(head.triangle.size(), 5'000u);
-  EXPECT_LE(head.triangle.size(), 20'000u);
+  EXPECT_LE(head.triangle.size(), 35'000u);
   const EdgeCount edges = count_edges(head);
   EXPECT_EQ(edges.open, 0u);
   EXPECT_LE(edges.repeated, head.triangle.size() / 500);
-  glm::vec3 low(1.0f), high(-1.0f);
+  struct Box {
+    glm::vec3 low{1.0f}, high{-1.0f};
+  } head_box, neck_box, bust_box;
   for (size_t i = 0; i < head.position_m.size(); ++i) {
     ASSERT_NEAR(glm::length(head.normal[i]), 1.0f, 1e-4f);
-    low = glm::min(low, head.position_m[i]);
-    high = glm::max(high, head.position_m[i]);
+    const glm::vec3& point = head.position_m[i];
+    const float height = point.y / kRadiusM;
+    Box& box = height > -1.4f ? head_box : (height > -1.7f ? neck_box : bust_box);
+    box.low = glm::min(box.low, point);
+    box.high = glm::max(box.high, point);
   }
-  EXPECT_NEAR(high.y, kRadiusM, 0.03f * kRadiusM);
-  EXPECT_NEAR(low.x, -high.x, 1e-3f * kRadiusM);  // symmetric
-  EXPECT_GT(high.z, 1.1f * kRadiusM);             // the nose
-  EXPECT_GT(low.z, -1.05f * kRadiusM);            // nothing behind the cranium
-  EXPECT_LT(low.y, -1.8f * kRadiusM);             // a neck
+  EXPECT_NEAR(head_box.high.y, kRadiusM, 0.03f * kRadiusM);
+  EXPECT_NEAR(head_box.low.x, -head_box.high.x, 1e-3f * kRadiusM);  // symmetric
+  EXPECT_NEAR(bust_box.low.x, -bust_box.high.x, 1e-3f * kRadiusM);
+  EXPECT_GT(head_box.high.z, 1.1f * kRadiusM);   // the nose
+  EXPECT_GT(head_box.low.z, -1.05f * kRadiusM);  // nothing behind the cranium
+  EXPECT_LT(neck_box.high.x, 0.8f * kRadiusM);   // a neck
+  // Shoulders of an adult: 0.36 m apart beside a head of 0.19 m.
+  EXPECT_NEAR(bust_box.high.x, 1.9f * kRadiusM, 0.2f * kRadiusM);
+  EXPECT_LT(bust_box.low.y, -3.5f * kRadiusM);
   double volume = 0.0;
   size_t agreeing = 0;
   for (const auto& t : head.triangle) {
@@ -180,7 +189,7 @@ TEST(Head, IsClosedSmoothAndOfHumanSize) {
   }
   // Outward: a cranium of this radius alone holds 3.6 litres.
   EXPECT_GT(volume, 3.5e-3);
-  EXPECT_LT(volume, 8e-3);
+  EXPECT_LT(volume, 20e-3);
   EXPECT_GE(agreeing, head.triangle.size() * 995 / 1000);
 }
 
@@ -195,6 +204,34 @@ TEST(Head, FitsUnderTheScalpCap) {
         std::abs(point.x) > 0.93f && std::abs(point.y + 0.28f) < 0.3f && std::abs(point.z) < 0.25f;
     ASSERT_TRUE(nearest > 0.03f || radius < 1.0f || is_ear) << point.x << " " << point.y << " " << point.z;
   }
+}
+
+/// How far forward the profile lies at a height; both in cranium radii.
+float profile_at(const Mesh& head, float height) {
+  float furthest = -10.0f;
+  for (const auto& t : head.triangle)
+    for (int k = 0; k < 3; ++k) {
+      const glm::vec3 a = head.position_m[t[k]], b = head.position_m[t[(k + 1) % 3]];
+      if (std::abs(a.x) > 0.05f || (a.y - height) * (b.y - height) > 0.0f || a.y == b.y) continue;
+      furthest = std::max(furthest, glm::mix(a.z, b.z, (height - a.y) / (b.y - a.y)));
+    }
+  return furthest;
+}
+
+// Down the middle of the face: out and in as on a person.
+TEST(Head, HasTheProfileOfAFace) {
+  const Mesh head = make_head(1.0f);
+  const float brow = profile_at(head, -0.02f), root_of_nose = profile_at(head, -0.14f),
+              nose = profile_at(head, -0.55f), under_nose = profile_at(head, -0.72f),
+              lips = profile_at(head, -0.95f), dip = profile_at(head, -1.07f),
+              chin = profile_at(head, -1.24f), throat = profile_at(head, -1.55f);
+  EXPECT_LT(root_of_nose, brow);
+  EXPECT_GT(nose, brow + 0.15f);
+  EXPECT_LT(under_nose, nose - 0.12f);
+  EXPECT_GT(lips, dip + 0.03f);
+  EXPECT_GT(chin, dip);
+  EXPECT_NEAR(chin, lips, 0.12f) << "neither a receding nor a jutting chin";
+  EXPECT_LT(throat, chin - 0.4f);
 }
 
 TEST(Head, ScalesWithItsRadius) {

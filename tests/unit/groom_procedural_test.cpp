@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/groom/head_field.h"
 #include "common/groom/procedural.h"
 #include "common/groom/scalp_roots.h"
 #include "common/math/point_tree.h"
@@ -133,6 +134,35 @@ TEST(Procedural, HangsDownAndLeavesTheFaceFree) {
       // Hair of 28 cm from anywhere on the scalp reaches below the ears when it hangs.
       EXPECT_GT(below_head, groom->strand_count() * 95 / 100);
     }
+  }
+}
+
+// On the built-in bust no vertex lies inside of it, some lie on it, and the strands are what they were.
+TEST(Procedural, LongHairLiesOnTheShoulders) {
+  for (const float length_m : {0.28f, 0.6f}) {
+    ProceduralGroomOptions options;
+    options.length_m = length_m;
+    options.length_variation = 0.0f;
+    const auto depth_counts = [&](const Groom& groom) {
+      struct {
+        size_t inside = 0, on_it = 0;
+      } count;
+      for (const glm::vec3& point : groom.rest_position_m) {
+        const float outside = bust_distance(point / kRadiusM);
+        count.inside += outside < 0.0f ? 1 : 0;
+        count.on_it += outside >= 0.0f && outside < 0.2f && point.y < -2.0f * kRadiusM ? 1 : 0;
+      }
+      return count;
+    };
+    const auto through = grow_groom(scalp(), options);
+    options.has_bust = true;
+    const auto groom = grow_groom(scalp(), options);
+    ASSERT_TRUE(groom && through);
+    EXPECT_GT(depth_counts(*through).inside, 500u);
+    EXPECT_EQ(depth_counts(*groom).inside, 0u) << length_m;
+    EXPECT_GT(depth_counts(*groom).on_it, 500u) << length_m;
+    for (uint32_t strand = 0; strand < groom->strand_count(); ++strand)
+      ASSERT_NEAR(groom->length_m(strand), length_m, 2e-4f) << strand;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -58,8 +59,8 @@ struct FittedHead {
 
 FittedHead head_under(const Groom& groom) {
   FittedHead head;
-  head.mesh = HeadShape(groom, fit_head(groom)).mesh();
-  head.spheres = shrink_under(fit_spheres(head.mesh, kHeadSpheres, groom.rest_position_m), groom);
+  head.mesh = HeadShape(groom, fit_head(groom), HeadFit::Whole).mesh();
+  head.spheres = shrink_under(fit_spheres(head.mesh, kHeadSpheres, groom), groom);
   head.measure = measure_head(head.mesh, head.spheres, groom);
   return head;
 }
@@ -148,6 +149,88 @@ TEST(HeadShape, TheSameGroomGivesTheSameHead) {
   for (size_t i = 0; i < a.spheres.size(); ++i) EXPECT_EQ(a.spheres[i].center_m, b.spheres[i].center_m);
 }
 
+// Hair that ends under the skin, as that of a ponytail under its band, does not pull the skin off the roots;
+// what collides gives way to it.
+TEST(HeadShape, TipsThatEndInTheHeadLeaveTheRootsOnTheSkin) {
+  Groom groom = full_head();
+  for (uint32_t strand = 0; strand < groom.strand_count(); strand += 5) {
+    const uint32_t tip = groom.offset[strand + 1] - 1;
+    const glm::vec3 root = groom.rest_position_m[groom.offset[strand]];
+    groom.rest_position_m[tip] = 0.85f * glm::length(root) * glm::normalize(root + glm::vec3(0.02f, 0, 0));
+  }
+  const FittedHead head = head_under(groom);
+  expect_head(head, "buried tips");
+  EXPECT_LT(head.measure.root_median_m, 0.003);
+  EXPECT_LT(head.measure.root_most_m, 0.006);
+}
+
+/// Hair that hangs from the built-in scalp, on the built-in shoulders or through where they are.
+Groom hanging(float length_m, bool has_bust) {
+  ProceduralGroomOptions options;
+  options.strand_count = 400;
+  options.length_m = length_m;
+  options.has_bust = has_bust;
+  return grow_groom(make_scalp_cap(glm::vec3(0.0f), kRadiusM, 500), options).value();
+}
+
+FittedHead bust_under(const Groom& groom) {
+  FittedHead head;
+  head.mesh = HeadShape(groom, {glm::vec3(0.0f), kRadiusM}, HeadFit::BustOnly).mesh();
+  head.spheres = shrink_under(fit_spheres(head.mesh, kHeadSpheres, groom), groom);
+  head.measure = measure_head(head.mesh, head.spheres, groom);
+  return head;
+}
+
+/// Share of the vertices deeper than 1 mm in the drawn head.
+double share_inside(const Groom& groom, const HeadShape& head) {
+  double inside = 0.0;
+  for (const glm::vec3& point : groom.rest_position_m)
+    inside += groom.pinned[&point - groom.rest_position_m.data()] == 0 && head.distance_m(point) < -0.001
+                  ? 1.0
+                  : 0.0;
+  return inside / static_cast<double>(groom.rest_position_m.size());
+}
+
+TEST(Shoulders, LieUnderHairThatWasGrownOnThem) {
+  const Groom groom = hanging(0.35f, true);
+  const FittedHead head = bust_under(groom);
+  expect_head(head, "on the shoulders");
+  const Mesh bald = HeadShape(Groom{}, {glm::vec3(0.0f), kRadiusM}, HeadFit::BustOnly).mesh();
+  float moved_m = 0.0f;
+  for (size_t i = 0; i < bald.position_m.size(); ++i)
+    moved_m = std::max(moved_m, glm::distance(head.mesh.position_m[i], bald.position_m[i]));
+  EXPECT_LT(moved_m, 0.003f) << "hardly anything has to give way";
+  EXPECT_LT(head.measure.sphere_most_m, 0.014) << "what is drawn under hair is what collides";
+}
+
+// Hair that passes where shoulders would be comes from a person with others: these are lower and narrower.
+TEST(Shoulders, GiveWayToHairThatPassesThem) {
+  const Groom groom = hanging(0.35f, false);
+  const FittedSphere skull{glm::vec3(0.0f), kRadiusM};
+  const double as_it_is = share_inside(groom, HeadShape(Groom{}, skull, HeadFit::BustOnly));
+  EXPECT_GT(as_it_is, 0.05);
+  EXPECT_LT(share_inside(groom, HeadShape(groom, skull, HeadFit::BustOnly)), 0.25 * as_it_is);
+  expect_head(bust_under(groom), "through the shoulders");
+}
+
+TEST(Shoulders, CollideOnlyWithHairThatReachesThem) {
+  const auto lowest_m = [](const std::vector<FittedSphere>& spheres) {
+    float low = 1.0f;
+    for (const FittedSphere& sphere : spheres) low = std::min(low, sphere.center_m.y - sphere.radius_m);
+    return low;
+  };
+  const FittedHead under_short = bust_under(hanging(0.06f, true)),
+                   under_long = bust_under(hanging(0.35f, true));
+  EXPECT_GT(lowest_m(under_short.spheres), -0.2f) << "the neck at most";
+  EXPECT_LT(lowest_m(under_long.spheres), -0.3f);
+  EXPECT_TRUE(std::any_of(under_long.spheres.begin(), under_long.spheres.end(),
+                          [](const FittedSphere& sphere) { return std::abs(sphere.center_m.x) > 0.1f; }));
+  // Of hair that reaches no more than the skin about its own roots only that collides: fewer spheres, which
+  // cost less.
+  const Groom tuft = picked(hanging(0.02f, true), [](const glm::vec3& p) { return p.y > 0.085f; });
+  EXPECT_LE(bust_under(tuft).spheres.size(), 4u);
+}
+
 TEST(HeadSpheres, LieInsideTheMeshAndNearIt) {
   const Mesh head = make_head(0.095f);
   const std::vector<FittedSphere> spheres = fit_spheres(head, kHeadSpheres);
@@ -159,7 +242,7 @@ TEST(HeadSpheres, LieInsideTheMeshAndNearIt) {
     EXPECT_GT(distance_m, -0.006);
     sum_m += std::abs(distance_m);
   }
-  EXPECT_LT(sum_m / static_cast<double>(head.position_m.size()), 0.008);
+  EXPECT_LT(sum_m / static_cast<double>(head.position_m.size()), 0.010);
   // Triangles that face inwards make no difference.
   Mesh turned = head;
   for (glm::uvec3& triangle : turned.triangle) std::swap(triangle.x, triangle.y);
