@@ -25,6 +25,9 @@ constexpr double kFarShare = 0.10;
 /// Nearer than this is as good as there, m: below it the next sphere is worth more elsewhere.
 constexpr double kNearEnoughM = 0.002;
 constexpr int kChoiceRounds = 2;
+/// Spheres that fill a mesh from within lie below it between where they touch it, and hair that lies there
+/// would be covered by the skin: where no hair as loaded forbids it they come out of it by so much.
+constexpr float kPlumpM = 0.006f;
 // Surface so far from all hair, m, counts e times less, and no less than the least weight.
 constexpr double kHairReachM = 0.04, kLeastWeight = 0.05;
 constexpr size_t kHairPoints = 10'000;  // more of them say nothing new
@@ -321,7 +324,7 @@ std::vector<FittedSphere> shrink_under(std::vector<FittedSphere> spheres, const 
     }
     const double largest = std::min(std::sqrt(nearest_squared[0]),
                                     std::sqrt(nearest_squared[1]) + static_cast<double>(kSwallowedM));
-    sphere.radius_m = std::min(sphere.radius_m, static_cast<float>(largest));
+    sphere.radius_m = std::min(sphere.radius_m + kPlumpM, static_cast<float>(largest));
   }
   std::erase_if(spheres, [](const FittedSphere& sphere) { return sphere.radius_m <= 2.0f * kSwallowedM; });
   return spheres;

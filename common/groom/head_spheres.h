@@ -25,8 +25,9 @@ std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count, const Groo
 /// The same without hair: all of the surface counts alike.
 std::vector<FittedSphere> fit_spheres(const Mesh& mesh, size_t count);
 
-/// The spheres, each made smaller until no free vertex of the groom lies inside of it and no pinned one
-/// deeper than kSwallowedM; those of which nothing is left are gone.
+/// The spheres, each as much larger as makes up for what lies between them, and smaller until no free vertex
+/// of the groom lies inside of it and no pinned one deeper than kSwallowedM; those of which nothing is left
+/// are gone.
 std::vector<FittedSphere> shrink_under(std::vector<FittedSphere> spheres, const Groom& groom);
 
 /// How far a point lies outside of all spheres, m; negative inside of one. Huge without spheres.

@@ -15,6 +15,7 @@
 #include "common/groom/head_measure.h"
 #include "common/groom/head_spheres.h"
 #include "common/groom/procedural.h"
+#include "common/math/point_tree.h"
 #include "tests/support/groom_files.h"
 
 namespace strandcast {
@@ -201,6 +202,16 @@ TEST(Shoulders, LieUnderHairThatWasGrownOnThem) {
     moved_m = std::max(moved_m, glm::distance(head.mesh.position_m[i], bald.position_m[i]));
   EXPECT_LT(moved_m, 0.003f) << "hardly anything has to give way";
   EXPECT_LT(head.measure.sphere_most_m, 0.014) << "what is drawn under hair is what collides";
+  // Where hair lies on the bust it does not sink under the skin before something holds it.
+  const PointTree hair(groom.rest_position_m);
+  double under_hair = 0.0, uncovered = 0.0;
+  for (const glm::vec3& point : head.mesh.position_m) {
+    if (point.y > -1.5f * kRadiusM || hair.nearest(point, 1).front().distance_squared > 1e-4f) continue;
+    under_hair += 1.0;
+    uncovered += distance_to_spheres_m(head.spheres, point) > 0.004 ? 1.0 : 0.0;
+  }
+  ASSERT_GT(under_hair, 300.0);
+  EXPECT_LT(uncovered / under_hair, 0.15);
 }
 
 // Hair that passes where shoulders would be comes from a person with others: these are lower and narrower.
