@@ -160,7 +160,7 @@ Groom MotionSet::groom(uint32_t vertex_count, uint32_t strand_count) const {
 RunPhysics MotionSet::physics() const {
   RunPhysics physics;
   physics.length_m = kLengthM;
-  // As direct_rod ships, and the damping of its material.
+  // The damping is that of direct_rod's material as it ships.
   physics.given = {{"air_drag_per_s", kAirDragPerS}, {"bending_damping_s", 2e-3}};
   if (options_.hair != MotionHair::Straight) physics.given["sag_free"] = 0.0;
   return physics;

@@ -46,7 +46,7 @@ class MotionSet {
  public:
   static constexpr double kSampleS = 1.0 / 30.0;
   static constexpr double kLengthM = 0.25;
-  static constexpr double kAirDragPerS = 4.0;    // as direct_rod ships: hair in air
+  static constexpr double kAirDragPerS = 4.0;    // between a wisp and a single hair
   static constexpr double kFrameS = 1.0 / 60.0;  // times are given per strand and frame of this length
 
   static Result<MotionSet> make(const MotionSetOptions& options);

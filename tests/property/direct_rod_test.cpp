@@ -4,6 +4,7 @@
 #include <complex>
 
 #include "server/report/swing_fit.h"
+#include "server/sim/hair_constants.h"
 #include "tests/property/direct_rod_fixture.h"
 #include "tests/support/claims.h"
 
@@ -255,6 +256,29 @@ TEST_F(RodMechanics, StretchStaysBelowAHundredthOfAPercentAtEveryMoment) {
     }
     EXPECT_LE(worst, claims::kShakeStretch);
     fmt::print("{}: largest stretch {:.1e}\n", is_gpu ? "GPU" : "double", worst);
+  }
+}
+
+// As it ships hair moves in the air as a wisp does, not as single hairs: in a light breeze it leans, and does
+// not fly.
+TEST_F(RodMechanics, HairLeansInABreezeAsAWispDoes) {
+  constexpr double kBreezeMps = 1.5, kAirKgpm3 = 1.2, kWispM = 0.005, kHairShare = 0.1, kCylinderDrag = 1.0;
+  const double wisp_per_s = 2.0 * kCylinderDrag * kAirKgpm3 * kBreezeMps /
+                            (std::numbers::pi * kHairShare * HairConstants{}.density_kgpm3 * kWispM);
+  const double drag_per_s = complete_parameters(**find_solver("direct_rod"), {})->at("air_drag_per_s");
+  EXPECT_NEAR(drag_per_s, wisp_per_s, 0.3);
+  const double lean_rad = std::atan(drag_per_s * kBreezeMps / kGravityMps2);  // of a chain, at rest
+  for (const bool is_gpu : {true, false}) {
+    auto rod = make_rod(is_gpu, straight_strand(32, {0.0, -1.0, 0.0}), {});
+    StepInput input;
+    input.wind_mps = {kBreezeMps, 0.0, 0.0};
+    for (int step = 0; step < 900; ++step) rod->substep(input);
+    const SolverState state = read(*rod);
+    const glm::dvec3 way = glm::dvec3(state.position_m.back()) - glm::dvec3(state.position_m.front());
+    const double leaned_rad = std::atan2(way.x, -way.y);
+    EXPECT_LT(leaned_rad, lean_rad);
+    EXPECT_GT(leaned_rad, 0.8 * lean_rad) << "but for the clamp";
+    EXPECT_LT(leaned_rad, 20.0 * std::numbers::pi / 180.0);
   }
 }
 

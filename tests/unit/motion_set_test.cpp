@@ -52,7 +52,8 @@ TEST(MotionSet, StrandsHangStraightWithTheirLength) {
   }
 }
 
-// What the page says of the hair: that of direct_rod as it ships, in every material.
+// What the page says of the hair, in every material: in air that moves it more than a lock, and damped as
+// direct_rod ships.
 TEST(MotionSet, HairIsInAir) {
   const auto motion = MotionSet::make({});
   const SolverRow& rod = **find_solver("direct_rod");
@@ -63,14 +64,14 @@ TEST(MotionSet, HairIsInAir) {
     for (const Material material : {Material::Hair, Material::Limp, Material::AsShipped}) {
       const auto parameters = run_parameters({&row, material, 16, 240.0}, motion->physics());
       ASSERT_TRUE(parameters) << row.name << ": " << parameters.error().to_string();
-      EXPECT_EQ(parameters->at("air_drag_per_s"), shipped.at("air_drag_per_s")) << row.name;
+      EXPECT_EQ(parameters->at("air_drag_per_s"), MotionSet::kAirDragPerS) << row.name;
     }
     ++rows_in_air;
   }
   EXPECT_GE(rows_in_air, 10);
   const auto rod_parameters = run_parameters({&rod, Material::Hair, 16, 60.0}, motion->physics());
   EXPECT_EQ(rod_parameters->at("bending_damping_s"), shipped.at("bending_damping_s"));
-  EXPECT_EQ(shipped.at("air_drag_per_s"), MotionSet::kAirDragPerS);
+  EXPECT_LT(shipped.at("air_drag_per_s"), MotionSet::kAirDragPerS);
 }
 
 TEST(MotionSet, AllRatesSampleTheSameMotion) {

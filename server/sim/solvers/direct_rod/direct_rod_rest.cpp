@@ -9,6 +9,14 @@
 namespace strandcast {
 namespace {
 
+/// Hair in the air, 1/s: a wisp of diameter D takes the drag of a solid cylinder, Cd rho U^2 D / 2 per length
+/// with Cd = 1 at its Reynolds number of about 500 (Hoerner, Fluid-Dynamic Drag, 1965, chapter 3), on the
+/// mass phi rho_hair pi D^2 / 4 of its hair: 2 Cd rho U / (pi phi rho_hair D), which is 1.8 for D = 5 mm, a
+/// tenth of it hair (phi), in the 1.5 m/s of a light breeze. A single hair of 0.1 mm (Reynolds number 10, Cd
+/// = 2.8) would have 25: its neighbours shield it. Less than this, as in thicker locks, leaves swings that
+/// the air alone damps going on for more than ten seconds.
+constexpr double kWispDragPerS = 2.0;
+
 constexpr double kSoftShare = 0.1;
 constexpr double kMinSoftLengthM = 1e-5;
 // Float positions say nothing about the direction of edges below.
@@ -290,8 +298,10 @@ SolverRow direct_rod_row() {
       {"bending_damping_s", 2e-3, 0.0, 1.0, "s",
        "material damping: time by which bending and twisting moments lead"},
       {"tip_mass_kg", 0.0, 0.0, 1.0, "kg", "a bead at the tip"},
-      {"air_drag_per_s", 4.0, 0.0, 1000.0, "1/s",
-       "rate at which strands take on the velocity of the air; a single hair has about 10"},
+      {"air_drag_per_s", kWispDragPerS, 0.0, 1000.0, "1/s",
+       "rate at which strands take on the velocity of the air: hair in a wisp of 5 mm, whose hairs shield "
+       "each "
+       "other; in a lock of 1 cm it is 1, of a single hair 10 to 25"},
       {"sag_free", 0.0, 0.0, 1.0, "",
        "share of the groom's weight that its rest shape carries: 1 = the groom as loaded is the equilibrium"},
       {"style_margin", kHangingMargin, 0.0, 10.0, "",
