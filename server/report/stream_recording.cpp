@@ -15,9 +15,6 @@
 namespace strandcast {
 namespace {
 
-/// Just under the built-in groom's roots.
-constexpr float kSkullRadiusM = 0.0931f;
-
 // Strands swing into the motion before anything is recorded.
 constexpr double kSettleS = 1.5;
 constexpr double kNsPerMs = 1e6;
@@ -29,9 +26,6 @@ SceneDesc scene_for(const RecordingDesc& desc) {
   groom.vertex_count = desc.size.vertex_count;
   if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
   scene.step_rate_hz = 1.0 / kStreamFrameS;
-  // The skull alone: hair hangs and swings beside it.
-  scene.head.is_visible = false;
-  scene.colliders = {{glm::vec3(0.0f), kSkullRadiusM}};
   return scene;
 }
 

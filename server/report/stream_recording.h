@@ -46,9 +46,9 @@ struct StreamRecording {
 /// BadInput when the motion is too short, LimitExceeded when the recording would be too large.
 Status check_recording(const RecordingDesc& desc);
 
-/// Records one part of the motion, after strands have settled into it. The built-in scene's groom and
-/// wind; the skull alone collides, so that what is measured does not follow the shape of the head that is
-/// drawn; 60 steps a second.
+/// Records one part of the motion, after strands have settled into it. The built-in scene as it
+/// ships, with its head, its wind and its follicles, so that what is measured is what a viewer gets; 60 steps
+/// a second.
 Result<StreamRecording> record_strands(const RecordingDesc& desc);
 
 }  // namespace strandcast

@@ -17,6 +17,7 @@
 #include "tests/support/eventually.h"
 #include "tests/support/gl_fixture.h"
 #include "tests/support/sample_messages.h"
+#include "tests/support/sanitizers.h"
 
 namespace strandcast {
 namespace {
@@ -243,9 +244,7 @@ class PaintingMemory : public GlTest {};
 // By how much the largest picture raises the peak beyond that of a small one, full of hair as the built-in
 // scene is.
 TEST_F(PaintingMemory, APixelTakesWithoutAGpuWhatTheBudgetCounts) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "a sanitizer's allocator takes memory of its own";
-#endif
+  if (test::kHasSanitizer) GTEST_SKIP() << "a sanitizer's allocator takes memory of its own";
   if (!context_->info().is_software)
     GTEST_SKIP() << "on a GPU pictures are not drawn in the process's memory";
   ProceduralGroomOptions options;

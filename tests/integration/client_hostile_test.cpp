@@ -15,6 +15,7 @@
 #include "tests/support/client_config.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_asset.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/tools/load_viewers.h"
 
@@ -134,9 +135,7 @@ class HostileStream : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Codecs, HostileStream, testing::Values("delta", "tangent"));
 
 TEST_P(HostileStream, WhatAViewerKeepsDoesNotGrow) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "a sanitizer's allocator does not tell what is in use";
-#endif
+  if (test::kHasSanitizer) GTEST_SKIP() << "a sanitizer's allocator does not tell what is in use";
   constexpr uint32_t kFirstRounds = 30;
   constexpr uint32_t kRounds = 230;
   constexpr uint64_t kSlackBytes = 1u << 20;  // 200 rounds of notices alone are three times that

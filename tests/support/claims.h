@@ -42,20 +42,20 @@ inline constexpr double kXpbdViolentStretch = 3.5;
 inline constexpr uint32_t kStreamStrands = 500;
 inline constexpr uint32_t kStreamVertices = 16;
 /// Bits per vertex of the built-in head motions.
-inline constexpr double kIdleBits = 1.1;
-inline constexpr double kActiveBits = 1.9;
-inline constexpr double kViolentBits = 4.8;
+inline constexpr double kIdleBits = 1.4;
+inline constexpr double kActiveBits = 2.3;
+inline constexpr double kViolentBits = 6.2;
 /// Of `delta` beside it in these.
-inline constexpr double kLeastDeltaRatio = 1.9;
-inline constexpr double kMostDeltaRatio = 4.5;
+inline constexpr double kLeastDeltaRatio = 1.8;
+inline constexpr double kMostDeltaRatio = 4.0;
 /// Strands that were left out beside the truth while turning, a quarter of these sent: mm.
 inline constexpr uint32_t kFilledStrands = 1'000;
-inline constexpr double kFilledMedianMm = 2.1;
-inline constexpr double kFilledMostMm = 8.5;  // of 95 % of the vertices
+inline constexpr double kFilledMedianMm = 2.2;
+inline constexpr double kFilledMostMm = 10.8;  // of 95 % of the vertices
 /// Of the median half second of a walk.
 inline constexpr const char* kStreamClip = "cmu_131_03.bvh";
-inline constexpr double kClipBits = 3.3;
-inline constexpr double kTimesFewerThanTemporal = 2.4;
-inline constexpr double kTimesFewerThanPlain = 8.2;
+inline constexpr double kClipBits = 4.6;
+inline constexpr double kTimesFewerThanTemporal = 2.0;
+inline constexpr double kTimesFewerThanPlain = 5.8;
 
 }  // namespace strandcast::claims
