@@ -2,7 +2,6 @@
 
 #include <epoxy/gl.h>
 
-#include "server/sim/strand_programs.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 
@@ -18,13 +17,11 @@ uint32_t group_count(const StrandLayout& layout) {
 Result<FollicleLimit> FollicleLimit::make(const gl::ShaderLibrary& shaders, const SceneFeatures& features,
                                           const StrandLayout& layout, const CarriedPlanes& carried) {
   RETURN_IF_ERROR(check_group_count(layout, group_count(layout)));
-  // Few strands are beyond the limit: one program serves any number of colliders.
   const int memory = carried.axis != nullptr ? 2 : carried.way != nullptr ? 1 : 0;
-  const gl::Variant variant = {
-      {"COLLIDERS", features.has_colliders ? static_cast<int>(shader::kMaxSphereColliders) : 0},
-      {"MEMORY", memory}};
+  KernelDesc kernel{"sim/follicle_limit.comp", {{"MEMORY", memory}}, {}};
+  kernel.meets_air = false;
   FollicleLimit limit;
-  ASSIGN_OR_RETURN(limit.program_, gl::Program::make(shaders, {"sim/follicle_limit.comp"}, variant));
+  ASSIGN_OR_RETURN(limit.programs_, StrandPrograms::make(shaders, features, kernel));
   return limit;
 }
 
@@ -33,7 +30,8 @@ bool FollicleLimit::holds(const StepInput& input, const StrandLayout& layout) {
          layout.pinned_root_count < layout.vertex_count;
 }
 
-void FollicleLimit::run(const StrandLayout& layout, const CarriedPlanes& carried) const {
+void FollicleLimit::run(const StepInput& input, const StrandLayout& layout,
+                        const CarriedPlanes& carried) const {
   if (carried.way != nullptr) {
     carried.way->bind_storage(shader::kBindingDisplacement);
     carried.way->bind_view(shader::kUnitDisplacement);
@@ -42,7 +40,7 @@ void FollicleLimit::run(const StrandLayout& layout, const CarriedPlanes& carried
     carried.axis->bind_storage(shader::kBindingRodAxis);
     carried.axis->bind_view(shader::kUnitRodAxis);
   }
-  program_.use();
+  programs_.fitting(input.colliders.size()).use();
   glDispatchCompute(group_count(layout), 1, 1);
 }
 

@@ -4,9 +4,7 @@
 // lengths could not be kept. From one thread with its GL context current.
 #pragma once
 
-#include <memory>
-
-#include "common/gl/program.h"
+#include "server/sim/strand_programs.h"
 #include "server/sim/strand_state.h"
 
 namespace strandcast {
@@ -27,10 +25,10 @@ class FollicleLimit {
   /// Whether this substep's strands are held: the input has a limit, and the strands have free tips.
   static bool holds(const StepInput& input, const StrandLayout& layout);
   /// Step block and strands are bound, and what wrote them is visible. Barriers are the caller's.
-  void run(const StrandLayout& layout, const CarriedPlanes& carried) const;
+  void run(const StepInput& input, const StrandLayout& layout, const CarriedPlanes& carried) const;
 
  private:
-  gl::Program program_;
+  StrandPrograms programs_;
 };
 
 }  // namespace strandcast

@@ -58,7 +58,7 @@ void GpuSolver::substep(const StepInput& input) {
   run(program);
   show_strands();
   if (follicle_limit_ && FollicleLimit::holds(input, layout())) {
-    follicle_limit_->run(layout(), carried());
+    follicle_limit_->run(input, layout(), carried());
     show_strands();
   }
   strands_->advance(input);

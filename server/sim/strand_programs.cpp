@@ -43,7 +43,7 @@ Result<StrandPrograms> StrandPrograms::make(const gl::ShaderLibrary& shaders, co
   for (const uint32_t capacity : capacities) {
     gl::Variant variant = desc.variant;
     variant["COLLIDERS"] = static_cast<int>(capacity);
-    variant["HAS_TURBULENCE"] = features.has_turbulence ? 1 : 0;
+    if (desc.meets_air) variant["HAS_TURBULENCE"] = features.has_turbulence ? 1 : 0;
     ASSIGN_OR_RETURN(gl::Program program, gl::Program::make(shaders, {desc.shader_path}, variant));
     RETURN_IF_ERROR(set_constants(program, desc.constants));
     programs.by_capacity_[capacity] = std::move(program);

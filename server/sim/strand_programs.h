@@ -25,6 +25,7 @@ struct KernelDesc {
   std::string shader_path;  // below shaders/
   gl::Variant variant;      // besides COLLIDERS and HAS_TURBULENCE
   ModelConstants constants;
+  bool meets_air = true;  // false: it has no HAS_TURBULENCE
 };
 
 class StrandPrograms {

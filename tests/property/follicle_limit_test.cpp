@@ -8,6 +8,7 @@
 #include "common/math/pose.h"
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
+#include "tests/support/claims.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
@@ -18,7 +19,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kDegree = kPi / 180.0;
-constexpr double kLimitDeg = 20.0;
+constexpr double kLimitDeg = claims::kFollicleLimitDeg;
 constexpr double kSubstepS = 1.0 / 60.0;
 /// A position of 0.3 m is stored to 1.5e-8 m: so much of an angle over a first segment of some millimetres,
 /// at both ends, and the angle's own arithmetic.

@@ -32,6 +32,10 @@ inline constexpr double kShakeG = 10.0;
 /// `articulated` and the rod, both converged, on a moving head: RMS distance over the length.
 inline constexpr double kModelsApart = 0.001;
 
+/// Most that a root leans from its groomed direction, whatever model runs and however fast the head is: what
+/// scenes have unless they say otherwise.
+inline constexpr double kFollicleLimitDeg = 20.0;
+
 // ---- iterated constraints in the violent motions of the stability report: largest stretch ----
 
 inline constexpr double kPbdViolentStretch = 6.6;

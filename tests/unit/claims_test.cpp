@@ -42,6 +42,7 @@ std::vector<std::string> readme_claims() {
       fmt::format("first swing within {} at {:g} Hz", percent(kFirstSwing), kFirstSwingHz),
       fmt::format("curls as helical springs within {}", percent(kCurlSpring)),
       fmt::format("buckling load bracketed within {}", percent(kBuckling)),
+      fmt::format("stand within {:g} degrees of their groomed direction", kFollicleLimitDeg),
       fmt::format("stretch below {} in a head shake of {:g} g", percent(kShakeStretch), kShakeG),
       fmt::format("by up to {:.0f} % (`pbd`) and {:.0f} % (`xpbd`)", 100.0 * kPbdViolentStretch,
                   100.0 * kXpbdViolentStretch),
