@@ -278,7 +278,11 @@ class GroomLasts : public RodStyle {
   class Run {
    public:
     Run(GroomLasts& test, bool is_gpu, const Groom& groom, const SolverParameters& given)
-        : groom_(groom), rod_(test.make_rod(is_gpu, groom, given)) {}
+        : groom_(groom), limit_rad_(test.limit_rad_) {
+      SceneFeatures features = all_features();
+      features.has_follicle_limit = limit_rad_ < kFreeFollicleRad;
+      rod_ = test.make(test.kind(is_gpu), groom, given, {1.0, 0.0, 0.0, 0.0}, features);
+    }
 
     /// Moves the head for so long as `head` says from now on.
     template <class Head>
@@ -293,6 +297,7 @@ class GroomLasts : public RodStyle {
         input.world_from_head_rotation = now.rotation;
         input.gravity_mps2 = kGravity;
         input.groom_gravity_in_head_mps2 = kGravity;
+        input.follicle_limit_rad = limit_rad_;
         rod_->substep(input);
         rotation_ = now.rotation;
         if (on_step) on_step();
@@ -332,10 +337,14 @@ class GroomLasts : public RodStyle {
 
    private:
     const Groom& groom_;
+    double limit_rad_;
     std::unique_ptr<Solver> rod_;
     SolverState state_;
     glm::dquat rotation_{1.0, 0.0, 0.0, 0.0};
   };
+
+  /// Of the roots.
+  double limit_rad_ = kFreeFollicleRad;
 
   /// 10 g to and fro at 4 Hz for 2 s.
   static Pose shake(double t) {
@@ -444,6 +453,14 @@ TEST_F(GroomLasts, CurlsAndStubble) {
 TEST_F(GroomLasts, BuiltInHair) {
   const Groom groom = groom_of_scene(built_in_scene());
   expect_lasting(true, some_strands(groom, static_cast<uint32_t>(on_grid(24, 2000))));
+}
+
+// Roots that are turned back in the middle of a motion come to rest in the same style.
+TEST_F(GroomLasts, WithRootsHeldAsScenesHoldThem) {
+  limit_rad_ = glm::radians(SceneDesc().follicle_limit_deg);
+  const Groom groom = some_of(groom_of_scene(built_in_scene()), 24);
+  expect_lasting(true, groom);
+  if (test_grid() == TestGrid::Whole) expect_lasting(false, groom);
 }
 
 // Held hair still swings: measured 0.91; the strands that are stiffened by themselves 0.76.
