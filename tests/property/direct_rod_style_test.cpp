@@ -458,7 +458,7 @@ TEST_F(GroomLasts, BuiltInHair) {
 // Roots that are turned back in the middle of a motion come to rest in the same style.
 TEST_F(GroomLasts, WithRootsHeldAsScenesHoldThem) {
   limit_rad_ = glm::radians(SceneDesc().follicle_limit_deg);
-  const Groom groom = some_of(groom_of_scene(built_in_scene()), 24);
+  const Groom groom = some_strands(groom_of_scene(built_in_scene()), 24);
   expect_lasting(true, groom);
   if (test_grid() == TestGrid::Whole) expect_lasting(false, groom);
 }

@@ -12,6 +12,7 @@
 #include "tests/support/shared_data.h"
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
+#include "tests/support/some_strands.h"
 #include "tests/support/test_grid.h"
 
 namespace strandcast {
@@ -108,18 +109,6 @@ class FollicleLimits : public SolverTest {
                                     const glm::dquat& rotation = kUpright) {
     return make(kind, groom, given, rotation, held_features());
   }
-
-  /// Every n-th strand, as many as asked for.
-  static Groom some_of(const Groom& groom, uint32_t strand_count) {
-    std::vector<std::vector<glm::vec3>> strands;
-    const uint32_t taken = std::min(strand_count, groom.strand_count());
-    for (uint32_t k = 0; k < taken; ++k) {
-      const auto s = static_cast<uint32_t>(uint64_t{k} * groom.strand_count() / taken);
-      strands.emplace_back(groom.rest_position_m.begin() + groom.offset[s],
-                           groom.rest_position_m.begin() + groom.offset[s + 1]);
-    }
-    return groom_from(strands, first_free(groom) == 1 ? Pinning::Root : Pinning::RootPair);
-  }
 };
 
 // ---- what a viewer sees of hair in violent motion ----
@@ -156,7 +145,7 @@ class RootsInMotion : public FollicleLimits {
     for (const SolverRow& row : solver_table()) {
       const SolverKind kind{&row, row.has_kernel};
       // In double, on one thread.
-      const Groom groom = some_of(content->groom, row.has_kernel ? strand_count : 6);
+      const Groom groom = test::some_strands(content->groom, row.has_kernel ? strand_count : 6);
       for (const Excitation& excitation : kExcitations) {
         SCOPED_TRACE(row.name + ", " + excitation.name);
         const double free_deg = p95_deg(kind, groom, content->colliders, excitation.head, 180.0);
