@@ -39,11 +39,12 @@ std::vector<std::pair<std::string, gl::PassFate>> decisions(const gl::PassReport
   return decided;
 }
 
-/// No wind, nothing to collide with, no head.
+/// No wind, nothing to collide with, no head, free roots.
 SceneDesc barest_scene() {
   SceneDesc scene = test::bald_scene();
   scene.wind = {};
   scene.has_auto_collider = false;
+  scene.follicle_limit_deg = 180.0;
   return scene;
 }
 
@@ -107,6 +108,13 @@ TEST_F(ServerCost, EachFactOfTheSceneCostsItsOwnVariants) {
   ASSERT_TRUE(start(scene));
   EXPECT_GT(compiled() - bare, bare) << "colliders need programs that the bare scene has not";
   EXPECT_EQ(decisions(server_->passes()), decisions(planned(scene, {})));
+  server_->stop();
+  server_.reset();
+  const uint64_t before = compiled();
+  scene = barest_scene();
+  scene.follicle_limit_deg = SceneDesc().follicle_limit_deg;
+  ASSERT_TRUE(start(scene));
+  EXPECT_EQ(compiled() - before, bare + 1) << "held roots take one program more";
 }
 
 TEST_F(ServerCost, WhatViewersNeedComesAndGoesWithThem) {
