@@ -73,9 +73,9 @@ const char* to_string(MotionPart part) {
   return part == MotionPart::Median ? "median" : "wildest";
 }
 
-HeadMeasure measure_head(const std::vector<Pose>& world_from_head, double frame_s) {
+HeadPace measure_pace(const std::vector<Pose>& world_from_head, double frame_s) {
   CHECK(frame_s > 0.0);
-  HeadMeasure measure;
+  HeadPace measure;
   const double total_s = frame_s * (static_cast<double>(world_from_head.size()) - 1.0);
   for (size_t i = 1; i < world_from_head.size(); ++i) {
     const Pose& before = world_from_head[i - 1];

@@ -28,11 +28,11 @@ inline constexpr MotionPart kMotionParts[] = {MotionPart::Median, MotionPart::Wi
 /// "median", "wildest".
 const char* to_string(MotionPart part);
 
-struct HeadMeasure {
+struct HeadPace {
   double mean_speed_mps = 0.0;  // of the head joint
   double mean_turn_rad_per_s = 0.0;
 };
-HeadMeasure measure_head(const std::vector<Pose>& world_from_head, double frame_s);
+HeadPace measure_pace(const std::vector<Pose>& world_from_head, double frame_s);
 
 struct StreamMotion {
   std::string name;

@@ -130,7 +130,7 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
     ASSIGN_OR_RETURN(StreamFrame frame, frame_of(state, input.world_from_head));
     recording.frames.push_back(std::move(frame));
   }
-  recording.head = measure_head(poses, kStreamFrameS);
+  recording.head = measure_pace(poses, kStreamFrameS);
   recording.hair_rms_mps = hair_rms_mps(recording.frames);
   return recording;
 }

@@ -34,7 +34,7 @@ struct RecordingDesc {
 
 struct StreamRecording {
   std::string motion_name;
-  HeadMeasure head;                              // of the recorded part
+  HeadPace head;                                 // of the recorded part
   double hair_rms_mps = 0.0;                     // of all vertices, in head space
   MotionLevel motion_level = MotionLevel::Idle;  // of the whole motion
   MotionPart part = MotionPart::Median;

@@ -25,10 +25,10 @@ TEST(StreamMotion, AHeadIsMeasuredByItsWayAndItsTurn) {
     const double t_s = i * kStreamFrameS;
     poses.push_back({t_s * glm::dvec3(3.0, 0.0, 4.0), glm::angleAxis(2.0 * t_s, glm::dvec3(0.0, 1.0, 0.0))});
   }
-  const HeadMeasure head = measure_head(poses, kStreamFrameS);
+  const HeadPace head = measure_pace(poses, kStreamFrameS);
   EXPECT_NEAR(head.mean_speed_mps, 5.0, 1e-9);
   EXPECT_NEAR(head.mean_turn_rad_per_s, 2.0, 1e-6);
-  EXPECT_EQ(measure_head({}, kStreamFrameS).mean_speed_mps, 0.0);
+  EXPECT_EQ(measure_pace({}, kStreamFrameS).mean_speed_mps, 0.0);
 }
 
 TEST(StreamMotion, TheBuiltInOnesAreWhatTheyAreCalled) {
