@@ -89,9 +89,11 @@ Status write_port(const std::filesystem::path& path, uint16_t port) {
 Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
   if (options.token_path.empty()) return std::vector<AccessToken>{};
   ASSIGN_OR_RETURN(TokenFile file, open_token_file(options.token_path));
-  if (file.is_new)
+  if (file.is_new) {
     fmt::print("New tokens, stored in {} and shown this once:\n{}", options.token_path.string(),
                to_text(file.tokens));
+    std::fflush(stdout);  // whatever becomes of the start
+  }
   return std::move(file.tokens);
 }
 
