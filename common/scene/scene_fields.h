@@ -7,6 +7,7 @@
 
 #include "common/base/picture_size.h"
 #include "common/groom/procedural.h"
+#include "common/scene/hair_color.h"
 #include "common/scene/scene_desc.h"
 
 namespace strandcast::scene_fields {
@@ -51,6 +52,16 @@ inline constexpr Range kLightColor{0.0, 100.0, ""};
 inline constexpr Range kDrawnRadius{1e-6, 0.01, "m"};
 inline constexpr Range kFollowers{0, 64, ""};
 inline constexpr Range kSegments{1, 8, ""};
+inline constexpr Range kLocks{1, 16, ""};
+inline constexpr Range kStyleAmplitude{0.0, 0.1, "m"};
+inline constexpr Range kStyleCount{0.0, 64.0, "waves"};
+inline constexpr Range kStraySpread{0.0, 20.0, ""};
+inline constexpr Range kMelanin{0.0, 10.0, ""};
+inline constexpr Range kShadingWeight{0.0, 10.0, ""};
+inline constexpr Range kHighlightWidth{1.0, 45.0, "degrees"};
+inline constexpr Range kCuticle{-15.0, 15.0, "degrees"};
+inline constexpr Range kCuticleSpread{0.0, 30.0, "degrees"};
+inline constexpr Range kExposure{0.0, 100.0, ""};
 inline constexpr Range kDirection{-1e3, 1e3, ""};
 inline constexpr Range kCameraOffset{-100.0, 100.0, "m"};
 inline constexpr Range kFieldOfView{0.02, 2.8, "rad"};
@@ -100,18 +111,61 @@ void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& g
 }
 
 template <class Visitor>
+void visit_style(Visitor& v, StrandStyleDesc& style) {
+  v.number("clump", style.clump, kFraction);
+  v.number("locks", style.locks, kLocks);
+  v.number("spread", style.spread, kFraction);
+  v.number("wave_m", style.wave_m, kStyleAmplitude);
+  v.number("wave_count", style.wave_count, kStyleCount);
+  v.number("frizz_m", style.frizz_m, kStyleAmplitude);
+  v.number("frizz_count", style.frizz_count, kStyleCount);
+  v.number("stray_share", style.stray_share, kFraction);
+  v.number("stray_spread", style.stray_spread, kStraySpread);
+  v.number("length_spread", style.length_spread, kFraction);
+  v.number("short_share", style.short_share, kFraction);
+  v.number("tip_fade", style.tip_fade, kFraction);
+}
+
+template <class Visitor>
+void visit_shading(Visitor& v, HairShadingDesc& shading) {
+  v.number("diffuse", shading.diffuse, kShadingWeight);
+  v.number("scatter", shading.scatter, kShadingWeight);
+  v.number("highlight", shading.highlight, kShadingWeight);
+  v.number("transmission", shading.transmission, kShadingWeight);
+  v.number("second_highlight", shading.second_highlight, kShadingWeight);
+  v.number("highlight_width_deg", shading.highlight_width_deg, kHighlightWidth);
+  v.number("cuticle_deg", shading.cuticle_deg, kCuticle);
+  v.number("cuticle_spread_deg", shading.cuticle_spread_deg, kCuticleSpread);
+  v.number("root_darkening", shading.root_darkening, kFraction);
+  v.number("strand_variation", shading.strand_variation, kFraction);
+  v.number("lock_variation", shading.lock_variation, kFraction);
+  v.number("warmth_variation", shading.warmth_variation, kFraction);
+  v.number("wetness", shading.wetness, kFraction);
+}
+
+template <class Visitor>
 void visit_look(Visitor& v, LookDesc& look) {
+  v.text("hair_color", look.hair_color, kMaxNameBytes);
+  v.require("hair_color", is_hair_color(look.hair_color), kHairColorSentence);
   v.color("root_color", look.root_color, kFraction);
   v.color("tip_color", look.tip_color, kFraction);
+  v.number("eumelanin", look.eumelanin, kMelanin);
+  v.number("pheomelanin", look.pheomelanin, kMelanin);
   v.number("strand_radius_m", look.strand_radius_m, kDrawnRadius);
   v.number("tip_scale", look.tip_scale, kFraction);
   v.number("followers", look.followers, kFollowers);
   v.number("segments", look.segments, kSegments);
+  v.group("style", [&] { visit_style(v, look.style); });
+  v.group("shading", [&] { visit_shading(v, look.shading); });
   v.vector("light_direction", look.light_direction, kDirection);
   v.require("light_direction", glm::length(look.light_direction) >= kMinDirectionLength,
-            "is almost zero, it must be at least 0.001 long");
+            "must point somewhere");
   v.color("light_color", look.light_color, kLightColor);
+  v.vector("rim_direction", look.rim_direction, kDirection);
+  v.require("rim_direction", glm::length(look.rim_direction) >= kMinDirectionLength, "must point somewhere");
+  v.color("rim_color", look.rim_color, kLightColor);
   v.number("ambient", look.ambient, kFraction);
+  v.number("exposure", look.exposure, kExposure);
   v.color("background", look.background, kFraction);
   v.color("skin_color", look.skin_color, kFraction);
 }

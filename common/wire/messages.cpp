@@ -203,7 +203,9 @@ class MessageReader {
     value = static_cast<Enum>(given - first);
   }
   void text(const char* name, std::string& value, size_t limit) {
-    value = get_string(name);
+    const auto field = finder_.find(at_.type, name);
+    if (!is_given(field)) return;
+    value = at_.reflection->GetString(*at_.message, field.descriptor);
     check_printable(name, value);
     // The parser has checked that it is UTF-8.
     check_length(name, static_cast<size_t>(std::count_if(value.begin(), value.end(), begins_character)),

@@ -19,6 +19,16 @@ inline LookDesc sample_look() {
   look.ambient = 0.4375f;
   look.background = {0.75f, 0.0f, 0.5f};
   look.skin_color = {0.25f, 0.625f, 1.0f};
+  look.hair_color = "red";
+  look.eumelanin = 0.25f;
+  look.pheomelanin = 0.75f;
+  look.style = {0.5f, 3,      0.03125f, 0.0078125f, 2.0f,    0.001953125f,
+                5.0f, 0.125f, 2.0f,     0.25f,      0.0625f, 0.375f};
+  look.shading = {0.625f, 0.375f, 1.5f,   0.75f,   1.25f,    9.0f, 2.5f,
+                  3.0f,   0.25f,  0.125f, 0.0625f, 0.03125f, 0.5f};
+  look.rim_direction = {-0.5f, -0.25f, 1.0f};
+  look.rim_color = {0.75f, 0.5f, 1.0f};
+  look.exposure = 1.25f;
   return look;
 }
 

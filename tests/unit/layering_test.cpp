@@ -30,10 +30,11 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
   static const std::set<std::string> kStreams = with(with(kScene, kPictures), {"common/log"});
   static const std::set<std::string> kWire = with({"common/wire"}, kStreams);
   static const std::set<std::string> kGl = with({"common/gl", "shaders/shared", "common/log"}, kBase);
-  static const std::set<std::string> kRender = with(with({"common/render"}, kGl), kStreams);
+  static const std::set<std::string> kRender = with(with({"common/render", "common/simd", "shaders/lib"}, kGl), kStreams);
   static const std::set<std::string> kAll = with(with(kRender, kWire), kReplay);
   static const std::map<std::string, std::set<std::string>> kAllowed = {
       {"common/base", {}},
+      {"common/simd", kBase},
       {"common/log", kBase},
       {"common/math", kBase},
       // The core: a viewer in a browser, a relay or a fuzzer links these and nothing else of ours.

@@ -66,6 +66,13 @@ struct FieldValues {
   void number(const char* name, Value& value, const scene_fields::Range&) {
     values[name] = {static_cast<double>(value)};
   }
+  void text(const char* name, const std::string& value, size_t) {
+    values[name] = {static_cast<double>(std::hash<std::string>()(value))};
+  }
+  template <class Body>
+  void group(const char*, Body body) {
+    body();
+  }
   void vector(const char* name, const glm::vec3& value, const scene_fields::Range&) {
     values[name] = {value.x, value.y, value.z};
   }
@@ -85,7 +92,7 @@ TEST(WireMessages, TheSampleOfALookHasNoDefaultInIt) {
   scene_fields::visit_look(usual, usual_look);
   scene_fields::visit_camera(sample, camera);
   scene_fields::visit_camera(usual, usual_camera);
-  EXPECT_EQ(sample.values.size(), 14u);
+  EXPECT_EQ(sample.values.size(), 45u);
   for (const auto& [name, values] : sample.values)
     for (size_t i = 0; i < values.size(); ++i) EXPECT_NE(values[i], usual.values.at(name)[i]) << name;
 }

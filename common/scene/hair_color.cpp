@@ -1,0 +1,57 @@
+#include "common/scene/hair_color.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace strandcast {
+namespace {
+
+// Chosen by eye under the built-in scene's light; tips are bleached by the sun.
+constexpr std::array<HairColorPreset, 6> kPresets{{
+    {"black", {{0.010f, 0.008f, 0.007f}, {0.019f, 0.015f, 0.013f}}},
+    {"brown", {{0.070f, 0.033f, 0.016f}, {0.190f, 0.092f, 0.040f}}},
+    {"blond", {{0.360f, 0.225f, 0.100f}, {0.640f, 0.455f, 0.240f}}},
+    {"red", {{0.230f, 0.058f, 0.018f}, {0.430f, 0.130f, 0.038f}}},
+    {"grey", {{0.300f, 0.300f, 0.310f}, {0.500f, 0.500f, 0.510f}}},
+    {"dyed", {{0.060f, 0.020f, 0.200f}, {0.250f, 0.060f, 0.520f}}},
+}};
+
+const glm::dvec3 kEumelaninAbsorption(0.419, 0.697, 1.37);
+const glm::dvec3 kPheomelaninAbsorption(0.187, 0.4, 1.05);
+// Azimuthal roughness that the fit between absorption and colour is taken at.
+constexpr double kRoughness = 0.3;
+
+}  // namespace
+
+std::span<const HairColorPreset> hair_color_presets() {
+  return kPresets;
+}
+
+bool is_hair_color(std::string_view name) {
+  return name == "custom" || name == "melanin" ||
+         std::any_of(kPresets.begin(), kPresets.end(),
+                     [&](const HairColorPreset& preset) { return preset.name == name; });
+}
+
+glm::vec3 color_of_melanin(float eumelanin, float pheomelanin) {
+  constexpr double b = kRoughness;
+  constexpr double b2 = b * b;
+  constexpr double kFit =
+      5.969 - 0.215 * b + 2.532 * b2 - 10.73 * b2 * b + 5.574 * b2 * b2 + 0.245 * b2 * b2 * b;
+  const glm::dvec3 absorption =
+      kEumelaninAbsorption * double{eumelanin} + kPheomelaninAbsorption * double{pheomelanin};
+  return glm::vec3(glm::exp(-kFit * glm::sqrt(glm::max(absorption, 0.0))));
+}
+
+HairColors colors_of(const LookDesc& look) {
+  if (look.hair_color == "melanin") {
+    const glm::vec3 color = color_of_melanin(look.eumelanin, look.pheomelanin);
+    return {color, color};
+  }
+  for (const HairColorPreset& preset : kPresets)
+    if (preset.name == look.hair_color) return preset.colors;
+  return {look.root_color, look.tip_color};
+}
+
+}  // namespace strandcast

@@ -1,0 +1,335 @@
+// Lanes: the types and functions of GLSL over eight invocations side by side, so that a law written once in
+// shaders/lib runs on the CPU as well (common/simd/laws.h). Every operation is done for every lane as a
+// scalar would do it, without contraction, so all instruction sets give the same bits. Choices are made by
+// select(), never by branches. Everything is inline; instruction sets are chosen by common/simd/variants.h.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+namespace strandcast::simd {
+
+inline constexpr uint32_t kLanes = 8;
+
+#define STRANDCAST_LANES inline __attribute__((always_inline))
+
+using FloatBits = float __attribute__((vector_size(4 * kLanes)));
+using IntBits = int32_t __attribute__((vector_size(4 * kLanes)));
+using UintBits = uint32_t __attribute__((vector_size(4 * kLanes)));
+
+/// All bits of a lane, or none.
+struct Bool {
+  IntBits v;
+};
+
+struct Uint {
+  UintBits v;
+  Uint() = default;
+  STRANDCAST_LANES constexpr Uint(UintBits bits) : v(bits) {}
+  STRANDCAST_LANES constexpr Uint(uint32_t value) : v(UintBits{} + value) {}
+};
+
+struct Float {
+  FloatBits v;
+  Float() = default;
+  STRANDCAST_LANES constexpr Float(FloatBits bits) : v(bits) {}
+  STRANDCAST_LANES constexpr Float(float value) : v(FloatBits{} + value) {}
+  STRANDCAST_LANES constexpr Float(double value) : v(FloatBits{} + static_cast<float>(value)) {}
+  STRANDCAST_LANES constexpr Float(int value) : v(FloatBits{} + static_cast<float>(value)) {}
+  /// Of values below 2^31.
+  STRANDCAST_LANES explicit Float(Uint value) : v(__builtin_convertvector((IntBits)value.v, FloatBits)) {}
+};
+
+// ---- operators
+STRANDCAST_LANES constexpr Float operator+(Float a, Float b) {
+  return a.v + b.v;
+}
+STRANDCAST_LANES constexpr Float operator-(Float a, Float b) {
+  return a.v - b.v;
+}
+STRANDCAST_LANES constexpr Float operator*(Float a, Float b) {
+  return a.v * b.v;
+}
+STRANDCAST_LANES constexpr Float operator/(Float a, Float b) {
+  return a.v / b.v;
+}
+STRANDCAST_LANES constexpr Float operator-(Float a) {
+  return -a.v;
+}
+STRANDCAST_LANES Float& operator+=(Float& a, Float b) {
+  return a = a + b;
+}
+STRANDCAST_LANES Float& operator-=(Float& a, Float b) {
+  return a = a - b;
+}
+STRANDCAST_LANES Float& operator*=(Float& a, Float b) {
+  return a = a * b;
+}
+STRANDCAST_LANES Float& operator/=(Float& a, Float b) {
+  return a = a / b;
+}
+
+STRANDCAST_LANES Bool operator<(Float a, Float b) {
+  return {a.v < b.v};
+}
+STRANDCAST_LANES Bool operator>(Float a, Float b) {
+  return {a.v > b.v};
+}
+STRANDCAST_LANES Bool operator<=(Float a, Float b) {
+  return {a.v <= b.v};
+}
+STRANDCAST_LANES Bool operator>=(Float a, Float b) {
+  return {a.v >= b.v};
+}
+STRANDCAST_LANES Bool operator&&(Bool a, Bool b) {
+  return {a.v & b.v};
+}
+STRANDCAST_LANES Bool operator||(Bool a, Bool b) {
+  return {a.v | b.v};
+}
+STRANDCAST_LANES Bool operator!(Bool a) {
+  return {~a.v};
+}
+
+STRANDCAST_LANES Uint operator+(Uint a, Uint b) {
+  return a.v + b.v;
+}
+STRANDCAST_LANES Uint operator*(Uint a, Uint b) {
+  return a.v * b.v;
+}
+STRANDCAST_LANES Uint operator^(Uint a, Uint b) {
+  return a.v ^ b.v;
+}
+STRANDCAST_LANES Uint operator&(Uint a, Uint b) {
+  return a.v & b.v;
+}
+STRANDCAST_LANES Uint operator|(Uint a, Uint b) {
+  return a.v | b.v;
+}
+STRANDCAST_LANES Uint operator>>(Uint a, int bits) {
+  return a.v >> bits;
+}
+STRANDCAST_LANES Uint operator<<(Uint a, int bits) {
+  return a.v << bits;
+}
+STRANDCAST_LANES Uint& operator^=(Uint& a, Uint b) {
+  return a = a ^ b;
+}
+STRANDCAST_LANES Uint& operator*=(Uint& a, Uint b) {
+  return a = a * b;
+}
+
+// ---- functions of GLSL on one number
+STRANDCAST_LANES Float select(Bool which, Float yes, Float no) {
+  return which.v ? yes.v : no.v;
+}
+STRANDCAST_LANES Uint select(Bool which, Uint yes, Uint no) {
+  return which.v ? yes.v : no.v;
+}
+STRANDCAST_LANES Float min(Float a, Float b) {
+  return a.v < b.v ? a.v : b.v;
+}  // b where one is no number
+STRANDCAST_LANES Float max(Float a, Float b) {
+  return a.v > b.v ? a.v : b.v;
+}
+STRANDCAST_LANES Float clamp(Float x, Float low, Float high) {
+  return min(max(x, low), high);
+}
+STRANDCAST_LANES Float mix(Float a, Float b, Float share) {
+  return a + share * (b - a);
+}
+STRANDCAST_LANES Float abs(Float x) {
+  return (FloatBits)((UintBits)x.v & 0x7fffffffu);
+}
+STRANDCAST_LANES Float sqrt(Float x) {
+  FloatBits root;
+  for (uint32_t lane = 0; lane < kLanes; ++lane) root[lane] = __builtin_sqrtf(x.v[lane]);
+  return root;
+}
+STRANDCAST_LANES Float inversesqrt(Float x) {
+  return 1.0f / sqrt(x);
+}
+/// Of values within +-2^31.
+STRANDCAST_LANES Float floor(Float x) {
+  const FloatBits cut = __builtin_convertvector(__builtin_convertvector(x.v, IntBits), FloatBits);
+  return cut > x.v ? cut - 1.0f : cut;
+}
+STRANDCAST_LANES Float fract(Float x) {
+  return x - floor(x);
+}
+STRANDCAST_LANES Float smoothstep(Float low, Float high, Float x) {
+  const Float t = clamp((x - low) / (high - low), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
+}
+/// Relative error below 3e-7; 0 below e^-87, and no more than e^88.
+STRANDCAST_LANES Float exp(Float x) {
+  // 2^n 2^f with |f| <= 1/2; the polynomial is the Taylor series of 2^f to the sixth power.
+  const Float y = clamp(x, -87.0f, 88.0f) * 1.44269504f;
+  const Float n = floor(y + 0.5f);
+  const Float f = (y - n) * 0.693147181f;
+  const Float p =
+      1.0f + f * (1.0f + f * (0.5f + f * (1.66666667e-1f +
+                                          f * (4.16666667e-2f + f * (8.33333333e-3f + f * 1.38888889e-3f)))));
+  const IntBits power = (__builtin_convertvector(n.v, IntBits) + 127) << 23;
+  return p * Float((FloatBits)power);
+}
+/// Of positive numbers; absolute error below 1e-6.
+STRANDCAST_LANES Float log2(Float x) {
+  const IntBits bits = (IntBits)x.v;
+  IntBits exponent = (bits >> 23) - 127;
+  FloatBits m = (FloatBits)((bits & 0x7fffff) | 0x3f800000);
+  const IntBits is_big = m > 1.41421356f;
+  m = is_big ? m * 0.5f : m;
+  exponent -= is_big;  // a true lane is -1
+  // log2(m) = 2 / ln 2 * artanh(s), s = (m - 1) / (m + 1), |s| < 0.1716
+  const Float s = Float(m - 1.0f) / Float(m + 1.0f);
+  const Float s2 = s * s;
+  const Float series =
+      s * (2.88539008f + s2 * (0.961796694f + s2 * (0.577078016f + s2 * (0.412198583f + s2 * 0.320598898f))));
+  return Float(__builtin_convertvector(exponent, FloatBits)) + series;
+}
+STRANDCAST_LANES Float pow(Float x, Float power) {
+  return exp(0.693147181f * (power * log2(x)));
+}
+
+/// Error below 1e-6 for |x| < 1e4.
+STRANDCAST_LANES Float sine_of_quarters(Float x, int shift) {
+  // Minimax polynomials of the Cephes library's sinf and cosf on [-pi/4, pi/4].
+  const Float quarters = floor(x * 0.636619772f + 0.5f);
+  const Float r = ((x - quarters * 1.5703125f) - quarters * 4.83751297e-4f) - quarters * 7.54978995e-8f;
+  const Float z = r * r;
+  const Float s = r + r * z * (-1.66666546e-1f + z * (8.33216087e-3f - z * 1.95152959e-4f));
+  const Float c = 1.0f - 0.5f * z + z * z * (4.16666457e-2f + z * (-1.38873163e-3f + z * 2.44331571e-5f));
+  const IntBits n = __builtin_convertvector(quarters.v, IntBits) + shift;
+  const FloatBits value = (n & 1) != 0 ? c.v : s.v;
+  return (FloatBits)((IntBits)value ^ ((n & 2) << 30));
+}
+STRANDCAST_LANES Float sin(Float x) {
+  return sine_of_quarters(x, 0);
+}
+STRANDCAST_LANES Float cos(Float x) {
+  return sine_of_quarters(x, 1);
+}
+
+STRANDCAST_LANES Uint floatBitsToUint(Float x) {
+  return (UintBits)x.v;
+}
+
+// ---- beyond GLSL
+STRANDCAST_LANES bool is_any(Bool which) {
+  uint64_t parts[sizeof(IntBits) / sizeof(uint64_t)];
+  std::memcpy(parts, &which.v, sizeof parts);
+  uint64_t all = 0;
+  for (const uint64_t part : parts) all |= part;
+  return all != 0;
+}
+STRANDCAST_LANES Float load_lanes(const float* from) {
+  FloatBits v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
+}
+STRANDCAST_LANES void store_lanes(Float x, float* to) {
+  std::memcpy(to, &x.v, sizeof x.v);
+}
+/// 0, 1, 2 ...
+STRANDCAST_LANES Float lane_numbers() {
+  return FloatBits{0, 1, 2, 3, 4, 5, 6, 7};
+}
+/// Towards zero, of values within +-2^31.
+STRANDCAST_LANES IntBits to_integers(Float x) {
+  return __builtin_convertvector(x.v, IntBits);
+}
+
+// ---- vectors
+struct vec2 {
+  Float x, y;
+  vec2() = default;
+  STRANDCAST_LANES constexpr vec2(Float all) : x(all), y(all) {}
+  STRANDCAST_LANES constexpr vec2(Float a, Float b) : x(a), y(b) {}
+};
+struct vec3 {
+  Float x, y, z;
+  vec3() = default;
+  STRANDCAST_LANES constexpr vec3(Float all) : x(all), y(all), z(all) {}
+  STRANDCAST_LANES constexpr vec3(Float a, Float b, Float c) : x(a), y(b), z(c) {}
+  /// Any vector of three numbers, the same in all lanes.
+  template <class Vector>
+  requires requires(const Vector& v) { v.x, v.y, v.z, v[2]; }
+  STRANDCAST_LANES vec3(const Vector& v) : x(v.x), y(v.y), z(v.z) {}
+};
+
+STRANDCAST_LANES vec2 operator+(vec2 a, vec2 b) {
+  return {a.x + b.x, a.y + b.y};
+}
+STRANDCAST_LANES vec2 operator-(vec2 a, vec2 b) {
+  return {a.x - b.x, a.y - b.y};
+}
+STRANDCAST_LANES vec2 operator*(vec2 a, vec2 b) {
+  return {a.x * b.x, a.y * b.y};
+}
+STRANDCAST_LANES Float dot(vec2 a, vec2 b) {
+  return a.y * b.y + a.x * b.x;
+}
+
+STRANDCAST_LANES vec3 operator+(vec3 a, vec3 b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+STRANDCAST_LANES vec3 operator-(vec3 a, vec3 b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+STRANDCAST_LANES vec3 operator*(vec3 a, vec3 b) {
+  return {a.x * b.x, a.y * b.y, a.z * b.z};
+}
+STRANDCAST_LANES vec3 operator/(vec3 a, vec3 b) {
+  return {a.x / b.x, a.y / b.y, a.z / b.z};
+}
+STRANDCAST_LANES vec3 operator-(vec3 a) {
+  return {-a.x, -a.y, -a.z};
+}
+STRANDCAST_LANES vec3& operator+=(vec3& a, vec3 b) {
+  return a = a + b;
+}
+STRANDCAST_LANES vec3& operator-=(vec3& a, vec3 b) {
+  return a = a - b;
+}
+STRANDCAST_LANES vec3& operator*=(vec3& a, vec3 b) {
+  return a = a * b;
+}
+STRANDCAST_LANES Float dot(vec3 a, vec3 b) {
+  return (a.z * b.z + a.y * b.y) + a.x * b.x;
+}
+STRANDCAST_LANES vec3 cross(vec3 a, vec3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+STRANDCAST_LANES Float length(vec3 a) {
+  return sqrt(dot(a, a));
+}
+STRANDCAST_LANES vec3 normalize(vec3 a) {
+  return a * vec3(inversesqrt(dot(a, a)));
+}
+STRANDCAST_LANES vec3 min(vec3 a, vec3 b) {
+  return {min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)};
+}
+STRANDCAST_LANES vec3 max(vec3 a, vec3 b) {
+  return {max(a.x, b.x), max(a.y, b.y), max(a.z, b.z)};
+}
+STRANDCAST_LANES vec3 mix(vec3 a, vec3 b, Float share) {
+  return {mix(a.x, b.x, share), mix(a.y, b.y, share), mix(a.z, b.z, share)};
+}
+STRANDCAST_LANES vec3 clamp(vec3 x, Float low, Float high) {
+  return {clamp(x.x, low, high), clamp(x.y, low, high), clamp(x.z, low, high)};
+}
+STRANDCAST_LANES vec3 sqrt(vec3 x) {
+  return {sqrt(x.x), sqrt(x.y), sqrt(x.z)};
+}
+STRANDCAST_LANES vec3 exp(vec3 x) {
+  return {exp(x.x), exp(x.y), exp(x.z)};
+}
+STRANDCAST_LANES vec3 pow(vec3 x, vec3 p) {
+  return {pow(x.x, p.x), pow(x.y, p.y), pow(x.z, p.z)};
+}
+STRANDCAST_LANES vec3 select(Bool which, vec3 yes, vec3 no) {
+  return {select(which, yes.x, no.x), select(which, yes.y, no.y), select(which, yes.z, no.z)};
+}
+
+}  // namespace strandcast::simd

@@ -1,0 +1,59 @@
+// One kernel for several instruction sets, chosen at run time. STRANDCAST_KERNEL(name, Arguments) behind an
+// always-inline function `name_lanes(const Arguments&)` makes `name(InstructionSet, const Arguments&)`. All
+// of them give the same bits (common/simd/lanes.h). No lambdas in kernels: they would not be compiled for the
+// set.
+#pragma once
+
+#include <span>
+
+#include "common/simd/lanes.h"
+
+namespace strandcast::simd {
+
+/// From the narrowest to the widest; Plain is what every processor of the kind has (SSE2, NEON).
+enum class InstructionSet { Plain, Sse4, Avx2, Avx512 };
+
+const char* to_string(InstructionSet set);
+/// Those that this processor has, the widest last.
+std::span<const InstructionSet> instruction_sets();
+inline InstructionSet widest_set() {
+  return instruction_sets().back();
+}
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define STRANDCAST_KERNEL(name, Arguments)                                                          \
+  __attribute__((flatten)) static void name##_plain(const Arguments& arguments) {                   \
+    name##_lanes(arguments);                                                                        \
+  }                                                                                                 \
+  __attribute__((flatten, target("sse4.2"))) static void name##_sse4(const Arguments& arguments) {  \
+    name##_lanes(arguments);                                                                        \
+  }                                                                                                 \
+  __attribute__((flatten, target("avx2"))) static void name##_avx2(const Arguments& arguments) {    \
+    name##_lanes(arguments);                                                                        \
+  }                                                                                                 \
+  __attribute__((flatten, target("avx512f,avx512vl,avx512dq,avx512bw"))) static void name##_avx512( \
+      const Arguments& arguments) {                                                                 \
+    name##_lanes(arguments);                                                                        \
+  }                                                                                                 \
+  void name(::strandcast::simd::InstructionSet set, const Arguments& arguments) {                   \
+    switch (set) {                                                                                  \
+      case ::strandcast::simd::InstructionSet::Plain:                                               \
+        return name##_plain(arguments);                                                             \
+      case ::strandcast::simd::InstructionSet::Sse4:                                                \
+        return name##_sse4(arguments);                                                              \
+      case ::strandcast::simd::InstructionSet::Avx2:                                                \
+        return name##_avx2(arguments);                                                              \
+      case ::strandcast::simd::InstructionSet::Avx512:                                              \
+        return name##_avx512(arguments);                                                            \
+    }                                                                                               \
+  }                                                                                                 \
+  static_assert(true)
+#else
+#define STRANDCAST_KERNEL(name, Arguments)                                    \
+  void name(::strandcast::simd::InstructionSet, const Arguments& arguments) { \
+    name##_lanes(arguments);                                                  \
+  }                                                                           \
+  static_assert(true)
+#endif
+
+}  // namespace strandcast::simd
