@@ -43,18 +43,10 @@ class PathRenderer final : public Renderer {
 
 Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
                           const DrawTerms& terms) {
-  if (strands.position_m.size() != position_count_)
-    return make_error(ErrorCode::BadInput, "the strands have {} vertices but the scene has {}",
-                      strands.position_m.size(), position_count_);
-  if (size.width > kMaxImageSide || size.height > kMaxImageSide)
-    return make_error(ErrorCode::LimitExceeded, "a picture of {} x {} pixels exceeds {} per side", size.width,
-                      size.height, kMaxImageSide);
+  RETURN_IF_ERROR(check_draw(strands, position_count_, size, terms));
   const glm::uvec2 pixels(size.width, size.height);
   ASSIGN_OR_RETURN(const View view,
                    make_view(camera, strands.world_from_head.rotation, pixels * kSamplesPerSide));
-  if (!(terms.strand_share > 0.0f && terms.strand_share <= 1.0f))
-    return make_error(ErrorCode::BadInput, "the share of strands to draw is {} but must lie in (0, 1]",
-                      terms.strand_share);
   RenderTurn turn(strands, view, pixels, terms);
   RETURN_IF_ERROR(passes_.run(turn, &timer_));
   profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
@@ -62,6 +54,19 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
 }
 
 }  // namespace
+
+Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size, const DrawTerms& terms) {
+  if (strands.position_m.size() != position_count)
+    return make_error(ErrorCode::BadInput, "the strands have {} vertices but the scene has {}",
+                      strands.position_m.size(), position_count);
+  if (size.width > kMaxImageSide || size.height > kMaxImageSide)
+    return make_error(ErrorCode::LimitExceeded, "a picture of {} x {} pixels exceeds {} per side", size.width,
+                      size.height, kMaxImageSide);
+  if (!(terms.strand_share > 0.0f && terms.strand_share <= 1.0f))
+    return make_error(ErrorCode::BadInput, "the share of strands to draw is {} but must lie in (0, 1]",
+                      terms.strand_share);
+  return {};
+}
 
 Result<std::unique_ptr<Renderer>> Renderer::make(const gl::ShaderLibrary& shaders,
                                                  const gl::DeviceInfo& device, const SceneAsset& asset,

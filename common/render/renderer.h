@@ -49,6 +49,9 @@ class Renderer {
   virtual const gl::PassListBase& passes() const = 0;
 };
 
+/// What every renderer refuses to draw. BadInput or LimitExceeded.
+Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size, const DrawTerms& terms);
+
 /// The passes that a renderer of this would run, without any GL.
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, bool is_software,
                                       const RenderPath& path = segment_path());

@@ -4,6 +4,7 @@
 // select(), never by branches. Everything is inline; instruction sets are chosen by common/simd/variants.h.
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <cstring>
 
@@ -22,11 +23,16 @@ struct Bool {
   IntBits v;
 };
 
+struct Float;
+
 struct Uint {
   UintBits v;
   Uint() = default;
   STRANDCAST_LANES constexpr Uint(UintBits bits) : v(bits) {}
-  STRANDCAST_LANES constexpr Uint(uint32_t value) : v(UintBits{} + value) {}
+  template <std::same_as<uint32_t> Number>
+  STRANDCAST_LANES constexpr Uint(Number value) : v(UintBits{} + value) {}
+  /// Of values in 0 .. 2^31, towards zero.
+  STRANDCAST_LANES explicit Uint(Float value);
 };
 
 struct Float {
@@ -39,6 +45,8 @@ struct Float {
   /// Of values below 2^31.
   STRANDCAST_LANES explicit Float(Uint value) : v(__builtin_convertvector((IntBits)value.v, FloatBits)) {}
 };
+
+STRANDCAST_LANES Uint::Uint(Float value) : v((UintBits) __builtin_convertvector(value.v, IntBits)) {}
 
 // ---- operators
 STRANDCAST_LANES constexpr Float operator+(Float a, Float b) {
@@ -286,6 +294,21 @@ STRANDCAST_LANES vec3 operator/(vec3 a, vec3 b) {
 STRANDCAST_LANES vec3 operator-(vec3 a) {
   return {-a.x, -a.y, -a.z};
 }
+STRANDCAST_LANES vec3 operator+(vec3 a, Float b) {
+  return {a.x + b, a.y + b, a.z + b};
+}
+STRANDCAST_LANES vec3 operator-(vec3 a, Float b) {
+  return {a.x - b, a.y - b, a.z - b};
+}
+STRANDCAST_LANES vec3 operator*(vec3 a, Float b) {
+  return {a.x * b, a.y * b, a.z * b};
+}
+STRANDCAST_LANES vec3 operator*(Float a, vec3 b) {
+  return {a * b.x, a * b.y, a * b.z};
+}
+STRANDCAST_LANES vec3 operator/(vec3 a, Float b) {
+  return {a.x / b, a.y / b, a.z / b};
+}
 STRANDCAST_LANES vec3& operator+=(vec3& a, vec3 b) {
   return a = a + b;
 }
@@ -306,6 +329,12 @@ STRANDCAST_LANES Float length(vec3 a) {
 }
 STRANDCAST_LANES vec3 normalize(vec3 a) {
   return a * vec3(inversesqrt(dot(a, a)));
+}
+STRANDCAST_LANES vec3 min(vec3 a, Float b) {
+  return {min(a.x, b), min(a.y, b), min(a.z, b)};
+}
+STRANDCAST_LANES vec3 max(vec3 a, Float b) {
+  return {max(a.x, b), max(a.y, b), max(a.z, b)};
 }
 STRANDCAST_LANES vec3 min(vec3 a, vec3 b) {
   return {min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)};

@@ -7,7 +7,7 @@ namespace {
 
 std::vector<InstructionSet> find_sets() {
   std::vector<InstructionSet> sets{InstructionSet::Plain};
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#if STRANDCAST_HAS_SETS
   __builtin_cpu_init();
   if (__builtin_cpu_supports("sse4.2")) sets.push_back(InstructionSet::Sse4);
   if (__builtin_cpu_supports("avx2")) sets.push_back(InstructionSet::Avx2);

@@ -20,7 +20,15 @@ inline InstructionSet widest_set() {
   return instruction_sets().back();
 }
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+// Under sanitizers one is enough: each takes minutes to compile there.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(_GLIBCXX_TSAN)
+#define STRANDCAST_HAS_SETS 1
+#else
+#define STRANDCAST_HAS_SETS 0
+#endif
+
+#if STRANDCAST_HAS_SETS
 #define STRANDCAST_KERNEL(name, Arguments)                                                          \
   __attribute__((flatten)) static void name##_plain(const Arguments& arguments) {                   \
     name##_lanes(arguments);                                                                        \

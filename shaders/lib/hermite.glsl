@@ -1,5 +1,7 @@
 // Cubic Hermite curves through the vertices of a strand (Catmull 1974 tangents, one-sided at the ends). The basis is
 // exactly 0 or 1 at t = 0 and t = 1, so that a curve passes bit for bit through its vertices.
+#pragma once
+#include "lib/select.glsl"
 
 struct HermiteGap {
   vec3 p0;
@@ -8,7 +10,7 @@ struct HermiteGap {
   vec3 m1;
 };
 
-vec3 hermite_point(HermiteGap g, float t) {
+LAW vec3 hermite_point(HermiteGap g, float t) {
   float t2 = t * t;
   float t3 = t2 * t;
   float h01 = 3.0 * t2 - 2.0 * t3;
@@ -16,7 +18,7 @@ vec3 hermite_point(HermiteGap g, float t) {
 }
 
 // Derivative by t.
-vec3 hermite_derivative(HermiteGap g, float t) {
+LAW vec3 hermite_derivative(HermiteGap g, float t) {
   float t2 = t * t;
   float d01 = 6.0 * (t - t2);
   return d01 * (g.p1 - g.p0) + (3.0 * t2 - 4.0 * t + 1.0) * g.m0 + (3.0 * t2 - 2.0 * t) * g.m1;
@@ -26,7 +28,7 @@ vec3 hermite_derivative(HermiteGap g, float t) {
 const float kMinDirectionSquared = 1e-24;
 
 // v as a unit vector, or the fallback where v has no direction.
-vec3 unit_or(vec3 v, vec3 fallback) {
+LAW vec3 unit_or(vec3 v, vec3 fallback) {
   float squared = dot(v, v);
-  return squared > kMinDirectionSquared ? v * inversesqrt(squared) : fallback;
+  return select(squared > kMinDirectionSquared, v * inversesqrt(max(squared, kMinDirectionSquared)), fallback);
 }

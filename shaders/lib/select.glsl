@@ -1,5 +1,8 @@
-// A choice that is written the same for one invocation and for lanes of them (common/simd/lanes.h): both sides are
-// evaluated.
+// What lets a law compile for lanes of invocations on the CPU as well (common/render/laws.h): LAW in front of each of its
+// functions, and a choice whose both sides are evaluated.
 #pragma once
 
+#ifndef __cplusplus
+#define LAW
 #define select(which, yes, no) ((which) ? (yes) : (no))
+#endif

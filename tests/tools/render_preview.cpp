@@ -1,7 +1,7 @@
 // render_preview: draws a scene's hair at rest into a PNG, without server or simulation. For looking at the
 // renderer.
 //   render_preview OUT.png [--scene FILE] [--set path=value]... [--size WxH] [--repeat N] [--turn DEGREES]
-//   [--shaders DIR]
+//   [--shaders DIR] [--renderer gl|tiles] [--threads N]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +15,7 @@
 #include "common/groom/groom_asset.h"
 #include "common/pictures/image_codec.h"
 #include "common/render/renderer.h"
+#include "common/render/tiles/tile_renderer.h"
 #include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
@@ -30,6 +31,8 @@ struct Options {
   RenderSize size;
   int repeat = 1;
   double turn_degrees = 0.0;  // of the head about the vertical
+  std::string renderer = "tiles";
+  TileOptions tiles;
 };
 
 Result<Options> parse(int argc, char** argv) {
@@ -52,12 +55,18 @@ Result<Options> parse(int argc, char** argv) {
       options.repeat = std::max(1, std::atoi(value.c_str()));
     } else if (word == "--turn") {
       options.turn_degrees = std::atof(value.c_str());
+    } else if (word == "--renderer") {
+      options.renderer = value;
+    } else if (word == "--threads") {
+      options.tiles.threads = static_cast<uint32_t>(std::max(1, std::atoi(value.c_str())));
     } else if (word == "--size") {
       if (std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2)
         return make_error(ErrorCode::BadInput, "--size is {} but must look like 640x360", value);
     } else {
-      return make_error(ErrorCode::BadInput,
-                        "unknown option {} (known: --scene --set --shaders --size --repeat --turn)", word);
+      return make_error(
+          ErrorCode::BadInput,
+          "unknown option {} (known: --scene --set --shaders --size --repeat --turn --renderer --threads)",
+          word);
     }
   }
   if (options.out.empty()) return make_error(ErrorCode::BadInput, "name the PNG file to write");
@@ -73,8 +82,17 @@ Status run(int argc, char** argv) {
   const SceneAsset asset = make_scene_asset(content.groom, std::move(content.head));
   const gl::ShaderLibrary shaders =
       options.shaders.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shaders);
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
-  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, scene.look));
+  std::unique_ptr<gl::EglContext> context;
+  std::unique_ptr<Renderer> renderer;
+  std::string device =
+      fmt::format("tiles, {} threads, {}", options.tiles.threads, to_string(options.tiles.set));
+  if (options.renderer == "gl") {
+    ASSIGN_OR_RETURN(context, gl::EglContext::make("auto"));
+    ASSIGN_OR_RETURN(renderer, Renderer::make(shaders, context->info(), asset, scene.look));
+    device = context->info().renderer;
+  } else {
+    ASSIGN_OR_RETURN(renderer, make_tile_renderer(asset, scene.look, options.tiles));
+  }
 
   PosedStrands strands;
   strands.position_m = asset.rest_position_m;
@@ -98,10 +116,11 @@ Status run(int argc, char** argv) {
   for (const gl::PassReport& pass : renderer->passes().report())
     passes += fmt::format(", {} {:.1f}", pass.name, pass.median_ms);
   std::printf("%s: %ux%u, %llu strands, %llu segments; picture %.1f ms (best %.1f), %.1f ms of CPU%s\n",
-              context->info().renderer.c_str(), options.size.width, options.size.height,
+              device.c_str(), options.size.width, options.size.height,
               static_cast<unsigned long long>(profile.drawn_strands),
               static_cast<unsigned long long>(profile.drawn_segments), picture_ms[picture_ms.size() / 2],
               picture_ms.front(), cpu_ms, passes.c_str());
+  std::printf("memory %.1f MB\n", static_cast<double>(renderer->passes().live_bytes()) / 1048576.0);
   return {};
 }
 

@@ -1,0 +1,278 @@
+#include "common/render/light_lattice.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "common/render/tiles/tile_frame.h"
+
+namespace strandcast {
+namespace {
+
+// Mean |sine| between a strand and the light when strands point everywhere.
+constexpr float kMeanCrossing = 0.785398f;
+// Part of the light that a drawn strand takes out where it is; the rest passes or is scattered onwards.
+constexpr float kStrandOpacity = 0.6f;
+// Optical depth of a cell inside the skull.
+constexpr float kSkullDepth = 3.0f;
+// Sums are kept in such parts of a unit of optical depth: 2^31 of them are 32,768 units.
+constexpr float kSumUnit = 1.0f / 65536.0f;
+// Hair that flies out of the lattice casts no shadow; this much room is left around the hair at rest.
+constexpr float kRoom = 1.2f;
+constexpr int kMaxCells = 160;  // per axis
+constexpr int kSizeStep = 8;
+// Workers that sum have a lattice each.
+constexpr uint32_t kMaxSummingWorkers = 4;
+constexpr size_t kStrandsPerRange = 64;
+
+glm::vec3 any_across(const glm::vec3& axis) {
+  const glm::vec3 other = std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
+  return glm::normalize(glm::cross(other, axis));
+}
+
+glm::vec3 along_axes(const glm::vec3& v, const LightLatticeView& view) {
+  return {glm::dot(v, view.axis[0]), glm::dot(v, view.axis[1]), glm::dot(v, view.axis[2])};
+}
+
+bool is_number(const StrandPoint& p) {
+  constexpr float kFarM = 1e4f;
+  return std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM;
+}
+
+}  // namespace
+
+uint64_t LightLattice::size_bytes() const {
+  uint64_t bytes = key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
+                   (halved_.capacity() + rim_depth_.capacity() + sky_depth_.capacity()) * sizeof(float);
+  for (const auto& sums : sums_) bytes += sums.capacity() * sizeof(int32_t);
+  return bytes;
+}
+
+void LightLattice::build(const StrandPoints& points, const LightStrands& strands,
+                         const LightDirections& lights, WorkerPool& workers) {
+  fit(points, lights, workers);
+  sum_strands(points, strands, workers);
+  sweep_key(workers);
+  workers.run([&](uint32_t worker) {
+    if (worker == 0) sweep(along_axes(lights.up, view_), sky_depth_);
+    if (worker == std::min(1u, workers.size() - 1)) {
+      if (lights.has_rim)
+        sweep(along_axes(lights.to_rim, view_), rim_depth_);
+      else
+        rim_depth_.assign(halved_.size(), 0.0f);
+    }
+  });
+  others_.resize(halved_.size());
+  const auto stored = [](float depth) {
+    return static_cast<uint32_t>(std::clamp(depth * (1.0f / kLightDepthUnit), 0.0f, 65535.0f));
+  };
+  for (size_t i = 0; i < others_.size(); ++i)
+    others_[i] = stored(rim_depth_[i]) | stored(sky_depth_[i]) << 16;
+  view_.key = key_.data();
+  view_.others = others_.data();
+}
+
+// The lattice is as large as the hair and stands on whole cells, so that a shadow does not shimmer when the
+// hair's extent changes a little.
+void LightLattice::fit(const StrandPoints& points, const LightDirections& lights, WorkerPool& workers) {
+  view_.axis[2] = -lights.to_key;
+  view_.axis[0] = any_across(lights.to_key);
+  view_.axis[1] = glm::cross(view_.axis[2], view_.axis[0]);
+  view_.cell_m = std::max(kRoom * desc_.extent_m / static_cast<float>(desc_.cells), 1e-5f);
+  constexpr float kNone = 1e30f;
+  std::vector<glm::vec3> low(workers.size(), glm::vec3(kNone));
+  std::vector<glm::vec3> high(workers.size(), glm::vec3(-kNone));
+  const uint32_t strands = points.strand_count();
+  workers.run([&](uint32_t worker) {
+    const uint32_t begin = static_cast<uint32_t>(uint64_t{strands} * worker / workers.size());
+    const uint32_t end = static_cast<uint32_t>(uint64_t{strands} * (worker + 1) / workers.size());
+    constexpr uint32_t kEvery = 4;  // points along a strand are close
+    for (uint32_t strand = begin; strand < end; ++strand)
+      for (uint32_t i = points.first_point[strand]; i < points.first_point[strand + 1]; i += kEvery) {
+        const StrandPoint& p = points.point[i];
+        if (!is_number(p)) continue;
+        const glm::vec3 q = along_axes({p.x, p.y, p.z}, view_);
+        low[worker] = glm::min(low[worker], q);
+        high[worker] = glm::max(high[worker], q);
+      }
+  });
+  for (uint32_t worker = 1; worker < workers.size(); ++worker) {
+    low[0] = glm::min(low[0], low[worker]);
+    high[0] = glm::max(high[0], high[worker]);
+  }
+  if (desc_.has_skull) {
+    const glm::vec3 q = along_axes(desc_.skull.center_m, view_);
+    low[0] = glm::min(low[0], q - desc_.skull.radius_m);
+    high[0] = glm::max(high[0], q + desc_.skull.radius_m);
+  }
+  if (!(low[0].x <= high[0].x)) low[0] = high[0] = glm::vec3(0.0f);
+  for (int a = 0; a < 3; ++a) {
+    const float first = std::floor(low[0][a] / view_.cell_m) - 1.0f;
+    const float last = std::ceil(high[0][a] / view_.cell_m) + 1.0f;
+    const int wanted = (static_cast<int>(std::min(last - first + 1.0f, 4.0f * kMaxCells)) + kSizeStep - 1) /
+                       kSizeStep * kSizeStep;
+    view_.size[a] = std::min(wanted, kMaxCells);
+    // One that is too long keeps its middle.
+    view_.origin_m[a] = view_.cell_m * (first + 0.5f * static_cast<float>(wanted - view_.size[a]));
+  }
+  view_.half_size = view_.size / 2;
+}
+
+void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers) {
+  const glm::ivec3 size = view_.size;
+  const size_t cells = static_cast<size_t>(size.x) * size.y * size.z;
+  const uint32_t summing = std::min(workers.size(), kMaxSummingWorkers);
+  sums_.resize(summing);
+  for (auto& sums : sums_) sums.resize(cells);
+  const float per_m =
+      strands.width_m * kStrandOpacity * kMeanCrossing / (view_.cell_m * view_.cell_m) / kSumUnit;
+  const glm::vec3 u = view_.axis[0] / view_.cell_m;
+  const glm::vec3 v = view_.axis[1] / view_.cell_m;
+  const glm::vec3 w = view_.axis[2] / view_.cell_m;
+  const glm::vec3 origin = view_.origin_m / view_.cell_m;
+  const float fade = 1.0f / std::max(strands.tip_fade, 1e-3f);
+  const size_t dy = size.x;
+  const size_t dz = dy * size.y;
+  std::atomic<uint32_t> next{0};
+  workers.run([&](uint32_t worker) {
+    if (worker >= summing) return;
+    int32_t* const sums = sums_[worker].data();
+    std::fill_n(sums, cells, 0);
+    for (uint32_t begin = next.fetch_add(kStrandsPerRange); begin < points.strand_count();
+         begin = next.fetch_add(kStrandsPerRange)) {
+      const uint32_t end = std::min<uint32_t>(begin + kStrandsPerRange, points.strand_count());
+      for (uint32_t strand = begin; strand < end; ++strand) {
+        const uint32_t first = points.first_point[strand];
+        const uint32_t last = points.first_point[strand + 1] - 1;
+        const float along_step = 1.0f / static_cast<float>(std::max(last - first, 1u));
+        for (uint32_t i = first; i < last; ++i) {
+          const StrandPoint& a = points.point[i];
+          const StrandPoint& b = points.point[i + 1];
+          const glm::vec3 step(b.x - a.x, b.y - a.y, b.z - a.z);
+          const glm::vec3 middle(a.x + 0.5f * step.x, a.y + 0.5f * step.y, a.z + 0.5f * step.z);
+          const float x = glm::dot(middle, u) - origin.x;
+          const float y = glm::dot(middle, v) - origin.y;
+          const float z = glm::dot(middle, w) - origin.z;
+          if (!(x >= 0.0f && y >= 0.0f && z >= 0.0f && x < static_cast<float>(size.x - 1) &&
+                y < static_cast<float>(size.y - 1) && z < static_cast<float>(size.z - 1)))
+            continue;
+          const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
+          const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
+          const float amount = per_m * std::sqrt(glm::dot(step, step)) * cover *
+                               (1.0f + (strands.tip_scale - 1.0f) * along * along);
+          const int cx = static_cast<int>(x);
+          const int cy = static_cast<int>(y);
+          const int cz = static_cast<int>(z);
+          const float fx = x - static_cast<float>(cx);
+          const float fy = y - static_cast<float>(cy);
+          const float fz = z - static_cast<float>(cz);
+          int32_t* const cell = sums + (static_cast<size_t>(cz) * dz + static_cast<size_t>(cy) * dy + cx);
+          const float y1 = amount * fy;
+          const float y0 = amount - y1;
+          const float y1x1 = y1 * fx;
+          const float y0x1 = y0 * fx;
+          const float corner[4] = {y0 - y0x1, y0x1, y1 - y1x1, y1x1};
+          const size_t offset[4] = {0, 1, dy, dy + 1};
+          for (int k = 0; k < 4; ++k) {
+            const float far = corner[k] * fz;
+            cell[offset[k]] += static_cast<int32_t>(corner[k] - far);
+            cell[offset[k] + dz] += static_cast<int32_t>(far);
+          }
+        }
+      }
+    }
+  });
+}
+
+// A running sum away from the light, and half of the cell itself.
+void LightLattice::sweep_key(WorkerPool& workers) {
+  const glm::ivec3 size = view_.size;
+  const size_t slice = static_cast<size_t>(size.x) * size.y;
+  key_.resize(slice * size.z);
+  halved_.assign(static_cast<size_t>(view_.half_size.x) * view_.half_size.y * view_.half_size.z, 0.0f);
+  glm::vec3 center(0.0f);
+  float radius = -1.0f;
+  if (desc_.has_skull) {
+    center = (along_axes(desc_.skull.center_m, view_) - view_.origin_m) / view_.cell_m;
+    radius = desc_.skull.radius_m / view_.cell_m;
+  }
+  // Two rows at a time: they halve into one.
+  workers.for_ranges(static_cast<size_t>(size.y) / 2, 1, [&](size_t begin, size_t end) {
+    std::vector<float> passed(size.x);
+    std::vector<float> here(size.x);
+    std::vector<int32_t> sum(size.x);
+    for (size_t y = 2 * begin; y < 2 * end; ++y) {
+      std::fill(passed.begin(), passed.end(), 0.0f);
+      for (int z = 0; z < size.z; ++z) {
+        const size_t row = static_cast<size_t>(z) * slice + y * size.x;
+        std::copy_n(sums_[0].data() + row, size.x, sum.data());
+        for (size_t other = 1; other < sums_.size(); ++other) {
+          const int32_t* const from = sums_[other].data() + row;
+          for (int x = 0; x < size.x; ++x) sum[x] += from[x];
+        }
+        for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kSumUnit;
+        const float dy = static_cast<float>(y) - center.y;
+        const float dz = static_cast<float>(z) - center.z;
+        const float inside = radius * radius - dy * dy - dz * dz;
+        if (radius > 0.0f && inside > 0.0f) {
+          const float reach = std::sqrt(inside);
+          const int from = std::max(0, static_cast<int>(std::ceil(center.x - reach)));
+          const int to = std::min(size.x - 1, static_cast<int>(std::floor(center.x + reach)));
+          for (int x = from; x <= to; ++x) here[x] += kSkullDepth;
+        }
+        uint16_t* const key = key_.data() + row;
+        constexpr float kStored = 1.0f / kLightDepthUnit;
+        for (int x = 0; x < size.x; ++x) {
+          const float depth = (passed[x] + 0.5f * here[x]) * kStored;
+          key[x] = static_cast<uint16_t>(static_cast<int32_t>(depth < 65535.0f ? depth : 65535.0f));
+          passed[x] += here[x];
+        }
+        // Across a cell twice as wide: the sum of two in its length, the mean over four across.
+        float* const halved =
+            halved_.data() + (static_cast<size_t>(z / 2) * view_.half_size.y + y / 2) * view_.half_size.x;
+        for (int x = 0; x < view_.half_size.x; ++x) halved[x] += 0.25f * (here[2 * x] + here[2 * x + 1]);
+      }
+    }
+  });
+}
+
+// Slice by slice away from the light: a cell's depth is that of the slice before it, looked up where the ray
+// to the light crosses it, plus half of both cells on the way.
+void LightLattice::sweep(const glm::vec3& to_light, std::vector<float>& depth) const {
+  const glm::ivec3 size = view_.half_size;
+  const glm::vec3 length = glm::abs(to_light);
+  const int a = length.x >= length.y && length.x >= length.z ? 0 : (length.y >= length.z ? 1 : 2);
+  const int u = (a + 1) % 3;
+  const int v = (a + 2) % 3;
+  depth.assign(halved_.size(), 0.0f);
+  if (!(length[a] > 0.0f)) return;
+  const float shift_u = to_light[u] / length[a];
+  const float shift_v = to_light[v] / length[a];
+  const float half_step = 0.5f * glm::length(to_light) / length[a];
+  const glm::ivec3 stride(1, size.x, size.x * size.y);
+  const int first = to_light[a] > 0.0f ? size[a] - 1 : 0;
+  const int direction = to_light[a] > 0.0f ? -1 : 1;
+  const int floor_u = static_cast<int>(std::floor(shift_u));
+  const int floor_v = static_cast<int>(std::floor(shift_v));
+  const float part_u = shift_u - static_cast<float>(floor_u);
+  const float part_v = shift_v - static_cast<float>(floor_v);
+  for (int slice = 0; slice < size[a]; ++slice) {
+    const int here = first + direction * slice;
+    const auto behind = [&](int i, int j) {
+      if (slice == 0 || i < 0 || j < 0 || i >= size[u] || j >= size[v]) return 0.0f;
+      const auto cell = static_cast<size_t>((here - direction) * stride[a] + i * stride[u] + j * stride[v]);
+      return depth[cell] + half_step * halved_[cell];
+    };
+    for (int j = 0; j < size[v]; ++j)
+      for (int i = 0; i < size[u]; ++i) {
+        const int i0 = i + floor_u;
+        const int j0 = j + floor_v;
+        const float near = (1.0f - part_u) * behind(i0, j0) + part_u * behind(i0 + 1, j0);
+        const float far = (1.0f - part_u) * behind(i0, j0 + 1) + part_u * behind(i0 + 1, j0 + 1);
+        const auto cell = static_cast<size_t>(here * stride[a] + i * stride[u] + j * stride[v]);
+        depth[cell] = (1.0f - part_v) * near + part_v * far + half_step * halved_[cell];
+      }
+  }
+}
+
+}  // namespace strandcast

@@ -1,0 +1,80 @@
+// LightLattice: how much drawn hair lies between each place and the key light, the rim light and the sky, as
+// optical depth. Strands are summed into cells along the key light in integers, so the order does not matter;
+// a running sum along the light gives its depth, sweeps through the halved lattice those of the others. No
+// GL.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "common/base/worker_pool.h"
+#include "common/groom/mesh.h"
+
+namespace strandcast {
+
+struct StrandPoints;
+
+/// What of a scene it needs and does not change from picture to picture.
+struct LightLatticeDesc {
+  float extent_m = 0.3f;   // of the hair at rest, its largest side
+  uint32_t cells = 96;     // along that side
+  bool has_skull = false;  // an opaque ball under the hair
+  FittedSphere skull;
+};
+
+/// Unit vectors in head space.
+struct LightDirections {
+  glm::vec3 to_key{0.0f, 1.0f, 0.0f};
+  glm::vec3 to_rim{0.0f, 1.0f, 0.0f};
+  glm::vec3 up{0.0f, 1.0f, 0.0f};
+  bool has_rim = false;
+};
+
+/// Of the strands that are summed.
+struct LightStrands {
+  float width_m = 0.0f;  // at the root
+  float tip_scale = 1.0f;
+  float tip_fade = 0.0f;
+};
+
+/// Optical depth per unit of the stored numbers: 16 bits reach 64.
+inline constexpr float kLightDepthUnit = 64.0f / 65536.0f;
+
+/// The stored depths, for look-ups by kernels and by OpenGL.
+struct LightLatticeView {
+  glm::vec3 axis[3];         // unit: across, across, away from the key light
+  glm::vec3 origin_m{0.0f};  // middle of the first cell, along the axes
+  float cell_m = 1.0f;
+  glm::ivec3 size{0};                // of the key light's cells
+  const uint16_t* key = nullptr;     // (size.z x size.y x size.x)
+  glm::ivec3 half_size{0};           // of the other lights' cells, twice as large
+  const uint32_t* others = nullptr;  // (half_size): rim in the low 16 bits, sky in the high ones
+};
+
+class LightLattice {
+ public:
+  explicit LightLattice(const LightLatticeDesc& desc) : desc_(desc) {}
+
+  void build(const StrandPoints& points, const LightStrands& strands, const LightDirections& lights,
+             WorkerPool& workers);
+  const LightLatticeView& view() const { return view_; }
+  uint64_t size_bytes() const;
+
+ private:
+  void fit(const StrandPoints& points, const LightDirections& lights, WorkerPool& workers);
+  void sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers);
+  void sweep_key(WorkerPool& workers);
+  void sweep(const glm::vec3& to_light, std::vector<float>& depth) const;
+
+  LightLatticeDesc desc_;
+  LightLatticeView view_;
+  std::vector<std::vector<int32_t>> sums_;  // one lattice per worker that sums
+  std::vector<uint16_t> key_;
+  std::vector<float> halved_;  // optical depth across a halved cell
+  std::vector<float> rim_depth_;
+  std::vector<float> sky_depth_;
+  std::vector<uint32_t> others_;
+};
+
+}  // namespace strandcast

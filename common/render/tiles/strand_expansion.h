@@ -1,0 +1,53 @@
+// From simulated strands to the points that are drawn: curves through the vertices of key strands, and
+// followers between three of them (shaders/lib/strand_style.glsl). What is the same from picture to picture
+// is found once. No GL.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "common/base/worker_pool.h"
+#include "common/render/tiles/tile_frame.h"
+#include "common/simd/variants.h"
+#include "common/strands/scene_asset.h"
+
+namespace strandcast {
+
+/// How finely one picture is drawn.
+struct StrandDetail {
+  uint32_t segments_per_gap = 1;  // >= 1
+  uint32_t followers = 0;         // per triangle, at most those of the look
+  uint32_t strand_count = 0;      // the first of keys and followers
+};
+
+class StrandExpansion {
+ public:
+  /// `mean_length_m`: of a key strand at rest.
+  StrandExpansion(const SceneAsset& asset, float mean_length_m);
+
+  /// Lengths and numbers of the look's style.
+  void set_look(const LookDesc& look);
+  uint32_t key_count() const { return key_count_; }
+  uint32_t strand_count(uint32_t followers) const;
+  /// `position_m`: (vertex_count x key_count) vertex-major, head space.
+  void expand(const std::vector<glm::vec3>& position_m, const StrandDetail& detail, WorkerPool& workers,
+              simd::InstructionSet set, StrandPoints& points);
+  uint64_t size_bytes() const;
+
+ private:
+  uint32_t key_count_;
+  uint32_t vertex_count_;
+  float mean_length_m_;
+  uint32_t max_followers_ = 0;
+  StrandStyleDesc style_;
+  // Per root triangle: its keys, whose hair falls to different sides where the first bit of `is_parted` says
+  // so.
+  std::vector<RootTriangle> triangle_;
+  std::vector<uint8_t> is_parted_;
+  // Per key strand: samples of its curve, x, y and z in rows of `row_floats`.
+  std::vector<float> samples_;
+};
+
+}  // namespace strandcast

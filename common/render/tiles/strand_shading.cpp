@@ -1,0 +1,174 @@
+#include "common/render/tiles/strand_shading.h"
+
+#include <glm/gtc/constants.hpp>
+
+#include "common/render/tiles/light_lookup.h"
+#include "common/scene/hair_color.h"
+#include "common/strands/strand_limits.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kStrandsPerRange = 16;
+constexpr uint32_t kMaxSegmentsPerGap = 8;
+constexpr uint32_t kMaxPoints = (kMaxVertexCount - 1) * kMaxSegmentsPerGap + 2;
+
+struct ShadeArguments {
+  const ShadeInput* input;
+  uint32_t begin, end;  // strands
+  const uint32_t* first_point;
+  const uint32_t* index;
+  const uint32_t* lock;
+  StrandPoint* point;
+};
+
+/// As IEEE halves: rounded to the nearest, at most 65,504.
+STRANDCAST_LANES simd::UintBits half_bits(simd::Float x) {
+  using namespace simd;
+  constexpr float kHalfScale = 1.92592994e-34f;  // 2^-112: the difference of the two biases
+  const UintBits sign = ((UintBits)x.v >> 16) & 0x8000u;
+  const Float size = min(abs(x), 65504.0f) * kHalfScale;
+  return sign | (((UintBits)size.v + 0x1000u) >> 13);
+}
+
+/// Room for one strand, with a lane's worth before and behind.
+using StrandRow = float[kMaxPoints + 3 * simd::kLanes];
+
+STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
+  using namespace law;
+  const ShadeInput& in = *a.input;
+  const HairLook look = hair_look(in.look);
+  const HairLights lights = hair_lights(in.look, in.lights);
+  const glm::mat4& clip = in.view.clip_from_head;
+  const vec3 eye(in.view.eye_m);
+  constexpr uint32_t kFirst = kLanes;  // of a row
+  StrandRow xs, ys, zs, dx, dy;
+  for (uint32_t strand = a.begin; strand < a.end; ++strand) {
+    const uint32_t first = a.first_point[strand];
+    const uint32_t count = a.first_point[strand + 1] - first;
+    StrandPoint* const points = a.point + first;
+    for (uint32_t k = 0; k < count; ++k) {
+      xs[kFirst + k] = points[k].x;
+      ys[kFirst + k] = points[k].y;
+      zs[kFirst + k] = points[k].z;
+    }
+    const auto extend = [&](StrandRow & row) __attribute__((always_inline)) {
+      row[kFirst - 1] = row[kFirst];
+      for (uint32_t k = count; k < count + kLanes + 1; ++k) row[kFirst + k] = row[kFirst + count - 1];
+    };
+    extend(xs);
+    extend(ys);
+    extend(zs);
+    const HairStrand hair = hair_strand(Uint(a.index[strand]), Uint(a.lock[strand]), look);
+    const Float along_step = 1.0f / static_cast<float>(count > 1 ? count - 1 : 1);
+    for (uint32_t k = 0; k < count; k += kLanes) {
+      const uint32_t at = kFirst + k;
+      const vec3 position(load_lanes(xs + at), load_lanes(ys + at), load_lanes(zs + at));
+      const vec3 tangent = unit_or(vec3(load_lanes(xs + at + 1) - load_lanes(xs + at - 1),
+                                        load_lanes(ys + at + 1) - load_lanes(ys + at - 1),
+                                        load_lanes(zs + at + 1) - load_lanes(zs + at - 1)),
+                                   vec3(0.0f, -1.0f, 0.0f));
+      const Float along = min((lane_numbers() + Float(static_cast<float>(k))) * along_step, 1.0f);
+      const vec3 to_eye = unit_or(eye - position, vec3(0.0f, 0.0f, 1.0f));
+      const LightDepth depth = light_depth_at(in.lattice, position);
+      const vec3 light = hair_radiance(look, hair, lights, depth, along, tangent, to_eye);
+
+      const Float clip_x =
+          clip[0][0] * position.x + clip[1][0] * position.y + clip[2][0] * position.z + clip[3][0];
+      const Float clip_y =
+          clip[0][1] * position.x + clip[1][1] * position.y + clip[2][1] * position.z + clip[3][1];
+      const Float away =
+          clip[0][3] * position.x + clip[1][3] * position.y + clip[2][3] * position.z + clip[3][3];
+      const Float per_away = 1.0f / max(away, in.view.near_m);
+      const Float half_width = 0.5f * in.view.target_px.x;
+      const Float half_height = 0.5f * in.view.target_px.y;
+      const Float x = half_width + half_width * clip_x * per_away;
+      const Float y = half_height - half_height * clip_y * per_away;
+      store_lanes(x, dx + at);
+      store_lanes(y, dy + at);
+      const Float width =
+          in.width_m * in.view.focal_px * (1.0f + (in.tip_scale - 1.0f) * along * along) * per_away;
+      const Float opacity = tip_cover(along, in.tip_fade);
+      const UintBits width_bits = half_bits(width);
+      const UintBits opacity_bits = half_bits(opacity);
+      const UintBits red = half_bits(light.x);
+      const UintBits green = half_bits(light.y);
+      const UintBits blue = half_bits(light.z);
+      const uint32_t lanes = count - k < kLanes ? count - k : kLanes;
+      for (uint32_t lane = 0; lane < lanes; ++lane) {
+        StrandPoint& point = points[k + lane];
+        point.x = x.v[lane];
+        point.y = y.v[lane];
+        point.z = away.v[lane];
+        point.half[kWidthPx] = static_cast<uint16_t>(width_bits[lane]);
+        point.half[kOpacity] = static_cast<uint16_t>(opacity_bits[lane]);
+        point.half[kRed] = static_cast<uint16_t>(red[lane]);
+        point.half[kGreen] = static_cast<uint16_t>(green[lane]);
+        point.half[kBlue] = static_cast<uint16_t>(blue[lane]);
+      }
+    }
+    // Joints: across the mean of the directions before and behind.
+    extend(dx);
+    extend(dy);
+    for (uint32_t k = 0; k < count; k += kLanes) {
+      const uint32_t at = kFirst + k;
+      const Float x = load_lanes(dx + at);
+      const Float y = load_lanes(dy + at);
+      vec2 before(x - load_lanes(dx + at - 1), y - load_lanes(dy + at - 1));
+      vec2 behind(load_lanes(dx + at + 1) - x, load_lanes(dy + at + 1) - y);
+      const Float before2 = dot(before, before);
+      const Float behind2 = dot(behind, behind);
+      constexpr float kNoWay = 1e-12f;  // squared pixels
+      before = before * vec2(select(before2 > kNoWay, inversesqrt(max(before2, kNoWay)), 0.0f));
+      behind = behind * vec2(select(behind2 > kNoWay, inversesqrt(max(behind2, kNoWay)), 0.0f));
+      const vec2 sum = before + behind;
+      // A strand that turns back has no mitre: it is cut across its way on.
+      const Bool turns = dot(sum, sum) < 0.03f;
+      const UintBits mitre_x = half_bits(select(turns, behind.x, sum.x));
+      const UintBits mitre_y = half_bits(select(turns, behind.y, sum.y));
+      const uint32_t lanes = count - k < kLanes ? count - k : kLanes;
+      for (uint32_t lane = 0; lane < lanes; ++lane) {
+        points[k + lane].half[kMitreX] = static_cast<uint16_t>(mitre_x[lane]);
+        points[k + lane].half[kMitreY] = static_cast<uint16_t>(mitre_y[lane]);
+      }
+    }
+  }
+}
+STRANDCAST_KERNEL(shade_strand_points, ShadeArguments);
+
+}  // namespace
+
+ShadingNumbers shading_numbers(const LookDesc& look) {
+  const HairColors colors = colors_of(look);
+  const HairShadingDesc& s = look.shading;
+  return {colors.root,
+          colors.tip,
+          s.diffuse,
+          s.scatter,
+          s.highlight,
+          s.transmission,
+          s.second_highlight,
+          glm::radians(s.highlight_width_deg),
+          glm::radians(s.cuticle_deg),
+          glm::radians(s.cuticle_spread_deg),
+          s.root_darkening,
+          s.strand_variation,
+          s.lock_variation,
+          s.warmth_variation,
+          s.wetness,
+          look.exposure * look.light_color,
+          look.exposure * look.rim_color,
+          look.skin_color,
+          look.exposure * look.ambient};
+}
+
+void shade_points(const ShadeInput& input, WorkerPool& workers, simd::InstructionSet set,
+                  StrandPoints& points) {
+  workers.for_ranges(points.strand_count(), kStrandsPerRange, [&](size_t begin, size_t end) {
+    shade_strand_points(
+        set, {&input, static_cast<uint32_t>(begin), static_cast<uint32_t>(end), points.first_point.data(),
+              points.index.data(), points.lock.data(), points.point.data()});
+  });
+}
+
+}  // namespace strandcast

@@ -1,0 +1,46 @@
+// TileFrame: what the stages of the tile renderer hand to one another, for one picture. Made once, reused; no
+// GL.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "common/pictures/image_codec.h"
+#include "common/render/light_lattice.h"
+#include "common/scene/scene_desc.h"
+
+namespace strandcast {
+
+/// Tiles are squares of so many pixels: part of what a picture is, as they decide where strands are sorted.
+inline constexpr uint32_t kTilePx = 16;
+
+/// A point of a drawn strand. Two of them in a row, of one strand, are a segment.
+struct StrandPoint {
+  float x, y, z;  // m, head space; once shaded: pixels from the top left, and metres along the view
+  uint32_t unused;
+  // Once shaded, as IEEE halves.
+  std::array<uint16_t, 8> half;
+};
+static_assert(sizeof(StrandPoint) == 32);
+enum StrandPointHalf : uint32_t { kMitreX, kMitreY, kWidthPx, kOpacity, kRed, kGreen, kBlue };
+
+/// Drawn strands: `first_point` has one entry more than there are strands.
+struct StrandPoints {
+  std::vector<uint32_t> first_point;
+  // Per strand: its number among all that could be drawn, and its lock; randomness hangs on these.
+  std::vector<uint32_t> index;
+  std::vector<uint32_t> lock;
+  std::vector<StrandPoint> point;
+
+  uint32_t strand_count() const {
+    return first_point.empty() ? 0 : static_cast<uint32_t>(first_point.size() - 1);
+  }
+  uint64_t size_bytes() const {
+    return (first_point.capacity() + index.capacity() + lock.capacity()) * sizeof(uint32_t) +
+           point.capacity() * sizeof(StrandPoint);
+  }
+};
+
+}  // namespace strandcast

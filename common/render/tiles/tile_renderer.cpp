@@ -1,0 +1,283 @@
+#include "common/render/tiles/tile_renderer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <utility>
+
+#include "common/render/light_lattice.h"
+#include "common/render/render_scene.h"
+#include "common/render/scalp_cover.h"
+#include "common/render/tiles/strand_expansion.h"
+#include "common/render/tiles/strand_shading.h"
+#include "common/render/tiles/tile_bins.h"
+#include "common/render/tiles/tile_raster.h"
+#include "common/render/view.h"
+
+namespace strandcast {
+namespace {
+
+// What is drawn follows from its size on the screen: bends shorter than this are not seen, and for strands
+// thinner than this stand fewer and wider ones.
+constexpr float kSegmentPx = 10.0f;
+constexpr float kThinnestPx = 0.35f;
+// Points of all drawn strands at most: 256 MiB. More, and fewer strands are drawn.
+constexpr uint64_t kMaxPoints = uint64_t{8} << 20;
+// A root tints the skin this far around it, of the hair's extent.
+constexpr float kCoverReach = 0.025f;
+constexpr float kShadowLiftCells = 1.5f;
+
+/// Memory of an object that a pass writes, as it is now.
+template <class Object>
+class Held final : public gl::Resource {
+ public:
+  Held(std::string name, const Object& object) : Resource(std::move(name)), object_(object) {}
+  uint64_t size_bytes() const override { return object_.size_bytes(); }
+
+ private:
+  const Object& object_;
+};
+
+struct HeldImage {
+  Image image;
+  uint64_t size_bytes() const { return image.rgba.capacity(); }
+};
+
+/// Hair whose shape is no number is as large as any.
+RestFacts usable(RestFacts rest) {
+  constexpr float kUsualM = 0.3f;
+  constexpr float kFarM = 1e4f;
+  if (!(rest.extent_m > 0.0f && rest.extent_m < kFarM)) rest.extent_m = kUsualM;
+  if (!(rest.mean_length_m >= 0.0f && rest.mean_length_m < kFarM)) rest.mean_length_m = kUsualM;
+  return rest;
+}
+
+/// All that the passes of a picture share.
+struct TileState {
+  TileState(const SceneAsset& asset, const LookDesc& wanted, const RenderScene& facts,
+            const TileOptions& options)
+      : look(wanted),
+        rest(usable(facts.rest)),
+        vertex_count(asset.vertex_count),
+        workers(options.threads),
+        set(options.set),
+        expansion(asset, rest.mean_length_m),
+        lattice({rest.extent_m, LightLatticeDesc().cells,
+                 facts.light_volume.has_skull && std::isfinite(facts.light_volume.skull.radius_m),
+                 facts.light_volume.skull}),
+        mesh(asset.head),
+        cover(scalp_cover(asset, rest.extent_m * kCoverReach)),
+        scratch(workers.size()),
+        srgb(make_srgb_table()) {
+    expansion.set_look(look);
+    if (!mesh.triangle.empty()) {
+      head.mesh = &mesh;
+      head.cover = &cover;
+    }
+  }
+
+  LookDesc look;
+  RestFacts rest;
+  uint32_t vertex_count;
+  WorkerPool workers;
+  simd::InstructionSet set;
+  StrandExpansion expansion;
+  StrandPoints points;
+  LightLattice lattice;
+  Mesh mesh;
+  std::vector<float> cover;
+  HeadPicture head;
+  TileBins bins;
+  std::vector<TileScratch> scratch;
+  std::vector<uint8_t> srgb;
+  HeldImage picture;
+
+  // Of the draw that is under way.
+  StrandDetail detail;
+  ShadeInput shade;
+  BinCounts counts;
+};
+
+/// Directions and colours of the look, in head space.
+LightDirections light_directions(const LookDesc& look, const PosedStrands& strands, const View& view) {
+  const glm::mat3 head_from_world(glm::transpose(glm::mat3_cast(strands.world_from_head.rotation)));
+  const auto to_light = [&](const glm::vec3& direction) {
+    const float length = glm::length(direction);
+    return glm::normalize(head_from_world *
+                          (length > 0.0f ? -direction / length : glm::vec3(0.0f, 1.0f, 0.0f)));
+  };
+  return {to_light(look.light_direction), to_light(look.rim_direction), view.up,
+          look.rim_color != glm::vec3(0.0f)};
+}
+
+StrandDetail choose_detail(const TileState& state, const View& view, const DrawTerms& terms) {
+  StrandDetail detail;
+  const uint32_t max_followers =
+      state.expansion.strand_count(1) > state.expansion.key_count() ? state.look.followers : 0;
+  const float px_per_m = view.focal_px / view.target_distance_m;
+  const float gap_px =
+      state.rest.mean_length_m / static_cast<float>(std::max(state.vertex_count, 2u) - 1) * px_per_m;
+  const float width_px = 2.0f * state.look.strand_radius_m * px_per_m;
+  // A size that is not a number takes the least detail.
+  const auto at_most = [](float wanted, uint32_t limit) {
+    return wanted > 1.0f ? static_cast<uint32_t>(std::min(std::ceil(wanted), static_cast<float>(limit)))
+                         : std::min(1u, limit);
+  };
+  detail.segments_per_gap = at_most(gap_px / kSegmentPx, state.look.segments);
+  detail.followers = at_most(static_cast<float>(max_followers) * width_px / kThinnestPx, max_followers);
+  detail.strand_count = state.expansion.strand_count(detail.followers);
+  if (terms.strand_share < 1.0f) {
+    // Followers of all triangles first, then key strands: any first so many of those cover the head evenly.
+    const auto wanted = std::max(
+        1u, static_cast<uint32_t>(std::ceil(terms.strand_share * static_cast<float>(detail.strand_count))));
+    while (detail.followers > 0 && state.expansion.strand_count(detail.followers) > wanted)
+      --detail.followers;
+    detail.strand_count = std::min(state.expansion.strand_count(detail.followers), wanted);
+  }
+  const uint64_t points_per_strand =
+      uint64_t{std::max(state.vertex_count, 2u) - 1} * detail.segments_per_gap + 2;
+  while (detail.followers > 0 && detail.strand_count * points_per_strand > kMaxPoints)
+    detail.strand_count = state.expansion.strand_count(--detail.followers);
+  while (detail.segments_per_gap > 1 && detail.strand_count * points_per_strand > kMaxPoints * 2)
+    detail.segments_per_gap = 1;
+  detail.strand_count =
+      static_cast<uint32_t>(std::min<uint64_t>(detail.strand_count, kMaxPoints / points_per_strand));
+  return detail;
+}
+
+/// A pass that is one function.
+class TilePass final : public RenderPass {
+ public:
+  using Work = Status (*)(TileState&, RenderTurn&);
+  TilePass(gl::PassDeclaration declaration, TileState& state, Work work)
+      : Pass(std::move(declaration), gl::PassClock::Host), state_(state), work_(work) {}
+  Status run(RenderTurn& turn) override { return work_(state_, turn); }
+
+ private:
+  TileState& state_;
+  Work work_;
+};
+
+Status expand(TileState& state, RenderTurn& turn) {
+  if (state.expansion.key_count() == 0) return {};
+  state.detail = choose_detail(state, turn.view, turn.terms);
+  state.expansion.expand(turn.strands.position_m, state.detail, state.workers, state.set, state.points);
+  turn.drawn_strands = state.detail.strand_count;
+  return {};
+}
+
+Status light(TileState& state, RenderTurn& turn) {
+  const uint32_t drawn = std::max(state.points.strand_count(), 1u);
+  const uint32_t all = state.expansion.strand_count(state.look.followers);
+  state.shade.width_m =
+      2.0f * state.look.strand_radius_m * static_cast<float>(all) / static_cast<float>(drawn);
+  state.shade.tip_scale = state.look.tip_scale;
+  state.shade.tip_fade = state.look.style.tip_fade;
+  state.shade.lights = light_directions(state.look, turn.strands, turn.view);
+  state.lattice.build(state.points, {state.shade.width_m, state.shade.tip_scale, state.shade.tip_fade},
+                      state.shade.lights, state.workers);
+  return {};
+}
+
+Status shade(TileState& state, RenderTurn& turn) {
+  state.shade.look = shading_numbers(state.look);
+  state.shade.lattice = state.lattice.view();
+  state.shade.view = turn.view;
+  shade_points(state.shade, state.workers, state.set, state.points);
+  return {};
+}
+
+Status bin(TileState& state, RenderTurn& turn) {
+  const TileGrid grid{turn.size_px};
+  state.counts = state.bins.bin_segments(state.points, grid, turn.view.near_m, state.workers);
+  turn.drawn_segments = state.counts.segments;
+  if (state.head.mesh != nullptr) {
+    state.head.shadow_lift_m = kShadowLiftCells * state.lattice.view().cell_m;
+    place_head(turn.view, state.workers, state.head);
+  }
+  state.bins.bin_boxes(state.head.box, grid);
+  return {};
+}
+
+Status draw_tiles(TileState& state, RenderTurn& turn) {
+  Image& image = state.picture.image;
+  image.width = turn.size_px.x;
+  image.height = turn.size_px.y;
+  image.rgba.resize(size_t{image.width} * image.height * 4);
+  const TileInput input{&state.points,  &state.bins,           &state.head,       &state.shade,
+                        {turn.size_px}, state.look.background, state.srgb.data(), image.rgba.data()};
+  std::atomic<uint32_t> next{0};
+  constexpr uint32_t kTilesAtOnce = 4;
+  const uint32_t tiles = input.grid.count();
+  std::atomic<bool> is_given_up{false};
+  state.workers.run([&](uint32_t worker) {
+    for (uint32_t begin = next.fetch_add(kTilesAtOnce); begin < tiles; begin = next.fetch_add(kTilesAtOnce)) {
+      if (worker == 0 && turn.terms.is_unwanted && turn.terms.is_unwanted()) is_given_up = true;
+      if (is_given_up) return;
+      for (uint32_t tile = begin; tile < std::min(begin + kTilesAtOnce, tiles); ++tile)
+        draw_tile(state.set, {&input, &state.scratch[worker], tile});
+    }
+  });
+  if (is_given_up) turn.is_whole = false;
+  return {};
+}
+
+class TileRenderer final : public Renderer {
+ public:
+  TileRenderer(const SceneAsset& asset, const LookDesc& look, const TileOptions& options)
+      : scene_(asset, look, true),
+        state_(asset, scene_.look, scene_, options),
+        position_count_(asset.rest_position_m.size()),
+        points_("points", state_.points),
+        lattice_("light lattice", state_.lattice),
+        bins_("tiles", state_.bins),
+        picture_("picture", state_.picture) {
+    const auto add = [&](gl::PassDeclaration declaration, TilePass::Work work) {
+      passes_.add(std::make_unique<TilePass>(std::move(declaration), state_, work));
+    };
+    add({"tiles/expand", {&scene_.strands}, {&points_}, true, {}}, expand);
+    add({"tiles/light", {&points_}, {&lattice_}, true, {}}, light);
+    add({"tiles/shade", {&points_, &lattice_}, {&points_}, true, {}}, shade);
+    add({"tiles/bin", {&points_}, {&bins_}, true, {}}, bin);
+    add({"tiles/draw", {&points_, &bins_, &lattice_}, {&picture_}, true, {}}, draw_tiles);
+  }
+
+  Status plan() { return passes_.plan({&scene_.strands}, {&picture_}); }
+
+  Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
+              const DrawTerms& terms) override {
+    const glm::uvec2 pixels(size.width, size.height);
+    RETURN_IF_ERROR(check_draw(strands, position_count_, size, terms));
+    ASSIGN_OR_RETURN(const View view, make_view(camera, strands.world_from_head.rotation, pixels));
+    RenderTurn turn(strands, view, pixels, terms);
+    RETURN_IF_ERROR(passes_.run(turn, nullptr));
+    profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
+    return {};
+  }
+  Image read_image() override { return state_.picture.image; }
+  const RenderProfile& profile() const override { return profile_; }
+  const gl::PassListBase& passes() const override { return passes_; }
+
+ private:
+  RenderScene scene_;
+  TileState state_;
+  size_t position_count_;
+  Held<StrandPoints> points_;
+  Held<LightLattice> lattice_;
+  Held<TileBins> bins_;
+  Held<HeldImage> picture_;
+  RenderPassList passes_;
+  RenderProfile profile_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> make_tile_renderer(const SceneAsset& asset, const LookDesc& look,
+                                                     const TileOptions& options) {
+  RETURN_IF_ERROR(check_asset(asset));
+  auto renderer = std::make_unique<TileRenderer>(asset, look, options);
+  RETURN_IF_ERROR(renderer->plan());
+  return std::unique_ptr<Renderer>(std::move(renderer));
+}
+
+}  // namespace strandcast

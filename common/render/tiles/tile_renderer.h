@@ -1,0 +1,23 @@
+// The renderer without OpenGL: strands are expanded, lit and shaded once per point, sorted into tiles and
+// blended there front to back, on all processors (shaders/README.md says how it and the OpenGL renderer
+// agree). The same pixels for every number of threads and every instruction set.
+#pragma once
+
+#include <memory>
+#include <thread>
+
+#include "common/render/renderer.h"
+#include "common/simd/variants.h"
+
+namespace strandcast {
+
+struct TileOptions {
+  uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+  simd::InstructionSet set = simd::widest_set();
+};
+
+/// BadInput for an asset that does not fit together.
+Result<std::unique_ptr<Renderer>> make_tile_renderer(const SceneAsset& asset, const LookDesc& look,
+                                                     const TileOptions& options = {});
+
+}  // namespace strandcast

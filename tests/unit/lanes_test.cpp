@@ -1,0 +1,107 @@
+// Functions of lanes against the standard library in double, and the same bits from every instruction set.
+#include "common/simd/lanes.h"
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "common/base/hash.h"
+#include "common/base/worker_pool.h"
+#include "common/render/laws.h"
+#include "common/simd/variants.h"
+
+namespace strandcast {
+namespace {
+
+using simd::InstructionSet;
+using simd::kLanes;
+
+enum Function { kExp, kLog2, kSin, kCos, kSqrt, kFloor, kPow, kMin, kFunctions };
+
+struct FunctionArguments {
+  const float* x;
+  float* y;  // kFunctions rows
+  size_t count;
+};
+
+STRANDCAST_LANES void run_functions_lanes(const FunctionArguments& a) {
+  using namespace simd;
+  for (size_t i = 0; i < a.count; i += kLanes) {
+    const Float x = load_lanes(a.x + i);
+    const Float size = max(abs(x), 1e-6f);
+    const auto put = [&](Function f, Float y) __attribute__((always_inline)) {
+      store_lanes(y, a.y + f * a.count + i);
+    };
+    put(kExp, exp(x));
+    put(kLog2, log2(size));
+    put(kSin, sin(x));
+    put(kCos, cos(x));
+    put(kSqrt, sqrt(size));
+    put(kFloor, floor(x));
+    put(kPow, pow(size, 1.7f));
+    put(kMin, min(x, 2.0f));
+  }
+}
+STRANDCAST_KERNEL(run_functions, FunctionArguments);
+
+std::vector<float> sample_numbers() {
+  std::vector<float> x;
+  for (int i = 0; i < 4096; ++i) x.push_back(-40.0f + 80.0f * static_cast<float>(i) / 4095.0f);
+  return x;
+}
+
+TEST(Lanes, FunctionsAreAsExactAsTold) {
+  const std::vector<float> x = sample_numbers();
+  std::vector<float> y(kFunctions * x.size());
+  run_functions(InstructionSet::Plain, {x.data(), y.data(), x.size()});
+  for (size_t i = 0; i < x.size(); ++i) {
+    const auto of = [&](Function f) { return double{y[f * x.size() + i]}; };
+    const double v = x[i];
+    const double size = std::max(std::abs(v), 1e-6);
+    // The argument itself is known to 2^-24 of it, which e^x multiplies by x.
+    ASSERT_NEAR(of(kExp) / std::exp(v), 1.0, 5e-6) << v;
+    ASSERT_NEAR(of(kLog2), std::log2(size), 2e-6) << v;
+    ASSERT_NEAR(of(kSin), std::sin(v), 2e-6) << v;
+    ASSERT_NEAR(of(kCos), std::cos(v), 2e-6) << v;
+    ASSERT_EQ(of(kSqrt), std::sqrt(static_cast<float>(size))) << v;
+    ASSERT_EQ(of(kFloor), std::floor(v)) << v;
+    ASSERT_NEAR(of(kPow) / std::pow(size, 1.7), 1.0, 2e-5) << v;
+    ASSERT_EQ(of(kMin), std::min(v, 2.0));
+  }
+}
+
+TEST(Lanes, EveryInstructionSetGivesTheSameBits) {
+  const std::vector<float> x = sample_numbers();
+  std::vector<float> plain(kFunctions * x.size());
+  run_functions(InstructionSet::Plain, {x.data(), plain.data(), x.size()});
+  for (const InstructionSet set : simd::instruction_sets()) {
+    std::vector<float> y(plain.size());
+    run_functions(set, {x.data(), y.data(), x.size()});
+    EXPECT_EQ(std::memcmp(y.data(), plain.data(), y.size() * sizeof(float)), 0) << to_string(set);
+  }
+}
+
+TEST(Lanes, HashesAreThoseOfTheRest) {
+  for (const uint32_t x : {0u, 1u, 77u, 0xdeadbeefu})
+    for (uint32_t lane = 0; lane < kLanes; ++lane)
+      EXPECT_EQ(law::mix_u32(simd::Uint(x)).v[lane], mix_u32(x)) << x;
+}
+
+TEST(WorkerPool, DoesEveryPartOnceAndAgain) {
+  for (const uint32_t threads : {1u, 2u, 5u}) {
+    WorkerPool workers(threads);
+    for (int turn = 0; turn < 20; ++turn) {
+      std::vector<std::atomic<int>> done(1000);
+      workers.for_ranges(done.size(), 7, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) ++done[i];
+      });
+      for (const auto& count : done) ASSERT_EQ(count.load(), 1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,290 @@
+// The tile renderer: the same pixels however it runs, coverage and blending as computed by hand, and finite
+// pictures of impossible hair.
+#include "common/render/tiles/tile_renderer.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "common/groom/groom_asset.h"
+#include "common/groom/mesh.h"
+#include "common/groom/procedural.h"
+#include "common/render/tiles/half_float.h"
+#include "common/render/tiles/tile_raster.h"
+#include "tests/support/sample_look.h"
+
+namespace strandcast {
+namespace {
+
+constexpr float kHeadRadiusM = 0.095f;
+
+SceneAsset grown(uint32_t strands = 300) {
+  ProceduralGroomOptions options;
+  options.strand_count = strands;
+  options.vertex_count = 12;
+  options.length_m = 0.2f;
+  auto groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadRadiusM, 1000), options);
+  EXPECT_TRUE(groom);
+  return make_scene_asset(*groom, make_head(kHeadRadiusM));
+}
+
+Image drawn(const SceneAsset& asset, const LookDesc& look,
+            const TileOptions& options = {1, simd::widest_set()}, RenderSize size = {160, 120},
+            const CameraDesc& camera = {}) {
+  auto renderer = make_tile_renderer(asset, look, options);
+  if (!renderer) {
+    ADD_FAILURE() << renderer.error().to_string();
+    return {};
+  }
+  PosedStrands strands{{}, asset.rest_position_m};
+  strands.world_from_head.rotation = glm::angleAxis(0.3, glm::dvec3(0.0, 1.0, 0.0));
+  const Status status = (*renderer)->draw(strands, camera, size);
+  EXPECT_TRUE(status) << status.error().to_string();
+  return (*renderer)->read_image();
+}
+
+TEST(TileRenderer, ThreadsAndInstructionSetsDoNotShow) {
+  const SceneAsset asset = grown();
+  // A look where no field has its default.
+  const Image first = drawn(asset, sample_look(), {1, simd::InstructionSet::Plain});
+  for (const uint32_t threads : {1u, 2u, 4u})
+    for (const simd::InstructionSet set : simd::instruction_sets())
+      EXPECT_TRUE(drawn(asset, sample_look(), {threads, set}).rgba == first.rgba)
+          << threads << " threads, " << to_string(set);
+}
+
+TEST(TileRenderer, TenPicturesAreOne) {
+  const SceneAsset asset = grown();
+  auto renderer = make_tile_renderer(asset, {}, {3, simd::widest_set()});
+  ASSERT_TRUE(renderer);
+  std::vector<uint8_t> first;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, {}, {160, 120}));
+    const Image image = (*renderer)->read_image();
+    if (i == 0) first = image.rgba;
+    EXPECT_TRUE(image.rgba == first) << i;
+    // Another picture in between leaves nothing behind.
+    ASSERT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, {}, {64, 200}));
+  }
+}
+
+// ---- one tile after another, from points made by hand
+
+uint16_t half_of(float x) {
+  uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  constexpr float kSmallest = 6.2e-5f;  // of what has all its bits
+  return std::abs(x) < kSmallest
+             ? 0
+             : static_cast<uint16_t>(((bits >> 16) & 0x8000u) | ((((bits >> 23) & 0xff) - 112) << 10) |
+                                     ((bits >> 13) & 0x3ff));
+}
+
+struct Line {
+  std::vector<glm::vec2> point_px;
+  float depth_m = 1.0f;
+  float width_px = 1.0f;  // a half, exactly
+  float opacity = 1.0f;
+  glm::vec3 color{1.0f};
+};
+
+/// As stage `shade` leaves them.
+StrandPoints points_of(const std::vector<Line>& lines) {
+  StrandPoints points;
+  points.first_point.push_back(0);
+  for (const Line& line : lines) {
+    for (size_t i = 0; i < line.point_px.size(); ++i) {
+      glm::vec2 mitre(0.0f);
+      if (i > 0) mitre += glm::normalize(line.point_px[i] - line.point_px[i - 1]);
+      if (i + 1 < line.point_px.size()) mitre += glm::normalize(line.point_px[i + 1] - line.point_px[i]);
+      StrandPoint point{line.point_px[i].x, line.point_px[i].y, line.depth_m, 0, {}};
+      point.half = {
+          half_of(mitre.x),      half_of(mitre.y),      half_of(line.width_px), half_of(line.opacity),
+          half_of(line.color.r), half_of(line.color.g), half_of(line.color.b),  0};
+      points.point.push_back(point);
+    }
+    points.first_point.push_back(static_cast<uint32_t>(points.point.size()));
+    points.index.push_back(0);
+    points.lock.push_back(0);
+  }
+  return points;
+}
+
+/// Linear values over black, tone curve undone.
+std::vector<glm::vec3> raster(const std::vector<Line>& lines, glm::uvec2 size) {
+  const StrandPoints points = points_of(lines);
+  WorkerPool workers(2);
+  TileBins bins;
+  const TileGrid grid{size};
+  bins.bin_segments(points, grid, 0.01f, workers);
+  HeadPicture head;
+  bins.bin_boxes({}, grid);
+  ShadeInput shade{};
+  std::vector<uint8_t> srgb(kSrgbSteps + 1);
+  // Linear numbers, in two pictures: the high and the low bits.
+  std::vector<uint32_t> value(size_t{size.x} * size.y * 3);
+  for (const uint32_t shift : {0u, 8u}) {
+    for (uint32_t i = 0; i <= kSrgbSteps; ++i) srgb[i] = static_cast<uint8_t>(i >> shift);
+    std::vector<uint8_t> rgba(size_t{size.x} * size.y * 4);
+    const TileInput input{&points, &bins, &head, &shade, grid, glm::vec3(0.0f), srgb.data(), rgba.data()};
+    TileScratch scratch;
+    for (uint32_t tile = 0; tile < grid.count(); ++tile)
+      draw_tile(simd::widest_set(), {&input, &scratch, tile});
+    for (size_t i = 0; i < value.size(); ++i) value[i] |= uint32_t{rgba[i / 3 * 4 + i % 3]} << shift;
+  }
+  std::vector<glm::vec3> pixels(size_t{size.x} * size.y);
+  for (size_t i = 0; i < value.size(); ++i)
+    pixels[i / 3][static_cast<int>(i % 3)] = static_cast<float>(value[i]) / kSrgbSteps;
+  return pixels;
+}
+
+// The tone curve leaves values below 0.7 as they are.
+constexpr float kInk = 0.5f;
+constexpr float kStep = 1.0f / kSrgbSteps;
+
+TEST(TileRaster, SummedAcrossALineCoverageIsItsWidth) {
+  for (const float width : {0.0625f, 0.25f, 0.5f, 1.0f, 1.5f, 3.0f})
+    for (const float angle : {0.0f, 0.2f, 0.7854f, 1.3f, 1.5708f})
+      for (const float offset : {0.0f, 0.21f, 0.5f}) {
+        const glm::vec2 along(std::cos(angle), std::sin(angle));
+        const glm::vec2 middle = glm::vec2(48.0f) + offset * glm::vec2(-along.y, along.x);
+        const float length = 60.0f;
+        Line line{{middle - 0.5f * length * along, middle + 0.5f * length * along},
+                  1.0f,
+                  width,
+                  1.0f,
+                  glm::vec3(kInk)};
+        const auto pixels = raster({line}, {96, 96});
+        double sum = 0.0;
+        for (const glm::vec3& pixel : pixels) sum += double{pixel.r} / kInk;
+        // Ends are cut off at whole pixels: within half a pixel of length at each.
+        EXPECT_NEAR(sum / length, width, 0.02 * width + width / length)
+            << width << " px at " << angle << " rad, " << offset;
+      }
+}
+
+TEST(TileRaster, AJointNeitherGapsNorBlendsTwice) {
+  // Half-transparent, so that what is blended twice would show.
+  Line whole{{{8.0f, 20.3f}, {88.0f, 50.3f}}, 1.0f, 2.0f, 0.5f, glm::vec3(kInk)};
+  Line cut = whole;
+  cut.point_px.clear();
+  for (int i = 0; i <= 20; ++i)
+    cut.point_px.push_back(glm::mix(whole.point_px[0], whole.point_px[1], 0.05f * static_cast<float>(i)));
+  const auto one = raster({whole}, {96, 96});
+  const auto many = raster({cut}, {96, 96});
+  for (size_t i = 0; i < one.size(); ++i) ASSERT_NEAR(one[i].r, many[i].r, 3 * kStep) << i;
+
+  // Round a bend no pixel has more than one layer.
+  Line bend{
+      {{10.0f, 10.0f}, {50.0f, 12.0f}, {60.0f, 50.0f}, {20.0f, 70.0f}}, 1.0f, 4.0f, 0.5f, glm::vec3(kInk)};
+  float most = 0.0f;
+  for (const glm::vec3& pixel : raster({bend}, {96, 96})) most = std::max(most, pixel.r);
+  EXPECT_NEAR(most, 0.5f * kInk, 2 * kStep);
+}
+
+TEST(TileRaster, LayersBlendFrontToBackWhateverTheirOrder) {
+  Line red{{{0.0f, 8.0f}, {32.0f, 8.0f}}, 1.0f, 8.0f, 0.5f, {0.5f, 0.0f, 0.0f}};
+  Line blue = red;
+  blue.depth_m = 2.0f;
+  blue.color = {0.0f, 0.0f, 0.5f};
+  for (const auto& lines : {std::vector<Line>{red, blue}, std::vector<Line>{blue, red}}) {
+    const glm::vec3 pixel = raster(lines, {32, 16})[8 * 32 + 16];
+    // 0.5 of red over 0.5 of blue over black, each of half light.
+    EXPECT_NEAR(pixel.r, 0.25f, 2 * kStep);
+    EXPECT_NEAR(pixel.g, 0.0f, 2 * kStep);
+    EXPECT_NEAR(pixel.b, 0.125f, 2 * kStep);
+  }
+  for (const int layers : {1, 2, 5, 20, 100}) {
+    std::vector<Line> lines;
+    for (int i = 0; i < layers; ++i) {
+      lines.push_back(red);
+      lines.back().opacity = 0.25f;
+      lines.back().depth_m = 1.0f + 0.01f * static_cast<float>((i * 37) % layers);
+    }
+    const float expected = 0.5f * static_cast<float>(1.0 - std::pow(0.75, layers));
+    // Behind what is opaque to a 300th nothing is drawn.
+    EXPECT_NEAR(raster(lines, {32, 16})[8 * 32 + 16].r, expected, 2 * kStep + 0.5f / 300.0f) << layers;
+  }
+}
+
+// ---- impossible hair
+
+TEST(TileRenderer, ImpossibleHairGivesAFinitePicture) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  const SceneAsset whole = grown(40);
+  const auto with = [&](auto change) {
+    SceneAsset asset = whole;
+    change(asset);
+    const Image image = drawn(asset, {}, {2, simd::widest_set()}, {96, 64});
+    ASSERT_EQ(image.rgba.size(), 96u * 64u * 4u);
+    // The background is there: nothing spreads over the picture.
+    EXPECT_GT(image.rgba[0], 40);
+    EXPECT_EQ(image.rgba[3], 255);
+  };
+  with([&](SceneAsset& asset) { asset.rest_position_m[45] = glm::vec3(nan); });
+  with([&](SceneAsset& asset) { asset.rest_position_m[45] = {inf, 0.0f, -inf}; });
+  with([&](SceneAsset& asset) { asset.rest_position_m[45] = glm::vec3(1e30f); });
+  with([&](SceneAsset& asset) {
+    std::fill(asset.rest_position_m.begin(), asset.rest_position_m.end(), glm::vec3(nan));
+  });
+  with([&](SceneAsset& asset) {
+    std::fill(asset.rest_position_m.begin(), asset.rest_position_m.end(), glm::vec3(0.1f));
+  });
+  with([](SceneAsset& asset) { asset.triangle.clear(); });
+  with([](SceneAsset& asset) {
+    asset.strand_count = 0;
+    asset.vertex_count = 0;
+    asset.rest_position_m.clear();
+    asset.triangle.clear();
+  });
+  with([](SceneAsset& asset) { asset.head = {}; });
+}
+
+TEST(TileRenderer, ExtremeLooksAndViewsGiveAFinitePicture) {
+  const SceneAsset asset = grown(60);
+  LookDesc look;
+  look.strand_radius_m = 0.01f;
+  look.followers = 64;
+  EXPECT_FALSE(drawn(asset, look, {2, simd::widest_set()}, {320, 200}).rgba.empty());
+  look = {};
+  look.light_color = glm::vec3(0.0f);
+  look.ambient = 0.0f;
+  EXPECT_FALSE(drawn(asset, look).rgba.empty());
+  for (const RenderSize size : {RenderSize{1, 1}, RenderSize{17, 3}, RenderSize{1920, 1080}}) {
+    const Image image = drawn(asset, {}, {2, simd::widest_set()}, size);
+    EXPECT_EQ(image.rgba.size(), size_t{size.width} * size.height * 4);
+  }
+  CameraDesc inside;
+  inside.offset_m = {0.0f, 0.02f, 0.001f};
+  inside.target_m = {0.0f, 0.09f, 0.0f};
+  EXPECT_FALSE(drawn(asset, {}, {2, simd::widest_set()}, {160, 120}, inside).rgba.empty());
+}
+
+TEST(TileRenderer, RefusesWhatDoesNotFit) {
+  SceneAsset asset = grown(40);
+  auto renderer = make_tile_renderer(asset, {});
+  ASSERT_TRUE(renderer);
+  EXPECT_FALSE((*renderer)->draw({{}, {}}, {}, {64, 64}));
+  EXPECT_FALSE((*renderer)->draw({{}, asset.rest_position_m}, {}, {0, 64}));
+  EXPECT_FALSE((*renderer)->draw({{}, asset.rest_position_m}, {}, {100'000, 64}));
+  asset.triangle.push_back({0, 1, 40});
+  EXPECT_FALSE(make_tile_renderer(asset, {}));
+}
+
+// Halves of the renderer are IEEE halves: every one of them comes back as what the format says.
+TEST(TileRenderer, HalvesAreExact) {
+  for (uint32_t bits = 0; bits < 0x7c00u; ++bits) {
+    const int exponent = static_cast<int>(bits >> 10);
+    const double mantissa = static_cast<double>(bits & 0x3ff) / 1024.0;
+    const double expected =
+        exponent == 0 ? std::ldexp(mantissa, -14) : std::ldexp(1.0 + mantissa, exponent - 15);
+    ASSERT_EQ(float_of_half(static_cast<uint16_t>(bits)), static_cast<float>(expected)) << bits;
+    ASSERT_EQ(float_of_half(static_cast<uint16_t>(bits | 0x8000u)), -static_cast<float>(expected)) << bits;
+  }
+}
+
+}  // namespace
+}  // namespace strandcast
