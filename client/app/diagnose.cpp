@@ -10,7 +10,7 @@
 #include "client/app/way_out.h"
 #include "client/window/window.h"
 #include "common/base/version.h"
-#include "common/gl/egl_context.h"
+#include "common/render/render_device.h"
 #include "common/strands/strand_codec.h"
 
 namespace strandcast {
@@ -27,7 +27,7 @@ class Examination {
   Examination(const ViewOptions& options, const std::atomic<bool>& stop) : options_(options), stop_(stop) {}
 
   Diagnosis run() {
-    look_at_opengl();
+    look_at_drawing();
     look_at_display();
     look_at_decoders();
     if (const auto session = connect()) watch(*session);
@@ -39,21 +39,22 @@ class Examination {
     lines_.push_back({finding, subject, std::move(text), std::move(way_out)});
   }
 
-  void look_at_opengl() {
-    const auto context = gl::EglContext::make(options_.device);
-    if (context) {
-      const gl::DeviceInfo& device = (*context)->info();
-      if (device.is_software)
-        return add(Finding::Note, "OpenGL",
-                   fmt::format("{}: strands are drawn by the processor", device.renderer),
+  void look_at_drawing() {
+    const auto device = RenderDevice::open(options_.drawing);
+    if (device) {
+      const RenderDeviceInfo& info = (*device)->info();
+      if (info.is_software)
+        return add(Finding::Note, "drawing", "strands are drawn by " + info.name,
                    "a GPU with its driver draws them faster");
-      return add(Finding::Ok, "OpenGL", fmt::format("{}, {}", device.renderer, device.version));
+      return add(Finding::Ok, "drawing", "strands are drawn by " + info.name);
     }
     const bool is_needed = options_.mode == StreamMode::Strands;
-    add(is_needed ? Finding::Missing : Finding::Note, "OpenGL",
-        "strands cannot be drawn here: " + context.error().to_string(),
-        is_needed ? "--mode auto or frames shows the server's pictures"
-                  : "the server's pictures are shown instead");
+    add(is_needed ? Finding::Missing : Finding::Note, "drawing",
+        "strands cannot be drawn here: " + device.error().to_string(),
+        is_needed
+            ? "without --device and --renderer the processor draws them; --mode auto or frames shows the "
+              "server's pictures"
+            : "the server's pictures are shown instead");
   }
 
   void look_at_display() {

@@ -15,7 +15,7 @@ enum class Finding { Ok, Note, Missing };  // Note: works, but a person may want
 
 struct DiagnosisLine {
   Finding finding = Finding::Ok;
-  std::string subject;  // "OpenGL", "server", "role"
+  std::string subject;  // "drawing", "server", "role"
   std::string text;
   std::string way_out;  // may be empty
 };

@@ -5,8 +5,6 @@
 
 #include "client/app/clip_store.h"
 #include "client/app/live_connection.h"
-#include "common/gl/egl_context.h"
-#include "common/gl/program.h"
 #include "common/log/log.h"
 #include "common/log/progress.h"
 
@@ -28,7 +26,7 @@ struct Collected {
 
 /// What snapshots are drawn with, after the connection is gone.
 struct Drawn {
-  gl::DeviceInfo device;
+  const RenderDevice* device = nullptr;
   std::shared_ptr<const SceneAsset> asset;
   Welcome welcome;
 };
@@ -178,13 +176,11 @@ Status write_images(const ViewOptions& options, const Collected& collected) {
   return clip.finish();
 }
 
-/// Draws the collected snapshots with the same renderer as the server and the window, in the current context.
+/// Draws the collected snapshots with the same renderer as the server and the window.
 /// After a stop nothing more is drawn, and a clip that has begun is not written.
 Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Collected& collected,
                         StageTimer& render_timer, const std::atomic<bool>& stop) {
-  const gl::ShaderLibrary shaders =
-      options.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shader_dir);
-  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, scene.device, *scene.asset, scene.welcome.look));
+  ASSIGN_OR_RETURN(auto renderer, scene.device->make_renderer(*scene.asset, scene.welcome.look));
   StrandFill fill(scene.asset->rest_position_m, scene.asset->vertex_count);
 
   const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
@@ -219,13 +215,13 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
 Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bool>& stop) {
   const bool wants_render = !options.screenshot.empty() || !options.clip.empty();
   ClientConfig config = client_config(options);
-  std::unique_ptr<gl::EglContext> context;
+  std::unique_ptr<RenderDevice> device;
   std::string own_reason;
   if (wants_render && options.mode != StreamMode::Frames) {
-    auto made = gl::EglContext::make(options.device);
+    auto made = RenderDevice::open(options.drawing);
     if (!made && options.mode == StreamMode::Strands) return made.error();
     if (made) {
-      context = std::move(made).value();
+      device = std::move(made).value();
     } else {
       config.hello.mode = StreamMode::Frames;
       own_reason = "frames: strands cannot be drawn here: " + made.error().to_string();
@@ -245,15 +241,14 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   ViewReport report = make_report(*session);
   if (!own_reason.empty()) set_mode_reason(report, own_reason);
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
-  const Drawn scene{context ? context->info() : gl::DeviceInfo{}, session->shared_asset(),
-                    session->welcome()};
+  const Drawn scene{device.get(), session->shared_asset(), session->welcome()};
   live.reset();  // the server need not serve a viewer that only draws now
   if (stop && wants_render) log_warn("render", "stopped: nothing is drawn");
   if (stop) return report;
   if (collected.clip.is_cut())
     log_warn("render", "the clip ends early: its states would take more than {} MiB", kMaxClipBytes >> 20);
   if (wants_render && mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
-  if (wants_render && mode == StreamMode::Strands && scene.asset)
+  if (wants_render && mode == StreamMode::Strands && scene.asset && scene.device)
     RETURN_IF_ERROR(render_snapshots(options, scene, collected, render_timer, stop));
   set_render_times(report, render_timer);
   return report;

@@ -37,9 +37,7 @@ DrawView limited(DrawView view) {
 
 }  // namespace
 
-StrandDrawer::StrandDrawer(Config config)
-    : config_(std::move(config)),
-      shaders_(config_.shader_dir.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(config_.shader_dir)) {
+StrandDrawer::StrandDrawer(Config config) : config_(std::move(config)) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -98,17 +96,17 @@ DrawnState StrandDrawer::look() const {
 void StrandDrawer::run() {
   try {
     setpriority(PRIO_PROCESS, 0, kDrawingThreadNice);
-    auto context = gl::EglContext::make(config_.device);
+    auto device = RenderDevice::open(config_.device);
     {
       const std::lock_guard lock(mutex_);
-      if (context)
-        newest_.device = (*context)->info();
+      if (device)
+        newest_.device = (*device)->info();
       else
-        newest_.device = context.error();
+        newest_.device = device.error();
     }
     config_.on_news();
-    if (context) draw_until_stopped((*context)->info());
-    renderer_.reset();  // while its context is there
+    if (device) draw_until_stopped(**device);
+    renderer_.reset();  // while its device is there
   } catch (const std::exception& failure) {
     (void)renderer_.release();  // its context went first: what it held of the driver went along
     fail(make_error(ErrorCode::Internal, "the drawing thread failed: {}", failure.what()));
@@ -124,8 +122,8 @@ void StrandDrawer::fail(const Error& error) {
   config_.on_news();
 }
 
-void StrandDrawer::draw_until_stopped(const gl::DeviceInfo& device) {
-  plan_ = DrawPlan(device.is_software ? kFirstSoftwareStep : kFirstHardwareStep);
+void StrandDrawer::draw_until_stopped(const RenderDevice& device) {
+  plan_ = DrawPlan(device.info().is_software ? kFirstSoftwareStep : kFirstHardwareStep);
   while (const auto job = wait_for_job())
     if (job->view && job->state != nullptr && prepare(device, *job)) turn(*job);
 }
@@ -147,14 +145,14 @@ std::optional<StrandDrawer::Job> StrandDrawer::wait_for_job() {
 }
 
 /// Whether the newest strands can be drawn. Groom and look may have changed with the server.
-bool StrandDrawer::prepare(const gl::DeviceInfo& device, const Job& job) {
+bool StrandDrawer::prepare(const RenderDevice& device, const Job& job) {
   const ViewerState& state = *job.state;
   if (state.asset == nullptr) return false;
   if (state.asset == asset_) return renderer_ != nullptr;
   asset_ = state.asset;
   renderer_.reset();
   drawn_.reset();
-  auto made = Renderer::make(shaders_, device, *state.asset, state.welcome.look);
+  auto made = device.make_renderer(*state.asset, state.welcome.look);
   if (!made) {
     fail(made.error());
     return false;

@@ -1,4 +1,4 @@
-// StrandDrawer: draws strands with a GL context and a thread of its own, so that a window never waits for
+// StrandDrawer: draws strands with a device and a thread of its own, so that a window never waits for
 // hair. What it draws when and how finely, DrawPlan says. It keeps the newest picture in memory; what it is
 // told and what it tells are the newest only. All functions from any thread.
 #pragma once
@@ -16,8 +16,7 @@
 #include "client/app/draw_plan.h"
 #include "client/app/viewer_thread.h"
 #include "common/base/profile.h"
-#include "common/gl/egl_context.h"
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 
 namespace strandcast {
 
@@ -29,22 +28,21 @@ struct DrawView {
 
 /// Newest of all.
 struct DrawnState {
-  std::optional<Result<gl::DeviceInfo>> device;  // nothing while OpenGL starts
-  std::optional<Error> trouble;                  // why the newest scene cannot be drawn
-  std::shared_ptr<const Image> image;            // null before the first
-  size_t step = 0;                               // of image
-  uint64_t count = 0;                            // of pictures
-  uint64_t asked_whole = 0;                      // the last ask_whole() that image answers
-  StageTimer draw_timer;                         // of the whole run
-  double fair_ms = 0.0;                          // DrawPlan::fair_ms
+  std::optional<Result<RenderDeviceInfo>> device;  // nothing while it is opened
+  std::optional<Error> trouble;                    // why the newest scene cannot be drawn
+  std::shared_ptr<const Image> image;              // null before the first
+  size_t step = 0;                                 // of image
+  uint64_t count = 0;                              // of pictures
+  uint64_t asked_whole = 0;                        // the last ask_whole() that image answers
+  StageTimer draw_timer;                           // of the whole run
+  double fair_ms = 0.0;                            // DrawPlan::fair_ms
 };
 
 class StrandDrawer {
  public:
   struct Config {
-    std::filesystem::path shader_dir;  // empty = the shaders in the program
-    std::string device = "auto";       // as in EglContext::make
-    std::function<void()> on_news;     // called by the drawing thread; must not block
+    RenderDeviceConfig device;
+    std::function<void()> on_news;  // called by the drawing thread; must not block
   };
   explicit StrandDrawer(Config config);
   /// Ends the thread; a picture that is being drawn is left.
@@ -76,9 +74,9 @@ class StrandDrawer {
   };
 
   void run();
-  void draw_until_stopped(const gl::DeviceInfo& device);
+  void draw_until_stopped(const RenderDevice& device);
   std::optional<Job> wait_for_job();
-  bool prepare(const gl::DeviceInfo& device, const Job& job);
+  bool prepare(const RenderDevice& device, const Job& job);
   void turn(const Job& job);
   Status draw(const Job& job, PosedStrands strands, size_t step);
   void fail(const Error& error);
@@ -86,7 +84,6 @@ class StrandDrawer {
   const Config config_;
 
   // Of the thread.
-  const gl::ShaderLibrary shaders_;
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const SceneAsset> asset_;  // that renderer_ is made for, or could not be
   TimelinePlayer player_;

@@ -26,7 +26,7 @@ std::optional<HudBanner> banner(const ViewerState& now, const ViewFacts& facts) 
   banner.help = now.help;
   if (facts.is_starting) {
     banner.headline = "starting";
-    banner.doing = "looking for OpenGL";
+    banner.doing = "looking for what draws";
   } else if (now.final_error) {
     banner.headline = "no connection to " + where;
     banner.doing = "Esc quits";

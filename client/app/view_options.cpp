@@ -134,8 +134,13 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--seconds", raw.seconds, "Stop receiving after this long; what came is then drawn")
       ->check(CLI::Range(0.1, 1e6));
   app.add_option("--report", options.report, "Write what was measured: .json, else key=value lines");
-  app.add_option("--shader-dir", options.shader_dir, "Read shaders from this folder");
-  app.add_option("--device", options.device, "GL device for --headless: auto, software, hardware or a number")
+  app.add_option("--renderer", options.drawing.renderer,
+                 "What draws strands: tiles (the processor), gl, or auto: gl where the device is hardware")
+      ->check(CLI::IsMember({"auto", "tiles", "gl"}))
+      ->capture_default_str();
+  app.add_option("--shader-dir", options.drawing.shader_folder, "Read shaders from this folder");
+  app.add_option("--device", options.drawing.gl_device,
+                 "GL device that draws strands: auto, software, hardware or a number")
       ->capture_default_str();
   app.add_option("--log", options.log_level, "error, warn, info, debug or off")->capture_default_str();
 }

@@ -7,7 +7,7 @@
 
 #include "client/net/viewer_client.h"
 #include "common/base/result.h"
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 #include "common/replay/strand_replay.h"
 
 namespace strandcast {
@@ -29,10 +29,9 @@ struct ViewOptions {
   double clip_s = 3.0;
   double clip_fps = 15.0;
   RenderSize clip_size{960, 540};
-  std::optional<double> seconds;     // stop after this long
-  std::filesystem::path report;      // empty = none
-  std::filesystem::path shader_dir;  // empty = the shaders in the program
-  std::string device = "auto";
+  std::optional<double> seconds;  // stop after this long
+  std::filesystem::path report;   // empty = none
+  RenderDeviceConfig drawing;     // what draws strands
   std::string log_level = "warn";
 };
 

@@ -32,7 +32,7 @@ class WindowedView {
         window_(std::move(window)),
         playout_(options.playout),
         state_(std::make_shared<const ViewerState>()),
-        drawer_({options.shader_dir, options.device, [] { Window::wake(); }}) {}
+        drawer_({options.drawing, [] { Window::wake(); }}) {}
 
   Result<ViewReport> run(const std::atomic<bool>& stop) {
     const int64_t begin_ns = now_ns();

@@ -213,12 +213,16 @@ void LightLattice::sweep_key(WorkerPool& workers) {
         for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kSumUnit;
         const float dy = static_cast<float>(y) - center.y;
         const float dz = static_cast<float>(z) - center.z;
-        const float inside = radius * radius - dy * dy - dz * dz;
-        if (radius > 0.0f && inside > 0.0f) {
-          const float reach = std::sqrt(inside);
+        const float off = dy * dy + dz * dz;
+        const float outer = radius + 0.5f;
+        if (radius > 0.0f && off < outer * outer) {
+          const float reach = std::sqrt(outer * outer - off);
           const int from = std::max(0, static_cast<int>(std::ceil(center.x - reach)));
           const int to = std::min(size.x - 1, static_cast<int>(std::floor(center.x + reach)));
-          for (int x = from; x <= to; ++x) here[x] += kSkullDepth;
+          for (int x = from; x <= to; ++x) {
+            const float dx = static_cast<float>(x) - center.x;
+            here[x] += kSkullDepth * std::clamp(outer - std::sqrt(dx * dx + off), 0.0f, 1.0f);
+          }
         }
         uint16_t* const key = key_.data() + row;
         constexpr float kStored = 1.0f / kLightDepthUnit;

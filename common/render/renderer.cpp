@@ -55,7 +55,8 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
 
 }  // namespace
 
-Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size, const DrawTerms& terms) {
+Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size,
+                  const DrawTerms& terms) {
   if (strands.position_m.size() != position_count)
     return make_error(ErrorCode::BadInput, "the strands have {} vertices but the scene has {}",
                       strands.position_m.size(), position_count);

@@ -50,7 +50,8 @@ class Renderer {
 };
 
 /// What every renderer refuses to draw. BadInput or LimitExceeded.
-Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size, const DrawTerms& terms);
+Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size,
+                  const DrawTerms& terms);
 
 /// The passes that a renderer of this would run, without any GL.
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, bool is_software,

@@ -140,7 +140,7 @@ struct LookDesc {
   glm::vec3 light_direction{-0.45f, -0.75f, -0.5f};  // travels this way, world
   glm::vec3 light_color{1.0f, 0.97f, 0.92f};
   glm::vec3 rim_direction{0.55f, -0.45f, 0.8f};  // the second light's
-  glm::vec3 rim_color{0.0f};                     // black: there is none
+  glm::vec3 rim_color{0.45f, 0.48f, 0.55f};      // black: there is none
   float ambient = 0.22f;
   float exposure = 1.0f;
   glm::vec3 background{0.11f, 0.12f, 0.135f};

@@ -6,7 +6,7 @@
 #include "common/gl/egl_context.h"
 #include "common/gl/timer.h"
 #include "common/groom/groom_asset.h"
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 #include "common/strands/strand_codec.h"
 #include "server/app/server_passes.h"
 #include "server/encode/picture_encoder.h"
@@ -38,7 +38,8 @@ struct Bench {
   const SceneAsset& asset;
   const RuntimeFacts& facts;
   const gl::ShaderLibrary& shaders;
-  const gl::DeviceInfo& device;
+  const gl::DeviceInfo& device;  // that simulates
+  RenderDeviceConfig render;
   ThreadPasses passes;                  // measured so far
   std::vector<EncodedFramePtr> frames;  // of the strands
 };
@@ -86,11 +87,12 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
 /// Follows the strands, paints and codes pictures.
 Status measure_pictures(Bench& bench) {
   PictureView view = assumed_view(bench.scene);
-  view.size = fit_picture(view.size, bench.device.is_software ? kSoftwareBudget : kHardwareBudget);
+  ASSIGN_OR_RETURN(const auto device, RenderDevice::open(bench.render));
+  view.size = fit_picture(view.size, device->info().is_software ? kSoftwareBudget : kHardwareBudget);
   ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(bench.scene.stream.codec,
                                                      {bench.asset.strand_count, bench.asset.vertex_count}));
   decoder->set_rest_shape(bench.asset.rest_position_m);
-  ASSIGN_OR_RETURN(auto renderer, Renderer::make(bench.shaders, bench.device, bench.asset, bench.scene.look));
+  ASSIGN_OR_RETURN(auto renderer, device->make_renderer(bench.asset, bench.scene.look));
   ASSIGN_OR_RETURN(auto encoder, make_picture_encoder(view, bench.scene.stream.frame_rate_hz, 0));
   PictureTimers timers;
   StageTimer read_timer;
@@ -143,13 +145,22 @@ Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneConten
   const gl::ShaderLibrary shaders =
       config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
   const SceneAsset asset = make_scene_asset(content.groom, content.head);
-  Bench bench{scene, asset, facts, shaders, context->info(), {}, {}};
+  Bench bench{scene,
+              asset,
+              facts,
+              shaders,
+              context->info(),
+              {config.renderer, config.gl_device, config.shader_folder},
+              {},
+              {}};
   RETURN_IF_ERROR(measure_strands(bench, content));
   if (facts.frame_viewers > 0) {
     RETURN_IF_ERROR(measure_pictures(bench));
   } else {
-    ASSIGN_OR_RETURN(bench.passes.pictures,
-                     plan_picture_passes(asset, scene.look, context->info().is_software, 0));
+    ASSIGN_OR_RETURN(
+        bench.passes.pictures,
+        plan_picture_passes(asset, scene.look,
+                            config.renderer == "gl" ? RendererKind::Gl : RendererKind::Tiles, 0));
   }
   return join_passes(std::move(bench.passes), facts.frame_viewers > 0);
 }

@@ -18,6 +18,7 @@ std::string list_solvers();
 
 struct MeasureConfig {
   std::string gl_device = "auto";                      // as EglContext::make
+  std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
 };
 

@@ -10,7 +10,7 @@
 #include "common/gl/egl_context.h"
 #include "common/groom/groom_asset.h"
 #include "common/pictures/image_codec.h"
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 #include "server/scene/scene_content.h"
 
 namespace strandcast {
@@ -82,8 +82,8 @@ void paste(const Image& picture, uint32_t column, uint32_t row, Image& sheet) {
 }
 
 /// One row of the sheet: a head (or none) under the hair (or none), from all sides.
-Status draw_row(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device, const SceneAsset& asset,
-                const SceneDesc& scene, const Box& box, uint32_t row, Image& sheet) {
+Status draw_row(const RenderDevice& device, const SceneAsset& asset, const SceneDesc& scene, const Box& box,
+                uint32_t row, Image& sheet) {
   const glm::vec3 size_m = box.high - box.low;
   const float reach_m = std::max({size_m.x, size_m.y, size_m.z, 1e-3f});
   CameraDesc camera;
@@ -94,7 +94,7 @@ Status draw_row(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device, 
   look.followers = 0;
   look.tip_scale = 1.0f;
   look.strand_radius_m = 0.5f * kPixelsPerStrand * kMargin * reach_m / kPictureSide;
-  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, device, asset, look));
+  ASSIGN_OR_RETURN(auto renderer, device.make_renderer(asset, look));
   PosedStrands strands;
   strands.position_m = asset.rest_position_m;
   for (uint32_t view = 0; view < kDirections.size(); ++view) {
@@ -115,9 +115,8 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   if (failure)
     return make_error(ErrorCode::Unavailable, "cannot make the folder {}: {}", folder.string(),
                       failure.message());
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(config.gl_device));
-  const gl::ShaderLibrary shaders =
-      config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
+  ASSIGN_OR_RETURN(const auto device,
+                   RenderDevice::open({config.renderer, config.gl_device, config.shader_folder}));
   // Hair alone, hair on its head, hair on what collides.
   const std::array<Mesh, 3> heads = {Mesh{}, content.head, balls_of(content.colliders)};
   const Box box = box_of(content, content.head);
@@ -126,8 +125,7 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
               {}};
   sheet.rgba.resize(4 * size_t{sheet.width} * sheet.height);
   for (uint32_t row = 0; row < heads.size(); ++row)
-    RETURN_IF_ERROR(draw_row(shaders, context->info(), make_scene_asset(content.groom, heads[row]), scene,
-                             box, row, sheet));
+    RETURN_IF_ERROR(draw_row(*device, make_scene_asset(content.groom, heads[row]), scene, box, row, sheet));
   std::string text;
   for (const std::string& note : content.notes) text += note + "\n";
   const std::filesystem::path picture = folder / "groom.png";

@@ -173,6 +173,10 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   app.add_option("--viewer-mbit", raw.viewer_mbit,
                  "most that the strands for one viewer may take, Mbit/s; 0 = no cap")
       ->check(in_range(0.0, kMaxViewerMbit));
+  app.add_option("--renderer", options.config.renderer,
+                 "what draws pictures: tiles (the processor), gl, or auto: gl where the device is hardware")
+      ->check(CLI::IsMember({"auto", "tiles", "gl"}))
+      ->capture_default_str();
   app.add_option("--gl-device", options.config.gl_device, "auto, software, hardware or a device number")
       ->capture_default_str();
   app.add_option("--shader-dir", raw.shader_folder, "read shaders from this folder instead of the program");

@@ -91,11 +91,14 @@ Status Server::State::start() {
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   RETURN_IF_ERROR(choose_stream(*asset));
   ASSIGN_OR_RETURN(EncodedFramePtr asset_frame, encode_asset(*asset));
-  const GlPainterConfig painter{config_.gl_device, config_.shader_folder, asset, scene.look};
+  const PainterConfig painter{
+      {config_.renderer, config_.gl_device, config_.shader_folder}, asset, scene.look};
   ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream, scene.step_rate_hz,
                                           make_scene_view(scene, scene_picture_size(scene), 0), asset,
                                           config_.make_painter(painter)}));
-  ASSIGN_OR_RETURN(idle_picture_passes_, plan_picture_passes(*asset, scene.look, true, 0));
+  ASSIGN_OR_RETURN(idle_picture_passes_,
+                   plan_picture_passes(*asset, scene.look,
+                                       config_.renderer == "gl" ? RendererKind::Gl : RendererKind::Tiles, 0));
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
   RETURN_IF_ERROR(source_->start(*hub_, scene.stream));

@@ -28,10 +28,11 @@ struct ServerConfig {
   SceneDesc scene;
   NetConfig net;
   std::string gl_device = "auto";                      // as EglContext::make
+  std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
   SnapshotObserver on_publish;                         // may be empty
-  std::function<MakePicturePainter(GlPainterConfig)> make_painter =
-      gl_picture_painter;  // of the frame thread
+  std::function<MakePicturePainter(PainterConfig)> make_painter =
+      device_picture_painter;  // of the frame thread
   /// What feeds the stream; its states have the scene's codec, bound and rate.
   std::function<Result<std::unique_ptr<StateSource>>(const ServerConfig&, InputHub&)> make_source =
       simulation_source;

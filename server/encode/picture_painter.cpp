@@ -2,21 +2,18 @@
 
 #include <utility>
 
-#include "common/gl/egl_context.h"
-#include "common/gl/program.h"
 #include "common/log/log.h"
 #include "common/render/renderer.h"
 
 namespace strandcast {
 namespace {
 
-class GlPicturePainter : public PicturePainter {
+class DevicePicturePainter : public PicturePainter {
  public:
-  GlPicturePainter(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Renderer> renderer)
-      : context_(std::move(context)), renderer_(std::move(renderer)) {}
-  ~GlPicturePainter() override {
-    if (context_->make_current())
-      renderer_.reset();  // GL objects are deleted from the context that made them
+  DevicePicturePainter(std::unique_ptr<RenderDevice> device, std::unique_ptr<Renderer> renderer)
+      : device_(std::move(device)), renderer_(std::move(renderer)) {}
+  ~DevicePicturePainter() override {
+    if (device_->make_current()) renderer_.reset();  // GL objects are deleted from the context that made them
   }
 
   Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
@@ -37,7 +34,7 @@ class GlPicturePainter : public PicturePainter {
   }
 
  private:
-  std::unique_ptr<gl::EglContext> context_;  // outlives the renderer's GL objects
+  std::unique_ptr<RenderDevice> device_;  // outlives the renderer
   std::unique_ptr<Renderer> renderer_;
   StageTimer read_timer_;
   PosedStrands strands_;
@@ -50,17 +47,15 @@ gl::PassReport read_back_report(const StageTimer& timer) {
   return gl::make_report("render/read", gl::PassFate::Kept, "writes the picture for its encoders", timer);
 }
 
-MakePicturePainter gl_picture_painter(GlPainterConfig config) {
+MakePicturePainter device_picture_painter(PainterConfig config) {
+  // Else a picture in the shared queue of a software renderer would hold up the simulation until it is drawn.
+  config.device.driver_threads = gl::DriverThreads::Own;
   return [config = std::move(config)]() -> Result<std::unique_ptr<PicturePainter>> {
-    // Else a picture in the shared queue of a software renderer would hold up the simulation until it is
-    // drawn.
-    ASSIGN_OR_RETURN(auto context, gl::EglContext::make(config.gl_device, gl::DriverThreads::Own));
-    const gl::ShaderLibrary shaders =
-        config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
-    ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), *config.asset, config.look));
-    log_info("render", "frames are drawn by {}", context->info().renderer);
+    ASSIGN_OR_RETURN(auto device, RenderDevice::open(config.device));
+    ASSIGN_OR_RETURN(auto renderer, device->make_renderer(*config.asset, config.look));
+    log_info("render", "frames are drawn by {}", device->info().name);
     return std::unique_ptr<PicturePainter>(
-        std::make_unique<GlPicturePainter>(std::move(context), std::move(renderer)));
+        std::make_unique<DevicePicturePainter>(std::move(device), std::move(renderer)));
   };
 }
 

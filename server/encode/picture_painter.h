@@ -1,16 +1,15 @@
 // PicturePainter: turns a decoded snapshot into pixels. Made, used and destroyed on the frame thread.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "common/base/profile.h"
 #include "common/base/result.h"
 #include "common/gl/pass_list.h"
 #include "common/pictures/image_codec.h"
+#include "common/render/render_device.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/snapshot.h"
@@ -31,9 +30,8 @@ class PicturePainter {
 
 using MakePicturePainter = std::function<Result<std::unique_ptr<PicturePainter>>()>;
 
-struct GlPainterConfig {
-  std::string gl_device = "auto";                      // as EglContext::make
-  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+struct PainterConfig {
+  RenderDeviceConfig device;
   std::shared_ptr<const SceneAsset> asset;
   LookDesc look;
 };
@@ -41,7 +39,7 @@ struct GlPainterConfig {
 /// The line of the copy from the device to the processor.
 gl::PassReport read_back_report(const StageTimer& timer);
 
-/// A maker of painters with a GL context of their own and the renderer of common/render.
-MakePicturePainter gl_picture_painter(GlPainterConfig config);
+/// A maker of painters with a device of their own (common/render/render_device.h).
+MakePicturePainter device_picture_painter(PainterConfig config);
 
 }  // namespace strandcast

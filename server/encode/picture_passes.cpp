@@ -1,6 +1,6 @@
 #include "server/encode/picture_passes.h"
 
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 #include "server/encode/picture_painter.h"
 
 namespace strandcast {
@@ -21,9 +21,9 @@ gl::PassReports picture_passes(const PictureTimers& timers, const gl::PassReport
   return passes;
 }
 
-Result<gl::PassReports> plan_picture_passes(const SceneAsset& asset, const LookDesc& look, bool is_software,
+Result<gl::PassReports> plan_picture_passes(const SceneAsset& asset, const LookDesc& look, RendererKind kind,
                                             PictureCodecs wanted) {
-  ASSIGN_OR_RETURN(gl::PassReports painted, plan_renderer(asset, look, is_software));
+  ASSIGN_OR_RETURN(gl::PassReports painted, plan_renderer(asset, look, kind));
   painted.push_back(read_back_report(StageTimer()));
   return picture_passes({}, painted, wanted);
 }

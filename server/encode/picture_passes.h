@@ -6,6 +6,7 @@
 #include "common/base/profile.h"
 #include "common/gl/pass_list.h"
 #include "common/pictures/picture.h"
+#include "common/render/render_device.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
 
@@ -22,7 +23,7 @@ gl::PassReports picture_passes(const PictureTimers& timers, const gl::PassReport
                                PictureCodecs wanted);
 
 /// The same before there is a frame thread. BadInput for an asset that cannot be drawn.
-Result<gl::PassReports> plan_picture_passes(const SceneAsset& asset, const LookDesc& look, bool is_software,
+Result<gl::PassReports> plan_picture_passes(const SceneAsset& asset, const LookDesc& look, RendererKind kind,
                                             PictureCodecs wanted);
 
 }  // namespace strandcast

@@ -38,6 +38,7 @@ struct HairLights {
   vec3 key_color;
   vec3 to_rim;
   vec3 rim_color;
+  bool has_rim;
   vec3 up;
   float ambient;
 };
@@ -106,17 +107,18 @@ LAW vec3 hair_lobes(HairLook look, float tilt, vec3 color, vec3 tangent, vec3 to
 
   // R keeps the light's colour; TT and TRT went through the strand once and twice.
   const float kPi = 3.14159265;
-  const float kTrtAlbedo = 0.3;   // of TRT over R, by eye
-  float sharp = 1.0 + 1.5 * look.wetness;
-  float highlight = kPi * sharp * look.highlight * m_r * n_r;
+  const float kBright = 2.2;      // by eye, beside the diffuse term
+  const float kTrtShare = 0.35;
+  float sharp = 1.0 + look.wetness;
+  float highlight = kBright * kPi * sharp * look.highlight * m_r * n_r;
   vec3 through = sqrt(color);
-  float transmitted = look.transmission * m_tt * n_tt;
-  float second = kTrtAlbedo * kPi * look.second_highlight * m_trt * n_trt;
+  float transmitted = kBright * look.transmission * m_tt * n_tt;
+  float second = kBright * kTrtShare * kPi * look.second_highlight * m_trt * n_trt;
   // Between the fibre's own facing and that of the tuft it lies in.
   vec3 across = to_eye - tangent * sin_out;
   float facing = 0.5 + 0.5 * dot(across, to_light) / cos_out;
   float diffuse = look.diffuse * (1.0 - 0.5 * look.wetness) * (0.55 * cos_in + 0.45 * facing);
-  return (vec3(highlight) + through * transmitted + color * (second + diffuse)) ;
+  return vec3(highlight) + through * transmitted + color * (second + diffuse);
 }
 
 // Of all that reaches a point of a strand.
@@ -135,8 +137,10 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
 
   vec3 key = exp(-depth.key) * hair_lobes(look, tilt, color, tangent, lights.to_key, to_eye) +
              mix(kScatterFloor, 1.0, exp(-kScatterReach * depth.key)) * scattered_color;
-  vec3 rim = exp(-depth.rim) * hair_lobes(look, tilt, color, tangent, lights.to_rim, to_eye) +
-             mix(kScatterFloor, 1.0, exp(-kScatterReach * depth.rim)) * scattered_color;
+  vec3 rim = vec3(0.0);
+  if (lights.has_rim)
+    rim = exp(-depth.rim) * hair_lobes(look, tilt, color, tangent, lights.to_rim, to_eye) +
+          mix(kScatterFloor, 1.0, exp(-kScatterReach * depth.rim)) * scattered_color;
   vec3 across = to_eye - tangent * dot(tangent, to_eye);
   float facing = 0.5 + 0.5 * dot(across, lights.up);
   float open_sky = mix(kSkyFloor, 1.0, exp(-kSkyReach * depth.sky));

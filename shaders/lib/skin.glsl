@@ -13,8 +13,10 @@ LAW vec3 skin_radiance(vec3 skin_color, vec3 root_color, HairLights lights, Ligh
   const float kScalpTint = 0.85;
   const float kShine = 0.10;
   const float kGroundLight = 0.45;
-  const float kSkyReach = 0.22;
-  const float kSkyFloor = 0.10;
+  const float kSkyReach = 0.18;
+  const float kSkyFloor = 0.30;
+  const float kSeepReach = 0.15;  // light that seeps through hair onto skin, as scattered as within it
+  const float kSeep = 0.12;
   // Faces turned away are seen only where the mesh is open; lit as if turned here.
   vec3 outward = select(dot(normal, to_eye) < -0.2, -normal, normal);
   float tint = kScalpTint * clamp(cover, 0.0, 1.0);
@@ -32,6 +34,6 @@ LAW vec3 skin_radiance(vec3 skin_color, vec3 root_color, HairLights lights, Ligh
   float shine = (1.0 - tint) * kShine * h8 * h8 * select(key_facing > 0.0, 1.0, 0.0);
   float sky = lights.ambient * mix(kGroundLight, 1.0, 0.5 + 0.5 * dot(outward, lights.up)) *
               mix(kSkyFloor, 1.0, exp(-kSkyReach * depth.sky));
-  return lights.key_color * (exp(-depth.key) * (key + vec3(shine))) + lights.rim_color * (exp(-depth.rim) * rim) +
+  return lights.key_color * (exp(-depth.key) * (key + vec3(shine)) + kSeep * exp(-kSeepReach * depth.key) * skin) + lights.rim_color * (exp(-depth.rim) * rim) +
          skin * sky;
 }

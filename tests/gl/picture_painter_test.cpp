@@ -58,50 +58,57 @@ PictureView small_view() {
 
 class GlPainting : public GlTest {
  protected:
-  GlPainting() : asset_(make_asset()) { config_.asset = asset_; }
+  GlPainting() : asset_(make_asset()) {
+    config_.asset = asset_;
+    config_.device.renderer = "gl";
+  }
 
   std::shared_ptr<const SceneAsset> asset_;
-  GlPainterConfig config_;
+  PainterConfig config_;
 };
 
 TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
   // What a client knows of the look is what came in the Welcome, and this one has no default in it.
-  const ServerMessage welcome = sample_server_messages().front();
-  config_.look = std::get<Welcome>(welcome).look;
-  const auto told = decode_server_message(encode(welcome));
-  ASSERT_TRUE(told) << told.error().to_string();
-  auto renderer =
-      Renderer::make(gl::ShaderLibrary(), context_->info(), *asset_, std::get<Welcome>(*told).look);
-  ASSERT_TRUE(renderer) << renderer.error().to_string();
-  auto encoder = std::move(*make_strand_encoder("delta"));
-  auto server_decoder =
-      std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count}));
-  auto client_decoder =
-      std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count}));
-  auto painter = gl_picture_painter(config_)();  // its context is current from here on
-  ASSERT_TRUE(painter) << painter.error().to_string();
-  std::vector<Image> painted, drawn;
-  std::vector<EncodedFramePtr> frames;
-  for (uint64_t tick = 1; tick <= 3; ++tick) {
-    frames.push_back(encoder->encode(make_state(*asset_, tick)));
-    auto image = (*painter)->paint(*server_decoder->decode(frames.back()->message), small_view());
-    ASSERT_TRUE(image) << image.error().to_string();
-    painted.push_back(std::move(image).value());
+  for (const char* renderer_name : {"gl", "tiles"}) {
+    SCOPED_TRACE(renderer_name);
+    config_.device.renderer = renderer_name;
+    const ServerMessage welcome = sample_server_messages().front();
+    config_.look = std::get<Welcome>(welcome).look;
+    const auto told = decode_server_message(encode(welcome));
+    ASSERT_TRUE(told) << told.error().to_string();
+    auto encoder = std::move(*make_strand_encoder("delta"));
+    auto server_decoder =
+        std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count}));
+    auto client_decoder =
+        std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count}));
+    auto painter = device_picture_painter(config_)();  // its context is current from here on
+    ASSERT_TRUE(painter) << painter.error().to_string();
+    std::vector<Image> painted, drawn;
+    std::vector<EncodedFramePtr> frames;
+    for (uint64_t tick = 1; tick <= 3; ++tick) {
+      frames.push_back(encoder->encode(make_state(*asset_, tick)));
+      auto image = (*painter)->paint(*server_decoder->decode(frames.back()->message), small_view());
+      ASSERT_TRUE(image) << image.error().to_string();
+      painted.push_back(std::move(image).value());
+    }
+    painter->reset();
+    const auto device = RenderDevice::open(config_.device);
+    ASSERT_TRUE(device) << device.error().to_string();
+    auto renderer = (*device)->make_renderer(*asset_, std::get<Welcome>(*told).look);
+    ASSERT_TRUE(renderer) << renderer.error().to_string();
+    for (const EncodedFramePtr& frame : frames) {
+      const auto snapshot = *client_decoder->decode(frame->message);
+      const PosedStrands strands{snapshot->world_from_head, positions_in_head(*snapshot)};
+      ASSERT_TRUE((*renderer)->draw(strands, small_view().camera, small_view().size));
+      drawn.push_back((*renderer)->read_image());
+    }
+    for (size_t i = 0; i < painted.size(); ++i) EXPECT_TRUE(painted[i] == drawn[i]) << "frame " << i;
+    EXPECT_FALSE(painted[0] == painted[2]) << "the hair moved";
   }
-  ASSERT_TRUE(context_->make_current());
-  for (const EncodedFramePtr& frame : frames) {
-    const auto snapshot = *client_decoder->decode(frame->message);
-    const PosedStrands strands{snapshot->world_from_head, positions_in_head(*snapshot)};
-    ASSERT_TRUE((*renderer)->draw(strands, small_view().camera, small_view().size));
-    drawn.push_back((*renderer)->read_image());
-  }
-  for (size_t i = 0; i < painted.size(); ++i) EXPECT_TRUE(painted[i] == drawn[i]) << "frame " << i;
-  EXPECT_FALSE(painted[0] == painted[2]) << "the hair moved";
-  renderer->reset();  // while its context is current
 }
 
 TEST_F(GlPainting, ATickThatComesAgainIsPaintedAgain) {
-  auto painter = gl_picture_painter(config_)();
+  auto painter = device_picture_painter(config_)();
   ASSERT_TRUE(painter) << painter.error().to_string();
   const auto paint = [&](const std::shared_ptr<const Snapshot>& snapshot) {
     auto image = (*painter)->paint(snapshot, small_view());
@@ -118,7 +125,7 @@ TEST_F(GlPainting, ATickThatComesAgainIsPaintedAgain) {
 }
 
 TEST_F(GlPainting, EveryViewThatIsAcceptedCanBePainted) {
-  auto painter = gl_picture_painter(config_)();
+  auto painter = device_picture_painter(config_)();
   ASSERT_TRUE(painter) << painter.error().to_string();
   const auto snapshot = std::make_shared<const Snapshot>(make_state(*asset_, 1));
   std::vector<PictureView> views;
@@ -157,7 +164,7 @@ TEST_F(GlPainting, AFrameWorkerSendsPicturesOfTheHead) {
   };
   hooks.request_keyframe = [&] { ++requests; };
   FrameWorker worker(std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count})),
-                     gl_picture_painter(config_), {1000.0}, std::move(hooks));
+                     device_picture_painter(config_), {1000.0}, std::move(hooks));
   worker.set_views({{1, small_view()}});
   ASSERT_TRUE(eventually([&] { return requests > 0; }));
   worker.offer(encoder->encode_for_join(make_state(*asset_, 1)).keyframe);
@@ -196,7 +203,7 @@ TEST_F(GlPainting, TheFrameThreadHoldsGlAndHasPassesOnlyWhileSomebodyWatches) {
   hooks.sink = [&](uint32_t, PicturePtr) { ++pictures; };
   hooks.request_keyframe = [&] { ++requests; };
   FrameWorker worker(std::move(*make_strand_decoder("delta", {asset_->strand_count, asset_->vertex_count})),
-                     gl_picture_painter(config_), {1000.0}, std::move(hooks));
+                     device_picture_painter(config_), {1000.0}, std::move(hooks));
   worker.offer(encoder->encode_for_join(make_state(*asset_, 1)).keyframe);  // for nobody
   EXPECT_TRUE(worker.passes().empty());
 
@@ -209,7 +216,7 @@ TEST_F(GlPainting, TheFrameThreadHoldsGlAndHasPassesOnlyWhileSomebodyWatches) {
   EXPECT_EQ(gl::object_counts().contexts, before.contexts + 1);
   const gl::PassReports ran = worker.passes();
   const auto planned =
-      plan_picture_passes(*asset_, config_.look, context_->info().is_software, codec_bit(PictureCodec::Jpeg));
+      plan_picture_passes(*asset_, config_.look, RendererKind::Gl, codec_bit(PictureCodec::Jpeg));
   ASSERT_TRUE(planned) << planned.error().to_string();
   EXPECT_EQ(decisions(ran), decisions(*planned));
   for (const gl::PassReport& pass : ran)
@@ -224,8 +231,8 @@ TEST_F(GlPainting, TheFrameThreadHoldsGlAndHasPassesOnlyWhileSomebodyWatches) {
 }
 
 TEST_F(GlPainting, AnUnknownDeviceIsAnErrorThatNamesTheKnownOnes) {
-  config_.gl_device = "abacus";
-  const auto painter = gl_picture_painter(config_)();
+  config_.device.gl_device = "abacus";
+  const auto painter = device_picture_painter(config_)();
   ASSERT_FALSE(painter);
   EXPECT_THAT(painter.error().message, testing::HasSubstr("known: auto, software, hardware"));
 }
@@ -251,9 +258,9 @@ TEST_F(PaintingMemory, APixelTakesWithoutAGpuWhatTheBudgetCounts) {
   options.strand_count = 2'000;
   options.vertex_count = 16;
   const auto groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadRadiusM, 4'000), options);
-  GlPainterConfig config;
+  PainterConfig config;
   config.asset = std::make_shared<SceneAsset>(make_scene_asset(groom.value(), make_head(kHeadRadiusM)));
-  auto painter = gl_picture_painter(config)();
+  auto painter = device_picture_painter(config)();
   ASSERT_TRUE(painter) << painter.error().to_string();
   const auto state = std::make_shared<const Snapshot>(make_state(*config.asset, 1));
   const auto paint = [&](uint32_t width, uint32_t height) {

@@ -33,7 +33,7 @@ class StrandDrawerTest : public testing::Test {
   }
   static StrandDrawer::Config config(const std::string& device) {
     StrandDrawer::Config wanted;
-    wanted.device = device;
+    wanted.device.gl_device = device;
     wanted.on_news = [] {};
     return wanted;
   }

@@ -64,12 +64,12 @@ TEST_F(Diagnose, AServerThatIsDown) {
   EXPECT_THAT(line, HasSubstr("missing"));
   EXPECT_THAT(line, HasSubstr("cannot connect"));
   EXPECT_THAT(line, HasSubstr("start strandcast-server there"));
-  EXPECT_THAT(line_of(text, "OpenGL"), HasSubstr("the server's pictures are shown instead"));
+  EXPECT_THAT(line_of(text, "drawing"), HasSubstr("the server's pictures are shown instead"));
   EXPECT_THAT(line_of(text, "decoders"), HasSubstr("tangent"));
 }
 
-TEST_F(Diagnose, StrandsWithoutOpenGlAreMissingIt) {
-  const std::string line = line_of(diagnose("127.0.0.1:1", 1, {"--mode", "strands"}), "OpenGL");
+TEST_F(Diagnose, StrandsWithoutWhatDrawsThemAreMissingIt) {
+  const std::string line = line_of(diagnose("127.0.0.1:1", 1, {"--mode", "strands"}), "drawing");
   EXPECT_THAT(line, HasSubstr("missing"));
   EXPECT_THAT(line, HasSubstr("--mode auto or frames"));
 }

@@ -15,9 +15,8 @@
 #include "client/app/headless_view.h"
 #include "client/app/stream_check.h"
 #include "common/base/file.h"
-#include "common/gl/egl_context.h"
 #include "common/motion/motion_clip.h"
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/sample_look.h"
 #include "tests/support/server_fixture.h"
@@ -93,9 +92,9 @@ class EndToEnd : public test::ServerFixture {
     config.scene.stream.frame_width = 96;
     config.scene.stream.frame_height = 64;
     config.on_publish = [this](const auto& snapshot) { observer_.saw(*snapshot); };
-    config.make_painter = [this](GlPainterConfig painter) -> MakePicturePainter {
+    config.make_painter = [this](PainterConfig painter) -> MakePicturePainter {
       return [this,
-              make = gl_picture_painter(std::move(painter))]() -> Result<std::unique_ptr<PicturePainter>> {
+              make = device_picture_painter(std::move(painter))]() -> Result<std::unique_ptr<PicturePainter>> {
         ASSIGN_OR_RETURN(auto made, make());
         return std::unique_ptr<PicturePainter>(std::make_unique<ObservedPainter>(std::move(made), observer_));
       };
@@ -226,10 +225,10 @@ TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {
   ASSERT_TRUE(pump_until({strands.get(), frames.get()},
                          [&] { return frames->image_count() >= 3 && common_pictures().size() >= 3; }));
 
-  auto context = gl::EglContext::make("auto");
-  ASSERT_TRUE(context) << context.error().to_string();
+  const auto device = RenderDevice::open({});
+  ASSERT_TRUE(device) << device.error().to_string();
   const Welcome& welcome = frames->welcome();
-  auto renderer = Renderer::make(gl::ShaderLibrary(), (*context)->info(), *strands->asset(), welcome.look);
+  auto renderer = (*device)->make_renderer(*strands->asset(), welcome.look);
   ASSERT_TRUE(renderer) << renderer.error().to_string();
   StrandFill fill;  // these states have all strands
   std::vector<Image> drawn;
@@ -441,12 +440,24 @@ TEST_F(EndToEnd, TheWindowOpensDrawsAndLeaves) {
   EXPECT_EQ(report.find(nothing), std::string::npos) << report;
 }
 
-/// A driver with OpenGL 3.3 can show pictures only.
-TEST_F(EndToEnd, AWindowWithoutOpenGl45AsksForTheServersPictures) {
+/// A driver with OpenGL 3.3 can show pictures, and those of strands are drawn without it.
+TEST_F(EndToEnd, AWindowWithoutOpenGl45DrawsStrandsOnTheProcessor) {
+  if (!has_virtual_display())
+    GTEST_SKIP() << "xvfb-run (package xvfb) is not installed: no display to open a window on";
+  const std::string nothing = "rendered_pictures=0\n";
+  const std::string report =
+      window_report(server_->port(), "MESA_GL_VERSION_OVERRIDE=3.3", "--mode strands", nothing);
+  EXPECT_THAT(report, HasSubstr("mode=strands\n"));
+  EXPECT_EQ(report.find(nothing), std::string::npos) << report;
+}
+
+/// Who insists on OpenGL and has not got it is shown the server's pictures.
+TEST_F(EndToEnd, AWindowThatInsistsOnOpenGl45AsksForTheServersPictures) {
   if (!has_virtual_display())
     GTEST_SKIP() << "xvfb-run (package xvfb) is not installed: no display to open a window on";
   const std::string nothing = "decoded_frames=0\n";
-  const std::string report = window_report(server_->port(), "MESA_GL_VERSION_OVERRIDE=3.3", "", nothing);
+  const std::string report =
+      window_report(server_->port(), "MESA_GL_VERSION_OVERRIDE=3.3", "--renderer gl", nothing);
   EXPECT_THAT(report, HasSubstr("mode=frames\n"));
   EXPECT_THAT(report, HasSubstr("no OpenGL 4.5"));
   EXPECT_THAT(report, HasSubstr("blank_pictures=0\n"));
@@ -464,7 +475,7 @@ TEST_F(EndToEnd, ADiagnosisWithoutADisplayFindsThatASessionWouldWork) {
   ASSERT_TRUE(log) << log.error().to_string();
   EXPECT_EQ(WEXITSTATUS(status), 0) << *log;
   for (const char* part :
-       {"OpenGL", "note     display", "ok       decoders", "ok       server", "ok       role",
+       {"drawing", "note     display", "ok       decoders", "ok       server", "ok       role",
         "ok       stream", "ok       clock", "link", "a session would work\n"})
     EXPECT_THAT(*log, HasSubstr(part));
 }

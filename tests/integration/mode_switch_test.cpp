@@ -30,12 +30,12 @@ class PatternPainter : public PicturePainter {
   }
 };
 
-MakePicturePainter pattern_painter(const GlPainterConfig&) {
+MakePicturePainter pattern_painter(const PainterConfig&) {
   return []() -> Result<std::unique_ptr<PicturePainter>> {
     return std::unique_ptr<PicturePainter>(std::make_unique<PatternPainter>());
   };
 }
-MakePicturePainter broken_painter(const GlPainterConfig&) {
+MakePicturePainter broken_painter(const PainterConfig&) {
   return []() -> Result<std::unique_ptr<PicturePainter>> {
     return make_error(ErrorCode::Unavailable, "no OpenGL on this server");
   };
@@ -44,7 +44,7 @@ MakePicturePainter broken_painter(const GlPainterConfig&) {
 class ModeSwitching : public test::ServerFixture {
  protected:
   [[nodiscard]] bool start(SceneDesc scene = test::bald_scene(),
-                           std::function<MakePicturePainter(GlPainterConfig)> painter = pattern_painter) {
+                           std::function<MakePicturePainter(PainterConfig)> painter = pattern_painter) {
     ServerConfig config;
     config.scene = std::move(scene);
     config.scene.stream.frame_width = picture_.width;

@@ -27,7 +27,7 @@ class LinesPainter : public PicturePainter {
     return test::waving_lines(view.size.width, view.size.height, 0.1 * static_cast<double>(snapshot->tick));
   }
 };
-MakePicturePainter lines_painter(const GlPainterConfig&) {
+MakePicturePainter lines_painter(const PainterConfig&) {
   return []() -> Result<std::unique_ptr<PicturePainter>> {
     return std::unique_ptr<PicturePainter>(std::make_unique<LinesPainter>());
   };

@@ -55,7 +55,7 @@ class StreamOfARecording : public test::ServerFixture {
     states_ = recorded_states(*quantum_m);
     // The one line that makes it the source.
     config.make_source = [this](const ServerConfig&, InputHub&) { return make_source(); };
-    config.make_painter = [this](const GlPainterConfig&) -> MakePicturePainter {
+    config.make_painter = [this](const PainterConfig&) -> MakePicturePainter {
       return [this]() -> Result<std::unique_ptr<PicturePainter>> {
         ++painters_;
         return make_error(ErrorCode::Unavailable, "no OpenGL in this test");

@@ -15,7 +15,7 @@ STRANDCAST_LANES law::HairLook hair_look(const ShadingNumbers& n) {
           n.root_darkening, n.strand_variation, n.lock_variation, n.warmth_variation, n.wetness};
 }
 STRANDCAST_LANES law::HairLights hair_lights(const ShadingNumbers& n, const LightDirections& lights) {
-  return {lights.to_key, n.key_color, lights.to_rim, n.rim_color, lights.up, n.ambient};
+  return {lights.to_key, n.key_color, lights.to_rim, n.rim_color, lights.has_rim, lights.up, n.ambient};
 }
 
 /// Where a point lies in a lattice: cells of its lower corner, and the way to the next ones.

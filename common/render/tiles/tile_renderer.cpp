@@ -235,11 +235,11 @@ class TileRenderer final : public Renderer {
     const auto add = [&](gl::PassDeclaration declaration, TilePass::Work work) {
       passes_.add(std::make_unique<TilePass>(std::move(declaration), state_, work));
     };
-    add({"tiles/expand", {&scene_.strands}, {&points_}, true, {}}, expand);
-    add({"tiles/light", {&points_}, {&lattice_}, true, {}}, light);
-    add({"tiles/shade", {&points_, &lattice_}, {&points_}, true, {}}, shade);
-    add({"tiles/bin", {&points_}, {&bins_}, true, {}}, bin);
-    add({"tiles/draw", {&points_, &bins_, &lattice_}, {&picture_}, true, {}}, draw_tiles);
+    add({"render/expand", {&scene_.strands}, {&points_}, true, {}}, expand);
+    add({"render/light", {&points_}, {&lattice_}, true, {}}, light);
+    add({"render/shade", {&points_, &lattice_}, {&points_}, true, {}}, shade);
+    add({"render/bin", {&points_}, {&bins_}, true, {}}, bin);
+    add({"render/draw", {&points_, &bins_, &lattice_}, {&picture_}, true, {}}, draw_tiles);
   }
 
   Status plan() { return passes_.plan({&scene_.strands}, {&picture_}); }

@@ -1,0 +1,53 @@
+// RenderDevice: what draws pictures, chosen in one place: a hardware GPU through OpenGL where there is one,
+// else the processors in tiles. Opened, used and closed on one thread; renderers that it made go first.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/gl/egl_context.h"
+#include "common/render/renderer.h"
+
+namespace strandcast {
+
+enum class RendererKind { Tiles, Gl };
+const char* to_string(RendererKind kind);
+/// Names that RenderDeviceConfig::renderer takes: "auto", "tiles", "gl".
+bool is_renderer_name(const std::string& name);
+
+struct RenderDeviceConfig {
+  std::string renderer = "auto";                       // tiles unless the OpenGL device is hardware
+  std::string gl_device = "auto";                      // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
+  gl::DriverThreads driver_threads = gl::DriverThreads::Shared;
+};
+
+struct RenderDeviceInfo {
+  RendererKind kind = RendererKind::Tiles;
+  std::string name;         // for people
+  bool is_software = true;  // it draws on processor cores
+};
+
+class RenderDevice {
+ public:
+  /// Makes its context current. "gl", and an OpenGL device that is named, fail where it is not there:
+  /// Unavailable, or BadInput for an unknown name.
+  static Result<std::unique_ptr<RenderDevice>> open(const RenderDeviceConfig& config);
+  /// Binds its context, if it has one, to the calling thread.
+  Status make_current();
+  const RenderDeviceInfo& info() const { return info_; }
+  Result<std::unique_ptr<Renderer>> make_renderer(const SceneAsset& asset, const LookDesc& look) const;
+
+ private:
+  explicit RenderDevice(const RenderDeviceConfig& config);
+  RenderDeviceInfo info_;
+  gl::ShaderLibrary shaders_;
+  std::unique_ptr<gl::EglContext> context_;  // of Gl
+};
+
+/// The passes that a renderer of this kind would run, without drawing.
+Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind);
+
+}  // namespace strandcast
