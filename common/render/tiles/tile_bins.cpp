@@ -124,8 +124,9 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
   segments_.item.resize(next);
   in_parts(drawn, [&](uint32_t part, uint32_t i) {
     uint32_t* const places = counts_.data() + size_t{tiles} * part;
-    visit_tiles(points.point[i], points.point[i + 1], grid, near_m,
-                [&](uint32_t tile) { segments_.item[places[tile]++] = i; });
+    visit_tiles(points.point[i], points.point[i + 1], grid, near_m, [&](uint32_t tile) {
+      segments_.item[places[tile]++] = {points.point[i].z + points.point[i + 1].z, i};
+    });
   });
   BinCounts sum;
   for (const BinCounts& counts : counted) {

@@ -22,12 +22,18 @@ struct TileGrid {
   uint32_t count() const { return columns() * rows(); }
 };
 
-/// `first` has one entry more than there are tiles; the entries of tile i are item[first[i]] .. item[first[i
-/// + 1]].
+/// A segment in a tile: the depths of its two ends, summed, and its first point.
+struct TileSegment {
+  float depth;
+  uint32_t point;
+};
+
+/// Tile i has item[first[i]] up to item[first[i + 1]]; `first` has one entry more than there are tiles.
+template <class Item>
 struct TileLists {
   std::vector<uint32_t> first;
-  std::vector<uint32_t> item;
-  uint64_t size_bytes() const { return (first.capacity() + item.capacity()) * sizeof(uint32_t); }
+  std::vector<Item> item;
+  uint64_t size_bytes() const { return first.capacity() * sizeof(uint32_t) + item.capacity() * sizeof(Item); }
 };
 
 struct BinCounts {
@@ -43,13 +49,13 @@ class TileBins {
   /// Boxes (low x, low y, high x, high y) in pixels; an empty one is in no tile.
   void bin_boxes(const std::vector<glm::vec4>& boxes, const TileGrid& grid);
 
-  const TileLists& segments() const { return segments_; }
-  const TileLists& boxes() const { return boxes_; }
+  const TileLists<TileSegment>& segments() const { return segments_; }
+  const TileLists<uint32_t>& boxes() const { return boxes_; }
   uint64_t size_bytes() const;
 
  private:
-  TileLists segments_;
-  TileLists boxes_;
+  TileLists<TileSegment> segments_;
+  TileLists<uint32_t> boxes_;
   std::vector<uint32_t> counts_;  // (worker x tile)
 };
 

@@ -14,7 +14,7 @@
 namespace strandcast {
 
 /// Tiles are squares of so many pixels: part of what a picture is, as they decide where strands are sorted.
-inline constexpr uint32_t kTilePx = 16;
+inline constexpr uint32_t kTilePx = 32;
 
 /// A point of a drawn strand. Two of them in a row, of one strand, are a segment.
 struct StrandPoint {

@@ -35,6 +35,7 @@ constexpr float kGradient = 0.35f;
 // Samples of the head per pixel side.
 constexpr int kHeadSamples = 2;
 constexpr float kFar = 1e30f;
+constexpr uint32_t kNoTriangle = 0xffffffffu;
 
 /// Of one tile, per pixel.
 struct TilePixels {
@@ -61,7 +62,7 @@ STRANDCAST_LANES Float block_rows() {
 // ---- the head
 
 STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& out) {
-  const TileLists& lists = in.bins->boxes();
+  const TileLists<uint32_t>& lists = in.bins->boxes();
   const uint32_t begin = lists.first[tile];
   const uint32_t end = lists.first[tile + 1];
   if (begin == end) return false;
@@ -73,7 +74,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
   simd::UintBits which[kSampleBlocks];
   for (int i = 0; i < kSampleBlocks; ++i) {
     depth[i] = kFar;
-    which[i] = simd::UintBits{} + 0xffffffffu;
+    which[i] = simd::UintBits{} + kNoTriangle;
   }
   const auto tile_x = static_cast<float>(tile % in.grid.columns() * kTilePx);
   const auto tile_y = static_cast<float>(tile / in.grid.columns() * kTilePx);
@@ -120,72 +121,76 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
-      float nearest[kLanes], uncovered[kLanes];
-      float value[7][kLanes];  // position, normal, cover
+      float nearest[kLanes], uncovered[kLanes], seen_x[kLanes], seen_y[kLanes];
+      float corner_x[3][kLanes], corner_y[3][kLanes], corner_w[3][kLanes];
+      float value[3][7][kLanes];  // position, normal, cover
       bool is_block = false;
       for (int lane = 0; lane < static_cast<int>(kLanes); ++lane) {
-        const int pixel_x = x * kBlockColumns + lane % kBlockColumns;
-        const int pixel_y = y * kBlockRows + lane / kBlockColumns;
+        const int sample_x = (x * kBlockColumns + lane % kBlockColumns) * kHeadSamples;
+        const int sample_y = (y * kBlockRows + lane / kBlockColumns) * kHeadSamples;
+        // The samples of a pixel are two pairs in one block.
+        static_assert(kHeadSamples == kBlockRows);
+        const int first =
+            (sample_y / kBlockRows * kRowBlocks + sample_x / kBlockColumns) * static_cast<int>(kLanes) +
+            sample_x % kBlockColumns;
+        uint32_t triangle = kNoTriangle;
         int covered = 0;
-        uint32_t triangle = 0xffffffffu;
-        float seen_x = 0.0f, seen_y = 0.0f;
         nearest[lane] = kFar;
+        seen_x[lane] = seen_y[lane] = 0.0f;
         for (int sample = 0; sample < kHeadSamples * kHeadSamples; ++sample) {
-          const int sx = pixel_x * kHeadSamples + sample % kHeadSamples;
-          const int sy = pixel_y * kHeadSamples + sample / kHeadSamples;
-          const int at = ((sy / kBlockRows) * kRowBlocks + sx / kBlockColumns) * static_cast<int>(kLanes) +
-                         (sy % kBlockRows) * kBlockColumns + sx % kBlockColumns;
-          if (triangles[at] == 0xffffffffu) continue;
+          const int at = first + sample / kHeadSamples * kBlockColumns + sample % kHeadSamples;
+          if (triangles[at] == kNoTriangle) continue;
           ++covered;
           nearest[lane] = std::min(nearest[lane], depths[at]);
-          if (triangle != 0xffffffffu) continue;
+          if (triangle != kNoTriangle) continue;
           triangle = triangles[at];
-          seen_x = tile_x + (static_cast<float>(sx) + 0.5f) * kStep;
-          seen_y = tile_y + (static_cast<float>(sy) + 0.5f) * kStep;
+          seen_x[lane] = tile_x + (static_cast<float>(sample_x + sample % kHeadSamples) + 0.5f) * kStep;
+          seen_y[lane] = tile_y + (static_cast<float>(sample_y + sample / kHeadSamples) + 0.5f) * kStep;
         }
         uncovered[lane] = 1.0f - static_cast<float>(covered) / (kHeadSamples * kHeadSamples);
-        for (auto& values : value) values[lane] = 0.0f;
-        value[5][lane] = 1.0f;
-        if (covered == 0) continue;
-        is_block = true;
-        const glm::uvec3& corner = head.mesh->triangle[triangle];
-        const glm::vec4& a = head.screen[corner.x];
-        const glm::vec4& b = head.screen[corner.y];
-        const glm::vec4& c = head.screen[corner.z];
-        // Weights in space: those on the screen, each over its depth.
-        const float w0 = ((b.x - seen_x) * (c.y - seen_y) - (b.y - seen_y) * (c.x - seen_x)) * a.w;
-        const float w1 = ((c.x - seen_x) * (a.y - seen_y) - (c.y - seen_y) * (a.x - seen_x)) * b.w;
-        const float w2 = ((a.x - seen_x) * (b.y - seen_y) - (a.y - seen_y) * (b.x - seen_x)) * c.w;
-        const float per_sum = 1.0f / (w0 + w1 + w2);
-        for (int axis = 0; axis < 3; ++axis) {
-          value[axis][lane] =
-              (w0 * head.mesh->position_m[corner.x][axis] + w1 * head.mesh->position_m[corner.y][axis] +
-               w2 * head.mesh->position_m[corner.z][axis]) *
-              per_sum;
-          value[3 + axis][lane] =
-              (w0 * head.mesh->normal[corner.x][axis] + w1 * head.mesh->normal[corner.y][axis] +
-               w2 * head.mesh->normal[corner.z][axis]) *
-              per_sum;
+        is_block |= covered > 0;
+        const glm::uvec3& corner = head.mesh->triangle[covered > 0 ? triangle : 0];
+        for (int c = 0; c < 3; ++c) {
+          const glm::vec4& screen = head.screen[corner[c]];
+          corner_x[c][lane] = screen.x;
+          corner_y[c][lane] = screen.y;
+          corner_w[c][lane] = screen.w;
+          const glm::vec3& position = head.mesh->position_m[corner[c]];
+          const glm::vec3& normal = head.mesh->normal[corner[c]];
+          for (int axis = 0; axis < 3; ++axis) {
+            value[c][axis][lane] = position[axis];
+            value[c][3 + axis][lane] = normal[axis];
+          }
+          value[c][6][lane] = (*head.cover)[corner[c]];
         }
-        value[6][lane] =
-            (w0 * (*head.cover)[corner.x] + w1 * (*head.cover)[corner.y] + w2 * (*head.cover)[corner.z]) *
-            per_sum;
       }
       out.depth[block] = simd::load_lanes(nearest);
       out.uncovered[block] = simd::load_lanes(uncovered);
       out.red[block] = out.green[block] = out.blue[block] = Float(0.0f);
       if (!is_block) continue;
       is_there = true;
-      const law::vec3 position(simd::load_lanes(value[0]), simd::load_lanes(value[1]),
-                               simd::load_lanes(value[2]));
-      const law::vec3 normal = law::unit_or(
-          law::vec3(simd::load_lanes(value[3]), simd::load_lanes(value[4]), simd::load_lanes(value[5])),
-          law::vec3(0.0f, 0.0f, 1.0f));
+      // Weights in space: those on the screen, each over its depth.
+      Float off_x[3], off_y[3], weight[3], mean[7];
+      for (int c = 0; c < 3; ++c) {
+        off_x[c] = simd::load_lanes(corner_x[c]) - simd::load_lanes(seen_x);
+        off_y[c] = simd::load_lanes(corner_y[c]) - simd::load_lanes(seen_y);
+      }
+      for (int c = 0; c < 3; ++c)
+        weight[c] = (off_x[(c + 1) % 3] * off_y[(c + 2) % 3] - off_y[(c + 1) % 3] * off_x[(c + 2) % 3]) *
+                    simd::load_lanes(corner_w[c]);
+      const Float per_sum = 1.0f / (weight[0] + weight[1] + weight[2]);
+      for (int i = 0; i < 7; ++i)
+        mean[i] = (weight[0] * simd::load_lanes(value[0][i]) + weight[1] * simd::load_lanes(value[1][i]) +
+                   weight[2] * simd::load_lanes(value[2][i])) *
+                  per_sum;
+      const law::vec3 position(mean[0], mean[1], mean[2]);
+      const law::vec3 normal =
+          law::unit_or(law::vec3(mean[3], mean[4], mean[5]), law::vec3(0.0f, 0.0f, 1.0f));
       const law::vec3 to_eye =
           law::unit_or(law::vec3(shade.view.eye_m) - position, law::vec3(0.0f, 0.0f, 1.0f));
       const law::LightDepth light = light_depth_at(shade.lattice, position + head.shadow_lift_m * normal);
       const law::vec3 color = law::skin_radiance(shade.look.skin_color, shade.look.root_color, lights, light,
-                                                 normal, to_eye, simd::load_lanes(value[6]));
+                                                 normal, to_eye, mean[6]);
       out.red[block] = color.x;
       out.green[block] = color.y;
       out.blue[block] = color.z;
@@ -198,25 +203,22 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
 /// The segments of a tile from front to back: by the depth of their middles, then by their number.
 STRANDCAST_LANES const uint64_t* sort_segments(const TileInput& in, uint32_t begin, uint32_t count,
                                                TileScratch& scratch) {
-  const StrandPoint* const points = in.points->point.data();
-  const uint32_t* const items = in.bins->segments().item.data() + begin;
+  const TileSegment* const items = in.bins->segments().item.data() + begin;
   scratch.order.resize(count);
   scratch.sorted.resize(count);
   float low = kFar;
   float high = -kFar;
   for (uint32_t i = 0; i < count; ++i) {
-    const float depth = points[items[i]].z + points[items[i] + 1].z;
-    low = std::min(low, depth);
-    high = std::max(high, depth);
+    low = std::min(low, items[i].depth);
+    high = std::max(high, items[i].depth);
   }
   constexpr float kDepthSteps = 65535.0f;
   const float scale = kDepthSteps / std::max(high - low, 1e-9f);
   uint32_t counts[2][256] = {};
   for (uint32_t i = 0; i < count; ++i) {
-    const float depth = points[items[i]].z + points[items[i] + 1].z;
-    const auto key =
-        static_cast<uint32_t>(static_cast<int32_t>(std::min((depth - low) * scale, kDepthSteps)));
-    scratch.order[i] = uint64_t{key} << 32 | items[i];
+    const float step = std::min((items[i].depth - low) * scale, kDepthSteps);
+    const auto key = static_cast<uint32_t>(static_cast<int32_t>(step));
+    scratch.order[i] = uint64_t{key} << 32 | items[i].point;
     ++counts[0][key & 255];
     ++counts[1][key >> 8];
   }
@@ -270,9 +272,14 @@ STRANDCAST_LANES void blend_segment(const StrandPoint& a, const StrandPoint& b, 
   const float uy = dy * per_length;
   const float wa = va.value[kWidthPx];
   const float wb = vb.value[kWidthPx];
-  const law::LineFilter filter_a = law::line_filter(wa, {ux, uy});
-  const law::LineFilter filter_b = law::line_filter(wb, {ux, uy});
-  const float reach = std::max(filter_a.reach.v[0], filter_b.reach.v[0]);
+  // The filter of the middle, times the width where it is: coverage adds up to the width all along.
+  const float mean_width = std::max(0.5f * (wa + wb), 1e-4f);
+  const law::LineFilter filter = law::line_filter(mean_width, {ux, uy});
+  const float per_width = 1.0f / mean_width;
+  const Float base = filter.base * per_width;
+  const Float slope = filter.slope * per_width;
+  const Float peak = filter.peak * per_width;
+  const float reach = filter.reach.v[0];
   const float low_x = std::min(ax, bx) - reach;
   const float high_x = std::max(ax, bx) + reach;
   const float low_y = std::min(ay, by) - reach;
@@ -286,13 +293,13 @@ STRANDCAST_LANES void blend_segment(const StrandPoint& a, const StrandPoint& b, 
   const float x_per_y = is_steep ? dx / dy : 0.0f;
   const float room = is_steep ? reach / std::abs(uy) : 0.0f;
 
+  const float along_x = dx * per_length2;
+  const float along_y = dy * per_length2;
   const Float cx = block_columns();
   const Float cy = block_rows();
   const float da = vb.value[kOpacity] - va.value[kOpacity];
   const bool fades = da != 0.0f || va.value[kOpacity] != 1.0f;
-  const Float base_step = filter_b.base - filter_a.base;
-  const Float slope_step = filter_b.slope - filter_a.slope;
-  const Float peak_step = filter_b.peak - filter_a.peak;
+  const float width_step = wb - wa;
   for (int y = std::max(y0, 0); y <= y1; ++y) {
     float from = low_x;
     float to = high_x;
@@ -313,12 +320,10 @@ STRANDCAST_LANES void blend_segment(const StrandPoint& a, const StrandPoint& b, 
       const Float rx = px - ax;
       const Float ry = py - ay;
       const Float across = rx * uy - ry * ux;
-      const Float part = simd::clamp((rx * dx + ry * dy) * per_length2, 0.0f, 1.0f);
+      const Float part = simd::clamp(rx * along_x + ry * along_y, 0.0f, 1.0f);
       // shaders/lib/coverage.glsl
-      const Float base = filter_a.base + part * base_step;
-      const Float slope = filter_a.slope + part * slope_step;
-      const Float peak = filter_a.peak + part * peak_step;
-      const Float cover = simd::min(base - slope * simd::abs(across), peak);
+      const Float cover =
+          simd::min(simd::min(base - slope * simd::abs(across), peak) * (wa + part * width_step), 1.0f);
       // Joints: a pixel belongs to the segment between the mitres of its ends, computed alike on both sides
       // of one.
       const Float behind_a = (px - ax) * va.value[kMitreX] + (py - ay) * va.value[kMitreY];
@@ -345,6 +350,25 @@ STRANDCAST_LANES Float tone_mapped(Float linear) {
   constexpr float kRoom = 1.0f - kKnee;
   const Float over = simd::max(linear - kKnee, 0.0f);
   return simd::min(linear, kKnee) + kRoom * over / (over + kRoom);
+}
+
+STRANDCAST_LANES float background_gradient(const TileInput& in, uint32_t row) {
+  const float high = 1.0f - (static_cast<float>(row) + 0.5f) / static_cast<float>(in.grid.size_px.y);
+  return 1.0f + kGradient * (2.0f * high - 1.0f);
+}
+
+STRANDCAST_LANES void fill_background(const TileInput& in, uint32_t left, uint32_t top, uint32_t width,
+                                      uint32_t height) {
+  for (uint32_t y = 0; y < height; ++y) {
+    const glm::vec3 color = in.background * background_gradient(in, top + y);
+    uint32_t packed = 0xff000000u;
+    for (int c = 0; c < 3; ++c) {
+      const auto step = static_cast<int>(std::clamp(color[c], 0.0f, 1.0f) * kSrgbSteps);
+      packed |= uint32_t{in.srgb[step]} << (8 * c);
+    }
+    uint8_t* const row = in.rgba + 4 * (size_t{top + y} * in.grid.size_px.x + left);
+    for (uint32_t x = 0; x < width; ++x) std::memcpy(row + 4 * x, &packed, sizeof packed);
+  }
 }
 
 STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
@@ -388,16 +412,17 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
 
   const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);
   const uint32_t height = std::min(kTilePx, in.grid.size_px.y - top);
-  const bool is_empty = count == 0 && !has_head;
+  if (count == 0 && !has_head) return fill_background(in, left, top, width, height);
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
-      // Row by row: the two rows of a block have backgrounds of their own.
-      const Float row = block_rows() + static_cast<float>(top + static_cast<uint32_t>(y) * kBlockRows);
-      const Float high = 1.0f - row * (1.0f / static_cast<float>(in.grid.size_px.y));
-      const Float gradient = 1.0f + kGradient * (2.0f * high - 1.0f);
+      // The two rows of a block have backgrounds of their own.
+      const uint32_t row = top + static_cast<uint32_t>(y) * kBlockRows;
+      const float upper = background_gradient(in, row);
+      const float lower = background_gradient(in, row + 1);
+      const Float gradient = FloatBits{upper, upper, upper, upper, lower, lower, lower, lower};
       Float color[3] = {in.background.x * gradient, in.background.y * gradient, in.background.z * gradient};
-      if (!is_empty) {
+      {
         Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};
         Float drawn = 1.0f - pixels.passed[block];
         if (has_head) {
