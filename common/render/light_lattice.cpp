@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "common/base/hash.h"
 #include "common/render/tiles/tile_frame.h"
 
 namespace strandcast {
@@ -24,6 +25,10 @@ constexpr int kSizeStep = 8;
 // Workers that sum have a lattice each.
 constexpr uint32_t kMaxSummingWorkers = 4;
 constexpr size_t kStrandsPerRange = 64;
+// A segment is summed at one place, one that is longer than two cells at more.
+constexpr float kPiecesPerCell = 0.5f;
+// Further out, or no number: says nothing about where the hair is.
+constexpr float kFarM = 1e4f;
 
 glm::vec3 any_across(const glm::vec3& axis) {
   const glm::vec3 other = std::abs(axis.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
@@ -34,8 +39,30 @@ glm::vec3 along_axes(const glm::vec3& v, const LightLatticeView& view) {
   return {glm::dot(v, view.axis[0]), glm::dot(v, view.axis[1]), glm::dot(v, view.axis[2])};
 }
 
+/// Spreads an amount over the eight cells round a place, in cells.
+inline void add_to_cells(const glm::vec3& place, const glm::ivec3& size, float amount, int32_t* sums) {
+  if (!(place.x >= 0.0f && place.y >= 0.0f && place.z >= 0.0f && place.x < static_cast<float>(size.x - 1) &&
+        place.y < static_cast<float>(size.y - 1) && place.z < static_cast<float>(size.z - 1)))
+    return;
+  const glm::ivec3 low(place);
+  const glm::vec3 f = place - glm::vec3(low);
+  const auto dy = static_cast<size_t>(size.x);
+  const size_t dz = dy * static_cast<size_t>(size.y);
+  int32_t* const cell = sums + (static_cast<size_t>(low.z) * dz + static_cast<size_t>(low.y) * dy + low.x);
+  const float y1 = amount * f.y;
+  const float y0 = amount - y1;
+  const float y1x1 = y1 * f.x;
+  const float y0x1 = y0 * f.x;
+  const float corner[4] = {y0 - y0x1, y0x1, y1 - y1x1, y1x1};
+  const size_t offset[4] = {0, 1, dy, dy + 1};
+  for (int k = 0; k < 4; ++k) {
+    const float far = corner[k] * f.z;
+    cell[offset[k]] += static_cast<int32_t>(corner[k] - far);
+    cell[offset[k] + dz] += static_cast<int32_t>(far);
+  }
+}
+
 bool is_number(const StrandPoint& p) {
-  constexpr float kFarM = 1e4f;
   return std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM;
 }
 
@@ -131,8 +158,7 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
   const glm::vec3 w = view_.axis[2] / view_.cell_m;
   const glm::vec3 origin = view_.origin_m / view_.cell_m;
   const float fade = 1.0f / std::max(strands.tip_fade, 1e-3f);
-  const size_t dy = size.x;
-  const size_t dz = dy * size.y;
+  const float pieces_per_m = kPiecesPerCell / view_.cell_m;
   std::atomic<uint32_t> next{0};
   workers.run([&](uint32_t worker) {
     if (worker >= summing) return;
@@ -145,38 +171,25 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
         const uint32_t first = points.first_point[strand];
         const uint32_t last = points.first_point[strand + 1] - 1;
         const float along_step = 1.0f / static_cast<float>(std::max(last - first, 1u));
+        // Somewhere within each segment, elsewhere for each strand: roots in a row leave no bands.
+        const float phase = unit_float(mix_u32(points.index[strand]));
         for (uint32_t i = first; i < last; ++i) {
           const StrandPoint& a = points.point[i];
           const StrandPoint& b = points.point[i + 1];
           const glm::vec3 step(b.x - a.x, b.y - a.y, b.z - a.z);
-          const glm::vec3 middle(a.x + 0.5f * step.x, a.y + 0.5f * step.y, a.z + 0.5f * step.z);
-          const float x = glm::dot(middle, u) - origin.x;
-          const float y = glm::dot(middle, v) - origin.y;
-          const float z = glm::dot(middle, w) - origin.z;
-          if (!(x >= 0.0f && y >= 0.0f && z >= 0.0f && x < static_cast<float>(size.x - 1) &&
-                y < static_cast<float>(size.y - 1) && z < static_cast<float>(size.z - 1)))
-            continue;
+          const float length_m = std::sqrt(glm::dot(step, step));
+          if (!(length_m < kFarM)) continue;
           const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
           const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
-          const float amount = per_m * std::sqrt(glm::dot(step, step)) * cover *
-                               (1.0f + (strands.tip_scale - 1.0f) * along * along);
-          const int cx = static_cast<int>(x);
-          const int cy = static_cast<int>(y);
-          const int cz = static_cast<int>(z);
-          const float fx = x - static_cast<float>(cx);
-          const float fy = y - static_cast<float>(cy);
-          const float fz = z - static_cast<float>(cz);
-          int32_t* const cell = sums + (static_cast<size_t>(cz) * dz + static_cast<size_t>(cy) * dy + cx);
-          const float y1 = amount * fy;
-          const float y0 = amount - y1;
-          const float y1x1 = y1 * fx;
-          const float y0x1 = y0 * fx;
-          const float corner[4] = {y0 - y0x1, y0x1, y1 - y1x1, y1x1};
-          const size_t offset[4] = {0, 1, dy, dy + 1};
-          for (int k = 0; k < 4; ++k) {
-            const float far = corner[k] * fz;
-            cell[offset[k]] += static_cast<int32_t>(corner[k] - far);
-            cell[offset[k] + dz] += static_cast<int32_t>(far);
+          const float amount = per_m * length_m * cover * (1.0f + (strands.tip_scale - 1.0f) * along * along);
+          const int pieces = std::clamp(static_cast<int>(length_m * pieces_per_m), 1, kMaxCells);
+          const float share = 1.0f / static_cast<float>(pieces);
+          for (int piece = 0; piece < pieces; ++piece) {
+            const float part = (static_cast<float>(piece) + phase) * share;
+            const glm::vec3 at(a.x + part * step.x, a.y + part * step.y, a.z + part * step.z);
+            const glm::vec3 cell(glm::dot(at, u) - origin.x, glm::dot(at, v) - origin.y,
+                                 glm::dot(at, w) - origin.z);
+            add_to_cells(cell, size, amount * share, sums);
           }
         }
       }

@@ -65,6 +65,19 @@ std::string html_escaped(std::string_view text) {
   return escaped;
 }
 
+/// RFC 4648.
+std::string base64_of(std::span<const std::byte> bytes) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t group = 0;
+    for (size_t k = 0; k < 3; ++k)
+      group = group << 8 | (i + k < bytes.size() ? std::to_integer<uint32_t>(bytes[i + k]) : 0);
+    for (size_t k = 0; k < 4; ++k) text += i + k <= bytes.size() ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
 HtmlPage::HtmlPage(std::string title) : title_(std::move(title)) {}
 
 void HtmlPage::element(std::string_view tag, std::string_view text) {
@@ -108,6 +121,14 @@ void HtmlPage::table(const HtmlTable& table) {
 
 void HtmlPage::figure(std::string_view svg, std::string_view caption) {
   body_ += fmt::format("<figure>\n{}<figcaption>{}</figcaption></figure>\n", svg, html_escaped(caption));
+}
+
+void HtmlPage::picture(std::span<const std::byte> jpeg, std::string_view caption) {
+  body_ += fmt::format(
+      "<figure>\n<img style=\"max-width:100%\" alt=\"\" "
+      "src=\"data:image/jpeg;base64,{}\"><figcaption>{}</figcaption>"
+      "</figure>\n",
+      base64_of(jpeg), html_escaped(caption));
 }
 
 std::string HtmlPage::text() const {

@@ -2,6 +2,8 @@
 // browser, without scripts and without anything from elsewhere. Any thread.
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +12,8 @@ namespace strandcast {
 
 /// The text with the five characters that mean something in HTML and SVG replaced.
 std::string html_escaped(std::string_view text);
+
+std::string base64_of(std::span<const std::byte> bytes);
 
 enum class HtmlMark { None, Good, Bad };
 
@@ -42,6 +46,9 @@ class HtmlPage {
   void table(const HtmlTable& table);
   /// `svg` as made by make_svg_plot(), not escaped.
   void figure(std::string_view svg, std::string_view caption);
+
+  /// A JPEG, kept in the page.
+  void picture(std::span<const std::byte> jpeg, std::string_view caption);
 
   /// The whole page.
   std::string text() const;

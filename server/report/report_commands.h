@@ -25,6 +25,7 @@ using AddReportCommand = void (*)(CLI::App& app, ReportAction& action);
 
 void add_work_precision_command(CLI::App& app, ReportAction& action);
 void add_recommend_command(CLI::App& app, ReportAction& action);
+void add_rendering_command(CLI::App& app, ReportAction& action);
 void add_scalp_command(CLI::App& app, ReportAction& action);
 void add_stability_command(CLI::App& app, ReportAction& action);
 void add_streaming_command(CLI::App& app, ReportAction& action);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/render/light_lattice.h"
+#include "common/render/passes/expand_pass.h"
 #include "common/render/render_scene.h"
 #include "common/render/scalp_cover.h"
 #include "common/render/tiles/strand_expansion.h"
@@ -59,10 +60,11 @@ struct TileState {
       : look(wanted),
         rest(usable(facts.rest)),
         vertex_count(asset.vertex_count),
+        is_finest(options.is_finest),
         workers(options.threads),
         set(options.set),
         expansion(asset, rest.mean_length_m),
-        lattice({rest.extent_m, LightLatticeDesc().cells,
+        lattice({rest.extent_m, options.light_cells,
                  facts.light_volume.has_skull && std::isfinite(facts.light_volume.skull.radius_m),
                  facts.light_volume.skull}),
         mesh(asset.head),
@@ -79,6 +81,7 @@ struct TileState {
   LookDesc look;
   RestFacts rest;
   uint32_t vertex_count;
+  bool is_finest;
   WorkerPool workers;
   simd::InstructionSet set;
   StrandExpansion expansion;
@@ -125,6 +128,10 @@ StrandDetail choose_detail(const TileState& state, const View& view, const DrawT
   };
   detail.segments_per_gap = at_most(gap_px / kSegmentPx, state.look.segments);
   detail.followers = at_most(static_cast<float>(max_followers) * width_px / kThinnestPx, max_followers);
+  if (state.is_finest) {
+    detail.segments_per_gap = kMaxSegmentsPerGap;
+    detail.followers = max_followers;
+  }
   detail.strand_count = state.expansion.strand_count(detail.followers);
   if (terms.strand_share < 1.0f) {
     // Followers of all triangles first, then key strands: any first so many of those cover the head evenly.

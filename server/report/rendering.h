@@ -1,0 +1,68 @@
+// The rendering report: every way to draw the same strands, its time and memory, and how far its picture is
+// from one that is drawn sixteen times as finely. Near and far, interleaved, so that a busy machine disturbs
+// all alike.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/pictures/picture_error.h"
+#include "common/render/render_device.h"
+#include "common/scene/scene_desc.h"
+#include "common/strands/posed_strands.h"
+
+namespace strandcast {
+
+struct RenderingReportDesc {
+  SceneDesc scene;
+  RenderSize size{1280, 720};
+  uint32_t rounds = 5;      // of each way; the median counts
+  double far_factor = 4.0;  // distance of the far view over that of the near one
+  std::string gl_device = "auto";
+  std::function<void(const std::string& doing)> on_progress;
+};
+
+/// A way to draw.
+struct RenderingRow {
+  std::string name;
+  std::string summary;
+  RendererKind kind = RendererKind::Tiles;
+  std::function<void(LookDesc&)> change;  // of the scene's look; empty: none
+};
+/// All of them; the first is the main path, what the others are held against.
+const std::vector<RenderingRow>& rendering_rows();
+
+struct RenderingMeasure {
+  double cpu_ms = 0.0;  // of the process, median
+  double wall_ms = 0.0;
+  double drawn_segments = 0.0;
+  PictureError error;  // in the hair's pixels
+  Image picture;
+};
+
+struct RenderingOutcome {
+  std::string name;
+  std::string summary;
+  std::string trouble;  // why it could not be drawn here; then nothing else is there
+  double memory_mb = 0.0;
+  RenderingMeasure near;
+  RenderingMeasure far;
+};
+
+struct RenderingReport {
+  std::string device_gl;  // empty: no OpenGL here
+  std::string device_tiles;
+  uint64_t strand_count = 0;
+  std::vector<RenderingOutcome> rows;
+};
+
+/// Of the scene's strands at rest.
+Result<RenderingReport> run_rendering(const RenderingReportDesc& desc);
+
+std::string rendering_csv(const RenderingReport& report);
+std::string rendering_text(const RenderingReport& report);
+/// Self-contained: tables, plots of error against time and a sheet of all pictures.
+std::string rendering_page(const RenderingReportDesc& desc, const RenderingReport& report);
+
+}  // namespace strandcast

@@ -1,0 +1,137 @@
+// Optical depths of the light lattice against what strands of known number and place give.
+#include "common/render/light_lattice.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "common/render/tiles/tile_frame.h"
+
+namespace strandcast {
+namespace {
+
+// Of the lattice: a strand takes out 0.6 of the light that falls on its width, and is met at pi / 4 on
+// average.
+constexpr double kOpacity = 0.6;
+constexpr double kCrossing = 0.785398;
+constexpr float kWidthM = 2e-4f;
+
+/// Horizontal strands of two points, spread evenly through a box of `side_m` about the origin.
+StrandPoints strands_in_box(uint32_t count, float side_m, uint32_t seed = 1) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> in(-0.5f * side_m, 0.5f * side_m);
+  StrandPoints points;
+  points.first_point.push_back(0);
+  constexpr uint32_t kPoints = 17;
+  for (uint32_t i = 0; i < count; ++i) {
+    const float y = in(random);
+    const float z = in(random);
+    for (uint32_t k = 0; k < kPoints; ++k)
+      points.point.push_back({side_m * (static_cast<float>(k) / (kPoints - 1) - 0.5f), y, z, 0, {}});
+    points.first_point.push_back(static_cast<uint32_t>(points.point.size()));
+    points.index.push_back(i);
+  }
+  return points;
+}
+
+/// Optical depth towards the key light at a point of the lattice's own axes: the nearest cell.
+double key_depth(const LightLatticeView& view, const glm::vec3& point) {
+  glm::ivec3 cell;
+  for (int a = 0; a < 3; ++a)
+    cell[a] = std::clamp(
+        static_cast<int>(std::lround((glm::dot(point, view.axis[a]) - view.origin_m[a]) / view.cell_m)), 0,
+        view.size[a] - 1);
+  return view.key[(static_cast<size_t>(cell.z) * view.size.y + cell.y) * view.size.x + cell.x] *
+         double{kLightDepthUnit};
+}
+double other_depth(const LightLatticeView& view, const glm::vec3& point, bool is_sky) {
+  glm::ivec3 cell;
+  for (int a = 0; a < 3; ++a)
+    cell[a] = std::clamp(
+        static_cast<int>(
+            std::lround(((glm::dot(point, view.axis[a]) - view.origin_m[a]) / view.cell_m - 0.5f) * 0.5f)),
+        0, view.half_size[a] - 1);
+  const uint32_t both =
+      view.others[(static_cast<size_t>(cell.z) * view.half_size.y + cell.y) * view.half_size.x + cell.x];
+  return (is_sky ? both >> 16 : both & 0xffffu) * double{kLightDepthUnit};
+}
+
+class LightLatticeTest : public testing::Test {
+ protected:
+  static constexpr float kSideM = 0.1f;
+  static constexpr uint32_t kCount = 20000;
+  /// Length per volume x width x opacity x mean crossing: depth per metre.
+  static constexpr double kPerM = kCount * 0.1 / (0.1 * 0.1 * 0.1) * kWidthM * kOpacity * kCrossing;
+  WorkerPool workers_{2};
+};
+
+TEST_F(LightLatticeTest, DepthGrowsAsTheHairThatIsPassed) {
+  const StrandPoints points = strands_in_box(kCount, kSideM);
+  LightLattice lattice({kSideM, 32, false, {}});
+  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
+  for (const float y : {0.03f, 0.0f, -0.03f}) {
+    const double passed_m = 0.5 * kSideM - y;
+    EXPECT_NEAR(key_depth(lattice.view(), {0, y, 0}), kPerM * passed_m, 0.04 * kPerM * kSideM) << y;
+    EXPECT_NEAR(other_depth(lattice.view(), {0, y, 0}, true), kPerM * passed_m, 0.06 * kPerM * kSideM) << y;
+  }
+  for (const float z : {0.03f, -0.03f})
+    EXPECT_NEAR(other_depth(lattice.view(), {0, 0, z}, false), kPerM * (0.5 * kSideM - z),
+                0.06 * kPerM * kSideM)
+        << z;
+}
+
+TEST_F(LightLatticeTest, NothingIsShadowedInFrontOfTheHair) {
+  const StrandPoints points = strands_in_box(2000, kSideM);
+  LightLattice lattice({kSideM, 32, false, {}});
+  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
+  EXPECT_NEAR(key_depth(lattice.view(), {0, 0, 0.06f}), 0.0, 0.02);
+  EXPECT_EQ(other_depth(lattice.view(), {0, 0, 0}, false), 0.0) << "there is no rim light";
+}
+
+TEST_F(LightLatticeTest, OrderAndThreadsDoNotShow) {
+  StrandPoints points = strands_in_box(3000, kSideM);
+  LightLattice one({kSideM, 48, false, {}});
+  WorkerPool alone(1);
+  const LightDirections lights{
+      glm::normalize(glm::vec3(0.3f, 1, 0.2f)), glm::normalize(glm::vec3(-1, 0.3f, 0.5f)), {0, 1, 0}, true};
+  one.build(points, {kWidthM, 0.3f, 0.2f}, lights, alone);
+  const glm::ivec3 size = one.view().size;
+  const std::vector<uint16_t> key(one.view().key, one.view().key + size_t{1} * size.x * size.y * size.z);
+  // Strands in another order, on more threads.
+  StrandPoints turned;
+  turned.first_point.push_back(0);
+  for (uint32_t strand = points.strand_count(); strand-- > 0;) {
+    for (uint32_t i = points.first_point[strand]; i < points.first_point[strand + 1]; ++i)
+      turned.point.push_back(points.point[i]);
+    turned.first_point.push_back(static_cast<uint32_t>(turned.point.size()));
+    turned.index.push_back(points.index[strand]);
+  }
+  WorkerPool many(4);
+  LightLattice other({kSideM, 48, false, {}});
+  other.build(turned, {kWidthM, 0.3f, 0.2f}, lights, many);
+  ASSERT_EQ(other.view().size, size);
+  EXPECT_TRUE(std::equal(key.begin(), key.end(), other.view().key));
+}
+
+TEST_F(LightLatticeTest, TheSkullIsOpaque) {
+  LightLattice lattice({0.2f, 64, true, {{0, 0, 0}, 0.08f}});
+  const StrandPoints points = strands_in_box(10, 0.2f);
+  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
+  EXPECT_GT(key_depth(lattice.view(), {0, -0.09f, 0}), 20.0);
+  EXPECT_LT(key_depth(lattice.view(), {0, 0.09f, 0}), 0.5);
+  EXPECT_LT(key_depth(lattice.view(), {0.09f, -0.09f, 0}), 0.5);
+}
+
+TEST_F(LightLatticeTest, StrandsThatAreNoNumbersCastNothing) {
+  StrandPoints points = strands_in_box(100, kSideM);
+  points.point[5].x = std::numeric_limits<float>::quiet_NaN();
+  points.point[40].y = 1e30f;
+  LightLattice lattice({kSideM, 32, false, {}});
+  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
+  EXPECT_LE(lattice.view().size.x, 160);
+  EXPECT_LT(key_depth(lattice.view(), {0, 0.04f, 0}), 1.0);
+}
+
+}  // namespace
+}  // namespace strandcast
