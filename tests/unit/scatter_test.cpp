@@ -189,6 +189,33 @@ TEST(Marschner, HalfOfTheGaussianKeepsTheLight) {
         << width;
 }
 
+// Two entries beside the caustic leave together: where Phi falls by w_c, they are dh = 2 sqrt(2 w_c /
+// |Phi''|) apart.
+TEST(Marschner, TheWidthOfTheCausticFollowsFromItsCurvature) {
+  SmoothFibre fibre;
+  fibre.caustic.max_width_h = 10.0;
+  const Caustic caustic = trt_caustic(kIndex);
+  constexpr double kStep = 1e-4;
+  const auto exit = [](double h) { return wrapped(cubic_exit(2, kIndex, std::asin(h))); };
+  const double bend =
+      (exit(caustic.h + kStep) - 2.0 * exit(caustic.h) + exit(caustic.h - kStep)) / (kStep * kStep);
+  const double width_h = 2.0 * std::sqrt(2.0 * fibre.caustic.width / std::abs(bend));
+  EXPECT_NEAR(azimuthal_trt(fibre, 0.0, caustic.phi),
+              fibre.caustic.power * lobe_shares({kIndex, 0.0, caustic.h, 0.0})[2] * width_h *
+                  (gaussian(fibre.caustic.width, 0.0) + gaussian(fibre.caustic.width, 2.0 * caustic.phi)),
+              1e-5);
+}
+
+TEST(Marschner, ShiftsAndWidthsAreInTheRatiosOfThePaper) {
+  const auto shapes = lobe_shapes(0.2, -0.1);
+  EXPECT_EQ(shapes[0].shift, -0.1);
+  EXPECT_NEAR(shapes[1].shift, 0.05, 1e-12);
+  EXPECT_NEAR(shapes[2].shift, 0.15, 1e-12);
+  EXPECT_EQ(shapes[0].width, 0.2);
+  EXPECT_NEAR(shapes[1].width, 0.1, 1e-12);
+  EXPECT_NEAR(shapes[2].width, 0.4, 1e-12);
+}
+
 TEST(Marschner, AnEllipticFibreHasAnotherIndexAcrossEachOfItsAxes) {
   EXPECT_NEAR(elliptic_index(kIndex, 1.0, 0.7), kIndex, 1e-12);
   EXPECT_NEAR(elliptic_index(kIndex, 0.9, 0.0), 2.0 * 0.55 * 0.81 + 0.45, 1e-12);
