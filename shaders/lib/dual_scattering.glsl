@@ -33,14 +33,14 @@ BackScatter back_scatter(FibreAverages means) {
   vec3 f2 = means.forward * means.forward;
   vec3 b = means.back;
   vec3 b3 = b * b * b;
-  vec3 kept = max(1.0 - f2, 1e-6);
+  vec3 kept = max(vec3(1.0) - f2, vec3(1e-6));
   vec3 ff = 2.0 * means.forward_width * means.forward_width;
   vec3 bb = means.back_width * means.back_width;
   BackScatter back;
   back.albedo = b * f2 / kept + b3 * f2 / (kept * kept * kept);
-  back.shift = means.back_shift * (1.0 - 2.0 * b * b / (kept * kept)) +
+  back.shift = means.back_shift * (vec3(1.0) - 2.0 * b * b / (kept * kept)) +
                means.forward_shift * (2.0 * kept * kept + 4.0 * f2 * b * b) / (kept * kept * kept);
-  back.width = (1.0 + kBackDensity * f2) * (b * sqrt(ff + bb) + b3 * sqrt(ff + 3.0 * bb)) /
+  back.width = (vec3(1.0) + kBackDensity * f2) * (b * sqrt(ff + bb) + b3 * sqrt(ff + 3.0 * bb)) /
                (b + b3 * (2.0 * means.forward_width + 3.0 * means.back_width));
   return back;
 }
@@ -55,7 +55,7 @@ vec3 back_lobe(BackScatter back, float theta_half, float cos_diff, vec3 spread) 
 }
 
 // Mean share that gets through a crowd.
-vec3 mean_transmittance(vec3 forward, float crossed) { return exp(-crossed * (1.0 - forward)); }
+vec3 mean_transmittance(vec3 forward, float crossed) { return exp(-crossed * (vec3(1.0) - forward)); }
 
 // What goes to the eye of a unit of light in front of the hair. single: what the strand scatters of a unit at itself;
 // crossed: mean number of strands on the light's way.

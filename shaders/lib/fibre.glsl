@@ -73,13 +73,17 @@ ScatterAngles scatter_angles(vec3 tangent, vec3 to_light, vec3 to_eye) {
 // 0.3; common/scene/hair_color.h has the fit for all).
 const float kColorFit = 5.8884;
 const float kDarkestColor = 1e-3;
-
-vec3 fibre_absorption(vec3 color) {
-  vec3 root = log(clamp(color, kDarkestColor, 1.0)) / kColorFit;
-  return root * root;
-}
+const float kLogOfTwo = 0.69314718056;
 
 float squared(float x) { return x * x; }
+
+float channel_absorption(float color) {
+  return squared(log2(clamp(color, kDarkestColor, 1.0)) * (kLogOfTwo / kColorFit));
+}
+
+vec3 fibre_absorption(vec3 color) {
+  return vec3(channel_absorption(color.x), channel_absorption(color.y), channel_absorption(color.z));
+}
 
 // Reflectance of hair for unpolarised light.
 float hair_fresnel(float cos_incidence) {

@@ -76,7 +76,7 @@ RoughLobes rough_azimuthal(float phi, float theta_out, vec3 absorption) {
     sum.tt += weight * trimmed_logistic(phi - (2.0 * refracted - 2.0 * gamma + kPi)) * share;
     share = share * pass * fresnel;
     sum.trt += weight * trimmed_logistic(phi - (4.0 * refracted - 2.0 * gamma)) * share;
-    sum.rest += (weight / (2.0 * kPi)) * share * pass * fresnel / max(1.0 - pass * fresnel, 1e-4);
+    sum.rest += (weight / (2.0 * kPi)) * share * pass * fresnel / max(vec3(1.0) - pass * fresnel, vec3(1e-4));
   }
   return sum;
 }
