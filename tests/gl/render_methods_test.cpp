@@ -188,6 +188,16 @@ TEST_F(RenderMethods, AsASurfaceTheLitSideIsBrighterThanWithStrandsAlone) {
   EXPECT_GT(contrast("isosurface"), contrast("volume"));
 }
 
+// Seen from the side that the light does not reach: what gets there went through all of the hair.
+TEST_F(RenderMethods, DualScatteringTakesLightOnItsWayThroughTheHair) {
+  LookDesc look = look_of("marschner", "dual", "brown");
+  look.ambient = 0.0f;
+  look.light_direction = {-0.55f, -0.3f, 0.35f};
+  const double lit = mean_luminance(draw(look));
+  look.light_direction = {0.55f, -0.3f, -0.35f};
+  EXPECT_LT(mean_luminance(draw(look)), 0.5 * lit);
+}
+
 TEST_F(RenderMethods, StrandsWithoutLengthDrawAFinitePicture) {
   for (glm::vec3& point : asset_.rest_position_m) point = glm::vec3(0.0f, 0.12f, 0.0f);
   const auto expect_finite = [&](std::string_view shading, std::string_view scattering) {
