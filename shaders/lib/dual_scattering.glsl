@@ -1,9 +1,10 @@
-// Dual scattering (Zinke et al. 2008): light that other strands let through or scatter on is brighter and wider than the
-// direct light, and what lies around a strand gives some of it back. Who includes this has, in front of it, what the tables
-// of common/render/scatter/lobe_tables.h hold of a fibre:
+// Dual scattering (Zinke et al. 2008): light that other strands let through or scatter on is brighter and
+// wider than the direct light, and what lies around a strand gives some of it back. Who includes this has, in
+// front of it, what the tables of common/render/scatter/lobe_tables.h hold of a fibre:
 //   vec4 table_averages(float cos_inclination, float root_absorption, uint layer)
-// Deviation: a strand takes part of the direct light according to how likely it is that none was crossed, where the paper
-// has either all or nothing; and behind a mean of n strands, which chance spreads, the mean of a_f^n is exp(-n (1 - a_f)).
+// Deviation: a strand takes part of the direct light according to how likely it is that none was crossed,
+// where the paper has either all or nothing; and behind a mean of n strands, which chance spreads, the mean
+// of a_f^n is exp(-n (1 - a_f)).
 #pragma once
 #include "lib/fibre.glsl"
 
@@ -57,8 +58,8 @@ vec3 back_lobe(BackScatter back, float theta_half, float cos_diff, vec3 spread) 
 // Mean share that gets through a crowd.
 vec3 mean_transmittance(vec3 forward, float crossed) { return exp(-crossed * (vec3(1.0) - forward)); }
 
-// What goes to the eye of a unit of light in front of the hair. single: what the strand scatters of a unit at itself;
-// crossed: mean number of strands on the light's way.
+// What goes to the eye of a unit of light in front of the hair. single: what the strand scatters of a unit at
+// itself; crossed: mean number of strands on the light's way.
 vec3 dual_scattering(ScatterAngles angles, Fibre fibre, vec3 single, float crossed) {
   vec3 root = sqrt(fibre.absorption);
   float cos_in = max(cos(angles.theta_in), 0.0);

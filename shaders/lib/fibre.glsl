@@ -1,7 +1,8 @@
 // A strand as light finds it, and what all models of shading share. A model is a function
 //   vec3 scatter_NAME(vec3 tangent, vec3 to_light, vec3 to_eye, Fibre fibre)
-// in a file of its own: what of a unit of light goes to the eye. Directions are unit vectors and point away from the
-// strand, `tangent` from root to tip. Each has its ground truth in double precision in common/render/scatter.
+// in a file of its own: what of a unit of light goes to the eye. Directions are unit vectors and point away
+// from the strand, `tangent` from root to tip. Each has its ground truth in double precision in
+// common/render/scatter.
 #pragma once
 #include "lib/select.glsl"
 
@@ -69,8 +70,8 @@ ScatterAngles scatter_angles(vec3 tangent, vec3 to_light, vec3 to_eye) {
   return angles;
 }
 
-// Absorption per radius with which hair as a whole has this colour (Chiang et al. 2016, equation 9 at azimuthal roughness
-// 0.3; common/scene/hair_color.h has the fit for all).
+// Absorption per radius with which hair as a whole has this colour (Chiang et al. 2016, equation 9 at
+// azimuthal roughness 0.3; common/scene/hair_color.h has the fit for all).
 const float kColorFit = 5.8884;
 const float kDarkestColor = 1e-3;
 const float kLogOfTwo = 0.69314718056;

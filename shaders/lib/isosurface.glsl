@@ -1,5 +1,5 @@
-// Diffuse light of hair as a surface (Petrovic et al. 2005): the normal is that of the surface on which the density of hair
-// is constant, where Kajiya and Kay's would be any across the strand.
+// Diffuse light of hair as a surface (Petrovic et al. 2005): the normal is that of the surface on which the
+// density of hair is constant, where Kajiya and Kay's would be any across the strand.
 #pragma once
 #include "lib/select.glsl"
 

@@ -1,6 +1,6 @@
-// Chiang et al. 2016 (with d'Eon et al. 2011 along the fibre): the rough fibre that conserves energy, seen from so far that
-// all entries into it are one, and the reference for the other models. The formulae are those of
-// common/render/scatter/chiang.h; the mean over the fibre has few points, which roughness hides.
+// Chiang et al. 2016 (with d'Eon et al. 2011 along the fibre): the rough fibre that conserves energy, seen
+// from so far that all entries into it are one, and the reference for the other models. The formulae are
+// those of common/render/scatter/chiang.h; the mean over the fibre has few points, which roughness hides.
 #pragma once
 #include "lib/fibre.glsl"
 
@@ -13,16 +13,13 @@ const vec3 kChiangWeights = vec3(2.0, 0.5, 2.5);
 // exp(-x) I0(x), x >= 0 (Abramowitz and Stegun 9.8.1 and 9.8.2; error below 2e-7).
 float scaled_bessel_0(float x) {
   float t = squared(min(x, 3.75) / 3.75);
-  float near = exp(-min(x, 3.75)) *
-               (1.0 + t * (3.5156229 + t * (3.0899424 + t * (1.2067492 + t * (0.2659732 + t * (0.0360768 + t * 0.0045813))))));
+  float near = 0.2659732 + t * (0.0360768 + t * 0.0045813);
+  near = 1.0 + t * (3.5156229 + t * (3.0899424 + t * (1.2067492 + t * near)));
+  near *= exp(-min(x, 3.75));
   float s = 3.75 / max(x, 3.75);
-  float far = (0.39894228 +
-               s * (0.01328592 +
-                    s * (0.00225319 +
-                         s * (-0.00157565 +
-                              s * (0.00916281 +
-                                   s * (-0.02057706 + s * (0.02635537 + s * (-0.01647633 + s * 0.00392377)))))))) /
-              sqrt(max(x, 3.75));
+  float far = -0.02057706 + s * (0.02635537 + s * (-0.01647633 + s * 0.00392377));
+  far = 0.00225319 + s * (-0.00157565 + s * (0.00916281 + s * far));
+  far = (0.39894228 + s * (0.01328592 + s * far)) / sqrt(max(x, 3.75));
   return select(x < 3.75, near, far);
 }
 
@@ -30,7 +27,8 @@ float scaled_bessel_0(float x) {
 float rough_longitudinal(float variance, float theta_in, float theta_out) {
   float cosines = cos(theta_in) * cos(theta_out);
   // The cosine of an inclination that the scales turn past the fibre's end counts as positive.
-  float half_way = select(cosines < 0.0, cos(0.5 * (theta_in - theta_out)), sin(0.5 * (theta_in + theta_out)));
+  float half_way =
+      select(cosines < 0.0, cos(0.5 * (theta_in - theta_out)), sin(0.5 * (theta_in + theta_out)));
   return scaled_bessel_0(abs(cosines) / variance) * exp(-2.0 * half_way * half_way / variance) /
          (variance * (1.0 - exp(-2.0 / variance)));
 }
@@ -43,7 +41,8 @@ float trimmed_logistic(float angle) {
   return decay / (kAzimuthScale * squared(1.0 + decay)) * ((1.0 + edge) / (1.0 - edge));
 }
 
-// Azimuthal parts of R, TT, TRT and the rest: the means over the fibre of A_p times the distribution about its exit.
+// Azimuthal parts of R, TT, TRT and the rest: the means over the fibre of A_p times the distribution about
+// its exit.
 struct RoughLobes {
   vec3 r;
   vec3 tt;

@@ -1,5 +1,5 @@
-// Kajiya and Kay 1989: a thin cylinder that is diffuse and reflects into a cone; with two highlights as in TressFX 4.1,
-// the white one turned to the root, the one in the hair's colour to the tip.
+// Kajiya and Kay 1989: a thin cylinder that is diffuse and reflects into a cone; with two highlights as in
+// TressFX 4.1, the white one turned to the root, the one in the hair's colour to the tip.
 #pragma once
 #include "lib/fibre.glsl"
 

@@ -1,10 +1,10 @@
-// Karis 2016 (Physically Based Hair Shading in Unreal): closed fits to R, TT and TRT of a smooth fibre, and Gaussians in the
-// sum of the sines. No cosine and no difference angle: the fit has them.
+// Karis 2016 (Physically Based Hair Shading in Unreal): closed fits to R, TT and TRT of a smooth fibre, and
+// Gaussians in the sum of the sines. No cosine and no difference angle: the fit has them.
 #pragma once
 #include "lib/fibre.glsl"
 
-// The lobes of the fit are brighter or darker than what they stand for by little; weights bring all models to one
-// brightness on the built-in scene.
+// The lobes of the fit are brighter or darker than what they stand for by little; weights bring all models to
+// one brightness on the built-in scene.
 const vec3 kKarisWeights = vec3(2.0, 0.5, 2.5);
 
 float schlick_fresnel(float cosine) {

@@ -1,5 +1,5 @@
-// Marschner et al. 2003 from tables (common/render/scatter/lobe_tables.h): S = sum over p of M_p N_p / cos^2 theta_d, times
-// the cosine of the light's inclination. Who includes this has, in front of it,
+// Marschner et al. 2003 from tables (common/render/scatter/lobe_tables.h): S = sum over p of M_p N_p / cos^2
+// theta_d, times the cosine of the light's inclination. Who includes this has, in front of it,
 //   vec3 table_longitudinal(float theta_half)                                        M of R, TT, TRT
 //   vec3 table_azimuthal(float phi, float cos_diff, float root_absorption)           N of R, TT, TRT
 #pragma once

@@ -1,5 +1,6 @@
-// Sadeghi et al. 2010, the artist's lobes: R, TT and TRT of simple shape, with the longitudinal shifts and widths of
-// Marschner et al. 2003, over Kajiya and Kay's diffuse term. Without the cosine of the inclination, as it was tuned.
+// Sadeghi et al. 2010, the artist's lobes: R, TT and TRT of simple shape, with the longitudinal shifts and
+// widths of Marschner et al. 2003, over Kajiya and Kay's diffuse term. Without the cosine of the inclination,
+// as it was tuned.
 #pragma once
 #include "lib/fibre.glsl"
 
@@ -12,8 +13,8 @@ const float kLobeR = 0.07;
 const float kLobeTT = 0.25;
 const float kLobeTRT = 1.10;
 
-// Strengths (R, TT, TRT) of the three lobes, longitudinal times azimuthal part over cos^2 of the difference angle. The
-// glint's azimuth is 30..45 degrees, random per strand.
+// Strengths (R, TT, TRT) of the three lobes, longitudinal times azimuthal part over cos^2 of the difference
+// angle. The glint's azimuth is 30..45 degrees, random per strand.
 vec3 sadeghi_lobes(ScatterAngles angles, Fibre fibre) {
   vec3 longitudinal = vec3(unit_bell(fibre.width, angles.theta_half - fibre.shift),
                            unit_bell(0.5 * fibre.width, angles.theta_half + 0.5 * fibre.shift),

@@ -1,5 +1,6 @@
-// Lookups of the tables that are made at load (common/render/scatter/lobe_tables.h), for lib/scatter_marschner.glsl and
-// lib/dual_scattering.glsl. A sampler that a variant does not use is not there.
+// Lookups of the tables that are made at load (common/render/scatter/lobe_tables.h), for
+// lib/scatter_marschner.glsl and lib/dual_scattering.glsl. A sampler that a variant does not use is not
+// there.
 #include "lib/fibre.glsl"
 #include "shared/lobe_tables.h"
 

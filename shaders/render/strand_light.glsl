@@ -1,5 +1,5 @@
-// Light that a point of a strand sends to the eye, by the methods that the look names (common/scene/render_methods.h). For
-// the vertex stage or the fragment stage, whichever computes it.
+// Light that a point of a strand sends to the eye, by the methods that the look names
+// (common/scene/render_methods.h). For the vertex stage or the fragment stage, whichever computes it.
 #pragma variant SHADING 0 1 2 3 4
 #pragma variant SCATTERING 0 1 2 3
 #include "lib/fibre.glsl"
@@ -13,7 +13,7 @@ uniform vec3 u_tip_color;
 uniform vec3 u_lobe_weights;      // of R, TT and TRT
 uniform float u_highlight_width;  // of R in the half angle, rad
 uniform float u_highlight_shift;  // likewise
-uniform float u_tilt_spread;      // strands do not lie perfectly in their direction: the cuticle's tilt seems to vary, rad
+uniform float u_tilt_spread;      // the cuticle's tilt seems to vary, for strands do not lie perfectly, rad
 
 #include "render/lobe_tables.glsl"
 #include "lib/scatter_sadeghi.glsl"
@@ -82,16 +82,19 @@ uniform sampler3D u_density;      // strands crossed per metre, in the cells of 
 uniform float u_min_slope;        // change of it from cell to cell that makes a surface, per metre
 
 const float kSurfaceWrap = 0.30;
-// Of the diffuse term, whose mean over all directions is pi / 4 where Lambert's is 1 / 4 of the sphere.
+// Weight of the diffuse term, which is as bright as that of single strands by it.
 const float kSurfaceDiffuse = 1.10;
+
+float density_at(vec3 at) { return texture(u_density, at).r; }
 
 vec3 hair_normal(vec3 point_m, vec3 fallback) {
   vec3 at = (point_m - u_volume_origin_m) * u_volume_from_m;
   vec3 cell = 1.0 / vec3(textureSize(u_density, 0));
-  vec3 low = vec3(texture(u_density, at - vec3(cell.x, 0.0, 0.0)).r, texture(u_density, at - vec3(0.0, cell.y, 0.0)).r,
-                  texture(u_density, at - vec3(0.0, 0.0, cell.z)).r);
-  vec3 high = vec3(texture(u_density, at + vec3(cell.x, 0.0, 0.0)).r, texture(u_density, at + vec3(0.0, cell.y, 0.0)).r,
-                   texture(u_density, at + vec3(0.0, 0.0, cell.z)).r);
+  vec3 x = vec3(cell.x, 0.0, 0.0);
+  vec3 y = vec3(0.0, cell.y, 0.0);
+  vec3 z = vec3(0.0, 0.0, cell.z);
+  vec3 low = vec3(density_at(at - x), density_at(at - y), density_at(at - z));
+  vec3 high = vec3(density_at(at + x), density_at(at + y), density_at(at + z));
   return density_normal(0.5 * (high - low), u_min_slope, fallback);
 }
 #endif
