@@ -12,11 +12,15 @@ std::unique_ptr<RenderPass> make_upload_pass(RenderScene& scene);
 std::unique_ptr<RenderPass> make_clear_pass(RenderScene& scene);
 std::unique_ptr<RenderPass> make_head_pass(RenderScene& scene);
 std::unique_ptr<RenderPass> make_resolve_pass(RenderScene& scene);
+std::unique_ptr<RenderPass> make_lobe_table_pass(RenderScene& scene);
+std::unique_ptr<RenderPass> make_scatter_table_pass(RenderScene& scene);
 
 const RenderPath& segment_path() {
   static const RenderPath path{"segments", "camera-facing quads, depth test, a fixed pattern of coverage",
                                [](RenderScene& scene, RenderPassList& passes) {
                                  auto& expanded = passes.keep(make_expanded_strands(scene));
+                                 passes.add(make_lobe_table_pass(scene));
+                                 passes.add(make_scatter_table_pass(scene));
                                  passes.add(make_light_pass(scene));
                                  passes.add(make_upload_pass(scene));
                                  passes.add(make_clear_pass(scene));

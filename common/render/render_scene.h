@@ -9,6 +9,7 @@
 #include "common/render/passes/light_texture.h"
 #include "common/render/passes/picture_target.h"
 #include "common/render/passes/strand_buffers.h"
+#include "common/render/passes/table_textures.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
 #include "common/strands/scene_asset.h"
@@ -37,6 +38,9 @@ struct RenderScene {
   gl::Resource strands{"posed strands"};  // from outside
   KeyStrands key_strands;
   LightTexture light;
+  DensityTexture density;
+  LobeTables lobe_tables;
+  ScatterTables scatter_tables;
   SceneTarget scene;
   PictureTarget picture;
 };

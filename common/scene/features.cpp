@@ -1,5 +1,7 @@
 #include "common/scene/features.h"
 
+#include <fmt/format.h>
+
 #include <array>
 
 namespace strandcast {
@@ -60,6 +62,12 @@ Fact decide_head_mesh(const SceneAsset& asset) {
   return {false, "the scene has no head mesh (head.is_visible)"};
 }
 
+/// A fact that follows from which method of one kind is drawn.
+Fact decide_method(const Fact& has_strands, const char* kind, const std::string& chosen, bool is_it) {
+  if (!has_strands.value) return has_strands;
+  return {is_it, fmt::format("look.methods.{} is {}", kind, chosen)};
+}
+
 struct FactRow {
   const char* name;
   bool SceneFeatures::*member;
@@ -94,15 +102,37 @@ std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& f
 }
 
 PictureFeatures analyse_picture(const SceneAsset& asset, const LookDesc& look) {
-  return {decide_strands(asset), decide_followers(asset, look), decide_head_mesh(asset)};
+  PictureFeatures features;
+  features.has_strands = decide_strands(asset);
+  features.has_followers = decide_followers(asset, look);
+  features.has_head_mesh = decide_head_mesh(asset);
+  const RenderMethodsDesc& methods = look.methods;
+  features.shading = shading_models().at(methods.shading);
+  features.scattering = scattering_models().at(methods.scattering);
+  const auto decide = [&](const char* kind, const std::string& chosen, bool is_it) {
+    return decide_method(features.has_strands, kind, chosen, is_it);
+  };
+  features.has_lobe_tables = decide("shading", methods.shading, features.shading == ShadingModel::Marschner);
+  features.has_scatter_tables =
+      decide("scattering", methods.scattering, features.scattering == ScatteringModel::Dual);
+  features.has_density_normals =
+      decide("scattering", methods.scattering, features.scattering == ScatteringModel::Isosurface);
+  features.is_shaded_per_fragment = decide("evaluation", methods.evaluation,
+                                           shading_places().at(methods.evaluation) == ShadingPlace::Fragment);
+  return features;
 }
 
 std::vector<FeatureReason> explain(const PictureFeatures& features) {
   const auto row = [](const char* name, const Fact& fact) {
     return FeatureReason{name, fact.value, fact.reason};
   };
-  return {row("has_strands", features.has_strands), row("has_followers", features.has_followers),
-          row("has_head_mesh", features.has_head_mesh)};
+  return {row("has_strands", features.has_strands),
+          row("has_followers", features.has_followers),
+          row("has_head_mesh", features.has_head_mesh),
+          row("has_lobe_tables", features.has_lobe_tables),
+          row("has_scatter_tables", features.has_scatter_tables),
+          row("has_density_normals", features.has_density_normals),
+          row("is_shaded_per_fragment", features.is_shaded_per_fragment)};
 }
 
 }  // namespace strandcast

@@ -41,14 +41,21 @@ std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& f
 /// A fact's value with its cause.
 struct Fact {
   bool value = false;
-  const char* reason = "";
+  std::string reason;
 };
 
-/// What of a picture there is to draw: for the server's frames and for viewers, who have no scene file.
+/// What of a picture there is to draw, and what the methods that the look names need for it: for the server's
+/// frames and for viewers, who have no scene file.
 struct PictureFeatures {
   Fact has_strands;
   Fact has_followers;
   Fact has_head_mesh;
+  Fact has_lobe_tables;      // of a smooth fibre, by angles and absorption
+  Fact has_scatter_tables;   // what such fibres scatter forward and back, by inclination and absorption
+  Fact has_density_normals;  // of the volume that the strands fill
+  Fact is_shaded_per_fragment;
+  ShadingModel shading = ShadingModel::Sadeghi;
+  ScatteringModel scattering = ScatteringModel::Volume;
 };
 
 PictureFeatures analyse_picture(const SceneAsset& asset, const LookDesc& look);

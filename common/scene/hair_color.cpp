@@ -19,8 +19,12 @@ constexpr std::array<HairColorPreset, 6> kPresets{{
 
 const glm::dvec3 kEumelaninAbsorption(0.419, 0.697, 1.37);
 const glm::dvec3 kPheomelaninAbsorption(0.187, 0.4, 1.05);
-// Azimuthal roughness that the fit between absorption and colour is taken at.
-constexpr double kRoughness = 0.3;
+
+// Between the root of the absorption and the logarithm of the colour (Chiang et al. 2016, equation 9).
+constexpr double color_fit(double b) {
+  const double b2 = b * b;
+  return 5.969 - 0.215 * b + 2.532 * b2 - 10.73 * b2 * b + 5.574 * b2 * b2 + 0.245 * b2 * b2 * b;
+}
 
 }  // namespace
 
@@ -34,14 +38,21 @@ bool is_hair_color(std::string_view name) {
                      [&](const HairColorPreset& preset) { return preset.name == name; });
 }
 
+glm::dvec3 absorption_of_melanin(double eumelanin, double pheomelanin) {
+  return kEumelaninAbsorption * eumelanin + kPheomelaninAbsorption * pheomelanin;
+}
+
+glm::dvec3 absorption_of_color(const glm::dvec3& color, double roughness) {
+  const glm::dvec3 root = glm::log(color) / color_fit(roughness);
+  return root * root;
+}
+
+glm::dvec3 color_of_absorption(const glm::dvec3& absorption, double roughness) {
+  return glm::exp(-color_fit(roughness) * glm::sqrt(glm::max(absorption, 0.0)));
+}
+
 glm::vec3 color_of_melanin(float eumelanin, float pheomelanin) {
-  constexpr double b = kRoughness;
-  constexpr double b2 = b * b;
-  constexpr double kFit =
-      5.969 - 0.215 * b + 2.532 * b2 - 10.73 * b2 * b + 5.574 * b2 * b2 + 0.245 * b2 * b2 * b;
-  const glm::dvec3 absorption =
-      kEumelaninAbsorption * double{eumelanin} + kPheomelaninAbsorption * double{pheomelanin};
-  return glm::vec3(glm::exp(-kFit * glm::sqrt(glm::max(absorption, 0.0))));
+  return glm::vec3(color_of_absorption(absorption_of_melanin(eumelanin, pheomelanin)));
 }
 
 HairColors colors_of(const LookDesc& look) {

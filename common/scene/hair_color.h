@@ -28,8 +28,15 @@ bool is_hair_color(std::string_view name);
 inline constexpr const char* kHairColorSentence =
     "must be custom, melanin, black, brown, blond, red, grey or dyed";
 
-/// Absorption of eumelanin and pheomelanin per strand radius (Chiang et al. 2016, section 4.2), as the colour
-/// that the hair as a whole has (their equation 9, inverted). Concentrations, >= 0.
+/// Absorption per strand radius of concentrations >= 0 (Chiang et al. 2016, section 4.2).
+glm::dvec3 absorption_of_melanin(double eumelanin, double pheomelanin);
+/// Absorption per strand radius with which hair as a whole has a colour, and back (their equation 9, a fit).
+/// `roughness`: azimuthal, 0..1. Components of the colour within (0, 1].
+inline constexpr double kUsualRoughness = 0.3;
+glm::dvec3 absorption_of_color(const glm::dvec3& color, double roughness = kUsualRoughness);
+glm::dvec3 color_of_absorption(const glm::dvec3& absorption, double roughness = kUsualRoughness);
+
+/// The colour that hair with these concentrations has as a whole.
 glm::vec3 color_of_melanin(float eumelanin, float pheomelanin);
 
 /// What `look` asks for. An unknown name counts as "custom".

@@ -14,6 +14,7 @@
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
 #include "common/math/pose.h"
+#include "common/scene/render_methods.h"
 
 namespace strandcast {
 
@@ -145,6 +146,7 @@ struct LookDesc {
   float exposure = 1.0f;
   glm::vec3 background{0.11f, 0.12f, 0.135f};
   glm::vec3 skin_color{0.55f, 0.38f, 0.29f};
+  RenderMethodsDesc methods;
 
   bool operator==(const LookDesc&) const = default;
 };

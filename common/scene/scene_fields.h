@@ -144,6 +144,17 @@ void visit_shading(Visitor& v, HairShadingDesc& shading) {
 }
 
 template <class Visitor>
+void visit_methods(Visitor& v, RenderMethodsDesc& methods) {
+  const auto method = [&](const char* name, std::string& chosen, const auto& table) {
+    v.text(name, chosen, kMaxNameBytes);
+    v.require(name, table.has(chosen), table.refusal());
+  };
+  method("shading", methods.shading, shading_models());
+  method("scattering", methods.scattering, scattering_models());
+  method("evaluation", methods.evaluation, shading_places());
+}
+
+template <class Visitor>
 void visit_look(Visitor& v, LookDesc& look) {
   v.text("hair_color", look.hair_color, kMaxNameBytes);
   v.require("hair_color", is_hair_color(look.hair_color), kHairColorSentence);
@@ -168,6 +179,7 @@ void visit_look(Visitor& v, LookDesc& look) {
   v.number("exposure", look.exposure, kExposure);
   v.color("background", look.background, kFraction);
   v.color("skin_color", look.skin_color, kFraction);
+  v.group("methods", [&] { visit_methods(v, look.methods); });
 }
 
 template <class Visitor>

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "common/base/file.h"
 #include "common/gl/program.h"
@@ -121,7 +122,8 @@ void add_textures(uint32_t program, Used& used) {
 
 class LimitsInUse : public GlTest {
  protected:
-  /// Links every program with the first and with the last value of all its variants.
+  /// Links every program with the first and with the last value of all its variants, and with every other
+  /// value of one of them among these.
   Used measure() {
     const ShaderLibrary library;
     std::map<std::string, std::vector<std::string>> programs;  // stages of one name belong together
@@ -130,6 +132,7 @@ class LimitsInUse : public GlTest {
     Used used;
     for (const auto& [name, stages] : programs) {
       Variant first, last;
+      std::map<std::string, std::vector<int>> values;
       for (const std::string& stage : stages) {
         const auto flat = library.flatten(stage);
         if (!flat) {
@@ -137,11 +140,19 @@ class LimitsInUse : public GlTest {
           continue;
         }
         for (const VariantAxis& axis : flat->axes) {
+          values[axis.name] = axis.values;
           first[axis.name] = axis.values.front();
           last[axis.name] = axis.values.back();
         }
       }
-      for (const Variant& variant : {first, last}) add(library, stages, variant, used);
+      std::set<Variant> variants{first, last};
+      for (const auto& [axis, all] : values)
+        for (const int value : all)
+          for (Variant variant : {first, last}) {
+            variant[axis] = value;
+            variants.insert(variant);
+          }
+      for (const Variant& variant : variants) add(library, stages, variant, used);
     }
     return used;
   }

@@ -9,19 +9,11 @@ namespace strandcast::reference {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegree = kPi / 180.0;
 constexpr double kWaves = 2.5;
 constexpr double kWaveShare = 0.35;
 
 double random(uint32_t follower, uint32_t salt) {
   return unit_float(mix_u32(follower ^ salt));
-}
-
-double gaussian(double sigma, double x) {
-  return std::exp(-x * x / (2.0 * sigma * sigma)) / (sigma * std::sqrt(2.0 * kPi));
-}
-double bell(double sigma, double x) {
-  return std::exp(-x * x / (2.0 * sigma * sigma));
 }
 
 }  // namespace
@@ -78,42 +70,6 @@ double line_coverage(double width_px, double distance_px) {
   const double low = std::max(distance_px - 0.5, -width_px / 2.0);
   const double high = std::min(distance_px + 0.5, width_px / 2.0);
   return std::max(0.0, high - low);
-}
-
-double kajiya_kay_diffuse(const glm::dvec3& tangent, const glm::dvec3& to_light) {
-  return glm::length(glm::cross(tangent, to_light));
-}
-
-double kajiya_kay_specular(const glm::dvec3& tangent, const glm::dvec3& to_light, const glm::dvec3& to_eye,
-                           double power) {
-  const double cosine =
-      glm::length(glm::cross(tangent, to_light)) * glm::length(glm::cross(tangent, to_eye)) -
-      glm::dot(tangent, to_light) * glm::dot(tangent, to_eye);
-  return std::pow(std::max(0.0, cosine), power);
-}
-
-std::array<LobeShape, 3> lobe_shapes() {
-  return {
-      {{-7.0 * kDegree, 7.5 * kDegree}, {3.5 * kDegree, 3.75 * kDegree}, {10.5 * kDegree, 15.0 * kDegree}}};
-}
-
-glm::dvec3 sadeghi_lobes(const glm::dvec3& tangent, const glm::dvec3& to_light, const glm::dvec3& to_eye,
-                         double glint_phi) {
-  const double theta_in = std::asin(std::clamp(glm::dot(tangent, to_light), -1.0, 1.0));
-  const double theta_out = std::asin(std::clamp(glm::dot(tangent, to_eye), -1.0, 1.0));
-  const glm::dvec3 light_across = glm::normalize(to_light - tangent * glm::dot(tangent, to_light));
-  const glm::dvec3 eye_across = glm::normalize(to_eye - tangent * glm::dot(tangent, to_eye));
-  const double phi = std::acos(std::clamp(glm::dot(light_across, eye_across), -1.0, 1.0));
-  const double half = (theta_in + theta_out) / 2.0;
-  const double cos_diff = std::cos((theta_out - theta_in) / 2.0);
-  const auto shapes = lobe_shapes();
-  const glm::dvec3 azimuth(std::cos(phi / 2.0), bell(kAzimuthTtRad, kPi - phi),
-                           std::cos(phi / 2.0) + kGlint * bell(kAzimuthGlintRad, glint_phi - phi));
-  glm::dvec3 lobes;
-  for (int i = 0; i < 3; ++i)
-    lobes[i] =
-        0.5 * gaussian(shapes[i].width_rad, half - shapes[i].shift_rad) * azimuth[i] / (cos_diff * cos_diff);
-  return lobes;
 }
 
 }  // namespace strandcast::reference

@@ -1,9 +1,8 @@
 // Reference in double precision of what the strand shaders compute, written from the equations: Hermite
-// curves, followers between three key strands, coverage, Kajiya-Kay and the Sadeghi lobes. Shares no code
-// with the shaders.
+// curves, followers between three key strands, coverage. Shares no code with the shaders. For shading see
+// common/render/scatter.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
@@ -45,23 +44,5 @@ CurvePoint follower_point(const Keys& keys, const glm::uvec3& corner, uint32_t f
 
 /// Part of a pixel that a line covers, box filter of one pixel across the line.
 double line_coverage(double width_px, double distance_px);
-
-double kajiya_kay_diffuse(const glm::dvec3& tangent, const glm::dvec3& to_light);
-double kajiya_kay_specular(const glm::dvec3& tangent, const glm::dvec3& to_light, const glm::dvec3& to_eye,
-                           double power);
-
-struct LobeShape {
-  double shift_rad = 0.0;
-  double width_rad = 0.0;
-};
-/// The parameters of shaders/lib/strand_shading.glsl, in degrees there.
-std::array<LobeShape, 3> lobe_shapes();
-inline constexpr double kAzimuthTtRad = 35.0 * 3.14159265358979 / 180.0;
-inline constexpr double kAzimuthGlintRad = 15.0 * 3.14159265358979 / 180.0;
-inline constexpr double kGlint = 0.4;
-
-/// R, TT, TRT of Sadeghi et al. 2010 with half-angle normalisation 1/2.
-glm::dvec3 sadeghi_lobes(const glm::dvec3& tangent, const glm::dvec3& to_light, const glm::dvec3& to_eye,
-                         double glint_phi);
 
 }  // namespace strandcast::reference

@@ -61,12 +61,40 @@ TEST(Features, WhatThereIsToDrawFollowsFromAssetAndLook) {
   look.followers = 0;
   EXPECT_EQ(facts(), (std::vector<bool>{true, false, true}));
   const auto off = explain(analyse_picture({}, look));
-  ASSERT_EQ(on.size(), 3u);
+  constexpr size_t kOfContents = 3;  // the others are of methods
+  ASSERT_EQ(on.size(), 7u);
   for (size_t i = 0; i < on.size(); ++i) {
-    EXPECT_TRUE(on[i].value && !off[i].value) << on[i].name;
+    EXPECT_TRUE(on[i].value == (i < kOfContents) && !off[i].value) << on[i].name;
     EXPECT_EQ(on[i].name, off[i].name);
     EXPECT_NE(on[i].reason, off[i].reason) << on[i].name;
   }
+}
+
+TEST(Features, TablesAndNormalsAreOnlyForTheMethodsThatReadThem) {
+  SceneAsset asset;
+  asset.strand_count = 3;
+  LookDesc look;
+  const auto facts = [&] {
+    const PictureFeatures features = analyse_picture(asset, look);
+    return std::vector<bool>{features.has_lobe_tables.value, features.has_scatter_tables.value,
+                             features.has_density_normals.value, features.is_shaded_per_fragment.value};
+  };
+  const std::vector<bool> nothing(4, false);
+  for (const MethodRow& row : shading_models().rows()) {
+    look.methods.shading = row.name;
+    EXPECT_EQ(facts(), (std::vector<bool>{row.name == "marschner", false, false, false})) << row.name;
+  }
+  look = {};
+  for (const MethodRow& row : scattering_models().rows()) {
+    look.methods.scattering = row.name;
+    EXPECT_EQ(facts(), (std::vector<bool>{false, row.name == "dual", row.name == "isosurface", false}))
+        << row.name;
+  }
+  look.methods = {"marschner", "dual", "fragment"};
+  EXPECT_EQ(facts(), (std::vector<bool>{true, true, false, true}));
+  EXPECT_EQ(explain(analyse_picture(asset, look)).at(3).reason, "look.methods.shading is marschner");
+  asset.strand_count = 0;
+  EXPECT_EQ(facts(), nothing) << "there is nothing to shade";
 }
 
 TEST(Features, ExplainAgreesWithAnalyse) {

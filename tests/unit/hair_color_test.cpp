@@ -37,6 +37,17 @@ TEST(HairColor, FollowsThePublishedFit) {
   EXPECT_NEAR(color_of_melanin(eumelanin, 0.0f).r, std::exp(-5.88841 * 0.5), 1e-5);
 }
 
+TEST(HairColor, AbsorptionAndColorAreInverseAtEveryRoughness) {
+  const glm::dvec3 color(0.83, 0.41, 0.07);
+  for (const double roughness : {0.0, 0.3, 0.7, 1.0}) {
+    const glm::dvec3 back = color_of_absorption(absorption_of_color(color, roughness), roughness);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(back[c], color[c], 1e-12) << roughness;
+  }
+  // pbrt's default brown: 1.3 of eumelanin.
+  EXPECT_NEAR(absorption_of_melanin(1.3, 0.0).b, 1.781, 1e-12);
+  EXPECT_NEAR(absorption_of_melanin(1.0, 2.0).g, 1.497, 1e-12);
+}
+
 TEST(HairColor, IsChosenByName) {
   LookDesc look;
   EXPECT_EQ(colors_of(look).root, look.root_color);

@@ -93,7 +93,8 @@ SceneDesc unusual_scene() {
             .ambient = 0.5f,
             .exposure = 1.5f,
             .background = {0, 0.5f, 1},
-            .skin_color = {1, 0, 0.5f}};
+            .skin_color = {1, 0, 0.5f},
+            .methods = {.shading = "chiang", .scattering = "isosurface", .evaluation = "fragment"}};
   s.camera = {.offset_m = {0, 0, 2}, .target_m = {0.1f, 0.2f, 0.3f}, .fov_y_rad = 1.0f};
   s.stream = {.codec = "raw",
               .has_codec = true,
@@ -182,6 +183,13 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
   EXPECT_THAT(error_of("gravity_mps2 { y: 1e999 }"), HasSubstr("gravity_mps2.y is inf"));
   EXPECT_THAT(error_of("look { root_color { g: 1.5 } }"), HasSubstr("look.root_color.g is 1.5"));
   EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: delta, raw, tangent"));
+  EXPECT_EQ(error_of("look { methods { shading: 'phong' } }"),
+            "s.textproto:1:18: look.methods.shading is unknown (known: sadeghi, kajiya_kay, karis, chiang, "
+            "marschner)");
+  EXPECT_THAT(error_of("look { methods { scattering: 'double' } }"),
+              HasSubstr("scattering is unknown (known: volume, none, isosurface, dual)"));
+  EXPECT_THAT(error_of("look { methods { evaluation: 'pixel' } }"),
+              HasSubstr("evaluation is unknown (known: vertex, fragment)"));
   EXPECT_THAT(error_of("camera { offset_m { x: 0 y: 0 z: 0 } }"),
               HasSubstr("camera.offset_m is almost zero"));
   EXPECT_THAT(error_of("groom { file { } }"), HasSubstr("--set groom.file.path=FILE"));

@@ -29,6 +29,7 @@ SceneDesc full_scene() {
   scene.groom = groom;
   scene.wind.mean_mps = {3.0f, 0.0f, 1.0f};
   scene.wind.gust_intensity = 0.3f;
+  scene.look.methods = {"marschner", "dual", "vertex"};  // each has tables
   return scene;
 }
 

@@ -92,7 +92,7 @@ TEST(WireMessages, TheSampleOfALookHasNoDefaultInIt) {
   scene_fields::visit_look(usual, usual_look);
   scene_fields::visit_camera(sample, camera);
   scene_fields::visit_camera(usual, usual_camera);
-  EXPECT_EQ(sample.values.size(), 45u);
+  EXPECT_EQ(sample.values.size(), 48u);
   for (const auto& [name, values] : sample.values)
     for (size_t i = 0; i < values.size(); ++i) EXPECT_NE(values[i], usual.values.at(name)[i]) << name;
 }
@@ -209,6 +209,7 @@ TEST(WireMessages, WelcomeFieldsOutOfRangeAreNamed) {
       {"look.segments", [](Welcome& w) { w.look.segments = 9; }},
       {"look.followers", [](Welcome& w) { w.look.followers = 1000; }},
       {"look.light_direction", [](Welcome& w) { w.look.light_direction = glm::vec3(0.0f); }},
+      {"methods.shading", [](Welcome& w) { w.look.methods.shading = "phong"; }},
       {"camera.offset_m", [](Welcome& w) { w.camera.offset_m = glm::vec3(0.0f); }},
       {"camera.target_m", [](Welcome& w) { w.camera.target_m.z = 1e9f; }},
       {"camera.fov_y_rad", [&](Welcome& w) { w.camera.fov_y_rad = nan; }},

@@ -4,6 +4,7 @@
 
 #include "common/render/render_path.h"
 #include "common/render/scalp_cover.h"
+#include "common/scene/hair_color.h"
 
 namespace strandcast {
 namespace {
@@ -66,7 +67,7 @@ class HeadPass final : public RenderPass {
     program_.set("u_clip_from_head", turn.view.clip_from_head);
     program_.set("u_eye_m", turn.view.eye_m);
     program_.set("u_skin_color", scene_.look.skin_color);
-    program_.set("u_root_color", scene_.look.root_color);
+    program_.set("u_root_color", colors_of(scene_.look).root);
     program_.set("u_shadow_lift_m", kShadowLiftCells * scene_.light_volume.cell_m);
     glDrawElements(GL_TRIANGLES, index_count_, GL_UNSIGNED_INT, nullptr);
     return {};

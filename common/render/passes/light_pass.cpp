@@ -9,7 +9,8 @@ namespace {
 class LightPass final : public RenderPass {
  public:
   explicit LightPass(RenderScene& scene)
-      : Pass({"render/light", {&scene.strands}, {&scene.light}, true, {}}, gl::PassClock::Host),
+      : Pass({"render/light", {&scene.strands}, {&scene.light, &scene.density}, true, {}},
+             gl::PassClock::Host),
         scene_(scene),
         volume_(scene.light_volume) {}
 
@@ -23,6 +24,7 @@ class LightPass final : public RenderPass {
     volume_.build(turn.strands.position_m, to_light);
     scene_.light.upload(volume_);
     scene_.light.set_light(look, turn.view, to_light);
+    if (scene_.features.has_density_normals.value) scene_.density.upload(volume_);
     return {};
   }
 

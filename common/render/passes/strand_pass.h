@@ -1,5 +1,5 @@
-// Strand pass: a camera-facing quad per expanded segment, shaded per vertex, covered by a fixed pattern
-// instead of sorted blending. All calls from the context's thread.
+// Strand pass: a camera-facing quad per expanded segment, shaded by the model that the look names, covered by
+// a fixed pattern instead of sorted blending. All calls from the context's thread.
 #pragma once
 
 #include <memory>

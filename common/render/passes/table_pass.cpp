@@ -1,0 +1,39 @@
+// Passes that make the lookup tables of shading once, at load: a picture only reads them.
+
+#include "common/render/render_path.h"
+
+namespace strandcast {
+namespace {
+
+template <class Tables>
+class TablePass final : public RenderPass {
+ public:
+  TablePass(const char* name, RenderScene& scene, Tables& tables, const Fact& wanted)
+      : Pass({name, {}, {&tables}, wanted.value, wanted.reason}, gl::PassClock::Host),
+        scene_(scene),
+        tables_(tables) {}
+
+  Status prepare(const RenderSetup&) override {
+    tables_.make(scene_.look);
+    return {};
+  }
+  Status run(RenderTurn&) override { return {}; }
+
+ private:
+  RenderScene& scene_;
+  Tables& tables_;
+};
+
+}  // namespace
+
+std::unique_ptr<RenderPass> make_lobe_table_pass(RenderScene& scene) {
+  return std::make_unique<TablePass<LobeTables>>("render/lobe_tables", scene, scene.lobe_tables,
+                                                 scene.features.has_lobe_tables);
+}
+
+std::unique_ptr<RenderPass> make_scatter_table_pass(RenderScene& scene) {
+  return std::make_unique<TablePass<ScatterTables>>("render/scatter_tables", scene, scene.scatter_tables,
+                                                    scene.features.has_scatter_tables);
+}
+
+}  // namespace strandcast
