@@ -30,5 +30,9 @@ Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::
 
 /// The scene as protobuf text that parse_scene reads back to an equal SceneDesc.
 std::string to_text(const SceneDesc& scene);
+/// Likewise in one line, for messages.
+std::string to_line(const SceneDesc& scene);
+/// Look and camera alone: a scene whose other fields keep their defaults.
+std::string to_text(const LookDesc& look, const CameraDesc& camera);
 
 }  // namespace strandcast

@@ -12,8 +12,9 @@ namespace {
 
 class GlPicturePainter : public PicturePainter {
  public:
-  GlPicturePainter(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Renderer> renderer)
-      : context_(std::move(context)), renderer_(std::move(renderer)) {}
+  GlPicturePainter(std::shared_ptr<const SceneAsset> asset, std::unique_ptr<gl::EglContext> context,
+                   std::unique_ptr<Renderer> renderer)
+      : asset_(std::move(asset)), context_(std::move(context)), renderer_(std::move(renderer)) {}
   ~GlPicturePainter() override {
     if (context_->make_current())
       renderer_.reset();  // GL objects are deleted from the context that made them
@@ -30,6 +31,8 @@ class GlPicturePainter : public PicturePainter {
     return renderer_->read_image();
   }
 
+  Status set_look(const LookDesc& look) override { return renderer_->set_look(look); }
+
   gl::PassReports passes() const override {
     gl::PassReports passes = renderer_->passes().report();
     passes.push_back(read_back_report(read_timer_));
@@ -37,7 +40,8 @@ class GlPicturePainter : public PicturePainter {
   }
 
  private:
-  std::unique_ptr<gl::EglContext> context_;  // outlives the renderer's GL objects
+  const std::shared_ptr<const SceneAsset> asset_;  // that the renderer is made for
+  std::unique_ptr<gl::EglContext> context_;        // outlives the renderer's GL objects
   std::unique_ptr<Renderer> renderer_;
   StageTimer read_timer_;
   PosedStrands strands_;
@@ -60,7 +64,7 @@ MakePicturePainter gl_picture_painter(GlPainterConfig config) {
     ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), *config.asset, config.look));
     log_info("render", "frames are drawn by {}", context->info().renderer);
     return std::unique_ptr<PicturePainter>(
-        std::make_unique<GlPicturePainter>(std::move(context), std::move(renderer)));
+        std::make_unique<GlPicturePainter>(config.asset, std::move(context), std::move(renderer)));
   };
 }
 

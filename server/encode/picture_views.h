@@ -93,6 +93,9 @@ class PictureViews {
   /// Before the first class.
   void set_budget(const PictureBudget& budget);
 
+  /// The scene's own picture is taken from here from now on. Whoever has one from where it was keeps it.
+  void set_reserved_camera(const CameraDesc& camera) { reserved_.camera = camera; }
+
   /// Gives the viewer a class: that of an equal view, else a new one. Call again when its camera changes: a
   /// viewer alone in its class keeps the class. Unavailable while a limit above is reached, and the viewer
   /// then keeps what it had; BadInput for a view that cannot be drawn, or has not been made to fit.

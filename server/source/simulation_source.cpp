@@ -9,6 +9,23 @@
 namespace strandcast {
 namespace {
 
+/// Paths of a file start at its folder, and those of a running scene where the server was started.
+SceneDesc with_absolute_paths(SceneDesc scene) {
+  const auto complete = [](std::filesystem::path& path) {
+    std::error_code ignored;
+    if (path.empty()) return;
+    if (auto absolute = std::filesystem::absolute(path, ignored); !ignored)
+      path = absolute.lexically_normal();
+  };
+  complete(scene.head.mesh_path);
+  for (std::filesystem::path& path : scene.head.more_mesh_paths) complete(path);
+  if (auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
+    complete(file->path);
+    for (std::filesystem::path& path : file->more_paths) complete(path);
+  }
+  return scene;
+}
+
 class SimulationSource : public StateSource {
  public:
   SimulationSource(SimulationConfig config, std::shared_ptr<const SceneContent> content, InputHub& inputs)
@@ -32,6 +49,16 @@ class SimulationSource : public StateSource {
   void post(const ControlCommand& command, Reply reply) override { loop_->post(command, std::move(reply)); }
   void post(const SetParameter& parameter, Reply reply) override { loop_->post(parameter, std::move(reply)); }
   SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
+  std::optional<SceneDesc> scene() const override {
+    if (loop_ == nullptr) return std::nullopt;
+    SceneDesc scene = loop_->scene();
+    // Where the scene left the codec to the machine that runs it, it still does.
+    if (!config_.scene.stream.has_codec) {
+      scene.stream.codec = config_.scene.stream.codec;
+      scene.stream.has_codec = false;
+    }
+    return with_absolute_paths(std::move(scene));
+  }
   std::optional<Error> failure() const override { return loop_ != nullptr ? loop_->failure() : std::nullopt; }
 
  private:

@@ -129,6 +129,21 @@ TEST(SceneFile, TextRoundTripsExactly) {
   }
 }
 
+TEST(SceneFile, OneLineAndALookAloneReadBackToo) {
+  const std::string line = to_line(unusual_scene());
+  EXPECT_EQ(line.find('\n'), std::string::npos);
+  const auto whole = parse_scene(line, "s", {});
+  ASSERT_TRUE(whole) << whole.error().to_string();
+  EXPECT_EQ(*whole, unusual_scene());
+
+  const auto part = parse_scene(to_text(unusual_scene().look, unusual_scene().camera), "s", {});
+  ASSERT_TRUE(part) << part.error().to_string();
+  SceneDesc expected;
+  expected.look = unusual_scene().look;
+  expected.camera = unusual_scene().camera;
+  EXPECT_EQ(*part, expected) << "all else keeps its default";
+}
+
 TEST(SceneFile, EveryProtoFieldIsReadAndWritten) {
   // Names of all fields reachable from Scene; each must be written for some scene, and (round trip above)
   // read back.
