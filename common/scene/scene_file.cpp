@@ -429,6 +429,22 @@ std::string to_text(const SceneDesc& scene) {
   return text;
 }
 
+SceneDesc with_absolute_paths(SceneDesc scene) {
+  const auto complete = [](std::filesystem::path& path) {
+    std::error_code failure;
+    if (path.empty()) return;
+    const std::filesystem::path absolute = std::filesystem::absolute(path, failure);
+    if (!failure) path = absolute.lexically_normal();
+  };
+  complete(scene.head.mesh_path);
+  for (std::filesystem::path& path : scene.head.more_mesh_paths) complete(path);
+  if (auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
+    complete(file->path);
+    for (std::filesystem::path& path : file->more_paths) complete(path);
+  }
+  return scene;
+}
+
 std::string to_line(const SceneDesc& scene) {
   std::string text;
   pb::TextFormat::Printer printer;

@@ -32,6 +32,8 @@ Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::
 std::string to_text(const SceneDesc& scene);
 /// Likewise in one line, for messages.
 std::string to_line(const SceneDesc& scene);
+/// With paths that hold wherever it is saved; relative ones start at the current folder.
+SceneDesc with_absolute_paths(SceneDesc scene);
 /// Look and camera alone: a scene whose other fields keep their defaults.
 std::string to_text(const LookDesc& look, const CameraDesc& camera);
 

@@ -4,27 +4,11 @@
 
 #include "common/groom/groom_asset.h"
 #include "common/log/log.h"
+#include "common/scene/scene_file.h"
 #include "server/source/scene_change.h"
 
 namespace strandcast {
 namespace {
-
-/// Paths of a file start at its folder, and those of a running scene where the server was started.
-SceneDesc with_absolute_paths(SceneDesc scene) {
-  const auto complete = [](std::filesystem::path& path) {
-    std::error_code ignored;
-    if (path.empty()) return;
-    if (auto absolute = std::filesystem::absolute(path, ignored); !ignored)
-      path = absolute.lexically_normal();
-  };
-  complete(scene.head.mesh_path);
-  for (std::filesystem::path& path : scene.head.more_mesh_paths) complete(path);
-  if (auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
-    complete(file->path);
-    for (std::filesystem::path& path : file->more_paths) complete(path);
-  }
-  return scene;
-}
 
 class SimulationSource : public StateSource {
  public:

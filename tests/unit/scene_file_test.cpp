@@ -142,6 +142,22 @@ TEST(SceneFile, OneLineAndALookAloneReadBackToo) {
   expected.look = unusual_scene().look;
   expected.camera = unusual_scene().camera;
   EXPECT_EQ(*part, expected) << "all else keeps its default";
+  EXPECT_EQ(to_text(LookDesc{}, CameraDesc{}).find("groom"), std::string::npos) << "and is not said";
+}
+
+TEST(SceneFile, AbsolutePathsHoldWhereverTheSceneIsSaved) {
+  SceneDesc scene;
+  scene.groom = FileGroomDesc{.path = "hair/a.tfx", .more_paths = {"../b.tfx"}};
+  scene.head.mesh_path = "/heads/bust.obj";
+  scene.head.more_mesh_paths = {"eyes.obj"};
+  const SceneDesc absolute = with_absolute_paths(scene);
+  const auto& file = std::get<FileGroomDesc>(absolute.groom);
+  const std::filesystem::path here = std::filesystem::current_path();
+  EXPECT_EQ(file.path, here / "hair/a.tfx");
+  EXPECT_EQ(file.more_paths.at(0), (here / "../b.tfx").lexically_normal());
+  EXPECT_EQ(absolute.head.mesh_path, "/heads/bust.obj");
+  EXPECT_EQ(absolute.head.more_mesh_paths.at(0), here / "eyes.obj");
+  EXPECT_TRUE(with_absolute_paths(SceneDesc{}).head.mesh_path.empty()) << "no path stays none";
 }
 
 TEST(SceneFile, EveryProtoFieldIsReadAndWritten) {
