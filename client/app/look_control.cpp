@@ -73,8 +73,9 @@ FormState LookControl::form(bool are_frames, int64_t time_ns) const {
     if (are_frames)
       form.notes.emplace_back("These are the server's pictures: a look of your own shows with strands (M).");
     form.save_note =
-        "Look and view alone: a viewer that may not steer does not get the rest of the scene. All else is as "
-        "in the built-in scene.";
+        "Look and view alone: a viewer that may not steer does not get the rest of the scene. All else has "
+        "its "
+        "default then.";
     if (own_) form.undo = "Back to the scene's";
   }
   form.fields = look_fields(shown(time_ns));

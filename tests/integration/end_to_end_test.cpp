@@ -530,7 +530,39 @@ TEST_F(EndToEnd, TheHeadlessViewerLeavesPictureClipAndReport) {
   const std::string lines = to_lines(*report);
   EXPECT_THAT(lines, HasSubstr("rendered_pictures=6\n")) << "five of the clip and the picture";
   EXPECT_THAT(lines, HasSubstr("strands=150\n"));
+  EXPECT_THAT(lines, HasSubstr("hair_color=red\n"));
+  EXPECT_THAT(lines, HasSubstr("look_changes=0\n"));
   EXPECT_THAT(to_json(*report), HasSubstr("\"mode\": \"strands\""));
+}
+
+// It has no view of its own: the server's pictures for it are taken from where the scene's camera is.
+TEST_F(EndToEnd, TheHeadlessViewerGoesAlongWithLookAndCameraOfTheScene) {
+  const TemporaryFolder folder;
+  ViewOptions options;
+  options.address = {"127.0.0.1", server_->port()};
+  options.mode = StreamMode::Frames;
+  options.is_headless = true;
+  options.size = {96, 64};
+  options.seconds = kDeadlineS;
+  std::atomic<bool> stop{false};
+  std::optional<Result<ViewReport>> report;
+  std::thread viewer([&] { report = run_headless(options, stop); });
+  const auto is_seen = [&](auto&& is_it) {
+    return eventually([&] {
+      const auto painted = observer_.painted();
+      return !painted.empty() && is_it(painted.back());
+    });
+  };
+  EXPECT_TRUE(is_seen([](const Painted& painted) { return painted.view.camera == sample_camera(); }));
+  EXPECT_EQ(run_command(ctl_target(), SetParameter{"camera.fov_y_rad=0.5"}), kDoneExit);
+  EXPECT_EQ(run_command(ctl_target(), SetParameter{"look.hair_color=grey"}), kDoneExit);
+  EXPECT_TRUE(is_seen([](const Painted& painted) {
+    return painted.view.camera.fov_y_rad == 0.5f && painted.look.hair_color == "grey";
+  }));
+  stop = true;
+  viewer.join();
+  ASSERT_TRUE(report && *report) << (*report).error().to_string();
+  EXPECT_THAT(to_lines(**report), HasSubstr("hair_color=grey\n"));
 }
 
 TEST_F(EndToEnd, AStoppedServerTellsItsViewers) {
