@@ -3,19 +3,23 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <sstream>
 #include <utility>
+#include <variant>
 
 #include "client/app/feed.h"
 #include "client/app/line_budget.h"
+#include "client/app/save_scene.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
 #include "common/base/text.h"
 #include "common/motion/wind_csv.h"
+#include "common/scene/scene_file.h"
 
 namespace strandcast {
 namespace {
@@ -229,8 +233,13 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
 
 namespace {
 
-/// Sends one message and prints the answer, a notice or a list.
-int ask(const CtlTarget& target, Role role, const ClientMessage& message) {
+/// What a server answers with, beside notices.
+using Answer = std::variant<SessionList, SceneText>;
+/// Gives the exit code.
+using TakeAnswer = std::function<int(const Answer&)>;
+
+/// Sends one message and takes the answer; a notice is printed.
+int ask(const CtlTarget& target, Role role, const ClientMessage& message, const TakeAnswer& take) {
   auto client = connect(target, role);
   if (!client) return fail(client.error());
   if (const auto sent = (*client)->send(message); !sent) return fail(sent.error(), kRefusedExit);
@@ -239,10 +248,8 @@ int ask(const CtlTarget& target, Role role, const ClientMessage& message) {
     if (const auto why = stopped(target)) return fail(*why, kRefusedExit);
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);
-      if (const auto* list = std::get_if<SessionList>(&event)) {
-        std::cout << to_table(*list);
-        return kDoneExit;
-      }
+      if (const auto* list = std::get_if<SessionList>(&event)) return take(*list);
+      if (const auto* scene = std::get_if<SceneText>(&event)) return take(*scene);
       const auto* notice = std::get_if<Notice>(&event);
       if (notice == nullptr) continue;
       (notice->is_error ? std::cerr : std::cout) << notice->text << '\n';
@@ -257,11 +264,26 @@ int ask(const CtlTarget& target, Role role, const ClientMessage& message) {
 }  // namespace
 
 int run_command(const CtlTarget& target, const ClientMessage& message) {
-  return ask(target, Role::Controller, message);
+  return ask(target, Role::Controller, message, [](const Answer&) { return kDoneExit; });
 }
 
 int run_admin(const CtlTarget& target, const AdminCommand& command) {
-  return ask(target, Role::Admin, command);
+  return ask(target, Role::Admin, command, [](const Answer& answer) {
+    if (const auto* list = std::get_if<SessionList>(&answer)) std::cout << to_table(*list);
+    return kDoneExit;
+  });
+}
+
+int run_save(const CtlTarget& target, const std::filesystem::path& path) {
+  return ask(target, Role::Controller, SceneRequest{}, [&](const Answer& answer) {
+    const auto* text = std::get_if<SceneText>(&answer);
+    if (text == nullptr) return kDoneExit;
+    const auto scene = scene_of(*text);
+    if (!scene) return fail(scene.error(), kRefusedExit);
+    if (const auto saved = save_scene(path, to_text(*scene)); !saved) return fail(saved.error());
+    std::cout << fmt::format("saved {}: strandcast-server --scene {}\n", path.string(), path.string());
+    return kDoneExit;
+  });
 }
 
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {

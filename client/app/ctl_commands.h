@@ -48,6 +48,8 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
 int run_command(const CtlTarget& target, const ClientMessage& message);
 /// Needs an admin's token.
 int run_admin(const CtlTarget& target, const AdminCommand& command);
+/// Writes the scene as it runs to a scene file.
+int run_save(const CtlTarget& target, const std::filesystem::path& path);
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s);
 int run_health(const CtlTarget& target);
 

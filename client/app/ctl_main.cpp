@@ -24,6 +24,7 @@ struct CommandLine {
   uint64_t check_frames = 120;
   double check_timeout_s = 60.0;
   uint64_t session = 0;
+  std::string scene_path;
 };
 
 void declare_feed(CLI::App& app, CommandLine& line) {
@@ -94,7 +95,13 @@ int run(int argc, char** argv) {
   CLI::App* step = app.add_subcommand("step", "One simulation step while paused");
   CLI::App* reset = app.add_subcommand("reset", "Set every strand to rest");
   CLI::App* set = app.add_subcommand("set", "Change a scene parameter");
-  set->add_option("assignment", line.assignment, "path=value, for example solver.name=dftl")->required();
+  set->add_option(
+         "assignment", line.assignment,
+         "path=value, for example solver.name=dftl, look.hair_color=red, look.shading.wetness=0.5 or "
+         "\"camera.offset_m={ x: 0 y: 0.1 z: 0.7 }\"; a wrong path is answered with those that can change")
+      ->required();
+  CLI::App* save = app.add_subcommand("save", "Keep the scene as it runs, look and all, as a scene file");
+  save->add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
   CLI::App* check = app.add_subcommand("check", "Decode frames with two viewers and compare their states");
   check->add_option("--frames", line.check_frames, "Frames to decode")
       ->check(CLI::Range(uint64_t{2}, uint64_t{1'000'000}))
@@ -134,6 +141,7 @@ int run(int argc, char** argv) {
   if (*step) return run_command(line.target, ControlCommand{Command::StepOnce});
   if (*reset) return run_command(line.target, ControlCommand{Command::Reset});
   if (*set) return run_command(line.target, SetParameter{line.assignment});
+  if (*save) return run_save(line.target, line.scene_path);
   if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);
   if (*sessions) return run_admin(line.target, {AdminAction::ListSessions, 0});
   if (*kick) return run_admin(line.target, {AdminAction::Kick, line.session});

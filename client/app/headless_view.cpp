@@ -28,7 +28,7 @@ struct Collected {
 struct Drawn {
   const RenderDevice* device = nullptr;
   std::shared_ptr<const SceneAsset> asset;
-  Welcome welcome;
+  LookChange look;  // of the end
 };
 
 /// How long a run connects and receives; nothing = as long as it takes.
@@ -87,6 +87,7 @@ class Collector {
     session().replay().set_playout(options_.playout);
     taken_images_ = 0;
     known_frames_ = 0;
+    camera_ = session().welcome().camera;  // it is shown so to begin with
   }
 
   /// Waits for the server if it went away; the error is one that waiting does not mend.
@@ -101,8 +102,16 @@ class Collector {
         return make_error(ErrorCode::Unavailable, "the server came back with another scene");
     }
     if (live_.final_error()) return *live_.final_error();
+    follow_camera();
     report();
     return {};
+  }
+
+  /// The server's pictures are taken from where this viewer says, once it has said so.
+  void follow_camera() {
+    const CameraDesc& camera = session().look().camera;
+    if (camera == camera_ || !session().client().send(CameraChange{camera})) return;
+    camera_ = camera;
   }
 
   /// Tells the server about once a second how fast this machine decodes; it draws afterwards.
@@ -165,6 +174,7 @@ class Collector {
   uint64_t earlier_frames_ = 0;  // of sessions that broke
   uint64_t known_frames_ = 0;    // of the running one
   uint64_t taken_images_ = 0;
+  CameraDesc camera_;  // of the server's pictures
 };
 
 Status write_images(const ViewOptions& options, const Collected& collected) {
@@ -180,12 +190,12 @@ Status write_images(const ViewOptions& options, const Collected& collected) {
 /// After a stop nothing more is drawn, and a clip that has begun is not written.
 Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Collected& collected,
                         StageTimer& render_timer, const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto renderer, scene.device->make_renderer(*scene.asset, scene.welcome.look));
+  ASSIGN_OR_RETURN(auto renderer, scene.device->make_renderer(*scene.asset, scene.look.look));
   StrandFill fill(scene.asset->rest_position_m, scene.asset->vertex_count);
 
   const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(posed_strands_of(snapshot, fill), scene.welcome.camera, size));
+    RETURN_IF_ERROR(renderer->draw(posed_strands_of(snapshot, fill), scene.look.camera, size));
     Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
     render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
     return image;
@@ -241,7 +251,7 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   ViewReport report = make_report(*session);
   if (!own_reason.empty()) set_mode_reason(report, own_reason);
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
-  const Drawn scene{device.get(), session->shared_asset(), session->welcome()};
+  const Drawn scene{device.get(), session->shared_asset(), session->look()};
   live.reset();  // the server need not serve a viewer that only draws now
   if (stop && wants_render) log_warn("render", "stopped: nothing is drawn");
   if (stop) return report;

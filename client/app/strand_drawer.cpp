@@ -54,9 +54,11 @@ void StrandDrawer::set_state(std::shared_ptr<const ViewerState> state) {
   {
     const std::lock_guard lock(mutex_);
     // Told every few milliseconds; only what is drawn from is news.
-    const bool is_news = job_.state == nullptr || job_.state->asset != state->asset ||
+    const bool is_other_look = job_.state == nullptr || job_.state->look.look != state->look.look;
+    const bool is_news = is_other_look || job_.state->asset != state->asset ||
                          job_.state->timeline.newest() != state->timeline.newest();
     job_.state = std::move(state);
+    if (is_other_look) job_.view_number = ++view_number_;
     if (!is_news) return;
     ++version_;
   }
@@ -71,6 +73,17 @@ void StrandDrawer::set_view(const std::optional<DrawView>& view) {
         wanted.has_value() != job_.view.has_value() || (wanted && !is_same(*wanted, *job_.view));
     if (!is_news) return;
     job_.view = wanted;
+    job_.view_number = ++view_number_;
+    ++version_;
+  }
+  changed_.notify_one();
+}
+
+void StrandDrawer::set_own_look(const std::optional<LookDesc>& look) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (look == job_.own_look) return;
+    job_.own_look = look;
     job_.view_number = ++view_number_;
     ++version_;
   }
@@ -144,15 +157,19 @@ std::optional<StrandDrawer::Job> StrandDrawer::wait_for_job() {
   return job_;
 }
 
-/// Whether the newest strands can be drawn. Groom and look may have changed with the server.
+/// Whether the newest strands can be drawn. The groom may have changed with the server, the look at any time.
 bool StrandDrawer::prepare(const RenderDevice& device, const Job& job) {
   const ViewerState& state = *job.state;
   if (state.asset == nullptr) return false;
-  if (state.asset == asset_) return renderer_ != nullptr;
-  asset_ = state.asset;
+  if (state.asset == asset_) {
+    if (renderer_ != nullptr) follow_look(job.look());
+    return renderer_ != nullptr;
+  }
   renderer_.reset();
+  asset_ = state.asset;
   drawn_.reset();
-  auto made = device.make_renderer(*state.asset, state.welcome.look);
+  look_ = job.look();
+  auto made = device.make_renderer(*asset_, look_);
   if (!made) {
     fail(made.error());
     return false;
@@ -162,7 +179,19 @@ bool StrandDrawer::prepare(const RenderDevice& device, const Job& job) {
   is_first_draw_ = true;
   const std::lock_guard lock(mutex_);
   newest_.trouble.reset();
+  newest_.look_trouble.reset();
   return true;
+}
+
+/// Each is tried once; what cannot be drawn leaves the look of before.
+void StrandDrawer::follow_look(const LookDesc& look) {
+  if (look == look_) return;
+  look_ = look;
+  ++look_count_;
+  const Status status = renderer_->set_look(look);
+  if (!status) log_warn("render", "the look stays: {}", status.error().to_string());
+  const std::lock_guard lock(mutex_);
+  newest_.look_trouble = status ? std::nullopt : std::optional(status.error());
 }
 
 void StrandDrawer::turn(const Job& job) {
@@ -171,7 +200,7 @@ void StrandDrawer::turn(const Job& job) {
   if (!strands) return;
   const DrawView& view = *job.view;
   plan_.set_pixels(uint64_t{view.size.width} * view.size.height);
-  const bool is_other_view = !drawn_ || !is_same(drawn_->view, view);
+  const bool is_other_view = !drawn_ || !is_same(drawn_->view, view) || drawn_->look_count != look_count_;
   const bool has_moved =
       is_other_view || seen_motion_px(drawn_->strands, *strands, view.camera, view.size) > kSeenPx;
   if (has_moved) plan_.note_motion(begin_ns);
@@ -208,7 +237,8 @@ Status StrandDrawer::draw(const Job& job, PosedStrands strands, size_t step) {
   drawn_ = Drawn{std::move(strands), view, step,
                  step == 0 ? job.asked_whole
                  : drawn_  ? drawn_->asked_whole
-                           : 0};
+                           : 0,
+                 look_count_};
   {
     const std::lock_guard lock(mutex_);
     newest_.image = std::move(image);

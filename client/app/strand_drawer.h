@@ -30,6 +30,7 @@ struct DrawView {
 struct DrawnState {
   std::optional<Result<RenderDeviceInfo>> device;  // nothing while it is opened
   std::optional<Error> trouble;                    // why the newest scene cannot be drawn
+  std::optional<Error> look_trouble;               // why the look of before is drawn, not the newest
   std::shared_ptr<const Image> image;              // null before the first
   size_t step = 0;                                 // of image
   uint64_t count = 0;                              // of pictures
@@ -54,6 +55,8 @@ class StrandDrawer {
   void set_state(std::shared_ptr<const ViewerState> state);
   /// Nothing: no picture is wanted.
   void set_view(const std::optional<DrawView>& view);
+  /// Drawn instead of the look of the server's scene; nothing: that one.
+  void set_own_look(const std::optional<LookDesc>& look);
   /// The next picture is to be the finest, whatever moves; DrawnState says when it is there.
   uint64_t ask_whole();
   DrawnState look() const;
@@ -62,8 +65,11 @@ class StrandDrawer {
   struct Job {
     std::shared_ptr<const ViewerState> state;
     std::optional<DrawView> view;
-    uint64_t view_number = 0;
+    std::optional<LookDesc> own_look;
+    uint64_t view_number = 0;  // of the view and the look
     uint64_t asked_whole = 0;
+
+    const LookDesc& look() const { return own_look ? *own_look : state->look.look; }
   };
   /// What decides the pixels of the newest picture.
   struct Drawn {
@@ -71,12 +77,14 @@ class StrandDrawer {
     DrawView view;
     size_t step = 0;
     uint64_t asked_whole = 0;
+    uint64_t look_count = 0;
   };
 
   void run();
   void draw_until_stopped(const RenderDevice& device);
   std::optional<Job> wait_for_job();
   bool prepare(const RenderDevice& device, const Job& job);
+  void follow_look(const LookDesc& look);
   void turn(const Job& job);
   Status draw(const Job& job, PosedStrands strands, size_t step);
   void fail(const Error& error);
@@ -86,6 +94,8 @@ class StrandDrawer {
   // Of the thread.
   std::unique_ptr<Renderer> renderer_;
   std::shared_ptr<const SceneAsset> asset_;  // that renderer_ is made for, or could not be
+  LookDesc look_;                            // that was wanted of renderer_ last
+  uint64_t look_count_ = 0;                  // of the looks that were
   TimelinePlayer player_;
   DrawPlan plan_{0};
   std::optional<Drawn> drawn_;

@@ -45,6 +45,14 @@ std::string how_drawn(size_t step) {
   return text + ", until all stands still";
 }
 
+/// Whose look is seen.
+std::string look_text(const ViewerState& now, const ViewFacts& facts) {
+  if (facts.has_own_look && !shows_frames(now)) return "your own, seen here alone (L)";
+  const std::string& color = now.look.look.hair_color;
+  if (now.look_changes == 0) return color + " (L)";
+  return fmt::format("{}, changed {} time{} (L)", color, now.look_changes, now.look_changes == 1 ? "" : "s");
+}
+
 std::string shortened(const std::string& name) {
   return name.size() <= kMaxSceneChars ? name : name.substr(0, kMaxSceneChars) + "...";
 }
@@ -107,6 +115,7 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   add("server", facts.address.to_string());
   add("scene", fmt::format("{}, {} strands x {}", now.welcome.scene_name, now.welcome.strand_count,
                            now.welcome.vertex_count));
+  add("look", look_text(now, facts));
   add("asked for", now.mode.wish());
   const std::string& reason = facts.own_reason.empty() ? now.mode.reason : facts.own_reason;
   if (!reason.empty()) add("because", reason);

@@ -31,9 +31,10 @@ class Rate {
 struct ViewFacts {
   Address address;
   Playout playout = Playout::LowLatency;
-  std::string own_reason;    // why this machine needs frames
-  std::string message;       // the newest notice
-  bool is_starting = false;  // OpenGL
+  std::string own_reason;     // why this machine needs frames
+  std::string message;        // the newest notice
+  bool has_own_look = false;  // not the scene's
+  bool is_starting = false;   // OpenGL
   size_t draw_step = 0;
   double draw_ms = 0.0;      // median
   double answer_ms = 0.0;    // median, from waking up to the picture on the display

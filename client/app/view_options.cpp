@@ -112,7 +112,8 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--token", options.token, kTokenHelp)->envname(kTokenVariable);
   app.add_flag("--tls", raw.is_tls, "Encrypt the connection, as an address with wss:// does");
   app.add_option("--tls-ca", options.tls_authorities, kTlsAuthoritiesHelp);
-  app.add_flag("--view-only", options.is_view_only, "Ask for a viewer's role: no steering of the server");
+  app.add_flag("--view-only", options.is_view_only,
+               "Ask for a viewer's role: no steering of the server, and another look is seen here alone");
   app.add_option("--size", raw.size, "Picture or window size, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--playout", raw.playout,
                  "low-latency: the newest state; smooth: between states, a little behind")

@@ -66,6 +66,8 @@ ViewReport make_report(ViewerSession& session) {
   out.count("mode_changes", session.mode_changes());
   out.count("blank_pictures", session.blank_pictures());
   out.word("scene", welcome.scene_name);
+  out.word("hair_color", session.look().look.hair_color);
+  out.count("look_changes", session.look_changes());
   const FrameQuality quality = session.frame_quality().value_or(FrameQuality{});
   out.word("codec", is_frames ? to_string(quality.codec) : welcome.codec);
   out.count("strands", welcome.strand_count);

@@ -32,6 +32,7 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
   if (!replay) return at(config.address.to_string(), replay.error());
   session->replay_ = std::move(replay).value();
   session->opened_ns_ = now_ns();
+  session->look_ = {welcome.look, welcome.camera};
   session->quality_.bound_m = session->welcome().bound_m;
   session->asked_mode_ = config.hello.mode;
   session->follow(std::make_shared<ModeControl>(config.hello.mode));
@@ -69,8 +70,18 @@ Status ViewerSession::handle(ClientEvent& event) {
     take_quality(std::move(*frame_quality));
   } else if (auto* change = std::get_if<ModeChange>(&event)) {
     take_mode(std::move(*change));
+  } else if (const auto* look = std::get_if<LookChange>(&event)) {
+    take_look(*look);
+  } else if (auto* scene = std::get_if<SceneText>(&event)) {
+    scene_ = std::move(*scene);
   }
   return {};
+}
+
+void ViewerSession::take_look(const LookChange& look) {
+  if (look == look_) return;
+  look_ = look;
+  ++look_changes_;
 }
 
 void ViewerSession::take_mode(ModeChange change) {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/app/line_budget.h"
@@ -81,6 +82,12 @@ class ViewerSession {
   const StreamQuality& quality() const { return quality_; }
   uint64_t quality_changes() const { return quality_changes_; }
 
+  /// What the scene looks like now, and its own camera: as the Welcome said, or a LookChange since.
+  const LookChange& look() const { return look_; }
+  uint64_t look_changes() const { return look_changes_; }
+  /// The answer to the last SceneRequest, once.
+  std::optional<SceneText> take_scene() { return std::exchange(scene_, std::nullopt); }
+
   /// How the server makes pictures for this viewer; nothing before it said so.
   const std::optional<FrameQuality>& frame_quality() const { return frame_quality_; }
 
@@ -108,6 +115,7 @@ class ViewerSession {
   void take_quality(FrameQuality quality);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
+  void take_look(const LookChange& look);
   void show(StreamMode mode);
 
   std::shared_ptr<ViewerClient> client_;
@@ -125,6 +133,9 @@ class ViewerSession {
   std::optional<FrameQuality> frame_quality_;
   StreamQuality quality_;
   uint64_t quality_changes_ = 0;
+  LookChange look_;
+  uint64_t look_changes_ = 0;
+  std::optional<SceneText> scene_;
   ServerStatus status_;
   bool has_status_ = false;
   std::string last_slow_motion_;

@@ -76,6 +76,7 @@ void ViewerThread::publish() {
     if (live_->has_session()) {
       client_ = live_->session().shared_client();
       for (Notice& notice : live_->session().take_notices()) notices_.add(std::move(notice));
+      if (auto scene = live_->session().take_scene()) scene_ = std::move(scene);
     }
   }
   if (listener_) listener_(state);
@@ -92,6 +93,8 @@ void ViewerThread::describe(ViewerState& state) {
   state.image_count = session.image_count();
   state.quality = session.quality();
   state.quality_changes = session.quality_changes();
+  state.look = session.look();
+  state.look_changes = session.look_changes();
   state.status = session.status();
   state.has_status = session.has_status();
   state.net = session.client().counters();
@@ -114,6 +117,11 @@ std::shared_ptr<const ViewerState> ViewerThread::look() const {
 std::vector<Notice> ViewerThread::take_notices() {
   const std::lock_guard lock(mutex_);
   return notices_.take();
+}
+
+std::optional<SceneText> ViewerThread::take_scene() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(scene_, std::nullopt);
 }
 
 std::shared_ptr<ViewerClient> ViewerThread::client() const {

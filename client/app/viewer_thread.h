@@ -33,6 +33,8 @@ struct ViewerState {
   uint64_t image_count = 0;
   StreamQuality quality;
   uint64_t quality_changes = 0;
+  LookChange look;  // of the scene
+  uint64_t look_changes = 0;
   ServerStatus status;
   bool has_status = false;
   ConnectionCounters net;
@@ -63,6 +65,8 @@ class ViewerThread {
   std::shared_ptr<const ViewerState> look() const;
   /// Notices since the last call, the newest kMaxWaitingNotices.
   std::vector<Notice> take_notices();
+  /// The answer to the last SceneRequest, once.
+  std::optional<SceneText> take_scene();
   /// As ViewerClient::send, to the running connection; Unavailable before the first.
   Status send(const ClientMessage& message);
   void set_playout(Playout playout) { playout_ = playout; }
@@ -92,6 +96,7 @@ class ViewerThread {
   std::shared_ptr<const ViewerState> state_;
   std::shared_ptr<ViewerClient> client_;
   NoticeList notices_;
+  std::optional<SceneText> scene_;
 
   std::thread thread_;  // last: starts when everything else is there
 };

@@ -4,12 +4,15 @@
 #include <future>
 #include <utility>
 
+#include "client/app/look_control.h"
+#include "client/app/save_scene.h"
 #include "client/app/strand_drawer.h"
 #include "client/app/view_hud.h"
 #include "client/app/viewer_thread.h"
 #include "client/window/orbit_camera.h"
 #include "client/window/window.h"
 #include "common/log/log.h"
+#include "common/scene/scene_file.h"
 
 namespace strandcast {
 namespace {
@@ -22,7 +25,9 @@ constexpr int64_t kCameraSendNs = 33 * kNsPerMs;
 constexpr int64_t kReportNs = 1000 * kNsPerMs;
 constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
 constexpr int64_t kPanelNs = 250 * kNsPerMs;          // how often its numbers change
-constexpr milliseconds kLongestWait{50};              // how late a stop is noticed
+constexpr int64_t kSceneWaitNs = 5000 * kNsPerMs;
+constexpr milliseconds kLongestWait{50};       // how late a stop is noticed
+constexpr const char* kLookAnswer = "look={";  // the slider says it already
 
 class WindowedView {
  public:
@@ -71,8 +76,31 @@ class WindowedView {
       wants_whole_ = false;
       save(drawn_.image);
     }
-    for (const Notice& notice : viewer_->take_notices()) show_message(notice.text);
+    for (const Notice& notice : viewer_->take_notices())
+      if (notice.is_error || !notice.text.starts_with(kLookAnswer)) show_message(notice.text);
+    follow_look();
     return {};
+  }
+
+  void follow_look() {
+    if (state_->session_number > 0 && orbit_.set_home(state_->look.camera)) is_camera_sent_ = false;
+    look_.follow(state_->look,
+                 state_->welcome.role == Role::Controller || state_->welcome.role == Role::Admin);
+    if (drawn_.look_trouble && drawn_.look_trouble->to_string() != look_trouble_)
+      show_message("this look cannot be drawn here: " + drawn_.look_trouble->to_string());
+    look_trouble_ = drawn_.look_trouble ? drawn_.look_trouble->to_string() : std::string();
+    if (const auto scene = viewer_->take_scene(); scene && scene_asked_ns_ != 0) {
+      scene_asked_ns_ = 0;
+      const auto whole = scene_of(*scene, look_.shown(now_ns()), orbit_.camera());
+      if (whole)
+        save_text(to_text(*whole));
+      else
+        show_message("the scene is not saved: " + whole.error().to_string());
+    }
+    if (scene_asked_ns_ != 0 && now_ns() - scene_asked_ns_ > kSceneWaitNs) {
+      scene_asked_ns_ = 0;
+      show_message("the scene is not saved: the server does not send it");
+    }
   }
 
   /// What this machine can draw decides what to ask for.
@@ -94,7 +122,7 @@ class WindowedView {
   }
 
   void begin_session(bool is_first) {
-    if (is_first) orbit_ = OrbitCamera(state_->welcome.camera);
+    if (is_first) orbit_ = OrbitCamera(state_->look.camera);
     is_camera_sent_ = false;
   }
 
@@ -119,6 +147,7 @@ class WindowedView {
     if (saving_.valid() && saving_.wait_for(milliseconds(0)) == std::future_status::ready)
       show_message(saving_.get());
     if (viewer_ == nullptr) return;
+    act(actions.form);
 
     if (actions.wants_pause_toggle)
       send(ControlCommand{state_->status.is_paused ? Command::Resume : Command::Pause});
@@ -133,6 +162,31 @@ class WindowedView {
       camera_sent_ns_ = now_ns();
       is_camera_sent_ = send(CameraChange{orbit_.camera()});
     }
+  }
+
+  void act(const FormActions& done) {
+    const int64_t time_ns = now_ns();
+    if (const Status status = look_.edit(done.edits, time_ns); !status)
+      show_message(status.error().to_string());
+    if (done.wants_undo) look_.undo();
+    if (done.file) look_.set_file(*done.file);
+    if (done.wants_save) save_scene_now();
+    drawer_.set_own_look(look_.own_look());
+    if (!state_->is_connected) return;
+    if (auto assignment = look_.take_assignment(time_ns); assignment && !send(SetParameter{*assignment}))
+      look_.put_back();
+  }
+
+  /// The scene of whoever may ask the server for it, else what is known here.
+  void save_scene_now() {
+    if (!look_.is_steering()) return save_text(to_text(look_.shown(now_ns()), orbit_.camera()));
+    if (send(SceneRequest{})) scene_asked_ns_ = now_ns();
+  }
+
+  void save_text(const std::string& text) {
+    const Status saved = save_scene(look_.file(), text);
+    show_message(saved ? fmt::format("saved {0}: strandcast-server --scene {0}", look_.file())
+                       : saved.error().to_string());
   }
 
   /// Strands, frames, the server's choice, and again.
@@ -202,7 +256,9 @@ class WindowedView {
     const int64_t time_ns = now_ns();
     is_due_ = false;
     presented_ns_ = time_ns;
-    window_->present(image_, fit_, hud_.write(*state_, facts(time_ns), time_ns));
+    const bool has_form = window_->is_form_visible() && state_->session_number > 0;
+    window_->present(image_, fit_, hud_.write(*state_, facts(time_ns), time_ns),
+                     has_form ? std::optional(look_.form(is_frames(), time_ns)) : std::nullopt);
     answer_timer_.add_ms(static_cast<double>(now_ns() - woke_ns) / kNsPerMs);
   }
 
@@ -212,6 +268,7 @@ class WindowedView {
     facts.playout = playout_;
     facts.own_reason = own_reason_;
     if (time_ns - message_ns_ < kMessageNs) facts.message = message_;
+    facts.has_own_look = look_.own_look().has_value();
     facts.is_starting = viewer_ == nullptr;
     facts.draw_step = drawn_.step;
     facts.draw_ms = drawn_.draw_timer.median_ms();
@@ -263,6 +320,9 @@ class WindowedView {
   OrbitCamera orbit_{CameraDesc{}};
   std::string own_reason_;  // why this machine needs frames; empty = the server's reason counts
   Playout playout_;
+  LookControl look_;
+  std::string look_trouble_;    // as it was told
+  int64_t scene_asked_ns_ = 0;  // for saving it; 0 = not asked
   HudWriter hud_;
   StageTimer answer_timer_;
   bool is_camera_sent_ = false;

@@ -96,6 +96,14 @@ void Mailbox::push(const FrameQuality& quality) {
   keep_newest(quality);
 }
 
+void Mailbox::push(const LookChange& look) {
+  keep_newest(look);
+}
+
+void Mailbox::push(const SceneText& scene) {
+  keep_newest(scene);
+}
+
 void Mailbox::push(Notice notice) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return;

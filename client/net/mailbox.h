@@ -1,6 +1,6 @@
 // Mailbox: hands what the network thread received to the application thread; bounded in every kind. Strand
 // frames keep their order (a delta needs every frame before it), and so do pictures that build on each other;
-// whole pictures, assets, status, qualities and mode keep only the newest. Any thread. Does not decode.
+// whole pictures, assets, status, qualities, look and mode keep only the newest. Any thread. Does not decode.
 #pragma once
 
 #include <chrono>
@@ -34,7 +34,7 @@ struct ClosedEvent {
 };
 
 using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, FrameQuality, ModeChange,
-                                 SessionList, ClosedEvent>;
+                                 SessionList, LookChange, SceneText, ClosedEvent>;
 
 struct MailboxLimits {
   // Of strand frames, and as much of pictures that build on each other.
@@ -57,6 +57,8 @@ class Mailbox {
   void push(const SessionList& list);
   void push(const ModeChange& change);
   void push(const FrameQuality& quality);
+  void push(const LookChange& look);
+  void push(const SceneText& scene);
   /// The oldest notice gives way when there are too many.
   void push(Notice notice);
   /// Adds the final event; later pushes are ignored.

@@ -41,6 +41,8 @@ websocket::close_code close_code_for(const Error& error) {
 
 // What the server wrote for people, fit for a terminal.
 void clean(ServerStatus&) {}
+void clean(LookChange&) {}
+void clean(SceneText&) {}  // whoever takes it parses it
 void clean(Welcome& welcome) {
   for (std::string* text :
        {&welcome.server_version, &welcome.scene_name, &welcome.mode_reason, &welcome.codec})

@@ -108,15 +108,15 @@ PanelSize draw_hud_panel(const HudState& hud, HudFold fold) {
   return panel("measurements", {{margin, margin}, {0.0f, 0.0f}, max_width, kPanelAlpha}, [&] {
     text(kTextColor, hud.title);
     for (const std::string& warning : hud.warnings) text(kWarningColor, warning);
-    if (fold == HudFold::Small) return text(kLabelColor, "H help   U details");
+    if (fold == HudFold::Small) return text(kLabelColor, "H help   L look   U details");
     ImGui::Spacing();
     for (const HudRow& entry : hud.rows) row(entry.label, entry.value, letters(kLabelLetters));
-    text(kLabelColor, "H help   U hides this");
+    text(kLabelColor, "H help   L look   U hides this");
   });
 }
 
 PanelSize draw_help_panel() {
-  static constexpr std::array<std::pair<const char*, const char*>, 12> kHelp{{
+  static constexpr std::array<std::pair<const char*, const char*>, 13> kHelp{{
       {"left drag", "turn about the head"},
       {"middle, right drag", "move the view"},
       {"wheel", "closer, farther"},
@@ -125,6 +125,7 @@ PanelSize draw_help_panel() {
       {"N", "one simulation step"},
       {"P", "newest state or smooth playout"},
       {"M", "auto, strands drawn here, or the server's pictures"},
+      {"L", "look of the hair: colours, style, light; save it as a scene"},
       {"S", "save a picture"},
       {"U", "details, nothing, or one line in the corner"},
       {"H, F1", "this help"},

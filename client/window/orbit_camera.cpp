@@ -24,13 +24,14 @@ glm::vec3 from_polar(const Polar& polar) {
                                       level * std::cos(polar.yaw_rad));
 }
 
+CameraDesc usable(CameraDesc home) {
+  if (!(glm::length(home.offset_m) >= kMinOrbitDistanceM)) home.offset_m = CameraDesc().offset_m;
+  return home;
+}
+
 }  // namespace
 
-OrbitCamera::OrbitCamera(const CameraDesc& home) : home_(home) {
-  const CameraDesc fallback;
-  if (!(glm::length(home_.offset_m) >= kMinOrbitDistanceM)) home_.offset_m = fallback.offset_m;
-  camera_ = home_;
-}
+OrbitCamera::OrbitCamera(const CameraDesc& home) : home_(usable(home)), camera_(home_) {}
 
 void OrbitCamera::orbit(const glm::vec2& drag_heights) {
   Polar polar = to_polar(camera_.offset_m);
@@ -60,6 +61,15 @@ void OrbitCamera::zoom(float wheel_steps) {
 
 void OrbitCamera::reset() {
   camera_ = home_;
+}
+
+bool OrbitCamera::set_home(const CameraDesc& home) {
+  const CameraDesc next = usable(home);
+  if (next == home_) return false;
+  const bool is_at_home = camera_ == home_;
+  home_ = next;
+  if (is_at_home) camera_ = next;
+  return is_at_home;
 }
 
 }  // namespace strandcast

@@ -27,6 +27,8 @@ class OrbitCamera {
   /// Wheel steps, positive comes closer.
   void zoom(float wheel_steps);
   void reset();
+  /// Another view to return to; who looks from the old one looks from there at once. True then.
+  bool set_home(const CameraDesc& home);
 
   const CameraDesc& camera() const { return camera_; }
 

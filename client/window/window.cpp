@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/window/form_panel.h"
 #include "client/window/hud_panel.h"
 #include "common/log/log.h"
 
@@ -48,6 +49,7 @@ struct Window::State {
   bool has_imgui = false;
   HudFold fold = HudFold::Small;
   bool is_help_visible = false;
+  bool is_form_visible = false;
   glm::dvec2 cursor{0.0};
   WindowActions actions;
   GLuint picture = 0;  // plain OpenGL 3.3: it must work where nothing better is to be had
@@ -67,6 +69,7 @@ struct Window::State {
 
   void on_key(int key) {
     actions.is_touched = true;
+    if (is_form_visible && ImGui::GetIO().WantTextInput) return;  // it is being typed
     switch (key) {
       case GLFW_KEY_ESCAPE:
       case GLFW_KEY_Q:
@@ -93,6 +96,9 @@ struct Window::State {
       case GLFW_KEY_U:
         fold = next_fold(fold);
         break;
+      case GLFW_KEY_L:
+        is_form_visible = !is_form_visible;
+        break;
       case GLFW_KEY_H:
       case GLFW_KEY_F1:
         is_help_visible = !is_help_visible;
@@ -105,6 +111,8 @@ struct Window::State {
   void on_cursor(const glm::dvec2& position) {
     const glm::dvec2 moved = position - cursor;
     cursor = position;
+    // Its fields answer to the pointer.
+    actions.is_touched = actions.is_touched || is_form_visible;
     int width = 0;
     int height = 0;
     glfwGetWindowSize(window, &width, &height);
@@ -127,8 +135,16 @@ struct Window::State {
     });
     glfwSetScrollCallback(window, [](GLFWwindow* source, double, double steps) {
       WindowActions& wanted = static_cast<State*>(glfwGetWindowUserPointer(source))->actions;
-      wanted.zoom_steps += static_cast<float>(steps);
       wanted.is_touched = true;
+      if (!ImGui::GetIO().WantCaptureMouse) wanted.zoom_steps += static_cast<float>(steps);
+    });
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* source, int, int, int) {
+      State& state = *static_cast<State*>(glfwGetWindowUserPointer(source));
+      state.actions.is_touched = state.actions.is_touched || state.is_form_visible;
+    });
+    glfwSetCharCallback(window, [](GLFWwindow* source, unsigned int) {
+      State& state = *static_cast<State*>(glfwGetWindowUserPointer(source));
+      state.actions.is_touched = state.actions.is_touched || state.is_form_visible;
     });
     // Uncovered, or of another size: the old picture is gone.
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* source) {
@@ -141,8 +157,9 @@ struct Window::State {
 
   void upload(const std::shared_ptr<const Image>& image);
   void add_picture(const Image& image, PictureFit fit) const;
-  void add_panels(const HudState& hud) const {
+  void add_panels(const HudState& hud, const std::optional<FormState>& form) {
     draw_hud_panel(hud, fold);
+    if (form && is_form_visible) draw_form_panel(*form, actions.form);
     if (hud.banner) draw_banner(*hud.banner);
     if (is_help_visible) draw_help_panel();
   }
@@ -236,20 +253,25 @@ void Window::State::add_picture(const Image& image, PictureFit fit) const {
                                            ImVec2(corner.x + shown.x, corner.y + shown.y));
 }
 
-void Window::present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud) {
+bool Window::is_form_visible() const {
+  return state_->is_form_visible;
+}
+
+void Window::present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud,
+                     const std::optional<FormState>& form) {
   const RenderSize size = framebuffer_size();
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   // Panels learn their size from what they held before: the first time is not drawn.
   ImGui::NewFrame();
-  state_->add_panels(hud);
+  state_->add_panels(hud, form);
   ImGui::EndFrame();
   ImGui::NewFrame();
   if (image != nullptr && !image->rgba.empty()) {
     state_->upload(image);
     state_->add_picture(*image, fit);
   }
-  state_->add_panels(hud);
+  state_->add_panels(hud, form);
   ImGui::Render();
   glViewport(0, 0, static_cast<GLsizei>(size.width), static_cast<GLsizei>(size.height));
   constexpr float kDarkGrey = 0.1f;
@@ -257,6 +279,7 @@ void Window::present(const std::shared_ptr<const Image>& image, PictureFit fit, 
   glClear(GL_COLOR_BUFFER_BIT);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glfwSwapBuffers(state_->window);
+  if (!state_->actions.form.is_empty()) wake();
 }
 
 }  // namespace strandcast

@@ -6,8 +6,10 @@
 #include <chrono>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "client/window/form.h"
 #include "client/window/hud.h"
 #include "common/base/picture_size.h"
 #include "common/base/result.h"
@@ -28,6 +30,7 @@ struct WindowActions {
   glm::vec2 orbit_heights{0.0f};      // left drag, in window heights
   glm::vec2 pan_heights{0.0f};        // middle or right drag
   float zoom_steps = 0.0f;            // wheel
+  FormActions form;                   // what was done in the form
 };
 
 /// How a picture of other sides than the window's is shown.
@@ -49,8 +52,12 @@ class Window {
   static void wake();
   /// Size of the framebuffer, pixels; 0 x 0 while minimised.
   RenderSize framebuffer_size() const;
-  /// Shows this picture (dark grey when there is none) with the panels over it; waits for the display.
-  void present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud);
+  /// Whether the person has opened the form (L).
+  bool is_form_visible() const;
+  /// Shows this picture (dark grey when there is none) with the panels over it, the form too when it is given
+  /// and open; waits for the display. What is done in the form comes with the next wait().
+  void present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud,
+               const std::optional<FormState>& form);
 
  private:
   struct State;

@@ -69,13 +69,13 @@ LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, co
   return desc;
 }
 
-LookDesc limited(LookDesc look) {
+}  // namespace
+
+LookDesc drawable(LookDesc look) {
   look.followers = std::min(look.followers, kMaxFollowers);
   look.segments = std::clamp(look.segments, 1u, kMaxSegmentsPerGap);
   return look;
 }
-
-}  // namespace
 
 Status check_asset(const SceneAsset& asset) {
   const size_t expected = static_cast<size_t>(asset.strand_count) * asset.vertex_count;
@@ -103,7 +103,7 @@ Status check_asset(const SceneAsset& asset) {
 }
 
 RenderScene::RenderScene(const SceneAsset& asset, const LookDesc& wanted_look, bool is_drawn_by_software)
-    : look(limited(wanted_look)),
+    : look(drawable(wanted_look)),
       features(analyse_picture(asset, look)),
       is_software(is_drawn_by_software),
       triangle_count(static_cast<uint32_t>(asset.triangle.size())),

@@ -45,6 +45,9 @@ struct RenderScene {
   PictureTarget picture;
 };
 
+/// The look within what renderers can draw.
+LookDesc drawable(LookDesc look);
+
 /// BadInput names what of an asset does not fit together.
 Status check_asset(const SceneAsset& asset);
 

@@ -15,28 +15,84 @@ Status add_planned(const RenderPath& path, RenderScene& scene, RenderPassList& p
   return passes.plan({&scene.strands}, {&scene.picture});
 }
 
+/// Whether the passes that were made for one look draw the other: what they are made for is how much there is
+/// to draw. The rest they read anew for each picture, and what is not named here makes new passes.
+bool have_same_passes(const LookDesc& a, const LookDesc& b) {
+  LookDesc alike = b;
+  alike.hair_color = a.hair_color;
+  alike.root_color = a.root_color;
+  alike.tip_color = a.tip_color;
+  alike.eumelanin = a.eumelanin;
+  alike.pheomelanin = a.pheomelanin;
+  alike.tip_scale = a.tip_scale;
+  alike.style = a.style;
+  alike.shading = a.shading;
+  alike.light_direction = a.light_direction;
+  alike.light_color = a.light_color;
+  alike.rim_direction = a.rim_direction;
+  alike.rim_color = a.rim_color;
+  alike.ambient = a.ambient;
+  alike.exposure = a.exposure;
+  alike.background = a.background;
+  alike.skin_color = a.skin_color;
+  return alike == a;
+}
+
+/// What one look is drawn with.
+struct LookPasses {
+  LookPasses(const SceneAsset& asset, const LookDesc& look, bool is_software)
+      : scene(asset, look, is_software) {}
+
+  RenderScene scene;  // before the passes that refer to it
+  RenderPassList list;
+};
+
 class PathRenderer final : public Renderer {
  public:
-  PathRenderer(const gl::DeviceInfo& device, const SceneAsset& asset, const LookDesc& look)
-      : timer_(device),
-        scene_(asset, look, device.is_software),
+  PathRenderer(const gl::ShaderLibrary& shaders, const gl::DeviceInfo& device, const SceneAsset& asset,
+               const RenderPath& path)
+      : shaders_(shaders),
+        is_software_(device.is_software),
+        asset_(asset),
+        path_(path),
+        timer_(device),
         position_count_(asset.rest_position_m.size()) {}
 
-  Status prepare(const RenderPath& path, const RenderSetup& setup) {
-    RETURN_IF_ERROR(add_planned(path, scene_, passes_));
-    return passes_.prepare(setup);
+  /// With passes of its own.
+  Status prepare(const LookDesc& look) {
+    auto passes = std::make_unique<LookPasses>(asset_, look, is_software_);
+    RETURN_IF_ERROR(add_planned(path_, passes->scene, passes->list));
+    RETURN_IF_ERROR(passes->list.prepare({shaders_, asset_}));
+    passes_ = std::move(passes);
+    look_ = look;
+    return {};
+  }
+
+  Status set_look(const LookDesc& look) override {
+    if (look == look_) return {};
+    if (!have_same_passes(look_, look)) return prepare(look);
+    LookDesc& drawn = passes_->scene.look;
+    const LookDesc limited = std::exchange(drawn, look);
+    drawn.followers = limited.followers;
+    drawn.segments = limited.segments;
+    look_ = look;
+    return {};
   }
 
   Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
               const DrawTerms& terms) override;
-  Image read_image() override { return scene_.picture.read_image(); }
+  Image read_image() override { return passes_->scene.picture.read_image(); }
   const RenderProfile& profile() const override { return profile_; }
-  const gl::PassListBase& passes() const override { return passes_; }
+  const gl::PassListBase& passes() const override { return passes_->list; }
 
  private:
+  const gl::ShaderLibrary shaders_;
+  const bool is_software_;
+  const SceneAsset& asset_;
+  const RenderPath path_;
   gl::GpuTimer timer_;
-  RenderScene scene_;  // before the passes that refer to it
-  RenderPassList passes_;
+  LookDesc look_;  // as it was wanted
+  std::unique_ptr<LookPasses> passes_;
   size_t position_count_ = 0;
   RenderProfile profile_;
 };
@@ -48,8 +104,8 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
   ASSIGN_OR_RETURN(const View view,
                    make_view(camera, strands.world_from_head.rotation, pixels * kSamplesPerSide));
   RenderTurn turn(strands, view, pixels, terms);
-  RETURN_IF_ERROR(passes_.run(turn, &timer_));
-  profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
+  RETURN_IF_ERROR(passes_->list.run(turn, &timer_));
+  profile_ = {passes_->list.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
   return {};
 }
 
@@ -73,8 +129,8 @@ Result<std::unique_ptr<Renderer>> Renderer::make(const gl::ShaderLibrary& shader
                                                  const gl::DeviceInfo& device, const SceneAsset& asset,
                                                  const LookDesc& look, const RenderPath& path) {
   RETURN_IF_ERROR(check_asset(asset));
-  auto renderer = std::make_unique<PathRenderer>(device, asset, look);
-  RETURN_IF_ERROR(renderer->prepare(path, {shaders, asset}));
+  auto renderer = std::make_unique<PathRenderer>(shaders, device, asset, path);
+  RETURN_IF_ERROR(renderer->prepare(look));
   return std::unique_ptr<Renderer>(std::move(renderer));
 }
 

@@ -30,7 +30,7 @@ struct RenderProfile {
 
 class Renderer {
  public:
-  /// Compiles, allocates and uploads only what asset and look need.
+  /// Compiles, allocates and uploads only what asset and look need. `asset` outlives calls of set_look().
   static Result<std::unique_ptr<Renderer>> make(const gl::ShaderLibrary& shaders,
                                                 const gl::DeviceInfo& device, const SceneAsset& asset,
                                                 const LookDesc& look,
@@ -42,6 +42,9 @@ class Renderer {
   /// input.
   virtual Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
                       const DrawTerms& terms = {}) = 0;
+  /// From the next draw on; its pixels are then those of a renderer that was made with this look. On an error
+  /// the look of before stays.
+  virtual Status set_look(const LookDesc& look) = 0;
   /// Pixels of the last draw, top row first.
   virtual Image read_image() = 0;
   virtual const RenderProfile& profile() const = 0;

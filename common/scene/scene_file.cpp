@@ -21,7 +21,8 @@ namespace {
 namespace pb = google::protobuf;
 using scene_fields::Range;
 
-constexpr int kMaxNesting = 16;  // scene.proto nests four deep
+constexpr int kMaxNesting = 16;         // scene.proto nests four deep
+constexpr size_t kMaxShownChars = 200;  // of an assignment, in error messages
 
 const pb::FieldDescriptor& field_of(const pb::Message& message, const char* name) {
   const auto* field = message.GetDescriptor()->FindFieldByName(name);
@@ -199,7 +200,8 @@ class Reader {
   std::string place_of(const char* name, const std::string& path) const {
     for (auto item = source_.overrides->rbegin(); item != source_.overrides->rend(); ++item) {
       const std::string set(override_path(*item));
-      if (set == path || path.starts_with(set + '.') || set.starts_with(path + '.')) return "--set " + *item;
+      if (set == path || path.starts_with(set + '.') || set.starts_with(path + '.'))
+        return "--set " + excerpt(*item, kMaxShownChars);
     }
     const auto& field = field_of(*message_, name);
     if (!tree_) return source_.place;
@@ -424,6 +426,43 @@ Result<SceneDesc> built_in_scene_with(const std::vector<std::string>& overrides)
 std::string to_text(const SceneDesc& scene) {
   std::string text;
   CHECK(pb::TextFormat::PrintToString(to_message(scene), &text));
+  return text;
+}
+
+SceneDesc with_absolute_paths(SceneDesc scene) {
+  const auto complete = [](std::filesystem::path& path) {
+    std::error_code failure;
+    if (path.empty()) return;
+    const std::filesystem::path absolute = std::filesystem::absolute(path, failure);
+    if (!failure) path = absolute.lexically_normal();
+  };
+  complete(scene.head.mesh_path);
+  for (std::filesystem::path& path : scene.head.more_mesh_paths) complete(path);
+  if (auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
+    complete(file->path);
+    for (std::filesystem::path& path : file->more_paths) complete(path);
+  }
+  return scene;
+}
+
+std::string to_line(const SceneDesc& scene) {
+  std::string text;
+  pb::TextFormat::Printer printer;
+  printer.SetSingleLineMode(true);
+  CHECK(printer.PrintToString(to_message(scene), &text));
+  return text;
+}
+
+std::string to_text(const LookDesc& look, const CameraDesc& camera) {
+  SceneDesc scene;
+  scene.look = look;
+  scene.camera = camera;
+  const v1::Scene whole = to_message(scene);
+  v1::Scene part;
+  *part.mutable_look() = whole.look();
+  *part.mutable_camera() = whole.camera();
+  std::string text;
+  CHECK(pb::TextFormat::PrintToString(part, &text));
   return text;
 }
 

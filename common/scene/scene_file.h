@@ -30,5 +30,11 @@ Result<SceneDesc> with_overrides(const SceneDesc& scene, const std::vector<std::
 
 /// The scene as protobuf text that parse_scene reads back to an equal SceneDesc.
 std::string to_text(const SceneDesc& scene);
+/// Likewise in one line, for messages.
+std::string to_line(const SceneDesc& scene);
+/// With paths that hold wherever it is saved; relative ones start at the current folder.
+SceneDesc with_absolute_paths(SceneDesc scene);
+/// Look and camera alone: a scene whose other fields keep their defaults.
+std::string to_text(const LookDesc& look, const CameraDesc& camera);
 
 }  // namespace strandcast

@@ -147,6 +147,11 @@ void visit(Visitor& v, ModeRequest& m) {
   v.choice("mode", m.mode, StreamMode::Auto);
 }
 
+template <>
+inline constexpr const char* kKind<SceneRequest> = "scene_request";
+template <class Visitor>
+void visit(Visitor&, SceneRequest&) {}
+
 // ---- server to client ----
 
 static_assert(kSessionIdChars == 16, "as the sentence below says");
@@ -270,6 +275,21 @@ void visit(Visitor& v, SessionList& m) {
     v.measure("queue_delay_ms", session.queue_delay_ms);
     v.measure("connected_s", session.connected_s);
   });
+}
+
+template <>
+inline constexpr const char* kKind<LookChange> = "look_change";
+template <class Visitor>
+void visit(Visitor& v, LookChange& m) {
+  v.group("look", [&] { scene_fields::visit_look(v, m.look); });
+  v.group("camera", [&] { scene_fields::visit_camera(v, m.camera); });
+}
+
+template <>
+inline constexpr const char* kKind<SceneText> = "scene_text";
+template <class Visitor>
+void visit(Visitor& v, SceneText& m) {
+  v.exact_text("text", m.text, kMaxSceneTextBytes);
 }
 
 }  // namespace strandcast::wire_fields

@@ -27,6 +27,7 @@ inline constexpr size_t kMaxNameChars = 64;    // names of clients, scenes, code
 inline constexpr size_t kMaxTextChars = 1024;  // reasons and notices
 inline constexpr size_t kMaxTokenBytes = 256;
 inline constexpr size_t kMaxAssignmentBytes = 4096;  // SetParameter
+inline constexpr size_t kMaxSceneTextBytes = 60u << 10;
 inline constexpr size_t kSessionIdChars = 16;
 inline constexpr uint32_t kMaxRateDivisor = 64;
 // A full SessionList stays below kMaxControlBytes.
@@ -118,9 +119,12 @@ struct ModeRequest {  // answered by a ModeChange
   StreamMode mode = StreamMode::Auto;
   bool operator==(const ModeRequest&) const = default;
 };
+struct SceneRequest {  // from a Controller; answered by a SceneText or a Notice
+  bool operator==(const SceneRequest&) const = default;
+};
 using ClientMessage =
     std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
-                 ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand>;
+                 ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand, SceneRequest>;
 
 // ---- server to client ----
 struct Welcome {
@@ -211,8 +215,17 @@ struct SessionList {                  // answer to an AdminCommand
   std::vector<SessionInfo> sessions;  // at most kMaxListedSessions
   bool operator==(const SessionList&) const = default;
 };
+struct LookChange {  // what the scene looks like from now on, and its own camera
+  LookDesc look;
+  CameraDesc camera;
+  bool operator==(const LookChange&) const = default;
+};
+struct SceneText {   // the scene as it runs
+  std::string text;  // as in a scene file, in one line
+  bool operator==(const SceneText&) const = default;
+};
 using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange,
-                                   SessionList, FrameQuality>;
+                                   SessionList, FrameQuality, LookChange, SceneText>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

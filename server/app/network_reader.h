@@ -21,6 +21,13 @@ class NetworkReader : public StreamReader {
   void on_picture_refused(PictureClass picture_class, const Error& error) override {
     net_.send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()});
   }
+  void on_look_refused(PictureClass picture_class, const Error& error) override {
+    net_.send_to_class(picture_class, Notice{true,
+                                             "The server's pictures keep their look, this one cannot be "
+                                             "drawn there: " +
+                                                 error.to_string()});
+  }
+  void on_look_change(const LookChange& look) override { net_.broadcast(look); }
   void on_pictures_failed(const Error& error) override {
     net_.broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});
   }

@@ -58,19 +58,26 @@ class Server::State {
 
  private:
   Status choose_stream(const SceneAsset& asset);
+  RendererKind planned_renderer() const {
+    return config_.renderer == "gl" ? RendererKind::Gl : RendererKind::Tiles;
+  }
   Status connect(EncodedFramePtr asset_frame);
   void run_status();
   void watch_speed(const ServerCounters& now);
   std::string metrics() const;
+  gl::PassReports idle_picture_passes() const;
 
   ServerConfig config_;
   InputHub inputs_;
-  gl::PassReports idle_picture_passes_;  // what the frame thread would run
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
   std::unique_ptr<StateSource> source_;
   std::unique_ptr<SessionDesk> desk_;
   std::unique_ptr<NetServer> net_;
+
+  mutable std::mutex idle_passes_mutex_;  // guards the two below
+  mutable LookDesc idle_look_;
+  mutable gl::PassReports idle_picture_passes_;  // what the frame thread would run for that look
 
   std::mutex mutex_;  // guards has_stopped_
   std::condition_variable changed_;
@@ -93,12 +100,14 @@ Status Server::State::start() {
   ASSIGN_OR_RETURN(EncodedFramePtr asset_frame, encode_asset(*asset));
   const PainterConfig painter{
       {config_.renderer, config_.gl_device, config_.shader_folder}, asset, scene.look};
-  ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream, scene.step_rate_hz,
-                                          make_scene_view(scene, scene_picture_size(scene), 0), asset,
-                                          config_.make_painter(painter)}));
-  ASSIGN_OR_RETURN(idle_picture_passes_,
-                   plan_picture_passes(*asset, scene.look,
-                                       config_.renderer == "gl" ? RendererKind::Gl : RendererKind::Tiles, 0));
+  ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream,
+                                          scene.step_rate_hz,
+                                          make_scene_view(scene, scene_picture_size(scene), 0),
+                                          asset,
+                                          config_.make_painter(painter),
+                                          {scene.look, scene.camera}}));
+  ASSIGN_OR_RETURN(idle_picture_passes_, plan_picture_passes(*asset, scene.look, planned_renderer(), 0));
+  idle_look_ = scene.look;
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
   RETURN_IF_ERROR(source_->start(*hub_, scene.stream));
@@ -216,8 +225,19 @@ ServerCounters Server::State::counters() const {
 gl::PassReports Server::State::passes() const {
   ThreadPasses threads{source_->stats().passes, hub_->strand_passes(), hub_->picture_passes()};
   const bool is_drawing = !threads.pictures.empty();
-  if (!is_drawing) threads.pictures = idle_picture_passes_;
+  if (!is_drawing) threads.pictures = idle_picture_passes();
   return join_passes(std::move(threads), is_drawing);
+}
+
+gl::PassReports Server::State::idle_picture_passes() const {
+  const LookDesc look = hub_->look().look;
+  const std::lock_guard lock(idle_passes_mutex_);
+  if (look != idle_look_) {
+    if (auto planned = plan_picture_passes(*source_->asset(), look, planned_renderer(), 0))
+      idle_picture_passes_ = std::move(planned).value();
+    idle_look_ = look;
+  }
+  return idle_picture_passes_;
 }
 
 std::string Server::State::metrics() const {

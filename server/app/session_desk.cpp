@@ -8,6 +8,7 @@
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
+#include "common/scene/scene_file.h"
 #include "server/app/mode_facts.h"
 
 namespace strandcast {
@@ -45,6 +46,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
   const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
+  viewers_.set_scene_camera(parts_.hub.look().camera);
   const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, visitor.subscription, hello);
   if (!place) {
     parts_.hub.remove(reader);
@@ -71,8 +73,9 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place) const {
   welcome.vertex_count = asset->vertex_count;
   welcome.bound_m = parts_.hub.stream().bound_m;
   welcome.step_rate_hz = scene.step_rate_hz;
-  welcome.look = scene.look;
-  welcome.camera = scene.camera;
+  const LookChange look = parts_.hub.look();
+  welcome.look = look.look;
+  welcome.camera = look.camera;
   welcome.frame_width = place.size.width;
   welcome.frame_height = place.size.height;
   return welcome;
@@ -94,6 +97,21 @@ void SessionDesk::on_command(SessionId session, const ControlCommand& command) {
 
 void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter) {
   if (may_control(session, parameter.assignment)) parts_.source.post(parameter, reply_to(session));
+}
+
+void SessionDesk::on_scene_request(SessionId session) {
+  if (!may_control(session, "save the scene")) return;
+  const std::optional<SceneDesc> scene = parts_.source.scene();
+  SceneText answer{scene ? to_line(*scene) : std::string()};
+  if (!scene)
+    net_->send(session, Notice{true, "What is shown here is no scene that could be saved."});
+  else if (answer.text.size() > kMaxSceneTextBytes)
+    net_->send(session,
+               Notice{true, fmt::format("The scene has {} bytes as text and cannot be sent: the limit "
+                                        "is {}.",
+                                        answer.text.size(), kMaxSceneTextBytes)});
+  else
+    net_->send(session, std::move(answer));
 }
 
 StateSource::Reply SessionDesk::reply_to(SessionId session) {

@@ -44,6 +44,7 @@ class SessionDesk : public NetHandler {
   void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) override;
   void on_command(SessionId session, const ControlCommand& command) override;
   void on_parameter(SessionId session, const SetParameter& parameter) override;
+  void on_scene_request(SessionId session) override;
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }

@@ -43,6 +43,8 @@ class Viewers {
   /// `desk` outlives this.
   Viewers(const SceneDesc& scene, DemandDesk& desk) : scene_(scene), desk_(desk) {}
 
+  /// Of those who join from now on, until they say their own.
+  void set_scene_camera(const CameraDesc& camera) { scene_.camera = camera; }
   /// A Source gets a place too, without any stream. Unavailable while too many pictures are drawn for others,
   /// BadInput for a size that cannot be drawn.
   /// `subscription` is filled in, and outlives the session's place here.
@@ -105,7 +107,7 @@ class Viewers {
   ModeChange stay(Viewer& viewer, const std::string& reason);
   void count();
 
-  const SceneDesc scene_;
+  SceneDesc scene_;
   std::map<SessionId, Viewer> viewers_;
   DemandDesk& desk_;
   std::atomic<uint32_t> viewer_count_{0};

@@ -84,6 +84,14 @@ void FrameWorker::set_views(std::map<uint32_t, PictureView> views) {
   changed_.notify_all();
 }
 
+void FrameWorker::set_look(const LookDesc& look) {
+  {
+    const std::lock_guard lock(mutex_);
+    new_look_ = look;
+  }
+  changed_.notify_all();
+}
+
 void FrameWorker::request_whole(uint32_t picture_class) {
   {
     const std::lock_guard lock(mutex_);
@@ -126,6 +134,7 @@ void FrameWorker::run() {
   while (true) {
     const Job job = wait_for_job();
     if (job.is_stopping) break;
+    if (job.look) take_look(*job.look);
     if (job.views.empty()) {
       rest();
       continue;
@@ -146,7 +155,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
   std::unique_lock lock(mutex_);
   while (true) {
     const bool has_news = is_stopping_ || can_draw() != is_active_ || has_new_views_ || !pending_.empty() ||
-                          !wanted_wholes_.empty();
+                          !wanted_wholes_.empty() || new_look_;
     const auto due = is_active_ ? next_due() : std::nullopt;
     const int64_t wait_ns = due ? due->wait.due_ns - now_ns() : 1;
     if (has_news || wait_ns <= 0) break;
@@ -157,7 +166,11 @@ FrameWorker::Job FrameWorker::wait_for_job() {
   }
   has_new_views_ = false;
   pending_bytes_ = 0;
-  Job job{std::exchange(pending_, {}), {}, std::exchange(wanted_wholes_, {}), is_stopping_};
+  Job job{std::exchange(pending_, {}),
+          {},
+          std::exchange(wanted_wholes_, {}),
+          std::exchange(new_look_, std::nullopt),
+          is_stopping_};
   if (can_draw()) job.views = views_;
   return job;
 }
@@ -175,6 +188,16 @@ void FrameWorker::rest() {
   drawn_.clear();
   const std::lock_guard lock(mutex_);
   painted_.clear();
+}
+
+/// The same state is drawn again, as with another camera.
+void FrameWorker::take_look(LookDesc look) {
+  wanted_look_ = std::move(look);
+  for (auto& [picture_class, drawn] : drawn_) {
+    drawn.decode_count = 0;
+    drawn.is_refused = false;
+    drawn.is_still = false;
+  }
 }
 
 void FrameWorker::update_views(const std::map<uint32_t, PictureView>& views) {
@@ -340,8 +363,24 @@ void FrameWorker::paint_alike(const PictureView& view) {
 Result<Image> FrameWorker::paint(const PictureView& view) {
   if (painter_ == nullptr) {
     ASSIGN_OR_RETURN(painter_, make_painter_());
+    if (look_) RETURN_IF_ERROR(painter_->set_look(*look_));  // which was drawn before
   }
+  follow_look();
   return painter_->paint(snapshot_, view);
+}
+
+/// Where the look that is wanted cannot be drawn, pictures go on with the one before.
+void FrameWorker::follow_look() {
+  if (!wanted_look_) return;
+  const LookDesc wanted = *std::exchange(wanted_look_, std::nullopt);
+  const Status status = painter_->set_look(wanted);
+  if (status) {
+    look_ = wanted;
+    return;
+  }
+  log_warn("render", "pictures keep their look: {}", status.error().to_string());
+  if (!hooks_.on_look_refused) return;
+  for (const auto& [picture_class, drawn] : drawn_) hooks_.on_look_refused(picture_class, status.error());
 }
 
 PictureStamp FrameWorker::stamp(uint32_t picture_class) const {

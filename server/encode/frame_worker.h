@@ -60,6 +60,9 @@ class FrameWorker {
     /// Called on the worker's thread when one class cannot be drawn; it is left out until its view changes.
     /// May be empty.
     std::function<void(uint32_t picture_class, const Error& error)> on_refused;
+    /// Called on the worker's thread for each class when its pictures keep their look because the newest
+    /// cannot be drawn. May be empty.
+    std::function<void(uint32_t picture_class, const Error& error)> on_look_refused;
     /// Called once, on the worker's thread, when no frames can be drawn any more (no GL, say). May be empty.
     std::function<void(const Error& error)> on_failure;
   };
@@ -77,6 +80,9 @@ class FrameWorker {
   /// What to draw from now on, by picture class; none: the painter is destroyed and strand frames are not
   /// needed.
   void set_views(std::map<uint32_t, PictureView> views);
+  /// What pictures look like from now on; what stands is drawn again. Before the first call as the painter is
+  /// made.
+  void set_look(const LookDesc& look);
   /// Gives the newest picture of a class again, for viewers that have none; video at the next keyframe that
   /// may be made. Ignored for unknown classes, and before the first picture.
   void request_whole(uint32_t picture_class);
@@ -110,6 +116,7 @@ class FrameWorker {
     std::deque<EncodedFramePtr> strand_frames;
     std::map<uint32_t, PictureView> views;
     std::set<uint32_t> wholes;
+    std::optional<LookDesc> look;
     bool is_stopping = false;
   };
   enum class Task { Paint, Whole, Still };
@@ -124,6 +131,7 @@ class FrameWorker {
   bool can_draw() const { return !views_.empty() && !failure_; }  // mutex_ is held
   void begin();
   void rest();
+  void take_look(LookDesc look);
   void update_views(const std::map<uint32_t, PictureView>& views);
   void decode(const std::deque<EncodedFramePtr>& strand_frames);
   void share_time();
@@ -135,6 +143,7 @@ class FrameWorker {
   void serve(const Due& due);
   void paint_alike(const PictureView& view);
   Result<Image> paint(const PictureView& view);
+  void follow_look();
   Status encode(uint32_t picture_class, const Image& image);
   Status resend(const Due& due);
   PictureStamp stamp(uint32_t picture_class) const;
@@ -155,6 +164,7 @@ class FrameWorker {
   std::map<uint32_t, PictureView> views_;
   bool has_new_views_ = false;
   std::set<uint32_t> wanted_wholes_;
+  std::optional<LookDesc> new_look_;
   bool is_stopping_ = false;
   std::optional<Error> failure_;
   FrameCounters counters_;
@@ -166,6 +176,8 @@ class FrameWorker {
   // Of the worker's thread.
   bool is_active_ = false;
   std::unique_ptr<PicturePainter> painter_;
+  std::optional<LookDesc> look_;         // of the pictures; nothing = as painters are made
+  std::optional<LookDesc> wanted_look_;  // not yet tried
   std::shared_ptr<const Snapshot> snapshot_;
   uint64_t decode_count_ = 0;
   bool is_chain_lost_ = true;  // until a keyframe comes

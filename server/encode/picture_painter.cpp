@@ -10,8 +10,9 @@ namespace {
 
 class DevicePicturePainter : public PicturePainter {
  public:
-  DevicePicturePainter(std::unique_ptr<RenderDevice> device, std::unique_ptr<Renderer> renderer)
-      : device_(std::move(device)), renderer_(std::move(renderer)) {}
+  DevicePicturePainter(std::shared_ptr<const SceneAsset> asset, std::unique_ptr<RenderDevice> device,
+                       std::unique_ptr<Renderer> renderer)
+      : asset_(std::move(asset)), device_(std::move(device)), renderer_(std::move(renderer)) {}
   ~DevicePicturePainter() override {
     if (device_->make_current()) renderer_.reset();  // GL objects are deleted from the context that made them
   }
@@ -27,6 +28,8 @@ class DevicePicturePainter : public PicturePainter {
     return renderer_->read_image();
   }
 
+  Status set_look(const LookDesc& look) override { return renderer_->set_look(look); }
+
   gl::PassReports passes() const override {
     gl::PassReports passes = renderer_->passes().report();
     passes.push_back(read_back_report(read_timer_));
@@ -34,7 +37,8 @@ class DevicePicturePainter : public PicturePainter {
   }
 
  private:
-  std::unique_ptr<RenderDevice> device_;  // outlives the renderer
+  const std::shared_ptr<const SceneAsset> asset_;  // that the renderer is made for
+  std::unique_ptr<RenderDevice> device_;           // outlives the renderer
   std::unique_ptr<Renderer> renderer_;
   StageTimer read_timer_;
   PosedStrands strands_;
@@ -55,7 +59,7 @@ MakePicturePainter device_picture_painter(PainterConfig config) {
     ASSIGN_OR_RETURN(auto renderer, device->make_renderer(*config.asset, config.look));
     log_info("render", "frames are drawn by {}", device->info().name);
     return std::unique_ptr<PicturePainter>(
-        std::make_unique<DevicePicturePainter>(std::move(device), std::move(renderer)));
+        std::make_unique<DevicePicturePainter>(config.asset, std::move(device), std::move(renderer)));
   };
 }
 

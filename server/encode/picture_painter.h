@@ -24,6 +24,8 @@ class PicturePainter {
   /// again after a reset. BadInput and LimitExceeded concern this view alone; after any other error nothing
   /// can be painted any more.
   virtual Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) = 0;
+  /// From the next picture on. On an error the look of before stays, and painting goes on.
+  virtual Status set_look(const LookDesc&) { return {}; }
   /// What it runs to paint.
   virtual gl::PassReports passes() const { return {}; }
 };

@@ -148,11 +148,26 @@ PictureUse PictureViews::use_with(const PictureView& view, IsCounted is_counted)
   return use;
 }
 
+/// There always is, but after its camera was moved while others stayed.
+Status PictureViews::check_reserved_room(const PictureView& view, uint32_t left_class) const {
+  PictureUse all = use_with(view, [&](uint32_t one) { return one != left_class; });
+  for (const auto& [picture_class, other] : view_of_class_) {
+    if (!is_reserved(other) || picture_class == left_class) continue;
+    ++all.classes;
+    all.pixels += pixels_of(other);
+  }
+  if (all.views > kMaxPictureViews || all.classes > kMaxPictureClasses)
+    return no_room(fmt::format("{} different pictures are being drawn already", all.classes - 1));
+  const uint64_t most_pixels = budget_.all_pixels + kReservedPictureClasses * budget_.picture_pixels;
+  if (all.pixels > most_pixels) return no_room(pixels_text("all together", all.pixels, most_pixels));
+  return {};
+}
+
 /// Whether the view can be drawn and encoded besides all classes but `left_class`, and is within the share of
 /// its owner. A class that several share counts for each of their addresses.
 Status PictureViews::check_room(const PictureOwner& owner, const PictureView& view,
                                 uint32_t left_class) const {
-  if (is_reserved(view)) return {};
+  if (is_reserved(view)) return check_reserved_room(view, left_class);
   const auto has_member = [&](uint32_t picture_class, auto is_one) {
     return std::any_of(members_.begin(), members_.end(), [&](const auto& entry) {
       return entry.second.picture_class == picture_class && is_one(entry.second.owner);

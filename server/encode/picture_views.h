@@ -93,6 +93,10 @@ class PictureViews {
   /// Before the first class.
   void set_budget(const PictureBudget& budget);
 
+  /// The scene's own picture is taken from here from now on. Whoever has one from where it was keeps it, and
+  /// counts like others then: the scene's own has room while all of them are within the limits.
+  void set_reserved_camera(const CameraDesc& camera) { reserved_.camera = camera; }
+
   /// Gives the viewer a class: that of an equal view, else a new one. Call again when its camera changes: a
   /// viewer alone in its class keeps the class. Unavailable while a limit above is reached, and the viewer
   /// then keeps what it had; BadInput for a view that cannot be drawn, or has not been made to fit.
@@ -114,6 +118,7 @@ class PictureViews {
   size_t member_count(uint32_t picture_class) const;
   template <class IsCounted>
   PictureUse use_with(const PictureView& view, IsCounted is_counted) const;
+  Status check_reserved_room(const PictureView& view, uint32_t left_class) const;
   Status check_room(const PictureOwner& owner, const PictureView& view, uint32_t left_class) const;
 
   const RenderSize reserved_size_;  // as wished for

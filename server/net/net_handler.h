@@ -62,6 +62,7 @@ class NetHandler {
   virtual void on_wind(SessionId session, const WindSamples& samples, int64_t arrival_ns) = 0;
   virtual void on_command(SessionId session, const ControlCommand& command) = 0;
   virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
+  virtual void on_scene_request(SessionId) {}
   /// May change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   /// An admin wants the server to end.

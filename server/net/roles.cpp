@@ -29,8 +29,8 @@ bool may_send(Role role, const ClientMessage& message) {
                  [&](const WindSamples&) { return feeds; }, [&](const CameraChange&) { return watches; },
                  [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
                  [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
-                 [&](const SetParameter&) { return steers; }, [&](const ViewerReport&) { return watches; },
-                 [&](const ModeRequest&) { return watches; },
+                 [&](const SetParameter&) { return steers; }, [&](const SceneRequest&) { return steers; },
+                 [&](const ViewerReport&) { return watches; }, [&](const ModeRequest&) { return watches; },
                  [&](const AdminCommand&) { return role == Role::Admin; }},
       message);
 }

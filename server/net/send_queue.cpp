@@ -5,6 +5,9 @@
 namespace strandcast {
 
 bool SendQueue::push_control(ServerMessage message) {
+  // Somebody drags a slider: of the looks that wait only the newest counts.
+  if (std::holds_alternative<LookChange>(message))
+    std::erase_if(control_, [](const auto& waiting) { return std::holds_alternative<LookChange>(waiting); });
   if (control_.size() >= kMaxQueuedControl) return false;
   control_.push_back(std::move(message));
   return true;

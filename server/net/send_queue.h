@@ -25,7 +25,7 @@ class SendQueue {
   };
   using Item = std::variant<ServerMessage, EncodedFramePtr>;
 
-  /// False when the queue is full: the session must be closed.
+  /// False when the queue is full: the session must be closed. A LookChange replaces one that waits.
   [[nodiscard]] bool push_control(ServerMessage message);
   /// First media of a session; strand frames wait until it is written.
   void set_asset(EncodedFramePtr asset);

@@ -27,7 +27,8 @@ CloseCode close_code_for(const Error& error) {
 const char* message_name(const ClientMessage& message) {
   constexpr const char* kNames[] = {"Hello",           "MotionSamples", "WindSamples", "CameraChange",
                                     "KeyframeRequest", "FrameAck",      "Ping",        "ControlCommand",
-                                    "SetParameter",    "ViewerReport",  "ModeRequest", "AdminCommand"};
+                                    "SetParameter",    "ViewerReport",  "ModeRequest", "AdminCommand",
+                                    "SceneRequest"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
 }
@@ -123,7 +124,8 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                           is_mode_request_waiting_ = true;
                           report_link(arrival_ns);
                         },
-                        [&](const AdminCommand& command) { obey(command, arrival_ns); }},
+                        [&](const AdminCommand& command) { obey(command, arrival_ns); },
+                        [&](const SceneRequest&) { handler.on_scene_request(id_); }},
              message);
 }
 

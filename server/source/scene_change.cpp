@@ -17,6 +17,8 @@ const std::vector<std::string>& live_fields() {
                                                    "colliders",
                                                    "has_auto_collider",
                                                    "wind",
+                                                   "look",
+                                                   "camera",
                                                    "stream.bound_m",
                                                    "stream.strand_rate_hz"};
   return kFields;

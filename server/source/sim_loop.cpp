@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/text.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/scene_change.h"
@@ -18,6 +19,7 @@ constexpr double kNsPerS = 1e9;
 /// Medians cost a sort of the window; viewers are told twice a second.
 constexpr uint64_t kStatsInterval = 8;
 constexpr int64_t kStatsNs = 250'000'000;  // when steps take long
+constexpr size_t kMaxToldChars = 200;      // of an assignment, in its answer
 
 /// Whether a solver built for one set of facts serves another: only what it compiles for counts.
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
@@ -92,6 +94,7 @@ Status SimLoop::begin() {
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
   publisher_.emplace(config_.content->groom, quantum_m);
   stream_ = stream;
+  look_ = wanted_look();
   const Groom& groom = config_.content->groom;
   const StageSizes sizes{groom.strand_count(), groom.uniform_vertex_count(), config_.scene.substeps,
                          static_cast<uint32_t>(config_.content->colliders.size())};
@@ -100,6 +103,10 @@ Status SimLoop::begin() {
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
   input_clock_.emplace(1.0 / config_.scene.step_rate_hz);
+  {
+    const std::lock_guard lock(mutex_);
+    scene_ = config_.scene;
+  }
   update_stats();
   return {};
 }
@@ -110,6 +117,7 @@ void SimLoop::loop() {
     if (is_stopping_) return;
     for (const Job& job : jobs) carry_out_in_turn(job);
     follow_stream_settings();
+    follow_look();
     const auto time_ns = clock_->take_step(now_ns());
     if (time_ns) step(*time_ns);
     const bool is_old = now_ns() - stats_ns_ >= kStatsNs;
@@ -131,6 +139,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   std::optional<int64_t> wake_ns = clock_->next_due_ns();
   const auto wake_by = [&](int64_t time_ns) { wake_ns = std::min(wake_ns.value_or(time_ns), time_ns); };
   if (has_other_stream()) wake_by(stream_changed_ns_ + kStreamChangeNs);
+  if (has_other_look()) wake_by(look_changed_ns_ + kLookChangeNs);
   if (now_ns() < jobs_rest_ns_) wake_by(jobs_rest_ns_);
   if (wake_ns) {
     const std::chrono::steady_clock::time_point wake{std::chrono::nanoseconds(*wake_ns)};
@@ -265,15 +274,24 @@ Notice SimLoop::change(const std::string& assignment) {
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
   if (scene->substeps != config_.scene.substeps) stages_->plan_step(scene->substeps, explain(*scene, facts_));
+  const std::string what = excerpt(assignment, kMaxToldChars);
   const std::string left_out = left_out_note(config_.scene.solver, scene->solver);
   config_.scene = *scene;
+  {
+    const std::lock_guard lock(mutex_);
+    scene_ = *scene;
+  }
   builder_->change(*scene, colliders_of(*scene, config_.content->head_colliders));
   follow_stream_settings();
+  follow_look();
+  if (has_other_look())
+    return {false,
+            fmt::format("{} soon: the look changes at most every {} ms.", what, kLookChangeNs / 1'000'000)};
   if (has_other_stream())
-    return {false, fmt::format("{} soon: the stream changes at most every {} ms.", assignment,
+    return {false, fmt::format("{} soon: the stream changes at most every {} ms.", what,
                                kStreamChangeNs / 1'000'000)};
-  return {false, fmt::format("{} from step {} on{}{}.", assignment, tick_ + 1, left_out.empty() ? "" : "; ",
-                             left_out)};
+  return {false,
+          fmt::format("{} from step {} on{}{}.", what, tick_ + 1, left_out.empty() ? "" : "; ", left_out)};
 }
 
 /// Publishes the present state once more, so that viewers see the change also while paused. Of many settings
@@ -289,6 +307,16 @@ void SimLoop::follow_stream_settings() {
   publisher_->set_quantum_m(*quantum_m);
   sink_.change_stream(stream_);
   publish();
+}
+
+/// Nothing is simulated or encoded otherwise: who draws is told. Of many changes in a short time only the
+/// last ever is.
+void SimLoop::follow_look() {
+  const int64_t time_ns = now_ns();
+  if (!has_other_look() || (look_changed_ns_ != 0 && time_ns - look_changed_ns_ < kLookChangeNs)) return;
+  look_ = wanted_look();
+  look_changed_ns_ = time_ns;
+  sink_.change_look(look_);
 }
 
 /// Builds the scene's solver; strands keep their state.
@@ -433,6 +461,11 @@ SimStats SimLoop::stats() const {
   SimStats stats = stats_;
   stats.last_step_ns = last_step_ns_;
   return stats;
+}
+
+SceneDesc SimLoop::scene() const {
+  const std::lock_guard lock(mutex_);
+  return scene_;
 }
 
 std::optional<Error> SimLoop::failure() const {

@@ -55,6 +55,8 @@ inline constexpr double kJobShare = 0.25;
 /// The stream is coded otherwise at most this often, with the newest settings: each time costs every viewer a
 /// keyframe.
 inline constexpr int64_t kStreamChangeNs = 500'000'000;
+/// Readers hear of another look at most this often, of the newest.
+inline constexpr int64_t kLookChangeNs = 100'000'000;
 
 class SimLoop {
  public:
@@ -75,6 +77,8 @@ class SimLoop {
   /// What is wanted; has_wind_stream is found by the loop itself.
   void set_demand(const SourceDemand& demand);
   SimStats stats() const;
+  /// As it runs now.
+  SceneDesc scene() const;
   /// Ends the thread after the substep or command that is under way. From one thread.
   void stop();
   /// Why the simulation ended; nothing while it runs.
@@ -101,6 +105,9 @@ class SimLoop {
   Notice change(const std::string& assignment);
   void follow_stream_settings();
   bool has_other_stream() const { return config_.scene.stream != stream_; }
+  void follow_look();
+  LookChange wanted_look() const { return {config_.scene.look, config_.scene.camera}; }
+  bool has_other_look() const { return wanted_look() != look_; }
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_demand(const SourceDemand& demand);
   void apply_facts(const RuntimeFacts& facts);
@@ -139,6 +146,8 @@ class SimLoop {
   int64_t stats_ns_ = 0;           // when they were made
   StreamDesc stream_;              // as it is published; the scene's is what it is to be
   int64_t stream_changed_ns_ = 0;  // 0 = never
+  LookChange look_;                // as readers know it
+  int64_t look_changed_ns_ = 0;    // 0 = never
   int64_t jobs_rest_ns_ = 0;       // no command is carried out before
   std::atomic<int64_t> last_step_ns_{0};
 
@@ -148,6 +157,7 @@ class SimLoop {
   bool is_preparing_ = false;  // no command is carried out before the one that is being prepared
   std::atomic<bool> is_stopping_{false};
   SimStats stats_;
+  SceneDesc scene_;  // as it runs
   std::optional<Error> failure_;
 
   std::jthread preparation_;  // of the command that comes next; started by thread_

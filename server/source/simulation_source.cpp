@@ -4,6 +4,7 @@
 
 #include "common/groom/groom_asset.h"
 #include "common/log/log.h"
+#include "common/scene/scene_file.h"
 #include "server/source/scene_change.h"
 
 namespace strandcast {
@@ -32,6 +33,16 @@ class SimulationSource : public StateSource {
   void post(const ControlCommand& command, Reply reply) override { loop_->post(command, std::move(reply)); }
   void post(const SetParameter& parameter, Reply reply) override { loop_->post(parameter, std::move(reply)); }
   SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
+  std::optional<SceneDesc> scene() const override {
+    if (loop_ == nullptr) return std::nullopt;
+    SceneDesc scene = loop_->scene();
+    // Where the scene left the codec to the machine that runs it, it still does.
+    if (!config_.scene.stream.has_codec) {
+      scene.stream.codec = config_.scene.stream.codec;
+      scene.stream.has_codec = false;
+    }
+    return with_absolute_paths(std::move(scene));
+  }
   std::optional<Error> failure() const override { return loop_ != nullptr ? loop_->failure() : std::nullopt; }
 
  private:

@@ -34,6 +34,7 @@ class DemandBook : public DemandDesk {
   PictureBudget picture_budget() const override { return views_.budget(); }
   /// Before the first demand for pictures.
   void set_picture_budget(const PictureBudget& budget) { views_.set_budget(budget); }
+  void set_scene_camera(const CameraDesc& camera) { views_.set_reserved_camera(camera); }
   /// Ignored for unknown readers.
   void remove(ReaderId reader);
 

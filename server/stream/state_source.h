@@ -52,6 +52,8 @@ class StateSink {
   virtual void put(std::shared_ptr<const Snapshot> state) = 0;
   /// Before the first state of it.
   virtual void change_stream(const StreamDesc& stream) = 0;
+  /// The scene looks so from now on; before the first call as it did at the start.
+  virtual void change_look(const LookChange& look) = 0;
 };
 
 class StateSource {
@@ -73,6 +75,8 @@ class StateSource {
   virtual void post(const ControlCommand& command, Reply reply) = 0;
   virtual void post(const SetParameter& parameter, Reply reply) = 0;
   virtual SimStats stats() const = 0;
+  /// The scene as it runs, to be run again elsewhere on this machine; nothing where there is none.
+  virtual std::optional<SceneDesc> scene() const { return std::nullopt; }
   /// Why it ended by itself; nothing while it runs.
   virtual std::optional<Error> failure() const = 0;
 };

@@ -18,7 +18,10 @@ bool is_alike(const SourceDemand& a, const SourceDemand& b) {
 }  // namespace
 
 StreamHub::StreamHub(StreamHubConfig config)
-    : config_(std::move(config)), stream_(config_.stream), book_(config_.scene_view, kSoftwareBudget) {}
+    : config_(std::move(config)),
+      stream_(config_.stream),
+      look_(config_.look),
+      book_(config_.scene_view, kSoftwareBudget) {}
 
 Result<std::unique_ptr<StreamHub>> StreamHub::make(StreamHubConfig config) {
   std::unique_ptr<StreamHub> hub(new StreamHub(std::move(config)));
@@ -47,6 +50,10 @@ Status StreamHub::begin() {
   hooks.on_refused = [this](PictureClass picture_class, const Error& error) {
     give([&](const Entry& entry) { return entry.picture_class == picture_class; },
          [&](StreamReader& reader) { reader.on_picture_refused(picture_class, error); });
+  };
+  hooks.on_look_refused = [this](PictureClass picture_class, const Error& error) {
+    give([&](const Entry& entry) { return entry.picture_class == picture_class; },
+         [&](StreamReader& reader) { reader.on_look_refused(picture_class, error); });
   };
   hooks.on_failure = [this](const Error& error) {
     give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_pictures_failed(error); });
@@ -190,6 +197,17 @@ void StreamHub::change_stream(const StreamDesc& stream) {
        [&](StreamReader& reader) { reader.on_stream_change(classes, until_told); });
 }
 
+/// Whoever joins from now on is told this look, and those who are there after it.
+void StreamHub::change_look(const LookChange& look) {
+  {
+    const std::lock_guard lock(mutex_);
+    look_ = look;
+    book_.set_scene_camera(look.camera);
+    if (frames_ != nullptr) frames_->set_look(look.look);
+  }
+  give([](const Entry&) { return true; }, [&](StreamReader& reader) { reader.on_look_change(look); });
+}
+
 void StreamHub::begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes) {
   const std::lock_guard lock(mutex_);
   stream_ = stream;
@@ -222,6 +240,11 @@ void StreamHub::tell_wind(uint64_t source, const WindSamples& samples, int64_t a
 StreamDesc StreamHub::stream() const {
   const std::lock_guard lock(mutex_);
   return stream_;
+}
+
+LookChange StreamHub::look() const {
+  const std::lock_guard lock(mutex_);
+  return look_;
 }
 
 std::vector<StrandClass> StreamHub::strand_classes() const {

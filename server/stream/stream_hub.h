@@ -28,6 +28,7 @@ struct StreamHubConfig {
   PictureView scene_view;  // always has room
   std::shared_ptr<const SceneAsset> asset;
   MakePicturePainter make_painter;  // called when somebody wants pictures
+  LookChange look = {};             // that the painters are made with
 };
 
 class StreamHub : public StateSink, public DemandDesk {
@@ -58,11 +59,14 @@ class StreamHub : public StateSink, public DemandDesk {
 
   void put(std::shared_ptr<const Snapshot> state) override;
   void change_stream(const StreamDesc& stream) override;
+  void change_look(const LookChange& look) override;
   // What comes in, for readers that want inputs.
   void tell_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns);
   void tell_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns);
 
   StreamDesc stream() const;
+  /// The newest.
+  LookChange look() const;
   std::vector<StrandClass> strand_classes() const;
   std::map<uint32_t, PictureView> picture_views() const;
   uint32_t strand_readers(uint16_t stream_id) const;
@@ -107,6 +111,7 @@ class StreamHub : public StateSink, public DemandDesk {
   std::mutex giving_mutex_;   // held while readers are called; taken after demand_mutex_
   mutable std::mutex mutex_;  // guards the block below; taken last, and never held while a reader is called
   StreamDesc stream_;
+  LookChange look_;
   std::vector<StrandClass> classes_;
   DemandBook book_;
   std::map<ReaderId, Entry> entries_;

@@ -32,6 +32,10 @@ class StreamReader {
   virtual void on_state(const std::shared_ptr<const Snapshot>&) {}
   virtual void on_motion(uint64_t /*source*/, const MotionSamples&, int64_t /*arrival_ns*/) {}
   virtual void on_wind(uint64_t /*source*/, const WindSamples&, int64_t /*arrival_ns*/) {}
+  /// Pictures of this class go on with the look of before: the new one cannot be drawn.
+  virtual void on_look_refused(PictureClass, const Error&) {}
+  /// The scene looks so from now on. Told to all.
+  virtual void on_look_change(const LookChange&) {}
   /// Strands are coded in these classes from now on. Told to all; nothing is encoded so while anybody holds
   /// `until_told`.
   virtual void on_stream_change(const std::vector<StrandClass>& /*classes*/,

@@ -74,6 +74,9 @@ void add_messages(const SeedFolder& seeds) {
   i = 0;
   for (const ServerMessage& message : sample_server_messages())
     seeds.add("server_message", fmt::format("{}", i++), encode(message));
+  LookChange dark{sample_look(), sample_camera()};
+  dark.look.light_direction = glm::vec3(0.0f);
+  seeds.add("server_message", "light_of_no_length", encode(ServerMessage(dark)));
   FrameHeader header;
   header.opcode = Opcode::StrandKeyframe;
   header.sequence = 1;

@@ -107,6 +107,32 @@ TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
   }
 }
 
+// Both were there before it changed.
+TEST_F(GlPainting, PaintsAChangedLookAsAClientDoesThatWasToldOfIt) {
+  config_.look = sample_look();
+  auto renderer = Renderer::make(gl::ShaderLibrary(), context_->info(), *asset_, sample_look());
+  ASSERT_TRUE(renderer) << renderer.error().to_string();
+  const auto state = std::make_shared<const Snapshot>(make_state(*asset_, 2));
+  const PosedStrands strands{state->world_from_head, positions_in_head(*state)};
+  const auto draw = [&] {
+    EXPECT_TRUE((*renderer)->draw(strands, small_view().camera, small_view().size));
+    return (*renderer)->read_image();
+  };
+  const Image before = draw();
+  auto painter = device_picture_painter(config_)();  // its context is current from here on
+  ASSERT_TRUE(painter) << painter.error().to_string();
+  ASSERT_TRUE((*painter)->paint(state, small_view()).value() == before);
+  const auto told = decode_server_message(encode(ServerMessage(LookChange{second_sample_look(), {}})));
+  ASSERT_TRUE(told) << told.error().to_string();
+  ASSERT_TRUE((*painter)->set_look(second_sample_look()));
+  const Image painted = (*painter)->paint(state, small_view()).value();
+  ASSERT_TRUE(context_->make_current());
+  ASSERT_TRUE((*renderer)->set_look(std::get<LookChange>(*told).look));
+  EXPECT_TRUE(painted == draw());
+  EXPECT_FALSE(painted == before);
+  renderer->reset();  // while its context is current
+}
+
 TEST_F(GlPainting, ATickThatComesAgainIsPaintedAgain) {
   auto painter = device_picture_painter(config_)();
   ASSERT_TRUE(painter) << painter.error().to_string();

@@ -67,6 +67,42 @@ TEST_F(StrandDrawerTest, SharpensWhatStandsAndThenDrawsNothingMore) {
   EXPECT_GT(drawer.look().fair_ms, 0.0);
 }
 
+// Hair that stands is drawn again, and the picture before stays until the next is there.
+TEST_F(StrandDrawerTest, FollowsTheLookOfTheSceneOrOnesOwn) {
+  StrandDrawer drawer(config("software"));
+  const auto told = [&](const std::string& color) {
+    auto now = std::make_shared<ViewerState>(*state());
+    now->look.look.hair_color = color;
+    return now;
+  };
+  const auto whole = [&](const std::shared_ptr<const Image>& after) {
+    EXPECT_TRUE(eventually([&] {
+      const DrawnState now = drawer.look();
+      EXPECT_TRUE(after == nullptr || now.image != nullptr) << "never blank";
+      return now.image != nullptr && now.image != after && now.step == 0 && !(after && *now.image == *after);
+    }));
+    return drawer.look().image;
+  };
+  const LookDesc plain = told("custom")->look.look;
+  drawer.set_state(told("custom"));
+  drawer.set_view(view());
+  const auto first = whole(nullptr);
+  LookDesc own = plain;
+  own.background = {0.9f, 0.1f, 0.1f};
+  drawer.set_own_look(own);
+  const auto second = whole(first);
+  auto of_all = std::make_shared<ViewerState>(*told("custom"));
+  of_all->look.look.background = {0.1f, 0.9f, 0.1f};
+  drawer.set_state(of_all);
+  give_time_to_misbehave();
+  EXPECT_TRUE(*drawer.look().image == *second) << "one's own is seen";
+  drawer.set_own_look(std::nullopt);
+  const auto third = whole(second);
+  drawer.set_state(told("custom"));
+  EXPECT_TRUE(*whole(third) == *first) << "and back to what it was";
+  EXPECT_FALSE(drawer.look().look_trouble);
+}
+
 TEST_F(StrandDrawerTest, DrawsNothingThatNobodySees) {
   StrandDrawer drawer(config("software"));
   drawer.set_state(state());

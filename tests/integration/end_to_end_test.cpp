@@ -13,10 +13,13 @@
 
 #include "client/app/feed.h"
 #include "client/app/headless_view.h"
+#include "client/app/look_form.h"
 #include "client/app/stream_check.h"
 #include "common/base/file.h"
 #include "common/motion/motion_clip.h"
 #include "common/render/render_device.h"
+#include "common/scene/scene_file.h"
+#include "tests/support/look_variants.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/sample_look.h"
 #include "tests/support/server_fixture.h"
@@ -38,6 +41,7 @@ struct Painted {
   uint64_t tick = 0;
   PictureView view;
   Image image;
+  LookDesc look;
 };
 
 /// Everything seen from inside the server.
@@ -69,16 +73,22 @@ class Observer {
 
 class ObservedPainter : public PicturePainter {
  public:
-  ObservedPainter(std::unique_ptr<PicturePainter> painter, Observer& observer)
-      : painter_(std::move(painter)), observer_(observer) {}
+  ObservedPainter(std::unique_ptr<PicturePainter> painter, const LookDesc& look, Observer& observer)
+      : painter_(std::move(painter)), look_(look), observer_(observer) {}
   Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     auto image = painter_->paint(snapshot, view);
-    if (image) observer_.saw({snapshot->tick, view, *image});
+    if (image) observer_.saw({snapshot->tick, view, *image, look_});
     return image;
+  }
+  Status set_look(const LookDesc& look) override {
+    RETURN_IF_ERROR(painter_->set_look(look));
+    look_ = look;
+    return {};
   }
 
  private:
   std::unique_ptr<PicturePainter> painter_;
+  LookDesc look_;
   Observer& observer_;
 };
 
@@ -93,10 +103,11 @@ class EndToEnd : public test::ServerFixture {
     config.scene.stream.frame_height = 64;
     config.on_publish = [this](const auto& snapshot) { observer_.saw(*snapshot); };
     config.make_painter = [this](PainterConfig painter) -> MakePicturePainter {
-      return [this,
-              make = device_picture_painter(std::move(painter))]() -> Result<std::unique_ptr<PicturePainter>> {
+      return [this, look = painter.look,
+              make = device_picture_painter(painter)]() -> Result<std::unique_ptr<PicturePainter>> {
         ASSIGN_OR_RETURN(auto made, make());
-        return std::unique_ptr<PicturePainter>(std::make_unique<ObservedPainter>(std::move(made), observer_));
+        return std::unique_ptr<PicturePainter>(
+            std::make_unique<ObservedPainter>(std::move(made), look, observer_));
       };
     };
     (void)start(std::move(config));
@@ -247,6 +258,136 @@ TEST_F(EndToEnd, TheServersFramesAreTheClientsPixelsByteForByte) {
   EXPECT_GT(*brightest - *darkest, 60);
 }
 
+/// What `strandcast-ctl set` takes to give the scene this look.
+std::string assignment_of(const LookDesc& look) {
+  std::vector<FormEdit> edits;
+  for (const auto& [path, value] : test::fields_of(look)) edits.push_back({path, value});
+  return look_assignment(edits);
+}
+
+// While all are connected, with a look in which no field is as it was nor as it is by default.
+TEST_F(EndToEnd, AfterALiveChangeTheServersFramesAreStillTheClientsPixels) {
+  const LookDesc look = second_sample_look();
+  const auto before = test::fields_of(sample_look());
+  const auto defaults = test::fields_of(LookDesc{});
+  const auto after = test::fields_of(look);
+  for (size_t i = 0; i < after.size(); ++i) {
+    ASSERT_NE(after[i].second, before[i].second) << after[i].first;
+    ASSERT_NE(after[i].second, defaults[i].second) << after[i].first;
+  }
+  start_feeding();
+  States decoded;
+  auto strands = join();
+  auto frames = join(StreamMode::Frames);
+  ASSERT_TRUE(strands && frames);
+  strands->set_snapshot_listener([&](const auto& snapshot) {
+    if (strands->quality().stream_id == 0) decoded[snapshot->tick] = snapshot;
+  });
+  ASSERT_TRUE(pump_until({strands.get(), frames.get()}, [&] { return frames->image_count() >= 2; }));
+  const auto asset = strands->shared_asset();
+  ASSERT_EQ(run_command(ctl_target(), SetParameter{assignment_of(look)}), kDoneExit);
+  const auto pictures = [&] {
+    std::vector<Painted> common;
+    for (Painted& painted : observer_.painted())
+      if (painted.look == look && decoded.contains(painted.tick)) common.push_back(std::move(painted));
+    return common;
+  };
+  ASSERT_TRUE(pump_until({strands.get(), frames.get()}, [&] {
+    return strands->look().look == look && frames->look().look == look && pictures().size() >= 3;
+  }));
+  EXPECT_EQ(strands->shared_asset(), asset) << "no new asset";
+  EXPECT_EQ(strands->replay().stats().keyframe_requests, 0u);
+  EXPECT_EQ(strands->blank_pictures() + frames->blank_pictures(), 0u);
+
+  // A client that was there before the change: its renderer goes on with the look that it was told.
+  const auto device = RenderDevice::open({});
+  ASSERT_TRUE(device) << device.error().to_string();
+  auto renderer = (*device)->make_renderer(*asset, sample_look());
+  ASSERT_TRUE(renderer) << renderer.error().to_string();
+  ASSERT_TRUE((*renderer)->set_look(strands->look().look));
+  StrandFill fill;
+  for (const Painted& server : pictures()) {
+    ASSERT_TRUE((*renderer)->draw(posed_strands_of(*decoded.at(server.tick), fill), server.view.camera,
+                                  server.view.size));
+    EXPECT_TRUE((*renderer)->read_image() == server.image) << "tick " << server.tick;
+  }
+}
+
+TEST_F(EndToEnd, EverybodySeesTheNewestLookWhoeverChangedItAndWhoeverJoinsLater) {
+  start_feeding();
+  auto one = join(StreamMode::Strands, Role::Controller);
+  auto other = join(StreamMode::Strands, Role::Controller);
+  ASSERT_TRUE(one && other);
+  ASSERT_TRUE(pump_until({one.get(), other.get()},
+                         [&] { return one->decoded_frames() >= 5 && other->decoded_frames() >= 5; }));
+  const uint64_t keyframes = one->replay().stats().keyframes;
+  // Two at once: fields are independent, and of one field the last change counts.
+  const auto set = [&](ViewerSession& by, const std::string& assignment) {
+    ASSERT_TRUE(by.client().send(SetParameter{assignment}));
+    ASSERT_TRUE(pump_until({one.get(), other.get()}, [&] {
+      const auto notices = by.take_notices();
+      return !notices.empty() && !notices.back().is_error;
+    }));
+  };
+  LookChange expected{sample_look(), sample_camera()};
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_NO_FATAL_FAILURE(set(*one, "look.hair_color=black"));
+    ASSERT_NO_FATAL_FAILURE(set(*other, "look.shading.wetness=0.875"));
+    ASSERT_NO_FATAL_FAILURE(set(*one, "camera.fov_y_rad=0.875"));
+    ASSERT_NO_FATAL_FAILURE(set(*other, "look.hair_color=grey"));
+  }
+  expected.look.hair_color = "grey";
+  expected.look.shading.wetness = 0.875f;
+  expected.camera.fov_y_rad = 0.875f;
+  ASSERT_TRUE(pump_until({one.get(), other.get()},
+                         [&] { return one->look() == expected && other->look() == expected; }));
+  EXPECT_GE(one->look_changes(), 1u);
+  EXPECT_EQ(one->replay().stats().keyframes, keyframes) << "no keyframe";
+  EXPECT_EQ(one->replay().stats().rejected_frames, 0u);
+
+  // Strands go back to rest; the look is none of theirs.
+  ASSERT_TRUE(one->client().send(ControlCommand{Command::Reset}));
+  ASSERT_TRUE(pump_until({one.get(), other.get()}, [&] { return !one->take_notices().empty(); }));
+  auto late = join(StreamMode::Frames);
+  ASSERT_TRUE(late);
+  EXPECT_EQ(late->welcome().look, expected.look);
+  EXPECT_EQ(late->welcome().camera, expected.camera);
+  ASSERT_TRUE(pump_until({late.get()}, [&] { return late->image_count() >= 1; }));
+  EXPECT_EQ(observer_.painted().back().look, expected.look);
+  EXPECT_EQ(observer_.painted().back().view.camera, expected.camera);
+  EXPECT_EQ(late->look_changes(), 0u);
+
+  // Whoever is refused changes nothing for anybody.
+  const uint64_t changes = other->look_changes();
+  ASSERT_TRUE(one->client().send(SetParameter{"look.light_direction={ x: 0 y: 0 z: 0 }"}));
+  ASSERT_TRUE(pump_until({one.get(), other.get()}, [&] {
+    const auto notices = one->take_notices();
+    return !notices.empty() && notices.back().is_error;
+  }));
+  EXPECT_EQ(other->look_changes(), changes);
+  EXPECT_EQ(other->look(), expected);
+}
+
+// What was changed while it ran is what starts again from the file.
+TEST_F(EndToEnd, TheSceneIsSavedAsItRuns) {
+  const CtlTarget target = ctl_target();
+  ASSERT_EQ(run_command(target, SetParameter{assignment_of(second_sample_look())}), kDoneExit);
+  ASSERT_EQ(run_command(target, SetParameter{"wind.mean_mps.x=3"}), kDoneExit);
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "kept" / "scene.textproto";
+  ASSERT_EQ(run_save(target, file), kDoneExit);
+  const auto saved = load_scene(file, {});
+  ASSERT_TRUE(saved) << saved.error().to_string();
+  SceneDesc expected = test::small_scene(kStrands, kVertices);
+  expected.look = second_sample_look();
+  expected.camera = sample_camera();
+  expected.stream.frame_width = 96;
+  expected.stream.frame_height = 64;
+  expected.wind.mean_mps.x = 3.0f;
+  EXPECT_EQ(*saved, expected) << to_text(*saved);
+  EXPECT_EQ(run_save(target, folder.path() / "kept"), kBadInputExit) << "a folder is no file";
+}
+
 TEST_F(EndToEnd, AControllerPausesStepsAndIsToldWhatIsWrong) {
   auto viewer = join(StreamMode::Strands, Role::Controller);
   ASSERT_TRUE(viewer);
@@ -388,7 +529,39 @@ TEST_F(EndToEnd, TheHeadlessViewerLeavesPictureClipAndReport) {
   const std::string lines = to_lines(*report);
   EXPECT_THAT(lines, HasSubstr("rendered_pictures=6\n")) << "five of the clip and the picture";
   EXPECT_THAT(lines, HasSubstr("strands=150\n"));
+  EXPECT_THAT(lines, HasSubstr("hair_color=red\n"));
+  EXPECT_THAT(lines, HasSubstr("look_changes=0\n"));
   EXPECT_THAT(to_json(*report), HasSubstr("\"mode\": \"strands\""));
+}
+
+// It has no view of its own: the server's pictures for it are taken from where the scene's camera is.
+TEST_F(EndToEnd, TheHeadlessViewerGoesAlongWithLookAndCameraOfTheScene) {
+  const TemporaryFolder folder;
+  ViewOptions options;
+  options.address = {"127.0.0.1", server_->port()};
+  options.mode = StreamMode::Frames;
+  options.is_headless = true;
+  options.size = {96, 64};
+  options.seconds = kDeadlineS;
+  std::atomic<bool> stop{false};
+  std::optional<Result<ViewReport>> report;
+  std::thread viewer([&] { report = run_headless(options, stop); });
+  const auto is_seen = [&](auto&& is_it) {
+    return eventually([&] {
+      const auto painted = observer_.painted();
+      return !painted.empty() && is_it(painted.back());
+    });
+  };
+  EXPECT_TRUE(is_seen([](const Painted& painted) { return painted.view.camera == sample_camera(); }));
+  EXPECT_EQ(run_command(ctl_target(), SetParameter{"camera.fov_y_rad=0.5"}), kDoneExit);
+  EXPECT_EQ(run_command(ctl_target(), SetParameter{"look.hair_color=grey"}), kDoneExit);
+  EXPECT_TRUE(is_seen([](const Painted& painted) {
+    return painted.view.camera.fov_y_rad == 0.5f && painted.look.hair_color == "grey";
+  }));
+  stop = true;
+  viewer.join();
+  ASSERT_TRUE(report && *report) << (*report).error().to_string();
+  EXPECT_THAT(to_lines(**report), HasSubstr("hair_color=grey\n"));
 }
 
 TEST_F(EndToEnd, AStoppedServerTellsItsViewers) {

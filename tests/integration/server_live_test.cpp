@@ -114,7 +114,7 @@ class LiveServer : public test::ServerFixture {
   StrandClient join(Role role = Role::Viewer) { return StrandClient(server_->port(), role); }
 };
 
-/// Takes what a loop makes, and keeps how the stream was changed.
+/// Takes what a loop makes, and keeps how stream and look were changed.
 class LoopSink : public StateSink {
  public:
   void put(std::shared_ptr<const Snapshot>) override {}
@@ -122,14 +122,23 @@ class LoopSink : public StateSink {
     const std::lock_guard lock(mutex_);
     streams_.push_back(stream);
   }
+  void change_look(const LookChange& look) override {
+    const std::lock_guard lock(mutex_);
+    looks_.push_back(look);
+  }
   std::vector<StreamDesc> streams() const {
     const std::lock_guard lock(mutex_);
     return streams_;
+  }
+  std::vector<LookChange> looks() const {
+    const std::lock_guard lock(mutex_);
+    return looks_;
   }
 
  private:
   mutable std::mutex mutex_;
   std::vector<StreamDesc> streams_;
+  std::vector<LookChange> looks_;
 };
 
 TEST(SimLoopJobs, CommandsBeyondTheLimitAreRefusedAtOnce) {
@@ -183,6 +192,7 @@ class Loop {
   SimLoop* operator->() const { return loop_.get(); }
   std::string trouble() const { return error_.to_string(); }
   std::vector<StreamDesc> streams() const { return sink_.streams(); }
+  std::vector<LookChange> looks() const { return sink_.looks(); }
   /// Posts the change and waits for its answer.
   Notice ask(const std::string& assignment) const {
     auto answer = std::make_shared<std::promise<Notice>>();
@@ -216,6 +226,38 @@ TEST(SimLoopJobs, AFloodOfChangesOfTheStreamIsPublishedTwiceASecondAndTheLastOne
     return !streams.empty() && streams.back().bound_m == 0.0004f;
   }));
   EXPECT_LE(loop.streams().size(), static_cast<size_t>((now_ns() - begin_ns) / kStreamChangeNs) + 1);
+}
+
+TEST(SimLoopJobs, AFloodOfLooksIsToldTenTimesASecondAndTheLastOneCounts) {
+  SimLoopConfig config;
+  config.scene = test::small_scene(kStrands, kVertices);
+  const LookDesc first = config.scene.look;
+  const Loop loop(std::move(config));
+  if (!loop && test::lacks_gl(loop.trouble())) GTEST_SKIP() << "needs OpenGL 4.5: " << loop.trouble();
+  ASSERT_TRUE(loop) << loop.trouble();
+  EXPECT_TRUE(loop.looks().empty()) << "nothing has changed";
+  const int64_t begin_ns = now_ns();
+  constexpr int kChanges = 300;
+  for (int i = 1; i <= kChanges; ++i)
+    ASSERT_FALSE(loop.ask(fmt::format("look.ambient={}", 1e-3 * i)).is_error);
+  const auto is_told = [&](auto&& is_it) {
+    return eventually([&] {
+      const auto looks = loop.looks();
+      return !looks.empty() && is_it(looks.back());
+    });
+  };
+  ASSERT_TRUE(is_told([](const LookChange& look) { return look.look.ambient == 0.3f; }));
+  EXPECT_LE(loop.looks().size(), static_cast<size_t>((now_ns() - begin_ns) / kLookChangeNs) + 1);
+  LookDesc expected = first;
+  expected.ambient = 0.3f;
+  EXPECT_EQ(loop.looks().back().look, expected) << "all else stays";
+  EXPECT_EQ(loop->scene().look, expected);
+  // While nothing is simulated, too, with what came too soon after the one before.
+  loop->post(ControlCommand{Command::Pause}, {});
+  for (const char* color : {"red", "black", "grey"})
+    ASSERT_FALSE(loop.ask(fmt::format("look.hair_color={}", color)).is_error);
+  ASSERT_TRUE(is_told([](const LookChange& look) { return look.look.hair_color == "grey"; }));
+  EXPECT_TRUE(loop.streams().empty()) << "the stream does not change with it";
 }
 
 TEST(SimLoopJobs, NewSolversLeaveTimeForStepsBetweenThem) {
@@ -443,6 +485,11 @@ TEST_F(LiveServer, BadChangesAreRefusedInOneSentenceAndChangeNothing) {
       {"stream", "stream.bound_m"},
       {"substeps=100000", "substeps"},
       {"wind.mean_mps.x=nan", "wind"},
+      {"look.hair_color=purple", "black, brown, blond"},
+      {"look.exposure=nan", "look.exposure is nan"},
+      {"look.light_direction={ x: 0 y: 0 z: 0 }", "point somewhere"},
+      {"look={ followers: 65 }", "look.followers is 65"},
+      {"camera.fov_y_rad=4", "camera.fov_y_rad is 4"},
       {"no assignment", "known: solver"}};
   for (const auto& [assignment, part] : cases) {
     const Notice notice = controller.ask(SetParameter{assignment});

@@ -33,6 +33,31 @@ inline LookDesc sample_look() {
   return look;
 }
 
+/// Another one, with none of the defaults nor of the values above.
+inline LookDesc second_sample_look() {
+  LookDesc look;
+  look.root_color = {0.03125f, 0.5f, 0.25f};
+  look.tip_color = {0.75f, 0.25f, 0.625f};
+  look.strand_radius_m = 0.00025f;
+  look.tip_scale = 0.5f;
+  look.followers = 2;
+  look.segments = 4;
+  look.light_direction = {-1.0f, -0.25f, -0.125f};
+  look.light_color = {1.5f, 0.75f, 0.25f};
+  look.ambient = 0.125f;
+  look.background = {0.0625f, 0.5f, 0.25f};
+  look.skin_color = {0.875f, 0.25f, 0.125f};
+  look.hair_color = "blond";
+  look.eumelanin = 2.5f;
+  look.pheomelanin = 1.25f;
+  look.style = {0.25f, 7, 0.0625f, 0.015625f, 5.0f, 0.00390625f, 3.0f, 0.0625f, 6.0f, 0.5f, 0.125f, 0.75f};
+  look.shading = {0.25f, 0.75f, 0.5f, 1.5f, 0.375f, 15.0f, -2.5f, 8.0f, 0.75f, 0.25f, 0.375f, 0.125f, 0.25f};
+  look.rim_direction = {0.75f, 0.125f, -0.5f};
+  look.rim_color = {0.25f, 1.0f, 0.5f};
+  look.exposure = 0.75f;
+  return look;
+}
+
 inline CameraDesc sample_camera() {
   return {{0.375f, 0.125f, 0.5f}, {0.015625f, -0.03125f, 0.0078125f}, 0.75f};
 }

@@ -29,7 +29,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
           SetParameter{"solver.name=dftl"},
           ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software},
           ModeRequest{StreamMode::Auto},
-          AdminCommand{AdminAction::Kick, 1ull << 40}};
+          AdminCommand{AdminAction::Kick, 1ull << 40},
+          SceneRequest{}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {
@@ -74,7 +75,9 @@ inline std::vector<ServerMessage> sample_server_messages() {
       ModeChange{StreamMode::Frames, "the viewer draws 3 pictures per second", 640, 360},
       SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
                    {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}},
-      FrameQuality{0x8003, 640, 360, 7.5, 50, PictureCodec::JpegTiles, "a slow link"}};
+      FrameQuality{0x8003, 640, 360, 7.5, 50, PictureCodec::JpegTiles, "a slow link"},
+      LookChange{sample_look(), sample_camera()},
+      SceneText{"name: \"walk\" step_rate_hz: 120"}};
 }
 
 }  // namespace strandcast

@@ -13,6 +13,7 @@
 #include "server/net/send_gate.h"
 #include "server/report/streaming.h"
 #include "server/report/work_precision.h"
+#include "server/source/sim_loop.h"
 
 namespace strandcast {
 namespace {
@@ -63,6 +64,7 @@ std::vector<std::string> readme_claims() {
                   1e3 * kStreamBoundsM[2], 1e3 * kStreamBoundsM[3]),
       fmt::format("stream.bound_m={:g}", 2e-4),
       fmt::format("{:.5f}..{:.4f}", scene_fields::kStreamBound.minimum, scene_fields::kStreamBound.maximum),
+      fmt::format("viewers hear of it within {:g} s", kLookChangeNs / kNsPerS),
       fmt::format("states per second, {:g}..{:.0f},000, at most", scene_fields::kStrandRate.minimum,
                   scene_fields::kStrandRate.maximum / 1000.0),
   };
@@ -78,6 +80,7 @@ std::vector<std::string> architecture_claims() {
       fmt::format("no more than {} ms of frames wait (a keyframe: {};", kGateQueueNs / kNsPerMs,
                   kStartDelayNs / kNsPerMs),
       fmt::format("only the asset, or {} KiB", kFirstBytes >> 10),
+      fmt::format("at most every {} ms and the newest only", kLookChangeNs / kNsPerMs),
       fmt::format("at most one in {:g} s for all", kKeyframePauseNs / kNsPerS),
       fmt::format("after {} periods it comes once more", kStillPeriods),
       fmt::format("frame {} in {:g} s found no place", kTroublingLosses, kLossWindowNs / kNsPerS),

@@ -114,6 +114,20 @@ TEST(Mailbox, BoundsStatusAndNotices) {
   EXPECT_EQ(notices, (std::vector<std::string>{"96", "97", "98", "99"}));
 }
 
+TEST(Mailbox, OfLooksOnlyTheNewestWaits) {
+  Mailbox mailbox;
+  LookChange look;
+  for (int i = 1; i <= 100; ++i) {
+    look.look.exposure = static_cast<float>(i);
+    mailbox.push(look);
+    mailbox.push(SceneText{std::to_string(i)});
+  }
+  const auto events = mailbox.take();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(std::get<LookChange>(events[0]).look.exposure, 100.0f);
+  EXPECT_EQ(std::get<SceneText>(events[1]).text, "100");
+}
+
 TEST(Mailbox, GivesOneEventAtATimeAndBoundsTheRest) {
   Mailbox mailbox({.chained_frames = 3});
   const auto next_sequence = [&]() -> uint32_t {

@@ -47,6 +47,9 @@ struct Studio {
   int painters_alive = 0;
   std::set<std::thread::id> threads;
   std::vector<uint64_t> hashes;
+  float look = 0.0f;         // exposure of the newest
+  float worst_look = 1e9f;   // what cannot be painted begins here
+  std::vector<float> looks;  // of the paintings
 
   template <class Read>
   auto get(Read read) {
@@ -64,6 +67,7 @@ class FakePainter : public PicturePainter {
  public:
   explicit FakePainter(Studio& studio) : studio_(studio) {
     const std::lock_guard lock(studio_.mutex);
+    studio_.look = 0.0f;
     ++studio_.painters_made;
     ++studio_.painters_alive;
     studio_.threads.insert(std::this_thread::get_id());
@@ -72,6 +76,12 @@ class FakePainter : public PicturePainter {
     const std::lock_guard lock(studio_.mutex);
     --studio_.painters_alive;
     studio_.threads.insert(std::this_thread::get_id());
+  }
+  Status set_look(const LookDesc& look) override {
+    const std::lock_guard lock(studio_.mutex);
+    if (look.exposure >= studio_.worst_look) return make_error(ErrorCode::Unsupported, "too bright");
+    studio_.look = look.exposure;
+    return {};
   }
   Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) override {
     std::unique_lock lock(studio_.mutex);
@@ -85,12 +95,14 @@ class FakePainter : public PicturePainter {
     if (width > studio_.largest_width)
       return make_error(ErrorCode::LimitExceeded, "the canvas has {} columns", studio_.largest_width);
     ++studio_.paints;
+    studio_.looks.push_back(studio_.look);
     ++studio_.paints_by_width[width];
     if (width > studio_.quick_width) std::this_thread::sleep_for(kSlowPaint);
     // Another state or camera gives another picture, unless the studio is dark.
     Image image{width, height, std::vector<uint8_t>(static_cast<size_t>(width) * height * 4, 255)};
     const auto level =
-        static_cast<uint8_t>(snapshot->tick * 50 + static_cast<uint64_t>(view.camera.offset_m.x * 90));
+        static_cast<uint8_t>(snapshot->tick * 50 + static_cast<uint64_t>(view.camera.offset_m.x * 90) +
+                             static_cast<uint64_t>(studio_.look * 40));
     for (size_t i = 0; i < 64 && !studio_.is_dark; i += 4) image.rgba[i] = level;
     return image;
   }
@@ -114,6 +126,10 @@ class FrameWork : public testing::Test {
     hooks.on_refused = [this](uint32_t picture_class, const Error&) {
       const std::lock_guard lock(mutex_);
       refused_.push_back(picture_class);
+    };
+    hooks.on_look_refused = [this](uint32_t picture_class, const Error&) {
+      const std::lock_guard lock(mutex_);
+      refused_looks_.push_back(picture_class);
     };
     hooks.on_failure = [this](const Error&) { ++failures_; };
     return std::make_unique<FrameWorker>(
@@ -152,6 +168,7 @@ class FrameWork : public testing::Test {
   std::mutex mutex_;
   std::vector<std::pair<uint32_t, EncodedFramePtr>> frames_;
   std::vector<uint32_t> refused_;  // classes
+  std::vector<uint32_t> refused_looks_;
 };
 
 TEST_F(FrameWork, NothingIsDecodedOrMadeWithoutViews) {
@@ -201,6 +218,66 @@ TEST_F(FrameWork, WithoutANewStateNothingIsDrawnAgainUnlessTheCameraMoves) {
   worker->set_views(views);
   ASSERT_TRUE(eventually([&] { return frame_count() == 2; }));
   EXPECT_EQ(frames()[1].second->header.sequence, 2u);
+}
+
+LookDesc exposed(float exposure) {
+  LookDesc look;
+  look.exposure = exposure;
+  return look;
+}
+
+TEST_F(FrameWork, AnotherLookDrawsTheSameStateAgainWithoutANewPainterOrAKeyframe) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  for (const float exposure : {1.0f, 2.0f}) worker->set_look(exposed(exposure));
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.looks.back(); }) == 2.0f; }));
+  ASSERT_TRUE(eventually([&] { return frame_count() >= 2; }));
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.painters_made; }), 1);
+  EXPECT_EQ(requests_, 0) << "no keyframe";
+  // Whoever comes back when nobody watched meanwhile sees the newest, too.
+  worker->set_views({});
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
+  worker->set_look(exposed(3.0f));
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.looks.back(); }) == 3.0f; }));
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.looks.back(); }), 3.0f);
+}
+
+TEST_F(FrameWork, ALookThatCannotBeDrawnIsToldAndTheOneBeforeStays) {
+  studio_.worst_look = 5.0f;
+  const auto worker = start(kFastHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  worker->set_look(exposed(2.0f));
+  ASSERT_TRUE(eventually(
+      [&] { return studio_.get([](Studio& s) { return !s.looks.empty() && s.looks.back() == 2.0f; }); }));
+  worker->set_look(exposed(7.0f));
+  const auto told = [&] {
+    const std::lock_guard lock(mutex_);
+    return refused_looks_;
+  };
+  ASSERT_TRUE(eventually([&] { return !told().empty(); }));
+  EXPECT_EQ(told(), std::vector<uint32_t>{1});
+  worker->offer(next_delta());
+  ASSERT_TRUE(eventually([&] { return worker->counters().decoded >= 2; }));
+  give_time_to_misbehave();
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.looks.back(); }), 2.0f);
+  EXPECT_FALSE(worker->failure());
+  // A painter that is made anew has it as well.
+  worker->set_views({});
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_alive; }) == 0; }));
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.painters_made; }) == 2; }));
+  ASSERT_TRUE(eventually([&] { return studio_.get([](Studio& s) { return s.looks.back(); }) == 2.0f; }));
+  give_time_to_misbehave();
+  EXPECT_EQ(studio_.get([](Studio& s) { return s.looks.back(); }), 2.0f);
+  EXPECT_EQ(told().size(), 1u) << "told once";
 }
 
 TEST_F(FrameWork, TheFrameRateIsALimitAndTheDecoderKeepsUp) {

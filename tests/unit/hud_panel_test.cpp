@@ -161,6 +161,27 @@ TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   EXPECT_TRUE(writer.write(state, facts, kS + 2 * kSlowMotionNs).warnings.empty());
 }
 
+TEST(ViewHud, SaysWhoseLookIsSeen) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = true;
+  state.session_number = 1;
+  state.look.look.hair_color = "red";
+  ViewFacts facts = facts_of("127.0.0.1");
+  const auto look = [&] {
+    for (const HudRow& row : writer.write(state, facts, kS).rows)
+      if (row.label == "look") return row.value;
+    return std::string("no row");
+  };
+  EXPECT_EQ(look(), "red (L)");
+  state.look_changes = 2;
+  EXPECT_EQ(look(), "red, changed 2 times (L)");
+  facts.has_own_look = true;
+  EXPECT_THAT(look(), HasSubstr("your own"));
+  state.mode.shown = StreamMode::Frames;
+  EXPECT_THAT(look(), HasSubstr("red")) << "the server's pictures show the scene's";
+}
+
 TEST(ViewHud, CountsPicturesAndSaysHowTheyAreDrawn) {
   HudWriter writer;
   ViewerState state;

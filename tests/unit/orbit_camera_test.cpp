@@ -29,6 +29,21 @@ TEST(OrbitCamera, OrbitKeepsTheDistanceAndAFullTurnComesBack) {
   EXPECT_LT(glm::length(orbit.camera().offset_m - start), 1e-3f);
 }
 
+TEST(OrbitCamera, WhoLooksFromHomeGoesAlongWhenItMoves) {
+  OrbitCamera orbit(CameraDesc{});
+  CameraDesc home;
+  home.fov_y_rad = 0.9f;
+  EXPECT_FALSE(orbit.set_home(CameraDesc{})) << "it has not moved";
+  EXPECT_TRUE(orbit.set_home(home));
+  EXPECT_EQ(orbit.camera(), home);
+  orbit.orbit({0.1f, 0.0f});
+  const CameraDesc own = orbit.camera();
+  EXPECT_FALSE(orbit.set_home(CameraDesc{})) << "who has turned away stays";
+  EXPECT_EQ(orbit.camera(), own);
+  orbit.reset();
+  EXPECT_EQ(orbit.camera(), CameraDesc{});
+}
+
 TEST(OrbitCamera, TheSceneTurnsWithTheHand) {
   OrbitCamera orbit(CameraDesc{});
   const glm::vec3 nose = 0.1f * glm::normalize(orbit.camera().offset_m) + orbit.camera().target_m;

@@ -102,6 +102,36 @@ TEST(PictureViews, ThePictureOfTheSceneHasRoomInEveryCodecWhateverOthersTake) {
   EXPECT_EQ(views.views().size(), kMaxPictureClasses);
 }
 
+// Whoever moves the scene's camera again and again fills no memory with those who stay where it was.
+TEST(PictureViews, WhereTheSceneLooksFromMovesWithinTheLimits) {
+  for (const PictureBudget& budget : {kHardwareBudget, kSoftwareBudget}) {
+    PictureView scene = scene_view();
+    scene.size = {1280, 720};
+    PictureViews views(scene, budget);
+    uint64_t viewer = 0;
+    size_t refused = 0;
+    for (int i = 0; i < 20; ++i) {
+      scene.camera.offset_m.x = -5.0f + 0.125f * static_cast<float>(i);
+      views.set_reserved_camera(scene.camera);
+      for (const PictureCodec codec : kPictureCodecs) {
+        PictureView own = scene;
+        own.codec = codec;
+        refused += views.assign(one(viewer++), own) ? 0 : 1;
+        EXPECT_TRUE(i > 0 || refused == 0) << to_string(codec);
+      }
+      uint64_t pixels = 0;
+      for (const auto& [picture_class, view] : views.views())
+        pixels += uint64_t{view.size.width} * view.size.height;
+      EXPECT_LE(views.views().size(), kMaxPictureClasses);
+      EXPECT_LE(pixels, budget.all_pixels + kReservedPictureClasses * budget.picture_pixels);
+    }
+    EXPECT_GT(refused, 0u);
+    // Those who stayed leave, and the scene's own has room from where it is now.
+    for (uint64_t gone = 0; gone < viewer; ++gone) views.remove(gone);
+    EXPECT_TRUE(views.assign(one(viewer), scene));
+  }
+}
+
 TEST(PictureViews, OneAddressCannotTakeAllViews) {
   PictureViews views(scene_view(), kHardwareBudget);
   uint64_t viewer = 0;

@@ -130,6 +130,37 @@ TEST(SceneFile, TextRoundTripsExactly) {
   }
 }
 
+TEST(SceneFile, OneLineAndALookAloneReadBackToo) {
+  const std::string line = to_line(unusual_scene());
+  EXPECT_EQ(line.find('\n'), std::string::npos);
+  const auto whole = parse_scene(line, "s", {});
+  ASSERT_TRUE(whole) << whole.error().to_string();
+  EXPECT_EQ(*whole, unusual_scene());
+
+  const auto part = parse_scene(to_text(unusual_scene().look, unusual_scene().camera), "s", {});
+  ASSERT_TRUE(part) << part.error().to_string();
+  SceneDesc expected;
+  expected.look = unusual_scene().look;
+  expected.camera = unusual_scene().camera;
+  EXPECT_EQ(*part, expected) << "all else keeps its default";
+  EXPECT_EQ(to_text(LookDesc{}, CameraDesc{}).find("groom"), std::string::npos) << "and is not said";
+}
+
+TEST(SceneFile, AbsolutePathsHoldWhereverTheSceneIsSaved) {
+  SceneDesc scene;
+  scene.groom = FileGroomDesc{.path = "hair/a.tfx", .more_paths = {"../b.tfx"}};
+  scene.head.mesh_path = "/heads/bust.obj";
+  scene.head.more_mesh_paths = {"eyes.obj"};
+  const SceneDesc absolute = with_absolute_paths(scene);
+  const auto& file = std::get<FileGroomDesc>(absolute.groom);
+  const std::filesystem::path here = std::filesystem::current_path();
+  EXPECT_EQ(file.path, here / "hair/a.tfx");
+  EXPECT_EQ(file.more_paths.at(0), (here / "../b.tfx").lexically_normal());
+  EXPECT_EQ(absolute.head.mesh_path, "/heads/bust.obj");
+  EXPECT_EQ(absolute.head.more_mesh_paths.at(0), here / "eyes.obj");
+  EXPECT_TRUE(with_absolute_paths(SceneDesc{}).head.mesh_path.empty()) << "no path stays none";
+}
+
 TEST(SceneFile, EveryProtoFieldIsReadAndWritten) {
   // Names of all fields reachable from Scene; each must be written for some scene, and (round trip above)
   // read back.

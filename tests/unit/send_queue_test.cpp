@@ -126,6 +126,27 @@ TEST(SendQueue, ControlIsBoundedAndGoesAheadOfMedia) {
   EXPECT_FALSE(queue.take_next().has_value());
 }
 
+// A client that reads slowly while somebody drags a slider has its place, and sees what it came to.
+TEST(SendQueue, OfTheLooksThatWaitOnlyTheNewestIsSent) {
+  SendQueue queue;
+  LookChange look;
+  for (size_t i = 1; i <= 10 * kMaxQueuedControl; ++i) {
+    look.look.exposure = static_cast<float>(i);
+    ASSERT_TRUE(queue.push_control(look)) << i;
+    if (i == 1) {
+      ASSERT_TRUE(queue.push_control(Notice{false, "between"}));
+    }
+  }
+  const auto taken = [&] {
+    const auto item = queue.take_next();
+    queue.written();
+    return std::get<ServerMessage>(*item);
+  };
+  EXPECT_EQ(taken(), ServerMessage(Notice{false, "between"}));
+  EXPECT_EQ(taken(), ServerMessage(look));
+  EXPECT_FALSE(queue.take_next().has_value());
+}
+
 PicturePtr picture(uint32_t sequence, uint32_t base_sequence) {
   return make_picture(frame(Opcode::Vp8Frame, sequence, base_sequence));
 }

@@ -47,6 +47,38 @@ TEST(SceneChange, ChangesLiveFieldsOnly) {
   EXPECT_THAT(error_of(change_scene(scene, "")), HasSubstr("known: solver"));
 }
 
+TEST(SceneChange, LookAndCameraAreLive) {
+  const SceneDesc scene = built_in_scene();
+  const auto changed = [&](const std::string& assignment) {
+    const auto result = change_scene(scene, assignment);
+    EXPECT_TRUE(result) << result.error().to_string();
+    return result ? *result : SceneDesc{};
+  };
+  EXPECT_EQ(changed("look.hair_color=red").look.hair_color, "red");
+  EXPECT_EQ(changed("look.shading.wetness=0.5").look.shading.wetness, 0.5f);
+  EXPECT_EQ(changed("camera.fov_y_rad=0.9").camera.fov_y_rad, 0.9f);
+  // Several at once, and the others stay.
+  const SceneDesc several = changed("look={ style { clump: 0.25 } rim_color { r: 1 } }");
+  EXPECT_EQ(several.look.style.clump, 0.25f);
+  EXPECT_EQ(several.look.style.locks, scene.look.style.locks);
+  EXPECT_EQ(several.look.rim_color, glm::vec3(1.0f, 0.0f, 0.0f));
+  for (const auto& [wrong, part] : std::vector<std::pair<std::string, std::string>>{
+           {"look.shading.wetness=1.5", "look.shading.wetness is 1.5, it must be within 0 .. 1"},
+           {"look.ambient=nan", "look.ambient is nan, it must be within 0 .. 1"},
+           {"look.hair_color=purple", "look.hair_color must be custom, melanin, black"},
+           {"look.light_direction={ x: 0 y: 0 z: 0 }", "look.light_direction must point somewhere"},
+           {"look.rim_direction={ x: 0 y: 0 z: 0 }", "look.rim_direction must point somewhere"},
+           {"look.shine=1", "look has no field \"shine\" (known: root_color"},
+           {"look", "expected path=value"},
+           {"camera.offset_m={ x: 0 y: 0 z: 0 }", "camera.offset_m is almost zero"}})
+    EXPECT_THAT(error_of(change_scene(scene, wrong)), HasSubstr(part)) << wrong;
+  // However much was said, the sentence says what is wrong with it.
+  std::string longest = "look={";
+  while (longest.size() < 3'000) longest += " style { clump: 0.5 }";
+  EXPECT_THAT(error_of(change_scene(scene, longest + " ambient: 2 }")).substr(0, kMaxTextChars),
+              HasSubstr("look.ambient is 2, it must be within 0 .. 1"));
+}
+
 TEST(SceneChange, NamesKnownSolversAndRanges) {
   const SceneDesc scene = built_in_scene();
   EXPECT_THAT(error_of(change_scene(scene, "solver.name=spaghetti")), HasSubstr("known: dftl"));

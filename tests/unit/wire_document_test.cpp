@@ -40,6 +40,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxControlBytes", with_commas(kMaxControlBytes)},
       {"kClockWindow", with_commas(kClockWindow)},
       {"kMaxListedSessions", with_commas(kMaxListedSessions)},
+      {"kMaxSceneTextBytes", with_commas(kMaxSceneTextBytes)},
       {"kMaxReportedMs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedMs)))},
       {"kMaxReportedHz", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedHz)))},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},

@@ -221,6 +221,38 @@ TEST(WireMessages, WelcomeFieldsOutOfRangeAreNamed) {
   }
 }
 
+TEST(WireMessages, ALookThatCannotBeIsNamed) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<std::pair<std::string, std::function<void(LookChange&)>>> changes = {
+      {"look.hair_color", [](LookChange& c) { c.look.hair_color = "purple"; }},
+      {"look.ambient", [&](LookChange& c) { c.look.ambient = nan; }},
+      {"look.light_direction", [](LookChange& c) { c.look.light_direction = glm::vec3(0.0f); }},
+      {"look.rim_direction", [](LookChange& c) { c.look.rim_direction = glm::vec3(0.0f); }},
+      {"style.locks", [](LookChange& c) { c.look.style.locks = 17; }},
+      {"shading.wetness", [&](LookChange& c) { c.look.shading.wetness = 1.5f; }},
+      {"camera.offset_m", [](LookChange& c) { c.camera.offset_m = glm::vec3(0.0f); }},
+  };
+  for (const auto& [field, change] : changes) {
+    LookChange look{sample_look(), sample_camera()};
+    ASSERT_EQ(round_trip(look), look);
+    change(look);
+    const auto refused = decode_server_message(encode(ServerMessage(look)));
+    ASSERT_FALSE(refused) << field;
+    EXPECT_EQ(refused.error().place, field);
+  }
+}
+
+TEST(WireMessages, ASceneIsOneLineOfLimitedLength) {
+  const SceneText longest{std::string(kMaxSceneTextBytes, 'x')};
+  EXPECT_LE(encode(ServerMessage(longest)).size(), kMaxControlBytes);
+  EXPECT_EQ(round_trip(longest), longest);
+  for (const std::string& text : {longest.text + "x", std::string("two\nlines")}) {
+    const auto refused = decode_server_message(encode(ServerMessage(SceneText{text})));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().place, "scene_text.text");
+  }
+}
+
 TEST(WireMessages, StatusNumbersMustBeFinite) {
   ServerStatus status;
   status.realtime_factor = std::numeric_limits<double>::quiet_NaN();

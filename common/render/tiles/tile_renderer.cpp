@@ -261,6 +261,11 @@ class TileRenderer final : public Renderer {
     profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
     return {};
   }
+  Status set_look(const LookDesc& look) override {
+    state_.look = drawable(look);
+    state_.expansion.set_look(state_.look);
+    return {};
+  }
   Image read_image() override { return state_.picture.image; }
   const RenderProfile& profile() const override { return profile_; }
   const gl::PassListBase& passes() const override { return passes_; }

@@ -1,0 +1,76 @@
+// A form to be filled in beside the picture: fields with ranges, and what a person did to them. Plain data:
+// what the fields mean knows the application, how they are drawn form_panel.h.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace strandcast {
+
+/// Of a number, of a colour or direction, of a name.
+using FormValue = std::variant<double, glm::vec3, std::string>;
+
+enum class FormWidget { Slider, Whole, Color, Direction, Choice, Text };
+
+struct FormField {
+  std::string path;     // names it in an edit
+  std::string section;  // fields of one section stand together
+  std::string title;
+  std::string help;  // shown beside the pointer; may be empty
+  std::string unit;  // may be empty
+  FormWidget widget = FormWidget::Slider;
+  FormValue value = 0.0;
+  double minimum = 0.0;  // of a number, or of each component
+  double maximum = 1.0;
+  double handy_maximum = 1.0;  // where a slider ends; more can be typed, up to maximum
+  double shown_per_unit = 1.0;
+  bool is_idle = false;              // shown, but it decides nothing now
+  std::vector<std::string> choices;  // of a Choice
+};
+
+struct FormState {
+  std::string title;
+  std::vector<std::string> notes;  // whom it concerns
+  std::vector<FormField> fields;
+  std::string undo;       // the name of a button that takes all changes back; empty: there is none
+  std::string file;       // to save as
+  std::string save_note;  // what is saved
+};
+
+struct FormEdit {
+  std::string path;
+  FormValue value;
+
+  bool operator==(const FormEdit&) const = default;
+};
+
+/// What a person did.
+struct FormActions {
+  std::vector<FormEdit> edits;      // in order
+  std::optional<std::string> file;  // another name
+  bool wants_save = false;
+  bool wants_undo = false;
+
+  bool is_empty() const { return edits.empty() && !file && !wants_save && !wants_undo; }
+  void add(FormActions later);
+};
+
+/// Where something comes from, seen from the middle: degrees about the up axis from +Z towards +X, and above
+/// the horizon.
+struct DirectionAngles {
+  double azimuth_deg = 0.0;
+  double elevation_deg = 0.0;
+};
+/// Of what travels along `direction`, which has a length.
+DirectionAngles angles_of(const glm::vec3& direction);
+/// Inverse, of this length.
+glm::vec3 direction_of(const DirectionAngles& angles, float length);
+
+/// What displays show of linear light, 0..1, and back (IEC 61966-2-1).
+float to_srgb(float linear);
+float from_srgb(float shown);
+
+}  // namespace strandcast

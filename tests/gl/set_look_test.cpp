@@ -1,0 +1,93 @@
+// A look that changes on a renderer: the pixels are those of one that was made with it.
+#include <epoxy/gl.h>
+
+#include "common/render/renderer.h"
+#include "tests/support/gl_fixture.h"
+#include "tests/support/look_variants.h"
+#include "tests/support/sample_asset.h"
+#include "tests/support/sample_look.h"
+
+namespace strandcast {
+namespace {
+
+constexpr RenderSize kSize{96, 72};
+
+class SetLookTest : public GlTest {
+ protected:
+  void TearDown() override { EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR)); }
+
+  std::unique_ptr<Renderer> make(const LookDesc& look) {
+    auto made = Renderer::make(gl::ShaderLibrary(), context_->info(), asset_, look);
+    EXPECT_TRUE(made) << made.error().to_string();
+    return made ? std::move(*made) : nullptr;
+  }
+  Image draw(Renderer& renderer) {
+    const Status status =
+        renderer.draw({{}, asset_.rest_position_m}, {{0.0f, 0.05f, 0.6f}, {0.0f, 0.0f, 0.0f}, 0.7f}, kSize);
+    EXPECT_TRUE(status) << status.error().to_string();
+    return renderer.read_image();
+  }
+
+  const SceneAsset asset_ = sample_asset(60, 8);
+};
+
+TEST_F(SetLookTest, EveryFieldReachesThePixelsAsIfTheRendererWereMadeWithIt) {
+  const LookDesc base;
+  const auto renderer = make(base);
+  ASSERT_NE(renderer, nullptr);
+  const Image before = draw(*renderer);
+  size_t seen = 0;
+  for (const auto& [path, look] : test::looks_one_field_apart(base, sample_look())) {
+    SCOPED_TRACE(path);
+    ASSERT_NE(look, base) << "the sample has the default here";
+    ASSERT_TRUE(renderer->set_look(look));
+    const Image changed = draw(*renderer);
+    const auto fresh = make(look);
+    ASSERT_NE(fresh, nullptr);
+    EXPECT_TRUE(changed == draw(*fresh));
+    seen += changed == before ? 0 : 1;
+    ASSERT_TRUE(renderer->set_look(base));
+    ASSERT_TRUE(draw(*renderer) == before) << "and back";
+  }
+  EXPECT_GE(seen, 10u) << "most of what is told above would hold for a renderer that ignores every look";
+}
+
+TEST_F(SetLookTest, ALookWithoutAnyDefaultAndBack) {
+  const auto renderer = make({});
+  ASSERT_NE(renderer, nullptr);
+  const Image before = draw(*renderer);
+  ASSERT_TRUE(renderer->set_look(sample_look()));
+  const Image changed = draw(*renderer);
+  EXPECT_FALSE(changed == before);
+  EXPECT_TRUE(changed == draw(*make(sample_look())));
+  ASSERT_TRUE(renderer->set_look({}));
+  EXPECT_TRUE(draw(*renderer) == before);
+}
+
+// What the passes are made for is allocated for the newest look alone; colours allocate nothing.
+TEST_F(SetLookTest, HoldsWhatTheNewestLookNeeds) {
+  LookDesc look;
+  const auto renderer = make(look);
+  ASSERT_NE(renderer, nullptr);
+  draw(*renderer);
+  const gl::ObjectCounts held = gl::object_counts();
+  look.root_color.r = 0.5f;
+  look.style.clump = 0.1f;
+  ASSERT_TRUE(renderer->set_look(look));
+  draw(*renderer);
+  EXPECT_EQ(gl::object_counts(), held) << "nothing is compiled or allocated for a colour";
+  look.followers = 0;
+  ASSERT_TRUE(renderer->set_look(look));
+  draw(*renderer);
+  const uint64_t fewer = renderer->passes().live_bytes();
+  const auto fresh = make(look);
+  ASSERT_NE(fresh, nullptr);
+  draw(*fresh);
+  EXPECT_EQ(fewer, fresh->passes().live_bytes());
+  ASSERT_TRUE(renderer->set_look({}));
+  draw(*renderer);
+  EXPECT_GT(renderer->passes().live_bytes(), fewer);
+}
+
+}  // namespace
+}  // namespace strandcast
