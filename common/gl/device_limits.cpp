@@ -15,6 +15,8 @@ constexpr const char* kByScene = "the groom";
 constexpr DeviceLimitRow kTable[] = {
     {DeviceLimit::VertexStorageBlocks, "storage blocks in the vertex stage",
      GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS, false, 0, 1, "render/strand.vert"},
+    {DeviceLimit::FragmentStorageBlocks, "storage blocks in the fragment stage",
+     GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS, false, 8, 3, "render/lists.frag"},
     {DeviceLimit::TessellationStorageBlocks, "storage blocks in the tessellation evaluation stage",
      GL_MAX_TESS_EVALUATION_SHADER_STORAGE_BLOCKS, false, 0, 2, "render/expand.tese"},
     {DeviceLimit::ComputeStorageBlocks, "storage blocks in the compute stage",
@@ -30,7 +32,7 @@ constexpr DeviceLimitRow kTable[] = {
     {DeviceLimit::VertexTextureUnits, "textures in the vertex stage", GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS,
      false, 16, 1, "render/strand.vert"},
     {DeviceLimit::FragmentTextureUnits, "textures in the fragment stage", GL_MAX_TEXTURE_IMAGE_UNITS, false,
-     16, 1, "render/light.glsl"},
+     16, 3, "render/moments_color.frag"},
     {DeviceLimit::GroupSize, "invocations of a work group in one dimension", GL_MAX_COMPUTE_WORK_GROUP_SIZE,
      true, 1'024, 128, "sim/dftl_parallel.comp"},
     {DeviceLimit::GroupInvocations, "invocations of a work group", GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS,

@@ -223,8 +223,11 @@ bool Framebuffer::is_complete() const {
   return glCheckNamedFramebufferStatus(name(), GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-Framebuffer Framebuffer::without_attachments(const std::string& label) {
-  return Framebuffer(label, {}, nullptr);
+Framebuffer Framebuffer::without_attachments(const std::string& label, uint32_t width, uint32_t height) {
+  Framebuffer framebuffer(label, {}, nullptr);
+  glNamedFramebufferParameteri(framebuffer.name(), GL_FRAMEBUFFER_DEFAULT_WIDTH, static_cast<GLint>(width));
+  glNamedFramebufferParameteri(framebuffer.name(), GL_FRAMEBUFFER_DEFAULT_HEIGHT, static_cast<GLint>(height));
+  return framebuffer;
 }
 
 void Framebuffer::bind() const {

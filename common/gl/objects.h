@@ -152,9 +152,10 @@ class Framebuffer {
   /// LimitExceeded when the driver cannot draw into the textures, which may be too large for it.
   static Result<Framebuffer> make(const std::string& label, std::span<const Texture* const> colors,
                                   const Texture* depth);
-  /// 1 x 1 without storage: what to bind for transform feedback with the rasteriser off, since a context
-  /// without a surface has no framebuffer of its own and refuses every draw.
-  static Framebuffer without_attachments(const std::string& label);
+  /// Without storage, 1 x 1: what to bind for transform feedback with the rasteriser off, since a context
+  /// without a surface has no framebuffer of its own and refuses every draw. Larger ones are for draws that
+  /// write into buffers.
+  static Framebuffer without_attachments(const std::string& label, uint32_t width = 1, uint32_t height = 1);
   void bind() const;
   uint32_t name() const { return handle_.name(); }
 

@@ -11,6 +11,7 @@ namespace {
 
 /// All passes of a path, and which of them run to make a picture.
 Status add_planned(const RenderPath& path, RenderScene& scene, RenderPassList& passes) {
+  scene.methods = path.methods;
   path.add_passes(scene, passes);
   return passes.plan({&scene.strands}, {&scene.picture});
 }
@@ -58,6 +59,7 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
   RenderTurn turn(strands, view, pixels, terms);
   RETURN_IF_ERROR(passes_.run(turn, &timer_));
   profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
+  profile_.left_out_fragments = turn.left_out_fragments;
   return {};
 }
 

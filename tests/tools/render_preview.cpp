@@ -1,7 +1,7 @@
 // render_preview: draws a scene's hair at rest into a PNG, without server or simulation. For looking at the
 // renderer.
 //   render_preview OUT.png [--scene FILE] [--set path=value]... [--size WxH] [--repeat N] [--turn DEGREES]
-//   [--shaders DIR]
+//   [--shaders DIR] [--methods SHADOW,TRANSPARENCY,ANTIALIASING]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -28,9 +28,21 @@ struct Options {
   std::string shaders;  // folder to read shaders from instead of the binary
   std::vector<std::string> overrides;
   RenderSize size;
+  RenderMethods methods;
   int repeat = 1;
   double turn_degrees = 0.0;  // of the head about the vertical
 };
+
+/// "deep_opacity,lists,analytic"
+Result<RenderMethods> parse_methods(const std::string& names) {
+  const size_t first = names.find(',');
+  const size_t second = first == std::string::npos ? first : names.find(',', first + 1);
+  if (second == std::string::npos)
+    return make_error(ErrorCode::BadInput, "--methods is {} but must look like volume,hashed,analytic",
+                      names);
+  return find_render_methods(names.substr(0, first), names.substr(first + 1, second - first - 1),
+                             names.substr(second + 1));
+}
 
 Result<Options> parse(int argc, char** argv) {
   Options options;
@@ -44,6 +56,8 @@ Result<Options> parse(int argc, char** argv) {
     const std::string value = argv[i];
     if (word == "--scene") {
       options.scene = value;
+    } else if (word == "--methods") {
+      ASSIGN_OR_RETURN(options.methods, parse_methods(value));
     } else if (word == "--shaders") {
       options.shaders = value;
     } else if (word == "--set") {
@@ -57,7 +71,8 @@ Result<Options> parse(int argc, char** argv) {
         return make_error(ErrorCode::BadInput, "--size is {} but must look like 640x360", value);
     } else {
       return make_error(ErrorCode::BadInput,
-                        "unknown option {} (known: --scene --set --shaders --size --repeat --turn)", word);
+                        "unknown option {} (known: --scene --set --shaders --methods --size --repeat --turn)",
+                        word);
     }
   }
   if (options.out.empty()) return make_error(ErrorCode::BadInput, "name the PNG file to write");
@@ -74,7 +89,8 @@ Status run(int argc, char** argv) {
   const gl::ShaderLibrary shaders =
       options.shaders.empty() ? gl::ShaderLibrary() : gl::ShaderLibrary(options.shaders);
   ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
-  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, scene.look));
+  ASSIGN_OR_RETURN(auto renderer, Renderer::make(shaders, context->info(), asset, scene.look,
+                                                 segment_path_with(options.methods)));
 
   PosedStrands strands;
   strands.position_m = asset.rest_position_m;
@@ -97,11 +113,15 @@ Status run(int argc, char** argv) {
   std::string passes;
   for (const gl::PassReport& pass : renderer->passes().report())
     passes += fmt::format(", {} {:.1f}", pass.name, pass.median_ms);
-  std::printf("%s: %ux%u, %llu strands, %llu segments; picture %.1f ms (best %.1f), %.1f ms of CPU%s\n",
-              context->info().renderer.c_str(), options.size.width, options.size.height,
-              static_cast<unsigned long long>(profile.drawn_strands),
-              static_cast<unsigned long long>(profile.drawn_segments), picture_ms[picture_ms.size() / 2],
-              picture_ms.front(), cpu_ms, passes.c_str());
+  std::printf(
+      "%s: %ux%u, %llu strands, %llu segments, %llu fragments left out, %.1f MB; picture %.1f ms "
+      "(best %.1f), %.1f ms of CPU%s\n",
+      context->info().renderer.c_str(), options.size.width, options.size.height,
+      static_cast<unsigned long long>(profile.drawn_strands),
+      static_cast<unsigned long long>(profile.drawn_segments),
+      static_cast<unsigned long long>(profile.left_out_fragments),
+      static_cast<double>(renderer->passes().live_bytes()) * 1e-6, picture_ms[picture_ms.size() / 2],
+      picture_ms.front(), cpu_ms, passes.c_str());
   return {};
 }
 

@@ -16,6 +16,10 @@ namespace strandcast {
 /// thinner than a pixel equally well.
 inline constexpr uint32_t kSamplesPerSide = 2;
 
+/// Nothing switched on but writing to all of a target of this size. Whoever else uses the context may leave
+/// its own state behind.
+void set_plain_state(glm::uvec2 viewport);
+
 /// Linear RGB with coverage in alpha, and depth, per sample.
 class SceneTarget final : public gl::Resource {
  public:
@@ -27,6 +31,9 @@ class SceneTarget final : public gl::Resource {
   void begin() const;
   void clear() const;
   const gl::Texture& color() const { return color_; }
+  const gl::Texture& depth() const { return depth_; }
+  /// In samples.
+  glm::uvec2 size_px() const { return size_px_; }
   /// 0 before the first resize().
   uint64_t size_bytes() const override { return color_.size_bytes() + depth_.size_bytes(); }
 
@@ -35,6 +42,24 @@ class SceneTarget final : public gl::Resource {
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
   glm::uvec2 size_px_{0};  // in samples
+};
+
+/// Strands of a picture by themselves, as they are blended over the scene: linear RGB times opacity, and
+/// opacity, per pixel.
+class StrandLayer final : public gl::Resource {
+ public:
+  StrandLayer() : Resource("strand layer") {}
+  /// As SceneTarget.
+  Status resize(glm::uvec2 picture_px);
+  /// Makes it what is drawn into, without depth.
+  void begin() const;
+  const gl::Texture& color() const { return color_; }
+  uint64_t size_bytes() const override { return color_.size_bytes(); }
+
+ private:
+  gl::Texture color_;
+  gl::Framebuffer framebuffer_;
+  glm::uvec2 size_px_{0};
 };
 
 /// sRGB, first row at the top.

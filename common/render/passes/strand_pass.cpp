@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/render/shadow/shadow_method.h"
 #include "shaders/shared/bindings.h"
 
 namespace strandcast {
@@ -59,55 +60,79 @@ class StrandPass final : public RenderPass {
         expanded_(expanded) {}
 
   bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override {
-    return uint64_t{kSegmentsPerDraw} * kIndicesPerSegment * sizeof(uint16_t);
-  }
+  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
 
   Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(program_,
-                     gl::Program::make(setup.shaders, {"render/strand.vert", "render/strand.frag"}, {}));
-    vertex_array_ = gl::VertexArray("strand");
-    quad_index_ = gl::Buffer::of("quad index", make_quad_indices());
-    glVertexArrayElementBuffer(vertex_array_.name(), quad_index_.name());
+    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/strand.frag"));
     return {};
   }
 
   Status run(RenderTurn& turn) override {
-    const LookDesc& look = scene_.look;
     scene_.scene.begin();
-    program_.use();
-    vertex_array_.bind();
-    expanded_.vertex().bind_storage(shader::kBindingExpanded);
-    scene_.light.set_uniforms(program_, kLightUnit);
-    program_.set("u_clip_from_head", turn.view.clip_from_head);
-    program_.set("u_eye_m", turn.view.eye_m);
-    program_.set("u_target_px", turn.view.target_px);
-    program_.set("u_focal_px", turn.view.focal_px);
-    program_.set("u_near_m", turn.view.near_m);
-    program_.set("u_strand_width_m", expanded_.width_m);
-    program_.set("u_tip_scale", look.tip_scale);
-    program_.set("u_root_color", look.root_color);
-    program_.set("u_tip_color", look.tip_color);
-    const uint32_t segments = expanded_.segment_count;
-    DrawQueue queue(scene_.is_software);
-    for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
-      const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
-      glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
-                               GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
-      queue.wait_for_the_one_before();
-    }
+    strands_.begin(scene_, expanded_, turn, scene_.scene.size_px());
+    strands_.draw(scene_, expanded_);
     return {};
   }
 
  private:
   RenderScene& scene_;
   ExpandedStrands& expanded_;
-  gl::Program program_;
-  gl::VertexArray vertex_array_;
-  gl::Buffer quad_index_;
+  StrandDraw strands_;
 };
 
 }  // namespace
+
+uint64_t StrandDraw::size_bytes() {
+  return uint64_t{kSegmentsPerDraw} * kIndicesPerSegment * sizeof(uint16_t);
+}
+
+Result<StrandDraw> StrandDraw::make(const RenderSetup& setup, const RenderScene& scene,
+                                    const std::string& fragment_stage, gl::Variant variant,
+                                    const std::string& vertex_stage) {
+  StrandDraw strands;
+  if (vertex_stage == kShadedStage) variant["SHADOW"] = static_cast<int>(scene.methods.shadow);
+  ASSIGN_OR_RETURN(strands.program_,
+                   gl::Program::make(setup.shaders, {vertex_stage, fragment_stage}, variant));
+  strands.vertex_array_ = gl::VertexArray("strand");
+  strands.quad_index_ = gl::Buffer::of("quad index", make_quad_indices());
+  glVertexArrayElementBuffer(strands.vertex_array_.name(), strands.quad_index_.name());
+  return strands;
+}
+
+void StrandDraw::begin(const RenderScene& scene, const ExpandedStrands& expanded, const RenderTurn& turn,
+                       glm::uvec2 target_px) {
+  const LookDesc& look = scene.look;
+  bind(expanded);
+  scene.light.set_uniforms(program_, kLightUnit);
+  if (scene.shadow != nullptr) scene.shadow->set_uniforms(program_, kFirstShadowUnit);
+  program_.set("u_clip_from_head", turn.view.clip_from_head);
+  program_.set("u_eye_m", turn.view.eye_m);
+  program_.set("u_target_px", glm::vec2(target_px));
+  // The view counts the samples of a picture with kSamplesPerSide.
+  program_.set("u_focal_px", turn.view.focal_px * (static_cast<float>(target_px.y) / turn.view.target_px.y));
+  program_.set("u_near_m", turn.view.near_m);
+  program_.set("u_strand_width_m", expanded.width_m);
+  program_.set("u_tip_scale", look.tip_scale);
+  program_.set("u_root_color", look.root_color);
+  program_.set("u_tip_color", look.tip_color);
+}
+
+void StrandDraw::bind(const ExpandedStrands& expanded) {
+  program_.use();
+  vertex_array_.bind();
+  expanded.vertex().bind_storage(shader::kBindingExpanded);
+}
+
+void StrandDraw::draw(const RenderScene& scene, const ExpandedStrands& expanded) const {
+  const uint32_t segments = expanded.segment_count;
+  DrawQueue queue(scene.is_software);
+  for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
+    const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
+    glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
+                             GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
+    queue.wait_for_the_one_before();
+  }
+}
 
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded) {
   return std::make_unique<StrandPass>(scene, expanded);
