@@ -177,6 +177,16 @@ Texture Texture::volume(const std::string& label, uint32_t internal_format, uint
   return texture;
 }
 
+Texture Texture::view_of(const std::string& label, uint32_t internal_format, const Buffer& buffer) {
+  Texture texture;
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_BUFFER, 1, &name);
+  glTextureBuffer(name, internal_format, buffer.name());
+  label_object(GL_TEXTURE, name, label);
+  texture.handle_ = Handle<delete_texture>(name);
+  return texture;
+}
+
 void Texture::bind(uint32_t unit) const {
   glBindTextureUnit(unit, name());
 }

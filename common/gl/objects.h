@@ -131,6 +131,8 @@ class Texture {
           uint32_t samples);
   static Texture volume(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
                         uint32_t depth);
+  /// A buffer as a texture: `internal_format` is of one texel. The buffer has to outlive it.
+  static Texture view_of(const std::string& label, uint32_t internal_format, const Buffer& buffer);
   void bind(uint32_t unit) const;
   uint32_t name() const { return handle_.name(); }
   uint64_t size_bytes() const { return handle_.size_bytes(); }

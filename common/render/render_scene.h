@@ -26,6 +26,8 @@ struct RestFacts {
 
 /// Numbers of the methods that no scene sets.
 struct MethodSettings {
+  uint32_t shadow_texels = 512;        // along each side of the light's map
+  float strand_opacity = 0.30f;        // optical depth of one strand across, as in the light volume
   uint32_t list_nodes_per_pixel = 12;  // strands over a pixel that there is room for, in the mean
 };
 

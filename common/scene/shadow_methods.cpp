@@ -5,9 +5,15 @@
 namespace strandcast {
 namespace {
 
-constexpr std::array<RenderMethodRow, 2> kShadows{{
+constexpr std::array<RenderMethodRow, 7> kShadows{{
     {"volume", "optical depth swept through a volume of the key strands, on the CPU"},
     {"none", "all light reaches every strand"},
+    {"deep_opacity", "layers that follow the first strand seen from the light (Yuksel and Keyser 2008)"},
+    {"opacity_maps", "16 slices at fixed depths (Kim and Neumann 2001)"},
+    {"density_rays", "rays through a volume of the drawn strands"},
+    {"deep_shadow",
+     "every strand on every ray, in double on the CPU: slow, the truth (Lokovic and Veach 2000)"},
+    {"hybrid", "a volume fine across the light and coarse along it, with the first depth, in one draw"},
 }};
 constexpr std::array<RenderMethodRow, 5> kTransparencies{{
     {"hashed", "coverage decides by a fixed pattern which samples a strand takes"},

@@ -39,6 +39,7 @@ const uint kBindingListHead = 3u;
 const uint kBindingListNode = 4u;
 const uint kBindingListCount = 5u;
 const uint kBindingDepthKeys = 6u;
+const uint kBindingDensity = 7u;
 
 #ifdef __cplusplus
 }  // namespace strandcast::shader

@@ -163,7 +163,9 @@ class LimitsInUse : public GlTest {
       ADD_FAILURE() << flat.error().to_string();
       return "render/resolve.vert";
     }
-    return flat->text.find("v_across_px") != std::string::npos ? "render/strand.vert" : "render/resolve.vert";
+    const auto takes = [&](const char* input) { return flat->text.find(input) != std::string::npos; };
+    if (takes("v_depth_m")) return "render/shadow_map.vert";
+    return takes("v_across_px") ? "render/strand.vert" : "render/resolve.vert";
   }
   static void add(const ShaderLibrary& library, const std::vector<std::string>& stages,
                   const Variant& variant, Used& used) {

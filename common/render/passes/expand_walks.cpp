@@ -14,18 +14,25 @@ gl::PassDeclaration declare(const RenderPass& expand, const std::string& purpose
 class FirstWalk final : public RenderPass {
  public:
   FirstWalk(std::shared_ptr<ExpandWalks::Shared> shared, const std::string& purpose)
-      : Pass(declare(*shared->expand, purpose)), shared_(std::move(shared)) {}
+      : Pass(declare(*shared->expand, purpose)), shared_(std::move(shared)), is_early_(!purpose.empty()) {}
 
   bool is_batched() const override { return true; }
   uint64_t size_bytes() const override { return shared_->expand->size_bytes(); }
-  Status prepare(const RenderSetup& setup) override { return shared_->expand->prepare(setup); }
+  Status prepare(const RenderSetup& setup) override {
+    if (is_early_) nothing_ = gl::Framebuffer::without_attachments("expand");
+    return shared_->expand->prepare(setup);
+  }
   Status run(RenderTurn& turn) override {
+    if (is_early_) nothing_.bind();
     shared_->batch_count = turn.batch_index + 1;
     return shared_->expand->run(turn);
   }
 
  private:
   std::shared_ptr<ExpandWalks::Shared> shared_;
+  // In front of all that draws no target is bound yet, and there is no expansion without one.
+  bool is_early_;
+  gl::Framebuffer nothing_;
 };
 
 /// Strands are counted once, however often they are walked over.

@@ -134,6 +134,12 @@ void StrandDraw::draw(const RenderScene& scene, const ExpandedStrands& expanded)
   }
 }
 
+gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
+                                gl::Resources writes) {
+  return {name, std::move(reads), std::move(writes), scene.features.has_strands.value,
+          scene.features.has_strands.reason};
+}
+
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded) {
   return std::make_unique<StrandPass>(scene, expanded);
 }

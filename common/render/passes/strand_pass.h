@@ -39,6 +39,10 @@ class StrandDraw {
   gl::Buffer quad_index_;
 };
 
+/// A declaration of a pass that runs when there are strands.
+gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
+                                gl::Resources writes);
+
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded);
 
 }  // namespace strandcast

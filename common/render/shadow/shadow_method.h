@@ -27,7 +27,14 @@ inline constexpr uint32_t kShadowUnits = 6;
 void add_shadow_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
 void add_none(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+void add_deep_opacity(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+void add_opacity_maps(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+void add_density_rays(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+void add_deep_shadow(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+void add_hybrid(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
+/// How far drawn strands may stray from the key strands.
+float shadow_margin_m(const RenderScene& scene);
 /// Towards the light of the look, unit, head space; from above when it has no direction.
 glm::vec3 to_light_in_head(const RenderScene& scene, const RenderTurn& turn);
 

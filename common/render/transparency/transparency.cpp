@@ -25,12 +25,6 @@ void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassL
   kMethods[static_cast<size_t>(scene.methods.transparency)](scene, walks, passes);
 }
 
-gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
-                                gl::Resources writes) {
-  return {name, std::move(reads), std::move(writes), scene.features.has_strands.value,
-          scene.features.has_strands.reason};
-}
-
 void begin_blended(StrandDraw& strands, const RenderScene& scene, const ExpandedStrands& expanded,
                    const RenderTurn& turn) {
   strands.begin(scene, expanded, turn, turn.size_px);

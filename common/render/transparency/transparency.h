@@ -24,9 +24,6 @@ void add_moments(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes)
 /// The method of the scene.
 void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 
-/// A declaration of a pass that runs when there are strands.
-gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
-                                gl::Resources writes);
 /// Strands with a fragment stage that includes render/blended.glsl, one invocation per pixel, for the target
 /// that is bound.
 void begin_blended(StrandDraw& strands, const RenderScene& scene, const ExpandedStrands& expanded,
