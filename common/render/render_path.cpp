@@ -17,6 +17,7 @@ std::unique_ptr<RenderPass> make_resolve_pass(RenderScene& scene);
 namespace {
 
 void add_segment_passes(RenderScene& scene, RenderPassList& passes) {
+  scene.scene.set_layout(sample_layout(scene.methods.antialiasing));
   auto& expanded = passes.keep(make_expanded_strands(scene));
   ExpandWalks walks(make_expand_pass(scene, expanded), expanded);
   passes.add(make_upload_pass(scene));

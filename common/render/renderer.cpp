@@ -11,6 +11,7 @@ namespace {
 
 /// All passes of a path, and which of them run to make a picture.
 Status add_planned(const RenderPath& path, RenderScene& scene, RenderPassList& passes) {
+  RETURN_IF_ERROR(check_render_methods(path.methods));
   scene.methods = path.methods;
   path.add_passes(scene, passes);
   return passes.plan({&scene.strands}, {&scene.picture});

@@ -22,8 +22,10 @@ constexpr std::array<RenderMethodRow, 5> kTransparencies{{
     {"weighted", "all strands of a pixel mixed with weights that fall with depth (McGuire and Bavoil 2013)"},
     {"moments", "transmittance of a pixel from four moments of depth (Muenstermann et al. 2018)"},
 }};
-constexpr std::array<RenderMethodRow, 1> kAntialiasings{{
+constexpr std::array<RenderMethodRow, 3> kAntialiasings{{
     {"analytic", "a strand covers as much of a pixel as it is wide"},
+    {"msaa4", "four samples per pixel, by the rasteriser"},
+    {"density_samples", "four samples where little hair is behind a strand, one where much is (003, 5.2)"},
 }};
 
 Result<uint8_t> find(std::string_view kind, std::span<const RenderMethodRow> rows, std::string_view name) {
@@ -49,6 +51,18 @@ std::span<const RenderMethodRow> antialiasing_methods() {
   return kAntialiasings;
 }
 
+Status check_render_methods(const RenderMethods& methods) {
+  // What is blended has its coverage as opacity: samples would take it twice.
+  if (methods.transparency != TransparencyMethod::Hashed &&
+      methods.antialiasing != AntialiasingMethod::Analytic)
+    return make_error(ErrorCode::BadInput,
+                      "antialiasing {} goes with transparency {} only: {} blends what {} says of coverage",
+                      kAntialiasings[static_cast<size_t>(methods.antialiasing)].name, kTransparencies[0].name,
+                      kTransparencies[static_cast<size_t>(methods.transparency)].name,
+                      kAntialiasings[0].name);
+  return {};
+}
+
 Result<RenderMethods> find_render_methods(std::string_view shadow, std::string_view transparency,
                                           std::string_view antialiasing) {
   ASSIGN_OR_RETURN(const uint8_t shadow_row, find("shadow", kShadows, shadow));
@@ -57,12 +71,7 @@ Result<RenderMethods> find_render_methods(std::string_view shadow, std::string_v
   const RenderMethods methods{static_cast<ShadowMethod>(shadow_row),
                               static_cast<TransparencyMethod>(transparency_row),
                               static_cast<AntialiasingMethod>(antialiasing_row)};
-  // What is blended has its coverage as opacity: samples would take it twice.
-  if (methods.transparency != TransparencyMethod::Hashed &&
-      methods.antialiasing != AntialiasingMethod::Analytic)
-    return make_error(ErrorCode::BadInput,
-                      "antialiasing {} goes with transparency {} only: {} blends what {} says of coverage",
-                      antialiasing, kTransparencies[0].name, transparency, kAntialiasings[0].name);
+  RETURN_IF_ERROR(check_render_methods(methods));
   return methods;
 }
 

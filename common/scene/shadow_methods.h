@@ -37,6 +37,9 @@ struct RenderMethods {
   bool operator==(const RenderMethods&) const = default;
 };
 
+/// BadInput for kinds that do not go together.
+Status check_render_methods(const RenderMethods& methods);
+
 /// By the names of their rows. BadInput names an unknown one with all that there are, and kinds that do not
 /// go together.
 Result<RenderMethods> find_render_methods(std::string_view shadow, std::string_view transparency,

@@ -165,7 +165,7 @@ class LimitsInUse : public GlTest {
     }
     const auto takes = [&](const char* input) { return flat->text.find(input) != std::string::npos; };
     if (takes("v_depth_m")) return "render/shadow_map.vert";
-    return takes("v_across_px") ? "render/strand.vert" : "render/resolve.vert";
+    return takes("v_width_px") ? "render/strand.vert" : "render/resolve.vert";
   }
   static void add(const ShaderLibrary& library, const std::vector<std::string>& stages,
                   const Variant& variant, Used& used) {

@@ -202,6 +202,15 @@ TEST_F(RenderCostTest, AMethodThatIsNotChosenCostsNothing) {
   EXPECT_LT(gl::object_counts().size_bytes - before.size_bytes, plain_bytes);
 }
 
+TEST_F(RenderCostTest, MethodsThatDoNotGoTogetherAreRefused) {
+  const auto path =
+      segment_path_with({ShadowMethod::Volume, TransparencyMethod::Moments, AntialiasingMethod::Msaa4});
+  const auto renderer =
+      Renderer::make(gl::ShaderLibrary(), context_->info(), strands_of(9, 5), look_with(2), path);
+  ASSERT_FALSE(renderer);
+  EXPECT_EQ(renderer.error().code, ErrorCode::BadInput);
+}
+
 TEST_F(RenderCostTest, NothingIsAllocatedOfAMethodWhereThereAreNoStrands) {
   for (const RenderMethods& methods : all_methods()) {
     if (methods.antialiasing != AntialiasingMethod::Analytic) continue;  // has targets of its own

@@ -34,5 +34,14 @@ TEST(ShadowMethods, RefuseAnUnknownNameAndSayWhichThereAre) {
   EXPECT_FALSE(find_render_methods("volume", "hashed", "fxaa"));
 }
 
+TEST(ShadowMethods, RefuseSamplesForWhatIsBlended) {
+  const auto both = find_render_methods("volume", "lists", "msaa4");
+  ASSERT_FALSE(both);
+  EXPECT_EQ(both.error().code, ErrorCode::BadInput);
+  EXPECT_EQ(
+      both.error().message,
+      "antialiasing msaa4 goes with transparency hashed only: lists blends what analytic says of coverage");
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -19,7 +19,7 @@ void set_plain_state(glm::uvec2 viewport) {
 }
 
 Status SceneTarget::resize(glm::uvec2 picture_px) {
-  const glm::uvec2 size = picture_px * kSamplesPerSide;
+  const glm::uvec2 size = picture_px * layout_.per_side;
   if (size == size_px_) return {};
   RETURN_IF_ERROR(
       gl::check_device_limit(gl::read_device_limits(), gl::DeviceLimit::TextureSize, std::max(size.x, size.y),
@@ -29,8 +29,8 @@ Status SceneTarget::resize(glm::uvec2 picture_px) {
   framebuffer_ = {};
   color_ = {};
   depth_ = {};
-  color_ = gl::Texture("scene color", GL_RGBA16F, size.x, size.y, 1);
-  depth_ = gl::Texture("scene depth", GL_DEPTH_COMPONENT32F, size.x, size.y, 1);
+  color_ = gl::Texture("scene color", GL_RGBA16F, size.x, size.y, layout_.multisamples);
+  depth_ = gl::Texture("scene depth", GL_DEPTH_COMPONENT32F, size.x, size.y, layout_.multisamples);
   const std::array<const gl::Texture*, 1> colors{&color_};
   ASSIGN_OR_RETURN(framebuffer_, gl::Framebuffer::make("scene", colors, &depth_));
   size_px_ = size;

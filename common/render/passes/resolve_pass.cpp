@@ -21,9 +21,10 @@ class ResolvePass final : public RenderPass {
       : Pass({"render/resolve", resolved(scene), {&scene.picture}, true, {}}), scene_(scene) {}
 
   Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(program_,
-                     gl::Program::make(setup.shaders, {"render/resolve.vert", "render/resolve.frag"},
-                                       {{"HAS_LAYER", scene_.has_strand_layer() ? 1 : 0}}));
+    ASSIGN_OR_RETURN(
+        program_, gl::Program::make(setup.shaders, {"render/resolve.vert", "render/resolve.frag"},
+                                    {{"HAS_LAYER", scene_.has_strand_layer() ? 1 : 0},
+                                     {"IS_MULTISAMPLED", scene_.scene.layout().multisamples > 1 ? 1 : 0}}));
     no_attributes_ = gl::VertexArray("resolve");
     return {};
   }
@@ -37,7 +38,7 @@ class ResolvePass final : public RenderPass {
     if (scene_.has_strand_layer()) scene_.strand_layer.color().bind(kLayerUnit);
     program_.set("u_layer", static_cast<int>(kLayerUnit));
     program_.set("u_scene", static_cast<int>(kSceneUnit));
-    program_.set("u_samples", static_cast<int>(kSamplesPerSide));
+    program_.set("u_samples", static_cast<int>(scene_.scene.layout().per_side));
     program_.set("u_target_height", static_cast<int>(turn.size_px.y));
     program_.set("u_background", scene_.look.background);
     glDrawArrays(GL_TRIANGLES, 0, 3);

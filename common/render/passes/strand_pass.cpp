@@ -111,6 +111,8 @@ void StrandDraw::begin(const RenderScene& scene, const ExpandedStrands& expanded
   // The view counts the samples of a picture with kSamplesPerSide.
   program_.set("u_focal_px", turn.view.focal_px * (static_cast<float>(target_px.y) / turn.view.target_px.y));
   program_.set("u_near_m", turn.view.near_m);
+  program_.set("u_widened_px", 1.0f);
+  program_.set("u_which", static_cast<int>(StrandDepth::All));
   program_.set("u_strand_width_m", expanded.width_m);
   program_.set("u_tip_scale", look.tip_scale);
   program_.set("u_root_color", look.root_color);

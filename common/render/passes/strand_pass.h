@@ -14,6 +14,10 @@
 
 namespace strandcast {
 
+/// Segments that are drawn: all, or those with little or much hair behind them, as sample_choice.comp marks
+/// them. strand.vert has the same numbers.
+enum class StrandDepth : int { All, Shallow, Deep };
+
 /// Quads of expanded segments with a program: for every pass that draws strands, seen from wherever.
 class StrandDraw {
  public:

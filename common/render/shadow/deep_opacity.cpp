@@ -9,8 +9,9 @@
 namespace strandcast {
 namespace {
 
-// Ends of the layers, of the hair's depth along the light. Most of what is seen happens in the first.
-const glm::vec3 kLayerEnds(0.12f, 0.4f, 1.0f);
+// Ends of the layers, of the hair's depth along the light. Most of what is seen happens in the first: with
+// 0.12 and 0.4 the picture of the built-in scene is twice as far from the truth.
+const glm::vec3 kLayerEnds(0.03f, 0.12f, 1.0f);
 constexpr uint32_t kFirstDepthUnit = 0;
 
 class DeepOpacityMap final : public LightMap {

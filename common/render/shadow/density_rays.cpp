@@ -66,7 +66,8 @@ class DensityPass final : public RenderPass {
 class DensityReadyPass final : public RenderPass {
  public:
   DensityReadyPass(RenderScene& scene, DensityVolume& volume)
-      : Pass(strand_pass(scene, "render/density_ready", {&volume}, {&volume, &scene.light})), volume_(volume) {}
+      : Pass(strand_pass(scene, "render/density_ready", {&volume}, {&volume, &scene.light})),
+        volume_(volume) {}
   Status run(RenderTurn&) override {
     volume_.finish();
     return {};
@@ -117,13 +118,17 @@ void DensityVolume::finish() const {
 }
 
 void DensityVolume::set_uniforms(const gl::Program& program, uint32_t first_unit) const {
+  set_density_uniforms(program, first_unit);
+  set_skull_uniforms(program, skull_);
+}
+
+void DensityVolume::set_density_uniforms(const gl::Program& program, uint32_t unit) const {
   const double cell_m = cube_.side_m / kCells;
-  texture_.bind(first_unit);
-  program.set("u_density", static_cast<int>(first_unit));
+  texture_.bind(unit);
+  program.set("u_density", static_cast<int>(unit));
   program.set("u_cube_origin_m", cube_.origin_m);
   program.set("u_cube_from_m", 1.0f / cube_.side_m);
   program.set("u_density_per_m", static_cast<float>(kGreatestInteger / kDensitySteps / cell_m));
-  set_skull_uniforms(program, skull_);
 }
 
 void add_density_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes,

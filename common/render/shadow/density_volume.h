@@ -19,6 +19,8 @@ class DensityVolume final : public ShadowMap {
   /// Makes what was added the texture that is looked up.
   void finish() const;
   void set_uniforms(const gl::Program& program, uint32_t first_unit) const override;
+  /// The density alone, for who looks along other rays.
+  void set_density_uniforms(const gl::Program& program, uint32_t unit) const;
   uint64_t size_bytes() const override { return cell_.size_bytes() + texture_.size_bytes(); }
 
  private:
@@ -29,7 +31,7 @@ class DensityVolume final : public ShadowMap {
   FittedSphere skull_;
 };
 
-/// The passes that fill it, with a walk named for `purpose`, once the light of the draw is known.
+/// The passes that fill it, with a walk of their own.
 void add_density_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes,
                         DensityVolume& volume);
 

@@ -30,10 +30,13 @@ class PixelLists final : public gl::Resource {
     node_ = {};
     framebuffer_ = {};
     const uint64_t pixels = uint64_t{size_px.x} * size_px.y;
-    const uint64_t node_bytes = std::min(pixels * nodes_per_pixel_ * kNodeBytes, kMaxListBytes);
-    RETURN_IF_ERROR(gl::check_device_limit(gl::read_device_limits(), gl::DeviceLimit::StorageBlockBytes,
-                                           std::max(node_bytes, pixels * sizeof(uint32_t)),
+    const gl::DeviceLimits limits = gl::read_device_limits();
+    RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::StorageBlockBytes, pixels * kNodeBytes,
                                            fmt::format("lists for {} x {} pixels", size_px.x, size_px.y)));
+    // What one block can hold is the budget where the device has less.
+    const uint64_t node_bytes =
+        std::min({pixels * nodes_per_pixel_ * kNodeBytes, kMaxListBytes,
+                  limits.of(gl::DeviceLimit::StorageBlockBytes) / kNodeBytes * kNodeBytes});
     head_ = gl::Buffer("list head", pixels * sizeof(uint32_t));
     node_ = gl::Buffer("list node", node_bytes);
     if (count_.size_bytes() == 0) count_ = gl::Buffer("list count", sizeof(Count));

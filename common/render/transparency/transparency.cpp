@@ -16,7 +16,15 @@ static_assert(kSamplesPerSide == 2, "blended.glsl gathers four samples of the sc
 
 }  // namespace
 
+SampleLayout sample_layout(AntialiasingMethod method) {
+  if (method == AntialiasingMethod::Msaa4) return {1, 4};
+  return {};
+}
+
 void add_hashed(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
+  if (scene.methods.antialiasing == AntialiasingMethod::Msaa4) return add_msaa4(scene, walks, passes);
+  if (scene.methods.antialiasing == AntialiasingMethod::DensitySamples)
+    return add_density_samples(scene, walks, passes);
   passes.add(walks.add());
   passes.add(make_strand_pass(scene, walks.expanded()));
 }

@@ -1,6 +1,7 @@
-// How strands that cover a part of a pixel are put in front of one another: each method of
-// common/scene/shadow_methods.h is a file of this folder that adds its passes, and only what is chosen is
-// compiled and allocated. All but `hashed` fill the strand layer, which the resolve pass lays over the scene.
+// How strands that cover a part of a pixel are put in front of one another, and how edges get smooth: each
+// method of common/scene/shadow_methods.h is a file of this folder that adds its passes, and only what is
+// chosen is compiled and allocated. All but `hashed` fill the strand layer, which the resolve pass lays over
+// the scene.
 #pragma once
 
 #include <span>
@@ -20,6 +21,12 @@ void add_lists(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_three_depths(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_weighted(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
 void add_moments(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+
+/// The other ways to smooth edges, which go with `hashed`.
+void add_msaa4(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+void add_density_samples(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
+/// Samples of the scene that a method draws into.
+SampleLayout sample_layout(AntialiasingMethod method);
 
 /// The method of the scene.
 void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes);
