@@ -26,7 +26,7 @@ struct Collected {
 
 /// What snapshots are drawn with, after the connection is gone.
 struct Drawn {
-  const RenderDevice* device = nullptr;
+  RenderDevice* device = nullptr;
   std::shared_ptr<const SceneAsset> asset;
   LookChange look;  // of the end
 };

@@ -135,7 +135,7 @@ void StrandDrawer::fail(const Error& error) {
   config_.on_news();
 }
 
-void StrandDrawer::draw_until_stopped(const RenderDevice& device) {
+void StrandDrawer::draw_until_stopped(RenderDevice& device) {
   plan_ = DrawPlan(device.info().is_software ? kFirstSoftwareStep : kFirstHardwareStep);
   while (const auto job = wait_for_job())
     if (job->view && job->state != nullptr && prepare(device, *job)) turn(*job);
@@ -158,7 +158,7 @@ std::optional<StrandDrawer::Job> StrandDrawer::wait_for_job() {
 }
 
 /// Whether the newest strands can be drawn. The groom may have changed with the server, the look at any time.
-bool StrandDrawer::prepare(const RenderDevice& device, const Job& job) {
+bool StrandDrawer::prepare(RenderDevice& device, const Job& job) {
   const ViewerState& state = *job.state;
   if (state.asset == nullptr) return false;
   if (state.asset == asset_) {

@@ -81,9 +81,9 @@ class StrandDrawer {
   };
 
   void run();
-  void draw_until_stopped(const RenderDevice& device);
+  void draw_until_stopped(RenderDevice& device);
   std::optional<Job> wait_for_job();
-  bool prepare(const RenderDevice& device, const Job& job);
+  bool prepare(RenderDevice& device, const Job& job);
   void follow_look(const LookDesc& look);
   void turn(const Job& job);
   Status draw(const Job& job, PosedStrands strands, size_t step);

@@ -15,6 +15,7 @@ namespace strandcast::gl {
 
 enum class DeviceLimit : uint8_t {
   VertexStorageBlocks,
+  FragmentStorageBlocks,
   TessellationStorageBlocks,
   ComputeStorageBlocks,
   StorageBlockBytes,
@@ -31,7 +32,7 @@ enum class DeviceLimit : uint8_t {
   CapturedComponents,
   TextureSize,
 };
-inline constexpr size_t kDeviceLimitCount = 16;
+inline constexpr size_t kDeviceLimitCount = 17;
 
 struct DeviceLimitRow {
   DeviceLimit limit;

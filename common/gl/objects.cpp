@@ -177,6 +177,16 @@ Texture Texture::volume(const std::string& label, uint32_t internal_format, uint
   return texture;
 }
 
+Texture Texture::view_of(const std::string& label, uint32_t internal_format, const Buffer& buffer) {
+  Texture texture;
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_BUFFER, 1, &name);
+  glTextureBuffer(name, internal_format, buffer.name());
+  label_object(GL_TEXTURE, name, label);
+  texture.handle_ = Handle<delete_texture>(name);
+  return texture;
+}
+
 void Texture::bind(uint32_t unit) const {
   glBindTextureUnit(unit, name());
 }
@@ -223,8 +233,11 @@ bool Framebuffer::is_complete() const {
   return glCheckNamedFramebufferStatus(name(), GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-Framebuffer Framebuffer::without_attachments(const std::string& label) {
-  return Framebuffer(label, {}, nullptr);
+Framebuffer Framebuffer::without_attachments(const std::string& label, uint32_t width, uint32_t height) {
+  Framebuffer framebuffer(label, {}, nullptr);
+  glNamedFramebufferParameteri(framebuffer.name(), GL_FRAMEBUFFER_DEFAULT_WIDTH, static_cast<GLint>(width));
+  glNamedFramebufferParameteri(framebuffer.name(), GL_FRAMEBUFFER_DEFAULT_HEIGHT, static_cast<GLint>(height));
+  return framebuffer;
 }
 
 void Framebuffer::bind() const {

@@ -131,6 +131,8 @@ class Texture {
           uint32_t samples);
   static Texture volume(const std::string& label, uint32_t internal_format, uint32_t width, uint32_t height,
                         uint32_t depth);
+  /// A buffer as a texture: `internal_format` is of one texel. The buffer has to outlive it.
+  static Texture view_of(const std::string& label, uint32_t internal_format, const Buffer& buffer);
   void bind(uint32_t unit) const;
   uint32_t name() const { return handle_.name(); }
   uint64_t size_bytes() const { return handle_.size_bytes(); }
@@ -152,9 +154,10 @@ class Framebuffer {
   /// LimitExceeded when the driver cannot draw into the textures, which may be too large for it.
   static Result<Framebuffer> make(const std::string& label, std::span<const Texture* const> colors,
                                   const Texture* depth);
-  /// 1 x 1 without storage: what to bind for transform feedback with the rasteriser off, since a context
-  /// without a surface has no framebuffer of its own and refuses every draw.
-  static Framebuffer without_attachments(const std::string& label);
+  /// Without storage, 1 x 1: what to bind for transform feedback with the rasteriser off, since a context
+  /// without a surface has no framebuffer of its own and refuses every draw. Larger ones are for draws that
+  /// write into buffers.
+  static Framebuffer without_attachments(const std::string& label, uint32_t width = 1, uint32_t height = 1);
   void bind() const;
   uint32_t name() const { return handle_.name(); }
 

@@ -57,6 +57,9 @@ std::map<std::string, std::string> declared_uniforms(const FlatSource& source);
 
 /// All combinations of the axes' values; one empty variant when there are no axes.
 std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes);
+/// All of them while they are few, else some in which every two values of every two axes meet: what checks of
+/// all shaders walk.
+std::vector<Variant> covering_variants(const std::vector<VariantAxis>& axes);
 
 /// What stands in front of the flattened text: the version, and a #define for each axis, with its default
 /// where the variant names no value.

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <regex>
 #include <set>
+#include <tuple>
 
 #include "common/base/file.h"
 #include "common/gl/embedded_shaders.h"
@@ -14,7 +15,8 @@ namespace strandcast::gl {
 namespace {
 
 constexpr uint64_t kMaxShaderFileBytes = 1u << 20;
-constexpr size_t kMaxVariants = 256;  // of one stage file: every one of them is compiled by a test
+constexpr size_t kMaxVariants = 1024;  // of one stage file
+constexpr size_t kFewVariants = 64;    // so many are all compiled by a test, of more some
 constexpr std::array<std::string_view, 6> kStageExtensions = {".vert", ".tesc", ".tese",
                                                               ".geom", ".frag", ".comp"};
 
@@ -201,6 +203,40 @@ std::map<std::string, std::string> declared_uniforms(const FlatSource& source) {
   for (std::sregex_iterator it(text.begin(), text.end(), kDeclaration), end; it != end; ++it)
     uniforms[(*it)[2].str()] = (*it)[1].str();
   return uniforms;
+}
+
+std::vector<Variant> covering_variants(const std::vector<VariantAxis>& axes) {
+  const std::vector<Variant> all = all_variants(axes);
+  if (all.size() <= kFewVariants) return all;
+  using Pair = std::tuple<size_t, int, size_t, int>;  // two axes with a value of each
+  const auto pairs_of = [&](const Variant& variant) {
+    std::vector<Pair> pairs;
+    for (size_t i = 0; i < axes.size(); ++i)
+      for (size_t j = i + 1; j < axes.size(); ++j)
+        pairs.emplace_back(i, variant.at(axes[i].name), j, variant.at(axes[j].name));
+    return pairs;
+  };
+  std::set<Pair> missing;
+  for (const Variant& variant : all)
+    for (const Pair& pair : pairs_of(variant)) missing.insert(pair);
+  // Each time the one that brings most: within a factor of the fewest, and the same list every time.
+  std::vector<Variant> chosen;
+  while (!missing.empty()) {
+    const Variant* best = nullptr;
+    size_t most = 0;
+    for (const Variant& variant : all) {
+      const std::vector<Pair> pairs = pairs_of(variant);
+      const auto brought = static_cast<size_t>(std::count_if(
+          pairs.begin(), pairs.end(), [&](const Pair& pair) { return missing.contains(pair); }));
+      if (brought > most) {
+        most = brought;
+        best = &variant;
+      }
+    }
+    chosen.push_back(*best);
+    for (const Pair& pair : pairs_of(*best)) missing.erase(pair);
+  }
+  return chosen;
 }
 
 std::vector<Variant> all_variants(const std::vector<VariantAxis>& axes) {

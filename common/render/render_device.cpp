@@ -14,8 +14,42 @@ bool is_renderer_name(const std::string& name) {
   return name == "auto" || name == "tiles" || name == "gl";
 }
 
+namespace {
+
+/// Follows the look to the kind of renderer that draws it.
+class LookRenderer final : public Renderer {
+ public:
+  LookRenderer(RenderDevice& device, const SceneAsset& asset, RendererKind kind,
+               std::unique_ptr<Renderer> renderer)
+      : device_(device), asset_(asset), kind_(kind), renderer_(std::move(renderer)) {}
+
+  Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
+              const DrawTerms& terms) override {
+    return renderer_->draw(strands, camera, size, terms);
+  }
+  Status set_look(const LookDesc& look) override {
+    const RendererKind kind = device_.kind_for(look);
+    if (kind == kind_) return renderer_->set_look(look);
+    ASSIGN_OR_RETURN(renderer_, device_.make_renderer(kind, asset_, look));
+    kind_ = kind;
+    return {};
+  }
+  Image read_image() override { return renderer_->read_image(); }
+  const RenderProfile& profile() const override { return renderer_->profile(); }
+  const gl::PassListBase& passes() const override { return renderer_->passes(); }
+
+ private:
+  RenderDevice& device_;
+  const SceneAsset& asset_;
+  RendererKind kind_;
+  std::unique_ptr<Renderer> renderer_;
+};
+
+}  // namespace
+
 RenderDevice::RenderDevice(const RenderDeviceConfig& config)
-    : shaders_(config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary()) {}
+    : config_(config),
+      shaders_(config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary()) {}
 
 Result<std::unique_ptr<RenderDevice>> RenderDevice::open(const RenderDeviceConfig& config) {
   if (!is_renderer_name(config.renderer))
@@ -44,10 +78,36 @@ Status RenderDevice::make_current() {
   return context_ ? context_->make_current() : Status();
 }
 
-Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(const SceneAsset& asset,
-                                                              const LookDesc& look) const {
-  if (context_) return Renderer::make(shaders_, context_->info(), asset, look);
-  return make_tile_renderer(asset, look);
+RendererKind RenderDevice::kind_for(const LookDesc& look) const {
+  return info_.kind == RendererKind::Tiles && look.methods == RenderMethodsDesc{} ? RendererKind::Tiles
+                                                                                  : RendererKind::Gl;
+}
+
+Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(RendererKind kind, const SceneAsset& asset,
+                                                              const LookDesc& look) {
+  if (kind == RendererKind::Tiles) return make_tile_renderer(asset, look);
+  if (config_.renderer == "tiles")
+    return make_error(ErrorCode::BadInput,
+                      "look.methods names what only OpenGL draws; --renderer auto or gl allows it");
+  if (!context_) {
+    auto context = gl::EglContext::make(config_.gl_device, config_.driver_threads);
+    if (!context)
+      return make_error(ErrorCode::Unavailable, "look.methods names what only OpenGL draws: {}",
+                        context.error().to_string());
+    context_ = std::move(context).value();
+  }
+  return Renderer::make(shaders_, context_->info(), asset, look);
+}
+
+Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(const SceneAsset& asset, const LookDesc& look) {
+  const RendererKind kind = kind_for(look);
+  ASSIGN_OR_RETURN(auto renderer, make_renderer(kind, asset, look));
+  if (info_.kind == RendererKind::Gl) return renderer;
+  return std::unique_ptr<Renderer>(std::make_unique<LookRenderer>(*this, asset, kind, std::move(renderer)));
+}
+
+RendererKind likely_renderer(const std::string& renderer, const LookDesc& look) {
+  return renderer != "gl" && look.methods == RenderMethodsDesc{} ? RendererKind::Tiles : RendererKind::Gl;
 }
 
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind) {

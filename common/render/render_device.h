@@ -38,14 +38,26 @@ class RenderDevice {
   /// Binds its context, if it has one, to the calling thread.
   Status make_current();
   const RenderDeviceInfo& info() const { return info_; }
-  Result<std::unique_ptr<Renderer>> make_renderer(const SceneAsset& asset, const LookDesc& look) const;
+  /// `asset` outlives the renderer. Where tiles draw, a look that names other methods than the main ones is
+  /// drawn by OpenGL, opened when the first such look comes; Unavailable without it, BadInput where "tiles"
+  /// was asked for.
+  Result<std::unique_ptr<Renderer>> make_renderer(const SceneAsset& asset, const LookDesc& look);
+  /// One of this kind, whatever the look names.
+  Result<std::unique_ptr<Renderer>> make_renderer(RendererKind kind, const SceneAsset& asset,
+                                                  const LookDesc& look);
+  /// What draws a look here.
+  RendererKind kind_for(const LookDesc& look) const;
 
  private:
   explicit RenderDevice(const RenderDeviceConfig& config);
+  const RenderDeviceConfig config_;
   RenderDeviceInfo info_;
   gl::ShaderLibrary shaders_;
-  std::unique_ptr<gl::EglContext> context_;  // of Gl
+  std::unique_ptr<gl::EglContext> context_;  // of Gl, or for methods that tiles have not
 };
+
+/// What will draw a look where the renderer was asked for by this name and there is no hardware GPU.
+RendererKind likely_renderer(const std::string& renderer, const LookDesc& look);
 
 /// The passes that a renderer of this kind would run, without drawing.
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind);

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/render/render_scene.h"
 #include "common/render/render_turn.h"
+#include "common/scene/shadow_methods.h"
 
 namespace strandcast {
 
@@ -15,9 +17,13 @@ struct RenderPath {
   std::string summary;
   /// Adds all passes in the order in which they run; the last one writes scene.picture.
   void (*add_passes)(RenderScene& scene, RenderPassList& passes);
+  /// For RenderScene::methods, before passes are added; none: those of the look.
+  std::optional<RenderMethods> methods = std::nullopt;
 };
 
 /// Segments of strands as camera-facing quads with a depth test and a fixed pattern of coverage.
 const RenderPath& segment_path();
+/// The same quads with other methods, which go together.
+RenderPath segment_path_with(const RenderMethods& methods);
 
 }  // namespace strandcast

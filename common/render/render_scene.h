@@ -12,9 +12,12 @@
 #include "common/render/passes/table_textures.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
+#include "common/scene/shadow_methods.h"
 #include "common/strands/scene_asset.h"
 
 namespace strandcast {
+
+class ShadowMap;
 
 /// Measures of the rest shape.
 struct RestFacts {
@@ -22,9 +25,21 @@ struct RestFacts {
   float extent_m = 0.0f;  // largest side of the bounding box
 };
 
+/// Numbers of the methods that no scene sets.
+struct MethodSettings {
+  uint32_t shadow_texels = 512;        // along each side of the light's map
+  float strand_opacity = 0.30f;        // optical depth of one strand across, as in the light volume
+  uint32_t list_nodes_per_pixel = 12;  // strands over a pixel that there is room for, in the mean
+};
+
 struct RenderScene {
   /// The asset has been checked.
   RenderScene(const SceneAsset& asset, const LookDesc& wanted_look, bool is_drawn_by_software);
+
+  /// Whether strands are blended in a layer of their own instead of drawn into the scene.
+  bool has_strand_layer() const {
+    return features.has_strands.value && methods.transparency != TransparencyMethod::Hashed;
+  }
 
   LookDesc look;  // within what the renderer can draw
   PictureFeatures features;
@@ -32,6 +47,8 @@ struct RenderScene {
   uint32_t triangle_count = 0;  // between roots
   uint32_t head_vertex_count = 0;
   uint32_t head_triangle_count = 0;
+  RenderMethods methods;  // of the path
+  MethodSettings method_settings;
   RestFacts rest;
   LightVolumeDesc light_volume;
 
@@ -41,7 +58,9 @@ struct RenderScene {
   DensityTexture density;
   LobeTables lobe_tables;
   ScatterTables scatter_tables;
+  const ShadowMap* shadow = nullptr;  // of the method, where it has one
   SceneTarget scene;
+  StrandLayer strand_layer;
   PictureTarget picture;
 };
 

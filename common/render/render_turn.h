@@ -40,6 +40,7 @@ struct RenderTurn : gl::PassTurn {
   uint64_t drawn_strands = 0;
   uint64_t drawn_segments = 0;
   bool is_whole = true;
+  uint64_t left_out_fragments = 0;
 };
 
 using RenderPass = gl::Pass<RenderTurn>;

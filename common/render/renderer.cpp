@@ -11,6 +11,13 @@ namespace {
 
 /// All passes of a path, and which of them run to make a picture.
 Status add_planned(const RenderPath& path, RenderScene& scene, RenderPassList& passes) {
+  const RenderMethodsDesc& wanted = scene.look.methods;
+  if (const char* const conflict = method_conflict(wanted); *conflict != '\0')
+    return make_error(ErrorCode::BadInput, "look.methods: {}", conflict);
+  ASSIGN_OR_RETURN(scene.methods,
+                   find_render_methods(wanted.shadow, wanted.transparency, wanted.antialiasing));
+  if (path.methods) scene.methods = *path.methods;
+  RETURN_IF_ERROR(check_render_methods(scene.methods));
   path.add_passes(scene, passes);
   return passes.plan({&scene.strands}, {&scene.picture});
 }
@@ -106,6 +113,7 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
   RenderTurn turn(strands, view, pixels, terms);
   RETURN_IF_ERROR(passes_->list.run(turn, &timer_));
   profile_ = {passes_->list.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
+  profile_.left_out_fragments = turn.left_out_fragments;
   return {};
 }
 

@@ -25,7 +25,8 @@ struct RenderProfile {
   double total_ms = 0.0;  // of all passes
   uint64_t drawn_strands = 0;
   uint64_t drawn_segments = 0;
-  bool is_whole = true;  // nobody gave it up half-way
+  bool is_whole = true;             // nobody gave it up half-way
+  uint64_t left_out_fragments = 0;  // pieces of strands for which a method's memory was too small
 };
 
 class Renderer {

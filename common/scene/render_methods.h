@@ -11,11 +11,17 @@
 
 namespace strandcast {
 
+/// The first row of every table, and what renderers without a choice do.
+inline constexpr const char* kMainMethod = "main";
+
 /// Names of rows. One kind of method has one such choice, whatever else is drawn.
 struct RenderMethodsDesc {
-  std::string shading = "sadeghi";
-  std::string scattering = "volume";
-  std::string evaluation = "vertex";
+  std::string shading = kMainMethod;
+  std::string scattering = kMainMethod;
+  std::string evaluation = kMainMethod;
+  std::string shadow = kMainMethod;
+  std::string transparency = kMainMethod;
+  std::string antialiasing = kMainMethod;
 
   bool operator==(const RenderMethodsDesc&) const = default;
 };
@@ -37,8 +43,8 @@ template <class Method>
 class MethodTable {
  public:
   explicit MethodTable(std::span<const MethodRow> rows) : rows_(rows) {
-    for (const MethodRow& row : rows)
-      refusal_ += std::string(refusal_.empty() ? "is unknown (known: " : ", ") + std::string(row.name);
+    refusal_ = std::string("is unknown (known: ") + kMainMethod;
+    for (const MethodRow& row : rows) refusal_ += ", " + std::string(row.name);
     refusal_ += ")";
   }
   std::span<const MethodRow> rows() const { return rows_; }
@@ -55,6 +61,7 @@ class MethodTable {
 
  private:
   size_t find(std::string_view name) const {
+    if (name == kMainMethod) return 0;
     size_t row = 0;
     while (row < rows_.size() && rows_[row].name != name) ++row;
     return row;

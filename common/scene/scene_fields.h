@@ -9,6 +9,7 @@
 #include "common/groom/procedural.h"
 #include "common/scene/hair_color.h"
 #include "common/scene/scene_desc.h"
+#include "common/scene/shadow_methods.h"
 
 namespace strandcast::scene_fields {
 
@@ -152,6 +153,11 @@ void visit_methods(Visitor& v, RenderMethodsDesc& methods) {
   method("shading", methods.shading, shading_models());
   method("scattering", methods.scattering, scattering_models());
   method("evaluation", methods.evaluation, shading_places());
+  method("shadow", methods.shadow, shadow_methods());
+  method("transparency", methods.transparency, transparency_methods());
+  method("antialiasing", methods.antialiasing, antialiasing_methods());
+  const char* const conflict = method_conflict(methods);
+  v.require("transparency", *conflict == '\0', conflict);
 }
 
 template <class Visitor>

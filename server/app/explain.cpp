@@ -157,10 +157,8 @@ Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneConten
   if (facts.frame_viewers > 0) {
     RETURN_IF_ERROR(measure_pictures(bench));
   } else {
-    ASSIGN_OR_RETURN(
-        bench.passes.pictures,
-        plan_picture_passes(asset, scene.look,
-                            config.renderer == "gl" ? RendererKind::Gl : RendererKind::Tiles, 0));
+    ASSIGN_OR_RETURN(bench.passes.pictures,
+                     plan_picture_passes(asset, scene.look, likely_renderer(config.renderer, scene.look), 0));
   }
   return join_passes(std::move(bench.passes), facts.frame_viewers > 0);
 }

@@ -82,7 +82,7 @@ void paste(const Image& picture, uint32_t column, uint32_t row, Image& sheet) {
 }
 
 /// One row of the sheet: a head (or none) under the hair (or none), from all sides.
-Status draw_row(const RenderDevice& device, const SceneAsset& asset, const SceneDesc& scene, const Box& box,
+Status draw_row(RenderDevice& device, const SceneAsset& asset, const SceneDesc& scene, const Box& box,
                 uint32_t row, Image& sheet) {
   const glm::vec3 size_m = box.high - box.low;
   const float reach_m = std::max({size_m.x, size_m.y, size_m.z, 1e-3f});

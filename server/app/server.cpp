@@ -58,9 +58,6 @@ class Server::State {
 
  private:
   Status choose_stream(const SceneAsset& asset);
-  RendererKind planned_renderer() const {
-    return config_.renderer == "gl" ? RendererKind::Gl : RendererKind::Tiles;
-  }
   Status connect(EncodedFramePtr asset_frame);
   void run_status();
   void watch_speed(const ServerCounters& now);
@@ -106,7 +103,8 @@ Status Server::State::start() {
                                           asset,
                                           config_.make_painter(painter),
                                           {scene.look, scene.camera}}));
-  ASSIGN_OR_RETURN(idle_picture_passes_, plan_picture_passes(*asset, scene.look, planned_renderer(), 0));
+  ASSIGN_OR_RETURN(idle_picture_passes_,
+                   plan_picture_passes(*asset, scene.look, likely_renderer(config_.renderer, scene.look), 0));
   idle_look_ = scene.look;
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
@@ -233,7 +231,8 @@ gl::PassReports Server::State::idle_picture_passes() const {
   const LookDesc look = hub_->look().look;
   const std::lock_guard lock(idle_passes_mutex_);
   if (look != idle_look_) {
-    if (auto planned = plan_picture_passes(*source_->asset(), look, planned_renderer(), 0))
+    if (auto planned =
+            plan_picture_passes(*source_->asset(), look, likely_renderer(config_.renderer, look), 0))
       idle_picture_passes_ = std::move(planned).value();
     idle_look_ = look;
   }

@@ -53,7 +53,8 @@ Result<gl::PassReports> plan_server(const SceneDesc& scene, const SceneAsset& as
   const bool is_encoding = facts.strand_viewers + facts.frame_viewers > 0;
   threads.strands = {strand_encode_report(0, is_encoding, StageTimer())};
   const PictureCodecs wanted = facts.frame_viewers > 0 ? codec_bit(assumed_view(scene).codec) : 0;
-  ASSIGN_OR_RETURN(threads.pictures, plan_picture_passes(asset, scene.look, RendererKind::Tiles, wanted));
+  ASSIGN_OR_RETURN(threads.pictures,
+                   plan_picture_passes(asset, scene.look, likely_renderer("auto", scene.look), wanted));
   return join_passes(std::move(threads), facts.frame_viewers > 0);
 }
 

@@ -20,6 +20,11 @@ uniform float u_focal_px;         // pixels per metre at 1 m distance
 uniform float u_strand_width_m;   // at the root
 uniform float u_tip_scale;
 uniform float u_near_m;
+uniform float u_widened_px;       // so that coverage fades out within the quad; 0: samples tell the edge
+uniform int u_which;              // of all segments
+
+const int kShallow = 1;
+const int kDeep = 2;
 
 noperspective out float v_across_px;   // from the strand's centre line
 noperspective out float v_width_px;
@@ -43,6 +48,12 @@ void main() {
   vec3 position_m = v.position_along.xyz;
   vec3 tangent = v.tangent_strand.xyz;
   uint strand = floatBitsToUint(v.tangent_strand.w);
+  uint is_deep = strand >> 31;   // of sample_choice.comp
+  strand &= 0x7fffffffu;
+  if (u_which == kShallow && is_deep == 1u || u_which == kDeep && is_deep == 0u) {
+    gl_Position = vec4(0.0, 0.0, 2.0, 1.0);   // all corners in one place, and that not seen
+    return;
+  }
   float along = v.position_along.w;
 
   vec4 clip = u_clip_from_head * vec4(position_m, 1.0);
@@ -54,7 +65,7 @@ void main() {
 
   float distance_m = max(clip.w, u_near_m);
   v_width_px = u_strand_width_m * mix(1.0, u_tip_scale, along * along) * u_focal_px / distance_m;
-  v_across_px = side * 0.5 * (v_width_px + 1.0);
+  v_across_px = side * 0.5 * max(v_width_px + u_widened_px, 1.0);
   clip.xy += across * v_across_px * (2.0 / u_target_px) * distance_m;
   gl_Position = clip;
   v_threshold = unit_float(mix_u32(strand ^ kSaltThreshold));

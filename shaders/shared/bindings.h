@@ -35,6 +35,11 @@ const uint kUnitRodAxis = 7u;
 const uint kBindingKeyPosition = 0u;
 const uint kBindingRootTriangle = 1u;
 const uint kBindingExpanded = 2u;
+const uint kBindingListHead = 3u;
+const uint kBindingListNode = 4u;
+const uint kBindingListCount = 5u;
+const uint kBindingDepthKeys = 6u;
+const uint kBindingDensity = 7u;
 
 #ifdef __cplusplus
 }  // namespace strandcast::shader

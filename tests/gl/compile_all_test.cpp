@@ -23,7 +23,7 @@ std::vector<std::string> compile_everything(const ShaderLibrary& library) {
       errors.push_back(flat.error().to_string());
       continue;
     }
-    for (const Variant& variant : all_variants(flat->axes))
+    for (const Variant& variant : covering_variants(flat->axes))
       if (const auto compiled = compile_stage(library, path, variant); !compiled)
         errors.push_back(compiled.error().to_string());
   }

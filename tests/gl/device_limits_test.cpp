@@ -84,7 +84,7 @@ void raise(Used& used, DeviceLimit limit, uint64_t value) {
 }
 
 void add_blocks(uint32_t program, Used& used) {
-  uint64_t in_vertex = 0, in_tessellation = 0, in_compute = 0;
+  uint64_t in_vertex = 0, in_fragment = 0, in_tessellation = 0, in_compute = 0;
   const auto blocks = static_cast<GLuint>(count_of(program, GL_SHADER_STORAGE_BLOCK));
   for (GLuint i = 0; i < blocks; ++i) {
     const auto is_in = [&](GLenum stage) {
@@ -93,8 +93,15 @@ void add_blocks(uint32_t program, Used& used) {
     in_vertex += is_in(GL_REFERENCED_BY_VERTEX_SHADER);
     in_tessellation += is_in(GL_REFERENCED_BY_TESS_EVALUATION_SHADER);
     in_compute += is_in(GL_REFERENCED_BY_COMPUTE_SHADER);
+    // Mesa says of a block that is only touched by atomic operations that no stage refers to it.
+    in_fragment += is_in(GL_REFERENCED_BY_VERTEX_SHADER) + is_in(GL_REFERENCED_BY_TESS_EVALUATION_SHADER) +
+                               is_in(GL_REFERENCED_BY_COMPUTE_SHADER) ==
+                           0
+                       ? 1
+                       : is_in(GL_REFERENCED_BY_FRAGMENT_SHADER);
   }
   raise(used, DeviceLimit::VertexStorageBlocks, in_vertex);
+  raise(used, DeviceLimit::FragmentStorageBlocks, in_fragment);
   raise(used, DeviceLimit::TessellationStorageBlocks, in_tessellation);
   raise(used, DeviceLimit::ComputeStorageBlocks, in_compute);
   const auto uniform_blocks = static_cast<GLuint>(count_of(program, GL_UNIFORM_BLOCK));
@@ -130,7 +137,9 @@ class LimitsInUse : public GlTest {
     for (const std::string& stage : library.stage_files())
       programs[std::filesystem::path(stage).replace_extension().string()].push_back(stage);
     Used used;
-    for (const auto& [name, stages] : programs) {
+    for (auto& [name, stages] : programs) {
+      if (stages.size() == 1 && stages.front().ends_with(".frag"))
+        stages.insert(stages.begin(), vertex_stage_of(library, stages.front()));
       Variant first, last;
       std::map<std::string, std::vector<int>> values;
       for (const std::string& stage : stages) {
@@ -158,6 +167,17 @@ class LimitsInUse : public GlTest {
   }
 
  private:
+  /// Of a fragment stage that is linked with the vertex stage of another: told by the inputs that it takes.
+  static std::string vertex_stage_of(const ShaderLibrary& library, const std::string& fragment_stage) {
+    const auto flat = library.flatten(fragment_stage);
+    if (!flat) {
+      ADD_FAILURE() << flat.error().to_string();
+      return "render/resolve.vert";
+    }
+    const auto takes = [&](const char* input) { return flat->text.find(input) != std::string::npos; };
+    if (takes("v_depth_m")) return "render/shadow_map.vert";
+    return takes("v_width_px") ? "render/strand.vert" : "render/resolve.vert";
+  }
   static void add(const ShaderLibrary& library, const std::vector<std::string>& stages,
                   const Variant& variant, Used& used) {
     // Without its outputs captured a program that draws nothing needs none of its inputs.

@@ -145,6 +145,24 @@ TEST_F(Programs, AllVariantsIsTheFullProduct) {
   EXPECT_EQ(all_variants({}).size(), 1u);
 }
 
+TEST(Variants, EveryTwoValuesOfEveryTwoAxesMeetInThoseThatCover) {
+  const std::vector<VariantAxis> axes{
+      {"A", {0, 1, 2, 3, 4}}, {"B", {0, 1, 2}}, {"C", {0, 1}}, {"D", {0, 1, 2}}};
+  const auto chosen = covering_variants(axes);
+  EXPECT_LT(chosen.size(), 25u) << "of 90";
+  for (size_t i = 0; i < axes.size(); ++i)
+    for (size_t j = i + 1; j < axes.size(); ++j)
+      for (const int a : axes[i].values)
+        for (const int b : axes[j].values)
+          EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(),
+                                  [&](const Variant& variant) {
+                                    return variant.at(axes[i].name) == a && variant.at(axes[j].name) == b;
+                                  }))
+              << axes[i].name << a << axes[j].name << b;
+  EXPECT_EQ(covering_variants({{"A", {0, 1}}, {"B", {0, 1}}}).size(), 4u);
+  EXPECT_EQ(covering_variants({}).size(), 1u);
+}
+
 TEST_F(Programs, LinkErrorsNameTheStages) {
   folder_.write("a.vert", "out vec3 colour;\nvoid main() { colour = vec3(1.0); gl_Position = vec4(0.0); }\n");
   folder_.write("a.frag", "in vec4 colour;\nout vec4 c;\nvoid main() { c = colour; }\n");

@@ -180,6 +180,77 @@ TEST_F(RenderCostTest, WhatIsPrintedWithoutGlIsWhatRunsWithIt) {
   }
 }
 
+/// Every method beside the default ones of the other kinds.
+std::vector<RenderMethods> all_methods() {
+  std::vector<RenderMethods> all;
+  for (size_t i = 0; i < shadow_methods().rows().size(); ++i)
+    all.push_back({static_cast<ShadowMethod>(i), {}, {}});
+  for (size_t i = 1; i < transparency_methods().rows().size(); ++i)
+    all.push_back({{}, static_cast<TransparencyMethod>(i), {}});
+  for (size_t i = 1; i < antialiasing_methods().rows().size(); ++i)
+    all.push_back({{}, {}, static_cast<AntialiasingMethod>(i)});
+  return all;
+}
+
+std::string name_of(const RenderMethods& methods) {
+  return fmt::format("{}, {}, {}", shadow_methods().rows()[static_cast<size_t>(methods.shadow)].name,
+                     transparency_methods().rows()[static_cast<size_t>(methods.transparency)].name,
+                     antialiasing_methods().rows()[static_cast<size_t>(methods.antialiasing)].name);
+}
+
+TEST_F(RenderCostTest, TheListsBytesAreWhatOpenGlHoldsWithEveryMethod) {
+  SceneAsset asset = strands_of(9, 5);
+  asset.triangle = {{0, 1, 2}, {2, 3, 4}, {5, 6, 7}};
+  asset.head = tetrahedron();
+  for (const RenderMethods& methods : all_methods()) {
+    const auto renderer = drawn(asset, look_with(4), segment_path_with(methods));
+    ASSERT_TRUE(renderer);
+    EXPECT_EQ(added_bytes(), renderer->passes().live_bytes()) << name_of(methods);
+    const auto planned = plan_renderer(asset, look_with(4), true, segment_path_with(methods));
+    ASSERT_TRUE(planned) << planned.error().to_string();
+    const gl::PassReports ran = renderer->passes().report();
+    ASSERT_EQ(ran.size(), planned->size()) << name_of(methods);
+    for (size_t i = 0; i < ran.size(); ++i) EXPECT_EQ(ran[i].name, (*planned)[i].name);
+  }
+}
+
+TEST_F(RenderCostTest, AMethodThatIsNotChosenCostsNothing) {
+  SceneAsset asset = strands_of(9, 5);
+  // Objects, bytes and programs with the default methods: as before there were others.
+  const auto plain = drawn(asset, look_with(0));
+  EXPECT_THAT(added(), ElementsAre(3u, 4u, 2u, 3u, 3u));
+  EXPECT_EQ(gl::object_counts().compiled_programs - before_.compiled_programs, 3u);
+  const uint64_t plain_bytes = added_bytes();
+  std::vector<std::string> plain_passes;
+  for (const gl::PassReport& pass : plain->passes().report()) plain_passes.push_back(pass.name);
+  EXPECT_THAT(plain_passes, ElementsAre("render/upload", "render/light", "render/clear", "render/head",
+                                        "render/expand", "render/strands", "render/resolve"));
+  // The methods that draw less than the default hold less.
+  const ObjectCounts before = gl::object_counts();
+  const auto bare = drawn(asset, look_with(0), segment_path_with({ShadowMethod::None, {}, {}}));
+  EXPECT_EQ(gl::object_counts().of(ObjectKind::Texture) - before.of(ObjectKind::Texture), 3u)
+      << "no light volume";
+  EXPECT_LT(gl::object_counts().size_bytes - before.size_bytes, plain_bytes);
+}
+
+TEST_F(RenderCostTest, MethodsThatDoNotGoTogetherAreRefused) {
+  const auto path =
+      segment_path_with({ShadowMethod::Volume, TransparencyMethod::Moments, AntialiasingMethod::Msaa4});
+  const auto renderer =
+      Renderer::make(gl::ShaderLibrary(), context_->info(), strands_of(9, 5), look_with(2), path);
+  ASSERT_FALSE(renderer);
+  EXPECT_EQ(renderer.error().code, ErrorCode::BadInput);
+}
+
+TEST_F(RenderCostTest, NothingIsAllocatedOfAMethodWhereThereAreNoStrands) {
+  for (const RenderMethods& methods : all_methods()) {
+    if (methods.antialiasing != AntialiasingMethod::Analytic) continue;  // has targets of its own
+    const auto renderer = drawn(SceneAsset{}, look_with(3), segment_path_with(methods));
+    ASSERT_TRUE(renderer);
+    EXPECT_THAT(added(), ElementsAre(0u, 3u, 2u, 1u, 1u)) << name_of(methods);
+  }
+}
+
 /// Another way to draw, as a new renderer would be: its own pass, the shared picture.
 class FillPass final : public RenderPass {
  public:

@@ -97,6 +97,9 @@ class RenderMethods : public GlTest {
 TEST_F(RenderMethods, TheDefaultsAreSadeghiInTheVolumePerVertex) {
   LookDesc named = look_of("sadeghi", "volume", "custom");
   named.methods.evaluation = "vertex";
+  named.methods.shadow = "volume";
+  named.methods.transparency = "hashed";
+  named.methods.antialiasing = "analytic";
   LookDesc usual = named;
   usual.methods = {};
   EXPECT_EQ(draw(named), draw(usual));

@@ -47,7 +47,7 @@ std::vector<WrittenVariant> write_variants(const ShaderLibrary& library, const T
       ADD_FAILURE() << flat.error().to_string();
       continue;
     }
-    for (const Variant& variant : all_variants(flat->axes)) {
+    for (const Variant& variant : covering_variants(flat->axes)) {
       const std::string header = variant_header(*flat, variant);
       const auto lines = static_cast<uint32_t>(std::count(header.begin(), header.end(), '\n'));
       const std::string file =

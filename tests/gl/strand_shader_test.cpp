@@ -43,6 +43,41 @@ TEST_F(StrandShader, CoverageThresholdsSpreadEvenly) {
   EXPECT_NEAR(shares[2].x, 0.7, 0.01);
 }
 
+TEST_F(StrandShader, MomentsOfTwoLayersTellWhatPassesEach) {
+  // Opacities 0.5 and 0.4 at -0.5 and 0.4: all passes in front, 0.5 between, 0.3 behind both.
+  std::vector<std::vector<glm::vec4>> rows;
+  const std::vector<std::pair<double, double>> expected{{-0.9, 1.0}, {-0.6, 1.0}, {-0.3, 0.5}, {0.0, 0.5},
+                                                        {0.3, 0.5},  {0.5, 0.3},  {0.9, 0.3}};
+  double b0 = 0.0;
+  glm::dvec4 moments(0.0);
+  for (const auto& [z, opacity] : {std::pair(-0.5, 0.5), std::pair(0.4, 0.4)}) {
+    const double absorbance = -std::log(1.0 - opacity);
+    b0 += absorbance;
+    moments += absorbance * glm::dvec4(z, z * z, z * z * z, z * z * z * z);
+  }
+  for (const auto& [z, passing] : expected) rows.push_back({glm::vec4(z, b0, 0, 0), glm::vec4(moments)});
+  const auto values =
+      evaluate("moments.glsl", "return vec4(transmittance_at(a(0u).x, a(0u).y, a(1u), 0.1));\n", rows);
+  for (size_t i = 0; i < rows.size(); ++i)
+    EXPECT_NEAR(values[i].x, expected[i].second, 2e-3) << expected[i].first;
+}
+
+TEST_F(StrandShader, OpacitiesMultiplyAsIntegers) {
+  // A hundred layers of each opacity.
+  std::vector<std::vector<glm::vec4>> rows;
+  for (const float opacity : {0.0005f, 0.01f, 0.3f, 0.9f, 1.0f}) rows.push_back({glm::vec4(opacity)});
+  const auto values =
+      evaluate("opacity_sum.glsl",
+               "return vec4(transmitted(opacity_log(a(0u).x)), transmitted(100u * opacity_log(a(0u).x)),\n"
+               "            0.0, 0.0);\n",
+               rows);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double passing = 1.0 - rows[i][0].x;
+    EXPECT_NEAR(values[i].x, passing, 2e-5);
+    EXPECT_NEAR(values[i].y, std::pow(passing, 100), 1e-3);
+  }
+}
+
 TEST_F(StrandShader, FollowerWeightsAreTheHashedOnesInsideTheTriangle) {
   std::vector<std::vector<glm::vec4>> rows;
   for (int i = 0; i < 4096; ++i) rows.push_back({glm::vec4(i, 0, 0, 0)});

@@ -29,7 +29,7 @@ inline LookDesc sample_look() {
   look.rim_direction = {-0.5f, -0.25f, 1.0f};
   look.rim_color = {0.75f, 0.5f, 1.0f};
   look.exposure = 1.25f;
-  look.methods = {"marschner", "dual", "fragment"};
+  look.methods = {"marschner", "dual", "fragment", "volume", "hashed", "analytic"};
   return look;
 }
 

@@ -1,7 +1,7 @@
 // render_preview: draws a scene's hair at rest into a PNG, without server or simulation. For looking at the
 // renderer.
 //   render_preview OUT.png [--scene FILE] [--set path=value]... [--size WxH] [--repeat N] [--turn DEGREES]
-//   [--shaders DIR] [--renderer gl|tiles] [--threads N]
+//   [--shaders DIR] [--renderer gl|tiles] [--threads N]; methods by --set look.methods.shadow=...
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -115,12 +115,15 @@ Status run(int argc, char** argv) {
   std::string passes;
   for (const gl::PassReport& pass : renderer->passes().report())
     passes += fmt::format(", {} {:.1f}", pass.name, pass.median_ms);
-  std::printf("%s: %ux%u, %llu strands, %llu segments; picture %.1f ms (best %.1f), %.1f ms of CPU%s\n",
-              device.c_str(), options.size.width, options.size.height,
-              static_cast<unsigned long long>(profile.drawn_strands),
-              static_cast<unsigned long long>(profile.drawn_segments), picture_ms[picture_ms.size() / 2],
-              picture_ms.front(), cpu_ms, passes.c_str());
-  std::printf("memory %.1f MB\n", static_cast<double>(renderer->passes().live_bytes()) / 1048576.0);
+  std::printf(
+      "%s: %ux%u, %llu strands, %llu segments, %llu fragments left out, %.1f MB; picture %.1f ms "
+      "(best %.1f), %.1f ms of CPU%s\n",
+      device.c_str(), options.size.width, options.size.height,
+      static_cast<unsigned long long>(profile.drawn_strands),
+      static_cast<unsigned long long>(profile.drawn_segments),
+      static_cast<unsigned long long>(profile.left_out_fragments),
+      static_cast<double>(renderer->passes().live_bytes()) * 1e-6, picture_ms[picture_ms.size() / 2],
+      picture_ms.front(), cpu_ms, passes.c_str());
   return {};
 }
 

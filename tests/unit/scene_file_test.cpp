@@ -94,7 +94,12 @@ SceneDesc unusual_scene() {
             .exposure = 1.5f,
             .background = {0, 0.5f, 1},
             .skin_color = {1, 0, 0.5f},
-            .methods = {.shading = "chiang", .scattering = "isosurface", .evaluation = "fragment"}};
+            .methods = {.shading = "chiang",
+                        .scattering = "isosurface",
+                        .evaluation = "fragment",
+                        .shadow = "volume",
+                        .transparency = "hashed",
+                        .antialiasing = "msaa4"}};
   s.camera = {.offset_m = {0, 0, 2}, .target_m = {0.1f, 0.2f, 0.3f}, .fov_y_rad = 1.0f};
   s.stream = {.codec = "raw",
               .has_codec = true,
@@ -214,9 +219,10 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
   EXPECT_THAT(error_of("gravity_mps2 { y: 1e999 }"), HasSubstr("gravity_mps2.y is inf"));
   EXPECT_THAT(error_of("look { root_color { g: 1.5 } }"), HasSubstr("look.root_color.g is 1.5"));
   EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: delta, raw, tangent"));
-  EXPECT_EQ(error_of("look { methods { shading: 'phong' } }"),
-            "s.textproto:1:18: look.methods.shading is unknown (known: sadeghi, kajiya_kay, karis, chiang, "
-            "marschner)");
+  EXPECT_EQ(
+      error_of("look { methods { shading: 'phong' } }"),
+      "s.textproto:1:18: look.methods.shading is unknown (known: main, sadeghi, kajiya_kay, karis, chiang, "
+      "marschner)");
   EXPECT_THAT(error_of("look { methods { scattering: 'double' } }"),
               HasSubstr("scattering is unknown (known: volume, none, isosurface, dual)"));
   EXPECT_THAT(error_of("look { methods { evaluation: 'pixel' } }"),

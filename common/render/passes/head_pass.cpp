@@ -4,6 +4,7 @@
 
 #include "common/render/render_path.h"
 #include "common/render/scalp_cover.h"
+#include "common/render/shadow/shadow_method.h"
 #include "common/scene/hair_color.h"
 
 namespace strandcast {
@@ -44,8 +45,8 @@ class HeadPass final : public RenderPass {
 
   Status prepare(const RenderSetup& setup) override {
     const Mesh& mesh = setup.asset.head;
-    ASSIGN_OR_RETURN(program_,
-                     gl::Program::make(setup.shaders, {"render/head.vert", "render/head.frag"}, {}));
+    ASSIGN_OR_RETURN(program_, gl::Program::make(setup.shaders, {"render/head.vert", "render/head.frag"},
+                                                 {{"SHADOW", static_cast<int>(scene_.methods.shadow)}}));
     vertex_array_ = gl::VertexArray("head");
     position_ = gl::Buffer::of("head position", mesh.position_m);
     normal_ = gl::Buffer::of("head normal", mesh.normal);
@@ -64,6 +65,7 @@ class HeadPass final : public RenderPass {
     program_.use();
     vertex_array_.bind();
     scene_.light.set_uniforms(program_, kLightUnit);
+    if (scene_.shadow != nullptr) scene_.shadow->set_uniforms(program_, kFirstShadowUnit);
     program_.set("u_clip_from_head", turn.view.clip_from_head);
     program_.set("u_eye_m", turn.view.eye_m);
     program_.set("u_skin_color", scene_.look.skin_color);

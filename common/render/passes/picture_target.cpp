@@ -9,9 +9,6 @@
 #include "common/gl/device_limits.h"
 
 namespace strandcast {
-namespace {
-
-// Whoever else uses the context may leave its own state behind.
 void set_plain_state(glm::uvec2 viewport) {
   for (const GLenum off : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_FRAMEBUFFER_SRGB,
                            GL_RASTERIZER_DISCARD, GL_PRIMITIVE_RESTART, GL_SAMPLE_ALPHA_TO_COVERAGE})
@@ -21,10 +18,8 @@ void set_plain_state(glm::uvec2 viewport) {
   glViewport(0, 0, static_cast<GLsizei>(viewport.x), static_cast<GLsizei>(viewport.y));
 }
 
-}  // namespace
-
 Status SceneTarget::resize(glm::uvec2 picture_px) {
-  const glm::uvec2 size = picture_px * kSamplesPerSide;
+  const glm::uvec2 size = picture_px * layout_.per_side;
   if (size == size_px_) return {};
   RETURN_IF_ERROR(
       gl::check_device_limit(gl::read_device_limits(), gl::DeviceLimit::TextureSize, std::max(size.x, size.y),
@@ -34,8 +29,8 @@ Status SceneTarget::resize(glm::uvec2 picture_px) {
   framebuffer_ = {};
   color_ = {};
   depth_ = {};
-  color_ = gl::Texture("scene color", GL_RGBA16F, size.x, size.y, 1);
-  depth_ = gl::Texture("scene depth", GL_DEPTH_COMPONENT32F, size.x, size.y, 1);
+  color_ = gl::Texture("scene color", GL_RGBA16F, size.x, size.y, layout_.multisamples);
+  depth_ = gl::Texture("scene depth", GL_DEPTH_COMPONENT32F, size.x, size.y, layout_.multisamples);
   const std::array<const gl::Texture*, 1> colors{&color_};
   ASSIGN_OR_RETURN(framebuffer_, gl::Framebuffer::make("scene", colors, &depth_));
   size_px_ = size;
@@ -55,6 +50,24 @@ void SceneTarget::clear() const {
   const float far = 1.0f;
   glClearNamedFramebufferfv(framebuffer_.name(), GL_COLOR, 0, nothing.data());
   glClearNamedFramebufferfv(framebuffer_.name(), GL_DEPTH, 0, &far);
+}
+
+Status StrandLayer::resize(glm::uvec2 picture_px) {
+  if (picture_px == size_px_) return {};
+  size_px_ = glm::uvec2(0);
+  framebuffer_ = {};
+  color_ = {};
+  color_ = gl::Texture("strand layer", GL_RGBA16F, picture_px.x, picture_px.y, 1);
+  const std::array<const gl::Texture*, 1> colors{&color_};
+  ASSIGN_OR_RETURN(framebuffer_, gl::Framebuffer::make("strand layer", colors, nullptr));
+  size_px_ = picture_px;
+  return {};
+}
+
+void StrandLayer::begin() const {
+  set_plain_state(size_px_);
+  framebuffer_.bind();
+  glDisable(GL_DEPTH_TEST);
 }
 
 Status PictureTarget::resize(glm::uvec2 picture_px) {

@@ -16,10 +16,23 @@ namespace strandcast {
 /// thinner than a pixel equally well.
 inline constexpr uint32_t kSamplesPerSide = 2;
 
+/// Samples of the scene in a pixel: a grid that is drawn as a larger picture, or the rasteriser's own.
+struct SampleLayout {
+  uint32_t per_side = kSamplesPerSide;
+  uint32_t multisamples = 1;
+};
+
+/// Nothing switched on but writing to all of a target of this size. Whoever else uses the context may leave
+/// its own state behind.
+void set_plain_state(glm::uvec2 viewport);
+
 /// Linear RGB with coverage in alpha, and depth, per sample.
 class SceneTarget final : public gl::Resource {
  public:
   SceneTarget() : Resource("scene") {}
+  /// Before the first resize().
+  void set_layout(const SampleLayout& layout) { layout_ = layout; }
+  const SampleLayout& layout() const { return layout_; }
   /// Allocates for a picture of this size, unless it has that size already. LimitExceeded when OpenGL cannot;
   /// the target then has no size.
   Status resize(glm::uvec2 picture_px);
@@ -27,6 +40,9 @@ class SceneTarget final : public gl::Resource {
   void begin() const;
   void clear() const;
   const gl::Texture& color() const { return color_; }
+  const gl::Texture& depth() const { return depth_; }
+  /// In samples, multisamples not counted.
+  glm::uvec2 size_px() const { return size_px_; }
   /// 0 before the first resize().
   uint64_t size_bytes() const override { return color_.size_bytes() + depth_.size_bytes(); }
 
@@ -34,7 +50,26 @@ class SceneTarget final : public gl::Resource {
   gl::Texture color_;
   gl::Texture depth_;
   gl::Framebuffer framebuffer_;
-  glm::uvec2 size_px_{0};  // in samples
+  SampleLayout layout_;
+  glm::uvec2 size_px_{0};  // without multisamples
+};
+
+/// Strands of a picture by themselves, as they are blended over the scene: linear RGB times opacity, and
+/// opacity, per pixel.
+class StrandLayer final : public gl::Resource {
+ public:
+  StrandLayer() : Resource("strand layer") {}
+  /// As SceneTarget.
+  Status resize(glm::uvec2 picture_px);
+  /// Makes it what is drawn into, without depth.
+  void begin() const;
+  const gl::Texture& color() const { return color_; }
+  uint64_t size_bytes() const override { return color_.size_bytes(); }
+
+ private:
+  gl::Texture color_;
+  gl::Framebuffer framebuffer_;
+  glm::uvec2 size_px_{0};
 };
 
 /// sRGB, first row at the top.

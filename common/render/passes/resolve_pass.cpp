@@ -8,15 +8,23 @@ namespace strandcast {
 namespace {
 
 constexpr uint32_t kSceneUnit = 0;
+constexpr uint32_t kLayerUnit = 1;
+
+gl::Resources resolved(const RenderScene& scene) {
+  if (scene.has_strand_layer()) return {&scene.scene, &scene.strand_layer};
+  return {&scene.scene};
+}
 
 class ResolvePass final : public RenderPass {
  public:
   explicit ResolvePass(RenderScene& scene)
-      : Pass({"render/resolve", {&scene.scene}, {&scene.picture}, true, {}}), scene_(scene) {}
+      : Pass({"render/resolve", resolved(scene), {&scene.picture}, true, {}}), scene_(scene) {}
 
   Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(program_,
-                     gl::Program::make(setup.shaders, {"render/resolve.vert", "render/resolve.frag"}, {}));
+    ASSIGN_OR_RETURN(
+        program_, gl::Program::make(setup.shaders, {"render/resolve.vert", "render/resolve.frag"},
+                                    {{"HAS_LAYER", scene_.has_strand_layer() ? 1 : 0},
+                                     {"IS_MULTISAMPLED", scene_.scene.layout().multisamples > 1 ? 1 : 0}}));
     no_attributes_ = gl::VertexArray("resolve");
     return {};
   }
@@ -27,8 +35,10 @@ class ResolvePass final : public RenderPass {
     program_.use();
     no_attributes_.bind();
     scene_.scene.color().bind(kSceneUnit);
+    if (scene_.has_strand_layer()) scene_.strand_layer.color().bind(kLayerUnit);
+    program_.set("u_layer", static_cast<int>(kLayerUnit));
     program_.set("u_scene", static_cast<int>(kSceneUnit));
-    program_.set("u_samples", static_cast<int>(kSamplesPerSide));
+    program_.set("u_samples", static_cast<int>(scene_.scene.layout().per_side));
     program_.set("u_target_height", static_cast<int>(turn.size_px.y));
     program_.set("u_background", scene_.look.background);
     glDrawArrays(GL_TRIANGLES, 0, 3);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/render/shadow/shadow_method.h"
 #include "common/scene/hair_color.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/methods.h"
@@ -17,10 +18,11 @@ constexpr uint32_t kIndicesPerSegment = 6;
 // Segments per draw such that 16-bit indices reach all corners.
 constexpr uint32_t kSegmentsPerDraw = 65'536 / kCornersPerSegment;
 constexpr uint32_t kLightUnit = 0;
-constexpr uint32_t kLongitudinalUnit = 1;
-constexpr uint32_t kAzimuthalUnit = 2;
-constexpr uint32_t kAverageUnit = 3;
-constexpr uint32_t kDensityUnit = 4;
+// Behind those of the light's map and of what is blended.
+constexpr uint32_t kLongitudinalUnit = 11;
+constexpr uint32_t kAzimuthalUnit = 12;
+constexpr uint32_t kAverageUnit = 13;
+constexpr uint32_t kDensityUnit = 14;
 // Change of the density from cell to cell that makes a surface, strands crossed per metre.
 constexpr float kMinSlopePerM = 2.0f;
 
@@ -34,9 +36,8 @@ static_assert(static_cast<int>(ScatteringModel::Volume) == SCATTERING_VOLUME &&
               static_cast<int>(ScatteringModel::Isosurface) == SCATTERING_ISOSURFACE &&
               static_cast<int>(ScatteringModel::Dual) == SCATTERING_DUAL);
 
-/// What is read to shade by the methods of the scene.
-gl::Resources resources_of(const RenderScene& scene, const ExpandedStrands& expanded) {
-  gl::Resources reads{&expanded, &scene.light};
+/// And what is read to shade by the methods of the scene.
+gl::Resources with_tables(const RenderScene& scene, gl::Resources reads) {
   if (scene.features.has_lobe_tables.value) reads.push_back(&scene.lobe_tables);
   if (scene.features.has_scatter_tables.value) reads.push_back(&scene.scatter_tables);
   if (scene.features.has_density_normals.value) reads.push_back(&scene.density);
@@ -74,98 +75,131 @@ class DrawQueue {
   GLsync before_ = nullptr;
 };
 
+/// What shaders/render/strand_light.glsl reads beside the light.
+void set_shading(const RenderScene& scene, const gl::Program& program) {
+  const LookDesc& look = scene.look;
+  const HairColors colors = colors_of(look);
+  const auto shapes = lobe_shapes_of(look);
+  program.set("u_root_color", colors.root);
+  program.set("u_tip_color", colors.tip);
+  program.set("u_lobe_weights",
+              glm::vec3(look.shading.highlight, look.shading.transmission, look.shading.second_highlight));
+  program.set("u_highlight_width", static_cast<float>(shapes[0].width));
+  program.set("u_highlight_shift", static_cast<float>(shapes[0].shift));
+  program.set("u_tilt_spread", glm::radians(look.shading.cuticle_spread_deg));
+  if (scene.features.has_lobe_tables.value) {
+    scene.lobe_tables.longitudinal().bind(kLongitudinalUnit);
+    scene.lobe_tables.azimuthal().bind(kAzimuthalUnit);
+    program.set("u_longitudinal_table", static_cast<int>(kLongitudinalUnit));
+    program.set("u_azimuthal_table", static_cast<int>(kAzimuthalUnit));
+  }
+  if (scene.features.has_scatter_tables.value) {
+    scene.scatter_tables.averages().bind(kAverageUnit);
+    program.set("u_average_table", static_cast<int>(kAverageUnit));
+  }
+  if (scene.features.has_density_normals.value) {
+    scene.density.density().bind(kDensityUnit);
+    program.set("u_density", static_cast<int>(kDensityUnit));
+    program.set("u_min_slope", kMinSlopePerM);
+  }
+}
+
 class StrandPass final : public RenderPass {
  public:
   StrandPass(RenderScene& scene, ExpandedStrands& expanded)
-      : Pass({"render/strands",
-              resources_of(scene, expanded),
-              {&scene.scene},
-              scene.features.has_strands.value,
-              scene.features.has_strands.reason}),
+      : Pass(strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene})),
         scene_(scene),
         expanded_(expanded) {}
 
   bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override {
-    return uint64_t{kSegmentsPerDraw} * kIndicesPerSegment * sizeof(uint16_t);
-  }
+  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
 
   Status prepare(const RenderSetup& setup) override {
-    const PictureFeatures& features = scene_.features;
-    const gl::Variant variant{{"SHADING", static_cast<int>(features.shading)},
-                              {"SCATTERING", static_cast<int>(features.scattering)},
-                              {"IS_PER_FRAGMENT", features.is_shaded_per_fragment.value ? 1 : 0}};
-    ASSIGN_OR_RETURN(program_,
-                     gl::Program::make(setup.shaders, {"render/strand.vert", "render/strand.frag"}, variant));
-    vertex_array_ = gl::VertexArray("strand");
-    quad_index_ = gl::Buffer::of("quad index", make_quad_indices());
-    glVertexArrayElementBuffer(vertex_array_.name(), quad_index_.name());
+    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, StrandDraw::kShadedFragment));
     return {};
   }
 
   Status run(RenderTurn& turn) override {
-    const LookDesc& look = scene_.look;
     scene_.scene.begin();
-    program_.use();
-    vertex_array_.bind();
-    expanded_.vertex().bind_storage(shader::kBindingExpanded);
-    scene_.light.set_uniforms(program_, kLightUnit);
-    program_.set("u_clip_from_head", turn.view.clip_from_head);
-    program_.set("u_eye_m", turn.view.eye_m);
-    program_.set("u_target_px", turn.view.target_px);
-    program_.set("u_focal_px", turn.view.focal_px);
-    program_.set("u_near_m", turn.view.near_m);
-    program_.set("u_strand_width_m", expanded_.width_m);
-    program_.set("u_tip_scale", look.tip_scale);
-    set_shading(look);
-    const uint32_t segments = expanded_.segment_count;
-    DrawQueue queue(scene_.is_software);
-    for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
-      const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
-      glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
-                               GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
-      queue.wait_for_the_one_before();
-    }
+    strands_.begin(scene_, expanded_, turn, scene_.scene.size_px());
+    strands_.draw(scene_, expanded_);
     return {};
   }
 
  private:
-  /// What shaders/render/strand_light.glsl reads beside the light.
-  void set_shading(const LookDesc& look) const {
-    const HairColors colors = colors_of(look);
-    const auto shapes = lobe_shapes_of(look);
-    program_.set("u_root_color", colors.root);
-    program_.set("u_tip_color", colors.tip);
-    program_.set("u_lobe_weights",
-                 glm::vec3(look.shading.highlight, look.shading.transmission, look.shading.second_highlight));
-    program_.set("u_highlight_width", static_cast<float>(shapes[0].width));
-    program_.set("u_highlight_shift", static_cast<float>(shapes[0].shift));
-    program_.set("u_tilt_spread", glm::radians(look.shading.cuticle_spread_deg));
-    if (scene_.features.has_lobe_tables.value) {
-      scene_.lobe_tables.longitudinal().bind(kLongitudinalUnit);
-      scene_.lobe_tables.azimuthal().bind(kAzimuthalUnit);
-      program_.set("u_longitudinal_table", static_cast<int>(kLongitudinalUnit));
-      program_.set("u_azimuthal_table", static_cast<int>(kAzimuthalUnit));
-    }
-    if (scene_.features.has_scatter_tables.value) {
-      scene_.scatter_tables.averages().bind(kAverageUnit);
-      program_.set("u_average_table", static_cast<int>(kAverageUnit));
-    }
-    if (scene_.features.has_density_normals.value) {
-      scene_.density.density().bind(kDensityUnit);
-      program_.set("u_density", static_cast<int>(kDensityUnit));
-      program_.set("u_min_slope", kMinSlopePerM);
-    }
-  }
-
   RenderScene& scene_;
   ExpandedStrands& expanded_;
-  gl::Program program_;
-  gl::VertexArray vertex_array_;
-  gl::Buffer quad_index_;
+  StrandDraw strands_;
 };
 
 }  // namespace
+
+uint64_t StrandDraw::size_bytes() {
+  return uint64_t{kSegmentsPerDraw} * kIndicesPerSegment * sizeof(uint16_t);
+}
+
+Result<StrandDraw> StrandDraw::make(const RenderSetup& setup, const RenderScene& scene,
+                                    const std::string& fragment_stage, gl::Variant variant,
+                                    const std::string& vertex_stage) {
+  StrandDraw strands;
+  if (vertex_stage == kShadedStage) {
+    variant["SHADOW"] = static_cast<int>(scene.methods.shadow);
+    variant["SHADING"] = static_cast<int>(scene.features.shading);
+    variant["SCATTERING"] = static_cast<int>(scene.features.scattering);
+    // Others take the colour of the vertex stage.
+    const bool is_per_fragment =
+        scene.features.is_shaded_per_fragment.value && fragment_stage == kShadedFragment;
+    variant["IS_PER_FRAGMENT"] = is_per_fragment ? 1 : 0;
+  }
+  ASSIGN_OR_RETURN(strands.program_,
+                   gl::Program::make(setup.shaders, {vertex_stage, fragment_stage}, variant));
+  strands.vertex_array_ = gl::VertexArray("strand");
+  strands.quad_index_ = gl::Buffer::of("quad index", make_quad_indices());
+  glVertexArrayElementBuffer(strands.vertex_array_.name(), strands.quad_index_.name());
+  return strands;
+}
+
+void StrandDraw::begin(const RenderScene& scene, const ExpandedStrands& expanded, const RenderTurn& turn,
+                       glm::uvec2 target_px) {
+  const LookDesc& look = scene.look;
+  bind(expanded);
+  scene.light.set_uniforms(program_, kLightUnit);
+  if (scene.shadow != nullptr) scene.shadow->set_uniforms(program_, kFirstShadowUnit);
+  program_.set("u_clip_from_head", turn.view.clip_from_head);
+  program_.set("u_eye_m", turn.view.eye_m);
+  program_.set("u_target_px", glm::vec2(target_px));
+  // The view counts the samples of a picture with kSamplesPerSide.
+  program_.set("u_focal_px", turn.view.focal_px * (static_cast<float>(target_px.y) / turn.view.target_px.y));
+  program_.set("u_near_m", turn.view.near_m);
+  program_.set("u_widened_px", 1.0f);
+  program_.set("u_which", static_cast<int>(StrandDepth::All));
+  program_.set("u_strand_width_m", expanded.width_m);
+  program_.set("u_tip_scale", look.tip_scale);
+  set_shading(scene, program_);
+}
+
+void StrandDraw::bind(const ExpandedStrands& expanded) {
+  program_.use();
+  vertex_array_.bind();
+  expanded.vertex().bind_storage(shader::kBindingExpanded);
+}
+
+void StrandDraw::draw(const RenderScene& scene, const ExpandedStrands& expanded) const {
+  const uint32_t segments = expanded.segment_count;
+  DrawQueue queue(scene.is_software);
+  for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
+    const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
+    glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
+                             GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
+    queue.wait_for_the_one_before();
+  }
+}
+
+gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
+                                gl::Resources writes) {
+  return {name, with_tables(scene, std::move(reads)), std::move(writes), scene.features.has_strands.value,
+          scene.features.has_strands.reason};
+}
 
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded) {
   return std::make_unique<StrandPass>(scene, expanded);

@@ -3,12 +3,50 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
+#include "common/base/result.h"
+#include "common/gl/objects.h"
+#include "common/gl/program.h"
 #include "common/render/passes/strand_buffers.h"
 #include "common/render/render_scene.h"
 #include "common/render/render_turn.h"
 
 namespace strandcast {
+
+/// Segments that are drawn: all, or those with little or much hair behind them, as sample_choice.comp marks
+/// them. strand.vert has the same numbers.
+enum class StrandDepth : int { All, Shallow, Deep };
+
+/// Quads of expanded segments with a program: for every pass that draws strands, seen from wherever.
+class StrandDraw {
+ public:
+  static constexpr const char* kShadedStage = "render/strand.vert";
+  static constexpr const char* kShadedFragment = "render/strand.frag";
+  StrandDraw() = default;
+  static Result<StrandDraw> make(const RenderSetup& setup, const RenderScene& scene,
+                                 const std::string& fragment_stage, gl::Variant variant = {},
+                                 const std::string& vertex_stage = kShadedStage);
+  /// Program, buffers and what render/strand.vert has to know, for a target of this size. The target is bound
+  /// by the caller.
+  void begin(const RenderScene& scene, const ExpandedStrands& expanded, const RenderTurn& turn,
+             glm::uvec2 target_px);
+  /// Program and buffers alone, for another vertex stage.
+  void bind(const ExpandedStrands& expanded);
+  /// All segments that are expanded now.
+  void draw(const RenderScene& scene, const ExpandedStrands& expanded) const;
+  const gl::Program& program() const { return program_; }
+  static uint64_t size_bytes();
+
+ private:
+  gl::Program program_;
+  gl::VertexArray vertex_array_;
+  gl::Buffer quad_index_;
+};
+
+/// A declaration of a pass that runs when there are strands.
+gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
+                                gl::Resources writes);
 
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded);
 

@@ -1,0 +1,55 @@
+// Maps of the hair as the light sees it: what deep opacity maps, opacity shadow maps, the hybrid and deep
+// shadow maps have in common. All calls from the context's thread.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/render/passes/strand_pass.h"
+#include "common/render/shadow/light_frame.h"
+#include "common/render/shadow/shadow_method.h"
+
+namespace strandcast {
+
+/// A map with the frame of the draw that is under way.
+class LightMap : public ShadowMap {
+ public:
+  LightMap(std::string name, uint32_t texels) : ShadowMap(std::move(name)), texels_(texels) {}
+  /// Called once per draw, before strands are drawn into it: allocates, and forgets the last draw.
+  virtual void begin() = 0;
+  void fit(const RenderScene& scene, const RenderTurn& turn);
+  const LightFrame& frame() const { return frame_; }
+  uint32_t texels() const { return texels_; }
+  void set_uniforms(const gl::Program& program, uint32_t first_unit) const override;
+
+ protected:
+  /// Textures and numbers of the method.
+  virtual void set_method_uniforms(const gl::Program& program, uint32_t first_unit) const = 0;
+
+ private:
+  uint32_t texels_;
+  LightFrame frame_;
+  FittedSphere skull_;  // radius 0: none
+};
+
+/// The skull under the hair for shaders/render/shadow.glsl; its radius is 0 where there is none.
+FittedSphere shadowing_skull(const RenderScene& scene);
+void set_skull_uniforms(const gl::Program& program, const FittedSphere& skull);
+
+/// In front of the first walk: the light of the draw, and the map's frame.
+std::unique_ptr<RenderPass> make_light_frame_pass(RenderScene& scene, LightMap& map);
+
+/// Strands as the light sees them, with a fragment stage that includes render/shadow_map.glsl.
+class LightDraw {
+ public:
+  static Result<LightDraw> make(const RenderSetup& setup, const RenderScene& scene,
+                                const std::string& fragment_stage, gl::Variant variant = {});
+  /// The target is bound by the caller.
+  void draw(const RenderScene& scene, const LightMap& map, const ExpandedStrands& expanded);
+  const gl::Program& program() const { return strands_.program(); }
+
+ private:
+  StrandDraw strands_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,58 @@
+#include "common/render/transparency/transparency.h"
+
+#include <epoxy/gl.h>
+
+#include <utility>
+
+namespace strandcast {
+namespace {
+
+// Beside the textures that the light takes in the vertex stage.
+constexpr uint32_t kSceneDepthUnit = 8;
+
+constexpr AddStrandPasses kMethods[] = {add_hashed, add_lists, add_three_depths, add_weighted, add_moments};
+
+static_assert(kSamplesPerSide == 2, "blended.glsl gathers four samples of the scene");
+
+}  // namespace
+
+SampleLayout sample_layout(AntialiasingMethod method) {
+  if (method == AntialiasingMethod::Msaa4) return {1, 4};
+  return {};
+}
+
+void add_hashed(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
+  if (scene.methods.antialiasing == AntialiasingMethod::Msaa4) return add_msaa4(scene, walks, passes);
+  if (scene.methods.antialiasing == AntialiasingMethod::DensitySamples)
+    return add_density_samples(scene, walks, passes);
+  passes.add(walks.add());
+  passes.add(make_strand_pass(scene, walks.expanded()));
+}
+
+void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
+  kMethods[static_cast<size_t>(scene.methods.transparency)](scene, walks, passes);
+}
+
+void begin_blended(StrandDraw& strands, const RenderScene& scene, const ExpandedStrands& expanded,
+                   const RenderTurn& turn) {
+  strands.begin(scene, expanded, turn, turn.size_px);
+  scene.scene.depth().bind(kSceneDepthUnit);
+  strands.program().set("u_scene_depth", static_cast<int>(kSceneDepthUnit));
+  strands.program().set("u_pixel_step", 1.0f / glm::vec2(turn.size_px));
+}
+
+Result<FullScreen> FullScreen::make(const RenderSetup& setup, const std::string& fragment_stage) {
+  FullScreen screen;
+  ASSIGN_OR_RETURN(screen.program_,
+                   gl::Program::make(setup.shaders, {"render/resolve.vert", fragment_stage}, {}));
+  screen.no_attributes_ = gl::VertexArray("full screen");
+  return screen;
+}
+
+void FullScreen::draw() const {
+  program_.use();
+  no_attributes_.bind();
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+}  // namespace strandcast
