@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 
 #include "common/groom/groom_asset.h"
 #include "common/render/tiles/tile_renderer.h"
+#include "common/scene/shadow_methods.h"
 #include "server/report/csv_file.h"
 #include "server/scene/scene_content.h"
 
@@ -49,45 +51,105 @@ Result<Image> drawn(Renderer& renderer, const PosedStrands& strands, const Camer
   return renderer.read_image();
 }
 
-/// Hair drawn sixteen times as finely, and where it is.
-Result<ReportView> make_view_of(const RenderingReportDesc& desc, const SceneAsset& asset,
-                                const CameraDesc& camera) {
+LookDesc changed(LookDesc look, const std::function<void(LookDesc&)>& change) {
+  if (change) change(look);
+  return look;
+}
+
+Result<std::unique_ptr<Renderer>> make_truth(RenderDevice& device, const RenderingGroup& group,
+                                             const SceneAsset& asset, const LookDesc& look) {
+  if (group.kind == RendererKind::Gl) return device.make_renderer(RendererKind::Gl, asset, look);
   TileOptions options;
   options.light_cells = kTruthCells;
   options.is_finest = true;
-  ASSIGN_OR_RETURN(const auto fine, make_tile_renderer(asset, desc.scene.look, options));
-  const PosedStrands strands{{}, asset.rest_position_m};
-  const RenderSize large{desc.size.width * kTruthFactor, desc.size.height * kTruthFactor};
-  ASSIGN_OR_RETURN(const Image with_hair, drawn(*fine, strands, camera, large));
+  return make_tile_renderer(asset, look, options);
+}
+
+/// The truth of a group from one camera, and where its hair is.
+Result<ReportView> make_view_of(const RenderingReportDesc& desc, RenderDevice& device,
+                                const RenderingGroup& group, const SceneAsset& asset,
+                                const CameraDesc& camera) {
+  const LookDesc look = changed(desc.scene.look, group.truth_change);
+  const RenderSize large{desc.size.width * group.truth_factor, desc.size.height * group.truth_factor};
   SceneAsset bald = asset;
   bald.strand_count = bald.vertex_count = 0;
   bald.rest_position_m.clear();
   bald.triangle.clear();
-  ASSIGN_OR_RETURN(const auto without, make_tile_renderer(bald, desc.scene.look, options));
+  ASSIGN_OR_RETURN(const auto with, make_truth(device, group, asset, look));
+  ASSIGN_OR_RETURN(const Image hair, drawn(*with, {{}, asset.rest_position_m}, camera, large));
+  ASSIGN_OR_RETURN(const auto without, make_truth(device, group, bald, look));
   ASSIGN_OR_RETURN(const Image skin, drawn(*without, {}, camera, large));
-  ReportView view{camera, shrunk(with_hair, kTruthFactor), {}};
-  view.hair = mask_of(view.truth, shrunk(skin, kTruthFactor));
+  ReportView view{camera, shrunk(hair, group.truth_factor), {}};
+  view.hair = mask_of(view.truth, shrunk(skin, group.truth_factor));
   return view;
 }
 
+/// The rows of a table of methods.
+template <class Method>
+void add_methods(const MethodTable<Method>& table, const char* kind, size_t group,
+                 std::string RenderMethodsDesc::*field, std::vector<RenderingRow>& rows) {
+  for (const MethodRow& row : table.rows()) {
+    const std::string name(row.name);
+    rows.push_back({fmt::format("gl {} {}", kind, name), std::string(row.summary), group, RendererKind::Gl,
+                    [field, name](LookDesc& look) { look.methods.*field = name; }});
+  }
+}
+
+enum GroupIndex : size_t { kWhole, kShadows, kTransparencies, kEdges, kShadings, kScatterings };
+
 }  // namespace
 
-const std::vector<RenderingRow>& rendering_rows() {
-  static const std::vector<RenderingRow> kRows = {
-      {"tiles",
-       "the main path: tiles on the processor, exact coverage, blended front to back, shadowed",
+const std::vector<RenderingGroup>& rendering_groups() {
+  static const std::vector<RenderingGroup> kGroups = {
+      {"the whole picture",
+       "tiles with sixteen samples per pixel, the finest strands and light",
        RendererKind::Tiles,
-       {}},
-      {"tiles, 1 segment per gap", "straight between simulated vertices", RendererKind::Tiles,
-       [](LookDesc& look) { look.segments = 1; }},
-      {"tiles, 2 segments per gap", "", RendererKind::Tiles, [](LookDesc& look) { look.segments = 2; }},
-      {"tiles, no followers", "the simulated strands alone, as thick as all", RendererKind::Tiles,
-       [](LookDesc& look) { look.followers = 0; }},
-      {"gl quads, hashed",
-       "camera-facing quads at 2 x 2 samples, a fixed pattern of coverage, OpenGL",
-       RendererKind::Gl,
-       {}},
+       {},
+       kTruthFactor},
+      {"shadow", "deep shadow maps: every strand on every ray, in double", RendererKind::Gl,
+       [](LookDesc& look) { look.methods.shadow = "deep_shadow"; }, 1},
+      {"transparency", "quads with 64 samples per pixel", RendererKind::Gl, {}, kTruthFactor},
+      {"edges", "quads with 64 samples per pixel", RendererKind::Gl, {}, kTruthFactor},
+      {"shading", "the rough fibre that conserves energy, per fragment", RendererKind::Gl,
+       [](LookDesc& look) {
+         look.methods.shading = "chiang";
+         look.methods.evaluation = "fragment";
+       },
+       1},
+      {"scattering", "dual scattering of the rough fibre", RendererKind::Gl,
+       [](LookDesc& look) {
+         look.methods.shading = "chiang";
+         look.methods.scattering = "dual";
+       },
+       1},
   };
+  return kGroups;
+}
+
+const std::vector<RenderingRow>& rendering_rows() {
+  static const std::vector<RenderingRow> kRows = [] {
+    std::vector<RenderingRow> rows = {
+        {"tiles",
+         "the main path: exact coverage, blended front to back, shadowed, on the processor",
+         kWhole,
+         RendererKind::Tiles,
+         {}},
+        {"tiles, 1 segment per gap", "straight between simulated vertices", kWhole, RendererKind::Tiles,
+         [](LookDesc& look) { look.segments = 1; }},
+        {"tiles, 2 segments per gap", "", kWhole, RendererKind::Tiles,
+         [](LookDesc& look) { look.segments = 2; }},
+        {"tiles, no followers", "the simulated strands alone, as thick as all", kWhole, RendererKind::Tiles,
+         [](LookDesc& look) { look.followers = 0; }},
+    };
+    add_methods(shadow_methods(), "shadow", kShadows, &RenderMethodsDesc::shadow, rows);
+    add_methods(transparency_methods(), "transparency", kTransparencies, &RenderMethodsDesc::transparency,
+                rows);
+    add_methods(antialiasing_methods(), "edges", kEdges, &RenderMethodsDesc::antialiasing, rows);
+    add_methods(shading_models(), "shading", kShadings, &RenderMethodsDesc::shading, rows);
+    add_methods(shading_places(), "evaluation", kShadings, &RenderMethodsDesc::evaluation, rows);
+    add_methods(scattering_models(), "scattering", kScatterings, &RenderMethodsDesc::scattering, rows);
+    return rows;
+  }();
   return kRows;
 }
 
@@ -100,28 +162,32 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
   const PosedStrands strands{{}, asset.rest_position_m};
   CameraDesc far_camera = desc.scene.camera;
   far_camera.offset_m *= static_cast<float>(desc.far_factor);
-  say("drawing the truth");
-  std::vector<ReportView> views;
-  for (const CameraDesc& camera : {desc.scene.camera, far_camera}) {
-    ASSIGN_OR_RETURN(ReportView view, make_view_of(desc, asset, camera));
-    views.push_back(std::move(view));
-  }
   RenderingReport report;
   ASSIGN_OR_RETURN(const auto tiles, RenderDevice::open({"tiles", "auto", {}}));
   report.device_tiles = tiles->info().name;
   auto gl = RenderDevice::open({"gl", desc.gl_device, {}});
   if (gl) report.device_gl = (*gl)->info().name;
+  // By group: near and far.
+  std::vector<std::array<ReportView, 2>> views;
+  for (const RenderingGroup& group : rendering_groups()) {
+    say("drawing the truth of " + group.name);
+    auto& both = views.emplace_back();
+    if (group.kind == RendererKind::Gl && !gl) continue;
+    RenderDevice& device = group.kind == RendererKind::Gl ? **gl : *tiles;
+    ASSIGN_OR_RETURN(both[0], make_view_of(desc, device, group, asset, desc.scene.camera));
+    ASSIGN_OR_RETURN(both[1], make_view_of(desc, device, group, asset, far_camera));
+  }
 
   std::vector<Candidate> candidates;
   for (const RenderingRow& row : rendering_rows()) {
     Candidate candidate;
     candidate.row = &row;
-    LookDesc look = desc.scene.look;
-    if (row.change) row.change(look);
+    const LookDesc look = changed(desc.scene.look, row.change);
     if (row.kind == RendererKind::Gl && !gl) {
       candidate.trouble = gl.error().to_string();
     } else {
-      auto made = (row.kind == RendererKind::Gl ? **gl : *tiles).make_renderer(asset, look);
+      RenderDevice& device = row.kind == RendererKind::Gl ? **gl : *tiles;
+      auto made = device.make_renderer(row.kind, asset, look);
       if (made)
         candidate.renderer = std::move(made).value();
       else
@@ -133,6 +199,7 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
     RenderingOutcome outcome;
     outcome.name = candidate.row->name;
     outcome.summary = candidate.row->summary;
+    outcome.group = candidate.row->group;
     report.rows.push_back(std::move(outcome));
   }
   // The first round compiles and allocates, and is looked at; the others are timed, turn by turn.
@@ -141,10 +208,11 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
     for (size_t i = 0; i < candidates.size(); ++i) {
       Candidate& candidate = candidates[i];
       RenderingOutcome& outcome = report.rows[i];
-      for (size_t v = 0; v < views.size() && candidate.trouble.empty(); ++v) {
+      const std::array<ReportView, 2>& seen = views[candidate.row->group];
+      for (size_t v = 0; v < seen.size() && candidate.trouble.empty(); ++v) {
         const double cpu_begin_ms = process_cpu_ms();
         const int64_t begin_ns = now_ns();
-        auto image = drawn(*candidate.renderer, strands, views[v].camera, desc.size);
+        auto image = drawn(*candidate.renderer, strands, seen[v].camera, desc.size);
         if (!image) {
           candidate.trouble = image.error().to_string();
           break;
@@ -155,7 +223,7 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
           continue;
         }
         RenderingMeasure& measure = v == 0 ? outcome.near : outcome.far;
-        ASSIGN_OR_RETURN(measure.error, picture_error(*image, views[v].truth, views[v].hair));
+        ASSIGN_OR_RETURN(measure.error, picture_error(*image, seen[v].truth, seen[v].hair));
         measure.drawn_segments = static_cast<double>(candidate.renderer->profile().drawn_segments);
         measure.picture = std::move(image).value();
         if (v == 0)
@@ -167,7 +235,7 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
   }
   for (size_t i = 0; i < candidates.size(); ++i) {
     report.rows[i].trouble = candidates[i].trouble;
-    for (size_t v = 0; v < views.size(); ++v) {
+    for (size_t v = 0; v < 2; ++v) {
       RenderingMeasure& measure = v == 0 ? report.rows[i].near : report.rows[i].far;
       measure.cpu_ms = median(candidates[i].cpu_ms[v]);
       measure.wall_ms = median(candidates[i].wall_ms[v]);
@@ -177,17 +245,17 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
 }
 
 std::string rendering_csv(const RenderingReport& report) {
-  CsvFile csv({"row", "view", "cpu_ms", "wall_ms", "cpu_over_main", "segments", "psnr_db", "ssim", "delta_e",
-               "memory_mb", "trouble"});
+  CsvFile csv({"group", "row", "view", "cpu_ms", "wall_ms", "cpu_over_main", "segments", "psnr_db", "ssim",
+               "delta_e", "memory_mb", "trouble"});
   for (const RenderingOutcome& row : report.rows)
     for (const bool is_near : {true, false}) {
       const RenderingMeasure& measure = is_near ? row.near : row.far;
       const RenderingMeasure& main = is_near ? report.rows.front().near : report.rows.front().far;
-      csv.add_row({row.name, is_near ? "near" : "far", csv_number(measure.cpu_ms),
-                   csv_number(measure.wall_ms), csv_number(measure.cpu_ms / main.cpu_ms),
-                   csv_number(measure.drawn_segments), csv_number(measure.error.psnr_db),
-                   csv_number(measure.error.ssim), csv_number(measure.error.delta_e),
-                   csv_number(row.memory_mb), row.trouble});
+      csv.add_row({rendering_groups()[row.group].name, row.name, is_near ? "near" : "far",
+                   csv_number(measure.cpu_ms), csv_number(measure.wall_ms),
+                   csv_number(measure.cpu_ms / main.cpu_ms), csv_number(measure.drawn_segments),
+                   csv_number(measure.error.psnr_db), csv_number(measure.error.ssim),
+                   csv_number(measure.error.delta_e), csv_number(row.memory_mb), row.trouble});
     }
   return csv.text();
 }

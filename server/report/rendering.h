@@ -23,14 +23,25 @@ struct RenderingReportDesc {
   std::function<void(const std::string& doing)> on_progress;
 };
 
+/// Ways to draw that are held against one truth.
+struct RenderingGroup {
+  std::string name;
+  std::string truth;                            // in words
+  RendererKind kind = RendererKind::Tiles;      // of the truth
+  std::function<void(LookDesc&)> truth_change;  // of the scene's look; empty: none
+  uint32_t truth_factor = 1;  // samples of the truth per pixel side, beside the renderer's own
+};
+const std::vector<RenderingGroup>& rendering_groups();
+
 /// A way to draw.
 struct RenderingRow {
   std::string name;
   std::string summary;
+  size_t group = 0;
   RendererKind kind = RendererKind::Tiles;
   std::function<void(LookDesc&)> change;  // of the scene's look; empty: none
 };
-/// All of them; the first is the main path, what the others are held against.
+/// All of them; the first is the main path, what the times of others are held against.
 const std::vector<RenderingRow>& rendering_rows();
 
 struct RenderingMeasure {
@@ -44,6 +55,7 @@ struct RenderingMeasure {
 struct RenderingOutcome {
   std::string name;
   std::string summary;
+  size_t group = 0;
   std::string trouble;  // why it could not be drawn here; then nothing else is there
   double memory_mb = 0.0;
   RenderingMeasure near;
