@@ -176,6 +176,7 @@ TEST_F(RenderCostTest, WhatIsPrintedWithoutGlIsWhatRunsWithIt) {
       const bool is_table = ran[i].name.ends_with("_tables");  // none for what is drawn by default
       EXPECT_EQ(is_table || (ran[i].name == "render/head" && !has_head), ran[i].fate != PassFate::Kept)
           << ran[i].name;
+      EXPECT_EQ(is_table, ran[i].reason.starts_with("look.methods.")) << ran[i].name;
     }
   }
 }

@@ -77,18 +77,28 @@ class RenderMethods : public GlTest {
   static double luminance(const glm::dvec3& shown) {
     return glm::dot(shown, glm::dvec3(0.2126, 0.7152, 0.0722));
   }
-  static double mean_luminance(const Image& image) {
+  static glm::dvec3 mean_of(const Image& image) {
     const auto pixels = hair_of(image);
-    double sum = 0.0;
-    for (const glm::dvec3& pixel : pixels) sum += luminance(pixel);
+    glm::dvec3 sum(0.0);
+    for (const glm::dvec3& pixel : pixels) sum += pixel;
     return sum / static_cast<double>(pixels.size());
   }
+  static double mean_luminance(const Image& image) { return luminance(mean_of(image)); }
   /// Of the hair's pixels, how far they differ on average.
   static double difference(const Image& a, const Image& b) {
     const auto in_a = hair_of(a), in_b = hair_of(b);
     double sum = 0.0;
     for (size_t i = 0; i < in_a.size(); ++i) sum += std::abs(luminance(in_a[i]) - luminance(in_b[i]));
     return sum / static_cast<double>(in_a.size());
+  }
+
+  /// Pixels of the whole picture that are clearly darker in `b`.
+  static int dimmed_pixels(const Image& a, const Image& b) {
+    constexpr int kClearly = 8;  // of 255
+    int count = 0;
+    for (size_t i = 0; i < a.rgba.size(); i += 4)
+      if (a.rgba[i] >= b.rgba[i] + kClearly) ++count;
+    return count;
   }
 
   SceneAsset asset_;
@@ -134,6 +144,22 @@ TEST_F(RenderMethods, EveryScatteringIsNeitherBlackNorBlownOut) {
     }
 }
 
+TEST_F(RenderMethods, PresetsAndPigmentShowTheirColor) {
+  const auto redness = [&](LookDesc look) {
+    const glm::dvec3 mean = mean_of(draw(look));
+    return mean.r / mean.b;
+  };
+  const double grey = redness(look_of("chiang", "volume", "grey"));
+  EXPECT_GT(redness(look_of("chiang", "volume", "red")), 1.5 * grey);
+  EXPECT_LT(redness(look_of("chiang", "volume", "dyed")), 0.9 * grey);
+  LookDesc pigment = look_of("chiang", "volume", "melanin");
+  pigment.eumelanin = 0.1f;
+  pigment.pheomelanin = 0.4f;
+  EXPECT_GT(redness(pigment), 1.3 * grey);
+  pigment.eumelanin = 8.0f;
+  EXPECT_LT(mean_luminance(draw(pigment)), 0.5 * mean_luminance(draw(look_of("chiang", "volume", "blond"))));
+}
+
 TEST_F(RenderMethods, NoTwoMethodsDrawTheSamePicture) {
   std::map<std::string, Image> pictures;
   for (const MethodRow& shading : shading_models().rows())
@@ -156,12 +182,21 @@ TEST_F(RenderMethods, WithoutScatteringHairIsDarker) {
 TEST_F(RenderMethods, ALobeThatIsOffIsMissedInThePicture) {
   for (const MethodRow& shading : shading_models().rows()) {
     LookDesc look = look_of(std::string(shading.name), "volume", "blond");
-    const double whole = mean_luminance(draw(look));
+    const glm::dvec3 whole = mean_of(draw(look));
     look.shading.second_highlight = 0.0f;
-    EXPECT_LT(mean_luminance(draw(look)), whole - 0.001) << shading.name << " without TRT";
-    look.shading.second_highlight = 1.0f;
+    const glm::dvec3 lost_trt = whole - mean_of(draw(look));
+    look.shading = {};
     look.shading.highlight = 0.0f;
-    EXPECT_LT(mean_luminance(draw(look)), whole - 0.001) << shading.name << " without R";
+    const glm::dvec3 lost_r = whole - mean_of(draw(look));
+    EXPECT_GT(luminance(lost_trt), 0.001) << shading.name << " without TRT";
+    EXPECT_GT(luminance(lost_r), 0.001) << shading.name << " without R";
+    EXPECT_GT(lost_r.b / lost_r.r, 1.1 * lost_trt.b / lost_trt.r) << shading.name << ": R is the whiter one";
+    if (shading.name == "kajiya_kay") continue;  // has no TT
+    look.shading = {};
+    look.light_direction = {0.6f, -0.4f, -0.3f};  // against the eye
+    const Image backlit = draw(look);
+    look.shading.transmission = 0.0f;
+    EXPECT_GT(dimmed_pixels(backlit, draw(look)), 50) << shading.name << " without TT: the rim glows";
   }
 }
 

@@ -252,6 +252,26 @@ TEST_F(ScatterShader, ThePrimaryHighlightIsShiftedTowardsTheRoot) {
   EXPECT_NEAR(peak(121), 24.4, 1);
 }
 
+// Whatever the model, light straight across is reflected 14 degrees towards the root, twice the shift, and a
+// strand whose scales are tilted by more sends it further by twice that.
+TEST_F(ScatterShader, EveryModelReflectsToTheSamePlace) {
+  constexpr int kFrom = -60, kCount = 121;
+  for (const Model& model : kModels)
+    for (const double tilt : {0.0, 5.0}) {
+      Rows rows;
+      for (int degrees = kFrom; degrees < kFrom + kCount; ++degrees)
+        rows.push_back(
+            row_of({{{1, 0, 0}, {0, 1, 0}, {std::sin(degrees * kDegree), std::cos(degrees * kDegree), 0}},
+                    tilt * kDegree},
+                   glm::vec3(1, 0, 0)));
+      const auto values = scatter(model, rows);
+      int peak = 0;
+      for (int i = 0; i < kCount; ++i)
+        if (values[i].x > values[peak].x) peak = i;
+      EXPECT_NEAR(peak + kFrom, -14.0 - 2.0 * tilt, 2.0) << model.name;
+    }
+}
+
 TEST_F(ScatterShader, KarisFitsMatchTheirEquationsEverywhere) {
   expect_lobes(
       kModels[2], random_samples(4096),
