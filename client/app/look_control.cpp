@@ -15,7 +15,7 @@ void LookControl::follow(const LookChange& scene, bool is_steering) {
 
 Status LookControl::edit(const std::vector<FormEdit>& edits, int64_t time_ns) {
   Status status;
-  for (const FormEdit& edit : edits) {
+  for (const FormEdit& edit : completed(shown(time_ns), edits)) {
     Result<LookDesc> changed = with_edits(shown(time_ns), {edit});
     if (!changed) {
       if (status) status = changed.error();

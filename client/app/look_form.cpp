@@ -18,6 +18,7 @@ namespace {
 using scene_fields::Range;
 
 constexpr double kMmPerM = 1e3;
+constexpr const char* kOwnColors = "custom";
 
 /// How a field is shown where its name, its group and its range do not say it well.
 struct Shown {
@@ -87,14 +88,14 @@ const Shown* find_shown(std::string_view path) {
 /// Names that a field of text can have; none: any text.
 std::vector<std::string> names_of(std::string_view path) {
   if (path != "hair_color") return {};
-  std::vector<std::string> names{"custom", "melanin"};
+  std::vector<std::string> names{kOwnColors, "melanin"};
   for (const HairColorPreset& preset : hair_color_presets()) names.emplace_back(preset.name);
   return names;
 }
 
 /// A field that says nothing while another one has this value.
 bool is_idle(const LookDesc& look, std::string_view path) {
-  if (path == "root_color" || path == "tip_color") return look.hair_color != "custom";
+  if (path == "root_color" || path == "tip_color") return look.hair_color != kOwnColors;
   if (path == "eumelanin" || path == "pheomelanin") return look.hair_color != "melanin";
   if (path == "rim_direction") return look.rim_color == glm::vec3(0.0f);
   return false;
@@ -224,6 +225,15 @@ std::vector<FormField> look_fields(const LookDesc& look) {
   FormMaker maker(look);
   scene_fields::visit_look(maker, copy);
   return maker.take();
+}
+
+std::vector<FormEdit> completed(const LookDesc& seen, std::vector<FormEdit> edits) {
+  const FormEdit own_colors{"hair_color", std::string(kOwnColors)};
+  if (seen.hair_color == kOwnColors || std::find(edits.begin(), edits.end(), own_colors) == edits.end())
+    return edits;
+  const HairColors colors = colors_of(seen);
+  edits.insert(edits.begin(), {{"root_color", colors.root}, {"tip_color", colors.tip}});
+  return edits;
 }
 
 std::string look_assignment(const std::vector<FormEdit>& edits) {

@@ -14,6 +14,9 @@ namespace strandcast {
 /// Every field of the look, those of one section together.
 std::vector<FormField> look_fields(const LookDesc& look);
 
+/// The same edits, with what a person expects of them: colours of one's own begin with those that are seen.
+std::vector<FormEdit> completed(const LookDesc& seen, std::vector<FormEdit> edits);
+
 /// "look={ ... }": what SetParameter takes to set these fields and no others. There must be one.
 std::string look_assignment(const std::vector<FormEdit>& edits);
 

@@ -103,6 +103,20 @@ TEST(LookForm, WhatIsSetReadsBackFieldByFieldAndAllAtOnce) {
   EXPECT_THAT(refused.error().to_string(), HasSubstr("look.hair_color must be custom")) << "text stays text";
 }
 
+TEST(LookForm, ColoursOfOnesOwnBeginWithThoseThatAreSeen) {
+  LookControl control;
+  LookDesc look = sample_look();
+  look.hair_color = "red";
+  control.follow({look, {}}, false);
+  ASSERT_TRUE(control.edit({{"hair_color", std::string("custom")}}, kS));
+  EXPECT_EQ(control.shown(kS).hair_color, "custom");
+  EXPECT_EQ(control.shown(kS).root_color, colors_of(look).root);
+  EXPECT_EQ(control.shown(kS).tip_color, colors_of(look).tip);
+  ASSERT_TRUE(control.edit({{"tip_color", glm::vec3(0.5f)}}, kS));
+  ASSERT_TRUE(control.edit({{"hair_color", std::string("custom")}}, kS));
+  EXPECT_EQ(control.shown(kS).tip_color, glm::vec3(0.5f)) << "they are one's own already";
+}
+
 TEST(Form, DirectionsAreTwoAngles) {
   const DirectionAngles front = angles_of({0.0f, 0.0f, -2.0f});
   EXPECT_NEAR(front.azimuth_deg, 0.0, 1e-5);
