@@ -87,10 +87,23 @@ const Shown* find_shown(std::string_view path) {
 
 /// Names that a field of text can have; none: any text.
 std::vector<std::string> names_of(std::string_view path) {
-  if (path != "hair_color") return {};
-  std::vector<std::string> names{kOwnColors, "melanin"};
-  for (const HairColorPreset& preset : hair_color_presets()) names.emplace_back(preset.name);
-  return names;
+  if (path == "hair_color") {
+    std::vector<std::string> names{kOwnColors, "melanin"};
+    for (const HairColorPreset& preset : hair_color_presets()) names.emplace_back(preset.name);
+    return names;
+  }
+  const auto methods = [](const auto& table) {
+    std::vector<std::string> names{kMainMethod};
+    for (const MethodRow& row : table.rows()) names.emplace_back(row.name);
+    return names;
+  };
+  if (path == "methods.shading") return methods(shading_models());
+  if (path == "methods.scattering") return methods(scattering_models());
+  if (path == "methods.evaluation") return methods(shading_places());
+  if (path == "methods.shadow") return methods(shadow_methods());
+  if (path == "methods.transparency") return methods(transparency_methods());
+  if (path == "methods.antialiasing") return methods(antialiasing_methods());
+  return {};
 }
 
 /// A field that says nothing while another one has this value.

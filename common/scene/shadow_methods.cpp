@@ -86,6 +86,9 @@ const char* method_conflict(const RenderMethodsDesc& methods) {
     return "antialiasing by samples goes with transparency hashed only: others blend what analytic says";
   if (is_blended && is_method(shading_places(), methods.evaluation, ShadingPlace::Fragment))
     return "evaluation per fragment goes with transparency hashed only";
+  if (is_method(shading_places(), methods.evaluation, ShadingPlace::Fragment) &&
+      is_method(antialiasing_methods(), methods.antialiasing, AntialiasingMethod::Msaa4))
+    return "evaluation per fragment does not go with antialiasing msaa4";
   if (is_method(scattering_models(), methods.scattering, ScatteringModel::Isosurface) &&
       !is_method(shadow_methods(), methods.shadow, ShadowMethod::Volume))
     return "scattering isosurface goes with shadow volume only: its surface is that of the volume";

@@ -57,7 +57,7 @@ TEST_F(StrandShader, MomentsOfTwoLayersTellWhatPassesEach) {
   }
   for (const auto& [z, passing] : expected) rows.push_back({glm::vec4(z, b0, 0, 0), glm::vec4(moments)});
   const auto values =
-      evaluate({"moments.glsl"}, "return vec4(transmittance_at(a(0u).x, a(0u).y, a(1u), 0.1));\n", rows);
+      evaluate({"lib/moments.glsl"}, "return vec4(transmittance_at(a(0u).x, a(0u).y, a(1u), 0.1));\n", rows);
   for (size_t i = 0; i < rows.size(); ++i)
     EXPECT_NEAR(values[i].x, expected[i].second, 2e-3) << expected[i].first;
 }
@@ -67,7 +67,7 @@ TEST_F(StrandShader, OpacitiesMultiplyAsIntegers) {
   std::vector<std::vector<glm::vec4>> rows;
   for (const float opacity : {0.0005f, 0.01f, 0.3f, 0.9f, 1.0f}) rows.push_back({glm::vec4(opacity)});
   const auto values =
-      evaluate({"opacity_sum.glsl"},
+      evaluate({"lib/opacity_sum.glsl"},
                "return vec4(transmitted(opacity_log(a(0u).x)), transmitted(100u * opacity_log(a(0u).x)),\n"
                "            0.0, 0.0);\n",
                rows);

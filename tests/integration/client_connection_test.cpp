@@ -191,7 +191,8 @@ TEST(ClientHostile, ControlMessagesBeforeTheWelcomeAreRefused) {
     EXPECT_THAT(error.message, HasSubstr("before its Welcome"));
     ++refused;
   }
-  EXPECT_EQ(refused, 6u) << "status, stream quality, mode change, frame quality, session list, notice";
+  EXPECT_EQ(refused, 8u)
+      << "status, stream quality, mode change, frame quality, session list, notice, look change, scene text";
 }
 
 TEST(ClientHostile, MediaBeforeTheWelcomeIsRefused) {
