@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds and runs every bench and leaves CSV files: simulation (the seeds' test sets, every solver), the models beside
-# Bullet's rope and in the form of the source documents' tables, strand codecs, picture codecs, and whole streams (server, feeder and
+# Bullet's rope and in the form of the source documents' tables, strand codecs, picture codecs, methods of drawing, and whole streams (server, feeder and
 # headless viewer on loopback). Nothing here passes or fails.
 # usage: bash tests/bench/run.sh [--out DIR] [--groom FILE] [--motion FILE.bvh] [--mohawk Ratboy_mohawk.tfx]
 set -euo pipefail
@@ -21,7 +21,7 @@ out=$(realpath "$out")
 cd "$(dirname "$0")/../.."
 bash deploy/install_deps.sh
 cmake --preset release -DBUILD_TESTING=ON >/dev/null
-cmake --build --preset release --target sim_bench peers_bench codec_bench frame_bench strandcast-server strandcast-view strandcast-ctl \
+cmake --build --preset release --target sim_bench peers_bench codec_bench frame_bench render_bench strandcast-server strandcast-view strandcast-ctl \
   >"$out/build.log" 2>&1 || { tail -30 "$out/build.log" >&2; exit 2; }
 bin=build/release/bin
 
@@ -34,6 +34,9 @@ echo "== codecs: $out/codec.csv"
 
 echo "== pictures: $out/frame.csv"
 "$bin/frame_bench" | tee "$out/frame.csv"
+
+echo "== methods of drawing: $out/render.csv"
+"$bin/render_bench" | tee "$out/render.csv"
 
 echo "== streams: $out/stream.csv"
 echo "scene,key,value" >"$out/stream.csv"

@@ -63,18 +63,19 @@ TEST_F(StrandShader, MomentsOfTwoLayersTellWhatPassesEach) {
 }
 
 TEST_F(StrandShader, OpacitiesMultiplyAsIntegers) {
-  // A hundred layers of each opacity.
+  // A hundred layers of each opacity, and one in front of an opaque one.
   std::vector<std::vector<glm::vec4>> rows;
   for (const float opacity : {0.0005f, 0.01f, 0.3f, 0.9f, 1.0f}) rows.push_back({glm::vec4(opacity)});
-  const auto values =
-      evaluate({"lib/opacity_sum.glsl"},
-               "return vec4(transmitted(opacity_log(a(0u).x)), transmitted(100u * opacity_log(a(0u).x)),\n"
-               "            0.0, 0.0);\n",
-               rows);
+  const auto values = evaluate({"lib/opacity_sum.glsl"},
+                               "uint one = opacity_log(a(0u).x);\n"
+                               "return vec4(transmitted(one), transmitted(100u * one),\n"
+                               "            transmitted(one + opacity_log(a(0u).x * 0.0 + 1.0)), 0.0);\n",
+                               rows);
   for (size_t i = 0; i < rows.size(); ++i) {
     const double passing = 1.0 - rows[i][0].x;
     EXPECT_NEAR(values[i].x, passing, 2e-5);
     EXPECT_NEAR(values[i].y, std::pow(passing, 100), 1e-3);
+    EXPECT_NEAR(values[i].z, 0.0, 2e-5);
   }
 }
 

@@ -131,6 +131,22 @@ TEST_F(TransparencyTest, EqualLayersLetThroughThePowerOfOne) {
     }
 }
 
+TEST_F(TransparencyTest, OneLayerHasItsColourTimesItsOpacity) {
+  Settings settings;
+  settings.opacity = 0.9f;
+  const glm::vec4 reference = draw({layer(0)}, settings).middle();
+  ASSERT_GT(reference.g, 0.1f);
+  for (const TransparencyMethod method : kBlended)
+    for (const float opacity : {0.2f, 0.6f}) {
+      settings.method = method;
+      settings.opacity = opacity;
+      const glm::vec4 one = draw({layer(0)}, settings).middle();
+      for (int channel = 0; channel < 4; ++channel)
+        EXPECT_NEAR(one[channel], reference[channel] * opacity / 0.9f, 3e-3)
+            << name_of(method) << ", " << opacity << ", channel " << channel;
+    }
+}
+
 TEST_F(TransparencyTest, HalfRedOverHalfBlueIsHalfRedAndAQuarterBlue) {
   for (const TransparencyMethod method : {TransparencyMethod::Lists, TransparencyMethod::ThreeDepths}) {
     Settings settings;
