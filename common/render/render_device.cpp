@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "common/log/log.h"
 #include "common/render/tiles/tile_renderer.h"
 
 namespace strandcast {
@@ -78,9 +79,19 @@ Status RenderDevice::make_current() {
   return context_ ? context_->make_current() : Status();
 }
 
-RendererKind RenderDevice::kind_for(const LookDesc& look) const {
-  return info_.kind == RendererKind::Tiles && look.methods == RenderMethodsDesc{} ? RendererKind::Tiles
-                                                                                  : RendererKind::Gl;
+RendererKind RenderDevice::kind_for(const LookDesc& look) {
+  if (info_.kind == RendererKind::Gl) return RendererKind::Gl;
+  if (look.methods == RenderMethodsDesc{} || has_no_gl_) return RendererKind::Tiles;
+  if (config_.renderer == "tiles" || context_) return RendererKind::Gl;
+  auto context = gl::EglContext::make(config_.gl_device, config_.driver_threads);
+  if (context) {
+    context_ = std::move(context).value();
+    return RendererKind::Gl;
+  }
+  has_no_gl_ = true;
+  log_warn("render", "look.methods names what only OpenGL draws: the main methods are drawn instead ({})",
+           context.error().to_string());
+  return RendererKind::Tiles;
 }
 
 Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(RendererKind kind, const SceneAsset& asset,
@@ -90,11 +101,7 @@ Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(RendererKind kind,
     return make_error(ErrorCode::BadInput,
                       "look.methods names what only OpenGL draws; --renderer auto or gl allows it");
   if (!context_) {
-    auto context = gl::EglContext::make(config_.gl_device, config_.driver_threads);
-    if (!context)
-      return make_error(ErrorCode::Unavailable, "look.methods names what only OpenGL draws: {}",
-                        context.error().to_string());
-    context_ = std::move(context).value();
+    ASSIGN_OR_RETURN(context_, gl::EglContext::make(config_.gl_device, config_.driver_threads));
   }
   return Renderer::make(shaders_, context_->info(), asset, look);
 }

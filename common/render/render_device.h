@@ -39,14 +39,14 @@ class RenderDevice {
   Status make_current();
   const RenderDeviceInfo& info() const { return info_; }
   /// `asset` outlives the renderer. Where tiles draw, a look that names other methods than the main ones is
-  /// drawn by OpenGL, opened when the first such look comes; Unavailable without it, BadInput where "tiles"
-  /// was asked for.
+  /// drawn by OpenGL, opened when the first such look comes; BadInput where "tiles" was asked for.
   Result<std::unique_ptr<Renderer>> make_renderer(const SceneAsset& asset, const LookDesc& look);
   /// One of this kind, whatever the look names.
   Result<std::unique_ptr<Renderer>> make_renderer(RendererKind kind, const SceneAsset& asset,
                                                   const LookDesc& look);
-  /// What draws a look here.
-  RendererKind kind_for(const LookDesc& look) const;
+  /// What draws a look here. Where a look needs OpenGL and there is none, tiles draw their own methods, and
+  /// the log says so.
+  RendererKind kind_for(const LookDesc& look);
 
  private:
   explicit RenderDevice(const RenderDeviceConfig& config);
@@ -54,6 +54,7 @@ class RenderDevice {
   RenderDeviceInfo info_;
   gl::ShaderLibrary shaders_;
   std::unique_ptr<gl::EglContext> context_;  // of Gl, or for methods that tiles have not
+  bool has_no_gl_ = false;                   // was looked for, for such methods
 };
 
 /// What will draw a look where the renderer was asked for by this name and there is no hardware GPU.

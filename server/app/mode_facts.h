@@ -25,7 +25,7 @@ struct ModeSources {
 
 /// Before the first picture: what drawing takes, by pixels, and the bytes of one, both as measured with the
 /// built-in scene.
-inline constexpr double kGuessedSoftwareMsPerPixel = 200.0 / (640.0 * 360.0);
+inline constexpr double kGuessedSoftwareMsPerPixel = 60.0 / (640.0 * 360.0);
 inline constexpr double kGuessedHardwareMs = 10.0;
 inline constexpr double kGuessedBytesPerPixel = 0.15;
 

@@ -78,18 +78,18 @@ vec3 strand_scatter(vec3 tangent, vec3 to_light, vec3 to_eye, Fibre fibre) {
 }
 
 #if SCATTERING == SCATTERING_ISOSURFACE
-uniform sampler3D u_density;      // strands crossed per metre, in the cells of the light volume
+uniform sampler3D u_surface_density;      // strands crossed per metre, in the cells of the light volume
 uniform float u_min_slope;        // change of it from cell to cell that makes a surface, per metre
 
 const float kSurfaceWrap = 0.30;
 // Weight of the diffuse term, which is as bright as that of single strands by it.
 const float kSurfaceDiffuse = 1.10;
 
-float density_at(vec3 at) { return texture(u_density, at).r; }
+float density_at(vec3 at) { return texture(u_surface_density, at).r; }
 
 vec3 hair_normal(vec3 point_m, vec3 fallback) {
   vec3 at = (point_m - u_volume_origin_m) * u_volume_from_m;
-  vec3 cell = 1.0 / vec3(textureSize(u_density, 0));
+  vec3 cell = 1.0 / vec3(textureSize(u_surface_density, 0));
   vec3 x = vec3(cell.x, 0.0, 0.0);
   vec3 y = vec3(0.0, cell.y, 0.0);
   vec3 z = vec3(0.0, 0.0, cell.z);

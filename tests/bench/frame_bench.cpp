@@ -1,7 +1,7 @@
 // Prints CSV: bytes, milliseconds of processor time and PSNR of every picture codec and quality on the
 // built-in scene, drawn as the server draws it: in motion, and idle (head and wind at rest, the hair swinging
 // out).
-//   frame_bench [--pictures N] [--size WxH] [--png DIR]     DIR: the last decoded picture of each mode
+//   frame_bench [--pictures N] [--size WxH] [--png DIR] [--renderer NAME]     DIR: the last decoded picture of each mode
 //   frame_bench --match yes     instead: bits per pixel with which video in motion looks like tiles of a
 //                               quality, at the size and at half of it
 #include <fmt/format.h>
@@ -15,9 +15,8 @@
 #include <string>
 
 #include "common/base/quantile.h"
-#include "common/gl/egl_context.h"
 #include "common/pictures/picture_decoder.h"
-#include "common/render/renderer.h"
+#include "common/render/render_device.h"
 #include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "tests/bench/scene_run.h"
@@ -36,6 +35,7 @@ struct Options {
   size_t pictures = 30;
   RenderSize size{640, 360};
   std::filesystem::path png;
+  std::string renderer = "auto";  // as RenderDeviceConfig
   bool is_matching = false;
 };
 
@@ -58,12 +58,14 @@ Result<Options> parse(int argc, char** argv) {
       options.pictures = static_cast<size_t>(std::max(2, std::atoi(value.c_str())));
     } else if (word == "--png") {
       options.png = value;
+    } else if (word == "--renderer") {
+      options.renderer = value;
     } else if (word == "--match") {
       options.is_matching = value == "yes";
     } else if (word != "--size" ||
                std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2) {
       return make_error(ErrorCode::BadInput,
-                        "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes)", word,
+                        "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes --renderer NAME)", word,
                         value);
     }
   }
@@ -73,9 +75,8 @@ Result<Options> parse(int argc, char** argv) {
 /// Pictures of the scene in motion, then after it came to rest.
 Result<std::vector<Sequence>> draw(const Options& options) {
   BuiltInScene run(quantum_for_bound(kBoundM));
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
-  ASSIGN_OR_RETURN(auto renderer,
-                   Renderer::make(gl::ShaderLibrary(), context->info(), run.asset(), run.scene().look));
+  ASSIGN_OR_RETURN(const auto device, RenderDevice::open({options.renderer, "auto", {}}));
+  ASSIGN_OR_RETURN(auto renderer, device->make_renderer(run.asset(), run.scene().look));
   const auto take = [&](const char* name) -> Result<Sequence> {
     Sequence sequence{name, {}};
     while (sequence.images.size() < options.pictures) {

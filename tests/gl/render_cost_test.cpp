@@ -224,8 +224,9 @@ TEST_F(RenderCostTest, AMethodThatIsNotChosenCostsNothing) {
   const uint64_t plain_bytes = added_bytes();
   std::vector<std::string> plain_passes;
   for (const gl::PassReport& pass : plain->passes().report()) plain_passes.push_back(pass.name);
-  EXPECT_THAT(plain_passes, ElementsAre("render/upload", "render/light", "render/clear", "render/head",
-                                        "render/expand", "render/strands", "render/resolve"));
+  EXPECT_THAT(plain_passes, ElementsAre("render/lobe_tables", "render/scatter_tables", "render/upload",
+                                        "render/light", "render/clear", "render/head", "render/expand",
+                                        "render/strands", "render/resolve"));
   // The methods that draw less than the default hold less.
   const ObjectCounts before = gl::object_counts();
   const auto bare = drawn(asset, look_with(0), segment_path_with({ShadowMethod::None, {}, {}}));

@@ -34,6 +34,7 @@ TEST(LightFrame, HoldsAllPointsThatAreNumbers) {
   points.emplace_back(1e20f, 0.0f, 0.0f);
   for (const glm::vec3 to_light : {glm::vec3(0, 0, 1), glm::vec3(0, 1, 0), glm::vec3(0.6f, -0.8f, 0.0f)}) {
     const LightFrame frame = fit_light_frame(points, to_light, 128, 0.01f);
+    EXPECT_GT(frame.texels_per_m, 128.0f / 0.8f) << "and nothing else";
     for (size_t i = 0; i < 200; ++i) {
       const glm::vec3 at = frame.in_map(points[i]);
       for (int axis = 0; axis < 2; ++axis) {

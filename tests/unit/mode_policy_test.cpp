@@ -270,7 +270,7 @@ TEST(ModeFacts, GuessesUntilSomethingWasMeasured) {
   EXPECT_EQ(known.strand_draw_ms, 2.0);
   EXPECT_EQ(known.picture_decode_ms, 3.0);
   EXPECT_EQ(known.device, DrawingDevice::Software);
-  EXPECT_NEAR(known.paint_ms, 2 * 200.0, 1e-9);
+  EXPECT_NEAR(known.paint_ms, 2 * 60.0, 1e-9);
   EXPECT_TRUE(known.is_paint_guessed);
   sources.is_software = false;
   EXPECT_FALSE(gather_mode_facts(sources).is_paint_guessed) << "a GPU is that fast or faster";

@@ -224,9 +224,9 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
       "s.textproto:1:18: look.methods.shading is unknown (known: main, sadeghi, kajiya_kay, karis, chiang, "
       "marschner)");
   EXPECT_THAT(error_of("look { methods { scattering: 'double' } }"),
-              HasSubstr("scattering is unknown (known: volume, none, isosurface, dual)"));
+              HasSubstr("scattering is unknown (known: main, volume, none, isosurface, dual)"));
   EXPECT_THAT(error_of("look { methods { evaluation: 'pixel' } }"),
-              HasSubstr("evaluation is unknown (known: vertex, fragment)"));
+              HasSubstr("evaluation is unknown (known: main, vertex, fragment)"));
   EXPECT_THAT(error_of("camera { offset_m { x: 0 y: 0 z: 0 } }"),
               HasSubstr("camera.offset_m is almost zero"));
   EXPECT_THAT(error_of("groom { file { } }"), HasSubstr("--set groom.file.path=FILE"));

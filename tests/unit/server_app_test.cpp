@@ -61,7 +61,7 @@ TEST(SceneChange, LookAndCameraAreLive) {
   const SceneDesc several = changed("look={ style { clump: 0.25 } rim_color { r: 1 } }");
   EXPECT_EQ(several.look.style.clump, 0.25f);
   EXPECT_EQ(several.look.style.locks, scene.look.style.locks);
-  EXPECT_EQ(several.look.rim_color, glm::vec3(1.0f, 0.0f, 0.0f));
+  EXPECT_EQ(several.look.rim_color, glm::vec3(1.0f, scene.look.rim_color.g, scene.look.rim_color.b));
   for (const auto& [wrong, part] : std::vector<std::pair<std::string, std::string>>{
            {"look.shading.wetness=1.5", "look.shading.wetness is 1.5, it must be within 0 .. 1"},
            {"look.ambient=nan", "look.ambient is nan, it must be within 0 .. 1"},

@@ -251,7 +251,7 @@ TEST(Metrics, SayThePassesAndWhatOpenGlHolds) {
   const std::string text = format_passes(*passes, objects);
   EXPECT_THAT(test::metric_faults(text), testing::IsEmpty());
   for (const char* line :
-       {"strandcast_pass_is_kept{pass=\"sim/step\"} 1\n", "strandcast_pass_is_kept{pass=\"render/draw\"} 0\n",
+       {"strandcast_pass_is_kept{pass=\"sim/step\"} 1\n", "strandcast_pass_is_kept{pass=\"render/head\"} 0\n",
         "strandcast_gl_objects{kind=\"buffer\"} 7\n", "strandcast_gl_bytes 4096\n",
         "# TYPE strandcast_pass_median_ms gauge\n"})
     EXPECT_THAT(text, HasSubstr(line));

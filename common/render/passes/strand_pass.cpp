@@ -99,7 +99,7 @@ void set_shading(const RenderScene& scene, const gl::Program& program) {
   }
   if (scene.features.has_density_normals.value) {
     scene.density.density().bind(kDensityUnit);
-    program.set("u_density", static_cast<int>(kDensityUnit));
+    program.set("u_surface_density", static_cast<int>(kDensityUnit));
     program.set("u_min_slope", kMinSlopePerM);
   }
 }
