@@ -19,9 +19,9 @@ namespace strandcast {
 namespace {
 
 // What is drawn follows from its size on the screen: bends shorter than this are not seen, and for strands
-// thinner than this stand fewer and wider ones.
+// thinner than about this stand fewer and wider ones.
 constexpr float kSegmentPx = 10.0f;
-constexpr float kThinnestPx = 0.35f;
+constexpr float kThinnestPx = 0.45f;
 // Points of all drawn strands at most: 256 MiB. More, and fewer strands are drawn.
 constexpr uint64_t kMaxPoints = uint64_t{8} << 20;
 // A root tints the skin this far around it, of the hair's extent.
@@ -127,7 +127,8 @@ StrandDetail choose_detail(const TileState& state, const View& view, const DrawT
                          : std::min(1u, limit);
   };
   detail.segments_per_gap = at_most(gap_px / kSegmentPx, state.look.segments);
-  detail.followers = at_most(static_cast<float>(max_followers) * width_px / kThinnestPx, max_followers);
+  const float followers = std::floor(static_cast<float>(max_followers) * width_px / kThinnestPx + 0.5f);
+  detail.followers = at_most(followers, max_followers);
   if (state.is_finest) {
     detail.segments_per_gap = kMaxSegmentsPerGap;
     detail.followers = max_followers;
