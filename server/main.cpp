@@ -58,7 +58,8 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
   const auto choice = choose_codec(config.scene, asset);
   if (!choice) return fail(choice.error());
   config.scene.stream.codec = choice->codec;
-  auto passes = measure_passes(config.scene, *content, facts, {config.gl_device, config.renderer, config.shader_folder});
+  auto passes = measure_passes(config.scene, *content, facts,
+                               {config.gl_device, config.renderer, config.shader_folder});
   const std::optional<Error> unmeasured = passes ? std::nullopt : std::optional(passes.error());
   if (unmeasured && unmeasured->code == ErrorCode::Unavailable)
     passes = plan_server(config.scene, asset, facts);
@@ -73,7 +74,8 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
 }
 
 int check_command(const ServerOptions& options, const ServerConfig& config) {
-  const auto text = check_groom(config.scene, options.check_folder, {config.gl_device, config.renderer, config.shader_folder});
+  const auto text = check_groom(config.scene, options.check_folder,
+                                {config.gl_device, config.renderer, config.shader_folder});
   if (!text) return fail(text.error());
   fmt::print("{}", *text);
   return 0;

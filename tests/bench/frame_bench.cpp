@@ -1,8 +1,9 @@
 // Prints CSV: bytes, milliseconds of processor time and PSNR of every picture codec and quality on the
 // built-in scene, drawn as the server draws it: in motion, and idle (head and wind at rest, the hair swinging
 // out).
-//   frame_bench [--pictures N] [--size WxH] [--png DIR] [--renderer NAME]     DIR: the last decoded picture of each mode
-//   frame_bench --match yes     instead: bits per pixel with which video in motion looks like tiles of a
+//   frame_bench [--pictures N] [--size WxH] [--png DIR] [--renderer NAME]     DIR: the last decoded picture
+//   of each mode frame_bench --match yes     instead: bits per pixel with which video in motion looks like
+//   tiles of a
 //                               quality, at the size and at half of it
 #include <fmt/format.h>
 #include <time.h>
@@ -64,9 +65,10 @@ Result<Options> parse(int argc, char** argv) {
       options.is_matching = value == "yes";
     } else if (word != "--size" ||
                std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2) {
-      return make_error(ErrorCode::BadInput,
-                        "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes --renderer NAME)", word,
-                        value);
+      return make_error(
+          ErrorCode::BadInput,
+          "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes --renderer NAME)", word,
+          value);
     }
   }
   return options;

@@ -30,7 +30,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
   static const std::set<std::string> kStreams = with(with(kScene, kPictures), {"common/log"});
   static const std::set<std::string> kWire = with({"common/wire"}, kStreams);
   static const std::set<std::string> kGl = with({"common/gl", "shaders/shared", "common/log"}, kBase);
-  static const std::set<std::string> kRender = with(with({"common/render", "common/simd", "shaders/lib"}, kGl), kStreams);
+  static const std::set<std::string> kRender =
+      with(with({"common/render", "common/simd", "shaders/lib"}, kGl), kStreams);
   static const std::set<std::string> kAll = with(with(kRender, kWire), kReplay);
   static const std::map<std::string, std::set<std::string>> kAllowed = {
       {"common/base", {}},

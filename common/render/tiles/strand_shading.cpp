@@ -2,6 +2,7 @@
 
 #include <glm/gtc/constants.hpp>
 
+#include "common/render/passes/expand_pass.h"
 #include "common/render/tiles/light_lookup.h"
 #include "common/scene/hair_color.h"
 #include "common/strands/strand_limits.h"
@@ -10,7 +11,6 @@ namespace strandcast {
 namespace {
 
 constexpr size_t kStrandsPerRange = 16;
-constexpr uint32_t kMaxSegmentsPerGap = 8;
 constexpr uint32_t kMaxPoints = (kMaxVertexCount - 1) * kMaxSegmentsPerGap + 2;
 
 struct ShadeArguments {

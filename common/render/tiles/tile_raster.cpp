@@ -391,8 +391,7 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
     const uint64_t* const order = sort_segments(in, begin, count, scratch);
     const StrandPoint* const points = in.points->point.data();
     uint32_t until_check = kPairsBetweenChecks;
-    uint32_t i = 0;
-    for (; i < count; ++i) {
+    for (uint32_t i = 0; i < count; ++i) {
       constexpr uint32_t kAhead = 8;
       const auto next = static_cast<uint32_t>(order[i + kAhead < count ? i + kAhead : count - 1]);
       __builtin_prefetch(points + next);
@@ -406,8 +405,6 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
       for (int block = 1; block < kBlocks; ++block) most = simd::max(most, pixels.passed[block]);
       if (!is_any(most > kOpaque)) break;
     }
-    scratch.drawn_pairs += std::min(i + 1, count);
-    scratch.hidden_pairs += count - std::min(i + 1, count);
   }
 
   const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);

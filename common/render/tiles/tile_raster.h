@@ -44,8 +44,6 @@ std::vector<uint8_t> make_srgb_table();
 struct TileScratch {
   std::vector<uint64_t> order;
   std::vector<uint64_t> sorted;
-  uint64_t drawn_pairs = 0;
-  uint64_t hidden_pairs = 0;  // left out behind what is opaque
 };
 
 struct TileArguments {
