@@ -33,6 +33,8 @@ constexpr DeviceLimitRow kTable[] = {
      false, 16, 8, "render/shadow.glsl"},
     {DeviceLimit::FragmentTextureUnits, "textures in the fragment stage", GL_MAX_TEXTURE_IMAGE_UNITS, false,
      16, 8, "render/shadow.glsl"},
+    {DeviceLimit::ComputeImages, "images in the compute stage", GL_MAX_COMPUTE_IMAGE_UNIFORMS, false, 8, 1,
+     "render/tile_draw.comp"},
     {DeviceLimit::GroupSize, "invocations of a work group in one dimension", GL_MAX_COMPUTE_WORK_GROUP_SIZE,
      true, 1'024, 128, "sim/dftl_parallel.comp"},
     {DeviceLimit::GroupInvocations, "invocations of a work group", GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS,

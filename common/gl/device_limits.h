@@ -24,6 +24,7 @@ enum class DeviceLimit : uint8_t {
   ComputeTextureUnits,
   VertexTextureUnits,
   FragmentTextureUnits,
+  ComputeImages,
   GroupSize,
   GroupInvocations,
   GroupCount,
@@ -32,7 +33,7 @@ enum class DeviceLimit : uint8_t {
   CapturedComponents,
   TextureSize,
 };
-inline constexpr size_t kDeviceLimitCount = 17;
+inline constexpr size_t kDeviceLimitCount = 18;
 
 struct DeviceLimitRow {
   DeviceLimit limit;

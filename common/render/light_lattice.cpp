@@ -14,19 +14,14 @@ namespace {
 constexpr float kMeanCrossing = 0.785398f;
 // Part of the light that a drawn strand takes out where it is; the rest passes or is scattered onwards.
 constexpr float kStrandOpacity = 0.6f;
-// Optical depth of a cell inside the skull.
-constexpr float kSkullDepth = 3.0f;
-// Sums are kept in such parts of a unit of optical depth: 2^31 of them are 32,768 units.
-constexpr float kSumUnit = 1.0f / 65536.0f;
 // Hair that flies out of the lattice casts no shadow; this much room is left around the hair at rest.
 constexpr float kRoom = 1.2f;
-constexpr int kMaxCells = 160;  // per axis
 constexpr int kSizeStep = 8;
 // Workers that sum have a lattice each.
 constexpr uint32_t kMaxSummingWorkers = 4;
 constexpr size_t kStrandsPerRange = 64;
-// A segment is summed at one place, one that is longer than two cells at more.
-constexpr float kPiecesPerCell = 0.5f;
+// Points that fit_lattice() looks at.
+constexpr size_t kPointsSeen = 65536;
 // Further out, or no number: says nothing about where the hair is.
 constexpr float kFarM = 1e4f;
 
@@ -35,7 +30,7 @@ glm::vec3 any_across(const glm::vec3& axis) {
   return glm::normalize(glm::cross(other, axis));
 }
 
-glm::vec3 along_axes(const glm::vec3& v, const LightLatticeView& view) {
+glm::vec3 along_axes(const glm::vec3& v, const LatticeFrame& view) {
   return {glm::dot(v, view.axis[0]), glm::dot(v, view.axis[1]), glm::dot(v, view.axis[2])};
 }
 
@@ -62,11 +57,68 @@ inline void add_to_cells(const glm::vec3& place, const glm::ivec3& size, float a
   }
 }
 
-bool is_number(const StrandPoint& p) {
-  return std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM;
+/// Along the axes of a lattice.
+struct Bounds {
+  glm::vec3 low{1e30f};
+  glm::vec3 high{-1e30f};
+
+  void add(const glm::vec3& p, const LatticeFrame& frame) {
+    if (!(std::abs(p.x) < kFarM && std::abs(p.y) < kFarM && std::abs(p.z) < kFarM)) return;
+    const glm::vec3 q = along_axes(p, frame);
+    low = glm::min(low, q);
+    high = glm::max(high, q);
+  }
+};
+
+/// A lattice of no cells, turned to the key light.
+LatticeFrame turned_frame(const LightLatticeDesc& desc, const LightDirections& lights) {
+  LatticeFrame frame;
+  frame.axis[2] = -lights.to_key;
+  frame.axis[0] = any_across(lights.to_key);
+  frame.axis[1] = glm::cross(frame.axis[2], frame.axis[0]);
+  frame.cell_m = std::max(kRoom * desc.extent_m / static_cast<float>(desc.cells), 1e-5f);
+  return frame;
+}
+
+// The lattice is as large as the hair and stands on whole cells, so that a shadow does not shimmer when the
+// hair's extent changes a little.
+void set_size(const LightLatticeDesc& desc, Bounds bounds, LatticeFrame& frame) {
+  if (desc.has_skull) {
+    const glm::vec3 q = along_axes(desc.skull.center_m, frame);
+    bounds.low = glm::min(bounds.low, q - desc.skull.radius_m);
+    bounds.high = glm::max(bounds.high, q + desc.skull.radius_m);
+  }
+  if (!(bounds.low.x <= bounds.high.x)) bounds.low = bounds.high = glm::vec3(0.0f);
+  for (int a = 0; a < 3; ++a) {
+    const float first = std::floor(bounds.low[a] / frame.cell_m) - 1.0f;
+    const float last = std::ceil(bounds.high[a] / frame.cell_m) + 1.0f;
+    const int wanted =
+        (static_cast<int>(std::min(last - first + 1.0f, 4.0f * kMaxLightCellsPerAxis)) + kSizeStep - 1) /
+        kSizeStep * kSizeStep;
+    frame.size[a] = std::min(wanted, kMaxLightCellsPerAxis);
+    // One that is too long keeps its middle.
+    frame.origin_m[a] = frame.cell_m * (first + 0.5f * static_cast<float>(wanted - frame.size[a]));
+  }
+  frame.half_size = frame.size / 2;
 }
 
 }  // namespace
+
+LatticeFrame fit_lattice(const LightLatticeDesc& desc, const LightDirections& lights,
+                         std::span<const glm::vec3> points_m, float room_m) {
+  LatticeFrame frame = turned_frame(desc, lights);
+  Bounds bounds;
+  const size_t every = std::max<size_t>(points_m.size() / kPointsSeen, 1);
+  for (size_t i = 0; i < points_m.size(); i += every) bounds.add(points_m[i], frame);
+  bounds.low -= room_m;
+  bounds.high += room_m;
+  set_size(desc, bounds, frame);
+  return frame;
+}
+
+float strand_depth_per_m(const LatticeFrame& frame, float width_m) {
+  return width_m * kStrandOpacity * kMeanCrossing / (frame.cell_m * frame.cell_m);
+}
 
 uint64_t LightLattice::size_bytes() const {
   uint64_t bytes = key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
@@ -99,16 +151,9 @@ void LightLattice::build(const StrandPoints& points, const LightStrands& strands
   view_.others = others_.data();
 }
 
-// The lattice is as large as the hair and stands on whole cells, so that a shadow does not shimmer when the
-// hair's extent changes a little.
 void LightLattice::fit(const StrandPoints& points, const LightDirections& lights, WorkerPool& workers) {
-  view_.axis[2] = -lights.to_key;
-  view_.axis[0] = any_across(lights.to_key);
-  view_.axis[1] = glm::cross(view_.axis[2], view_.axis[0]);
-  view_.cell_m = std::max(kRoom * desc_.extent_m / static_cast<float>(desc_.cells), 1e-5f);
-  constexpr float kNone = 1e30f;
-  std::vector<glm::vec3> low(workers.size(), glm::vec3(kNone));
-  std::vector<glm::vec3> high(workers.size(), glm::vec3(-kNone));
+  static_cast<LatticeFrame&>(view_) = turned_frame(desc_, lights);
+  std::vector<Bounds> bounds(workers.size());
   const uint32_t strands = points.strand_count();
   workers.run([&](uint32_t worker) {
     const uint32_t begin = static_cast<uint32_t>(uint64_t{strands} * worker / workers.size());
@@ -117,32 +162,14 @@ void LightLattice::fit(const StrandPoints& points, const LightDirections& lights
     for (uint32_t strand = begin; strand < end; ++strand)
       for (uint32_t i = points.first_point[strand]; i < points.first_point[strand + 1]; i += kEvery) {
         const StrandPoint& p = points.point[i];
-        if (!is_number(p)) continue;
-        const glm::vec3 q = along_axes({p.x, p.y, p.z}, view_);
-        low[worker] = glm::min(low[worker], q);
-        high[worker] = glm::max(high[worker], q);
+        bounds[worker].add({p.x, p.y, p.z}, view_);
       }
   });
   for (uint32_t worker = 1; worker < workers.size(); ++worker) {
-    low[0] = glm::min(low[0], low[worker]);
-    high[0] = glm::max(high[0], high[worker]);
+    bounds[0].low = glm::min(bounds[0].low, bounds[worker].low);
+    bounds[0].high = glm::max(bounds[0].high, bounds[worker].high);
   }
-  if (desc_.has_skull) {
-    const glm::vec3 q = along_axes(desc_.skull.center_m, view_);
-    low[0] = glm::min(low[0], q - desc_.skull.radius_m);
-    high[0] = glm::max(high[0], q + desc_.skull.radius_m);
-  }
-  if (!(low[0].x <= high[0].x)) low[0] = high[0] = glm::vec3(0.0f);
-  for (int a = 0; a < 3; ++a) {
-    const float first = std::floor(low[0][a] / view_.cell_m) - 1.0f;
-    const float last = std::ceil(high[0][a] / view_.cell_m) + 1.0f;
-    const int wanted = (static_cast<int>(std::min(last - first + 1.0f, 4.0f * kMaxCells)) + kSizeStep - 1) /
-                       kSizeStep * kSizeStep;
-    view_.size[a] = std::min(wanted, kMaxCells);
-    // One that is too long keeps its middle.
-    view_.origin_m[a] = view_.cell_m * (first + 0.5f * static_cast<float>(wanted - view_.size[a]));
-  }
-  view_.half_size = view_.size / 2;
+  set_size(desc_, bounds[0], view_);
 }
 
 void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers) {
@@ -151,14 +178,13 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
   const uint32_t summing = std::min(workers.size(), kMaxSummingWorkers);
   sums_.resize(summing);
   for (auto& sums : sums_) sums.resize(cells);
-  const float per_m =
-      strands.width_m * kStrandOpacity * kMeanCrossing / (view_.cell_m * view_.cell_m) / kSumUnit;
+  const float per_m = strand_depth_per_m(view_, strands.width_m) / kLightSumUnit;
   const glm::vec3 u = view_.axis[0] / view_.cell_m;
   const glm::vec3 v = view_.axis[1] / view_.cell_m;
   const glm::vec3 w = view_.axis[2] / view_.cell_m;
   const glm::vec3 origin = view_.origin_m / view_.cell_m;
   const float fade = 1.0f / std::max(strands.tip_fade, 1e-3f);
-  const float pieces_per_m = kPiecesPerCell / view_.cell_m;
+  const float pieces_per_m = kLightPiecesPerCell / view_.cell_m;
   std::atomic<uint32_t> next{0};
   workers.run([&](uint32_t worker) {
     if (worker >= summing) return;
@@ -182,7 +208,7 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
           const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
           const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
           const float amount = per_m * length_m * cover * (1.0f + (strands.tip_scale - 1.0f) * along * along);
-          const int pieces = std::clamp(static_cast<int>(length_m * pieces_per_m), 1, kMaxCells);
+          const int pieces = std::clamp(static_cast<int>(length_m * pieces_per_m), 1, kMaxLightCellsPerAxis);
           const float share = 1.0f / static_cast<float>(pieces);
           for (int piece = 0; piece < pieces; ++piece) {
             const float part = (static_cast<float>(piece) + phase) * share;
@@ -223,7 +249,7 @@ void LightLattice::sweep_key(WorkerPool& workers) {
           const int32_t* const from = sums_[other].data() + row;
           for (int x = 0; x < size.x; ++x) sum[x] += from[x];
         }
-        for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kSumUnit;
+        for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kLightSumUnit;
         const float dy = static_cast<float>(y) - center.y;
         const float dz = static_cast<float>(z) - center.z;
         const float off = dy * dy + dz * dz;
@@ -234,7 +260,7 @@ void LightLattice::sweep_key(WorkerPool& workers) {
           const int to = std::min(size.x - 1, static_cast<int>(std::floor(center.x + reach)));
           for (int x = from; x <= to; ++x) {
             const float dx = static_cast<float>(x) - center.x;
-            here[x] += kSkullDepth * std::clamp(outer - std::sqrt(dx * dx + off), 0.0f, 1.0f);
+            here[x] += kSolidDepth * std::clamp(outer - std::sqrt(dx * dx + off), 0.0f, 1.0f);
           }
         }
         uint16_t* const key = key_.data() + row;

@@ -6,10 +6,12 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "common/base/worker_pool.h"
 #include "common/groom/mesh.h"
+#include "common/render/look_lights.h"
 
 namespace strandcast {
 
@@ -23,14 +25,6 @@ struct LightLatticeDesc {
   FittedSphere skull;
 };
 
-/// Unit vectors in head space.
-struct LightDirections {
-  glm::vec3 to_key{0.0f, 1.0f, 0.0f};
-  glm::vec3 to_rim{0.0f, 1.0f, 0.0f};
-  glm::vec3 up{0.0f, 1.0f, 0.0f};
-  bool has_rim = false;
-};
-
 /// Of the strands that are summed.
 struct LightStrands {
   float width_m = 0.0f;  // at the root
@@ -41,14 +35,32 @@ struct LightStrands {
 /// Optical depth per unit of the stored numbers: 16 bits reach 64.
 inline constexpr float kLightDepthUnit = 64.0f / 65536.0f;
 
-/// The stored depths, for look-ups by kernels and by OpenGL.
-struct LightLatticeView {
+/// Where its cells are.
+struct LatticeFrame {
   glm::vec3 axis[3];         // unit: across, across, away from the key light
   glm::vec3 origin_m{0.0f};  // middle of the first cell, along the axes
   float cell_m = 1.0f;
-  glm::ivec3 size{0};                // of the key light's cells
+  glm::ivec3 size{0};       // of the key light's cells
+  glm::ivec3 half_size{0};  // of the other lights' cells, twice as large
+};
+
+/// Round points of head space and so much room beside them; every so many-th of many points is looked at.
+LatticeFrame fit_lattice(const LightLatticeDesc& desc, const LightDirections& lights,
+                         std::span<const glm::vec3> points_m, float room_m);
+
+/// Sums of strands are kept in such parts of a unit of optical depth: 2^31 of them are 32,768 units.
+inline constexpr float kLightSumUnit = 1.0f / 65536.0f;
+/// A segment is summed at one place, one that is longer than two cells at more.
+inline constexpr float kLightPiecesPerCell = 0.5f;
+inline constexpr int kMaxLightCellsPerAxis = 160;
+/// Optical depth of a cell inside the head.
+inline constexpr float kSolidDepth = 3.0f;
+/// Optical depth that a metre of a strand of this width adds to its cell.
+float strand_depth_per_m(const LatticeFrame& frame, float width_m);
+
+/// The stored depths, for look-ups by kernels.
+struct LightLatticeView : LatticeFrame {
   const uint16_t* key = nullptr;     // (size.z x size.y x size.x)
-  glm::ivec3 half_size{0};           // of the other lights' cells, twice as large
   const uint32_t* others = nullptr;  // (half_size): rim in the low 16 bits, sky in the high ones
 };
 

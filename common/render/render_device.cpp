@@ -17,22 +17,32 @@ bool is_renderer_name(const std::string& name) {
 
 namespace {
 
-/// Follows the look to the kind of renderer that draws it.
+/// Whether a look names nothing but what every kind of renderer draws in its own best way.
+bool has_main_methods(const LookDesc& look) {
+  return look.methods == RenderMethodsDesc{};
+}
+
+struct Choice {
+  RendererKind kind;
+  bool is_main;
+  bool operator==(const Choice&) const = default;
+};
+
 class LookRenderer final : public Renderer {
  public:
-  LookRenderer(RenderDevice& device, const SceneAsset& asset, RendererKind kind,
+  LookRenderer(RenderDevice& device, const SceneAsset& asset, const Choice& choice,
                std::unique_ptr<Renderer> renderer)
-      : device_(device), asset_(asset), kind_(kind), renderer_(std::move(renderer)) {}
+      : device_(device), asset_(asset), choice_(choice), renderer_(std::move(renderer)) {}
 
   Status draw(const PosedStrands& strands, const CameraDesc& camera, RenderSize size,
               const DrawTerms& terms) override {
     return renderer_->draw(strands, camera, size, terms);
   }
   Status set_look(const LookDesc& look) override {
-    const RendererKind kind = device_.kind_for(look);
-    if (kind == kind_) return renderer_->set_look(look);
-    ASSIGN_OR_RETURN(renderer_, device_.make_renderer(kind, asset_, look));
-    kind_ = kind;
+    const Choice choice{device_.kind_for(look), has_main_methods(look)};
+    if (choice == choice_) return renderer_->set_look(look);
+    ASSIGN_OR_RETURN(renderer_, device_.make_renderer(choice.kind, asset_, look));
+    choice_ = choice;
     return {};
   }
   Image read_image() override { return renderer_->read_image(); }
@@ -42,7 +52,7 @@ class LookRenderer final : public Renderer {
  private:
   RenderDevice& device_;
   const SceneAsset& asset_;
-  RendererKind kind_;
+  Choice choice_;
   std::unique_ptr<Renderer> renderer_;
 };
 
@@ -81,7 +91,7 @@ Status RenderDevice::make_current() {
 
 RendererKind RenderDevice::kind_for(const LookDesc& look) {
   if (info_.kind == RendererKind::Gl) return RendererKind::Gl;
-  if (look.methods == RenderMethodsDesc{} || has_no_gl_) return RendererKind::Tiles;
+  if (has_main_methods(look) || has_no_gl_) return RendererKind::Tiles;
   if (config_.renderer == "tiles" || context_) return RendererKind::Gl;
   auto context = gl::EglContext::make(config_.gl_device, config_.driver_threads);
   if (context) {
@@ -103,22 +113,22 @@ Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(RendererKind kind,
   if (!context_) {
     ASSIGN_OR_RETURN(context_, gl::EglContext::make(config_.gl_device, config_.driver_threads));
   }
-  return Renderer::make(shaders_, context_->info(), asset, look);
+  return Renderer::make(shaders_, context_->info(), asset, look, path_for(look));
 }
 
 Result<std::unique_ptr<Renderer>> RenderDevice::make_renderer(const SceneAsset& asset, const LookDesc& look) {
   const RendererKind kind = kind_for(look);
   ASSIGN_OR_RETURN(auto renderer, make_renderer(kind, asset, look));
-  if (info_.kind == RendererKind::Gl) return renderer;
-  return std::unique_ptr<Renderer>(std::make_unique<LookRenderer>(*this, asset, kind, std::move(renderer)));
+  return std::unique_ptr<Renderer>(std::make_unique<LookRenderer>(
+      *this, asset, Choice{kind, has_main_methods(look)}, std::move(renderer)));
 }
 
 RendererKind likely_renderer(const std::string& renderer, const LookDesc& look) {
-  return renderer != "gl" && look.methods == RenderMethodsDesc{} ? RendererKind::Tiles : RendererKind::Gl;
+  return renderer != "gl" && has_main_methods(look) ? RendererKind::Tiles : RendererKind::Gl;
 }
 
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind) {
-  if (kind == RendererKind::Gl) return plan_renderer(asset, look, true);
+  if (kind == RendererKind::Gl) return plan_renderer(asset, look, true, path_for(look));
   ASSIGN_OR_RETURN(const auto renderer, make_tile_renderer(asset, look, {1, simd::InstructionSet::Plain}));
   return renderer->passes().report();
 }

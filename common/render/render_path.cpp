@@ -36,13 +36,17 @@ void add_segment_passes(RenderScene& scene, RenderPassList& passes) {
 
 const RenderPath& segment_path() {
   static const RenderPath path{"segments", "camera-facing quads, depth test, a fixed pattern of coverage",
-                               add_segment_passes, std::nullopt};
+                               add_segment_passes, kSamplesPerSide, std::nullopt};
   return path;
+}
+
+const RenderPath& path_for(const LookDesc& look) {
+  return look.methods == RenderMethodsDesc{} ? tile_path() : segment_path();
 }
 
 RenderPath segment_path_with(const RenderMethods& methods) {
   return {"segments", "camera-facing quads, depth test, a fixed pattern of coverage", add_segment_passes,
-          methods};
+          kSamplesPerSide, methods};
 }
 
 }  // namespace strandcast

@@ -17,12 +17,18 @@ struct RenderPath {
   std::string summary;
   /// Adds all passes in the order in which they run; the last one writes scene.picture.
   void (*add_passes)(RenderScene& scene, RenderPassList& passes);
+  /// Samples per pixel side that RenderTurn::view counts.
+  uint32_t view_samples = 1;
   /// For RenderScene::methods, before passes are added; none: those of the look.
   std::optional<RenderMethods> methods = std::nullopt;
 };
 
+/// Strands as exact coverage, blended in tiles by compute kernels: the main methods.
+const RenderPath& tile_path();
 /// Segments of strands as camera-facing quads with a depth test and a fixed pattern of coverage.
 const RenderPath& segment_path();
+/// What draws a look: tiles where it names no other methods than the main ones.
+const RenderPath& path_for(const LookDesc& look);
 /// The same quads with other methods, which go together.
 RenderPath segment_path_with(const RenderMethods& methods);
 

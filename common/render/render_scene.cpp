@@ -1,6 +1,7 @@
 #include "common/render/render_scene.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/render/passes/expand_pass.h"
 
@@ -22,6 +23,10 @@ constexpr float kSkullShrink = 0.93f;
 
 RestFacts measure_rest(const SceneAsset& asset) {
   RestFacts facts;
+  // Hair whose shape is no number is as large as any.
+  constexpr float kUsualM = 0.3f;
+  constexpr float kFarM = 1e4f;
+  facts.extent_m = facts.mean_length_m = kUsualM;
   if (asset.strand_count == 0) return facts;
   double length_m = 0.0;
   glm::vec3 low = asset.rest_position_m.front();
@@ -35,6 +40,8 @@ RestFacts measure_rest(const SceneAsset& asset) {
   }
   facts.mean_length_m = static_cast<float>(length_m / asset.strand_count);
   facts.extent_m = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  if (!(facts.extent_m > 0.0f && facts.extent_m < kFarM)) facts.extent_m = kUsualM;
+  if (!(facts.mean_length_m >= 0.0f && facts.mean_length_m < kFarM)) facts.mean_length_m = kUsualM;
   return facts;
 }
 
@@ -63,7 +70,7 @@ LightVolumeDesc describe_light(const SceneAsset& asset, const LookDesc& look, co
     const std::vector<glm::vec3> roots_m(asset.rest_position_m.begin(),
                                          asset.rest_position_m.begin() + asset.strand_count);
     desc.skull = fit_sphere(roots_m);
-    desc.has_skull = is_skull_of(desc.skull, asset.head);
+    desc.has_skull = std::isfinite(desc.skull.radius_m) && is_skull_of(desc.skull, asset.head);
     desc.skull.radius_m *= kSkullShrink;
   }
   return desc;

@@ -109,7 +109,7 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
   RETURN_IF_ERROR(check_draw(strands, position_count_, size, terms));
   const glm::uvec2 pixels(size.width, size.height);
   ASSIGN_OR_RETURN(const View view,
-                   make_view(camera, strands.world_from_head.rotation, pixels * kSamplesPerSide));
+                   make_view(camera, strands.world_from_head.rotation, pixels * path_.view_samples));
   RenderTurn turn(strands, view, pixels, terms);
   RETURN_IF_ERROR(passes_->list.run(turn, &timer_));
   profile_ = {passes_->list.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};

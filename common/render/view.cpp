@@ -50,6 +50,7 @@ Result<View> make_view(const CameraDesc& camera, const glm::dquat& world_from_he
   view.target_px = glm::vec2(target_px);
   view.focal_px = static_cast<float>(0.5 * target_px.y / std::tan(0.5 * camera.fov_y_rad));
   view.near_m = static_cast<float>(near_m);
+  view.far_m = static_cast<float>(distance_m + kFarM);
   view.target_distance_m = static_cast<float>(distance_m);
   return view;
 }

@@ -18,6 +18,7 @@ struct View {
   glm::vec2 target_px{1.0f};       // drawn size
   float focal_px = 1.0f;           // pixels per metre at 1 m distance
   float near_m = 0.01f;
+  float far_m = 50.0f;
   float target_distance_m = 1.0f;  // from the eye to the point looked at
 };
 

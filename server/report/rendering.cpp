@@ -95,6 +95,11 @@ void add_methods(const MethodTable<Method>& table, const char* kind, size_t grou
   }
 }
 
+/// Whoever names a method is drawn as quads.
+void as_quads(LookDesc& look) {
+  look.methods.transparency = "hashed";
+}
+
 enum GroupIndex : size_t { kWhole, kShadows, kTransparencies, kEdges, kShadings, kScatterings };
 
 }  // namespace
@@ -108,8 +113,8 @@ const std::vector<RenderingGroup>& rendering_groups() {
        kTruthFactor},
       {"shadow", "deep shadow maps: every strand on every ray, in double", RendererKind::Gl,
        [](LookDesc& look) { look.methods.shadow = "deep_shadow"; }, 1},
-      {"transparency", "quads with 64 samples per pixel", RendererKind::Gl, {}, kTruthFactor},
-      {"edges", "quads with 64 samples per pixel", RendererKind::Gl, {}, kTruthFactor},
+      {"transparency", "quads with 64 samples per pixel", RendererKind::Gl, as_quads, kTruthFactor},
+      {"edges", "quads with 64 samples per pixel", RendererKind::Gl, as_quads, kTruthFactor},
       {"shading", "the rough fibre that conserves energy, per fragment", RendererKind::Gl,
        [](LookDesc& look) {
          look.methods.shading = "chiang";
@@ -134,6 +139,9 @@ const std::vector<RenderingRow>& rendering_rows() {
          kWhole,
          RendererKind::Tiles,
          {}},
+        {"gl tiles", "the same by compute kernels", kWhole, RendererKind::Gl, {}},
+        {"gl quads", "camera-facing quads, a pattern of samples, no style", kWhole, RendererKind::Gl,
+         as_quads},
         {"tiles, 1 segment per gap", "straight between simulated vertices", kWhole, RendererKind::Tiles,
          [](LookDesc& look) { look.segments = 1; }},
         {"tiles, 2 segments per gap", "", kWhole, RendererKind::Tiles,

@@ -15,3 +15,9 @@ vec3 srgb_from_linear(vec3 linear) {
   vec3 high = 1.055 * pow(max(linear, 0.0), vec3(1.0 / 2.4)) - 0.055;
   return mix(high, low, lessThanEqual(linear, vec3(0.0031308)));
 }
+
+// Of the background, linear: lighter at the top of the picture and darker at its bottom. `height`: 0 bottom .. 1 top.
+vec3 background_light(vec3 middle, float height) {
+  const float kGradient = 0.35;
+  return middle * (1.0 + kGradient * (2.0 * height - 1.0));
+}

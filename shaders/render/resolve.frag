@@ -17,9 +17,6 @@ uniform vec3 u_background;     // linear, at middle height
 
 layout(location = 0) out vec4 out_color;
 
-// The background is lighter at the top of the picture and darker at its bottom by this share.
-const float kGradient = 0.35;
-
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   ivec2 from_bottom = ivec2(pixel.x, u_target_height - 1 - pixel.y);
@@ -39,6 +36,5 @@ void main() {
   float drawn = sum.a * share;
   vec3 scene = drawn > 0.0 ? tone_map(sum.rgb / sum.a) : vec3(0.0);
   float height = (float(from_bottom.y) + 0.5) / float(u_target_height);
-  vec3 background = u_background * (1.0 + kGradient * (2.0 * height - 1.0));
-  out_color = vec4(srgb_from_linear(mix(background, scene, drawn)), 1.0);
+  out_color = vec4(srgb_from_linear(mix(background_light(u_background, height), scene, drawn)), 1.0);
 }

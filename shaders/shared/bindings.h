@@ -40,6 +40,38 @@ const uint kBindingListNode = 4u;
 const uint kBindingListCount = 5u;
 const uint kBindingDepthKeys = 6u;
 const uint kBindingDensity = 7u;
+// Of its tiles; beside them at most kBindingDensity and what is named above.
+const uint kBindingTilePoints = 0u;
+const uint kBindingTileStrands = 1u;
+const uint kBindingTileHalved = 2u;
+const uint kBindingTileSwept = 3u;
+const uint kBindingTileCounts = 0u;
+const uint kBindingTileFirst = 1u;
+const uint kBindingTileTotals = 2u;
+const uint kBindingTilePairs = 3u;
+const uint kBindingTileGrouped = 4u;
+const uint kBindingTileFull = 5u;
+
+// Uniform block of the renderer.
+const uint kBindingTileFrame = 0u;
+
+// Texture units of the tiles' buffer textures.
+const uint kUnitTilePoints = 0u;
+const uint kUnitTileStrands = 1u;
+const uint kUnitTileKeys = 2u;
+const uint kUnitTileTriangles = 3u;
+const uint kUnitTileOrder = 4u;
+const uint kUnitTileFirst = 5u;
+const uint kUnitTilePairs = 11u;
+const uint kUnitTileKeyDepth = 6u;
+const uint kUnitTileRimDepth = 7u;
+const uint kUnitTileSkyDepth = 8u;
+const uint kUnitTileHeadSkin = 9u;
+const uint kUnitTileHeadDepth = 10u;
+
+// Image units.
+const uint kImageTileDepth = 0u;
+const uint kImageTilePicture = 1u;
 
 #ifdef __cplusplus
 }  // namespace strandcast::shader

@@ -152,9 +152,12 @@ TEST_F(RenderCostTest, TheListsBytesAreWhatOpenGlHolds) {
   for (const bool has_head : {false, true})
     for (const uint32_t followers : {0u, 4u}) {
       if (has_head) asset.head = tetrahedron();
-      const auto renderer = drawn(asset, look_with(followers));
-      ASSERT_TRUE(renderer);
-      EXPECT_EQ(added_bytes(), renderer->passes().live_bytes()) << has_head << ' ' << followers;
+      for (const RenderPath* path : {&segment_path(), &tile_path()}) {
+        const auto renderer = drawn(asset, look_with(followers), *path);
+        ASSERT_TRUE(renderer);
+        EXPECT_EQ(added_bytes(), renderer->passes().live_bytes())
+            << path->name << ' ' << has_head << ' ' << followers;
+      }
     }
 }
 

@@ -1,6 +1,7 @@
 // A look that changes on a renderer: the pixels are those of one that was made with it.
 #include <epoxy/gl.h>
 
+#include "common/render/render_path.h"
 #include "common/render/renderer.h"
 #include "tests/support/gl_fixture.h"
 #include "tests/support/look_variants.h"
@@ -12,12 +13,13 @@ namespace {
 
 constexpr RenderSize kSize{96, 72};
 
-class SetLookTest : public GlTest {
+/// With quads and with tiles.
+class SetLookTest : public GlTest, public testing::WithParamInterface<const RenderPath*> {
  protected:
   void TearDown() override { EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR)); }
 
   std::unique_ptr<Renderer> make(const LookDesc& look) {
-    auto made = Renderer::make(gl::ShaderLibrary(), context_->info(), asset_, look);
+    auto made = Renderer::make(gl::ShaderLibrary(), context_->info(), asset_, look, *path_);
     EXPECT_TRUE(made) << made.error().to_string();
     return made ? std::move(*made) : nullptr;
   }
@@ -28,17 +30,29 @@ class SetLookTest : public GlTest {
     return renderer.read_image();
   }
 
+  /// A look where no field that this path draws has its default.
+  LookDesc sample() const {
+    LookDesc look = sample_look();
+    if (path_ == &tile_path()) look.methods = {};
+    return look;
+  }
+
+  const RenderPath* const path_ = GetParam();
   const SceneAsset asset_ = sample_asset(60, 8);
 };
 
-TEST_F(SetLookTest, EveryFieldReachesThePixelsAsIfTheRendererWereMadeWithIt) {
+INSTANTIATE_TEST_SUITE_P(Paths, SetLookTest, testing::Values(&segment_path(), &tile_path()),
+                         [](const auto& path) { return path.param->name; });
+
+TEST_P(SetLookTest, EveryFieldReachesThePixelsAsIfTheRendererWereMadeWithIt) {
   const LookDesc base;
   const auto renderer = make(base);
   ASSERT_NE(renderer, nullptr);
   const Image before = draw(*renderer);
   size_t seen = 0;
-  for (const auto& [path, look] : test::looks_one_field_apart(base, sample_look())) {
+  for (const auto& [path, look] : test::looks_one_field_apart(base, sample())) {
     SCOPED_TRACE(path);
+    if (path.starts_with("methods") && path_ == &tile_path()) continue;
     ASSERT_NE(look, base) << "the sample has the default here";
     ASSERT_TRUE(renderer->set_look(look));
     const Image changed = draw(*renderer);
@@ -52,20 +66,20 @@ TEST_F(SetLookTest, EveryFieldReachesThePixelsAsIfTheRendererWereMadeWithIt) {
   EXPECT_GE(seen, 10u) << "most of what is told above would hold for a renderer that ignores every look";
 }
 
-TEST_F(SetLookTest, ALookWithoutAnyDefaultAndBack) {
+TEST_P(SetLookTest, ALookWithoutAnyDefaultAndBack) {
   const auto renderer = make({});
   ASSERT_NE(renderer, nullptr);
   const Image before = draw(*renderer);
-  ASSERT_TRUE(renderer->set_look(sample_look()));
+  ASSERT_TRUE(renderer->set_look(sample()));
   const Image changed = draw(*renderer);
   EXPECT_FALSE(changed == before);
-  EXPECT_TRUE(changed == draw(*make(sample_look())));
+  EXPECT_TRUE(changed == draw(*make(sample())));
   ASSERT_TRUE(renderer->set_look({}));
   EXPECT_TRUE(draw(*renderer) == before);
 }
 
 // What the passes are made for is allocated for the newest look alone; colours allocate nothing.
-TEST_F(SetLookTest, HoldsWhatTheNewestLookNeeds) {
+TEST_P(SetLookTest, HoldsWhatTheNewestLookNeeds) {
   LookDesc look;
   const auto renderer = make(look);
   ASSERT_NE(renderer, nullptr);

@@ -1,7 +1,7 @@
 // render_preview: draws a scene's hair at rest into a PNG, without server or simulation. For looking at the
 // renderer.
 //   render_preview OUT.png [--scene FILE] [--set path=value]... [--size WxH] [--repeat N] [--turn DEGREES]
-//   [--shaders DIR] [--renderer gl|tiles] [--threads N]; methods by --set look.methods.shadow=...
+//   [--shaders DIR] [--renderer tiles|gl|quads] [--threads N]; methods by --set look.methods.shadow=...
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -86,9 +86,10 @@ Status run(int argc, char** argv) {
   std::unique_ptr<Renderer> renderer;
   std::string device =
       fmt::format("tiles, {} threads, {}", options.tiles.threads, to_string(options.tiles.set));
-  if (options.renderer == "gl") {
+  if (options.renderer != "tiles") {
     ASSIGN_OR_RETURN(context, gl::EglContext::make("auto"));
-    ASSIGN_OR_RETURN(renderer, Renderer::make(shaders, context->info(), asset, scene.look));
+    const RenderPath& path = options.renderer == "quads" ? segment_path() : path_for(scene.look);
+    ASSIGN_OR_RETURN(renderer, Renderer::make(shaders, context->info(), asset, scene.look, path));
     device = context->info().renderer;
   } else {
     ASSIGN_OR_RETURN(renderer, make_tile_renderer(asset, scene.look, options.tiles));

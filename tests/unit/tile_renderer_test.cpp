@@ -9,28 +9,14 @@
 #include <numeric>
 
 #include "common/base/hash.h"
-#include "common/groom/groom_asset.h"
-#include "common/groom/mesh.h"
-#include "common/groom/procedural.h"
 #include "common/pictures/picture_error.h"
 #include "common/render/tiles/half_float.h"
 #include "common/render/tiles/tile_raster.h"
+#include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
 
 namespace strandcast {
 namespace {
-
-constexpr float kHeadRadiusM = 0.095f;
-
-SceneAsset grown(uint32_t strands = 300) {
-  ProceduralGroomOptions options;
-  options.strand_count = strands;
-  options.vertex_count = 12;
-  options.length_m = 0.2f;
-  auto groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadRadiusM, 1000), options);
-  EXPECT_TRUE(groom);
-  return make_scene_asset(*groom, make_head(kHeadRadiusM));
-}
 
 Image drawn(const SceneAsset& asset, const LookDesc& look,
             const TileOptions& options = {1, simd::widest_set()}, RenderSize size = {160, 120},
@@ -48,7 +34,7 @@ Image drawn(const SceneAsset& asset, const LookDesc& look,
 }
 
 TEST(TileRenderer, ThreadsAndInstructionSetsDoNotShow) {
-  const SceneAsset asset = grown();
+  const SceneAsset asset = grown_hair();
   // A look where no field has its default.
   const Image first = drawn(asset, sample_look(), {1, simd::InstructionSet::Plain});
   for (const uint32_t threads : {1u, 2u, 4u})
@@ -58,7 +44,7 @@ TEST(TileRenderer, ThreadsAndInstructionSetsDoNotShow) {
 }
 
 TEST(TileRenderer, TenPicturesAreOne) {
-  const SceneAsset asset = grown();
+  const SceneAsset asset = grown_hair();
   auto renderer = make_tile_renderer(asset, {}, {3, simd::widest_set()});
   ASSERT_TRUE(renderer);
   std::vector<uint8_t> first;
@@ -74,7 +60,7 @@ TEST(TileRenderer, TenPicturesAreOne) {
 
 // What the codec's bound does to a picture: every vertex a tenth of a millimetre off.
 TEST(TileRenderer, TheDefaultBoundHardlyShows) {
-  const SceneAsset asset = grown(1000);
+  const SceneAsset asset = grown_hair(1000);
   auto renderer = make_tile_renderer(asset, {}, {2, simd::widest_set()});
   ASSERT_TRUE(renderer);
   const RenderSize size{640, 360};
@@ -247,7 +233,7 @@ TEST(TileRaster, LayersBlendFrontToBackWhateverTheirOrder) {
 TEST(TileRenderer, ImpossibleHairGivesAFinitePicture) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float inf = std::numeric_limits<float>::infinity();
-  const SceneAsset whole = grown(40);
+  const SceneAsset whole = grown_hair(40);
   const auto with = [&](auto change) {
     SceneAsset asset = whole;
     change(asset);
@@ -277,7 +263,7 @@ TEST(TileRenderer, ImpossibleHairGivesAFinitePicture) {
 }
 
 TEST(TileRenderer, ExtremeLooksAndViewsGiveAFinitePicture) {
-  const SceneAsset asset = grown(60);
+  const SceneAsset asset = grown_hair(60);
   LookDesc look;
   look.strand_radius_m = 0.01f;
   look.followers = 64;
@@ -297,7 +283,7 @@ TEST(TileRenderer, ExtremeLooksAndViewsGiveAFinitePicture) {
 }
 
 TEST(TileRenderer, RefusesWhatDoesNotFit) {
-  SceneAsset asset = grown(40);
+  SceneAsset asset = grown_hair(40);
   auto renderer = make_tile_renderer(asset, {});
   ASSERT_TRUE(renderer);
   EXPECT_FALSE((*renderer)->draw({{}, {}}, {}, {64, 64}));

@@ -29,7 +29,8 @@ Status SceneTarget::resize(glm::uvec2 picture_px) {
   framebuffer_ = {};
   color_ = {};
   depth_ = {};
-  color_ = gl::Texture("scene color", GL_RGBA16F, size.x, size.y, layout_.multisamples);
+  color_ = gl::Texture("scene color", layout_.color_format == 0 ? GL_RGBA16F : layout_.color_format, size.x,
+                       size.y, layout_.multisamples);
   depth_ = gl::Texture("scene depth", GL_DEPTH_COMPONENT32F, size.x, size.y, layout_.multisamples);
   const std::array<const gl::Texture*, 1> colors{&color_};
   ASSIGN_OR_RETURN(framebuffer_, gl::Framebuffer::make("scene", colors, &depth_));

@@ -20,6 +20,7 @@ inline constexpr uint32_t kSamplesPerSide = 2;
 struct SampleLayout {
   uint32_t per_side = kSamplesPerSide;
   uint32_t multisamples = 1;
+  uint32_t color_format = 0;  // 0: linear RGB with coverage, of half floats
 };
 
 /// Nothing switched on but writing to all of a target of this size. Whoever else uses the context may leave
@@ -81,6 +82,7 @@ class PictureTarget final : public gl::Resource {
   void begin() const;
   /// Top row first.
   Image read_image() const;
+  const gl::Texture& color() const { return color_; }
   glm::uvec2 size_px() const { return size_px_; }
   uint64_t size_bytes() const override { return color_.size_bytes(); }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "common/render/look_lights.h"
+
 namespace strandcast {
 
 std::unique_ptr<RenderPass> make_light_pass(RenderScene& scene);
@@ -53,10 +55,7 @@ float shadow_margin_m(const RenderScene& scene) {
 }
 
 glm::vec3 to_light_in_head(const RenderScene& scene, const RenderTurn& turn) {
-  const glm::mat3 head_from_world(glm::transpose(glm::mat3_cast(turn.strands.world_from_head.rotation)));
-  const float length = glm::length(scene.look.light_direction);
-  return glm::normalize(head_from_world *
-                        (length > 0.0f ? -scene.look.light_direction / length : glm::vec3(0.0f, 1.0f, 0.0f)));
+  return to_light_in_head(scene.look.light_direction, turn.strands.world_from_head.rotation);
 }
 
 }  // namespace strandcast

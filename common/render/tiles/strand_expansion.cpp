@@ -13,15 +13,6 @@ constexpr uint32_t kFrontSamples = 1;
 constexpr uint32_t kBackSamples = 2 * simd::kLanes;
 constexpr size_t kStrandsPerRange = 32;
 constexpr size_t kKeysPerRange = 64;
-// Hair of one triangle falls to different sides when, at this share of the length, the ways that its strands
-// have gone from their roots point further apart than this.
-constexpr float kPartedFrom = 0.5f;
-constexpr float kPartedCosine = 0.5f;
-
-struct StyleNumbers {
-  float clump, locks, spread_m, wave_m, wave_count, frizz_m, frizz_count, stray_share, stray_spread,
-      length_spread, short_share;
-};
 
 struct ExpandArguments {
   const float* samples;
@@ -162,46 +153,18 @@ STRANDCAST_LANES void expand_points_lanes(const ExpandArguments& a) {
 }
 STRANDCAST_KERNEL(expand_points, ExpandArguments);
 
-/// Whether the hair of a triangle falls to different sides at rest.
-bool is_parted(const SceneAsset& asset, const RootTriangle& triangle) {
-  const auto vertex =
-      static_cast<size_t>(std::lround(kPartedFrom * static_cast<float>(asset.vertex_count - 1)));
-  glm::vec3 way[3];
-  for (int k = 0; k < 3; ++k) {
-    way[k] =
-        asset.rest_position_m[vertex * asset.strand_count + triangle[k]] - asset.rest_position_m[triangle[k]];
-    const float length = glm::length(way[k]);
-    if (!(length > 0.0f)) return false;
-    way[k] /= length;
-  }
-  return std::min({glm::dot(way[0], way[1]), glm::dot(way[1], way[2]), glm::dot(way[2], way[0])}) <
-         kPartedCosine;
-}
-
 }  // namespace
 
 StrandExpansion::StrandExpansion(const SceneAsset& asset, float mean_length_m)
     : key_count_(asset.strand_count),
       vertex_count_(asset.vertex_count),
       mean_length_m_(mean_length_m),
-      triangle_(asset.triangle) {
-  is_parted_.reserve(triangle_.size());
-  for (const RootTriangle& triangle : triangle_) is_parted_.push_back(is_parted(asset, triangle) ? 1 : 0);
-}
+      triangle_(asset.triangle),
+      is_parted_(parted_triangles(asset)) {}
 
 void StrandExpansion::set_look(const LookDesc& look) {
-  style_ = look.style;
-  // Water draws strands together and lays the small waves.
-  const float dry = 1.0f - look.shading.wetness;
-  style_.clump = std::max(style_.clump, look.shading.wetness);
-  style_.frizz_m *= dry;
-  style_.spread *= 0.3f + 0.7f * dry;
-  style_.stray_share *= dry;
+  style_ = style_numbers(look, mean_length_m_);
   max_followers_ = triangle_.empty() ? 0 : look.followers;
-}
-
-uint32_t StrandExpansion::strand_count(uint32_t followers) const {
-  return key_count_ + static_cast<uint32_t>(triangle_.size()) * followers;
 }
 
 uint64_t StrandExpansion::size_bytes() const {
@@ -263,17 +226,7 @@ void StrandExpansion::expand(const std::vector<glm::vec3>& position_m, const Str
   arguments.followers = std::max(detail.followers, 1u);
   arguments.triangle = triangle_.data();
   arguments.is_parted = is_parted_.data();
-  arguments.style = {style_.clump,
-                     static_cast<float>(style_.locks),
-                     style_.spread * mean_length_m_,
-                     style_.wave_m,
-                     style_.wave_count,
-                     style_.frizz_m,
-                     style_.frizz_count,
-                     style_.stray_share,
-                     style_.stray_spread,
-                     style_.length_spread,
-                     style_.short_share};
+  arguments.style = style_;
   points.first_point.resize(size_t{detail.strand_count} + 1);
   points.first_point[0] = 0;
   points.index.resize(detail.strand_count);

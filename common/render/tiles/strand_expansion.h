@@ -9,18 +9,13 @@
 #include <vector>
 
 #include "common/base/worker_pool.h"
+#include "common/render/strand_detail.h"
+#include "common/render/strand_style.h"
 #include "common/render/tiles/tile_frame.h"
 #include "common/simd/variants.h"
 #include "common/strands/scene_asset.h"
 
 namespace strandcast {
-
-/// How finely one picture is drawn.
-struct StrandDetail {
-  uint32_t segments_per_gap = 1;  // >= 1
-  uint32_t followers = 0;         // per triangle, at most those of the look
-  uint32_t strand_count = 0;      // the first of keys and followers
-};
 
 class StrandExpansion {
  public:
@@ -30,7 +25,6 @@ class StrandExpansion {
   /// Lengths and numbers of the look's style.
   void set_look(const LookDesc& look);
   uint32_t key_count() const { return key_count_; }
-  uint32_t strand_count(uint32_t followers) const;
   /// `position_m`: (vertex_count x key_count) vertex-major, head space.
   void expand(const std::vector<glm::vec3>& position_m, const StrandDetail& detail, WorkerPool& workers,
               simd::InstructionSet set, StrandPoints& points);
@@ -41,7 +35,7 @@ class StrandExpansion {
   uint32_t vertex_count_;
   float mean_length_m_;
   uint32_t max_followers_ = 0;
-  StrandStyleDesc style_;
+  StyleNumbers style_;
   // Per root triangle: its keys, whose hair falls to different sides where the first bit of `is_parted` says
   // so.
   std::vector<RootTriangle> triangle_;

@@ -1,10 +1,7 @@
 #include "common/render/tiles/strand_shading.h"
 
-#include <glm/gtc/constants.hpp>
-
 #include "common/render/passes/expand_pass.h"
 #include "common/render/tiles/light_lookup.h"
-#include "common/scene/hair_color.h"
 #include "common/strands/strand_limits.h"
 
 namespace strandcast {
@@ -137,30 +134,6 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
 STRANDCAST_KERNEL(shade_strand_points, ShadeArguments);
 
 }  // namespace
-
-ShadingNumbers shading_numbers(const LookDesc& look) {
-  const HairColors colors = colors_of(look);
-  const HairShadingDesc& s = look.shading;
-  return {colors.root,
-          colors.tip,
-          s.diffuse,
-          s.scatter,
-          s.highlight,
-          s.transmission,
-          s.second_highlight,
-          glm::radians(s.highlight_width_deg),
-          glm::radians(s.cuticle_deg),
-          glm::radians(s.cuticle_spread_deg),
-          s.root_darkening,
-          s.strand_variation,
-          s.lock_variation,
-          s.warmth_variation,
-          s.wetness,
-          look.exposure * look.light_color,
-          look.exposure * look.rim_color,
-          look.skin_color,
-          look.exposure * look.ambient};
-}
 
 void shade_points(const ShadeInput& input, WorkerPool& workers, simd::InstructionSet set,
                   StrandPoints& points) {

@@ -4,24 +4,13 @@
 
 #include "common/base/worker_pool.h"
 #include "common/render/light_lattice.h"
+#include "common/render/look_lights.h"
 #include "common/render/tiles/tile_frame.h"
 #include "common/render/view.h"
 #include "common/scene/scene_desc.h"
 #include "common/simd/variants.h"
 
 namespace strandcast {
-
-/// The look in the numbers of shaders/lib/hair_light.glsl.
-struct ShadingNumbers {
-  glm::vec3 root_color, tip_color;
-  float diffuse, scatter, highlight, transmission, second_highlight;
-  float width_rad, tilt_rad, tilt_spread_rad;
-  float root_darkening, strand_variation, lock_variation, warmth_variation, wetness;
-  glm::vec3 key_color, rim_color;
-  glm::vec3 skin_color;
-  float ambient;
-};
-ShadingNumbers shading_numbers(const LookDesc& look);
 
 struct ShadeInput {
   ShadingNumbers look;

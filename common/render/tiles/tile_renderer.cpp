@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/render/light_lattice.h"
-#include "common/render/passes/expand_pass.h"
 #include "common/render/render_scene.h"
 #include "common/render/scalp_cover.h"
 #include "common/render/tiles/strand_expansion.h"
@@ -18,14 +17,8 @@
 namespace strandcast {
 namespace {
 
-// What is drawn follows from its size on the screen: bends shorter than this are not seen, and for strands
-// thinner than about this stand fewer and wider ones.
-constexpr float kSegmentPx = 10.0f;
-constexpr float kThinnestPx = 0.45f;
 // Points of all drawn strands at most: 256 MiB. More, and fewer strands are drawn.
 constexpr uint64_t kMaxPoints = uint64_t{8} << 20;
-// A root tints the skin this far around it, of the hair's extent.
-constexpr float kCoverReach = 0.025f;
 constexpr float kShadowLiftCells = 1.5f;
 
 /// Memory of an object that a pass writes, as it is now.
@@ -44,33 +37,23 @@ struct HeldImage {
   uint64_t size_bytes() const { return image.rgba.capacity(); }
 };
 
-/// Hair whose shape is no number is as large as any.
-RestFacts usable(RestFacts rest) {
-  constexpr float kUsualM = 0.3f;
-  constexpr float kFarM = 1e4f;
-  if (!(rest.extent_m > 0.0f && rest.extent_m < kFarM)) rest.extent_m = kUsualM;
-  if (!(rest.mean_length_m >= 0.0f && rest.mean_length_m < kFarM)) rest.mean_length_m = kUsualM;
-  return rest;
-}
-
 /// All that the passes of a picture share.
 struct TileState {
   TileState(const SceneAsset& asset, const LookDesc& wanted, const RenderScene& facts,
             const TileOptions& options)
       : look(wanted),
-        rest(usable(facts.rest)),
-        vertex_count(asset.vertex_count),
-        is_finest(options.is_finest),
+        detail_facts(strandcast::detail_facts(facts)),
         workers(options.threads),
         set(options.set),
-        expansion(asset, rest.mean_length_m),
-        lattice({rest.extent_m, options.light_cells,
-                 facts.light_volume.has_skull && std::isfinite(facts.light_volume.skull.radius_m),
+        expansion(asset, facts.rest.mean_length_m),
+        lattice({facts.rest.extent_m, options.light_cells, facts.light_volume.has_skull,
                  facts.light_volume.skull}),
         mesh(asset.head),
-        cover(scalp_cover(asset, rest.extent_m * kCoverReach)),
+        cover(scalp_cover(asset, facts.rest.extent_m * kCoverReach)),
         scratch(workers.size()),
         srgb(make_srgb_table()) {
+    detail_facts.max_points = kMaxPoints;
+    detail_facts.is_finest = options.is_finest;
     expansion.set_look(look);
     if (!mesh.triangle.empty()) {
       head.mesh = &mesh;
@@ -79,9 +62,7 @@ struct TileState {
   }
 
   LookDesc look;
-  RestFacts rest;
-  uint32_t vertex_count;
-  bool is_finest;
+  DetailFacts detail_facts;
   WorkerPool workers;
   simd::InstructionSet set;
   StrandExpansion expansion;
@@ -101,58 +82,6 @@ struct TileState {
   BinCounts counts;
 };
 
-/// Directions and colours of the look, in head space.
-LightDirections light_directions(const LookDesc& look, const PosedStrands& strands, const View& view) {
-  const glm::mat3 head_from_world(glm::transpose(glm::mat3_cast(strands.world_from_head.rotation)));
-  const auto to_light = [&](const glm::vec3& direction) {
-    const float length = glm::length(direction);
-    return glm::normalize(head_from_world *
-                          (length > 0.0f ? -direction / length : glm::vec3(0.0f, 1.0f, 0.0f)));
-  };
-  return {to_light(look.light_direction), to_light(look.rim_direction), view.up,
-          look.rim_color != glm::vec3(0.0f)};
-}
-
-StrandDetail choose_detail(const TileState& state, const View& view, const DrawTerms& terms) {
-  StrandDetail detail;
-  const uint32_t max_followers =
-      state.expansion.strand_count(1) > state.expansion.key_count() ? state.look.followers : 0;
-  const float px_per_m = view.focal_px / view.target_distance_m;
-  const float gap_px =
-      state.rest.mean_length_m / static_cast<float>(std::max(state.vertex_count, 2u) - 1) * px_per_m;
-  const float width_px = 2.0f * state.look.strand_radius_m * px_per_m;
-  // A size that is not a number takes the least detail.
-  const auto at_most = [](float wanted, uint32_t limit) {
-    return wanted > 1.0f ? static_cast<uint32_t>(std::min(std::ceil(wanted), static_cast<float>(limit)))
-                         : std::min(1u, limit);
-  };
-  detail.segments_per_gap = at_most(gap_px / kSegmentPx, state.look.segments);
-  const float followers = std::floor(static_cast<float>(max_followers) * width_px / kThinnestPx + 0.5f);
-  detail.followers = at_most(followers, max_followers);
-  if (state.is_finest) {
-    detail.segments_per_gap = kMaxSegmentsPerGap;
-    detail.followers = max_followers;
-  }
-  detail.strand_count = state.expansion.strand_count(detail.followers);
-  if (terms.strand_share < 1.0f) {
-    // Followers of all triangles first, then key strands: any first so many of those cover the head evenly.
-    const auto wanted = std::max(
-        1u, static_cast<uint32_t>(std::ceil(terms.strand_share * static_cast<float>(detail.strand_count))));
-    while (detail.followers > 0 && state.expansion.strand_count(detail.followers) > wanted)
-      --detail.followers;
-    detail.strand_count = std::min(state.expansion.strand_count(detail.followers), wanted);
-  }
-  const uint64_t points_per_strand =
-      uint64_t{std::max(state.vertex_count, 2u) - 1} * detail.segments_per_gap + 2;
-  while (detail.followers > 0 && detail.strand_count * points_per_strand > kMaxPoints)
-    detail.strand_count = state.expansion.strand_count(--detail.followers);
-  while (detail.segments_per_gap > 1 && detail.strand_count * points_per_strand > kMaxPoints * 2)
-    detail.segments_per_gap = 1;
-  detail.strand_count =
-      static_cast<uint32_t>(std::min<uint64_t>(detail.strand_count, kMaxPoints / points_per_strand));
-  return detail;
-}
-
 /// A pass that is one function.
 class TilePass final : public RenderPass {
  public:
@@ -168,7 +97,7 @@ class TilePass final : public RenderPass {
 
 Status expand(TileState& state, RenderTurn& turn) {
   if (state.expansion.key_count() == 0) return {};
-  state.detail = choose_detail(state, turn.view, turn.terms);
+  state.detail = choose_detail(state.detail_facts, state.look, turn.view, turn.terms);
   state.expansion.expand(turn.strands.position_m, state.detail, state.workers, state.set, state.points);
   turn.drawn_strands = state.detail.strand_count;
   return {};
@@ -176,12 +105,10 @@ Status expand(TileState& state, RenderTurn& turn) {
 
 Status light(TileState& state, RenderTurn& turn) {
   const uint32_t drawn = std::max(state.points.strand_count(), 1u);
-  const uint32_t all = state.expansion.strand_count(state.look.followers);
-  state.shade.width_m =
-      2.0f * state.look.strand_radius_m * static_cast<float>(all) / static_cast<float>(drawn);
+  state.shade.width_m = drawn_width_m(state.detail_facts, state.look, drawn);
   state.shade.tip_scale = state.look.tip_scale;
   state.shade.tip_fade = state.look.style.tip_fade;
-  state.shade.lights = light_directions(state.look, turn.strands, turn.view);
+  state.shade.lights = light_directions(state.look, turn.strands.world_from_head.rotation, turn.view.up);
   state.lattice.build(state.points, {state.shade.width_m, state.shade.tip_scale, state.shade.tip_fade},
                       state.shade.lights, state.workers);
   return {};

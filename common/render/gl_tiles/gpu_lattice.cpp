@@ -1,0 +1,119 @@
+#include "common/render/gl_tiles/gpu_lattice.h"
+
+#include <epoxy/gl.h>
+
+#include "shaders/shared/bindings.h"
+#include "shaders/shared/limits.h"
+#include "shaders/shared/tiles.h"
+
+namespace strandcast {
+namespace {
+
+// Of the kernels that walk a slice of cells, one invocation each.
+constexpr uint32_t kSliceGroupColumns = 32;
+constexpr uint32_t kSliceGroupRows = 2;
+
+uint64_t cell_count(const glm::ivec3& size) {
+  return uint64_t{1} * static_cast<uint32_t>(size.x) * static_cast<uint32_t>(size.y) *
+         static_cast<uint32_t>(size.z);
+}
+
+void dispatch_cells(int columns, int rows, int slices) {
+  glDispatchCompute((static_cast<uint32_t>(columns) + kSliceGroupColumns - 1) / kSliceGroupColumns,
+                    (static_cast<uint32_t>(rows) + kSliceGroupRows - 1) / kSliceGroupRows,
+                    static_cast<uint32_t>(slices));
+}
+
+gl::Texture depth_volume(const char* label, const glm::ivec3& size) {
+  const glm::uvec3 cells(size);
+  return gl::Texture::volume(label, GL_R32F, cells.x, cells.y, cells.z);
+}
+
+void bind_depth_image(const gl::Texture& depth) {
+  glBindImageTexture(shader::kImageTileDepth, depth.name(), 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_R32F);
+}
+
+}  // namespace
+
+Status GpuLattice::prepare(const gl::ShaderLibrary& shaders) {
+  ASSIGN_OR_RETURN(sum_, gl::Program::make(shaders, {"render/tile_light_sum.comp"}, {}));
+  ASSIGN_OR_RETURN(key_, gl::Program::make(shaders, {"render/tile_light_key.comp"}, {}));
+  ASSIGN_OR_RETURN(half_, gl::Program::make(shaders, {"render/tile_light_half.comp"}, {}));
+  ASSIGN_OR_RETURN(sweep_, gl::Program::make(shaders, {"render/tile_light_sweep.comp"}, {}));
+  return {};
+}
+
+uint64_t GpuLattice::size_bytes() const {
+  return sums_.size_bytes() + halved_.size_bytes() + swept_.size_bytes() + key_depth_.size_bytes() +
+         rim_depth_.size_bytes() + sky_depth_.size_bytes();
+}
+
+void GpuLattice::resize(const LatticeFrame& frame) {
+  sums_.reserve(cell_count(frame.size) * sizeof(int32_t));
+  halved_.reserve(cell_count(frame.half_size) * sizeof(float));
+  swept_.reserve(cell_count(frame.half_size) * sizeof(float));
+  if (size_ == frame.size) return;
+  size_ = frame.size;
+  key_depth_ = depth_volume("key depth", frame.size);
+  rim_depth_ = depth_volume("rim depth", frame.half_size);
+  sky_depth_ = depth_volume("sky depth", frame.half_size);
+}
+
+void GpuLattice::build(const LightLatticeDesc& desc, const LatticeFrame& frame, const LightDirections& lights,
+                       uint32_t strand_count, float width_m) {
+  const auto along_axes = [&](const glm::vec3& v) {
+    return glm::vec3(glm::dot(v, frame.axis[0]), glm::dot(v, frame.axis[1]), glm::dot(v, frame.axis[2]));
+  };
+  resize(frame);
+  glClearNamedBufferData(sums_.buffer().name(), GL_R32I, GL_RED_INTEGER, GL_INT, nullptr);
+  sums_.buffer().bind_storage(shader::kBindingDensity);
+  halved_.buffer().bind_storage(shader::kBindingTileHalved);
+  swept_.buffer().bind_storage(shader::kBindingTileSwept);
+  sum_.use();
+  sum_.set("u_sum_per_m", strand_depth_per_m(frame, width_m) / kLightSumUnit);
+  sum_.set("u_max_pieces", kMaxLightCellsPerAxis);
+  sum_.set("u_pieces_per_m", kLightPiecesPerCell / frame.cell_m);
+  glDispatchCompute((strand_count + shader::kStrandLocalSize - 1) / shader::kStrandLocalSize, 1, 1);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  key_.use();
+  key_.set("u_sum_unit", kLightSumUnit);
+  key_.set("u_solid_depth", kSolidDepth);
+  key_.set("u_skull_middle", (along_axes(desc.skull.center_m) - frame.origin_m) / frame.cell_m);
+  key_.set("u_skull_radius", desc.has_skull ? desc.skull.radius_m / frame.cell_m : 0.0f);
+  bind_depth_image(key_depth_);
+  dispatch_cells(frame.size.x, frame.size.y, 1);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  half_.use();
+  dispatch_cells(frame.half_size.x, frame.half_size.y, frame.half_size.z);
+  sweep(frame, along_axes(lights.up), sky_depth_);
+  if (lights.has_rim) {
+    sweep(frame, along_axes(lights.to_rim), rim_depth_);
+  } else {
+    const float none = 0.0f;
+    glClearTexImage(rim_depth_.name(), 0, GL_RED, GL_FLOAT, &none);
+  }
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
+void GpuLattice::sweep(const LatticeFrame& frame, const glm::vec3& to_light, const gl::Texture& depth) {
+  const glm::vec3 length = glm::abs(to_light);
+  const int axis = length.x >= length.y && length.x >= length.z ? 0 : (length.y >= length.z ? 1 : 2);
+  if (!(length[axis] > 0.0f)) return;
+  sweep_.use();
+  sweep_.set("u_to_light", to_light);
+  sweep_.set("u_axis", axis);
+  bind_depth_image(depth);
+  for (int slice = 0; slice < frame.half_size[axis]; ++slice) {
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    sweep_.set("u_slice", slice);
+    dispatch_cells(frame.half_size[(axis + 1) % 3], frame.half_size[(axis + 2) % 3], 1);
+  }
+}
+
+void GpuLattice::bind() const {
+  key_depth_.bind(shader::kUnitTileKeyDepth);
+  rim_depth_.bind(shader::kUnitTileRimDepth);
+  sky_depth_.bind(shader::kUnitTileSkyDepth);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,36 @@
+// GpuLattice: the light lattice (common/render/light_lattice.h) on the GPU, from the points of the drawn
+// strands: optical depth towards key light, rim light and sky in three volumes. All calls from the context's
+// thread; the frame's uniform block is bound.
+#pragma once
+
+#include "common/gl/pass_plan.h"
+#include "common/gl/program.h"
+#include "common/render/gl_tiles/grown_buffer.h"
+#include "common/render/light_lattice.h"
+
+namespace strandcast {
+
+class GpuLattice final : public gl::Resource {
+ public:
+  GpuLattice() : Resource("light lattice") {}
+  Status prepare(const gl::ShaderLibrary& shaders);
+  /// Reads the points and strands that are bound to kUnitTilePoints and kUnitTileStrands.
+  void build(const LightLatticeDesc& desc, const LatticeFrame& frame, const LightDirections& lights,
+             uint32_t strand_count, float width_m);
+  /// Depths to the units that shaders/render/tile_light.glsl reads.
+  void bind() const;
+  uint64_t size_bytes() const override;
+
+ private:
+  void resize(const LatticeFrame& frame);
+  void sweep(const LatticeFrame& frame, const glm::vec3& to_light, const gl::Texture& depth);
+
+  gl::Program sum_, key_, half_, sweep_;
+  GrownBuffer sums_{"light sums"};
+  GrownBuffer halved_{"light halved"};
+  GrownBuffer swept_{"light swept"};
+  gl::Texture key_depth_, rim_depth_, sky_depth_;
+  glm::ivec3 size_{0};
+};
+
+}  // namespace strandcast

@@ -1,0 +1,77 @@
+#include "common/render/strand_detail.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/render/passes/expand_pass.h"
+
+namespace strandcast {
+namespace {
+
+// Bends shorter than this are not seen, and for strands thinner than about this stand fewer and wider ones.
+constexpr float kSegmentPx = 10.0f;
+constexpr float kThinnestPx = 0.45f;
+
+/// At least one, where the limit allows it. A size that is not a number takes the least detail.
+uint32_t at_most(float wanted, uint32_t limit) {
+  return wanted > 1.0f ? static_cast<uint32_t>(std::min(std::ceil(wanted), static_cast<float>(limit)))
+                       : std::min(1u, limit);
+}
+
+}  // namespace
+
+DetailFacts detail_facts(const RenderScene& scene) {
+  DetailFacts facts;
+  facts.key_count = scene.key_strands.strand_count();
+  facts.vertex_count = scene.key_strands.vertex_count();
+  facts.triangle_count = scene.triangle_count;
+  facts.mean_length_m = scene.rest.mean_length_m;
+  return facts;
+}
+
+uint32_t strand_count(const DetailFacts& facts, uint32_t followers) {
+  return facts.key_count + facts.triangle_count * followers;
+}
+
+uint32_t points_per_strand(const DetailFacts& facts, const StrandDetail& detail) {
+  return (std::max(facts.vertex_count, 2u) - 1) * detail.segments_per_gap + 2;
+}
+
+float drawn_width_m(const DetailFacts& facts, const LookDesc& look, uint32_t drawn) {
+  const uint32_t all = strand_count(facts, look.followers);
+  return 2.0f * look.strand_radius_m * static_cast<float>(all) / static_cast<float>(drawn);
+}
+
+StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const View& view,
+                           const DrawTerms& terms) {
+  StrandDetail detail;
+  const uint32_t max_followers = facts.triangle_count > 0 ? look.followers : 0;
+  const float px_per_m = view.focal_px / view.target_distance_m;
+  const float gap_px =
+      facts.mean_length_m / static_cast<float>(std::max(facts.vertex_count, 2u) - 1) * px_per_m;
+  const float width_px = 2.0f * look.strand_radius_m * px_per_m;
+  detail.segments_per_gap = at_most(gap_px / kSegmentPx, look.segments);
+  const float followers = std::floor(static_cast<float>(max_followers) * width_px / kThinnestPx + 0.5f);
+  detail.followers = at_most(followers, max_followers);
+  if (facts.is_finest) {
+    detail.segments_per_gap = kMaxSegmentsPerGap;
+    detail.followers = max_followers;
+  }
+  detail.strand_count = strand_count(facts, detail.followers);
+  if (terms.strand_share < 1.0f) {
+    // Followers of all triangles first, then key strands: any first so many of those cover the head evenly.
+    const auto wanted = std::max(
+        1u, static_cast<uint32_t>(std::ceil(terms.strand_share * static_cast<float>(detail.strand_count))));
+    while (detail.followers > 0 && strand_count(facts, detail.followers) > wanted) --detail.followers;
+    detail.strand_count = std::min(strand_count(facts, detail.followers), wanted);
+  }
+  const auto points = [&] { return uint64_t{points_per_strand(facts, detail)}; };
+  while (detail.followers > 0 && detail.strand_count * points() > facts.max_points)
+    detail.strand_count = strand_count(facts, --detail.followers);
+  if (detail.strand_count * points() > facts.max_points * 2) detail.segments_per_gap = 1;
+  detail.strand_count =
+      static_cast<uint32_t>(std::min<uint64_t>(detail.strand_count, facts.max_points / points()));
+  return detail;
+}
+
+}  // namespace strandcast

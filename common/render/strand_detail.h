@@ -1,0 +1,43 @@
+// How finely a picture is drawn, by its size on the screen: fewer segments where bends are not seen, fewer
+// and wider strands where they are thinner than can be seen. Pure function, any thread.
+#pragma once
+
+#include <cstdint>
+
+#include "common/render/render_scene.h"
+#include "common/render/render_turn.h"
+#include "common/render/view.h"
+#include "common/scene/scene_desc.h"
+#include "common/strands/scene_asset.h"
+
+namespace strandcast {
+
+/// What of a scene decides, and does not change from picture to picture.
+struct DetailFacts {
+  uint32_t key_count = 0;
+  uint32_t vertex_count = 0;  // of each
+  uint32_t triangle_count = 0;
+  float mean_length_m = 0.0f;  // of a key strand at rest
+  uint64_t max_points = 0;     // of all drawn strands
+  bool is_finest = false;      // all followers and segments of the look, whatever the size of the picture
+};
+
+/// How finely one picture is drawn.
+struct StrandDetail {
+  uint32_t segments_per_gap = 1;  // >= 1
+  uint32_t followers = 0;         // per triangle, at most those of the look
+  uint32_t strand_count = 0;      // the first of keys and followers
+};
+
+/// All but the limits.
+DetailFacts detail_facts(const RenderScene& scene);
+/// Key strands and so many followers per triangle.
+uint32_t strand_count(const DetailFacts& facts, uint32_t followers);
+/// Points that a strand has at most.
+uint32_t points_per_strand(const DetailFacts& facts, const StrandDetail& detail);
+/// What the strands of a picture are as wide as, at their roots: fewer are as much wider. `drawn` > 0.
+float drawn_width_m(const DetailFacts& facts, const LookDesc& look, uint32_t drawn);
+StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const View& view,
+                           const DrawTerms& terms);
+
+}  // namespace strandcast
