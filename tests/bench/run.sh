@@ -21,7 +21,7 @@ out=$(realpath "$out")
 cd "$(dirname "$0")/../.."
 bash deploy/install_deps.sh
 cmake --preset release -DBUILD_TESTING=ON >/dev/null
-cmake --build --preset release --target sim_bench peers_bench codec_bench frame_bench render_bench strandcast-server strandcast-view strandcast-ctl \
+cmake --build --preset release --target sim_bench peers_bench codec_bench frame_bench render_bench stage_bench strandcast-server strandcast-view strandcast-ctl \
   >"$out/build.log" 2>&1 || { tail -30 "$out/build.log" >&2; exit 2; }
 bin=build/release/bin
 
@@ -37,6 +37,8 @@ echo "== pictures: $out/frame.csv"
 
 echo "== methods of drawing: $out/render.csv"
 "$bin/render_bench" | tee "$out/render.csv"
+echo "== stages of the tiles beside what the machine can do: $out/stages.csv"
+"$bin/stage_bench" | tee "$out/stages.csv"
 
 echo "== streams: $out/stream.csv"
 echo "scene,key,value" >"$out/stream.csv"
