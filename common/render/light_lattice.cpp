@@ -121,8 +121,10 @@ float strand_depth_per_m(const LatticeFrame& frame, float width_m) {
 }
 
 uint64_t LightLattice::size_bytes() const {
-  uint64_t bytes = key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
-                   (halved_.capacity() + rim_depth_.capacity() + sky_depth_.capacity()) * sizeof(float);
+  uint64_t bytes =
+      key_.capacity() * sizeof(uint16_t) + others_.capacity() * sizeof(uint32_t) +
+      (halved_.capacity() + halved_solid_.capacity() + rim_depth_.capacity() + sky_depth_.capacity()) *
+          sizeof(float);
   for (const auto& sums : sums_) bytes += sums.capacity() * sizeof(int32_t);
   return bytes;
 }
@@ -133,10 +135,10 @@ void LightLattice::build(const StrandPoints& points, const LightStrands& strands
   sum_strands(points, strands, workers);
   sweep_key(workers);
   workers.run([&](uint32_t worker) {
-    if (worker == 0) sweep(along_axes(lights.up, view_), sky_depth_);
+    if (worker == 0) sweep(along_axes(lights.up, view_), halved_with(kSolidSkyDepth), sky_depth_);
     if (worker == std::min(1u, workers.size() - 1)) {
       if (lights.has_rim)
-        sweep(along_axes(lights.to_rim, view_), rim_depth_);
+        sweep(along_axes(lights.to_rim, view_), halved_with(kSolidRimDepth), rim_depth_);
       else
         rim_depth_.assign(halved_.size(), 0.0f);
     }
@@ -223,25 +225,68 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
   });
 }
 
-// A running sum away from the light, and half of the cell itself.
+// Shares of one row of cells. Far from the skin distances tell of how many cells nothing changes.
+void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
+  std::fill(share.begin(), share.end(), 0.0f);
+  const HeadOccupancy& head = *desc_.solid;
+  const float per_cell = view_.cell_m / head.cell_m;
+  const glm::vec3 step = per_cell * view_.axis[0];
+  const glm::vec3 along(view_.origin_m.x, view_.origin_m.y + view_.cell_m * static_cast<float>(y),
+                        view_.origin_m.z + view_.cell_m * static_cast<float>(z));
+  const glm::vec3 from =
+      (along.x * view_.axis[0] + along.y * view_.axis[1] + along.z * view_.axis[2] - head.origin_m) /
+      head.cell_m;
+  // Outside of the head's cells there is none.
+  float first = 0.0f;
+  auto last = static_cast<float>(view_.size.x - 1);
+  for (int a = 0; a < 3; ++a) {
+    const float high = static_cast<float>(head.size[a]) - 0.5f;
+    if (std::abs(step[a]) < 1e-6f) {
+      if (!(from[a] > -0.5f && from[a] < high)) return;
+      continue;
+    }
+    const float enters = (-0.5f - from[a]) / step[a];
+    const float leaves = (high - from[a]) / step[a];
+    first = std::max(first, std::min(enters, leaves));
+    last = std::min(last, std::max(enters, leaves));
+  }
+  // Distances from cell to cell are up to an eighth too long, and rounded.
+  constexpr float kSure = 0.8f;
+  const float per_m = 1.0f / view_.cell_m;
+  if (!(first <= last)) return;
+  const int end = static_cast<int>(std::floor(last)) + 1;
+  for (int x = static_cast<int>(std::ceil(first)); x < end;) {
+    const float outside = distance_at(head, from + static_cast<float>(x) * step) * per_m + kSolidInsetCells;
+    const float solid = std::clamp(0.5f - outside * (0.5f / kSolidRampCells), 0.0f, 1.0f);
+    const int alike = 1 + static_cast<int>(std::max(kSure * (std::abs(outside) - kSolidRampCells), 0.0f));
+    for (const int until = std::min(x + alike, end); x < until; ++x) share[x] = solid;
+  }
+}
+
+std::vector<float> LightLattice::halved_with(float solid_depth) const {
+  std::vector<float> all = halved_;
+  for (size_t i = 0; i < halved_solid_.size(); ++i) all[i] += solid_depth * halved_solid_[i];
+  return all;
+}
+
+// A running sum away from the light, and half of the cell itself; of the head the most that was passed, which
+// changes little from line to line where sums of it would jump.
 void LightLattice::sweep_key(WorkerPool& workers) {
   const glm::ivec3 size = view_.size;
   const size_t slice = static_cast<size_t>(size.x) * size.y;
   key_.resize(slice * size.z);
   halved_.assign(static_cast<size_t>(view_.half_size.x) * view_.half_size.y * view_.half_size.z, 0.0f);
-  glm::vec3 center(0.0f);
-  float radius = -1.0f;
-  if (desc_.has_skull) {
-    center = (along_axes(desc_.skull.center_m, view_) - view_.origin_m) / view_.cell_m;
-    radius = desc_.skull.radius_m / view_.cell_m;
-  }
+  halved_solid_.assign(has_solid() ? halved_.size() : 0, 0.0f);
   // Two rows at a time: they halve into one.
   workers.for_ranges(static_cast<size_t>(size.y) / 2, 1, [&](size_t begin, size_t end) {
     std::vector<float> passed(size.x);
     std::vector<float> here(size.x);
+    std::vector<float> solid(size.x);
+    std::vector<float> most_solid(size.x);
     std::vector<int32_t> sum(size.x);
     for (size_t y = 2 * begin; y < 2 * end; ++y) {
       std::fill(passed.begin(), passed.end(), 0.0f);
+      std::fill(most_solid.begin(), most_solid.end(), 0.0f);
       for (int z = 0; z < size.z; ++z) {
         const size_t row = static_cast<size_t>(z) * slice + y * size.x;
         std::copy_n(sums_[0].data() + row, size.x, sum.data());
@@ -250,30 +295,25 @@ void LightLattice::sweep_key(WorkerPool& workers) {
           for (int x = 0; x < size.x; ++x) sum[x] += from[x];
         }
         for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kLightSumUnit;
-        const float dy = static_cast<float>(y) - center.y;
-        const float dz = static_cast<float>(z) - center.z;
-        const float off = dy * dy + dz * dz;
-        const float outer = radius + 0.5f;
-        if (radius > 0.0f && off < outer * outer) {
-          const float reach = std::sqrt(outer * outer - off);
-          const int from = std::max(0, static_cast<int>(std::ceil(center.x - reach)));
-          const int to = std::min(size.x - 1, static_cast<int>(std::floor(center.x + reach)));
-          for (int x = from; x <= to; ++x) {
-            const float dx = static_cast<float>(x) - center.x;
-            here[x] += kSolidDepth * std::clamp(outer - std::sqrt(dx * dx + off), 0.0f, 1.0f);
-          }
-        }
+        if (has_solid()) find_solid(static_cast<int>(y), z, solid);
         uint16_t* const key = key_.data() + row;
         constexpr float kStored = 1.0f / kLightDepthUnit;
         for (int x = 0; x < size.x; ++x) {
-          const float depth = (passed[x] + 0.5f * here[x]) * kStored;
+          const float most = most_solid[x] = std::max(most_solid[x], solid[x]);
+          const float depth = (passed[x] + 0.5f * here[x] + kSolidDepth * (most * most * most)) * kStored;
           key[x] = static_cast<uint16_t>(static_cast<int32_t>(depth < 65535.0f ? depth : 65535.0f));
           passed[x] += here[x];
         }
         // Across a cell twice as wide: the sum of two in its length, the mean over four across.
-        float* const halved =
-            halved_.data() + (static_cast<size_t>(z / 2) * view_.half_size.y + y / 2) * view_.half_size.x;
-        for (int x = 0; x < view_.half_size.x; ++x) halved[x] += 0.25f * (here[2 * x] + here[2 * x + 1]);
+        const size_t half_row =
+            (static_cast<size_t>(z / 2) * view_.half_size.y + y / 2) * static_cast<size_t>(view_.half_size.x);
+        const auto halve = [&](const std::vector<float>& row_of_cells, std::vector<float>& halved) {
+          float* const to = halved.data() + half_row;
+          for (int x = 0; x < view_.half_size.x; ++x)
+            to[x] += 0.25f * (row_of_cells[2 * x] + row_of_cells[2 * x + 1]);
+        };
+        halve(here, halved_);
+        if (has_solid()) halve(solid, halved_solid_);
       }
     }
   });
@@ -281,13 +321,14 @@ void LightLattice::sweep_key(WorkerPool& workers) {
 
 // Slice by slice away from the light: a cell's depth is that of the slice before it, looked up where the ray
 // to the light crosses it, plus half of both cells on the way.
-void LightLattice::sweep(const glm::vec3& to_light, std::vector<float>& depth) const {
+void LightLattice::sweep(const glm::vec3& to_light, const std::vector<float>& halved,
+                         std::vector<float>& depth) const {
   const glm::ivec3 size = view_.half_size;
   const glm::vec3 length = glm::abs(to_light);
   const int a = length.x >= length.y && length.x >= length.z ? 0 : (length.y >= length.z ? 1 : 2);
   const int u = (a + 1) % 3;
   const int v = (a + 2) % 3;
-  depth.assign(halved_.size(), 0.0f);
+  depth.assign(halved.size(), 0.0f);
   if (!(length[a] > 0.0f)) return;
   const float shift_u = to_light[u] / length[a];
   const float shift_v = to_light[v] / length[a];
@@ -304,7 +345,7 @@ void LightLattice::sweep(const glm::vec3& to_light, std::vector<float>& depth) c
     const auto behind = [&](int i, int j) {
       if (slice == 0 || i < 0 || j < 0 || i >= size[u] || j >= size[v]) return 0.0f;
       const auto cell = static_cast<size_t>((here - direction) * stride[a] + i * stride[u] + j * stride[v]);
-      return depth[cell] + half_step * halved_[cell];
+      return depth[cell] + half_step * halved[cell];
     };
     for (int j = 0; j < size[v]; ++j)
       for (int i = 0; i < size[u]; ++i) {
@@ -313,7 +354,7 @@ void LightLattice::sweep(const glm::vec3& to_light, std::vector<float>& depth) c
         const float near = (1.0f - part_u) * behind(i0, j0) + part_u * behind(i0 + 1, j0);
         const float far = (1.0f - part_u) * behind(i0, j0 + 1) + part_u * behind(i0 + 1, j0 + 1);
         const auto cell = static_cast<size_t>(here * stride[a] + i * stride[u] + j * stride[v]);
-        depth[cell] = (1.0f - part_v) * near + part_v * far + half_step * halved_[cell];
+        depth[cell] = (1.0f - part_v) * near + part_v * far + half_step * halved[cell];
       }
   }
 }

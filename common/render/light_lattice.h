@@ -6,11 +6,13 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "common/base/worker_pool.h"
 #include "common/groom/mesh.h"
+#include "common/render/head_occupancy.h"
 #include "common/render/look_lights.h"
 
 namespace strandcast {
@@ -21,8 +23,9 @@ struct StrandPoints;
 struct LightLatticeDesc {
   float extent_m = 0.3f;   // of the hair at rest, its largest side
   uint32_t cells = 96;     // along that side
-  bool has_skull = false;  // an opaque ball under the hair
+  bool has_skull = false;  // a ball under the hair that has to have room
   FittedSphere skull;
+  std::shared_ptr<const HeadOccupancy> solid;  // none: nothing but hair casts shadows
 };
 
 /// Of the strands that are summed.
@@ -53,8 +56,15 @@ inline constexpr float kLightSumUnit = 1.0f / 65536.0f;
 /// A segment is summed at one place, one that is longer than two cells at more.
 inline constexpr float kLightPiecesPerCell = 0.5f;
 inline constexpr int kMaxLightCellsPerAxis = 160;
-/// Optical depth of a cell inside the head.
-inline constexpr float kSolidDepth = 3.0f;
+/// How much of a place is head: all of it or nothing so many cells from a surface that lies this deep below
+/// its skin, so that roots and skin stay lit.
+inline constexpr float kSolidInsetCells = 1.25f;
+inline constexpr float kSolidRampCells = 1.25f;
+/// Optical depth behind the head, times the cube of the most that was passed: an edge as soft as the ramp.
+inline constexpr float kSolidDepth = 12.0f;
+/// The other lights sum it up, per cell. The sky is all around: what lies above hides a part of it only.
+inline constexpr float kSolidRimDepth = 2.0f;
+inline constexpr float kSolidSkyDepth = 0.06f;
 /// Optical depth that a metre of a strand of this width adds to its cell.
 float strand_depth_per_m(const LatticeFrame& frame, float width_m);
 
@@ -77,13 +87,18 @@ class LightLattice {
   void fit(const StrandPoints& points, const LightDirections& lights, WorkerPool& workers);
   void sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers);
   void sweep_key(WorkerPool& workers);
-  void sweep(const glm::vec3& to_light, std::vector<float>& depth) const;
+  bool has_solid() const { return desc_.solid && !desc_.solid->is_empty(); }
+  void find_solid(int y, int z, std::vector<float>& share) const;
+  /// Across halved cells, with the head as opaque as this per cell.
+  std::vector<float> halved_with(float solid_depth) const;
+  void sweep(const glm::vec3& to_light, const std::vector<float>& halved, std::vector<float>& depth) const;
 
   LightLatticeDesc desc_;
   LightLatticeView view_;
   std::vector<std::vector<int32_t>> sums_;  // one lattice per worker that sums
   std::vector<uint16_t> key_;
-  std::vector<float> halved_;  // optical depth across a halved cell
+  std::vector<float> halved_;        // optical depth of strands across a halved cell
+  std::vector<float> halved_solid_;  // likewise, how much of the way leads through the head, in whole cells
   std::vector<float> rim_depth_;
   std::vector<float> sky_depth_;
   std::vector<uint32_t> others_;

@@ -84,6 +84,15 @@ LookDesc drawable(LookDesc look) {
   return look;
 }
 
+LightLatticeDesc describe_lattice(const SceneAsset& asset, const RenderScene& scene, uint32_t cells) {
+  LightLatticeDesc desc{scene.rest.extent_m, cells, scene.light_volume.has_skull, scene.light_volume.skull,
+                        nullptr};
+  std::optional<FittedSphere> skull;
+  if (desc.has_skull) skull = FittedSphere{desc.skull.center_m, desc.skull.radius_m / kSkullShrink};
+  desc.solid = std::make_shared<const HeadOccupancy>(make_head_occupancy(asset, skull));
+  return desc;
+}
+
 Status check_asset(const SceneAsset& asset) {
   const size_t expected = static_cast<size_t>(asset.strand_count) * asset.vertex_count;
   if (asset.rest_position_m.size() != expected)

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "common/gl/pass_plan.h"
+#include "common/render/light_lattice.h"
 #include "common/render/light_volume.h"
 #include "common/render/passes/light_texture.h"
 #include "common/render/passes/picture_target.h"
@@ -66,6 +67,9 @@ struct RenderScene {
 
 /// The look within what renderers can draw.
 LookDesc drawable(LookDesc look);
+
+/// What the light lattice has to know. `cells`: along the hair's largest side.
+LightLatticeDesc describe_lattice(const SceneAsset& asset, const RenderScene& scene, uint32_t cells);
 
 /// BadInput names what of an asset does not fit together.
 Status check_asset(const SceneAsset& asset);

@@ -1,33 +1,49 @@
-// A running sum away from the key light, and half of the cell itself; one invocation per line of cells. Leaves the depth of
-// each cell where its sum was.
+// A running sum away from the key light, and half of the cell itself, and of the head the most that was passed; one
+// invocation per line of cells. Leaves what lies in each cell where its sum was: strands' optical depth and the share that
+// is head, as halves.
 #include "render/tile_frame.glsl"
 
 layout(local_size_x = 32, local_size_y = 2) in;
 
 layout(std430, binding = kBindingDensity) restrict buffer LightSums {
-  int cell[];   // (lattice_size) in steps of u_sum_unit; then the bits of optical depth
+  int cell[];   // (lattice_size) in steps of u_sum_unit; then both halves
 } b_sums;
 layout(r32f, binding = kImageTileDepth) restrict writeonly uniform image3D u_depth;
 
 uniform float u_sum_unit;
-uniform float u_solid_depth;       // of a cell inside the head
-uniform vec3 u_skull_middle;       // cells
-uniform float u_skull_radius;      // cells; 0: there is none
+uniform float u_solid_depth;       // behind the head
+uniform float u_solid_inset_m;     // half solid so far below its skin
+uniform float u_solid_ramp_m;      // and all of it or nothing so far from there
+layout(binding = kUnitTileSolid) uniform sampler3D u_solid;         // distance to the head's skin, negative inside
+uniform float u_solid_reach_m;     // that 1 of it stands for
+uniform vec3 u_solid_origin_m;     // corner of its first cell, head space
+uniform vec3 u_solid_from_m;       // 1 / (cells x cell size); 0: there is no head
 
 void main() {
   ivec3 size = u_frame.lattice_size.xyz;
   ivec2 line = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(line, size.xy))) return;
+  float cell_m = u_frame.lattice_origin.w;
+  vec3 along = u_frame.lattice_origin.xyz + cell_m * vec3(line, 0.0);
+  vec3 place = along.x * u_frame.lattice_axis[0].xyz + along.y * u_frame.lattice_axis[1].xyz +
+               along.z * u_frame.lattice_axis[2].xyz;
+  vec3 solid = (place - u_solid_origin_m) * u_solid_from_m;
+  vec3 solid_step = cell_m * u_frame.lattice_axis[2].xyz * u_solid_from_m;
   float passed = 0.0;
+  float most_solid = 0.0;
   int slice = size.x * size.y;
   int cell = line.y * size.x + line.x;
   for (int z = 0; z < size.z; ++z) {
     float here = float(b_sums.cell[cell]) * u_sum_unit;
-    float outer = u_skull_radius > 0.0 ? u_skull_radius + 0.5 - distance(vec3(line, z), u_skull_middle) : 0.0;
-    here += u_solid_depth * clamp(outer, 0.0, 1.0);
-    imageStore(u_depth, ivec3(line, z), vec4(passed + 0.5 * here));
-    b_sums.cell[cell] = floatBitsToInt(here);
+    // Outside of the head's box there is none.
+    bool is_inside = all(greaterThan(solid, vec3(0.0))) && all(lessThan(solid, vec3(1.0)));
+    float outside_m = u_solid_reach_m * textureLod(u_solid, solid, 0.0).r + u_solid_inset_m;
+    float share = is_inside ? clamp(0.5 - outside_m * (0.5 / u_solid_ramp_m), 0.0, 1.0) : 0.0;
+    b_sums.cell[cell] = int(packHalf2x16(vec2(here, share)));
+    most_solid = max(most_solid, share);
+    imageStore(u_depth, ivec3(line, z), vec4(passed + 0.5 * here + u_solid_depth * (most_solid * most_solid * most_solid)));
     passed += here;
+    solid += solid_step;
     cell += slice;
   }
 }

@@ -63,6 +63,7 @@ const uint kUnitTileTriangles = 3u;
 const uint kUnitTileOrder = 4u;
 const uint kUnitTileFirst = 5u;
 const uint kUnitTilePairs = 11u;
+const uint kUnitTileSolid = 12u;
 const uint kUnitTileKeyDepth = 6u;
 const uint kUnitTileRimDepth = 7u;
 const uint kUnitTileSkyDepth = 8u;

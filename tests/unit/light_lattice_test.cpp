@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "common/groom/mesh.h"
 #include "common/render/tiles/tile_frame.h"
 
 namespace strandcast {
@@ -68,7 +69,7 @@ class LightLatticeTest : public testing::Test {
 
 TEST_F(LightLatticeTest, DepthGrowsAsTheHairThatIsPassed) {
   const StrandPoints points = strands_in_box(kCount, kSideM);
-  LightLattice lattice({kSideM, 32, false, {}});
+  LightLattice lattice({kSideM, 32, false, {}, nullptr});
   lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
   for (const float y : {0.03f, 0.0f, -0.03f}) {
     const double passed_m = 0.5 * kSideM - y;
@@ -83,7 +84,7 @@ TEST_F(LightLatticeTest, DepthGrowsAsTheHairThatIsPassed) {
 
 TEST_F(LightLatticeTest, NothingIsShadowedInFrontOfTheHair) {
   const StrandPoints points = strands_in_box(2000, kSideM);
-  LightLattice lattice({kSideM, 32, false, {}});
+  LightLattice lattice({kSideM, 32, false, {}, nullptr});
   lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
   EXPECT_NEAR(key_depth(lattice.view(), {0, 0, 0.06f}), 0.0, 0.02);
   EXPECT_EQ(other_depth(lattice.view(), {0, 0, 0}, false), 0.0) << "there is no rim light";
@@ -91,7 +92,7 @@ TEST_F(LightLatticeTest, NothingIsShadowedInFrontOfTheHair) {
 
 TEST_F(LightLatticeTest, OrderAndThreadsDoNotShow) {
   StrandPoints points = strands_in_box(3000, kSideM);
-  LightLattice one({kSideM, 48, false, {}});
+  LightLattice one({kSideM, 48, false, {}, nullptr});
   WorkerPool alone(1);
   const LightDirections lights{
       glm::normalize(glm::vec3(0.3f, 1, 0.2f)), glm::normalize(glm::vec3(-1, 0.3f, 0.5f)), {0, 1, 0}, true};
@@ -108,26 +109,114 @@ TEST_F(LightLatticeTest, OrderAndThreadsDoNotShow) {
     turned.index.push_back(points.index[strand]);
   }
   WorkerPool many(4);
-  LightLattice other({kSideM, 48, false, {}});
+  LightLattice other({kSideM, 48, false, {}, nullptr});
   other.build(turned, {kWidthM, 0.3f, 0.2f}, lights, many);
   ASSERT_EQ(other.view().size, size);
   EXPECT_TRUE(std::equal(key.begin(), key.end(), other.view().key));
 }
 
-TEST_F(LightLatticeTest, TheSkullIsOpaque) {
-  LightLattice lattice({0.2f, 64, true, {{0, 0, 0}, 0.08f}});
+/// The built-in head of this radius, in a lattice of 64 cells along 0.2 m, or of others.
+LightLatticeDesc with_head(float radius_m, uint32_t cells = 64) {
+  OccupancyRequest request;
+  request.ball = FittedSphere{glm::vec3(0.0f), radius_m};
+  return {0.2f, cells, true, *request.ball,
+          std::make_shared<const HeadOccupancy>(make_head_occupancy(make_head(radius_m), request))};
+}
+
+TEST_F(LightLatticeTest, AHeadIsOpaqueAndBesideItNothingIs) {
+  constexpr float kRadiusM = 0.08f;
+  OccupancyRequest request;
+  request.ball = FittedSphere{glm::vec3(0.0f), kRadiusM};
+  LightLattice lattice({0.2f, 64, true, *request.ball,
+                        std::make_shared<const HeadOccupancy>(make_head_occupancy(Mesh(), request))});
   const StrandPoints points = strands_in_box(10, 0.2f);
-  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
-  EXPECT_GT(key_depth(lattice.view(), {0, -0.09f, 0}), 20.0);
-  EXPECT_LT(key_depth(lattice.view(), {0, 0.09f, 0}), 0.5);
-  EXPECT_LT(key_depth(lattice.view(), {0.09f, -0.09f, 0}), 0.5);
+  for (const glm::vec3 to_light :
+       {glm::vec3(0, 1, 0), glm::vec3(0.6f, 0, -0.8f), glm::normalize(glm::vec3(0.3f, 1, 0.2f))}) {
+    const glm::vec3 aside = glm::normalize(glm::cross(to_light, glm::vec3(0.3f, 0.1f, 1)));
+    lattice.build(points, {kWidthM, 1.0f, 0.0f}, {to_light, aside, {0, 1, 0}, true}, workers_);
+    EXPECT_NEAR(key_depth(lattice.view(), -1.1f * kRadiusM * to_light), kSolidDepth, 0.5);
+    EXPECT_LT(key_depth(lattice.view(), 1.1f * kRadiusM * to_light), 0.5);
+    EXPECT_LT(key_depth(lattice.view(), kRadiusM * (1.15f * aside - 1.1f * to_light)), 0.5);
+    // The surface that counts lies a little below its skin.
+    const float seen_m = kRadiusM - kSolidInsetCells * lattice.view().cell_m;
+    EXPECT_NEAR(key_depth(lattice.view(), seen_m * aside - 1.1f * kRadiusM * to_light), kSolidDepth / 8.0,
+                kSolidDepth / 6.0);
+    EXPECT_GT(other_depth(lattice.view(), -1.1f * kRadiusM * aside, false), 20.0);
+  }
+  // From straight above it hides a part of the sky, that goes with what lies above.
+  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
+  const float chord_cells = 2.0f * (kRadiusM / lattice.view().cell_m - kSolidInsetCells);
+  EXPECT_NEAR(other_depth(lattice.view(), {0, -1.2f * kRadiusM, 0}, true), kSolidSkyDepth * chord_cells,
+              0.1f * kSolidSkyDepth * chord_cells + 0.05f);
+}
+
+TEST_F(LightLatticeTest, ShouldersLieInTheShadeOfTheHead) {
+  constexpr float kRadiusM = 0.08f;
+  LightLattice lattice(with_head(kRadiusM));
+  // Hair down to the shoulders, so that the lattice reaches them.
+  const StrandPoints points = strands_in_box(10, 0.4f);
+  const LightDirections lights{{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true};
+  lattice.build(points, {kWidthM, 1.0f, 0.0f}, lights, workers_);
+  // Beside the neck, under jaw and ear; and out on the shoulder.
+  EXPECT_GT(key_depth(lattice.view(), {0.055f, -0.15f, 0.0f}), 10.0);
+  EXPECT_LT(key_depth(lattice.view(), {0.13f, -0.15f, 0.0f}), 0.5);
+  // The neck lies in the shade of the chin, the chest in front of it does not.
+  EXPECT_GT(key_depth(lattice.view(), {0.0f, -0.13f, 0.05f}), 10.0);
+  EXPECT_LT(key_depth(lattice.view(), {0.0f, -0.13f, 0.13f}), 0.5);
+}
+
+TEST_F(LightLatticeTest, TheHeadIsTheSameForAnyNumberOfThreads) {
+  const StrandPoints points = strands_in_box(500, 0.2f);
+  const LightDirections lights{
+      glm::normalize(glm::vec3(0.3f, 1, 0.2f)), glm::normalize(glm::vec3(-1, 0.3f, 0.5f)), {0, 1, 0}, true};
+  LightLattice one(with_head(0.08f));
+  WorkerPool alone(1);
+  one.build(points, {kWidthM, 1.0f, 0.0f}, lights, alone);
+  const auto count = [](const glm::ivec3& size) { return size_t{1} * size.x * size.y * size.z; };
+  for (const uint32_t threads : {2u, 3u, 5u}) {
+    LightLattice other(with_head(0.08f));
+    WorkerPool many(threads);
+    other.build(points, {kWidthM, 1.0f, 0.0f}, lights, many);
+    EXPECT_TRUE(std::equal(one.view().key, one.view().key + count(one.view().size), other.view().key));
+    EXPECT_TRUE(
+        std::equal(one.view().others, one.view().others + count(one.view().half_size), other.view().others));
+  }
+}
+
+// Rows are filled in strides where the skin is far: every cell as if looked up alone.
+TEST_F(LightLatticeTest, NoCellOfTheHeadIsSkipped) {
+  const LightLatticeDesc desc = with_head(0.08f, 96);
+  LightLattice lattice(desc);
+  StrandPoints none = strands_in_box(2, 0.4f);
+  const LightDirections lights{glm::normalize(glm::vec3(0.3f, 0.8f, 0.5f)), {0, 0, 1}, {0, 1, 0}, false};
+  lattice.build(none, {0.0f, 1.0f, 0.0f}, lights, workers_);
+  const LightLatticeView& view = lattice.view();
+  double worst = 0.0;
+  for (int y = 0; y < view.size.y; ++y)
+    for (int x = 0; x < view.size.x; ++x) {
+      double most = 0.0;
+      for (int z = 0; z < view.size.z; ++z) {
+        const glm::vec3 along = view.origin_m + view.cell_m * glm::vec3(x, y, z);
+        const glm::vec3 place = (along.x * view.axis[0] + along.y * view.axis[1] + along.z * view.axis[2] -
+                                 desc.solid->origin_m) /
+                                desc.solid->cell_m;
+        const bool is_there = glm::all(glm::greaterThan(place, glm::vec3(-0.5f))) &&
+                              glm::all(glm::lessThan(place, glm::vec3(desc.solid->size) - 0.5f));
+        const float outside = distance_at(*desc.solid, place) / view.cell_m + kSolidInsetCells;
+        if (is_there) most = std::max(most, std::clamp(0.5 - outside * 0.5 / kSolidRampCells, 0.0, 1.0));
+        const double depth = kSolidDepth * most * most * most;
+        const size_t cell = (static_cast<size_t>(z) * view.size.y + y) * static_cast<size_t>(view.size.x) + x;
+        worst = std::max(worst, std::abs(view.key[cell] * double{kLightDepthUnit} - depth));
+      }
+    }
+  EXPECT_LT(worst, 0.005);
 }
 
 TEST_F(LightLatticeTest, StrandsThatAreNoNumbersCastNothing) {
   StrandPoints points = strands_in_box(100, kSideM);
   points.point[5].x = std::numeric_limits<float>::quiet_NaN();
   points.point[40].y = 1e30f;
-  LightLattice lattice({kSideM, 32, false, {}});
+  LightLattice lattice({kSideM, 32, false, {}, nullptr});
   lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
   EXPECT_LE(lattice.view().size.x, 160);
   EXPECT_LT(key_depth(lattice.view(), {0, 0.04f, 0}), 1.0);

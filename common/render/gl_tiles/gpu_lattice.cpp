@@ -35,17 +35,28 @@ void bind_depth_image(const gl::Texture& depth) {
 
 }  // namespace
 
-Status GpuLattice::prepare(const gl::ShaderLibrary& shaders) {
+Status GpuLattice::prepare(const gl::ShaderLibrary& shaders, const HeadOccupancy& solid) {
   ASSIGN_OR_RETURN(sum_, gl::Program::make(shaders, {"render/tile_light_sum.comp"}, {}));
   ASSIGN_OR_RETURN(key_, gl::Program::make(shaders, {"render/tile_light_key.comp"}, {}));
   ASSIGN_OR_RETURN(half_, gl::Program::make(shaders, {"render/tile_light_half.comp"}, {}));
   ASSIGN_OR_RETURN(sweep_, gl::Program::make(shaders, {"render/tile_light_sweep.comp"}, {}));
+  if (solid.is_empty()) return {};
+  const glm::uvec3 cells(solid.size);
+  solid_ = gl::Texture::volume("head occupancy", GL_R8_SNORM, cells.x, cells.y, cells.z);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTextureSubImage3D(solid_.name(), 0, 0, 0, 0, solid.size.x, solid.size.y, solid.size.z, GL_RED, GL_BYTE,
+                      solid.distance.data());
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  constexpr float kMostSteps = 127.0f;  // that 1 of the texture stands for
+  solid_origin_m_ = solid.origin_m - 0.5f * solid.cell_m;
+  solid_from_m_ = 1.0f / (glm::vec3(solid.size) * solid.cell_m);
+  solid_reach_m_ = solid.cell_m * kMostSteps / kDistanceStepsPerCell;
   return {};
 }
 
 uint64_t GpuLattice::size_bytes() const {
   return sums_.size_bytes() + halved_.size_bytes() + swept_.size_bytes() + key_depth_.size_bytes() +
-         rim_depth_.size_bytes() + sky_depth_.size_bytes();
+         rim_depth_.size_bytes() + sky_depth_.size_bytes() + solid_.size_bytes();
 }
 
 void GpuLattice::resize(const LatticeFrame& frame) {
@@ -59,11 +70,8 @@ void GpuLattice::resize(const LatticeFrame& frame) {
   sky_depth_ = depth_volume("sky depth", frame.half_size);
 }
 
-void GpuLattice::build(const LightLatticeDesc& desc, const LatticeFrame& frame, const LightDirections& lights,
-                       uint32_t strand_count, float width_m) {
-  const auto along_axes = [&](const glm::vec3& v) {
-    return glm::vec3(glm::dot(v, frame.axis[0]), glm::dot(v, frame.axis[1]), glm::dot(v, frame.axis[2]));
-  };
+void GpuLattice::build(const LatticeFrame& frame, const LightDirections& lights, uint32_t strand_count,
+                       float width_m) {
   resize(frame);
   glClearNamedBufferData(sums_.buffer().name(), GL_R32I, GL_RED_INTEGER, GL_INT, nullptr);
   sums_.buffer().bind_storage(shader::kBindingDensity);
@@ -78,21 +86,34 @@ void GpuLattice::build(const LightLatticeDesc& desc, const LatticeFrame& frame, 
   key_.use();
   key_.set("u_sum_unit", kLightSumUnit);
   key_.set("u_solid_depth", kSolidDepth);
-  key_.set("u_skull_middle", (along_axes(desc.skull.center_m) - frame.origin_m) / frame.cell_m);
-  key_.set("u_skull_radius", desc.has_skull ? desc.skull.radius_m / frame.cell_m : 0.0f);
+  key_.set("u_solid_inset_m", kSolidInsetCells * frame.cell_m);
+  key_.set("u_solid_ramp_m", kSolidRampCells * frame.cell_m);
+  key_.set("u_solid_reach_m", solid_reach_m_);
+  key_.set("u_solid_origin_m", solid_origin_m_);
+  key_.set("u_solid_from_m", solid_from_m_);
+  if (solid_from_m_.x > 0.0f) solid_.bind(shader::kUnitTileSolid);
   bind_depth_image(key_depth_);
   dispatch_cells(frame.size.x, frame.size.y, 1);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-  half_.use();
-  dispatch_cells(frame.half_size.x, frame.half_size.y, frame.half_size.z);
+  halve(frame, kSolidSkyDepth);
+  const auto along_axes = [&](const glm::vec3& v) {
+    return glm::vec3(glm::dot(v, frame.axis[0]), glm::dot(v, frame.axis[1]), glm::dot(v, frame.axis[2]));
+  };
   sweep(frame, along_axes(lights.up), sky_depth_);
   if (lights.has_rim) {
+    if (solid_from_m_.x > 0.0f) halve(frame, kSolidRimDepth);
     sweep(frame, along_axes(lights.to_rim), rim_depth_);
   } else {
     const float none = 0.0f;
     glClearTexImage(rim_depth_.name(), 0, GL_RED, GL_FLOAT, &none);
   }
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
+void GpuLattice::halve(const LatticeFrame& frame, float solid_depth) {
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  half_.use();
+  half_.set("u_solid_depth", solid_depth);
+  dispatch_cells(frame.half_size.x, frame.half_size.y, frame.half_size.z);
 }
 
 void GpuLattice::sweep(const LatticeFrame& frame, const glm::vec3& to_light, const gl::Texture& depth) {

@@ -13,16 +13,16 @@ namespace strandcast {
 class GpuLattice final : public gl::Resource {
  public:
   GpuLattice() : Resource("light lattice") {}
-  Status prepare(const gl::ShaderLibrary& shaders);
+  Status prepare(const gl::ShaderLibrary& shaders, const HeadOccupancy& solid);
   /// Reads the points and strands that are bound to kUnitTilePoints and kUnitTileStrands.
-  void build(const LightLatticeDesc& desc, const LatticeFrame& frame, const LightDirections& lights,
-             uint32_t strand_count, float width_m);
+  void build(const LatticeFrame& frame, const LightDirections& lights, uint32_t strand_count, float width_m);
   /// Depths to the units that shaders/render/tile_light.glsl reads.
   void bind() const;
   uint64_t size_bytes() const override;
 
  private:
   void resize(const LatticeFrame& frame);
+  void halve(const LatticeFrame& frame, float solid_depth);
   void sweep(const LatticeFrame& frame, const glm::vec3& to_light, const gl::Texture& depth);
 
   gl::Program sum_, key_, half_, sweep_;
@@ -30,6 +30,10 @@ class GpuLattice final : public gl::Resource {
   GrownBuffer halved_{"light halved"};
   GrownBuffer swept_{"light swept"};
   gl::Texture key_depth_, rim_depth_, sky_depth_;
+  gl::Texture solid_;
+  glm::vec3 solid_origin_m_{0.0f};  // corner of its first cell
+  glm::vec3 solid_from_m_{0.0f};
+  float solid_reach_m_ = 0.0f;
   glm::ivec3 size_{0};
 };
 

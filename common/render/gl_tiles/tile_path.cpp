@@ -56,7 +56,7 @@ class TileFrame final : public gl::Resource {
       : Resource("tile frame", sizeof(TileBlock)),
         facts(detail_facts(scene)),
         lattice_desc{scene.rest.extent_m, LightLatticeDesc().cells, scene.light_volume.has_skull,
-                     scene.light_volume.skull} {}
+                     scene.light_volume.skull, nullptr} {}
 
   DetailFacts facts;
   LightLatticeDesc lattice_desc;
@@ -150,20 +150,24 @@ class TileExpandPass final : public RenderPass {
 
 class TileLightPass final : public RenderPass {
  public:
-  TileLightPass(TileFrame& frame, GpuPoints& points, GpuLattice& lattice)
+  TileLightPass(const RenderScene& scene, TileFrame& frame, GpuPoints& points, GpuLattice& lattice)
       : Pass({"render/light", {&points}, {&lattice}, true, {}}),
+        scene_(scene),
         frame_(frame),
         points_(points),
         lattice_(lattice) {}
-  Status prepare(const RenderSetup& setup) override { return lattice_.prepare(setup.shaders); }
+  Status prepare(const RenderSetup& setup) override {
+    const LightLatticeDesc desc = describe_lattice(setup.asset, scene_, frame_.lattice_desc.cells);
+    return lattice_.prepare(setup.shaders, *desc.solid);
+  }
   Status run(RenderTurn&) override {
     points_.bind();
-    lattice_.build(frame_.lattice_desc, frame_.lattice, frame_.lights, frame_.detail.strand_count,
-                   frame_.block.strand.x);
+    lattice_.build(frame_.lattice, frame_.lights, frame_.detail.strand_count, frame_.block.strand.x);
     return {};
   }
 
  private:
+  const RenderScene& scene_;
   TileFrame& frame_;
   GpuPoints& points_;
   GpuLattice& lattice_;
@@ -324,7 +328,7 @@ void add_tile_passes(RenderScene& scene, RenderPassList& passes) {
   auto& bins = passes.keep(std::make_unique<GpuBins>());
   passes.add(make_upload_pass(scene));
   passes.add(std::make_unique<TileExpandPass>(scene, frame, points));
-  passes.add(std::make_unique<TileLightPass>(frame, points, lattice));
+  passes.add(std::make_unique<TileLightPass>(scene, frame, points, lattice));
   passes.add(std::make_unique<TileShadePass>(frame, points, lattice));
   passes.add(std::make_unique<TileBinPass>(frame, points, bins));
   passes.add(std::make_unique<TileHeadPass>(scene));
