@@ -148,7 +148,11 @@ LAW vec3 hair_radiance(HairLook look, HairStrand hair, HairLights lights, LightD
   return lights.key_color * key + lights.rim_color * rim + color * sky;
 }
 
-// How much of its width a strand covers at `along`: it fades out over its last part. 0 fade: never.
-LAW float tip_cover(float along, float fade) {
-  return clamp((1.0 - along) / max(fade, 1e-3) + 0.1, 0.0, 1.0);
+// How much of its width a strand covers at `along`: it comes out of the skin over its first part and fades out over its
+// last. `step`: from point to point; where that is longer than the first part, as much is missing in all. 0 fade: never.
+LAW float strand_cover(float along, float step, float fade) {
+  const float kRootFade = 0.03;  // of the length
+  const float kRootCover = 0.15;
+  float buried = max(1.0 - along / kRootFade, 0.0) * min(kRootFade / max(step, 1e-6), 1.0);
+  return clamp((1.0 - along) / max(fade, 1e-3) + 0.1, 0.0, 1.0) * (1.0 - (1.0 - kRootCover) * buried);
 }

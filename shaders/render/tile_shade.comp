@@ -56,7 +56,7 @@ void main() {
     float along = min(float(k) * along_step, 1.0);
     vec3 light = hair_radiance(look, hair, lights, light_depth_at(place), along, tangent, to_eye);
     float width = u_frame.strand.x * u_frame.target.z * (1.0 + (u_frame.strand.y - 1.0) * along * along) * here.per_away;
-    float opacity = tip_cover(along, u_frame.strand.z);
+    float opacity = strand_cover(along, along_step, u_frame.strand.z);
     // Joints: across the mean of the directions before and behind. A strand that turns back is cut across its way on.
     vec2 way_behind = unit_or_none(next.at - here.at);
     vec2 mitre = way_before + way_behind;

@@ -90,6 +90,28 @@ TEST(Lanes, HashesAreThoseOfTheRest) {
       EXPECT_EQ(law::mix_u32(simd::Uint(x)).v[lane], mix_u32(x)) << x;
 }
 
+// However far apart its points are, as much of a strand is hidden in the skin.
+TEST(Laws, StrandsComeOutOfTheSkinAlikeForAnySteps) {
+  const auto cover_between = [](float step) {
+    const auto cover_at = [&](float along) {
+      return law::strand_cover(simd::Float(along), simd::Float(step), simd::Float(0.1f)).v[0];
+    };
+    constexpr float kEnd = 0.24f;
+    double sum = 0.0;
+    const int steps = static_cast<int>(std::lround(kEnd / step));
+    for (int i = 0; i < steps; ++i) {
+      const float from = step * static_cast<float>(i);
+      sum += 0.5 * step * (cover_at(from) + cover_at(from + step));
+    }
+    EXPECT_EQ(cover_at(kEnd), 1.0f);
+    EXPECT_LT(cover_at(0.0f), 1.0f);
+    return sum / kEnd;
+  };
+  const double fine = cover_between(0.001f);
+  EXPECT_LT(fine, 1.0);
+  for (const float step : {0.01f, 0.03f, 0.06f, 0.12f}) EXPECT_NEAR(cover_between(step), fine, 1e-4) << step;
+}
+
 TEST(WorkerPool, DoesEveryPartOnceAndAgain) {
   for (const uint32_t threads : {1u, 2u, 5u}) {
     WorkerPool workers(threads);

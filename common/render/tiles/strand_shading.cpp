@@ -85,7 +85,7 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
       store_lanes(y, dy + at);
       const Float width =
           in.width_m * in.view.focal_px * (1.0f + (in.tip_scale - 1.0f) * along * along) * per_away;
-      const Float opacity = tip_cover(along, in.tip_fade);
+      const Float opacity = strand_cover(along, along_step, in.tip_fade);
       const UintBits width_bits = half_bits(width);
       const UintBits opacity_bits = half_bits(opacity);
       const UintBits red = half_bits(light.x);
