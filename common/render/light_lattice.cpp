@@ -129,9 +129,9 @@ uint64_t LightLattice::size_bytes() const {
   return bytes;
 }
 
-void LightLattice::build(const StrandPoints& points, const LightStrands& strands,
+void LightLattice::build(const LatticeFrame& frame, const StrandPoints& points, const LightStrands& strands,
                          const LightDirections& lights, WorkerPool& workers) {
-  fit(points, lights, workers);
+  static_cast<LatticeFrame&>(view_) = frame;
   sum_strands(points, strands, workers);
   sweep_key(workers);
   workers.run([&](uint32_t worker) {
@@ -151,27 +151,6 @@ void LightLattice::build(const StrandPoints& points, const LightStrands& strands
     others_[i] = stored(rim_depth_[i]) | stored(sky_depth_[i]) << 16;
   view_.key = key_.data();
   view_.others = others_.data();
-}
-
-void LightLattice::fit(const StrandPoints& points, const LightDirections& lights, WorkerPool& workers) {
-  static_cast<LatticeFrame&>(view_) = turned_frame(desc_, lights);
-  std::vector<Bounds> bounds(workers.size());
-  const uint32_t strands = points.strand_count();
-  workers.run([&](uint32_t worker) {
-    const uint32_t begin = static_cast<uint32_t>(uint64_t{strands} * worker / workers.size());
-    const uint32_t end = static_cast<uint32_t>(uint64_t{strands} * (worker + 1) / workers.size());
-    constexpr uint32_t kEvery = 4;  // points along a strand are close
-    for (uint32_t strand = begin; strand < end; ++strand)
-      for (uint32_t i = points.first_point[strand]; i < points.first_point[strand + 1]; i += kEvery) {
-        const StrandPoint& p = points.point[i];
-        bounds[worker].add({p.x, p.y, p.z}, view_);
-      }
-  });
-  for (uint32_t worker = 1; worker < workers.size(); ++worker) {
-    bounds[0].low = glm::min(bounds[0].low, bounds[worker].low);
-    bounds[0].high = glm::max(bounds[0].high, bounds[worker].high);
-  }
-  set_size(desc_, bounds[0], view_);
 }
 
 void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers) {

@@ -78,13 +78,14 @@ class LightLattice {
  public:
   explicit LightLattice(const LightLatticeDesc& desc) : desc_(desc) {}
 
-  void build(const StrandPoints& points, const LightStrands& strands, const LightDirections& lights,
-             WorkerPool& workers);
+  /// `frame`: of fit_lattice(), with the same lights.
+  void build(const LatticeFrame& frame, const StrandPoints& points, const LightStrands& strands,
+             const LightDirections& lights, WorkerPool& workers);
+  const LightLatticeDesc& desc() const { return desc_; }
   const LightLatticeView& view() const { return view_; }
   uint64_t size_bytes() const;
 
  private:
-  void fit(const StrandPoints& points, const LightDirections& lights, WorkerPool& workers);
   void sum_strands(const StrandPoints& points, const LightStrands& strands, WorkerPool& workers);
   void sweep_key(WorkerPool& workers);
   bool has_solid() const { return desc_.solid && !desc_.solid->is_empty(); }

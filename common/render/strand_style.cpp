@@ -46,6 +46,10 @@ StyleNumbers style_numbers(const LookDesc& look, float mean_length_m) {
           s.short_share};
 }
 
+float style_room_m(const StyleNumbers& style) {
+  return style.spread_m + style.wave_m + style.frizz_m;
+}
+
 std::vector<uint8_t> parted_triangles(const SceneAsset& asset) {
   std::vector<uint8_t> parted;
   parted.reserve(asset.triangle.size());

@@ -18,6 +18,9 @@ struct StyleNumbers {
 /// `mean_length_m`: of a key strand at rest.
 StyleNumbers style_numbers(const LookDesc& look, float mean_length_m);
 
+/// What a drawn strand may lie beside its keys, m.
+float style_room_m(const StyleNumbers& style);
+
 /// Per root triangle: 1 where its hair falls to different sides at rest, else 0.
 std::vector<uint8_t> parted_triangles(const SceneAsset& asset);
 

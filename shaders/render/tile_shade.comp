@@ -26,11 +26,18 @@ ScreenPoint on_screen(vec3 point_m) {
   return s;
 }
 
-// As a unit vector; none where it has no length.
-vec2 unit_or_none(vec2 v) {
-  const float kNoWay = 1e-12;  // squared pixels
-  float squared = dot(v, v);
-  return squared > kNoWay ? v * inversesqrt(squared) : vec2(0.0);
+// Between two points on the screen.
+struct Way {
+  vec2 unit;      // none where it has no length
+  float squared;  // px
+};
+
+Way way_between(vec2 from, vec2 to) {
+  const float kNoWay = 1e-4;  // squared pixels; what is shorter points anywhere
+  Way way;
+  way.squared = dot(to - from, to - from);
+  way.unit = way.squared > kNoWay ? (to - from) * inversesqrt(way.squared) : vec2(0.0);
+  return way;
 }
 
 void main() {
@@ -46,7 +53,7 @@ void main() {
   vec3 place = point_place(first);
   vec3 before = place;
   ScreenPoint here = on_screen(place);
-  vec2 way_before = vec2(0.0);
+  Way way_before = Way(vec2(0.0), 0.0);
   for (uint k = 0u; k <= last; ++k) {
     // Read before anything is written over it.
     vec3 behind = point_place(first + min(k + 1u, last));
@@ -57,10 +64,11 @@ void main() {
     vec3 light = hair_radiance(look, hair, lights, light_depth_at(place), along, tangent, to_eye);
     float width = u_frame.strand.x * u_frame.target.z * (1.0 + (u_frame.strand.y - 1.0) * along * along) * here.per_away;
     float opacity = strand_cover(along, along_step, u_frame.strand.z);
-    // Joints: across the mean of the directions before and behind. A strand that turns back is cut across its way on.
-    vec2 way_behind = unit_or_none(next.at - here.at);
-    vec2 mitre = way_before + way_behind;
-    if (dot(mitre, mitre) < 0.03) mitre = way_behind;
+    // Joints: across the mean of the directions before and behind. A strand that turns back is cut across its longer side,
+    // which hides the other one.
+    Way way_behind = way_between(here.at, next.at);
+    vec2 mitre = way_before.unit + way_behind.unit;
+    if (dot(mitre, mitre) < 0.03) mitre = way_before.squared > way_behind.squared ? way_before.unit : way_behind.unit;
     const float kMostHalf = 65504.0;
     light = min(light, vec3(kMostHalf));
     uint texel = 2u * (first + k);

@@ -140,9 +140,10 @@ Result<StageWork> walk_stages(const Case& one, const SceneAsset& asset, const Ti
   shade.tip_scale = scene.look.tip_scale;
   shade.tip_fade = scene.look.style.tip_fade;
   shade.lights = light_directions(scene.look, strands.world_from_head.rotation, view.up);
-  LightLattice lattice({scene.rest.extent_m, options.light_cells, false, {}});
+  LightLattice lattice(describe_lattice(asset, scene, options.light_cells));
+  const LatticeFrame frame = fit_lattice(lattice.desc(), shade.lights, asset.rest_position_m, 0.0f);
   timed("render/light", [&] {
-    lattice.build(points, {shade.width_m, shade.tip_scale, shade.tip_fade}, shade.lights, workers);
+    lattice.build(frame, points, {shade.width_m, shade.tip_scale, shade.tip_fade}, shade.lights, workers);
   });
   shade.lattice = lattice.view();
   timed("render/shade", [&] { shade_points(shade, workers, options.set, points); });

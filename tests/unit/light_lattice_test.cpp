@@ -58,6 +58,14 @@ double other_depth(const LightLatticeView& view, const glm::vec3& point, bool is
   return (is_sky ? both >> 16 : both & 0xffffu) * double{kLightDepthUnit};
 }
 
+/// Round the points.
+void build(LightLattice& lattice, const StrandPoints& points, const LightStrands& strands,
+           const LightDirections& lights, WorkerPool& workers) {
+  std::vector<glm::vec3> place_m;
+  for (const StrandPoint& p : points.point) place_m.emplace_back(p.x, p.y, p.z);
+  lattice.build(fit_lattice(lattice.desc(), lights, place_m, 0.0f), points, strands, lights, workers);
+}
+
 class LightLatticeTest : public testing::Test {
  protected:
   static constexpr float kSideM = 0.1f;
@@ -70,7 +78,7 @@ class LightLatticeTest : public testing::Test {
 TEST_F(LightLatticeTest, DepthGrowsAsTheHairThatIsPassed) {
   const StrandPoints points = strands_in_box(kCount, kSideM);
   LightLattice lattice({kSideM, 32, false, {}, nullptr});
-  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
+  build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
   for (const float y : {0.03f, 0.0f, -0.03f}) {
     const double passed_m = 0.5 * kSideM - y;
     EXPECT_NEAR(key_depth(lattice.view(), {0, y, 0}), kPerM * passed_m, 0.04 * kPerM * kSideM) << y;
@@ -85,7 +93,7 @@ TEST_F(LightLatticeTest, DepthGrowsAsTheHairThatIsPassed) {
 TEST_F(LightLatticeTest, NothingIsShadowedInFrontOfTheHair) {
   const StrandPoints points = strands_in_box(2000, kSideM);
   LightLattice lattice({kSideM, 32, false, {}, nullptr});
-  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
+  build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
   EXPECT_NEAR(key_depth(lattice.view(), {0, 0, 0.06f}), 0.0, 0.02);
   EXPECT_EQ(other_depth(lattice.view(), {0, 0, 0}, false), 0.0) << "there is no rim light";
 }
@@ -96,7 +104,7 @@ TEST_F(LightLatticeTest, OrderAndThreadsDoNotShow) {
   WorkerPool alone(1);
   const LightDirections lights{
       glm::normalize(glm::vec3(0.3f, 1, 0.2f)), glm::normalize(glm::vec3(-1, 0.3f, 0.5f)), {0, 1, 0}, true};
-  one.build(points, {kWidthM, 0.3f, 0.2f}, lights, alone);
+  build(one, points, {kWidthM, 0.3f, 0.2f}, lights, alone);
   const glm::ivec3 size = one.view().size;
   const std::vector<uint16_t> key(one.view().key, one.view().key + size_t{1} * size.x * size.y * size.z);
   // Strands in another order, on more threads.
@@ -110,7 +118,7 @@ TEST_F(LightLatticeTest, OrderAndThreadsDoNotShow) {
   }
   WorkerPool many(4);
   LightLattice other({kSideM, 48, false, {}, nullptr});
-  other.build(turned, {kWidthM, 0.3f, 0.2f}, lights, many);
+  build(other, turned, {kWidthM, 0.3f, 0.2f}, lights, many);
   ASSERT_EQ(other.view().size, size);
   EXPECT_TRUE(std::equal(key.begin(), key.end(), other.view().key));
 }
@@ -133,7 +141,7 @@ TEST_F(LightLatticeTest, AHeadIsOpaqueAndBesideItNothingIs) {
   for (const glm::vec3 to_light :
        {glm::vec3(0, 1, 0), glm::vec3(0.6f, 0, -0.8f), glm::normalize(glm::vec3(0.3f, 1, 0.2f))}) {
     const glm::vec3 aside = glm::normalize(glm::cross(to_light, glm::vec3(0.3f, 0.1f, 1)));
-    lattice.build(points, {kWidthM, 1.0f, 0.0f}, {to_light, aside, {0, 1, 0}, true}, workers_);
+    build(lattice, points, {kWidthM, 1.0f, 0.0f}, {to_light, aside, {0, 1, 0}, true}, workers_);
     EXPECT_NEAR(key_depth(lattice.view(), -1.1f * kRadiusM * to_light), kSolidDepth, 0.5);
     EXPECT_LT(key_depth(lattice.view(), 1.1f * kRadiusM * to_light), 0.5);
     EXPECT_LT(key_depth(lattice.view(), kRadiusM * (1.15f * aside - 1.1f * to_light)), 0.5);
@@ -144,7 +152,7 @@ TEST_F(LightLatticeTest, AHeadIsOpaqueAndBesideItNothingIs) {
     EXPECT_GT(other_depth(lattice.view(), -1.1f * kRadiusM * aside, false), 20.0);
   }
   // From straight above it hides a part of the sky, that goes with what lies above.
-  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
+  build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
   const float chord_cells = 2.0f * (kRadiusM / lattice.view().cell_m - kSolidInsetCells);
   EXPECT_NEAR(other_depth(lattice.view(), {0, -1.2f * kRadiusM, 0}, true), kSolidSkyDepth * chord_cells,
               0.1f * kSolidSkyDepth * chord_cells + 0.05f);
@@ -156,7 +164,7 @@ TEST_F(LightLatticeTest, ShouldersLieInTheShadeOfTheHead) {
   // Hair down to the shoulders, so that the lattice reaches them.
   const StrandPoints points = strands_in_box(10, 0.4f);
   const LightDirections lights{{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true};
-  lattice.build(points, {kWidthM, 1.0f, 0.0f}, lights, workers_);
+  build(lattice, points, {kWidthM, 1.0f, 0.0f}, lights, workers_);
   // Beside the neck, under jaw and ear; and out on the shoulder.
   EXPECT_GT(key_depth(lattice.view(), {0.055f, -0.15f, 0.0f}), 10.0);
   EXPECT_LT(key_depth(lattice.view(), {0.13f, -0.15f, 0.0f}), 0.5);
@@ -171,12 +179,12 @@ TEST_F(LightLatticeTest, TheHeadIsTheSameForAnyNumberOfThreads) {
       glm::normalize(glm::vec3(0.3f, 1, 0.2f)), glm::normalize(glm::vec3(-1, 0.3f, 0.5f)), {0, 1, 0}, true};
   LightLattice one(with_head(0.08f));
   WorkerPool alone(1);
-  one.build(points, {kWidthM, 1.0f, 0.0f}, lights, alone);
+  build(one, points, {kWidthM, 1.0f, 0.0f}, lights, alone);
   const auto count = [](const glm::ivec3& size) { return size_t{1} * size.x * size.y * size.z; };
   for (const uint32_t threads : {2u, 3u, 5u}) {
     LightLattice other(with_head(0.08f));
     WorkerPool many(threads);
-    other.build(points, {kWidthM, 1.0f, 0.0f}, lights, many);
+    build(other, points, {kWidthM, 1.0f, 0.0f}, lights, many);
     EXPECT_TRUE(std::equal(one.view().key, one.view().key + count(one.view().size), other.view().key));
     EXPECT_TRUE(
         std::equal(one.view().others, one.view().others + count(one.view().half_size), other.view().others));
@@ -189,7 +197,7 @@ TEST_F(LightLatticeTest, NoCellOfTheHeadIsSkipped) {
   LightLattice lattice(desc);
   StrandPoints none = strands_in_box(2, 0.4f);
   const LightDirections lights{glm::normalize(glm::vec3(0.3f, 0.8f, 0.5f)), {0, 0, 1}, {0, 1, 0}, false};
-  lattice.build(none, {0.0f, 1.0f, 0.0f}, lights, workers_);
+  build(lattice, none, {0.0f, 1.0f, 0.0f}, lights, workers_);
   const LightLatticeView& view = lattice.view();
   double worst = 0.0;
   for (int y = 0; y < view.size.y; ++y)
@@ -217,7 +225,7 @@ TEST_F(LightLatticeTest, StrandsThatAreNoNumbersCastNothing) {
   points.point[5].x = std::numeric_limits<float>::quiet_NaN();
   points.point[40].y = 1e30f;
   LightLattice lattice({kSideM, 32, false, {}, nullptr});
-  lattice.build(points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
+  build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 1, 0}, {0, 0, 1}, {0, 1, 0}, true}, workers_);
   EXPECT_LE(lattice.view().size.x, 160);
   EXPECT_LT(key_depth(lattice.view(), {0, 0.04f, 0}), 1.0);
 }

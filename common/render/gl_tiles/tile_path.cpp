@@ -72,11 +72,6 @@ class TileFrame final : public gl::Resource {
   }
 };
 
-/// What the style may set a strand apart from its keys: room around them.
-float style_room_m(const StyleNumbers& style) {
-  return style.spread_m + style.wave_m + style.frizz_m;
-}
-
 uint32_t groups_of(uint32_t count, uint32_t size) {
   return (count + size - 1) / size;
 }

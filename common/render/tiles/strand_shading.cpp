@@ -115,14 +115,15 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
       vec2 behind(load_lanes(dx + at + 1) - x, load_lanes(dy + at + 1) - y);
       const Float before2 = dot(before, before);
       const Float behind2 = dot(behind, behind);
-      constexpr float kNoWay = 1e-12f;  // squared pixels
+      constexpr float kNoWay = 1e-4f;  // squared pixels; what is shorter points anywhere
       before = before * vec2(select(before2 > kNoWay, inversesqrt(max(before2, kNoWay)), 0.0f));
       behind = behind * vec2(select(behind2 > kNoWay, inversesqrt(max(behind2, kNoWay)), 0.0f));
       const vec2 sum = before + behind;
-      // A strand that turns back has no mitre: it is cut across its way on.
+      // A strand that turns back has no mitre: it is cut across its longer side, which hides the other one.
       const Bool turns = dot(sum, sum) < 0.03f;
-      const UintBits mitre_x = half_bits(select(turns, behind.x, sum.x));
-      const UintBits mitre_y = half_bits(select(turns, behind.y, sum.y));
+      const Bool is_before = before2 > behind2;
+      const UintBits mitre_x = half_bits(select(turns, select(is_before, before.x, behind.x), sum.x));
+      const UintBits mitre_y = half_bits(select(turns, select(is_before, before.y, behind.y), sum.y));
       const uint32_t lanes = count - k < kLanes ? count - k : kLanes;
       for (uint32_t lane = 0; lane < lanes; ++lane) {
         points[k + lane].half[kMitreX] = static_cast<uint16_t>(mitre_x[lane]);
