@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "common/render/tiles/half_float.h"
 #include "common/render/tiles/light_lookup.h"
+#include "common/render/tiles/tile_blend.h"
 
 namespace strandcast {
 namespace {
@@ -17,47 +17,13 @@ using simd::FloatBits;
 using simd::IntBits;
 using simd::kLanes;
 
-// Pixels that a vector holds.
-constexpr int kBlockColumns = 4;
-constexpr int kBlockRows = 2;
-static_assert(kBlockColumns * kBlockRows == kLanes);
-constexpr int kTile = static_cast<int>(kTilePx);
-constexpr int kBlocksAcross = kTile / kBlockColumns;
-constexpr int kBlocksDown = kTile / kBlockRows;
-constexpr int kBlocks = kBlocksAcross * kBlocksDown;
-// Light that still passes when a pixel counts as opaque.
-constexpr float kOpaque = 1.0f / 300.0f;
-constexpr uint32_t kPairsBetweenChecks = 24;
-// Strands this far behind the skin are still in front of it: roots stand in it.
-constexpr float kSkinDepthM = 0.0005f;
+constexpr uint32_t kPairsBetweenChecks = 32;
 // The background is lighter at the top of the picture and darker at its bottom by this share.
 constexpr float kGradient = 0.35f;
 // Samples of the head per pixel side.
 constexpr int kHeadSamples = 2;
 constexpr float kFar = 1e30f;
 constexpr uint32_t kNoTriangle = 0xffffffffu;
-
-/// Of one tile, per pixel.
-struct TilePixels {
-  Float red[kBlocks];
-  Float green[kBlocks];
-  Float blue[kBlocks];
-  Float passed[kBlocks];  // share of what lies behind that is still seen
-};
-struct TileHead {
-  Float depth[kBlocks];      // m, nearest
-  Float uncovered[kBlocks];  // share of the pixel
-  Float red[kBlocks];
-  Float green[kBlocks];
-  Float blue[kBlocks];
-};
-
-STRANDCAST_LANES Float block_columns() {
-  return FloatBits{0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f};
-}
-STRANDCAST_LANES Float block_rows() {
-  return FloatBits{0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f};
-}
 
 // ---- the head
 
@@ -67,7 +33,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
   const uint32_t end = lists.first[tile + 1];
   if (begin == end) return false;
   const HeadPicture& head = *in.head;
-  constexpr int kSide = kTile * kHeadSamples;
+  constexpr int kSide = kTileSidePx * kHeadSamples;
   constexpr int kRowBlocks = kSide / kBlockColumns;
   constexpr int kSampleBlocks = kRowBlocks * (kSide / kBlockRows);
   Float depth[kSampleBlocks];
@@ -103,10 +69,11 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
         const Float w0 = ((b.x - px) * (c.y - py) - (b.y - py) * (c.x - px)) * per_area;
         const Float w1 = ((c.x - px) * (a.y - py) - (c.y - py) * (a.x - px)) * per_area;
         const Float w2 = ((a.x - px) * (b.y - py) - (a.y - py) * (b.x - px)) * per_area;
+        const Bool is_inside = w0 >= 0.0f && w1 >= 0.0f && w2 >= 0.0f;
+        if (!is_any(is_inside)) continue;
         const int block = y * kRowBlocks + x;
         const Float z = 1.0f / (w0 * a.w + w1 * b.w + w2 * c.w);
-        const Bool is_nearest = w0 >= 0.0f && w1 >= 0.0f && w2 >= 0.0f && z < depth[block];
-        if (!is_any(is_nearest)) continue;
+        const Bool is_nearest = is_inside && z < depth[block];
         depth[block] = select(is_nearest, z, depth[block]);
         which[block] = is_nearest.v ? simd::UintBits{} + triangle : which[block];
       }
@@ -128,11 +95,11 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
       for (int lane = 0; lane < static_cast<int>(kLanes); ++lane) {
         const int sample_x = (x * kBlockColumns + lane % kBlockColumns) * kHeadSamples;
         const int sample_y = (y * kBlockRows + lane / kBlockColumns) * kHeadSamples;
-        // The samples of a pixel are two pairs in one block.
-        static_assert(kHeadSamples == kBlockRows);
+        // The samples of a pixel lie in one block.
+        static_assert(kBlockColumns % kHeadSamples == 0 && kBlockRows % kHeadSamples == 0);
         const int first =
             (sample_y / kBlockRows * kRowBlocks + sample_x / kBlockColumns) * static_cast<int>(kLanes) +
-            sample_x % kBlockColumns;
+            sample_y % kBlockRows * kBlockColumns + sample_x % kBlockColumns;
         uint32_t triangle = kNoTriangle;
         int covered = 0;
         nearest[lane] = kFar;
@@ -238,112 +205,6 @@ STRANDCAST_LANES const uint64_t* sort_segments(const TileInput& in, uint32_t beg
   return from;
 }
 
-/// The seven halves of a point as floats.
-struct PointValues {
-  float value[8];
-};
-STRANDCAST_LANES PointValues values_of(const StrandPoint& point) {
-  using HalfBits = uint16_t __attribute__((vector_size(16)));
-  HalfBits half;
-  std::memcpy(&half, point.half.data(), sizeof half);
-  constexpr float kFloatScale = 5.19229686e33f;  // as float_of_half
-  const simd::UintBits bits = __builtin_convertvector(half, simd::UintBits);
-  const FloatBits size = (FloatBits)((bits & 0x7fffu) << 13) * kFloatScale;
-  const FloatBits value = (FloatBits)((simd::UintBits)size | (bits & 0x8000u) << 16);
-  PointValues values;
-  std::memcpy(values.value, &value, sizeof value);
-  return values;
-}
-
-/// Blends one segment under what lies in front of it.
-STRANDCAST_LANES void blend_segment(const StrandPoint& a, const StrandPoint& b, float tile_x, float tile_y,
-                                    const TileHead* head, TilePixels& pixels) {
-  const PointValues va = values_of(a);
-  const PointValues vb = values_of(b);
-  const float ax = a.x - tile_x;
-  const float ay = a.y - tile_y;
-  const float bx = b.x - tile_x;
-  const float by = b.y - tile_y;
-  const float dx = bx - ax;
-  const float dy = by - ay;
-  const float per_length2 = 1.0f / (dx * dx + dy * dy);
-  const float per_length = std::sqrt(per_length2);
-  const float ux = dx * per_length;
-  const float uy = dy * per_length;
-  const float wa = va.value[kWidthPx];
-  const float wb = vb.value[kWidthPx];
-  // The filter of the middle, times the width where it is: coverage adds up to the width all along.
-  const float mean_width = std::max(0.5f * (wa + wb), 1e-4f);
-  const law::LineFilter filter = law::line_filter(mean_width, {ux, uy});
-  const float per_width = 1.0f / mean_width;
-  const Float base = filter.base * per_width;
-  const Float slope = filter.slope * per_width;
-  const Float peak = filter.peak * per_width;
-  const float reach = filter.reach.v[0];
-  const float low_x = std::min(ax, bx) - reach;
-  const float high_x = std::max(ax, bx) + reach;
-  const float low_y = std::min(ay, by) - reach;
-  const float high_y = std::max(ay, by) + reach;
-  const int y0 = low_y > 0.0f ? static_cast<int>(low_y * (1.0f / kBlockRows)) : 0;
-  const int y1 =
-      high_y < static_cast<float>(kTile) ? static_cast<int>(high_y * (1.0f / kBlockRows)) : kBlocksDown - 1;
-  // Of a steep line the blocks of a row lie close around it.
-  constexpr float kSteep = 0.08f;
-  const bool is_steep = std::abs(uy) > kSteep;
-  const float x_per_y = is_steep ? dx / dy : 0.0f;
-  const float room = is_steep ? reach / std::abs(uy) : 0.0f;
-
-  const float along_x = dx * per_length2;
-  const float along_y = dy * per_length2;
-  const Float cx = block_columns();
-  const Float cy = block_rows();
-  const float da = vb.value[kOpacity] - va.value[kOpacity];
-  const bool fades = da != 0.0f || va.value[kOpacity] != 1.0f;
-  const float width_step = wb - wa;
-  for (int y = std::max(y0, 0); y <= y1; ++y) {
-    float from = low_x;
-    float to = high_x;
-    const auto top = static_cast<float>(y * kBlockRows);
-    if (is_steep) {
-      const float x_top = ax + (top - ay) * x_per_y;
-      const float x_bottom = x_top + kBlockRows * x_per_y;
-      from = std::max(from, std::min(x_top, x_bottom) - room);
-      to = std::min(to, std::max(x_top, x_bottom) + room);
-    }
-    if (!(from < static_cast<float>(kTile))) continue;
-    const int x0 = from > 0.0f ? static_cast<int>(from * (1.0f / kBlockColumns)) : 0;
-    const int x1 =
-        to < static_cast<float>(kTile) ? static_cast<int>(to * (1.0f / kBlockColumns)) : kBlocksAcross - 1;
-    const Float py = cy + top;
-    for (int x = x0; x <= x1; ++x) {
-      const Float px = cx + static_cast<float>(x * kBlockColumns);
-      const Float rx = px - ax;
-      const Float ry = py - ay;
-      const Float across = rx * uy - ry * ux;
-      const Float part = simd::clamp(rx * along_x + ry * along_y, 0.0f, 1.0f);
-      // shaders/lib/coverage.glsl
-      const Float cover =
-          simd::min(simd::min(base - slope * simd::abs(across), peak) * (wa + part * width_step), 1.0f);
-      // Joints: a pixel belongs to the segment between the mitres of its ends, computed alike on both sides
-      // of one.
-      const Float behind_a = (px - ax) * va.value[kMitreX] + (py - ay) * va.value[kMitreY];
-      const Float behind_b = (px - bx) * vb.value[kMitreX] + (py - by) * vb.value[kMitreY];
-      const Bool is_mine = behind_a >= 0.0f && behind_b < 0.0f && cover > 0.0f;
-      const int block = y * kBlocksAcross + x;
-      Float opacity = fades ? cover * (va.value[kOpacity] + part * da) : cover;
-      if (head != nullptr) {
-        const Float z = a.z + part * (b.z - a.z);
-        opacity = select(z < head->depth[block] + kSkinDepthM, opacity, opacity * head->uncovered[block]);
-      }
-      const Float share = FloatBits((IntBits)(pixels.passed[block] * opacity).v & is_mine.v);
-      pixels.red[block] += share * (va.value[kRed] + part * (vb.value[kRed] - va.value[kRed]));
-      pixels.green[block] += share * (va.value[kGreen] + part * (vb.value[kGreen] - va.value[kGreen]));
-      pixels.blue[block] += share * (va.value[kBlue] + part * (vb.value[kBlue] - va.value[kBlue]));
-      pixels.passed[block] -= share;
-    }
-  }
-}
-
 STRANDCAST_LANES Float tone_mapped(Float linear) {
   // shaders/lib/tone.glsl
   constexpr float kKnee = 0.7f;
@@ -352,15 +213,16 @@ STRANDCAST_LANES Float tone_mapped(Float linear) {
   return simd::min(linear, kKnee) + kRoom * over / (over + kRoom);
 }
 
-STRANDCAST_LANES float background_gradient(const TileInput& in, uint32_t row) {
-  const float high = 1.0f - (static_cast<float>(row) + 0.5f) / static_cast<float>(in.grid.size_px.y);
+/// `middle`: of a row, px from the top.
+STRANDCAST_LANES Float background_gradient(const TileInput& in, Float middle) {
+  const Float high = 1.0f - middle / static_cast<float>(in.grid.size_px.y);
   return 1.0f + kGradient * (2.0f * high - 1.0f);
 }
 
 STRANDCAST_LANES void fill_background(const TileInput& in, uint32_t left, uint32_t top, uint32_t width,
                                       uint32_t height) {
   for (uint32_t y = 0; y < height; ++y) {
-    const glm::vec3 color = in.background * background_gradient(in, top + y);
+    const glm::vec3 color = in.background * background_gradient(in, static_cast<float>(top + y) + 0.5f).v[0];
     uint32_t packed = 0xff000000u;
     for (int c = 0; c < 3; ++c) {
       const auto step = static_cast<int>(std::clamp(color[c], 0.0f, 1.0f) * kSrgbSteps);
@@ -390,20 +252,21 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
   if (count > 0) {
     const uint64_t* const order = sort_segments(in, begin, count, scratch);
     const StrandPoint* const points = in.points->point.data();
-    uint32_t until_check = kPairsBetweenChecks;
-    for (uint32_t i = 0; i < count; ++i) {
-      constexpr uint32_t kAhead = 8;
-      const auto next = static_cast<uint32_t>(order[i + kAhead < count ? i + kAhead : count - 1]);
-      __builtin_prefetch(points + next);
-      __builtin_prefetch(points + next + 1);
-      const StrandPoint& a = points[static_cast<uint32_t>(order[i])];
-      blend_segment(a, (&a)[1], static_cast<float>(left), static_cast<float>(top), has_head ? &head : nullptr,
-                    pixels);
-      if (--until_check > 0) continue;
-      until_check = kPairsBetweenChecks;
-      Float most = pixels.passed[0];
-      for (int block = 1; block < kBlocks; ++block) most = simd::max(most, pixels.passed[block]);
-      if (!is_any(most > kOpaque)) break;
+    for (int y = 0; y < kBlocksDown; ++y) pixels.open[y] = (uint32_t{1} << kBlocksAcross) - 1;
+    for (uint32_t i = 0; i < count; i += kLanes) {
+      constexpr uint32_t kAhead = 2 * kLanes;
+      for (uint32_t lane = 0; lane < kLanes; ++lane) {
+        const uint32_t next = std::min(i + kAhead + lane, count - 1);
+        const StrandPoint* const ends = points + static_cast<uint32_t>(order[next]);
+        __builtin_prefetch(ends);
+        __builtin_prefetch(ends + 1);
+      }
+      const uint32_t some = std::min(count - i, kLanes);
+      SegmentBatch batch;
+      place_segments(points, order + i, some, static_cast<float>(left), static_cast<float>(top), batch);
+      for (uint32_t lane = 0; lane < some; ++lane)
+        blend_segment(batch, lane, has_head ? &head : nullptr, pixels);
+      if (i % kPairsBetweenChecks == 0 && !close_opaque_blocks(pixels)) break;
     }
   }
 
@@ -413,11 +276,8 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
-      // The two rows of a block have backgrounds of their own.
-      const uint32_t row = top + static_cast<uint32_t>(y) * kBlockRows;
-      const float upper = background_gradient(in, row);
-      const float lower = background_gradient(in, row + 1);
-      const Float gradient = FloatBits{upper, upper, upper, upper, lower, lower, lower, lower};
+      const Float gradient = background_gradient(
+          in, block_rows() + static_cast<float>(top + static_cast<uint32_t>(y) * kBlockRows));
       Float color[3] = {in.background.x * gradient, in.background.y * gradient, in.background.z * gradient};
       {
         Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};

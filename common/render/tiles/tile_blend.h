@@ -1,0 +1,264 @@
+// Blending of a tile's segments front to back, for the kernel of tile_raster.cpp: what a segment needs is
+// found for eight of them at once, then each is blended into the blocks of pixels that it can reach.
+// Everything is inlined.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "common/render/laws.h"
+#include "common/render/tiles/tile_frame.h"
+
+namespace strandcast {
+
+// Pixels that a vector holds. Hair hangs, so blocks are higher than wide.
+inline constexpr int kBlockColumns = 2;
+inline constexpr int kBlockRows = 4;
+static_assert(kBlockColumns * kBlockRows == simd::kLanes);
+inline constexpr int kTileSidePx = static_cast<int>(kTilePx);
+inline constexpr int kBlocksAcross = kTileSidePx / kBlockColumns;
+inline constexpr int kBlocksDown = kTileSidePx / kBlockRows;
+inline constexpr int kBlocks = kBlocksAcross * kBlocksDown;
+// Light that still passes when a pixel counts as opaque.
+inline constexpr float kOpaque = 1.0f / 300.0f;
+// Strands this far behind the skin are still in front of it: roots stand in it.
+inline constexpr float kSkinDepthM = 0.0005f;
+
+/// Of one tile, per pixel.
+struct TilePixels {
+  simd::Float red[kBlocks];
+  simd::Float green[kBlocks];
+  simd::Float blue[kBlocks];
+  simd::Float passed[kBlocks];  // share of what lies behind that is still seen
+  // Per row of blocks, a bit for each that something can still be blended into.
+  uint32_t open[kBlocksDown];
+};
+struct TileHead {
+  simd::Float depth[kBlocks];      // m, nearest
+  simd::Float uncovered[kBlocks];  // share of the pixel
+  simd::Float red[kBlocks];
+  simd::Float green[kBlocks];
+  simd::Float blue[kBlocks];
+};
+
+STRANDCAST_LANES simd::Float block_columns() {
+  return simd::FloatBits{0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f};
+}
+STRANDCAST_LANES simd::Float block_rows() {
+  return simd::FloatBits{0.5f, 0.5f, 1.5f, 1.5f, 2.5f, 2.5f, 3.5f, 3.5f};
+}
+
+/// The seven halves of a point as floats, in their order.
+STRANDCAST_LANES simd::Float values_of(const StrandPoint& point) {
+  using HalfBits = uint16_t __attribute__((vector_size(16)));
+  HalfBits half;
+  std::memcpy(&half, point.half.data(), sizeof half);
+  constexpr float kFloatScale = 5.19229686e33f;  // as float_of_half
+  const simd::UintBits bits = __builtin_convertvector(half, simd::UintBits);
+  const simd::FloatBits size = (simd::FloatBits)((bits & 0x7fffu) << 13) * kFloatScale;
+  return (simd::FloatBits)((simd::UintBits)size | (bits & 0x8000u) << 16);
+}
+
+/// Eight segments, as they are blended. Distances are straight functions of a pixel's middle (x, y), counted
+/// from the tile's corner: x * [0] + y * [1] + [2].
+struct SegmentBatch {
+  using Row = float[simd::kLanes];
+  Row across[3];    // from the line, px
+  Row along[3];     // 0 at the first end, 1 at the second
+  Row behind_a[3];  // positive beyond the mitre of an end
+  Row behind_b[3];
+  Row base, slope, peak;  // of the filter, per width
+  Row width, width_step;
+  Row depth, depth_step;
+  Row low_x, high_x, low_y, high_y;  // of middles of pixels that can be covered
+  Row x_per_y, x_at_top, room;       // of the line, and of what it covers to both sides of it in a row
+  float value[simd::kLanes][8];      // at the first end
+  float step[simd::kLanes][8];       // from there to the second
+};
+
+/// How far a mitre leans along a segment, per distance from it.
+STRANDCAST_LANES simd::Float lean_of(law::vec2 mitre, law::vec2 way) {
+  constexpr float kLeast = 1e-3f;
+  constexpr float kMost = 1e3f;
+  const simd::Float facing = dot(mitre, way);
+  const simd::Float aside = simd::abs(mitre.x * way.y - mitre.y * way.x);
+  return select(facing > kLeast, aside / simd::max(facing, kLeast), kMost);
+}
+
+STRANDCAST_LANES void place_segments(const StrandPoint* points, const uint64_t* order, uint32_t count,
+                                     float tile_x, float tile_y, SegmentBatch& out) {
+  using namespace law;
+  float ends[6][kLanes];
+  float mitre[4][kLanes];
+  float width[2][kLanes];
+  for (uint32_t lane = 0; lane < kLanes; ++lane) {
+    const StrandPoint* const a = points + static_cast<uint32_t>(order[lane < count ? lane : count - 1]);
+    const StrandPoint* const b = a + 1;
+    ends[0][lane] = a->x;
+    ends[1][lane] = a->y;
+    ends[2][lane] = a->z;
+    ends[3][lane] = b->x;
+    ends[4][lane] = b->y;
+    ends[5][lane] = b->z;
+    const Float va = values_of(*a);
+    const Float vb = values_of(*b);
+    store_lanes(va, out.value[lane]);
+    store_lanes(vb - va, out.step[lane]);
+    mitre[0][lane] = va.v[kMitreX];
+    mitre[1][lane] = va.v[kMitreY];
+    mitre[2][lane] = vb.v[kMitreX];
+    mitre[3][lane] = vb.v[kMitreY];
+    width[0][lane] = va.v[kWidthPx];
+    width[1][lane] = vb.v[kWidthPx];
+  }
+  const Float ax = load_lanes(ends[0]) - tile_x;
+  const Float ay = load_lanes(ends[1]) - tile_y;
+  const Float bx = load_lanes(ends[3]) - tile_x;
+  const Float by = load_lanes(ends[4]) - tile_y;
+  const Float dx = bx - ax;
+  const Float dy = by - ay;
+  const Float per_length2 = 1.0f / (dx * dx + dy * dy);
+  const Float per_length = sqrt(per_length2);
+  const Float ux = dx * per_length;
+  const Float uy = dy * per_length;
+  store_lanes(uy, out.across[0]);
+  store_lanes(-ux, out.across[1]);
+  store_lanes(ay * ux - ax * uy, out.across[2]);
+  const Float along_x = dx * per_length2;
+  const Float along_y = dy * per_length2;
+  store_lanes(along_x, out.along[0]);
+  store_lanes(along_y, out.along[1]);
+  store_lanes(-(ax * along_x + ay * along_y), out.along[2]);
+
+  // Joints: a pixel belongs to the segment between the mitres of its ends, computed alike on both sides of
+  // one.
+  const Float mitre_ax = load_lanes(mitre[0]);
+  const Float mitre_ay = load_lanes(mitre[1]);
+  const Float mitre_bx = load_lanes(mitre[2]);
+  const Float mitre_by = load_lanes(mitre[3]);
+  store_lanes(mitre_ax, out.behind_a[0]);
+  store_lanes(mitre_ay, out.behind_a[1]);
+  store_lanes(-(ax * mitre_ax + ay * mitre_ay), out.behind_a[2]);
+  store_lanes(mitre_bx, out.behind_b[0]);
+  store_lanes(mitre_by, out.behind_b[1]);
+  store_lanes(-(bx * mitre_bx + by * mitre_by), out.behind_b[2]);
+
+  // The filter of the middle, times the width where it is: coverage adds up to the width all along.
+  const Float wa = load_lanes(width[0]);
+  const Float wb = load_lanes(width[1]);
+  const Float mean_width = max(0.5f * (wa + wb), 1e-4f);
+  const LineFilter filter = line_filter(mean_width, vec2(ux, uy));
+  const Float per_width = 1.0f / mean_width;
+  store_lanes(filter.base * per_width, out.base);
+  store_lanes(filter.slope * per_width, out.slope);
+  store_lanes(filter.peak * per_width, out.peak);
+  store_lanes(wa, out.width);
+  store_lanes(wb - wa, out.width_step);
+  store_lanes(load_lanes(ends[2]), out.depth);
+  store_lanes(load_lanes(ends[5]) - load_lanes(ends[2]), out.depth_step);
+
+  // What is covered lies within `reach` of the line, and reaches beyond an end no further than a mitre leans.
+  const Float reach = filter.reach;
+  const vec2 way(ux, uy);
+  const Float beyond =
+      reach * max(lean_of(vec2(mitre_ax, mitre_ay), way), lean_of(vec2(mitre_bx, mitre_by), way));
+  constexpr float kSlack = 1e-3f;
+  const Float aside_x = min(reach * abs(uy) + beyond * abs(ux), reach) + kSlack;
+  const Float aside_y = min(reach * abs(ux) + beyond * abs(uy), reach) + kSlack;
+  store_lanes(min(ax, bx) - aside_x, out.low_x);
+  store_lanes(max(ax, bx) + aside_x, out.high_x);
+  store_lanes(min(ay, by) - aside_y, out.low_y);
+  store_lanes(max(ay, by) + aside_y, out.high_y);
+  // Of a line that is not level the pixels of a row lie close around it.
+  constexpr float kLevel = 0.02f;
+  constexpr float kWholeTile = 1e4f;
+  const Float steepness = abs(uy);
+  const Bool is_level = steepness < kLevel;
+  const Float x_per_y = select(is_level, 0.0f, dx / select(is_level, 1.0f, dy));
+  store_lanes(x_per_y, out.x_per_y);
+  store_lanes(ax - ay * x_per_y, out.x_at_top);
+  store_lanes(select(is_level, kWholeTile, reach / max(steepness, kLevel) + kSlack), out.room);
+}
+
+/// Blocks from the one that holds the first middle of a pixel at or above `low` ...
+STRANDCAST_LANES int first_block(float low, int side) {
+  // The last middle of a block lies half a pixel before its end.
+  const float at = (low + 0.5f) * (1.0f / static_cast<float>(side));
+  return at > 0.0f ? static_cast<int>(at) : 0;
+}
+/// ... to the one that holds the last at or below `high`; negative for none.
+STRANDCAST_LANES int last_block(float high, int side, int blocks) {
+  const float at = (high - 0.5f) * (1.0f / static_cast<float>(side));
+  if (at >= static_cast<float>(blocks)) return blocks - 1;
+  return at >= 0.0f ? static_cast<int>(at) : -1;
+}
+
+/// Blends one segment of a batch under what lies in front of it.
+STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, const TileHead* head,
+                                    TilePixels& pixels) {
+  using simd::Bool;
+  using simd::Float;
+  const float* const va = s.value[i];
+  const float* const step = s.step[i];
+  const Float cx = block_columns();
+  const Float cy = block_rows();
+  const bool fades = step[kOpacity] != 0.0f || va[kOpacity] != 1.0f;
+  const int y1 = last_block(s.high_y[i], kBlockRows, kBlocksDown);
+  for (int y = first_block(s.low_y[i], kBlockRows); y <= y1; ++y) {
+    const auto top = static_cast<float>(y * kBlockRows);
+    const float x_first = s.x_at_top[i] + (top + 0.5f) * s.x_per_y[i];
+    const float x_last = x_first + static_cast<float>(kBlockRows - 1) * s.x_per_y[i];
+    const float from = std::max(s.low_x[i], std::min(x_first, x_last) - s.room[i]);
+    const float to = std::min(s.high_x[i], std::max(x_first, x_last) + s.room[i]);
+    const int x0 = first_block(std::min(from, static_cast<float>(kTileSidePx)), kBlockColumns);
+    const int x1 = last_block(to, kBlockColumns, kBlocksAcross);
+    if (x0 > x1) continue;
+    uint32_t left = pixels.open[y] & (~0u << x0) & (~0u >> (31 - x1));
+    if (left == 0) continue;
+    const Float py = cy + top;
+    const Float row_across = py * s.across[1][i] + s.across[2][i];
+    const Float row_along = py * s.along[1][i] + s.along[2][i];
+    const Float row_behind_a = py * s.behind_a[1][i] + s.behind_a[2][i];
+    const Float row_behind_b = py * s.behind_b[1][i] + s.behind_b[2][i];
+    for (; left != 0; left &= left - 1) {
+      const int x = std::countr_zero(left);
+      const Float px = cx + static_cast<float>(x * kBlockColumns);
+      const Float across = px * s.across[0][i] + row_across;
+      const Float part = simd::clamp(px * s.along[0][i] + row_along, 0.0f, 1.0f);
+      // shaders/lib/coverage.glsl
+      const Float cover = simd::min(simd::min(s.base[i] - s.slope[i] * simd::abs(across), s.peak[i]) *
+                                        (s.width[i] + part * s.width_step[i]),
+                                    1.0f);
+      const Float behind_a = px * s.behind_a[0][i] + row_behind_a;
+      const Float behind_b = px * s.behind_b[0][i] + row_behind_b;
+      const Bool is_mine = behind_a >= 0.0f && behind_b < 0.0f && cover > 0.0f;
+      const int block = y * kBlocksAcross + x;
+      Float opacity = fades ? cover * (va[kOpacity] + part * step[kOpacity]) : cover;
+      if (head != nullptr) {
+        const Float z = s.depth[i] + part * s.depth_step[i];
+        opacity = select(z < head->depth[block] + kSkinDepthM, opacity, opacity * head->uncovered[block]);
+      }
+      const Float share = simd::FloatBits((simd::IntBits)(pixels.passed[block] * opacity).v & is_mine.v);
+      pixels.red[block] += share * (va[kRed] + part * step[kRed]);
+      pixels.green[block] += share * (va[kGreen] + part * step[kGreen]);
+      pixels.blue[block] += share * (va[kBlue] + part * step[kBlue]);
+      pixels.passed[block] -= share;
+    }
+  }
+}
+
+/// Closes the blocks that are opaque; true while any is open.
+STRANDCAST_LANES bool close_opaque_blocks(TilePixels& pixels) {
+  uint32_t any = 0;
+  for (int y = 0; y < kBlocksDown; ++y) {
+    for (uint32_t left = pixels.open[y]; left != 0; left &= left - 1) {
+      const int x = std::countr_zero(left);
+      if (!is_any(pixels.passed[y * kBlocksAcross + x] > kOpaque)) pixels.open[y] &= ~(1u << x);
+    }
+    any |= pixels.open[y];
+  }
+  return any != 0;
+}
+
+}  // namespace strandcast
