@@ -111,6 +111,7 @@ struct Segment {
   End b;
   vec2 unit;
   vec2 along;
+  float beyond;   // an end nothing is covered further than this, of the length: sharp bends have long mitres
   float base;
   float slope;
   float peak;
@@ -127,6 +128,7 @@ Segment segment_at(int point) {
   // The filter of the middle, times the width where it is: coverage adds up to the width all along.
   float mean_width = max(0.5 * (s.a.width + s.b.width), 1e-4);
   LineFilter filter_of_middle = line_filter(mean_width, s.unit);
+  s.beyond = filter_of_middle.reach * sqrt(per_length2);
   s.base = filter_of_middle.base / mean_width;
   s.slope = filter_of_middle.slope / mean_width;
   s.peak = filter_of_middle.peak / mean_width;
@@ -138,7 +140,8 @@ void blend(Segment s, float x, inout Pixels p) {
   float ax = x - s.a.place.x;
   vec4 ay = p.y - s.a.place.y;
   vec4 across = ax * s.unit.y - ay * s.unit.x;
-  vec4 part = clamp(ax * s.along.x + ay * s.along.y, 0.0, 1.0);
+  vec4 along = ax * s.along.x + ay * s.along.y;
+  vec4 part = clamp(along, 0.0, 1.0);
   vec4 cover = min(min(s.base - s.slope * abs(across), s.peak) * (s.a.width + part * (s.b.width - s.a.width)), 1.0);
   // A pixel belongs to the segment between the mitres of its ends, computed alike on both sides of one.
   vec4 behind_a = ax * s.a.mitre.x + ay * s.a.mitre.y;
@@ -146,7 +149,8 @@ void blend(Segment s, float x, inout Pixels p) {
   vec4 opacity = max(cover, 0.0) * (s.a.opacity + part * (s.b.opacity - s.a.opacity));
   vec4 z = s.a.place.z + part * (s.b.place.z - s.a.place.z);
   opacity *= mix(p.uncovered, vec4(1.0), lessThan(z, p.depth + kSkinDepthM));
-  vec4 is_mine = vec4(greaterThanEqual(behind_a, vec4(0.0))) * vec4(lessThan(behind_b, vec4(0.0)));
+  vec4 is_mine = vec4(greaterThanEqual(behind_a, vec4(0.0))) * vec4(lessThan(behind_b, vec4(0.0))) *
+                 vec4(lessThanEqual(abs(along - part), vec4(s.beyond)));
   vec4 share = p.passed * opacity * is_mine;
   p.red += share * (s.a.light.r + part * (s.b.light.r - s.a.light.r));
   p.green += share * (s.a.light.g + part * (s.b.light.g - s.a.light.g));

@@ -68,6 +68,7 @@ struct SegmentBatch {
   Row along[3];     // 0 at the first end, 1 at the second
   Row behind_a[3];  // positive beyond the mitre of an end
   Row behind_b[3];
+  Row beyond;  // an end nothing is covered further than this, as `along`: sharp bends have long mitres
   Row base, slope, peak;  // of the filter, per width
   Row width, width_step;
   Row depth, depth_step;
@@ -160,6 +161,7 @@ STRANDCAST_LANES void place_segments(const StrandPoint* points, const uint64_t* 
 
   // What is covered lies within `reach` of the line, and reaches beyond an end no further than a mitre leans.
   const Float reach = filter.reach;
+  store_lanes(reach * per_length, out.beyond);
   const vec2 way(ux, uy);
   const Float beyond =
       reach * max(lean_of(vec2(mitre_ax, mitre_ay), way), lean_of(vec2(mitre_bx, mitre_by), way));
@@ -225,14 +227,16 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, const Til
       const int x = std::countr_zero(left);
       const Float px = cx + static_cast<float>(x * kBlockColumns);
       const Float across = px * s.across[0][i] + row_across;
-      const Float part = simd::clamp(px * s.along[0][i] + row_along, 0.0f, 1.0f);
+      const Float along = px * s.along[0][i] + row_along;
+      const Float part = simd::clamp(along, 0.0f, 1.0f);
       // shaders/lib/coverage.glsl
       const Float cover = simd::min(simd::min(s.base[i] - s.slope[i] * simd::abs(across), s.peak[i]) *
                                         (s.width[i] + part * s.width_step[i]),
                                     1.0f);
       const Float behind_a = px * s.behind_a[0][i] + row_behind_a;
       const Float behind_b = px * s.behind_b[0][i] + row_behind_b;
-      const Bool is_mine = behind_a >= 0.0f && behind_b < 0.0f && cover > 0.0f;
+      const Bool is_mine =
+          behind_a >= 0.0f && behind_b < 0.0f && simd::abs(along - part) <= s.beyond[i] && cover > 0.0f;
       const int block = y * kBlocksAcross + x;
       Float opacity = fades ? cover * (va[kOpacity] + part * step[kOpacity]) : cover;
       if (head != nullptr) {
