@@ -6,8 +6,7 @@
 namespace strandcast {
 
 WorkerPool::WorkerPool(uint32_t threads) {
-  for (uint32_t worker = 1; worker < threads; ++worker)
-    threads_.emplace_back([this, worker] { serve(worker); });
+  for (uint32_t thread = 1; thread < threads; ++thread) threads_.emplace_back([this] { serve(); });
 }
 
 WorkerPool::~WorkerPool() {
@@ -21,17 +20,27 @@ WorkerPool::~WorkerPool() {
 
 void WorkerPool::run(const std::function<void(uint32_t)>& work) {
   if (threads_.empty()) return work(0);
-  {
-    const std::lock_guard lock(mutex_);
-    work_ = &work;
-    left_ = static_cast<uint32_t>(threads_.size());
-    ++turn_;
-  }
-  is_there_.notify_all();
-  work(0);
   std::unique_lock lock(mutex_);
-  is_done_.wait(lock, [&] { return left_ == 0; });
+  work_ = &work;
+  next_ = 0;
+  is_there_.notify_all();
+  while (take_share(lock)) {
+  }
+  is_done_.wait(lock, [&] { return under_way_ == 0; });
   work_ = nullptr;
+}
+
+/// Does one share, if there is one that nobody has begun. `lock` is held, but not during the work.
+bool WorkerPool::take_share(std::unique_lock<std::mutex>& lock) {
+  if (work_ == nullptr || next_ == size()) return false;
+  const auto* work = work_;
+  const uint32_t share = next_++;
+  ++under_way_;
+  lock.unlock();
+  (*work)(share);
+  lock.lock();
+  if (--under_way_ == 0) is_done_.notify_one();
+  return true;
 }
 
 void WorkerPool::for_ranges(size_t count, size_t grain,
@@ -43,18 +52,10 @@ void WorkerPool::for_ranges(size_t count, size_t grain,
   });
 }
 
-void WorkerPool::serve(uint32_t worker) {
-  uint64_t done = 0;
+void WorkerPool::serve() {
   std::unique_lock lock(mutex_);
-  for (;;) {
-    is_there_.wait(lock, [&] { return is_stopping_ || turn_ != done; });
-    if (is_stopping_) return;
-    done = turn_;
-    const auto* work = work_;
-    lock.unlock();
-    (*work)(worker);
-    lock.lock();
-    if (--left_ == 0) is_done_.notify_one();
+  while (!is_stopping_) {
+    if (!take_share(lock)) is_there_.wait(lock);
   }
 }
 

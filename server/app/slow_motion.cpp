@@ -53,9 +53,11 @@ StepWork work_per_step(const SceneDesc& scene, const ServerCounters& now) {
   const bool is_watched = now.strand_viewers + now.frame_viewers > 0;
   if (!is_watched) return work;
   work.publish_ms = now.sim.read_median_ms + now.sim.quantise_median_ms;
-  work.encode_ms = now.encode.encode_median_ms * states_per_second(scene) / scene.step_rate_hz;
+  const double state_ms = now.encode.encode_median_ms;
+  if (now.strand_viewers > 0) work.encode_ms = state_ms * states_per_second(scene) / scene.step_rate_hz;
   if (now.frame_viewers > 0)
-    work.picture_ms = (now.frames.paint_median_ms + now.frames.encode_median_ms) *
+    work.picture_ms = (now.frames.paint_median_ms + now.frames.encode_median_ms +
+                       (now.strand_viewers > 0 ? 0.0 : state_ms)) *
                       std::min(1.0, scene.stream.frame_rate_hz / scene.step_rate_hz);
   return work;
 }

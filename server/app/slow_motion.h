@@ -35,8 +35,8 @@ class SlowMotionWatch {
 struct StepWork {
   double simulate_ms = 0.0;  // all substeps
   double publish_ms = 0.0;   // reading back and rounding
-  double encode_ms = 0.0;    // states of strands
-  double picture_ms = 0.0;   // drawing and coding pictures
+  double encode_ms = 0.0;    // states of strands for viewers
+  double picture_ms = 0.0;   // drawing and coding pictures, and the states for them alone
   size_t vertices = 0;       // of all strands; 0 = unknown
 
   double total_ms() const { return simulate_ms + publish_ms + encode_ms + picture_ms; }

@@ -20,6 +20,10 @@ constexpr int kFrameThreadNice = 10;
 /// Weight of the newest drawing in what a view costs: a first drawing also pays for buffers and shaders.
 constexpr double kNewestCostShare = 0.5;
 
+/// Weight of the newest state in how long states take to come, which is never thought to be more than this.
+constexpr double kNewestLeadShare = 0.25;
+constexpr double kMostLeadMs = 100.0;
+
 /// Whether other views can still be drawn: this one is too large, say, or its camera impossible.
 bool concerns_view_only(const Error& error) {
   return error.code == ErrorCode::BadInput || error.code == ErrorCode::LimitExceeded;
@@ -271,6 +275,7 @@ void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
     const int64_t begin_ns = now_ns();
     auto snapshot = decoder_->decode(frame->message);
     decode_ms.push_back(ms_since(begin_ns));
+    note_arrival(*frame, decode_ms.back());
     is_chain_lost_ = !snapshot;
     if (!snapshot) {
       ++losses;
@@ -288,6 +293,25 @@ void FrameWorker::decode(const std::deque<EncodedFramePtr>& strand_frames) {
   for (const double one_ms : decode_ms) timers_.decode.add_ms(one_ms);
   counters_.decoded += decoded;
   counters_.chain_losses += losses;
+}
+
+/// Asks for the state of the next drawing, which can begin when the thread is free at `free_ns`: so early
+/// that it is there then, and no earlier, so that it is not old.
+void FrameWorker::request_state(int64_t free_ns) {
+  std::optional<int64_t> due_ns;
+  for (const auto& [picture_class, drawn] : drawn_)
+    if (!drawn.is_refused) due_ns = std::min(due_ns.value_or(paint_due_ns(drawn)), paint_due_ns(drawn));
+  if (!due_ns || !hooks_.request_state) return;
+  const int64_t wanted_ns = std::max(*due_ns, free_ns) - static_cast<int64_t>(lead_ms_ / kMsPerNs);
+  asked_ns_ = std::max(wanted_ns, now_ns());
+  hooks_.request_state(wanted_ns);
+}
+
+void FrameWorker::note_arrival(const EncodedFrame& frame, double decode_ms) {
+  const int64_t way_ns = frame.header.send_time_ns - std::exchange(asked_ns_, 0);
+  if (way_ns < 0 || way_ns == frame.header.send_time_ns) return;  // it was on its way, or nobody had asked
+  const double taken_ms = std::min(static_cast<double>(way_ns) * kMsPerNs + decode_ms, kMostLeadMs);
+  lead_ms_ += kNewestLeadShare * (taken_ms - lead_ms_);
 }
 
 std::optional<FrameWorker::Due> FrameWorker::next_due() const {
@@ -338,6 +362,8 @@ void FrameWorker::paint_alike(const PictureView& view) {
     drawn.schedule.begin(begin_ns, drawn.spacing_ns);
     classes.push_back(picture_class);
   }
+  if (!classes.empty())
+    request_state(begin_ns + static_cast<int64_t>(drawn_[classes.front()].cost_ms / kMsPerNs));
   const bool had_painter = painter_ != nullptr;
   const Result<Image> image = paint(view);
   {

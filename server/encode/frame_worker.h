@@ -57,6 +57,9 @@ class FrameWorker {
     std::function<void(uint32_t picture_class, PicturePtr picture)> sink;
     /// Asks whoever encodes strands for a keyframe, on any thread.
     std::function<void()> request_keyframe;
+    /// Asks them for one more state, the newest at this time (now_ns()): the next drawing begins when it is
+    /// there. Without it they give what they have. May be empty.
+    std::function<void(int64_t not_before_ns)> request_state;
     /// Called on the worker's thread when one class cannot be drawn; it is left out until its view changes.
     /// May be empty.
     std::function<void(uint32_t picture_class, const Error& error)> on_refused;
@@ -134,6 +137,8 @@ class FrameWorker {
   void take_look(LookDesc look);
   void update_views(const std::map<uint32_t, PictureView>& views);
   void decode(const std::deque<EncodedFramePtr>& strand_frames);
+  void request_state(int64_t free_ns);
+  void note_arrival(const EncodedFrame& frame, double decode_ms);
   void share_time();
   void note_cost(const std::vector<uint32_t>& classes, double cost_ms);
   std::optional<Due> next_due() const;
@@ -184,6 +189,8 @@ class FrameWorker {
   std::map<uint32_t, Drawn> drawn_;
   double ms_per_pixel_ = 0.0;     // of the newest drawing: the guess for views that were never drawn
   int64_t blocking_rest_ns_ = 0;  // until then no blocking view is drawn
+  int64_t asked_ns_ = 0;          // when the state that was asked for may be taken; 0 = none is awaited
+  double lead_ms_ = 0.0;          // smoothed, from then until it is decoded
 
   std::thread thread_;  // last: starts when everything else is there
 };

@@ -1,5 +1,6 @@
 #include "server/encode/strand_encode_worker.h"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <utility>
@@ -50,9 +51,16 @@ StrandEncodeWorker::~StrandEncodeWorker() {
   thread_.join();
 }
 
-void StrandEncodeWorker::set_has_listeners(bool has_listeners) {
-  if (has_listeners && !has_listeners_) is_restarting_ = true;
-  has_listeners_ = has_listeners;
+void StrandEncodeWorker::set_listeners(StrandListeners listeners) {
+  if (listeners != StrandListeners::None && !has_listeners()) is_restarting_ = true;
+  listeners_ = listeners;
+  slot_.notify();
+}
+
+void StrandEncodeWorker::request_state(int64_t not_before_ns) {
+  const bool is_first = !has_request();
+  state_wanted_ns_ = is_first ? not_before_ns : std::min(not_before_ns, state_wanted_ns_.load());
+  ++state_requests_;
   slot_.notify();
 }
 
@@ -91,12 +99,12 @@ gl::PassReport strand_encode_report(uint16_t stream_id, bool has_listeners, cons
 
 gl::PassReport StrandEncodeWorker::pass() const {
   const std::lock_guard lock(counters_mutex_);
-  return strand_encode_report(stream_id_, has_listeners_, encode_timer_);
+  return strand_encode_report(stream_id_, has_listeners(), encode_timer_);
 }
 
 bool StrandEncodeWorker::has_work(const SnapshotSlot::View& view) const {
   if (is_stopping_) return true;
-  if (!has_listeners_ || !has_state(view, config())) return false;
+  if (!has_listeners() || !has_state(view, config())) return false;
   return is_due(view) || is_restarting_ || (is_keyframe_wanted_ && keyframe_ != nullptr);
 }
 
@@ -106,6 +114,8 @@ bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
   const uint64_t tick = view.snapshot->tick;
   const uint32_t rate_divisor = config().rate_divisor;
   const bool is_first = encoded_version_ == 0 || is_restarting_;
+  if (listeners_ == StrandListeners::OnRequest)
+    return is_first || is_keyframe_wanted_ || (has_request() && now_ns() >= state_wanted_ns_);
   // By a fixed grid: a state that is taken late does not put off those that follow.
   return rate_divisor <= 1 || is_first || tick / rate_divisor != encoded_tick_ / rate_divisor;
 }
@@ -113,11 +123,17 @@ bool StrandEncodeWorker::is_due(const SnapshotSlot::View& view) const {
 /// Returns for a new state, or when somebody has waited long enough for a keyframe of the present one.
 SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
   const auto has_work_now = [this](const SnapshotSlot::View& now) { return has_work(now); };
-  const auto has_request = [this](const SnapshotSlot::View& now) {
-    return has_work(now) || (has_listeners_ && has_state(now, config()) && is_keyframe_wanted_);
+  const auto has_news = [this](const SnapshotSlot::View& now) {
+    return has_work(now) || (has_listeners() && has_state(now, config()) && is_keyframe_wanted_);
   };
-  const bool takes_all = config().rate_divisor <= 1;
-  (void)(takes_all ? slot_.wait(has_request) : slot_.wait_for(kLongestStateWait, has_request));
+  const bool is_on_request = listeners_ == StrandListeners::OnRequest;
+  const int64_t request_wait_ns = has_request() ? state_wanted_ns_ - now_ns() : 0;
+  if (is_on_request && request_wait_ns > 0)
+    (void)slot_.wait_for(std::chrono::nanoseconds(request_wait_ns), has_news);
+  else if (is_on_request || config().rate_divisor <= 1)
+    (void)slot_.wait(has_news);
+  else
+    (void)slot_.wait_for(kLongestStateWait, has_news);
   return slot_.wait_for(is_keyframe_wanted_ ? kKeyframePatience : std::chrono::milliseconds(0), has_work_now);
 }
 
@@ -126,13 +142,14 @@ void StrandEncodeWorker::run() {
     const SnapshotSlot::View view = wait_for_work();
     if (view.is_stopped || is_stopping_) return;
     const StrandEncodeConfig config_now = config();
-    if (has_listeners_ && has_state(view, config_now)) serve(view, config_now);
+    if (has_listeners() && has_state(view, config_now)) serve(view, config_now);
   }
 }
 
 void StrandEncodeWorker::serve(const SnapshotSlot::View& view, const StrandEncodeConfig& config) {
   // Without work there was a long wait: no further state comes whose turn it would be.
-  const bool is_overdue = !has_work(view) && view.version != encoded_version_;
+  const bool is_overdue =
+      listeners_ == StrandListeners::All && !has_work(view) && view.version != encoded_version_;
   const bool is_new = is_due(view) || is_overdue;
   // Requests up to here are served by one keyframe; later ones wake the thread again.
   const bool is_wanted = is_keyframe_wanted_.exchange(false);
@@ -145,7 +162,9 @@ void StrandEncodeWorker::serve(const SnapshotSlot::View& view, const StrandEncod
   encoded_version_ = view.version;
   encoded_tick_ = view.snapshot->tick;
   const Audience audience = is_wanted || is_restarting ? Audience::Joiners : Audience::Followers;
+  const uint64_t requests = state_requests_;
   const JoinFrames frames = encode(*view.snapshot, config, audience);
+  if (frames.frame != nullptr) answered_requests_ = requests;
   keyframe_ = frames.keyframe;
   // After a pause nobody has what a delta builds on; the keyframe is all they need.
   if (frames.frame != frames.keyframe && !is_restarting) give(frames.frame);

@@ -45,6 +45,13 @@ inline constexpr std::chrono::milliseconds kLongestStateWait{250};
 /// already.
 Snapshot coarsen(const Snapshot& snapshot, uint32_t factor);
 
+/// Who is there for the frames of a class.
+enum class StrandListeners {
+  None,       // nothing is encoded
+  OnRequest,  // whoever draws pictures: a state when it asks for one (request_state)
+  All,        // every state of the class's rate
+};
+
 /// "encode/strands" for the first class, "encode/strands_3" for stream 3.
 gl::PassReport strand_encode_report(uint16_t stream_id, bool has_listeners, const StageTimer& timer);
 
@@ -63,14 +70,17 @@ class StrandEncodeWorker {
   StrandEncodeWorker(const StrandEncodeWorker&) = delete;
   StrandEncodeWorker& operator=(const StrandEncodeWorker&) = delete;
 
-  /// False: nothing is encoded. From false to true the chain goes on with a keyframe of the newest snapshot.
-  void set_has_listeners(bool has_listeners);
+  /// From None to others the chain goes on with a keyframe of the newest snapshot.
+  void set_listeners(StrandListeners listeners);
   /// From the next state on; stream_id stays. States of the old lattice are left out from here on.
   void change(const StrandEncodeConfig& config);
   /// Asks for a keyframe and returns at once. It comes with the next state, or with the present one when no
   /// other is published soon. Requests that come before it is made share it; later ones for the same state
   /// get the same frame again.
   void request_keyframe();
+  /// Asks for one state that is newer than the last one, the newest from `not_before_ns` (now_ns()) on. Of
+  /// requests that wait the earliest counts. Without meaning for those who get all states.
+  void request_state(int64_t not_before_ns);
 
   StrandEncodeCounters counters() const;
   /// The line of its work among the passes.
@@ -82,6 +92,8 @@ class StrandEncodeWorker {
   void run();
   bool has_work(const SnapshotSlot::View& view) const;
   bool is_due(const SnapshotSlot::View& view) const;
+  bool has_request() const { return state_requests_ != answered_requests_; }
+  bool has_listeners() const { return listeners_ != StrandListeners::None; }
   StrandEncodeConfig config() const;
   SnapshotSlot::View wait_for_work() const;
   void serve(const SnapshotSlot::View& view, const StrandEncodeConfig& config);
@@ -98,7 +110,10 @@ class StrandEncodeWorker {
   StrandEncodeConfig config_;
 
   std::atomic<bool> is_stopping_{false};
-  std::atomic<bool> has_listeners_{false};
+  std::atomic<StrandListeners> listeners_{StrandListeners::None};
+  std::atomic<uint64_t> state_requests_{0};
+  std::atomic<uint64_t> answered_requests_{0};
+  std::atomic<int64_t> state_wanted_ns_{0};  // of the earliest that is not answered
   std::atomic<bool> is_keyframe_wanted_{false};
   std::atomic<bool> is_restarting_{false};  // nobody has the chain's last frame
 

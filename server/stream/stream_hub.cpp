@@ -47,6 +47,10 @@ Status StreamHub::begin() {
          [&](StreamReader& reader) { reader.on_picture(picture_class, picture); });
   };
   hooks.request_keyframe = [this] { request_keyframe(0); };
+  hooks.request_state = [this](int64_t not_before_ns) {
+    const std::lock_guard lock(mutex_);
+    if (!encoders_.empty() && encoders_[0] != nullptr) encoders_[0]->request_state(not_before_ns);
+  };
   hooks.on_refused = [this](PictureClass picture_class, const Error& error) {
     give([&](const Entry& entry) { return entry.picture_class == picture_class; },
          [&](StreamReader& reader) { reader.on_picture_refused(picture_class, error); });
@@ -133,10 +137,12 @@ void StreamHub::follow_demand() {
     if (has_stopped_) return;
     frames_->set_views(book_.picture_views());
     const std::set<uint16_t> wanted = book_.strand_classes();
-    for (const uint16_t stream_id : wanted) encoder(stream_id).set_has_listeners(true);
+    for (const uint16_t stream_id : wanted)
+      encoder(stream_id).set_listeners(book_.strand_readers(stream_id) > 0 ? StrandListeners::All
+                                                                           : StrandListeners::OnRequest);
     for (uint16_t stream_id = 0; stream_id < encoders_.size(); ++stream_id)
       if (encoders_[stream_id] != nullptr && !wanted.contains(stream_id))
-        encoders_[stream_id]->set_has_listeners(false);
+        encoders_[stream_id]->set_listeners(StrandListeners::None);
   }
   // A camera that turns is no news for the source.
   if (const SourceDemand now = total(); !is_alike(now, told_)) {

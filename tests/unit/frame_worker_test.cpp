@@ -123,6 +123,10 @@ class FrameWork : public testing::Test {
       frames_.emplace_back(picture_class, picture->after(0));
     };
     hooks.request_keyframe = [this] { ++requests_; };
+    hooks.request_state = [this](int64_t not_before_ns) {
+      const std::lock_guard lock(mutex_);
+      states_wanted_ns_.push_back(not_before_ns);
+    };
     hooks.on_refused = [this](uint32_t picture_class, const Error&) {
       const std::lock_guard lock(mutex_);
       refused_.push_back(picture_class);
@@ -168,6 +172,7 @@ class FrameWork : public testing::Test {
   std::mutex mutex_;
   std::vector<std::pair<uint32_t, EncodedFramePtr>> frames_;
   std::vector<uint32_t> refused_;  // classes
+  std::vector<int64_t> states_wanted_ns_;
   std::vector<uint32_t> refused_looks_;
 };
 
@@ -202,6 +207,36 @@ TEST_F(FrameWork, DrawsTheDecodedStateForEveryView) {
   }
   const auto hashes = studio_.get([](Studio& s) { return s.hashes; });
   EXPECT_EQ(std::set<uint64_t>(hashes.begin(), hashes.end()), std::set<uint64_t>{state_hash(make_state(1))});
+}
+
+TEST_F(FrameWork, EachDrawingAsksForTheStateOfTheNext) {
+  const auto worker = start(kFastHz);
+  next_delta();
+  const auto wanted = [this] {
+    const std::lock_guard lock(mutex_);
+    return states_wanted_ns_;
+  };
+  worker->set_views(one_view());
+  join_chain(*worker);
+  for (size_t drawn = 1; drawn <= 5; ++drawn) {
+    ASSERT_TRUE(eventually([&] { return frame_count() == drawn; }));
+    EXPECT_EQ(wanted().size(), drawn);
+    worker->offer(next_delta());
+  }
+  ASSERT_TRUE(eventually([&] { return frame_count() == 6; }));
+  EXPECT_LE(wanted().front(), now_ns()) << "pictures without a pause: at once";
+}
+
+TEST_F(FrameWork, AStateIsNotWantedBeforeItsPictureIsDue) {
+  const auto worker = start(kNeverHz);
+  next_delta();
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  const std::lock_guard lock(mutex_);
+  ASSERT_EQ(states_wanted_ns_.size(), 1u);
+  constexpr int64_t kHourNs = 3'600'000'000'000;
+  EXPECT_GT(states_wanted_ns_[0], now_ns() + kHourNs);
 }
 
 TEST_F(FrameWork, WithoutANewStateNothingIsDrawnAgainUnlessTheCameraMoves) {

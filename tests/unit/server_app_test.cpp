@@ -531,6 +531,9 @@ TEST(SlowMotion, WorkOfAStepIsWhatRunsForIt) {
   EXPECT_EQ(work_per_step(scene, now).encode_ms, 1.0) << "every fourth state";
   now.frame_viewers = 1;
   EXPECT_EQ(work_per_step(scene, now).picture_ms, 30.0) << "a quarter as many pictures as steps";
+  now.strand_viewers = 0;
+  EXPECT_EQ(work_per_step(scene, now).encode_ms, 0.0);
+  EXPECT_EQ(work_per_step(scene, now).picture_ms, 31.0) << "and one state for each";
 }
 
 TEST(SlowMotion, WaysOutSaveWhatTheySay) {

@@ -129,7 +129,7 @@ TEST_F(StrandEncoding, NothingIsEncodedWhileNobodyListens) {
   worker->request_keyframe();
   give_time_to_misbehave();
   EXPECT_EQ(worker->counters().encodes, 0u);
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   ASSERT_TRUE(eventually([&] { return list_.count() >= 1; }));
   EXPECT_EQ(list_.frames()[0]->header.opcode, Opcode::StrandKeyframe);
   EXPECT_EQ(control_->seen(), std::vector<uint64_t>{5}) << "only the newest state";
@@ -137,15 +137,15 @@ TEST_F(StrandEncoding, NothingIsEncodedWhileNobodyListens) {
 
 TEST_F(StrandEncoding, AfterAPauseTheChainGoesOnWithAKeyframe) {
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
-  worker->set_has_listeners(false);
+  worker->set_listeners(StrandListeners::None);
   slot_.put(make_state(2));
   slot_.put(make_state(3));
   give_time_to_misbehave();
   EXPECT_EQ(list_.count(), 1u);
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   ASSERT_TRUE(eventually([&] { return list_.count() >= 2; }));
   const auto frame = list_.frames()[1];
   EXPECT_EQ(frame->header.opcode, Opcode::StrandKeyframe) << "a delta would be of use to nobody";
@@ -155,9 +155,73 @@ TEST_F(StrandEncoding, AfterAPauseTheChainGoesOnWithAKeyframe) {
   EXPECT_EQ(list_.frames()[2]->header.base_sequence, 2u);
 }
 
+TEST_F(StrandEncoding, WhoDrawsPicturesGetsTheStatesThatItAsksFor) {
+  const auto worker = start();
+  worker->set_listeners(StrandListeners::OnRequest);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; })) << "to begin with";
+  EXPECT_EQ(list_.frames()[0]->header.opcode, Opcode::StrandKeyframe);
+  for (uint64_t tick = 2; tick <= 4; ++tick) slot_.put(make_state(tick));
+  constexpr int64_t kHourNs = 3'600'000'000'000;
+  worker->request_state(now_ns() + kHourNs);
+  give_time_to_misbehave();
+  EXPECT_EQ(list_.count(), 1u) << "not asked for, or not yet";
+  worker->request_state(now_ns());
+  ASSERT_TRUE(eventually([&] { return list_.count() == 2; }));
+  slot_.put(make_state(5));
+  give_time_to_misbehave();
+  EXPECT_EQ(control_->seen(), (std::vector<uint64_t>{1, 4})) << "the newest, once";
+  EXPECT_EQ(list_.frames()[1]->header.base_sequence, list_.frames()[0]->header.sequence);
+  // One that comes before there is a newer state gets the next.
+  worker->request_state(now_ns());
+  ASSERT_TRUE(eventually([&] { return list_.count() == 3; }));
+  worker->request_state(now_ns());
+  give_time_to_misbehave();
+  EXPECT_EQ(list_.count(), 3u) << "the scene is paused";
+  slot_.put(make_state(6));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 4; }));
+  EXPECT_EQ(control_->seen(), (std::vector<uint64_t>{1, 4, 5, 6}));
+}
+
+TEST_F(StrandEncoding, AKeyframeComesWithTheNewestStateThoughNobodyAskedForThat) {
+  const auto worker = start();
+  worker->set_listeners(StrandListeners::OnRequest);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  slot_.put(make_state(2));
+  worker->request_keyframe();
+  ASSERT_TRUE(eventually([&] { return list_.count() == 3; })) << "a delta and a keyframe";
+  EXPECT_EQ(list_.frames()[2]->header.opcode, Opcode::StrandKeyframe);
+  EXPECT_EQ(control_->seen(), (std::vector<uint64_t>{1, 2}));
+}
+
+TEST_F(StrandEncoding, ARequestStandsUntilAFrameAnswersIt) {
+  const auto worker = start();
+  worker->set_listeners(StrandListeners::OnRequest);
+  slot_.put(make_state(1));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
+  {
+    const std::lock_guard lock(control_->mutex);
+    control_->is_refusing = true;
+  }
+  worker->request_state(now_ns());
+  slot_.put(make_state(2));
+  ASSERT_TRUE(eventually([&] { return worker->counters().too_large == 1; }));
+  {
+    const std::lock_guard lock(control_->mutex);
+    control_->is_refusing = false;
+  }
+  slot_.put(make_state(3));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 2; }));
+  // Whoever reads every state gets every state, asked for or not.
+  worker->set_listeners(StrandListeners::All);
+  slot_.put(make_state(4));
+  ASSERT_TRUE(eventually([&] { return list_.count() == 3; }));
+}
+
 TEST_F(StrandEncoding, RequestsBetweenTwoTicksShareOneKeyframe) {
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
   control_->hold();
@@ -178,7 +242,7 @@ TEST_F(StrandEncoding, RequestsBetweenTwoTicksShareOneKeyframe) {
 
 TEST_F(StrandEncoding, AJoinerOfAPausedSceneGetsThePresentStateEncodedAgain) {
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
   slot_.put(make_state(2));
@@ -194,7 +258,7 @@ TEST_F(StrandEncoding, AJoinerOfAPausedSceneGetsThePresentStateEncodedAgain) {
 
 TEST_F(StrandEncoding, ALateRequestForTheSameStateGetsTheSameKeyframeAgain) {
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
   worker->request_keyframe();
@@ -205,7 +269,7 @@ TEST_F(StrandEncoding, ALateRequestForTheSameStateGetsTheSameKeyframeAgain) {
 
 TEST_F(StrandEncoding, ASlowEncoderSkipsToTheNewestState) {
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   control_->hold();
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return control_->inside(); }));
@@ -217,7 +281,7 @@ TEST_F(StrandEncoding, ASlowEncoderSkipsToTheNewestState) {
 
 TEST_F(StrandEncoding, AStateThatFitsNoMessageIsSkippedAndCounted) {
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   control_->is_refusing = true;
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return worker->counters().too_large == 1; }));
@@ -232,7 +296,7 @@ TEST_F(StrandEncoding, AStateThatFitsNoMessageIsSkippedAndCounted) {
 TEST_F(StrandEncoding, StopsWhileIdleAndWithTheSlot) {
   { const auto worker = start(); }
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   slot_.stop();
   slot_.put(make_state(1));
   give_time_to_misbehave();
@@ -242,7 +306,7 @@ TEST_F(StrandEncoding, StopsWhileIdleAndWithTheSlot) {
 TEST_F(StrandEncoding, CountsBytesAndStampsTheSendTime) {
   const int64_t begin_ns = now_ns();
   const auto worker = start();
-  worker->set_has_listeners(true);
+  worker->set_listeners(StrandListeners::All);
   slot_.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return list_.count() == 1; }));
   slot_.put(make_state(2));
@@ -266,7 +330,7 @@ TEST(StrandClassEncoding, EncodesOneStateInSoManySteps) {
   FrameList frames;
   auto control = std::make_shared<FakeEncoder::Control>();
   StrandEncodeWorker worker(slot, std::make_unique<FakeEncoder>(control), frames.sink(), {3, 4, 1});
-  worker.set_has_listeners(true);
+  worker.set_listeners(StrandListeners::All);
   uint64_t wanted = 0;
   for (uint64_t tick = 2; tick <= 13; ++tick) {
     slot.put(make_state(tick));
@@ -298,7 +362,7 @@ TEST(StrandClassEncoding, CodesTheFirstStrandsAndCoarsensThem) {
   SnapshotSlot slot;
   FrameList frames;
   StrandEncodeWorker worker(slot, std::move(*make_strand_encoder("raw")), frames.sink(), {2, 1, 3, 0.5f});
-  worker.set_has_listeners(true);
+  worker.set_listeners(StrandListeners::All);
   const auto state = make_state(4);
   slot.put(state);
   ASSERT_TRUE(eventually([&] { return frames.count() == 1; }));
@@ -313,7 +377,7 @@ TEST(StrandClassEncoding, AChangeLeavesStatesOfTheOldLatticeOut) {
   FrameList frames;
   StrandEncodeWorker worker(slot, std::move(*make_strand_encoder("delta")), frames.sink(),
                             {0, 1, 1, 1.0f, 1e-4f});
-  worker.set_has_listeners(true);
+  worker.set_listeners(StrandListeners::All);
   slot.put(make_state(1));
   ASSERT_TRUE(eventually([&] { return frames.count() == 1; }));
   worker.change({0, 1, 1, 0.5f, 2e-4f});
@@ -354,7 +418,7 @@ TEST(StrandEncodingWithCodec, EveryKeyframeIsAWayIntoTheChain) {
     SnapshotSlot slot;
     FrameList list;
     StrandEncodeWorker worker(slot, std::move(encoder).value(), list.sink());
-    worker.set_has_listeners(true);
+    worker.set_listeners(StrandListeners::All);
     std::atomic<bool> is_done{false};
     std::thread joiner([&] {
       std::mt19937 random(5);

@@ -13,6 +13,7 @@ struct TileRange {
   bool is_empty() const { return x0 > x1 || y0 > y1; }
 };
 
+constexpr uint32_t kPartsPerWorker = 4;
 constexpr float kPerTile = 1.0f / static_cast<float>(kTilePx);
 
 /// Towards minus infinity, of values that fit.
@@ -77,12 +78,14 @@ uint64_t TileBins::size_bytes() const {
 BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& grid, float near_m,
                                  WorkerPool& workers) {
   const uint32_t tiles = grid.count();
-  const uint32_t parts = workers.size();
+  // More than threads: who is held up leaves some to the others.
+  const uint32_t parts = workers.size() > 1 ? kPartsPerWorker * workers.size() : 1;
   const uint32_t strands = points.strand_count();
   std::vector<BinCounts> counted(parts);
   // Each part is a run of strands, so that the lists come out in their order.
   const auto in_parts = [&](uint32_t drawn, auto work) {
-    workers.run([&](uint32_t part) {
+    workers.for_ranges(parts, 1, [&](size_t begin_part, size_t) {
+      const auto part = static_cast<uint32_t>(begin_part);
       const auto begin = static_cast<uint32_t>(uint64_t{drawn} * part / parts);
       const auto end = static_cast<uint32_t>(uint64_t{drawn} * (part + 1) / parts);
       for (uint32_t strand = begin; strand < end; ++strand)

@@ -56,7 +56,7 @@ class TileBins {
  private:
   TileLists<TileSegment> segments_;
   TileLists<uint32_t> boxes_;
-  std::vector<uint32_t> counts_;  // (worker x tile)
+  std::vector<uint32_t> counts_;  // (part x tile)
 };
 
 }  // namespace strandcast

@@ -144,15 +144,13 @@ Status draw_tiles(TileState& state, RenderTurn& turn) {
   const TileInput input{&state.points,  &state.bins,           &state.head,       &state.shade,
                         {turn.size_px}, state.look.background, state.srgb.data(), image.rgba.data()};
   std::atomic<uint32_t> next{0};
-  constexpr uint32_t kTilesAtOnce = 4;
   const uint32_t tiles = input.grid.count();
   std::atomic<bool> is_given_up{false};
   state.workers.run([&](uint32_t worker) {
-    for (uint32_t begin = next.fetch_add(kTilesAtOnce); begin < tiles; begin = next.fetch_add(kTilesAtOnce)) {
+    for (uint32_t tile = next++; tile < tiles; tile = next++) {
       if (worker == 0 && turn.terms.is_unwanted && turn.terms.is_unwanted()) is_given_up = true;
       if (is_given_up) return;
-      for (uint32_t tile = begin; tile < std::min(begin + kTilesAtOnce, tiles); ++tile)
-        draw_tile(state.set, {&input, &state.scratch[worker], tile});
+      draw_tile(state.set, {&input, &state.scratch[worker], tile});
     }
   });
   if (is_given_up) turn.is_whole = false;
