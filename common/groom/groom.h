@@ -43,8 +43,8 @@ struct Groom {
 /// vertex 0 of every strand is pinned. BadInput or LimitExceeded name the strand and vertex.
 Status validate(const Groom& groom);
 
-/// Triangles of neighbouring roots (at most about 2 per strand), deterministic. Strands without a triangle
-/// are still drawn as themselves.
+/// Triangles of neighbouring roots (at most about 2 per strand), deterministic, across partings as well.
+/// Strands without a triangle are still drawn as themselves.
 std::vector<RootTriangle> make_root_triangles(const Groom& groom);
 
 /// Order of strands such that every prefix covers the head evenly, so that a prefix is a valid subset.

@@ -18,9 +18,6 @@ constexpr uint32_t kSpacingRank = 6;      // local spacing = distance to this ne
 constexpr uint32_t kStarVotes = 2;        // of the three corners
 constexpr float kMaxEdgeInSpacings = 1.6f;
 constexpr float kJitterInSpacings = 1e-3f;  // breaks ties of regular root grids the same way in every star
-// Strands of one triangle may move apart by this much of their length: a parting divides more.
-constexpr float kMaxDivergence = 0.45f;
-constexpr std::array<float, 4> kDivergenceAt = {0.25f, 0.5f, 0.75f, 1.0f};
 constexpr uint32_t kOrderSeed = 0;
 
 using Triple = std::array<uint32_t, 3>;
@@ -168,23 +165,6 @@ class StarBuilder {
   std::vector<double> jitter_m_;
 };
 
-glm::vec3 point_at(const Groom& groom, uint32_t strand, float part) {
-  const uint32_t last = groom.vertex_count(strand) - 1;
-  const float at = part * static_cast<float>(last);
-  const uint32_t vertex = std::min(static_cast<uint32_t>(at), last - 1);
-  const glm::vec3* strand_points = groom.rest_position_m.data() + groom.offset[strand];
-  return glm::mix(strand_points[vertex], strand_points[vertex + 1], at - static_cast<float>(vertex));
-}
-
-/// True when the strands run beside each other: a follower between them stays between them.
-bool runs_together(const Groom& groom, const std::vector<float>& lengths_m, uint32_t a, uint32_t b) {
-  const float root_distance = glm::distance(point_at(groom, a, 0.0f), point_at(groom, b, 0.0f));
-  const float reach = kMaxDivergence * std::max(lengths_m[a], lengths_m[b]);
-  return std::all_of(kDivergenceAt.begin(), kDivergenceAt.end(), [&](float part) {
-    return glm::distance(point_at(groom, a, part), point_at(groom, b, part)) <= root_distance + part * reach;
-  });
-}
-
 }  // namespace
 
 std::vector<RootTriangle> make_root_triangles(const Groom& groom) {
@@ -200,20 +180,12 @@ std::vector<RootTriangle> make_root_triangles(const Groom& groom) {
   for (uint32_t i = 0; i < points.size(); ++i) builder.append_star(i, triples);
   std::sort(triples.begin(), triples.end());
 
-  std::vector<float> lengths_m(groom.strand_count());
-  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand)
-    lengths_m[strand] = groom.length_m(strand);
   std::vector<RootTriangle> triangles;
   for (auto first = triples.begin(); first != triples.end();) {
     const auto last =
         std::find_if(first, triples.end(), [&](const Triple& triple) { return triple != *first; });
-    const glm::uvec3 corner(strands[(*first)[0]], strands[(*first)[1]], strands[(*first)[2]]);
-    if (last - first >= kStarVotes && builder.is_local(*first) &&
-        runs_together(groom, lengths_m, corner.x, corner.y) &&
-        runs_together(groom, lengths_m, corner.y, corner.z) &&
-        runs_together(groom, lengths_m, corner.z, corner.x)) {
-      triangles.push_back(corner);
-    }
+    if (last - first >= kStarVotes && builder.is_local(*first))
+      triangles.emplace_back(strands[(*first)[0]], strands[(*first)[1]], strands[(*first)[2]]);
     first = last;
   }
   return triangles;

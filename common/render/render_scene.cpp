@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/render/passes/expand_pass.h"
+#include "common/render/strand_style.h"
 
 namespace strandcast {
 namespace {
@@ -123,6 +124,7 @@ RenderScene::RenderScene(const SceneAsset& asset, const LookDesc& wanted_look, b
       features(analyse_picture(asset, look)),
       is_software(is_drawn_by_software),
       triangle_count(static_cast<uint32_t>(asset.triangle.size())),
+      joined_triangle_count(static_cast<uint32_t>(joined_triangles(asset).size())),
       head_vertex_count(static_cast<uint32_t>(asset.head.position_m.size())),
       head_triangle_count(static_cast<uint32_t>(asset.head.triangle.size())),
       rest(measure_rest(asset)),

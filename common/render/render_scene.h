@@ -44,8 +44,9 @@ struct RenderScene {
 
   LookDesc look;  // within what the renderer can draw
   PictureFeatures features;
-  bool is_software = false;     // detail costs more there
-  uint32_t triangle_count = 0;  // between roots
+  bool is_software = false;            // detail costs more there
+  uint32_t triangle_count = 0;         // between roots
+  uint32_t joined_triangle_count = 0;  // of them, those whose hair runs together
   uint32_t head_vertex_count = 0;
   uint32_t head_triangle_count = 0;
   RenderMethods methods;  // of the path

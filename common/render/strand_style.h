@@ -21,7 +21,10 @@ StyleNumbers style_numbers(const LookDesc& look, float mean_length_m);
 /// What a drawn strand may lie beside its keys, m.
 float style_room_m(const StyleNumbers& style);
 
-/// Per root triangle: 1 where its hair falls to different sides at rest, else 0.
+/// Per root triangle: 1 where its hair falls to different sides at rest, else 0. Followers there hang on
+/// their nearest key alone.
 std::vector<uint8_t> parted_triangles(const SceneAsset& asset);
+/// The triangles whose hair runs together at rest: for who lets followers hang between all three keys.
+std::vector<RootTriangle> joined_triangles(const SceneAsset& asset);
 
 }  // namespace strandcast

@@ -188,8 +188,7 @@ TEST(RootTriangles, CoverAScalpWithAboutTwoPerStrand) {
   const Groom groom = grown(3000);
   const auto triangles = make_root_triangles(groom);
   expect_proper(groom, triangles);
-  // Euler: a triangulated disc of n points has 2n - 2 - b triangles with b on its rim; the parting takes
-  // some.
+  // Euler: a triangulated disc of n points has 2n - 2 - b triangles with b on its rim.
   EXPECT_GT(triangles.size(), 3000u * 17 / 10);
   EXPECT_LT(triangles.size(), 3000u * 2);
   EXPECT_EQ(triangles, make_root_triangles(groom));
@@ -234,21 +233,21 @@ TEST(RootTriangles, DoNotBridgeAGapBetweenTwoPatches) {
   }
 }
 
-TEST(RootTriangles, DoNotBridgeAPartingOfCloseRoots) {
+TEST(RootTriangles, CoverThePartingOfCloseRoots) {
   std::vector<std::vector<glm::vec3>> strands;
   for (uint32_t i = 0; i < 400; ++i) {
     const glm::vec3 root(0.2f * random_unit(2 * i) - 0.1f, 0.0f, 0.2f * random_unit(2 * i + 1));
     const glm::vec3 comb(root.x < 0.0f ? -0.1f : 0.1f, 0.02f, 0.0f);
     strands.push_back({root, root + 0.5f * comb, root + comb});
   }
-  const Groom groom = make_groom(strands);
-  const auto triangles = make_root_triangles(groom);
-  EXPECT_GT(triangles.size(), 300u);
+  const auto triangles = make_root_triangles(make_groom(strands));
   const auto is_left = [&](uint32_t strand) { return strands[strand][0].x < 0.0f; };
-  for (const RootTriangle& t : triangles) {
-    ASSERT_EQ(is_left(t.x), is_left(t.y));
-    ASSERT_EQ(is_left(t.x), is_left(t.z));
-  }
+  const auto across = std::count_if(triangles.begin(), triangles.end(), [&](const RootTriangle& t) {
+    return is_left(t.x) != is_left(t.y) || is_left(t.x) != is_left(t.z);
+  });
+  // About two per spacing along the parting, of 20 x 20 roots.
+  EXPECT_GT(across, 20);
+  EXPECT_LT(across, 80);
 }
 
 TEST(RootTriangles, SurviveDegenerateRoots) {

@@ -11,6 +11,7 @@
 #include "common/base/hash.h"
 #include "common/pictures/picture_error.h"
 #include "common/render/tiles/half_float.h"
+#include "common/render/tiles/strand_expansion.h"
 #include "common/render/tiles/tile_raster.h"
 #include "tests/support/grown_hair.h"
 #include "tests/support/sample_look.h"
@@ -87,6 +88,55 @@ TEST(TileRenderer, TheDefaultBoundHardlyShows) {
   ASSERT_TRUE(error);
   EXPECT_GE(error->psnr_db, 45.0);
   EXPECT_GE(error->ssim, 0.99);
+}
+
+// Roots as close across a parting as beside it, combed to both sides.
+TEST(TileRenderer, FollowersCoverAPartingAndFallToTheirKeysSide) {
+  SceneAsset asset;
+  constexpr uint32_t kSide = 12;
+  constexpr float kSpacingM = 0.01f;
+  asset.strand_count = kSide * kSide;
+  asset.vertex_count = 4;
+  for (uint32_t vertex = 0; vertex < asset.vertex_count; ++vertex)
+    for (uint32_t i = 0; i < asset.strand_count; ++i) {
+      const float x = kSpacingM * (static_cast<float>(i % kSide) - 0.5f * (kSide - 1));
+      const float away = 0.05f * static_cast<float>(vertex);
+      asset.rest_position_m.emplace_back(x < 0.0f ? x - away : x + away, 0.2f * away,
+                                         kSpacingM * static_cast<float>(i / kSide));
+    }
+  for (uint32_t row = 0; row + 1 < kSide; ++row)
+    for (uint32_t column = 0; column + 1 < kSide; ++column) {
+      const uint32_t i = row * kSide + column;
+      asset.triangle.emplace_back(i, i + 1, i + kSide);
+      asset.triangle.emplace_back(i + 1, i + kSide + 1, i + kSide);
+    }
+  const std::vector<uint8_t> parted = parted_triangles(asset);
+  EXPECT_EQ(std::count(parted.begin(), parted.end(), 1), 2 * (kSide - 1)) << "one column of squares";
+  EXPECT_EQ(joined_triangles(asset).size() + 2 * (kSide - 1), asset.triangle.size());
+
+  LookDesc look;
+  look.followers = 20;
+  look.style = {};
+  look.style.clump = look.style.spread = look.style.wave_m = look.style.frizz_m = 0.0f;
+  look.style.stray_share = 0.0f;
+  StrandExpansion expansion(asset, 0.15f);
+  expansion.set_look(look);
+  StrandDetail detail;
+  detail.segments_per_gap = 2;
+  detail.followers = look.followers;
+  detail.strand_count = asset.strand_count + static_cast<uint32_t>(asset.triangle.size()) * look.followers;
+  WorkerPool workers(1);
+  StrandPoints points;
+  expansion.expand(asset.rest_position_m, detail, workers, simd::widest_set(), points);
+  int within = 0;
+  for (uint32_t strand = 0; strand < points.strand_count(); ++strand) {
+    const StrandPoint& root = points.point[points.first_point[strand]];
+    const StrandPoint& tip = points.point[points.first_point[strand + 1] - 1];
+    within += std::abs(root.x) < 0.45f * kSpacingM;
+    // Whichever way it falls, it goes all of it: none hangs between the sides.
+    EXPECT_GT(std::abs(tip.x - root.x), 0.05f) << strand;
+  }
+  EXPECT_GT(within, static_cast<int>(0.8 * 2 * (kSide - 1) * look.followers));
 }
 
 // ---- one tile after another, from points made by hand

@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/gl/device_limits.h"
+#include "common/render/strand_style.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 
@@ -54,7 +55,7 @@ void draw_lines(const gl::Program& program, uint32_t first, uint32_t strands, ui
 }
 
 ExpandSizes sizes_of(const RenderScene& scene) {
-  return {scene.key_strands, scene.triangle_count, scene.look.followers};
+  return {scene.key_strands, scene.joined_triangle_count, scene.look.followers};
 }
 
 /// Key strands, then all followers, in as many batches as the buffer needs.
@@ -72,7 +73,8 @@ class ExpandPass final : public RenderPass {
 
   bool is_batched() const override { return true; }
   uint64_t size_bytes() const override {
-    return scene_.features.has_followers.value ? sizeof(RootTriangle) * uint64_t{scene_.triangle_count} : 0;
+    return scene_.features.has_followers.value ? sizeof(RootTriangle) * uint64_t{scene_.joined_triangle_count}
+                                               : 0;
   }
 
   Status prepare(const RenderSetup& setup) override {
@@ -167,13 +169,15 @@ Result<StrandExpander> StrandExpander::make(const gl::ShaderLibrary& shaders, co
   CHECK(asset.strand_count > 0 && asset.vertex_count >= kMinVertexCount);
   StrandExpander expander;
   expander.followers_ = followers;
-  if (asset.triangle.empty()) expander.followers_.per_triangle = 0;
+  // A follower between strands that a parting divides would hang across it.
+  const std::vector<RootTriangle> triangles = joined_triangles(asset);
+  if (triangles.empty()) expander.followers_.per_triangle = 0;
   const bool has_followers = expander.followers_.per_triangle > 0;
   ASSIGN_OR_RETURN(expander.program_,
                    gl::Program::make(shaders, {"render/expand.vert", "render/expand.tese"},
                                      {{"HAS_FOLLOWERS", has_followers ? 1 : 0}}, kCaptured));
   expander.no_attributes_ = gl::VertexArray("expand");
-  if (has_followers) expander.root_triangle_ = gl::Buffer::of("root triangle", asset.triangle);
+  if (has_followers) expander.root_triangle_ = gl::Buffer::of("root triangle", triangles);
   return expander;
 }
 
