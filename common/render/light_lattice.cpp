@@ -207,6 +207,10 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
 // Shares of one row of cells. Far from the skin distances tell of how many cells nothing changes.
 void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
   std::fill(share.begin(), share.end(), 0.0f);
+  const auto is_border = [](int at, int size) {
+    return at < kSolidBorderCells || at >= size - kSolidBorderCells;
+  };
+  if (is_border(y, view_.size.y) || is_border(z, view_.size.z)) return;
   const HeadOccupancy& head = *desc_.solid;
   const float per_cell = view_.cell_m / head.cell_m;
   const glm::vec3 step = per_cell * view_.axis[0];
@@ -216,8 +220,8 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
       (along.x * view_.axis[0] + along.y * view_.axis[1] + along.z * view_.axis[2] - head.origin_m) /
       head.cell_m;
   // Outside of the head's cells there is none.
-  float first = 0.0f;
-  auto last = static_cast<float>(view_.size.x - 1);
+  auto first = static_cast<float>(kSolidBorderCells);
+  auto last = static_cast<float>(view_.size.x - 1 - kSolidBorderCells);
   for (int a = 0; a < 3; ++a) {
     const float high = static_cast<float>(head.size[a]) - 0.5f;
     if (std::abs(step[a]) < 1e-6f) {

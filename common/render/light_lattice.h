@@ -60,6 +60,9 @@ inline constexpr int kMaxLightCellsPerAxis = 160;
 /// its skin, so that roots and skin stay lit.
 inline constexpr float kSolidInsetCells = 1.25f;
 inline constexpr float kSolidRampCells = 1.25f;
+/// Along the lattice's sides nothing is head: whoever looks up beyond them is told what they hold, and a body
+/// that goes on out there does not lie in its own shade.
+inline constexpr int kSolidBorderCells = 2;
 /// Optical depth behind the head, times the cube of the most that was passed: an edge as soft as the ramp.
 inline constexpr float kSolidDepth = 12.0f;
 /// The other lights sum it up, per cell. The sky is all around: what lies above hides a part of it only.

@@ -16,6 +16,7 @@ uniform float u_solid_inset_m;     // half solid so far below its skin
 uniform float u_solid_ramp_m;      // and all of it or nothing so far from there
 layout(binding = kUnitTileSolid) uniform sampler3D u_solid;         // distance to the head's skin, negative inside
 uniform float u_solid_reach_m;     // that 1 of it stands for
+uniform int u_solid_border;        // cells along the lattice's sides that are none of it
 uniform vec3 u_solid_origin_m;     // corner of its first cell, head space
 uniform vec3 u_solid_from_m;       // 1 / (cells x cell size); 0: there is no head
 
@@ -31,12 +32,13 @@ void main() {
   vec3 solid_step = cell_m * u_frame.lattice_axis[2].xyz * u_solid_from_m;
   float passed = 0.0;
   float most_solid = 0.0;
+  bool is_line = all(greaterThanEqual(line, ivec2(u_solid_border))) && all(lessThan(line, size.xy - u_solid_border));
   int slice = size.x * size.y;
   int cell = line.y * size.x + line.x;
   for (int z = 0; z < size.z; ++z) {
     float here = float(b_sums.cell[cell]) * u_sum_unit;
     // Outside of the head's box there is none.
-    bool is_inside = all(greaterThan(solid, vec3(0.0))) && all(lessThan(solid, vec3(1.0)));
+    bool is_inside = is_line && z >= u_solid_border && z < size.z - u_solid_border && all(greaterThan(solid, vec3(0.0))) && all(lessThan(solid, vec3(1.0)));
     float outside_m = u_solid_reach_m * textureLod(u_solid, solid, 0.0).r + u_solid_inset_m;
     float share = is_inside ? clamp(0.5 - outside_m * (0.5 / u_solid_ramp_m), 0.0, 1.0) : 0.0;
     b_sums.cell[cell] = int(packHalf2x16(vec2(here, share)));

@@ -173,6 +173,23 @@ TEST_F(LightLatticeTest, ShouldersLieInTheShadeOfTheHead) {
   EXPECT_LT(key_depth(lattice.view(), {0.0f, -0.13f, 0.13f}), 0.5);
 }
 
+// Of a body that is larger than the hair's lattice only what lies within it casts shadows.
+TEST_F(LightLatticeTest, ABodyBeyondTheLatticeIsNotInItsOwnShade) {
+  OccupancyRequest request;
+  request.ball = FittedSphere{glm::vec3(0.0f), 0.2f};
+  LightLattice lattice(
+      {0.1f, 32, false, {}, std::make_shared<const HeadOccupancy>(make_head_occupancy(Mesh(), request))});
+  for (const glm::vec3 to_light : {glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(-1, 0, 0)}) {
+    const glm::vec3 aside(to_light.z, to_light.x, to_light.y);
+    lattice.build(strands_in_box(100, 0.1f), {kWidthM, 1.0f, 0.0f}, {to_light, aside, to_light, true},
+                  workers_);
+    for (const glm::vec3 way : {to_light, aside, -aside})
+      EXPECT_LT(key_depth(lattice.view(), 0.2f * way), 0.5);
+    EXPECT_LT(other_depth(lattice.view(), 0.2f * aside, false), 0.5);
+    EXPECT_NEAR(key_depth(lattice.view(), -0.2f * to_light), kSolidDepth, 1.0);
+  }
+}
+
 TEST_F(LightLatticeTest, TheHeadIsTheSameForAnyNumberOfThreads) {
   const StrandPoints points = strands_in_box(500, 0.2f);
   const LightDirections lights{
@@ -208,7 +225,10 @@ TEST_F(LightLatticeTest, NoCellOfTheHeadIsSkipped) {
         const glm::vec3 place = (along.x * view.axis[0] + along.y * view.axis[1] + along.z * view.axis[2] -
                                  desc.solid->origin_m) /
                                 desc.solid->cell_m;
-        const bool is_there = glm::all(glm::greaterThan(place, glm::vec3(-0.5f))) &&
+        const glm::ivec3 at(x, y, z);
+        const bool is_there = glm::all(glm::greaterThanEqual(at, glm::ivec3(kSolidBorderCells))) &&
+                              glm::all(glm::lessThan(at, view.size - kSolidBorderCells)) &&
+                              glm::all(glm::greaterThan(place, glm::vec3(-0.5f))) &&
                               glm::all(glm::lessThan(place, glm::vec3(desc.solid->size) - 0.5f));
         const float outside = distance_at(*desc.solid, place) / view.cell_m + kSolidInsetCells;
         if (is_there) most = std::max(most, std::clamp(0.5 - outside * 0.5 / kSolidRampCells, 0.0, 1.0));

@@ -86,6 +86,7 @@ void GpuLattice::build(const LatticeFrame& frame, const LightDirections& lights,
   key_.use();
   key_.set("u_sum_unit", kLightSumUnit);
   key_.set("u_solid_depth", kSolidDepth);
+  key_.set("u_solid_border", kSolidBorderCells);
   key_.set("u_solid_inset_m", kSolidInsetCells * frame.cell_m);
   key_.set("u_solid_ramp_m", kSolidRampCells * frame.cell_m);
   key_.set("u_solid_reach_m", solid_reach_m_);
