@@ -181,8 +181,8 @@ TEST_F(LightLatticeTest, ABodyBeyondTheLatticeIsNotInItsOwnShade) {
       {0.1f, 32, false, {}, std::make_shared<const HeadOccupancy>(make_head_occupancy(Mesh(), request))});
   for (const glm::vec3 to_light : {glm::vec3(0, 1, 0), glm::vec3(0, 0, 1), glm::vec3(-1, 0, 0)}) {
     const glm::vec3 aside(to_light.z, to_light.x, to_light.y);
-    lattice.build(strands_in_box(100, 0.1f), {kWidthM, 1.0f, 0.0f}, {to_light, aside, to_light, true},
-                  workers_);
+    build(lattice, strands_in_box(100, 0.1f), {kWidthM, 1.0f, 0.0f}, {to_light, aside, to_light, true},
+          workers_);
     for (const glm::vec3 way : {to_light, aside, -aside})
       EXPECT_LT(key_depth(lattice.view(), 0.2f * way), 0.5);
     EXPECT_LT(other_depth(lattice.view(), 0.2f * aside, false), 0.5);
