@@ -103,6 +103,11 @@ std::vector<std::string> names_of(std::string_view path) {
   if (path == "methods.shadow") return methods(shadow_methods());
   if (path == "methods.transparency") return methods(transparency_methods());
   if (path == "methods.antialiasing") return methods(antialiasing_methods());
+  if (path == "methods.curve") return methods(curve_methods());
+  if (path == "methods.joints") return methods(joint_methods());
+  if (path == "methods.detail") return methods(detail_methods());
+  if (path == "methods.culling") return methods(culling_methods());
+  if (path == "methods.shadow_detail") return methods(shadow_details());
   return {};
 }
 

@@ -14,7 +14,7 @@ constexpr const char* kByScene = "the groom";
 // specification.
 constexpr DeviceLimitRow kTable[] = {
     {DeviceLimit::VertexStorageBlocks, "storage blocks in the vertex stage",
-     GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS, false, 0, 1, "render/strand.vert"},
+     GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS, false, 0, 2, "render/strand.vert"},
     {DeviceLimit::FragmentStorageBlocks, "storage blocks in the fragment stage",
      GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS, false, 8, 3, "render/lists.frag"},
     {DeviceLimit::TessellationStorageBlocks, "storage blocks in the tessellation evaluation stage",

@@ -15,7 +15,7 @@ namespace strandcast::gl {
 namespace {
 
 constexpr uint64_t kMaxShaderFileBytes = 1u << 20;
-constexpr size_t kMaxVariants = 1024;  // of one stage file
+constexpr size_t kMaxVariants = 2048;  // of one stage file
 constexpr size_t kFewVariants = 64;    // so many are all compiled by a test, of more some
 constexpr std::array<std::string_view, 6> kStageExtensions = {".vert", ".tesc", ".tese",
                                                               ".geom", ".frag", ".comp"};

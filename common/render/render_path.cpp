@@ -18,14 +18,23 @@ std::unique_ptr<RenderPass> make_scatter_table_pass(RenderScene& scene);
 
 namespace {
 
+/// Shadows: of the strands that are drawn, or of others that are chosen for the light's map.
+void add_caster_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
+  if (scene.methods.shadow_detail == ShadowDetail::Same) return add_shadow_passes(scene, walks, passes);
+  auto& casters = passes.keep(make_casters(scene));
+  ExpandWalks caster_walks(make_caster_pass(scene, casters), casters);
+  add_shadow_passes(scene, caster_walks, passes);
+}
+
 void add_segment_passes(RenderScene& scene, RenderPassList& passes) {
   scene.scene.set_layout(sample_layout(scene.methods.antialiasing));
   auto& expanded = passes.keep(make_expanded_strands(scene));
   ExpandWalks walks(make_expand_pass(scene, expanded), expanded);
+  add_culling(scene, expanded, passes);
   passes.add(make_lobe_table_pass(scene));
   passes.add(make_scatter_table_pass(scene));
   passes.add(make_upload_pass(scene));
-  add_shadow_passes(scene, walks, passes);
+  add_caster_passes(scene, walks, passes);
   passes.add(make_clear_pass(scene));
   passes.add(make_head_pass(scene));
   add_transparency_passes(scene, walks, passes);

@@ -18,6 +18,7 @@
 
 namespace strandcast {
 
+class Culling;
 class ShadowMap;
 
 /// Measures of the rest shape.
@@ -37,9 +38,10 @@ struct RenderScene {
   /// The asset has been checked.
   RenderScene(const SceneAsset& asset, const LookDesc& wanted_look, bool is_drawn_by_software);
 
-  /// Whether strands are blended in a layer of their own instead of drawn into the scene.
+  /// Whether strands are blended in a layer of their own, over the scene.
   bool has_strand_layer() const {
-    return features.has_strands.value && methods.transparency != TransparencyMethod::Hashed;
+    return features.has_strands.value &&
+           (methods.transparency != TransparencyMethod::Hashed || methods.detail == DetailMethod::Volume);
   }
 
   LookDesc look;  // within what the renderer can draw
@@ -61,6 +63,7 @@ struct RenderScene {
   LobeTables lobe_tables;
   ScatterTables scatter_tables;
   const ShadowMap* shadow = nullptr;  // of the method, where it has one
+  Culling* culling = nullptr;         // chooses what the camera draws; none: all
   SceneTarget scene;
   StrandLayer strand_layer;
   PictureTarget picture;

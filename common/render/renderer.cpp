@@ -14,8 +14,7 @@ Status add_planned(const RenderPath& path, RenderScene& scene, RenderPassList& p
   const RenderMethodsDesc& wanted = scene.look.methods;
   if (const char* const conflict = method_conflict(wanted); *conflict != '\0')
     return make_error(ErrorCode::BadInput, "look.methods: {}", conflict);
-  ASSIGN_OR_RETURN(scene.methods,
-                   find_render_methods(wanted.shadow, wanted.transparency, wanted.antialiasing));
+  ASSIGN_OR_RETURN(scene.methods, find_render_methods(wanted));
   if (path.methods) scene.methods = *path.methods;
   RETURN_IF_ERROR(check_render_methods(scene.methods));
   path.add_passes(scene, passes);

@@ -22,6 +22,11 @@ struct RenderMethodsDesc {
   std::string shadow = kMainMethod;
   std::string transparency = kMainMethod;
   std::string antialiasing = kMainMethod;
+  std::string curve = kMainMethod;
+  std::string joints = kMainMethod;
+  std::string detail = kMainMethod;
+  std::string culling = kMainMethod;
+  std::string shadow_detail = kMainMethod;
 
   bool operator==(const RenderMethodsDesc&) const = default;
 };

@@ -156,6 +156,11 @@ void visit_methods(Visitor& v, RenderMethodsDesc& methods) {
   method("shadow", methods.shadow, shadow_methods());
   method("transparency", methods.transparency, transparency_methods());
   method("antialiasing", methods.antialiasing, antialiasing_methods());
+  method("curve", methods.curve, curve_methods());
+  method("joints", methods.joints, joint_methods());
+  method("detail", methods.detail, detail_methods());
+  method("culling", methods.culling, culling_methods());
+  method("shadow_detail", methods.shadow_detail, shadow_details());
   const char* const conflict = method_conflict(methods);
   v.require("transparency", *conflict == '\0', conflict);
 }

@@ -40,6 +40,23 @@ bool is_method(const MethodTable<Method>& table, std::string_view name, Method m
   return table.has(name) && table.at(name) == method;
 }
 
+/// Names that are unknown count as the main ones.
+template <class Method>
+Method known(const MethodTable<Method>& table, std::string_view name) {
+  return table.has(name) ? table.at(name) : Method{};
+}
+
+/// Of what reads the depth of what is opaque, in a grid of samples: empty, or why it cannot.
+const char* depth_conflict(const RenderMethods& methods) {
+  const bool is_msaa = methods.antialiasing == AntialiasingMethod::Msaa4;
+  if (methods.culling == CullingMethod::Occlusion && is_msaa)
+    return "culling occlusion does not go with antialiasing msaa4";
+  if (methods.detail == DetailMethod::Volume && (methods.transparency != TransparencyMethod::Hashed ||
+                                                 methods.antialiasing != AntialiasingMethod::Analytic))
+    return "detail volume goes with transparency hashed and antialiasing analytic only";
+  return "";
+}
+
 }  // namespace
 
 const MethodTable<ShadowMethod>& shadow_methods() {
@@ -66,15 +83,21 @@ Status check_render_methods(const RenderMethods& methods) {
                       kAntialiasings[static_cast<size_t>(methods.antialiasing)].name, kTransparencies[0].name,
                       kTransparencies[static_cast<size_t>(methods.transparency)].name,
                       kAntialiasings[0].name);
+  if (const char* const conflict = depth_conflict(methods); *conflict != '\0')
+    return make_error(ErrorCode::BadInput, "{}", conflict);
   return {};
 }
 
-Result<RenderMethods> find_render_methods(std::string_view shadow, std::string_view transparency,
-                                          std::string_view antialiasing) {
+Result<RenderMethods> find_render_methods(const RenderMethodsDesc& names) {
   RenderMethods methods;
-  ASSIGN_OR_RETURN(methods.shadow, find("shadow", shadow_methods(), shadow));
-  ASSIGN_OR_RETURN(methods.transparency, find("transparency", transparency_methods(), transparency));
-  ASSIGN_OR_RETURN(methods.antialiasing, find("antialiasing", antialiasing_methods(), antialiasing));
+  ASSIGN_OR_RETURN(methods.shadow, find("shadow", shadow_methods(), names.shadow));
+  ASSIGN_OR_RETURN(methods.transparency, find("transparency", transparency_methods(), names.transparency));
+  ASSIGN_OR_RETURN(methods.antialiasing, find("antialiasing", antialiasing_methods(), names.antialiasing));
+  ASSIGN_OR_RETURN(methods.curve, find("curve", curve_methods(), names.curve));
+  ASSIGN_OR_RETURN(methods.joints, find("joints", joint_methods(), names.joints));
+  ASSIGN_OR_RETURN(methods.detail, find("detail", detail_methods(), names.detail));
+  ASSIGN_OR_RETURN(methods.culling, find("culling", culling_methods(), names.culling));
+  ASSIGN_OR_RETURN(methods.shadow_detail, find("shadow_detail", shadow_details(), names.shadow_detail));
   RETURN_IF_ERROR(check_render_methods(methods));
   return methods;
 }
@@ -92,7 +115,12 @@ const char* method_conflict(const RenderMethodsDesc& methods) {
   if (is_method(scattering_models(), methods.scattering, ScatteringModel::Isosurface) &&
       !is_method(shadow_methods(), methods.shadow, ShadowMethod::Volume))
     return "scattering isosurface goes with shadow volume only: its surface is that of the volume";
-  return "";
+  RenderMethods drawn;
+  drawn.transparency = known(transparency_methods(), methods.transparency);
+  drawn.antialiasing = known(antialiasing_methods(), methods.antialiasing);
+  drawn.detail = known(detail_methods(), methods.detail);
+  drawn.culling = known(culling_methods(), methods.culling);
+  return depth_conflict(drawn);
 }
 
 }  // namespace strandcast

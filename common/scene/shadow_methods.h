@@ -8,6 +8,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/render_methods.h"
+#include "common/scene/strand_methods.h"
 
 namespace strandcast {
 
@@ -27,6 +28,11 @@ struct RenderMethods {
   ShadowMethod shadow = ShadowMethod::Volume;
   TransparencyMethod transparency = TransparencyMethod::Hashed;
   AntialiasingMethod antialiasing = AntialiasingMethod::Analytic;
+  CurveMethod curve = CurveMethod::Hermite;
+  JointMethod joints = JointMethod::Mended;
+  DetailMethod detail = DetailMethod::Adaptive;
+  CullingMethod culling = CullingMethod::None;
+  ShadowDetail shadow_detail = ShadowDetail::Same;
 
   bool operator==(const RenderMethods&) const = default;
 };
@@ -36,8 +42,7 @@ Status check_render_methods(const RenderMethods& methods);
 
 /// By the names of their rows. BadInput names an unknown one with all that there are, and kinds that do not
 /// go together.
-Result<RenderMethods> find_render_methods(std::string_view shadow, std::string_view transparency,
-                                          std::string_view antialiasing);
+Result<RenderMethods> find_render_methods(const RenderMethodsDesc& names);
 
 /// Empty where the methods of a look go together, else why they do not. Unknown names count as the main ones.
 const char* method_conflict(const RenderMethodsDesc& methods);

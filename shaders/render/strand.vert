@@ -2,6 +2,8 @@
 // fades out inside it. Four invocations per segment pull its two ends from the expanded buffer. Shaded here, unless the
 // look wants it per fragment: a strand is thinner than a pixel and its vertices are close.
 #pragma variant IS_PER_FRAGMENT 0 1
+#pragma variant JOINTS 0 1
+#pragma variant IS_CHOSEN 0 1
 #include "lib/hash.glsl"
 #include "render/strand_light.glsl"
 #include "shared/bindings.h"
@@ -13,6 +15,11 @@ struct ExpandedVertex {
 layout(std430, binding = kBindingExpanded) restrict readonly buffer Expanded {
   ExpandedVertex vertex[];  // (segment_count x 2)
 } expanded;
+#if IS_CHOSEN == 1
+layout(std430, binding = kBindingChosen) restrict readonly buffer Chosen {
+  uint segment[];  // those that are drawn
+} chosen;
+#endif
 
 uniform mat4 u_clip_from_head;
 uniform vec2 u_target_px;
@@ -40,8 +47,19 @@ out vec3 v_color;
 
 const uint kSaltThreshold = 0x7f4a7c15u;
 
+#if JOINTS == 1
+// Where the camera looks, unit, head space.
+vec3 front() {
+  return normalize(vec3(u_clip_from_head[0].w, u_clip_from_head[1].w, u_clip_from_head[2].w));
+}
+#endif
+
 void main() {
+#if IS_CHOSEN == 1
+  uint segment = chosen.segment[uint(gl_VertexID) >> 2];
+#else
   uint segment = uint(gl_VertexID) >> 2;
+#endif
   uint end = uint(gl_VertexID >> 1) & 1u;
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
   ExpandedVertex v = expanded.vertex[2u * segment + end];
@@ -57,7 +75,13 @@ void main() {
   float along = v.position_along.w;
 
   vec4 clip = u_clip_from_head * vec4(position_m, 1.0);
+#if JOINTS == 1
+  // 003, 4.3.2: across the segment's own way and the camera's, so that the next quad begins elsewhere at a bend.
+  vec3 way = expanded.vertex[2u * segment + 1u].position_along.xyz - expanded.vertex[2u * segment].position_along.xyz;
+  vec4 clip_step = u_clip_from_head * vec4(way - front() * dot(way, front()), 0.0);
+#else
   vec4 clip_step = u_clip_from_head * vec4(tangent, 0.0);
+#endif
   // Direction on the screen, up to a positive factor. A strand that points at the eye has none: any will do.
   vec2 direction = (clip_step.xy * clip.w - clip.xy * clip_step.w) * u_target_px;
   float direction_length = length(direction);

@@ -14,6 +14,11 @@ uniform vec3 u_lobe_weights;      // of R, TT and TRT
 uniform float u_highlight_width;  // of R in the half angle, rad
 uniform float u_highlight_shift;  // likewise
 uniform float u_tilt_spread;      // the cuticle's tilt seems to vary, for strands do not lie perfectly, rad
+uniform float u_diffuse;          // weights of the terms
+uniform float u_scatter;          // light that arrives through other strands
+uniform float u_root_darkening;   // 0..1
+uniform float u_strand_variation; // of brightness
+uniform float u_warmth_variation; // of red against blue
 
 #include "render/lobe_tables.glsl"
 #include "lib/scatter_sadeghi.glsl"
@@ -25,14 +30,11 @@ uniform float u_tilt_spread;      // the cuticle's tilt seems to vary, for stran
 #include "lib/isosurface.glsl"
 
 // Artist's weights of the terms, chosen by eye on the built-in scene.
-const float kDiffuse = 0.70;
-const float kScatter = 0.30;           // light that arrives through other strands
 const float kScatterReach = 0.35;      // power of the direct part: how deep that light goes
 const float kGroundLight = 0.45;       // light from below over light from above
 const float kDeepLight = 0.08;         // what is left of it in the middle of the hair, scattered many times
 // Variation between strands.
-const float kBrightnessSpread = 0.28;
-const float kWarmthSpread = 0.08;
+const float kDarkRoots = 0.25;         // of the length
 const float kGlintFrom = 30.0 * kDegree;
 const float kGlintTo = 45.0 * kDegree;
 const uint kSaltBrightness = 0x68bc21ebu;
@@ -42,23 +44,41 @@ const uint kSaltTilt = 0x3c6ef372u;
 
 float strand_random(uint strand, uint salt) { return unit_float(mix_u32(strand ^ salt)); }
 
+// Of the mean strand.
+vec3 mean_color(float along) {
+  float dark = 1.0 - u_root_darkening * (1.0 - min(along / kDarkRoots, 1.0));
+  return mix(u_root_color, u_tip_color, along * along * (3.0 - 2.0 * along)) * dark;
+}
+
 vec3 strand_color(uint strand, float along) {
-  float brightness = 1.0 + kBrightnessSpread * (2.0 * strand_random(strand, kSaltBrightness) - 1.0);
-  float warmth = kWarmthSpread * (2.0 * strand_random(strand, kSaltWarmth) - 1.0);
-  vec3 color = mix(u_root_color, u_tip_color, along * along * (3.0 - 2.0 * along));
-  return color * brightness * vec3(1.0 + warmth, 1.0, 1.0 - warmth);
+  float brightness = 1.0 + u_strand_variation * (2.0 * strand_random(strand, kSaltBrightness) - 1.0);
+  float warmth = u_warmth_variation * (2.0 * strand_random(strand, kSaltWarmth) - 1.0);
+  return mean_color(along) * brightness * vec3(1.0 + warmth, 1.0, 1.0 - warmth);
+}
+
+Fibre fibre_of(vec3 color, float tilt, float glint) {
+  Fibre fibre;
+  fibre.color = color;
+  fibre.absorption = fibre_absorption(color);
+  fibre.lobes = u_lobe_weights;
+  fibre.diffuse = u_diffuse;
+  fibre.width = u_highlight_width;
+  fibre.shift = u_highlight_shift;
+  fibre.tilt = tilt;
+  fibre.glint = glint;
+  return fibre;
 }
 
 Fibre strand_fibre(uint strand, float along) {
-  Fibre fibre;
-  fibre.color = strand_color(strand, along);
-  fibre.absorption = fibre_absorption(fibre.color);
-  fibre.lobes = u_lobe_weights;
-  fibre.diffuse = kDiffuse;
-  fibre.width = u_highlight_width;
-  fibre.shift = u_highlight_shift;
-  fibre.tilt = u_tilt_spread * (2.0 * strand_random(strand, kSaltTilt) - 1.0);
-  fibre.glint = mix(kGlintFrom, kGlintTo, strand_random(strand, kSaltGlint));
+  return fibre_of(strand_color(strand, along), u_tilt_spread * (2.0 * strand_random(strand, kSaltTilt) - 1.0),
+                  mix(kGlintFrom, kGlintTo, strand_random(strand, kSaltGlint)));
+}
+
+// What stands for many strands: highlights are as wide as those of all of them together.
+Fibre mean_fibre(float along) {
+  Fibre fibre = fibre_of(mean_color(along), 0.0, 0.5 * (kGlintFrom + kGlintTo));
+  // The variance of what is spread evenly is a third of its square.
+  fibre.width = sqrt(fibre.width * fibre.width + u_tilt_spread * u_tilt_spread / 3.0);
   return fibre;
 }
 
@@ -112,7 +132,7 @@ vec3 strand_light_of_source(vec3 position_m, vec3 tangent, vec3 to_eye, Fibre fi
   vec3 across = u_to_light - dot(tangent, u_to_light) * tangent;
   across = across / max(length(across), 1e-6);
   float diffuse = kSurfaceDiffuse * wrapped_diffuse(hair_normal(position_m, across), u_to_light, kSurfaceWrap);
-  vec3 scattered = kScatter * pow(max(light_share, 1e-6), kScatterReach) * fibre.color;
+  vec3 scattered = u_scatter * pow(max(light_share, 1e-6), kScatterReach) * fibre.color;
   return light_share * (own + diffuse * fibre.color) + scattered;
 #elif SCATTERING == SCATTERING_DUAL
   fibre.diffuse = 0.0;
@@ -126,18 +146,22 @@ vec3 strand_light_of_source(vec3 position_m, vec3 tangent, vec3 to_eye, Fibre fi
   return light_share * strand_scatter(tangent, u_to_light, to_eye, fibre);
 #else
   vec3 direct = strand_scatter(tangent, u_to_light, to_eye, fibre);
-  vec3 scattered = kScatter * pow(max(light_share, 1e-6), kScatterReach) * fibre.color;
+  vec3 scattered = u_scatter * pow(max(light_share, 1e-6), kScatterReach) * fibre.color;
   return light_share * direct + scattered;
 #endif
 }
 
-vec3 strand_light(vec3 position_m, vec3 tangent, uint strand, float along) {
+vec3 fibre_light(vec3 position_m, vec3 tangent, Fibre fibre) {
   vec3 to_eye = normalize(u_eye_m - position_m);
-  Fibre fibre = strand_fibre(strand, along);
   vec2 light = light_at(position_m);
   vec3 lit = strand_light_of_source(position_m, tangent, to_eye, fibre, light.x);
-  float facing = 0.5 + 0.5 * dot(u_up, normalize(position_m));
+  // At the head's own middle there is no outward.
+  float facing = 0.5 + 0.5 * dot(u_up, position_m / max(length(position_m), 1e-6));
   vec3 surrounding =
       u_ambient * mix(kGroundLight, 1.0, facing) * (kDeepLight + (1.0 - kDeepLight) * light.y) * fibre.color;
   return u_light_color * lit + surrounding;
+}
+
+vec3 strand_light(vec3 position_m, vec3 tangent, uint strand, float along) {
+  return fibre_light(position_m, tangent, strand_fibre(strand, along));
 }

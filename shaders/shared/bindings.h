@@ -40,6 +40,12 @@ const uint kBindingListNode = 4u;
 const uint kBindingListCount = 5u;
 const uint kBindingDepthKeys = 6u;
 const uint kBindingDensity = 7u;
+const uint kBindingChosen = 0u;  // of segments, for who draws them
+const uint kBindingRunningSum = 3u;
+const uint kBindingCullMask = 4u;
+const uint kBindingCullDepth = 5u;
+const uint kBindingDrawCommand = 6u;
+const uint kBindingFarSum = 7u;
 // Of its tiles; beside them at most kBindingDensity and what is named above.
 const uint kBindingTilePoints = 0u;
 const uint kBindingTileStrands = 1u;

@@ -16,6 +16,11 @@ const uint kStrandLocalSize = 64u;
 // Invocations per group of kernels with one vertex per invocation: as many whole strands as fit.
 const uint kVertexLocalSize = 128u;
 
+// Invocations that make running sums, alone; samples along the side of a block whose depth is known to
+// culling.
+const uint kRunningSumLocalSize = 128u;
+const uint kCullBlock = 16u;
+
 // llvmpipe indexes tessellated vertices of one draw with 16 bits and draws wrongly past that, without an
 // error: patches x lines x (segments + 1) of a draw stays at or below this.
 const uint kMaxTessellatedVerticesPerDraw = 65535u;

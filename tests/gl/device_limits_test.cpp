@@ -51,7 +51,7 @@ TEST(DeviceLimits, WhatOpenGlGuaranteesDoesNotReachTheVertexStage) {
   const auto checked = check_device_limits(limits);
   ASSERT_FALSE(checked);
   EXPECT_EQ(checked.error().message,
-            "render/strand.vert needs 1 storage blocks in the vertex stage, this device has 0");
+            "render/strand.vert needs 2 storage blocks in the vertex stage, this device has 0");
 }
 
 TEST(DeviceLimits, SizesOfTheSceneAreCheckedInTheSameWords) {

@@ -274,9 +274,10 @@ class FillPass final : public RenderPass {
 };
 
 TEST_F(RenderCostTest, AnotherPathDrawsBehindTheSameRendererAndPaysForNothingOfTheFirst) {
-  const RenderPath path{"toy", "one colour", [](RenderScene& scene, RenderPassList& passes) {
-                          passes.add(std::make_unique<FillPass>(scene));
-                        }};
+  const RenderPath path{
+      "toy", "one colour",
+      [](RenderScene& scene, RenderPassList& passes) { passes.add(std::make_unique<FillPass>(scene)); },
+      kSamplesPerSide};
   const auto renderer = drawn(strands_of(5, 4), look_with(2), path);
   ASSERT_TRUE(renderer);
   EXPECT_THAT(added(), ElementsAre(0u, 1u, 1u, 0u, 0u));

@@ -29,7 +29,8 @@ inline LookDesc sample_look() {
   look.rim_direction = {-0.5f, -0.25f, 1.0f};
   look.rim_color = {0.75f, 0.5f, 1.0f};
   look.exposure = 1.25f;
-  look.methods = {"marschner", "dual", "fragment", "volume", "hashed", "density_samples"};
+  look.methods = {"marschner", "dual",  "fragment", "volume",    "hashed", "density_samples",
+                  "bezier",    "split", "bends",    "occlusion", "coarse"};
   return look;
 }
 
@@ -55,7 +56,8 @@ inline LookDesc second_sample_look() {
   look.rim_direction = {0.75f, 0.125f, -0.5f};
   look.rim_color = {0.25f, 1.0f, 0.5f};
   look.exposure = 0.75f;
-  look.methods = {"chiang", "none", "vertex", "deep_opacity", "lists", "analytic"};
+  look.methods = {"chiang",  "none",   "vertex", "deep_opacity", "lists", "analytic",
+                  "hermite", "mended", "full",   "frustum",      "same"};
   return look;
 }
 

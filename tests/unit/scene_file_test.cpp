@@ -99,7 +99,12 @@ SceneDesc unusual_scene() {
                         .evaluation = "fragment",
                         .shadow = "volume",
                         .transparency = "hashed",
-                        .antialiasing = "density_samples"}};
+                        .antialiasing = "density_samples",
+                        .curve = "bezier",
+                        .joints = "split",
+                        .detail = "decimation",
+                        .culling = "occlusion",
+                        .shadow_detail = "coarse"}};
   s.camera = {.offset_m = {0, 0, 2}, .target_m = {0.1f, 0.2f, 0.3f}, .fov_y_rad = 1.0f};
   s.stream = {.codec = "raw",
               .has_codec = true,

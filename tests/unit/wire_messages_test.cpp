@@ -92,7 +92,7 @@ TEST(WireMessages, TheSampleOfALookHasNoDefaultInIt) {
   scene_fields::visit_look(usual, usual_look);
   scene_fields::visit_camera(sample, camera);
   scene_fields::visit_camera(usual, usual_camera);
-  EXPECT_EQ(sample.values.size(), 51u);
+  EXPECT_EQ(sample.values.size(), 56u);
   for (const auto& [name, values] : sample.values)
     for (size_t i = 0; i < values.size(); ++i) EXPECT_NE(values[i], usual.values.at(name)[i]) << name;
 }

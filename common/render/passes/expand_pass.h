@@ -10,28 +10,16 @@
 #include "common/gl/objects.h"
 #include "common/gl/program.h"
 #include "common/render/passes/strand_buffers.h"
+#include "common/render/passes/strand_curves.h"
 #include "common/render/render_scene.h"
 #include "common/render/render_turn.h"
 
 namespace strandcast {
 
-struct FollowerDesc {
-  uint32_t per_triangle = 0;
-  float clump = 0.0f;        // 0..1, pull towards the nearest key strand at the tip
-  float variation_m = 0.0f;  // how far a tip strays from its interpolated place
-  float shorten = 0.0f;      // 0..1, largest part cut off at the tip
-};
-
 /// Drawn segments per gap between two vertices, at most.
 inline constexpr uint32_t kMaxSegmentsPerGap = 8;
 /// Largest expanded buffer; more strands are expanded and drawn in several batches.
 inline constexpr uint64_t kMaxExpandedBytes = 96ull << 20;
-
-/// How finely one draw expands.
-struct ExpandLevel {
-  uint32_t segments_per_gap = 1;  // 1 .. the maximum given to make()
-  uint32_t followers = 0;         // per triangle, at most FollowerDesc::per_triangle
-};
 
 /// What is known about an expansion before there is any GL.
 class ExpandSizes {
@@ -68,21 +56,23 @@ class StrandExpander {
   /// The asset must have strands. Followers need triangles: without them none are drawn, and no code for them
   /// is compiled.
   static Result<StrandExpander> make(const gl::ShaderLibrary& shaders, const SceneAsset& asset,
-                                     const FollowerDesc& followers);
+                                     const FollowerDesc& followers, CurveMethod curve = CurveMethod::Hermite);
   /// Expands strands first .. first + count - 1 into `expanded`. Returns the segments written.
   uint32_t run(const KeyStrands& keys, const ExpandedStrands& expanded, uint32_t first, uint32_t count,
                const ExpandLevel& level) const;
-  uint64_t size_bytes() const { return root_triangle_.size_bytes(); }
+  uint64_t size_bytes() const { return curves_.size_bytes(); }
 
  private:
+  StrandCurves curves_;
   gl::Program program_;
   gl::VertexArray no_attributes_;
-  gl::Buffer root_triangle_;
-  FollowerDesc followers_;
 };
 
 /// What the expand pass writes for a pass after it.
 std::unique_ptr<ExpandedStrands> make_expanded_strands(const RenderScene& scene);
 std::unique_ptr<RenderPass> make_expand_pass(RenderScene& scene, ExpandedStrands& expanded);
+/// Strands that cast shadows and are not drawn: as fine as the map of the light that they are drawn into.
+std::unique_ptr<ExpandedStrands> make_casters(const RenderScene& scene);
+std::unique_ptr<RenderPass> make_caster_pass(RenderScene& scene, ExpandedStrands& casters);
 
 }  // namespace strandcast

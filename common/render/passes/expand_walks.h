@@ -21,6 +21,9 @@ class ExpandWalks {
   std::unique_ptr<RenderPass> add(const std::string& purpose = "");
   ExpandedStrands& expanded() const { return expanded_; }
 
+  /// Whether the camera has walked already.
+  bool has_camera_walk = false;
+
   /// What the passes of all walks share.
   struct Shared {
     std::unique_ptr<RenderPass> expand;

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <string>
+#include <utility>
 
 #include "common/gl/objects.h"
 #include "common/gl/pass_plan.h"
@@ -42,7 +44,8 @@ inline constexpr uint64_t kSegmentBytes = 2 * sizeof(ExpandedVertex);
 /// any order.
 class ExpandedStrands final : public gl::Resource {
  public:
-  explicit ExpandedStrands(uint64_t size_bytes) : Resource("expanded strands", size_bytes) {}
+  explicit ExpandedStrands(uint64_t size_bytes, std::string name = "expanded strands")
+      : Resource(std::move(name), size_bytes) {}
   void allocate() { vertex_ = gl::Buffer("expanded", size_bytes()); }
   const gl::Buffer& vertex() const { return vertex_; }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/render/detail/culling.h"
 #include "common/render/shadow/shadow_method.h"
 #include "common/scene/hair_color.h"
 #include "shaders/shared/bindings.h"
@@ -13,16 +14,19 @@
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kCornersPerSegment = 4;
-constexpr uint32_t kIndicesPerSegment = 6;
-// Segments per draw such that 16-bit indices reach all corners.
-constexpr uint32_t kSegmentsPerDraw = 65'536 / kCornersPerSegment;
+constexpr uint32_t kSegmentsPerDraw = StrandDraw::kSegmentsPerDraw;
 constexpr uint32_t kLightUnit = 0;
 // Behind those of the light's map and of what is blended.
 constexpr uint32_t kLongitudinalUnit = 11;
 constexpr uint32_t kAzimuthalUnit = 12;
 constexpr uint32_t kAverageUnit = 13;
 constexpr uint32_t kDensityUnit = 14;
+// Weights of the terms of a look with the usual ones, chosen by eye on the built-in scene.
+constexpr float kDiffuse = 0.70f;
+constexpr float kScatter = 0.30f;
+// What water takes of the colour, and of the width of highlights and the diffuse light.
+constexpr float kWetDark = 0.45f;
+constexpr float kWetSharp = 0.5f;
 // Change of the density from cell to cell that makes a surface, strands crossed per metre.
 constexpr float kMinSlopePerM = 2.0f;
 
@@ -46,10 +50,10 @@ gl::Resources with_tables(const RenderScene& scene, gl::Resources reads) {
 
 std::vector<uint16_t> make_quad_indices() {
   std::vector<uint16_t> index;
-  index.reserve(kSegmentsPerDraw * kIndicesPerSegment);
+  index.reserve(kSegmentsPerDraw * StrandDraw::kIndicesPerSegment);
   for (uint32_t segment = 0; segment < kSegmentsPerDraw; ++segment)
     for (const uint32_t corner : {0u, 1u, 2u, 2u, 1u, 3u})
-      index.push_back(static_cast<uint16_t>(kCornersPerSegment * segment + corner));
+      index.push_back(static_cast<uint16_t>(StrandDraw::kCornersPerSegment * segment + corner));
   return index;
 }
 
@@ -78,12 +82,22 @@ class DrawQueue {
 /// What shaders/render/strand_light.glsl reads beside the light.
 void set_shading(const RenderScene& scene, const gl::Program& program) {
   const LookDesc& look = scene.look;
+  const HairShadingDesc& shading = look.shading;
+  const HairShadingDesc usual;
   const HairColors colors = colors_of(look);
   const auto shapes = lobe_shapes_of(look);
-  program.set("u_root_color", colors.root);
-  program.set("u_tip_color", colors.tip);
-  program.set("u_lobe_weights",
-              glm::vec3(look.shading.highlight, look.shading.transmission, look.shading.second_highlight));
+  // Wet hair as lib/hair_light.glsl has it: darker, with sharp highlights.
+  const float dark = 1.0f - kWetDark * shading.wetness;
+  const float dry = 1.0f - kWetSharp * shading.wetness;
+  program.set("u_root_color", colors.root * dark);
+  program.set("u_tip_color", colors.tip * dark);
+  program.set("u_lobe_weights", glm::vec3(shading.highlight * (1.0f + shading.wetness), shading.transmission,
+                                          shading.second_highlight));
+  program.set("u_diffuse", kDiffuse * dry * shading.diffuse / usual.diffuse);
+  program.set("u_scatter", kScatter * shading.scatter / usual.scatter);
+  program.set("u_root_darkening", shading.root_darkening);
+  program.set("u_strand_variation", shading.strand_variation);
+  program.set("u_warmth_variation", shading.warmth_variation);
   program.set("u_highlight_width", static_cast<float>(shapes[0].width));
   program.set("u_highlight_shift", static_cast<float>(shapes[0].shift));
   program.set("u_tilt_spread", glm::radians(look.shading.cuticle_spread_deg));
@@ -121,6 +135,7 @@ class StrandPass final : public RenderPass {
 
   Status run(RenderTurn& turn) override {
     scene_.scene.begin();
+    if (turn.strands_shown <= 0.0f) return {};
     strands_.begin(scene_, expanded_, turn, scene_.scene.size_px());
     strands_.draw(scene_, expanded_);
     return {};
@@ -135,21 +150,23 @@ class StrandPass final : public RenderPass {
 }  // namespace
 
 uint64_t StrandDraw::size_bytes() {
-  return uint64_t{kSegmentsPerDraw} * kIndicesPerSegment * sizeof(uint16_t);
+  return uint64_t{kSegmentsPerDraw} * StrandDraw::kIndicesPerSegment * sizeof(uint16_t);
 }
 
 Result<StrandDraw> StrandDraw::make(const RenderSetup& setup, const RenderScene& scene,
                                     const std::string& fragment_stage, gl::Variant variant,
                                     const std::string& vertex_stage) {
   StrandDraw strands;
+  strands.is_shaded_ = fragment_stage == kShadedFragment;
   if (vertex_stage == kShadedStage) {
-    variant["SHADOW"] = static_cast<int>(scene.methods.shadow);
-    variant["SHADING"] = static_cast<int>(scene.features.shading);
-    variant["SCATTERING"] = static_cast<int>(scene.features.scattering);
+    variant.merge(strand_light_variant(scene));
     // Others take the colour of the vertex stage.
     const bool is_per_fragment =
         scene.features.is_shaded_per_fragment.value && fragment_stage == kShadedFragment;
     variant["IS_PER_FRAGMENT"] = is_per_fragment ? 1 : 0;
+    variant["JOINTS"] = static_cast<int>(scene.methods.joints);
+    strands.is_chosen_ = scene.culling != nullptr;
+    variant["IS_CHOSEN"] = strands.is_chosen_ ? 1 : 0;
   }
   ASSIGN_OR_RETURN(strands.program_,
                    gl::Program::make(setup.shaders, {vertex_stage, fragment_stage}, variant));
@@ -163,19 +180,17 @@ void StrandDraw::begin(const RenderScene& scene, const ExpandedStrands& expanded
                        glm::uvec2 target_px) {
   const LookDesc& look = scene.look;
   bind(expanded);
-  scene.light.set_uniforms(program_, kLightUnit);
-  if (scene.shadow != nullptr) scene.shadow->set_uniforms(program_, kFirstShadowUnit);
+  set_strand_light(scene, program_, turn);
   program_.set("u_clip_from_head", turn.view.clip_from_head);
-  program_.set("u_eye_m", turn.view.eye_m);
   program_.set("u_target_px", glm::vec2(target_px));
   // The view counts the samples of a picture with kSamplesPerSide.
   program_.set("u_focal_px", turn.view.focal_px * (static_cast<float>(target_px.y) / turn.view.target_px.y));
   program_.set("u_near_m", turn.view.near_m);
   program_.set("u_widened_px", 1.0f);
   program_.set("u_which", static_cast<int>(StrandDepth::All));
+  if (is_shaded_) program_.set("u_shown", turn.strands_shown);
   program_.set("u_strand_width_m", expanded.width_m);
   program_.set("u_tip_scale", look.tip_scale);
-  set_shading(scene, program_);
 }
 
 void StrandDraw::bind(const ExpandedStrands& expanded) {
@@ -187,18 +202,41 @@ void StrandDraw::bind(const ExpandedStrands& expanded) {
 void StrandDraw::draw(const RenderScene& scene, const ExpandedStrands& expanded) const {
   const uint32_t segments = expanded.segment_count;
   DrawQueue queue(scene.is_software);
+  if (is_chosen_) {
+    const ChosenSegments& chosen = scene.culling->chosen();
+    chosen.bind();
+    for (uint32_t draw = 0; draw < chosen.draw_count(segments); ++draw) {
+      chosen.draw(draw);
+      queue.wait_for_the_one_before();
+    }
+    return;
+  }
   for (uint32_t first = 0; first < segments; first += kSegmentsPerDraw) {
     const uint32_t count = std::min(kSegmentsPerDraw, segments - first);
-    glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * kIndicesPerSegment),
-                             GL_UNSIGNED_SHORT, nullptr, static_cast<GLint>(first * kCornersPerSegment));
+    glDrawElementsBaseVertex(GL_TRIANGLES, static_cast<GLsizei>(count * StrandDraw::kIndicesPerSegment),
+                             GL_UNSIGNED_SHORT, nullptr,
+                             static_cast<GLint>(first * StrandDraw::kCornersPerSegment));
     queue.wait_for_the_one_before();
   }
 }
 
-gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
+gl::Variant strand_light_variant(const RenderScene& scene) {
+  return {{"SHADOW", static_cast<int>(scene.methods.shadow)},
+          {"SHADING", static_cast<int>(scene.features.shading)},
+          {"SCATTERING", static_cast<int>(scene.features.scattering)}};
+}
+
+void set_strand_light(const RenderScene& scene, const gl::Program& program, const RenderTurn& turn) {
+  scene.light.set_uniforms(program, kLightUnit);
+  if (scene.shadow != nullptr) scene.shadow->set_uniforms(program, kFirstShadowUnit);
+  program.set("u_eye_m", turn.view.eye_m);
+  set_shading(scene, program);
+}
+
+gl::PassDeclaration strand_pass(const RenderScene& scene, std::string name, gl::Resources reads,
                                 gl::Resources writes) {
-  return {name, with_tables(scene, std::move(reads)), std::move(writes), scene.features.has_strands.value,
-          scene.features.has_strands.reason};
+  return {std::move(name), with_tables(scene, std::move(reads)), std::move(writes),
+          scene.features.has_strands.value, scene.features.has_strands.reason};
 }
 
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded) {

@@ -23,6 +23,10 @@ class StrandDraw {
  public:
   static constexpr const char* kShadedStage = "render/strand.vert";
   static constexpr const char* kShadedFragment = "render/strand.frag";
+  static constexpr uint32_t kCornersPerSegment = 4;
+  static constexpr uint32_t kIndicesPerSegment = 6;
+  /// Segments per draw such that 16-bit indices reach all corners.
+  static constexpr uint32_t kSegmentsPerDraw = 65'536 / kCornersPerSegment;
   StrandDraw() = default;
   static Result<StrandDraw> make(const RenderSetup& setup, const RenderScene& scene,
                                  const std::string& fragment_stage, gl::Variant variant = {},
@@ -33,7 +37,7 @@ class StrandDraw {
              glm::uvec2 target_px);
   /// Program and buffers alone, for another vertex stage.
   void bind(const ExpandedStrands& expanded);
-  /// All segments that are expanded now.
+  /// All segments that are expanded now; those that are chosen of them, where the camera draws and some are.
   void draw(const RenderScene& scene, const ExpandedStrands& expanded) const;
   const gl::Program& program() const { return program_; }
   static uint64_t size_bytes();
@@ -42,10 +46,17 @@ class StrandDraw {
   gl::Program program_;
   gl::VertexArray vertex_array_;
   gl::Buffer quad_index_;
+  bool is_shaded_ = false;  // by the stage that knows which share of the strands is shown
+  bool is_chosen_ = false;
 };
 
+/// What programs with shaders/render/strand_light.glsl are compiled with and told, evaluated per vertex
+/// unless they say otherwise.
+gl::Variant strand_light_variant(const RenderScene& scene);
+void set_strand_light(const RenderScene& scene, const gl::Program& program, const RenderTurn& turn);
+
 /// A declaration of a pass that runs when there are strands.
-gl::PassDeclaration strand_pass(const RenderScene& scene, const char* name, gl::Resources reads,
+gl::PassDeclaration strand_pass(const RenderScene& scene, std::string name, gl::Resources reads,
                                 gl::Resources writes);
 
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded);

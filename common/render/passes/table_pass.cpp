@@ -1,4 +1,5 @@
-// Passes that make the lookup tables of shading once, at load: a picture only reads them.
+// Passes that make the lookup tables of shading, at load and when the highlights get another shape: a picture
+// only reads them.
 
 #include "common/render/render_path.h"
 
@@ -14,14 +15,26 @@ class TablePass final : public RenderPass {
         tables_(tables) {}
 
   Status prepare(const RenderSetup&) override {
-    tables_.make(scene_.look);
+    make();
     return {};
   }
-  Status run(RenderTurn&) override { return {}; }
+  Status run(RenderTurn&) override {
+    const HairShadingDesc& now = scene_.look.shading;
+    if (now.highlight_width_deg != made_for_.highlight_width_deg ||
+        now.cuticle_deg != made_for_.cuticle_deg || now.wetness != made_for_.wetness)
+      make();
+    return {};
+  }
 
  private:
+  void make() {
+    made_for_ = scene_.look.shading;
+    tables_.make(scene_.look);
+  }
+
   RenderScene& scene_;
   Tables& tables_;
+  HairShadingDesc made_for_;
 };
 
 }  // namespace

@@ -170,7 +170,7 @@ void add_density_samples(RenderScene& scene, ExpandWalks& walks, RenderPassList&
     volume = &own;
   }
   auto& deep = passes.keep(std::make_unique<OneSampleTarget>());
-  passes.add(walks.add());
+  add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<SampleChoicePass>(scene, walks.expanded(), *volume));
   passes.add(std::make_unique<DensitySamplesPass>(scene, walks.expanded(), deep));
   passes.add(std::make_unique<StrandsMergePass>(scene, deep));

@@ -150,7 +150,7 @@ class ListsBlendPass final : public RenderPass {
 
 void add_lists(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
   auto& lists = passes.keep(std::make_unique<PixelLists>(scene.method_settings.list_nodes_per_pixel));
-  passes.add(walks.add());
+  add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<ListsPass>(scene, walks.expanded(), lists));
   passes.add(std::make_unique<ListsBlendPass>(scene, lists));
 }

@@ -177,10 +177,10 @@ void add_moments(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes)
   auto& moments =
       passes.keep(std::make_unique<PixelTarget>("moments", std::vector<uint32_t>{GL_RGBA32F, GL_R32F}));
   auto& sum = passes.keep(std::make_unique<PixelTarget>("moment colours", std::vector<uint32_t>{GL_RGBA16F}));
-  passes.add(walks.add("for_moments"));
+  add_camera_walk(scene, walks, passes, "for_moments");
   passes.add(std::make_unique<SumPass>(scene, walks.expanded(), moments));
   passes.add(std::make_unique<MomentsReadyPass>(scene, moments, sum));
-  passes.add(walks.add());
+  add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<ColorPass>(scene, walks.expanded(), moments, sum));
   passes.add(std::make_unique<MomentsBlendPass>(scene, moments, sum));
 }

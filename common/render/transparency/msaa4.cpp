@@ -36,7 +36,7 @@ class Msaa4Pass final : public RenderPass {
 }  // namespace
 
 void add_msaa4(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
-  passes.add(walks.add());
+  add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<Msaa4Pass>(scene, walks.expanded()));
 }
 

@@ -179,10 +179,10 @@ void add_three_depths(RenderScene& scene, ExpandWalks& walks, RenderPassList& pa
   auto& keys = passes.keep(std::make_unique<DepthKeys>());
   auto& colors = passes.keep(
       std::make_unique<PixelTarget>("three-depth colours", std::vector<uint32_t>{GL_RGBA16F, GL_RGBA16F}));
-  passes.add(walks.add("for_depths"));
+  add_camera_walk(scene, walks, passes, "for_depths");
   passes.add(std::make_unique<KeysPass>(scene, walks.expanded(), keys));
   passes.add(std::make_unique<KeysReadyPass>(scene, keys, colors));
-  passes.add(walks.add());
+  add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<KeyColorsPass>(scene, walks.expanded(), keys, colors));
   passes.add(std::make_unique<KeysBlendPass>(scene, keys, colors));
 }

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "common/render/detail/far_volume.h"
+
 namespace strandcast {
 namespace {
 
@@ -25,8 +27,11 @@ void add_hashed(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) 
   if (scene.methods.antialiasing == AntialiasingMethod::Msaa4) return add_msaa4(scene, walks, passes);
   if (scene.methods.antialiasing == AntialiasingMethod::DensitySamples)
     return add_density_samples(scene, walks, passes);
-  passes.add(walks.add());
+  FarVolume* const volume =
+      scene.methods.detail == DetailMethod::Volume ? &add_far_volume(scene, walks, passes) : nullptr;
+  add_camera_walk(scene, walks, passes);
   passes.add(make_strand_pass(scene, walks.expanded()));
+  if (volume != nullptr) add_far_volume_draw(scene, passes, *volume);
 }
 
 void add_transparency_passes(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
@@ -41,10 +46,11 @@ void begin_blended(StrandDraw& strands, const RenderScene& scene, const Expanded
   strands.program().set("u_pixel_step", 1.0f / glm::vec2(turn.size_px));
 }
 
-Result<FullScreen> FullScreen::make(const RenderSetup& setup, const std::string& fragment_stage) {
+Result<FullScreen> FullScreen::make(const RenderSetup& setup, const std::string& fragment_stage,
+                                    const gl::Variant& variant) {
   FullScreen screen;
   ASSIGN_OR_RETURN(screen.program_,
-                   gl::Program::make(setup.shaders, {"render/resolve.vert", fragment_stage}, {}));
+                   gl::Program::make(setup.shaders, {"render/resolve.vert", fragment_stage}, variant));
   screen.no_attributes_ = gl::VertexArray("full screen");
   return screen;
 }

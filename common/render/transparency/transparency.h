@@ -6,6 +6,7 @@
 
 #include <span>
 
+#include "common/render/detail/culling.h"
 #include "common/render/passes/expand_walks.h"
 #include "common/render/passes/strand_pass.h"
 #include "common/render/render_scene.h"
@@ -39,7 +40,8 @@ void begin_blended(StrandDraw& strands, const RenderScene& scene, const Expanded
 /// A triangle over all of the target that is bound.
 class FullScreen {
  public:
-  static Result<FullScreen> make(const RenderSetup& setup, const std::string& fragment_stage);
+  static Result<FullScreen> make(const RenderSetup& setup, const std::string& fragment_stage,
+                                 const gl::Variant& variant = {});
   const gl::Program& program() const { return program_; }
   void draw() const;
 

@@ -83,7 +83,7 @@ class WeightedBlendPass final : public RenderPass {
 void add_weighted(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes) {
   auto& target = passes.keep(
       std::make_unique<PixelTarget>("weighted colours", std::vector<uint32_t>{GL_RGBA16F, GL_R32F}));
-  passes.add(walks.add());
+  add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<WeightedPass>(scene, walks.expanded(), target));
   passes.add(std::make_unique<WeightedBlendPass>(scene, target));
 }

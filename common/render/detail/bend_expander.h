@@ -1,0 +1,34 @@
+// Expansion by need: of every gap of every strand as many segments as keep their chords within a part of a
+// pixel of the curve. The GPU counts them, sums the counts and writes them, in the order of strands; their
+// number is read back once. All calls from the context's thread.
+#pragma once
+
+#include <cstdint>
+
+#include "common/gl/objects.h"
+#include "common/gl/program.h"
+#include "common/render/detail/running_sum.h"
+#include "common/render/passes/strand_buffers.h"
+#include "common/render/passes/strand_curves.h"
+#include "common/render/view.h"
+
+namespace strandcast {
+
+class BendExpander {
+ public:
+  BendExpander() = default;
+  /// `max_gaps`: of all strands that are expanded at once.
+  static Result<BendExpander> make(const gl::ShaderLibrary& shaders, StrandCurves curves, uint64_t max_gaps);
+  /// As StrandExpander::run(), for this view; `level` says how many segments a gap may have.
+  uint32_t run(const KeyStrands& keys, const ExpandedStrands& expanded, uint32_t first, uint32_t count,
+               const ExpandLevel& level, const View& view) const;
+  static uint64_t size_bytes(uint64_t max_gaps) { return RunningSum::size_bytes(max_gaps); }
+
+ private:
+  StrandCurves curves_;
+  RunningSum sum_;
+  gl::Program count_program_;
+  gl::Program write_program_;
+};
+
+}  // namespace strandcast
