@@ -1,6 +1,7 @@
 #include "server/report/rendering.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +10,7 @@
 #include "common/groom/groom_asset.h"
 #include "common/render/tiles/tile_renderer.h"
 #include "common/scene/shadow_methods.h"
+#include "common/scene/strand_methods.h"
 #include "server/report/csv_file.h"
 #include "server/scene/scene_content.h"
 
@@ -43,6 +45,7 @@ struct Candidate {
   std::string trouble;
   std::vector<double> cpu_ms[2];
   std::vector<double> wall_ms[2];
+  std::vector<double> device_ms[2];
 };
 
 Result<Image> drawn(Renderer& renderer, const PosedStrands& strands, const CameraDesc& camera,
@@ -84,11 +87,11 @@ Result<ReportView> make_view_of(const RenderingReportDesc& desc, RenderDevice& d
   return view;
 }
 
-/// The rows of a table of methods.
+/// The rows of a table of methods, from `first` on.
 template <class Method>
 void add_methods(const MethodTable<Method>& table, const char* kind, size_t group,
-                 std::string RenderMethodsDesc::*field, std::vector<RenderingRow>& rows) {
-  for (const MethodRow& row : table.rows()) {
+                 std::string RenderMethodsDesc::*field, std::vector<RenderingRow>& rows, size_t first = 0) {
+  for (const MethodRow& row : table.rows().subspan(first)) {
     const std::string name(row.name);
     rows.push_back({fmt::format("gl {} {}", kind, name), std::string(row.summary), group, RendererKind::Gl,
                     [field, name](LookDesc& look) { look.methods.*field = name; }});
@@ -100,7 +103,7 @@ void as_quads(LookDesc& look) {
   look.methods.transparency = "hashed";
 }
 
-enum GroupIndex : size_t { kWhole, kShadows, kTransparencies, kEdges, kShadings, kScatterings };
+enum GroupIndex : size_t { kWhole, kShadows, kTransparencies, kEdges, kShadings, kScatterings, kStrands };
 
 }  // namespace
 
@@ -127,6 +130,12 @@ const std::vector<RenderingGroup>& rendering_groups() {
          look.methods.scattering = "dual";
        },
        1},
+      {"strands", "quads of all strands and twice the segments, with 64 samples per pixel", RendererKind::Gl,
+       [](LookDesc& look) {
+         look.methods.detail = "full";
+         look.segments *= 2;
+       },
+       kTruthFactor},
   };
   return kGroups;
 }
@@ -156,6 +165,23 @@ const std::vector<RenderingRow>& rendering_rows() {
     add_methods(shading_models(), "shading", kShadings, &RenderMethodsDesc::shading, rows);
     add_methods(shading_places(), "evaluation", kShadings, &RenderMethodsDesc::evaluation, rows);
     add_methods(scattering_models(), "scattering", kScatterings, &RenderMethodsDesc::scattering, rows);
+    add_methods(detail_methods(), "detail", kStrands, &RenderMethodsDesc::detail, rows);
+    rows.push_back({"gl detail bends, up to 8", "likewise, of more segments where hair curls", kStrands,
+                    RendererKind::Gl, [](LookDesc& look) {
+                      look.methods.detail = "bends";
+                      look.segments = 8;
+                    }});
+    // The first of these is what `adaptive` draws.
+    add_methods(curve_methods(), "curve", kStrands, &RenderMethodsDesc::curve, rows, 1);
+    add_methods(joint_methods(), "joints", kStrands, &RenderMethodsDesc::joints, rows, 1);
+    add_methods(culling_methods(), "culling", kStrands, &RenderMethodsDesc::culling, rows, 1);
+    for (const char* shadow : {"deep_opacity", "density_rays"})
+      rows.push_back({fmt::format("gl shadow {}, coarse casters", shadow),
+                      "strands as fine as the light's map cast the shadows", kShadows, RendererKind::Gl,
+                      [shadow](LookDesc& look) {
+                        look.methods.shadow = shadow;
+                        look.methods.shadow_detail = "coarse";
+                      }});
     return rows;
   }();
   return kRows;
@@ -175,6 +201,7 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
   report.device_tiles = tiles->info().name;
   auto gl = RenderDevice::open({"gl", desc.gl_device, {}});
   if (gl) report.device_gl = (*gl)->info().name;
+  report.has_gpu = gl && !(*gl)->info().is_software;
   // By group: near and far.
   std::vector<std::array<ReportView, 2>> views;
   for (const RenderingGroup& group : rendering_groups()) {
@@ -208,6 +235,7 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
     outcome.name = candidate.row->name;
     outcome.summary = candidate.row->summary;
     outcome.group = candidate.row->group;
+    outcome.is_gl = candidate.row->kind == RendererKind::Gl;
     report.rows.push_back(std::move(outcome));
   }
   // The first round compiles and allocates, and is looked at; the others are timed, turn by turn.
@@ -228,11 +256,13 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
         if (round > 0) {
           candidate.cpu_ms[v].push_back(process_cpu_ms() - cpu_begin_ms);
           candidate.wall_ms[v].push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+          candidate.device_ms[v].push_back(candidate.renderer->profile().total_ms);
           continue;
         }
         RenderingMeasure& measure = v == 0 ? outcome.near : outcome.far;
         ASSIGN_OR_RETURN(measure.error, picture_error(*image, seen[v].truth, seen[v].hair));
         measure.drawn_segments = static_cast<double>(candidate.renderer->profile().drawn_segments);
+        measure.drawn_strands = static_cast<double>(candidate.renderer->profile().drawn_strands);
         measure.picture = std::move(image).value();
         if (v == 0)
           report.strand_count = std::max(report.strand_count, candidate.renderer->profile().drawn_strands);
@@ -247,20 +277,35 @@ Result<RenderingReport> run_rendering(const RenderingReportDesc& desc) {
       RenderingMeasure& measure = v == 0 ? report.rows[i].near : report.rows[i].far;
       measure.cpu_ms = median(candidates[i].cpu_ms[v]);
       measure.wall_ms = median(candidates[i].wall_ms[v]);
+      measure.device_ms = median(candidates[i].device_ms[v]);
     }
   }
   return report;
 }
 
+std::vector<std::string> losing_rows(const RenderingReport& report) {
+  std::vector<std::string> losing;
+  const RenderingOutcome& main = report.rows.front();
+  for (const RenderingOutcome& row : report.rows)
+    if (row.trouble.empty() && row.near.cpu_ms > main.near.cpu_ms && row.far.cpu_ms > main.far.cpu_ms &&
+        row.memory_mb > main.memory_mb)
+      losing.push_back(row.name);
+  return losing;
+}
+
+double ms_per_100k_strands(const RenderingMeasure& measure) {
+  return measure.drawn_strands > 0.0 ? measure.device_ms * 1e5 / measure.drawn_strands : 0.0;
+}
+
 std::string rendering_csv(const RenderingReport& report) {
-  CsvFile csv({"group", "row", "view", "cpu_ms", "wall_ms", "cpu_over_main", "segments", "psnr_db", "ssim",
-               "delta_e", "memory_mb", "trouble"});
+  CsvFile csv({"group", "row", "view", "cpu_ms", "wall_ms", "passes_ms", "cpu_over_main", "segments",
+               "psnr_db", "ssim", "delta_e", "memory_mb", "trouble"});
   for (const RenderingOutcome& row : report.rows)
     for (const bool is_near : {true, false}) {
       const RenderingMeasure& measure = is_near ? row.near : row.far;
       const RenderingMeasure& main = is_near ? report.rows.front().near : report.rows.front().far;
       csv.add_row({rendering_groups()[row.group].name, row.name, is_near ? "near" : "far",
-                   csv_number(measure.cpu_ms), csv_number(measure.wall_ms),
+                   csv_number(measure.cpu_ms), csv_number(measure.wall_ms), csv_number(measure.device_ms),
                    csv_number(measure.cpu_ms / main.cpu_ms), csv_number(measure.drawn_segments),
                    csv_number(measure.error.psnr_db), csv_number(measure.error.ssim),
                    csv_number(measure.error.delta_e), csv_number(row.memory_mb), row.trouble});
@@ -281,6 +326,15 @@ std::string rendering_text(const RenderingReport& report) {
                         row.near.cpu_ms, row.near.error.psnr_db, row.near.error.ssim, row.far.cpu_ms,
                         row.far.error.psnr_db, row.far.error.ssim, row.memory_mb);
   }
+  text += fmt::format("Lose to the main path in time, near and far, and in memory: {}\n",
+                      fmt::join(losing_rows(report), ", "));
+  if (!report.has_gpu) return text;
+  text += fmt::format("\n{:<28} {:>22} {:>22}   (milliseconds of the GPU; aim: 1 per 100,000 strands)\n", "",
+                      "near: ms  per 100,000", "far: ms  per 100,000");
+  for (const RenderingOutcome& row : report.rows)
+    if (row.trouble.empty() && row.is_gl)
+      text += fmt::format("{:<28} {:>10.2f} {:>11.2f} {:>10.2f} {:>11.2f}\n", row.name, row.near.device_ms,
+                          ms_per_100k_strands(row.near), row.far.device_ms, ms_per_100k_strands(row.far));
   return text;
 }
 

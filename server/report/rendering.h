@@ -47,6 +47,8 @@ const std::vector<RenderingRow>& rendering_rows();
 struct RenderingMeasure {
   double cpu_ms = 0.0;  // of the process, median
   double wall_ms = 0.0;
+  double device_ms = 0.0;  // of the renderer's passes: on a GPU its own time
+  double drawn_strands = 0.0;
   double drawn_segments = 0.0;
   PictureError error;  // in the hair's pixels
   Image picture;
@@ -56,6 +58,7 @@ struct RenderingOutcome {
   std::string name;
   std::string summary;
   size_t group = 0;
+  bool is_gl = false;
   std::string trouble;  // why it could not be drawn here; then nothing else is there
   double memory_mb = 0.0;
   RenderingMeasure near;
@@ -64,6 +67,7 @@ struct RenderingOutcome {
 
 struct RenderingReport {
   std::string device_gl;  // empty: no OpenGL here
+  bool has_gpu = false;   // OpenGL is hardware's
   std::string device_tiles;
   uint64_t strand_count = 0;
   std::vector<RenderingOutcome> rows;
@@ -71,6 +75,12 @@ struct RenderingReport {
 
 /// Of the scene's strands at rest.
 Result<RenderingReport> run_rendering(const RenderingReportDesc& desc);
+
+/// Rows that take more time than the main path, near and far, and more memory: they are there to be compared
+/// with.
+std::vector<std::string> losing_rows(const RenderingReport& report);
+/// Of a GPU, to be held against 1 ms.
+double ms_per_100k_strands(const RenderingMeasure& measure);
 
 std::string rendering_csv(const RenderingReport& report);
 std::string rendering_text(const RenderingReport& report);

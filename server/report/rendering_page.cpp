@@ -1,5 +1,6 @@
 // The page of the rendering report.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "server/report/html_page.h"
 #include "server/report/rendering.h"
@@ -51,6 +52,20 @@ HtmlTable table_of(const RenderingReport& report, size_t group, bool is_near) {
   return table;
 }
 
+HtmlTable gpu_table(const RenderingReport& report) {
+  HtmlTable table;
+  table.caption = report.device_gl;
+  table.columns = {"row", "near: ms", "per 100,000 strands", "far: ms", "per 100,000 strands"};
+  for (const RenderingOutcome& row : report.rows) {
+    if (!row.trouble.empty() || !row.is_gl) continue;
+    table.rows.push_back({row.name, fmt::format("{:.2f}", row.near.device_ms),
+                          fmt::format("{:.2f}", ms_per_100k_strands(row.near)),
+                          fmt::format("{:.2f}", row.far.device_ms),
+                          fmt::format("{:.2f}", ms_per_100k_strands(row.far))});
+  }
+  return table;
+}
+
 }  // namespace
 
 std::string rendering_page(const RenderingReportDesc& desc, const RenderingReport& report) {
@@ -71,6 +86,18 @@ std::string rendering_page(const RenderingReportDesc& desc, const RenderingRepor
   page.answer(slower.empty() ? "No row is slower than the main path both near and far."
                              : "Slower than the main path, which draws everything at once, near and far: " +
                                    slower + ".");
+  const std::vector<std::string> losing = losing_rows(report);
+  page.paragraph(losing.empty()
+                     ? "No row loses to it in memory as well."
+                     : fmt::format("Those that also take more memory lose to it everywhere, and stay "
+                                   "to be compared with: {}.",
+                                   fmt::join(losing, ", ")));
+  if (report.has_gpu) {
+    page.heading("GPU");
+    page.paragraph(
+        "Milliseconds of the GPU for all passes of a picture, to be held against 1 ms per 100,000 strands.");
+    page.table(gpu_table(report));
+  }
   for (size_t group = 0; group < rendering_groups().size(); ++group) {
     const RenderingGroup& held = rendering_groups()[group];
     page.heading(held.name);

@@ -2,6 +2,8 @@
 
 #include <set>
 
+#include "common/scene/shadow_methods.h"
+#include "common/scene/strand_methods.h"
 #include "server/report/html_page.h"
 #include "tests/support/gl_fixture.h"
 
@@ -39,6 +41,21 @@ TEST_F(RenderingReports, MeasureEveryRowAgainstTheTruthOfItsGroup) {
       EXPECT_EQ(row.near.error.psnr_db, 99.0);
     }
   }
+  // Every row of every table is there.
+  const auto expect_all = [&](const auto& table, const std::string& kind, size_t first) {
+    for (const MethodRow& row : table.rows().subspan(first))
+      EXPECT_TRUE(names.contains("gl " + kind + " " + std::string(row.name))) << kind << ' ' << row.name;
+  };
+  expect_all(shadow_methods(), "shadow", 0);
+  expect_all(transparency_methods(), "transparency", 0);
+  expect_all(antialiasing_methods(), "edges", 0);
+  expect_all(shading_models(), "shading", 0);
+  expect_all(shading_places(), "evaluation", 0);
+  expect_all(scattering_models(), "scattering", 0);
+  expect_all(detail_methods(), "detail", 0);
+  expect_all(curve_methods(), "curve", 1);
+  expect_all(joint_methods(), "joints", 1);
+  expect_all(culling_methods(), "culling", 1);
   const std::string csv = rendering_csv(*report);
   const std::string page = rendering_page(desc, *report);
   const std::string text = rendering_text(*report);
@@ -48,6 +65,36 @@ TEST_F(RenderingReports, MeasureEveryRowAgainstTheTruthOfItsGroup) {
     EXPECT_THAT(text, HasSubstr(name));
   }
   EXPECT_THAT(page, HasSubstr("data:image/jpeg;base64,/9j/"));
+}
+
+RenderingOutcome outcome_of(const std::string& name, double near_ms, double far_ms, double memory_mb) {
+  RenderingOutcome row;
+  row.name = name;
+  row.is_gl = name != "main";
+  row.near.cpu_ms = row.near.device_ms = near_ms;
+  row.far.cpu_ms = row.far.device_ms = far_ms;
+  row.near.drawn_strands = row.far.drawn_strands = 50'000.0;
+  row.memory_mb = memory_mb;
+  return row;
+}
+
+TEST(RenderingReportRows, LoseWhenSlowerNearAndFarAndLarger) {
+  RenderingReport report;
+  report.rows = {outcome_of("main", 10.0, 4.0, 20.0), outcome_of("slower near", 11.0, 4.0, 30.0),
+                 outcome_of("smaller", 12.0, 5.0, 19.0), outcome_of("loses", 10.5, 4.5, 20.5)};
+  EXPECT_THAT(losing_rows(report), testing::ElementsAre("loses"));
+  report.rows.back().trouble = "not here";
+  EXPECT_THAT(losing_rows(report), testing::IsEmpty());
+}
+
+TEST(RenderingReportRows, HaveTimesPerStrandWhereThereIsAGpu) {
+  RenderingReport report;
+  report.rows = {outcome_of("main", 10.0, 4.0, 20.0), outcome_of("drawn", 0.7, 0.25, 30.0)};
+  EXPECT_THAT(rendering_text(report), testing::Not(HasSubstr("per 100,000")));
+  report.has_gpu = true;
+  // 50,000 strands in 0.7 ms are 1.4 ms per 100,000.
+  EXPECT_THAT(rendering_text(report), HasSubstr("1.40"));
+  EXPECT_THAT(rendering_page({}, report), HasSubstr("1.40"));
 }
 
 TEST(HtmlPages, CodePicturesInBase64) {
