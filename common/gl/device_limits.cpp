@@ -32,7 +32,7 @@ constexpr DeviceLimitRow kTable[] = {
     {DeviceLimit::VertexTextureUnits, "textures in the vertex stage", GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS,
      false, 16, 8, "render/shadow.glsl"},
     {DeviceLimit::FragmentTextureUnits, "textures in the fragment stage", GL_MAX_TEXTURE_IMAGE_UNITS, false,
-     16, 8, "render/shadow.glsl"},
+     16, 11, "render/far_volume.frag"},
     {DeviceLimit::ComputeImages, "images in the compute stage", GL_MAX_COMPUTE_IMAGE_UNIFORMS, false, 8, 1,
      "render/tile_draw.comp"},
     {DeviceLimit::GroupSize, "invocations of a work group in one dimension", GL_MAX_COMPUTE_WORK_GROUP_SIZE,

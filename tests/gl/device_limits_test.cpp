@@ -233,6 +233,7 @@ TEST(DeviceLimits, FilesThatShareMemoryAreKnown) {
   constexpr uint64_t kVectors = 128 + 128 + 2 * 128, kFloats = 128;
   constexpr uint64_t kSteps = 128, kInvocations = 16;
   const std::map<std::string, uint64_t> known{{"dftl_parallel.comp", kVectors * 16 + kFloats * 4},
+                                              {"running_sum.comp", 128 * 4},
                                               {"tile_offsets.comp", 128 * 4},
                                               {"tile_order.comp", (3 + kInvocations + kSteps) * 4}};
   constexpr uint64_t kMaxShaderBytes = 1u << 20;

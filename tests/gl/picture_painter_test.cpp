@@ -69,11 +69,14 @@ class GlPainting : public GlTest {
 
 TEST_F(GlPainting, PaintsWhatAClientDrawsFromTheSameBytes) {
   // What a client knows of the look is what came in the Welcome, and this one has no default in it.
-  for (const char* renderer_name : {"gl", "tiles"}) {
-    SCOPED_TRACE(renderer_name);
+  for (const auto& [renderer_name, is_main] :
+       {std::pair{"gl", false},
+        {"gl", true},
+        {"tiles", true}}) {  // OpenGL's quads and tiles, the processor's
+    SCOPED_TRACE(fmt::format("{}, {}", renderer_name, is_main ? "main methods" : "others"));
     config_.device.renderer = renderer_name;
     auto sent = std::get<Welcome>(sample_server_messages().front());
-    if (config_.device.renderer == "tiles") sent.look.methods = {};  // others are drawn by OpenGL
+    if (is_main) sent.look.methods = {};
     const ServerMessage welcome = sent;
     config_.look = sent.look;
     const auto told = decode_server_message(encode(welcome));

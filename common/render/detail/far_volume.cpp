@@ -56,7 +56,7 @@ class FarSumPass final : public RenderPass {
         volume_(volume) {}
   bool is_batched() const override { return true; }
   Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(program_, gl::Program::make(setup.shaders, {"render/far_volume.comp"}, {}));
+    ASSIGN_OR_RETURN(program_, gl::Program::make(setup.shaders, {"render/far_volume_sum.comp"}, {}));
     return {};
   }
   Status run(RenderTurn& turn) override {

@@ -19,7 +19,7 @@ class FarVolume final : public gl::Resource {
   FarVolume() : Resource("far volume") {}
   /// Once per draw; empties all cells where the volume is seen.
   void begin(const RenderScene& scene, RenderTurn& turn);
-  /// Adds what is expanded now; `program` is of far_volume.comp.
+  /// Adds what is expanded now; `program` is of far_volume_sum.comp.
   void add(const gl::Program& program, const RenderScene& scene, const ExpandedStrands& expanded,
            const RenderTurn& turn) const;
   void finish() const;
