@@ -38,8 +38,10 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
   const HairLights lights = hair_lights(in.look, in.lights);
   const glm::mat4& clip = in.view.clip_from_head;
   const vec3 eye(in.view.eye_m);
+  const float half_width = 0.5f * in.view.target_px.x;
+  const float half_height = 0.5f * in.view.target_px.y;
   constexpr uint32_t kFirst = kLanes;  // of a row
-  StrandRow xs, ys, zs, dx, dy;
+  StrandRow xs, ys, zs, dx, dy, aways, widths;
   for (uint32_t strand = a.begin; strand < a.end; ++strand) {
     const uint32_t first = a.first_point[strand];
     const uint32_t count = a.first_point[strand + 1] - first;
@@ -61,15 +63,7 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
     for (uint32_t k = 0; k < count; k += kLanes) {
       const uint32_t at = kFirst + k;
       const vec3 position(load_lanes(xs + at), load_lanes(ys + at), load_lanes(zs + at));
-      const vec3 tangent = unit_or(vec3(load_lanes(xs + at + 1) - load_lanes(xs + at - 1),
-                                        load_lanes(ys + at + 1) - load_lanes(ys + at - 1),
-                                        load_lanes(zs + at + 1) - load_lanes(zs + at - 1)),
-                                   vec3(0.0f, -1.0f, 0.0f));
       const Float along = min((lane_numbers() + Float(static_cast<float>(k))) * along_step, 1.0f);
-      const vec3 to_eye = unit_or(eye - position, vec3(0.0f, 0.0f, 1.0f));
-      const LightDepth depth = light_depth_at(in.lattice, position);
-      const vec3 light = hair_radiance(look, hair, lights, depth, along, tangent, to_eye);
-
       const Float clip_x =
           clip[0][0] * position.x + clip[1][0] * position.y + clip[2][0] * position.z + clip[3][0];
       const Float clip_y =
@@ -77,14 +71,43 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
       const Float away =
           clip[0][3] * position.x + clip[1][3] * position.y + clip[2][3] * position.z + clip[3][3];
       const Float per_away = 1.0f / max(away, in.view.near_m);
-      const Float half_width = 0.5f * in.view.target_px.x;
-      const Float half_height = 0.5f * in.view.target_px.y;
-      const Float x = half_width + half_width * clip_x * per_away;
-      const Float y = half_height - half_height * clip_y * per_away;
-      store_lanes(x, dx + at);
-      store_lanes(y, dy + at);
-      const Float width =
-          in.width_m * in.view.focal_px * (1.0f + (in.tip_scale - 1.0f) * along * along) * per_away;
+      store_lanes(half_width + half_width * clip_x * per_away, dx + at);
+      store_lanes(half_height - half_height * clip_y * per_away, dy + at);
+      store_lanes(away, aways + at);
+      store_lanes(in.width_m * in.view.focal_px * (1.0f + (in.tip_scale - 1.0f) * along * along) * per_away,
+                  widths + at);
+    }
+    extend(dx);
+    extend(dy);
+    extend(widths);
+    for (uint32_t k = 0; k < count; k += kLanes) {
+      const uint32_t at = kFirst + k;
+      const Float along = min((lane_numbers() + Float(static_cast<float>(k))) * along_step, 1.0f);
+      const Float x = load_lanes(dx + at);
+      const Float y = load_lanes(dy + at);
+      const Float away = load_lanes(aways + at);
+      const Float width = load_lanes(widths + at);
+      // What neither leads to nor comes from a place on the picture is not lit; tile_bins.cpp leaves it out.
+      constexpr float kRoomPx = 1.0f;  // more than half a pixel's diagonal, and than halves round widths
+      const Float reach =
+          0.501f * max(width, max(load_lanes(widths + at - 1), load_lanes(widths + at + 1))) + kRoomPx;
+      const Float before_x = load_lanes(dx + at - 1), behind_x = load_lanes(dx + at + 1);
+      const Float before_y = load_lanes(dy + at - 1), behind_y = load_lanes(dy + at + 1);
+      const Bool is_off =
+          max(x, max(before_x, behind_x)) + reach < 0.0f || max(y, max(before_y, behind_y)) + reach < 0.0f ||
+          min(x, min(before_x, behind_x)) - reach > in.view.target_px.x ||
+          min(y, min(before_y, behind_y)) - reach > in.view.target_px.y || away <= in.view.near_m;
+      vec3 light(0.0f);
+      if (is_any(!is_off)) {
+        const vec3 position(load_lanes(xs + at), load_lanes(ys + at), load_lanes(zs + at));
+        const vec3 tangent = unit_or(vec3(load_lanes(xs + at + 1) - load_lanes(xs + at - 1),
+                                          load_lanes(ys + at + 1) - load_lanes(ys + at - 1),
+                                          load_lanes(zs + at + 1) - load_lanes(zs + at - 1)),
+                                     vec3(0.0f, -1.0f, 0.0f));
+        const vec3 to_eye = unit_or(eye - position, vec3(0.0f, 0.0f, 1.0f));
+        const LightDepth depth = light_depth_at(in.lattice, position);
+        light = hair_radiance(look, hair, lights, depth, along, tangent, to_eye);
+      }
       const Float opacity = strand_cover(along, along_step, in.tip_fade);
       const UintBits width_bits = half_bits(width);
       const UintBits opacity_bits = half_bits(opacity);
@@ -105,8 +128,6 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
       }
     }
     // Joints: across the mean of the directions before and behind.
-    extend(dx);
-    extend(dy);
     for (uint32_t k = 0; k < count; k += kLanes) {
       const uint32_t at = kFirst + k;
       const Float x = load_lanes(dx + at);
