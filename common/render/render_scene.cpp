@@ -22,6 +22,32 @@ constexpr float kMaxDeepShare = 0.15f;
 // them.
 constexpr float kSkullShrink = 0.93f;
 
+/// How much strands bend between two vertices: the mean size of the second derivative of their curves
+/// (shaders/lib/hermite.glsl) by the way from vertex to vertex, at its ends.
+float mean_bend_m(const SceneAsset& asset) {
+  constexpr uint32_t kStrandsSeen = 1024;
+  const uint32_t last = asset.vertex_count - 1;
+  const uint32_t every = asset.strand_count / kStrandsSeen + 1;
+  double sum_m = 0.0;
+  uint64_t count = 0;
+  for (uint32_t strand = 0; strand < asset.strand_count; strand += every) {
+    const auto vertex = [&](uint32_t v) {
+      return asset.rest_position_m[size_t{v} * asset.strand_count + strand];
+    };
+    for (uint32_t gap = 0; gap < last; ++gap) {
+      const glm::vec3 chord = vertex(gap + 1) - vertex(gap);
+      const glm::vec3 m0 = gap == 0 ? chord : 0.5f * (vertex(gap + 1) - vertex(gap - 1));
+      const glm::vec3 m1 = gap + 1 == last ? chord : 0.5f * (vertex(gap + 2) - vertex(gap));
+      const double bend_m =
+          glm::length(3.0f * chord - 2.0f * m0 - m1) + glm::length(m0 + 2.0f * m1 - 3.0f * chord);
+      if (!std::isfinite(bend_m)) continue;
+      sum_m += bend_m;
+      ++count;
+    }
+  }
+  return count > 0 ? static_cast<float>(sum_m / static_cast<double>(count)) : 0.0f;
+}
+
 RestFacts measure_rest(const SceneAsset& asset) {
   RestFacts facts;
   // Hair whose shape is no number is as large as any.
@@ -40,6 +66,7 @@ RestFacts measure_rest(const SceneAsset& asset) {
       length_m += glm::length(point - asset.rest_position_m[i - asset.strand_count]);
   }
   facts.mean_length_m = static_cast<float>(length_m / asset.strand_count);
+  facts.mean_bend_m = mean_bend_m(asset);
   facts.extent_m = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
   if (!(facts.extent_m > 0.0f && facts.extent_m < kFarM)) facts.extent_m = kUsualM;
   if (!(facts.mean_length_m >= 0.0f && facts.mean_length_m < kFarM)) facts.mean_length_m = kUsualM;

@@ -24,7 +24,8 @@ class ShadowMap;
 /// Measures of the rest shape.
 struct RestFacts {
   float mean_length_m = 0.0f;
-  float extent_m = 0.0f;  // largest side of the bounding box
+  float extent_m = 0.0f;     // largest side of the bounding box
+  float mean_bend_m = 0.0f;  // of a strand's curve between two vertices: its second derivative
 };
 
 /// Numbers of the methods that no scene sets.

@@ -2,20 +2,39 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/constants.hpp>
 
 #include "common/render/passes/expand_pass.h"
+#include "common/render/strand_style.h"
 
 namespace strandcast {
 namespace {
 
-// Bends shorter than this are not seen, and for strands thinner than about this stand fewer and wider ones.
-constexpr float kSegmentPx = 10.0f;
+// Segments may be this far off the curve of a strand that bends as most do, and for strands thinner than
+// about this stand fewer and wider ones.
+constexpr float kBendErrorPx = 0.25f;
 constexpr float kThinnestPx = 0.45f;
+// Hair in motion bends at least so much from vertex to vertex, however straight it is at rest.
+constexpr float kLeastBendRad = 0.25f;
 
 /// At least one, where the limit allows it. A size that is not a number takes the least detail.
 uint32_t at_most(float wanted, uint32_t limit) {
   return wanted > 1.0f ? static_cast<uint32_t>(std::min(std::ceil(wanted), static_cast<float>(limit)))
                        : std::min(1u, limit);
+}
+
+/// How far a strand of the look bends between two vertices: as its keys, and by waves and frizz on top.
+float bend_m(const DetailFacts& facts, const LookDesc& look, float gap_m) {
+  const StyleNumbers style = style_numbers(look, facts.mean_length_m);
+  const float gaps = static_cast<float>(std::max(facts.vertex_count, 2u) - 1);
+  // They grow along the strand; half of their size stands for all of it.
+  const auto of_waves = [&](float size_m, float count) {
+    const float turn = glm::two_pi<float>() * count / gaps;
+    return 0.5f * size_m * turn * turn;
+  };
+  const float keys_m = std::max(facts.mean_bend_m, kLeastBendRad * gap_m);
+  return glm::length(glm::vec3(keys_m, of_waves(style.wave_m, style.wave_count),
+                               of_waves(style.frizz_m, style.frizz_count)));
 }
 
 }  // namespace
@@ -26,6 +45,7 @@ DetailFacts detail_facts(const RenderScene& scene) {
   facts.vertex_count = scene.key_strands.vertex_count();
   facts.triangle_count = scene.triangle_count;
   facts.mean_length_m = scene.rest.mean_length_m;
+  facts.mean_bend_m = scene.rest.mean_bend_m;
   return facts;
 }
 
@@ -47,10 +67,14 @@ StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const
   StrandDetail detail;
   const uint32_t max_followers = facts.triangle_count > 0 ? look.followers : 0;
   const float px_per_m = view.focal_px / view.target_distance_m;
-  const float gap_px =
-      facts.mean_length_m / static_cast<float>(std::max(facts.vertex_count, 2u) - 1) * px_per_m;
+  const float gap_m = facts.mean_length_m / static_cast<float>(std::max(facts.vertex_count, 2u) - 1);
   const float width_px = 2.0f * look.strand_radius_m * px_per_m;
-  detail.segments_per_gap = at_most(gap_px / kSegmentPx, look.segments);
+  // A chord of 1 / n of a gap is off its curve by an eighth of the second derivative over n^2.
+  constexpr float kEighth = 0.125f;
+  const float segments = std::sqrt(kEighth * bend_m(facts, look, gap_m) * px_per_m / kBendErrorPx);
+  // A little more than is allowed is not worth another segment for all.
+  constexpr float kSlack = 0.4f;
+  detail.segments_per_gap = at_most(segments - kSlack, look.segments);
   const float followers = std::floor(static_cast<float>(max_followers) * width_px / kThinnestPx + 0.5f);
   detail.followers = at_most(followers, max_followers);
   if (facts.is_finest) {

@@ -18,6 +18,7 @@ struct DetailFacts {
   uint32_t vertex_count = 0;  // of each
   uint32_t triangle_count = 0;
   float mean_length_m = 0.0f;  // of a key strand at rest
+  float mean_bend_m = 0.0f;    // likewise: RestFacts
   uint64_t max_points = 0;     // of all drawn strands
   bool is_finest = false;      // all followers and segments of the look, whatever the size of the picture
 };

@@ -10,6 +10,8 @@
 
 #include "common/base/hash.h"
 #include "common/pictures/picture_error.h"
+#include "common/render/render_scene.h"
+#include "common/render/strand_detail.h"
 #include "common/render/tiles/half_float.h"
 #include "common/render/tiles/strand_expansion.h"
 #include "common/render/tiles/tile_raster.h"
@@ -137,6 +139,55 @@ TEST(TileRenderer, FollowersCoverAPartingAndFallToTheirKeysSide) {
     EXPECT_GT(std::abs(tip.x - root.x), 0.05f) << strand;
   }
   EXPECT_GT(within, static_cast<int>(0.8 * 2 * (kSide - 1) * look.followers));
+}
+
+// Arcs of a circle: their curves are off chords of 1 / n of a gap by its sagitta.
+TEST(StrandDetail, ChordsStayAQuarterOfAPixelOffTheirCurves) {
+  constexpr float kRadiusM = 0.05f;
+  constexpr uint32_t kVertices = 16;
+  constexpr float kTurnRad = 0.2f;  // from vertex to vertex
+  SceneAsset asset;
+  asset.strand_count = 4;
+  asset.vertex_count = kVertices;
+  for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
+    for (uint32_t i = 0; i < asset.strand_count; ++i) {
+      const float turn = kTurnRad * static_cast<float>(vertex);
+      asset.rest_position_m.emplace_back(kRadiusM * std::sin(turn), kRadiusM * std::cos(turn),
+                                         0.01f * static_cast<float>(i));
+    }
+  LookDesc look;
+  look.segments = 8;
+  look.style.wave_m = look.style.frizz_m = 0.0f;
+  DetailFacts facts = detail_facts(RenderScene(asset, look, true));
+  facts.max_points = 1 << 20;
+  View view;
+  uint32_t before = 0;
+  for (const float px_per_m : {100.0f, 1000.0f, 4000.0f, 10000.0f, 60000.0f}) {
+    view.focal_px = px_per_m;
+    const uint32_t n = choose_detail(facts, look, view, {}).segments_per_gap;
+    const auto off_px = [&](uint32_t segments) {
+      return kRadiusM * (1.0f - std::cos(0.5f * kTurnRad / static_cast<float>(segments))) * px_per_m;
+    };
+    // Hair in motion bends more than these arcs' 0.2 rad: they are drawn as if by 0.25.
+    constexpr float kMore = 0.25f / kTurnRad;
+    if (n < 8) {
+      EXPECT_LT(kMore * off_px(n), 0.25f * 2.0f) << px_per_m;
+    }
+    if (n > 1) {
+      EXPECT_GT(kMore * off_px(n - 1), 0.25f) << px_per_m;
+    }
+    EXPECT_GE(n, before);
+    before = n;
+  }
+  EXPECT_EQ(before, 8u);
+  // Waves of a look count as well, and no look takes more than it says.
+  view.focal_px = 1000.0f;
+  const uint32_t plain = choose_detail(facts, look, view, {}).segments_per_gap;
+  look.style.wave_m = 0.01f;
+  look.style.wave_count = 6.0f;
+  EXPECT_GT(choose_detail(facts, look, view, {}).segments_per_gap, plain);
+  look.segments = 1;
+  EXPECT_EQ(choose_detail(facts, look, view, {}).segments_per_gap, 1u);
 }
 
 // ---- one tile after another, from points made by hand
