@@ -115,6 +115,7 @@ std::vector<std::string> names_of(std::string_view path) {
 bool is_idle(const LookDesc& look, std::string_view path) {
   if (path == "root_color" || path == "tip_color") return look.hair_color != kOwnColors;
   if (path == "eumelanin" || path == "pheomelanin") return look.hair_color != "melanin";
+  if (look.methods != RenderMethodsDesc{} && !is_drawn_by_methods(path)) return true;
   if (path == "rim_direction") return look.rim_color == glm::vec3(0.0f);
   return false;
 }

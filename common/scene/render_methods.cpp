@@ -8,7 +8,7 @@ namespace {
 constexpr std::array<MethodRow, 5> kShading{{
     {"sadeghi", "artist's lobes R, TT and TRT with glints (Sadeghi et al. 2010)"},
     {"kajiya_kay", "a diffuse cylinder with a white and a tinted highlight (Kajiya and Kay 1989; TressFX)"},
-    {"karis", "closed fits to the lobes of a smooth fibre (Karis 2016)"},
+    {"karis", "closed fits to the lobes of a smooth fibre, R a fifth too dim at 120 degrees (Karis 2016)"},
     {"chiang", "the rough fibre that conserves energy, the reference (Chiang et al. 2016)"},
     {"marschner", "the smooth fibre of Marschner et al. 2003, from tables that are made at load"},
 }};

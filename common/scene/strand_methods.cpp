@@ -57,4 +57,8 @@ const MethodTable<ShadowDetail>& shadow_details() {
   return table;
 }
 
+bool is_drawn_by_methods(std::string_view field) {
+  return !(field.starts_with("style.") || field.starts_with("rim_") || field == "shading.lock_variation");
+}
+
 }  // namespace strandcast

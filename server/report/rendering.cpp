@@ -103,7 +103,16 @@ void as_quads(LookDesc& look) {
   look.methods.transparency = "hashed";
 }
 
-enum GroupIndex : size_t { kWhole, kShadows, kTransparencies, kEdges, kShadings, kScatterings, kStrands };
+enum GroupIndex : size_t {
+  kWhole,
+  kShadows,
+  kTransparencies,
+  kEdges,
+  kShadings,
+  kScatterings,
+  kStrands,
+  kPlaces
+};
 
 }  // namespace
 
@@ -136,6 +145,8 @@ const std::vector<RenderingGroup>& rendering_groups() {
          look.segments *= 2;
        },
        kTruthFactor},
+      {"evaluation", "the same model in every sample", RendererKind::Gl,
+       [](LookDesc& look) { look.methods.evaluation = "fragment"; }, 1},
   };
   return kGroups;
 }
@@ -163,7 +174,7 @@ const std::vector<RenderingRow>& rendering_rows() {
                 rows);
     add_methods(antialiasing_methods(), "edges", kEdges, &RenderMethodsDesc::antialiasing, rows);
     add_methods(shading_models(), "shading", kShadings, &RenderMethodsDesc::shading, rows);
-    add_methods(shading_places(), "evaluation", kShadings, &RenderMethodsDesc::evaluation, rows);
+    add_methods(shading_places(), "evaluation", kPlaces, &RenderMethodsDesc::evaluation, rows);
     add_methods(scattering_models(), "scattering", kScatterings, &RenderMethodsDesc::scattering, rows);
     add_methods(detail_methods(), "detail", kStrands, &RenderMethodsDesc::detail, rows);
     rows.push_back({"gl detail bends, up to 8", "likewise, of more segments where hair curls", kStrands,

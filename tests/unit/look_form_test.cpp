@@ -82,6 +82,11 @@ TEST(LookForm, ShowsWhatAPersonExpects) {
   EXPECT_TRUE(field_of(look_fields(look), "root_color").is_idle);
   look.hair_color = "melanin";
   EXPECT_FALSE(field_of(look_fields(look), "eumelanin").is_idle);
+  // Other methods than the main ones know nothing of locks.
+  EXPECT_FALSE(field_of(fields, "style.clump").is_idle);
+  look.methods.shading = "marschner";
+  EXPECT_TRUE(field_of(look_fields(look), "style.clump").is_idle);
+  EXPECT_FALSE(field_of(look_fields(look), "shading.wetness").is_idle);
 }
 
 TEST(LookForm, WhatIsSetReadsBackFieldByFieldAndAllAtOnce) {

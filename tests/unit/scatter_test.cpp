@@ -259,6 +259,14 @@ TEST(Karis, StaysNearTheFibreItFits) {
   // Beyond, where Schlick's Fresnel and the exact one part at grazing angles, R is off by up to a quarter.
   for (const double phi : {0.0, 30.0, 60.0, 90.0, 150.0})
     EXPECT_NEAR(fit(phi).r / azimuthal(0, fibre, 0.0, phi * kDegree), 1.0, 0.2) << phi;
+  // It is off by nothing else: incidence is half the azimuth.
+  for (const double phi : {0.0, 60.0, 120.0, 150.0})
+    EXPECT_NEAR(fit(phi).r / azimuthal(0, fibre, 0.0, phi * kDegree),
+                schlick_fresnel(fibre.index, std::cos(0.5 * phi * kDegree)) /
+                    fresnel(fibre.index, std::cos(0.5 * phi * kDegree)),
+                1e-6)
+        << phi;
+  EXPECT_NEAR(fit(120).r / azimuthal(0, fibre, 0.0, 120 * kDegree), 0.78, 0.005);
   EXPECT_NEAR(karis_index_in_section(1.0), 1.5500, 1e-4);
   EXPECT_NEAR(karis_index_in_section(std::cos(30 * kDegree)), 1.6859, 1e-4);
   EXPECT_NEAR(karis_index_in_section(0.5), 2.5600, 1e-4);

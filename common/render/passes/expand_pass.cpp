@@ -29,7 +29,8 @@ struct DetailTarget {
 };
 constexpr DetailTarget kHardwareDetail{5.0f, 0.25f};
 constexpr DetailTarget kSoftwareDetail{9.0f, 0.6f};
-// A map of the light is looked up between its texels: half of what is drawn is enough for it.
+// A map of the light is looked up between its texels: half of what is drawn is enough for it, and from far
+// away what is drawn.
 constexpr DetailTarget kCasterDetail{16.0f, 1.0f};
 // In a batch of a picture that may be given up: some ten of them in a picture that takes a CPU long.
 constexpr uint32_t kInterruptibleStrands = 1024;
@@ -100,6 +101,10 @@ ExpandLevel map_level(const RenderScene& scene, const ExpandSizes& sizes, const 
   return level_of(scene, sizes, aim.target, static_cast<float>(aim.map_texels) / scene.rest.extent_m);
 }
 
+ExpandLevel coarser(const ExpandLevel& a, const ExpandLevel& b) {
+  return {std::min(a.segments_per_gap, b.segments_per_gap), std::min(a.followers, b.followers)};
+}
+
 ExpandAim caster_aim(const RenderScene& scene) {
   return {kCasterDetail, scene.method_settings.shadow_texels};
 }
@@ -166,8 +171,8 @@ class ExpandPass final : public RenderPass {
 
  private:
   void begin(const RenderTurn& turn) {
-    level_ = aim_.map_texels == 0 ? seen_level(scene_, sizes_, aim_.target, turn.view)
-                                  : map_level(scene_, sizes_, aim_);
+    level_ = seen_level(scene_, sizes_, aim_.target, turn.view);
+    if (aim_.map_texels > 0) level_ = coarser(level_, map_level(scene_, sizes_, aim_));
     strand_count_ = sizes_.strand_count(level_.followers);
     if (turn.terms.strand_share < 1.0f) thin_out(turn.terms.strand_share);
     batch_strands_ = sizes_.batch_strands(expanded_.size_bytes(), level_.segments_per_gap);

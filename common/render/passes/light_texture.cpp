@@ -20,8 +20,8 @@ void LightTexture::upload(const LightVolume& volume) {
 void LightTexture::set_light(const LookDesc& look, const View& view, const glm::vec3& to_light_in_head) {
   to_light_ = to_light_in_head;
   up_ = view.up;
-  light_color_ = look.light_color;
-  ambient_ = look.ambient;
+  light_color_ = look.exposure * look.light_color;
+  ambient_ = look.exposure * look.ambient;
 }
 
 void LightTexture::set_uniforms(const gl::Program& program, uint32_t unit) const {
