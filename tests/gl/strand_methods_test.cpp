@@ -216,8 +216,8 @@ int uncovered(const Image& image, float px_per_m, float share) {
                          (0.5f * static_cast<float>(image.height) - static_cast<float>(y) - 0.5f) / px_per_m);
       const float to_first = glm::distance(at, glm::vec2(std::clamp(at.x, -0.1f, 0.0f), 0.0f));
       const float to_second = glm::distance(at, glm::vec2(0.0f, std::clamp(at.y, -0.1f, 0.0f)));
-      if (at.x < -0.1f || at.y < -0.1f) continue;  // beyond the ends
-      if (std::min(to_first, to_second) > share * 0.01f) continue;
+      // Around the corner: strands have no caps.
+      if (std::min(to_first, to_second) > share * 0.01f || glm::length(at) > 0.05f) continue;
       if (image.rgba[4 * (size_t{y} * image.width + x)] > 20) ++count;
     }
   return count;
