@@ -76,7 +76,11 @@ LatticeFrame turned_frame(const LightLatticeDesc& desc, const LightDirections& l
   frame.axis[2] = -lights.to_key;
   frame.axis[0] = any_across(lights.to_key);
   frame.axis[1] = glm::cross(frame.axis[2], frame.axis[0]);
-  frame.cell_m = std::max(kRoom * desc.extent_m / static_cast<float>(desc.cells), 1e-5f);
+  const auto cell_m = [&](uint32_t cells) {
+    return std::max(kRoom * desc.extent_m / static_cast<float>(cells), 1e-5f);
+  };
+  frame.cell_m = cell_m(desc.cells);
+  frame.soft_m = std::max(frame.cell_m, cell_m(kLightCells));
   return frame;
 }
 
@@ -235,19 +239,23 @@ void LightLattice::find_solid(int y, int z, std::vector<float>& share) const {
   }
   // Distances from cell to cell are up to an eighth too long, and rounded.
   constexpr float kSure = 0.8f;
-  const float per_m = 1.0f / view_.cell_m;
+  const float per_ramp = 1.0f / (kSolidRamp * view_.soft_m);
+  const float cells_per_ramp = 1.0f / (per_ramp * view_.cell_m);
   if (!(first <= last)) return;
   const int end = static_cast<int>(std::floor(last)) + 1;
   for (int x = static_cast<int>(std::ceil(first)); x < end;) {
-    const float outside = distance_at(head, from + static_cast<float>(x) * step) * per_m + kSolidInsetCells;
-    const float solid = std::clamp(0.5f - outside * (0.5f / kSolidRampCells), 0.0f, 1.0f);
-    const int alike = 1 + static_cast<int>(std::max(kSure * (std::abs(outside) - kSolidRampCells), 0.0f));
+    const float outside =
+        (distance_at(head, from + static_cast<float>(x) * step) + kSolidInset * view_.soft_m) * per_ramp;
+    const float solid = std::clamp(0.5f - 0.5f * outside, 0.0f, 1.0f);
+    const int alike =
+        1 + static_cast<int>(std::max(kSure * (std::abs(outside) - 1.0f) * cells_per_ramp, 0.0f));
     for (const int until = std::min(x + alike, end); x < until; ++x) share[x] = solid;
   }
 }
 
 std::vector<float> LightLattice::halved_with(float solid_depth) const {
   std::vector<float> all = halved_;
+  solid_depth *= view_.cell_m / view_.soft_m;
   for (size_t i = 0; i < halved_solid_.size(); ++i) all[i] += solid_depth * halved_solid_[i];
   return all;
 }

@@ -19,11 +19,14 @@ namespace strandcast {
 
 struct StrandPoints;
 
+/// Cells along the hair's largest side, unless somebody wants more or fewer.
+inline constexpr uint32_t kLightCells = 96;
+
 /// What of a scene it needs and does not change from picture to picture.
 struct LightLatticeDesc {
-  float extent_m = 0.3f;   // of the hair at rest, its largest side
-  uint32_t cells = 96;     // along that side
-  bool has_skull = false;  // a ball under the hair that has to have room
+  float extent_m = 0.3f;         // of the hair at rest, its largest side
+  uint32_t cells = kLightCells;  // along that side
+  bool has_skull = false;        // a ball under the hair that has to have room
   FittedSphere skull;
   std::shared_ptr<const HeadOccupancy> solid;  // none: nothing but hair casts shadows
 };
@@ -43,6 +46,7 @@ struct LatticeFrame {
   glm::vec3 axis[3];         // unit: across, across, away from the key light
   glm::vec3 origin_m{0.0f};  // middle of the first cell, along the axes
   float cell_m = 1.0f;
+  float soft_m = 1.0f;      // what the head's shade is told apart by: a usual cell, or one that is larger
   glm::ivec3 size{0};       // of the key light's cells
   glm::ivec3 half_size{0};  // of the other lights' cells, twice as large
 };
@@ -56,16 +60,17 @@ inline constexpr float kLightSumUnit = 1.0f / 65536.0f;
 /// A segment is summed at one place, one that is longer than two cells at more.
 inline constexpr float kLightPiecesPerCell = 0.5f;
 inline constexpr int kMaxLightCellsPerAxis = 160;
-/// How much of a place is head: all of it or nothing so many cells from a surface that lies this deep below
-/// its skin, so that roots and skin stay lit.
-inline constexpr float kSolidInsetCells = 1.25f;
-inline constexpr float kSolidRampCells = 1.25f;
+/// How much of a place is head: all of it or nothing so many LatticeFrame::soft_m from a surface that lies
+/// this deep below its skin, so that roots and skin stay lit.
+inline constexpr float kSolidInset = 1.25f;
+inline constexpr float kSolidRamp = 1.25f;
 /// Along the lattice's sides nothing is head: whoever looks up beyond them is told what they hold, and a body
 /// that goes on out there does not lie in its own shade.
 inline constexpr int kSolidBorderCells = 2;
 /// Optical depth behind the head, times the cube of the most that was passed: an edge as soft as the ramp.
 inline constexpr float kSolidDepth = 12.0f;
-/// The other lights sum it up, per cell. The sky is all around: what lies above hides a part of it only.
+/// The other lights sum it up, per LatticeFrame::soft_m. The sky is all around: what lies above hides a part
+/// of it only.
 inline constexpr float kSolidRimDepth = 2.0f;
 inline constexpr float kSolidSkyDepth = 0.06f;
 /// Optical depth that a metre of a strand of this width adds to its cell.
@@ -93,7 +98,7 @@ class LightLattice {
   void sweep_key(WorkerPool& workers);
   bool has_solid() const { return desc_.solid && !desc_.solid->is_empty(); }
   void find_solid(int y, int z, std::vector<float>& share) const;
-  /// Across halved cells, with the head as opaque as this per cell.
+  /// Across halved cells, with the head as opaque as this per LatticeFrame::soft_m.
   std::vector<float> halved_with(float solid_depth) const;
   void sweep(const glm::vec3& to_light, const std::vector<float>& halved, std::vector<float>& depth) const;
 

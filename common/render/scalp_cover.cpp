@@ -1,6 +1,7 @@
 #include "common/render/scalp_cover.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <unordered_map>
 
@@ -37,7 +38,13 @@ class RootGrid {
 
  private:
   glm::ivec3 cell_of(const glm::vec3& point_m) const {
-    return glm::ivec3(glm::floor(glm::clamp(point_m / cell_m_, -1e6f, 1e6f)));
+    // What is no number counts as far away.
+    const auto part = [&](float value_m) {
+      constexpr float kFar = 1e6f;
+      const float cell = value_m / cell_m_;
+      return cell > -kFar ? static_cast<int>(std::floor(std::min(cell, kFar))) : static_cast<int>(-kFar);
+    };
+    return {part(point_m.x), part(point_m.y), part(point_m.z)};
   }
   static uint64_t key(const glm::ivec3& cell) {
     const auto part = [](int value) { return static_cast<uint64_t>(value + (1 << 20)) & 0x1fffff; };

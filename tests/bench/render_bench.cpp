@@ -1,11 +1,14 @@
 // Prints CSV: what every method of self-shadowing, transparency and antialiasing costs and how far its
 // pictures are from the truth, on the built-in scene at rest: near, and from four times as far.
-//   render_bench [--size WxH] [--rounds N] [--png DIR]
+//   render_bench [--size WxH] [--rounds N] [--png DIR] [--tiles yes]
 // CPU time of the process, on all threads; methods take turns, so that whatever else runs meets all alike.
 // `ratio` is to today's quads (volume, hashed, analytic). `rmse` is over the pixels that hair covers, in sRGB
 // of 0..1: of shadows against the picture with the deep shadow map, everything else alike; of the others at
 // half the size, against lists of four times as many pixels. The latter has the detail of the larger picture,
 // which the level of detail takes from all methods alike.
+// With --tiles nothing but the tiles on the processor: near, far and from so near that the head fills the
+// picture; with the detail they choose against all that a look allows; and shadows by lattices of more and
+// fewer cells against those of 128. `rmse` of the former is to the finest detail.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,18 +23,21 @@
 #include "common/gl/egl_context.h"
 #include "common/groom/groom_asset.h"
 #include "common/render/renderer.h"
+#include "common/render/tiles/tile_renderer.h"
 #include "server/scene/scene_content.h"
 
 namespace strandcast {
 namespace {
 
 constexpr float kFar = 4.0f;         // times the distance
+constexpr float kClose = 0.4f;       // likewise
 constexpr uint32_t kTruthScale = 2;  // per side
 
 struct Options {
   RenderSize size{1280, 720};
   int rounds = 5;
   std::filesystem::path png;
+  bool is_tiles = false;
 };
 
 struct Row {
@@ -66,10 +72,13 @@ Result<Options> parse(int argc, char** argv) {
       options.rounds = std::max(1, std::atoi(value.c_str()));
     } else if (word == "--png") {
       options.png = value;
+    } else if (word == "--tiles") {
+      options.is_tiles = value == "yes";
     } else if (word != "--size" ||
                std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2) {
-      return make_error(ErrorCode::BadInput, "unknown option {} {} (known: --size WxH --rounds N --png DIR)",
-                        word, value);
+      return make_error(ErrorCode::BadInput,
+                        "unknown option {} {} (known: --size WxH --rounds N --png DIR --tiles yes)", word,
+                        value);
     }
   }
   return options;
@@ -194,12 +203,79 @@ class Bench {
   const SceneAsset& asset_;
 };
 
+/// The tiles on the processor, by one view: each setting against the finest of its kind.
+Status bench_tiles(const char* name, const Options& options, const SceneDesc& scene,
+                   const SceneAsset& asset) {
+  struct Setting {
+    const char* kind;
+    std::string name;
+    TileOptions tiles;
+    std::unique_ptr<Renderer> renderer;
+    std::vector<double> picture, ms;
+  };
+  const auto detail_of = [](bool is_finest) {
+    TileOptions tiles;
+    tiles.is_finest = is_finest;
+    return tiles;
+  };
+  std::vector<Setting> settings;
+  settings.push_back({"detail", "finest", detail_of(true), nullptr, {}, {}});
+  settings.push_back({"detail", "chosen", detail_of(false), nullptr, {}, {}});
+  for (const uint32_t cells : {128u, 96u, 64u, 32u}) {
+    settings.push_back({"light cells", fmt::format("{}", cells), {}, nullptr, {}, {}});
+    settings.back().tiles.light_cells = cells;
+  }
+  SceneAsset bald = asset;
+  bald.strand_count = bald.vertex_count = 0;
+  bald.rest_position_m.clear();
+  bald.triangle.clear();
+  const auto draw = [&](Renderer& renderer, const SceneAsset& of) {
+    return renderer.draw({{}, of.rest_position_m}, scene.camera, options.size);
+  };
+  ASSIGN_OR_RETURN(auto without, make_tile_renderer(bald, scene.look));
+  RETURN_IF_ERROR(draw(*without, bald));
+  const std::vector<double> head = shrunk(without->read_image(), 1);
+  for (Setting& setting : settings) {
+    ASSIGN_OR_RETURN(setting.renderer, make_tile_renderer(asset, scene.look, setting.tiles));
+    RETURN_IF_ERROR(draw(*setting.renderer, asset));
+    setting.picture = shrunk(setting.renderer->read_image(), 1);
+  }
+  for (int round = 0; round < options.rounds; ++round)
+    for (Setting& setting : settings) {
+      const double begin_ms = cpu_ms();
+      RETURN_IF_ERROR(draw(*setting.renderer, asset));
+      setting.ms.push_back(cpu_ms() - begin_ms);
+    }
+  const Setting* finest = nullptr;
+  for (const Setting& setting : settings) {
+    if (finest == nullptr || setting.kind != finest->kind) finest = &setting;
+    fmt::print("{},{}x{},{},{},{:.0f},{:.2f},{:.1f},{:.4f},{}\n", name, options.size.width,
+               options.size.height, setting.kind, setting.name, median(setting.ms),
+               median(setting.ms) / median(finest->ms),
+               static_cast<double>(setting.renderer->passes().live_bytes()) * 1e-6,
+               rmse(setting.picture, finest->picture, head), setting.renderer->profile().drawn_segments);
+  }
+  std::fflush(stdout);
+  return {};
+}
+
+Status bench_tiles(const Options& options, SceneDesc scene, const SceneAsset& asset) {
+  fmt::print("view,size,kind,setting,cpu_ms,ratio,megabytes,rmse,segments\n");
+  const glm::vec3 offset_m = scene.camera.offset_m;
+  RETURN_IF_ERROR(bench_tiles("near", options, scene, asset));
+  scene.camera.offset_m = offset_m * kFar;
+  RETURN_IF_ERROR(bench_tiles("far", options, scene, asset));
+  scene.camera.offset_m = offset_m * kClose;
+  return bench_tiles("close", options, scene, asset);
+}
+
 Status run(int argc, char** argv) {
   ASSIGN_OR_RETURN(const Options options, parse(argc, argv));
   if (!options.png.empty()) std::filesystem::create_directories(options.png);
   const SceneDesc scene = built_in_scene();
   ASSIGN_OR_RETURN(SceneContent content, load_scene_content(scene));
   const SceneAsset asset = make_scene_asset(content.groom, std::move(content.head));
+  if (options.is_tiles) return bench_tiles(options, scene, asset);
   ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
   fmt::print("view,size,kind,method,cpu_ms,ratio,megabytes,rmse,left_out\n");
   Bench bench(options, context->info(), scene, asset);

@@ -1,7 +1,8 @@
 // render_preview: draws a scene's hair at rest into a PNG, without server or simulation. For looking at the
 // renderer.
 //   render_preview OUT.png [--scene FILE] [--set path=value]... [--size WxH] [--repeat N] [--turn DEGREES]
-//   [--shaders DIR] [--renderer tiles|gl|quads] [--threads N]; methods by --set look.methods.shadow=...
+//   [--shaders DIR] [--renderer tiles|gl|quads] [--threads N] [--light-cells N]; methods by --set
+//   look.methods.shadow=...
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -59,13 +60,16 @@ Result<Options> parse(int argc, char** argv) {
       options.renderer = value;
     } else if (word == "--threads") {
       options.tiles.threads = static_cast<uint32_t>(std::max(1, std::atoi(value.c_str())));
+    } else if (word == "--light-cells") {
+      options.tiles.light_cells = static_cast<uint32_t>(std::max(1, std::atoi(value.c_str())));
     } else if (word == "--size") {
       if (std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2)
         return make_error(ErrorCode::BadInput, "--size is {} but must look like 640x360", value);
     } else {
       return make_error(
           ErrorCode::BadInput,
-          "unknown option {} (known: --scene --set --shaders --size --repeat --turn --renderer --threads)",
+          "unknown option {} (known: --scene --set --shaders --size --repeat --turn --renderer --threads "
+          "--light-cells)",
           word);
     }
   }

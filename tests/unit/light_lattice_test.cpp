@@ -146,14 +146,14 @@ TEST_F(LightLatticeTest, AHeadIsOpaqueAndBesideItNothingIs) {
     EXPECT_LT(key_depth(lattice.view(), 1.1f * kRadiusM * to_light), 0.5);
     EXPECT_LT(key_depth(lattice.view(), kRadiusM * (1.15f * aside - 1.1f * to_light)), 0.5);
     // The surface that counts lies a little below its skin.
-    const float seen_m = kRadiusM - kSolidInsetCells * lattice.view().cell_m;
+    const float seen_m = kRadiusM - kSolidInset * lattice.view().soft_m;
     EXPECT_NEAR(key_depth(lattice.view(), seen_m * aside - 1.1f * kRadiusM * to_light), kSolidDepth / 8.0,
                 kSolidDepth / 6.0);
     EXPECT_GT(other_depth(lattice.view(), -1.1f * kRadiusM * aside, false), 20.0);
   }
   // From straight above it hides a part of the sky, that goes with what lies above.
   build(lattice, points, {kWidthM, 1.0f, 0.0f}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, false}, workers_);
-  const float chord_cells = 2.0f * (kRadiusM / lattice.view().cell_m - kSolidInsetCells);
+  const float chord_cells = 2.0f * (kRadiusM - kSolidInset * lattice.view().soft_m) / lattice.view().cell_m;
   EXPECT_NEAR(other_depth(lattice.view(), {0, -1.2f * kRadiusM, 0}, true), kSolidSkyDepth * chord_cells,
               0.1f * kSolidSkyDepth * chord_cells + 0.05f);
 }
@@ -230,8 +230,8 @@ TEST_F(LightLatticeTest, NoCellOfTheHeadIsSkipped) {
                               glm::all(glm::lessThan(at, view.size - kSolidBorderCells)) &&
                               glm::all(glm::greaterThan(place, glm::vec3(-0.5f))) &&
                               glm::all(glm::lessThan(place, glm::vec3(desc.solid->size) - 0.5f));
-        const float outside = distance_at(*desc.solid, place) / view.cell_m + kSolidInsetCells;
-        if (is_there) most = std::max(most, std::clamp(0.5 - outside * 0.5 / kSolidRampCells, 0.0, 1.0));
+        const float outside = distance_at(*desc.solid, place) / view.soft_m + kSolidInset;
+        if (is_there) most = std::max(most, std::clamp(0.5 - outside * 0.5 / kSolidRamp, 0.0, 1.0));
         const double depth = kSolidDepth * most * most * most;
         const size_t cell = (static_cast<size_t>(z) * view.size.y + y) * static_cast<size_t>(view.size.x) + x;
         worst = std::max(worst, std::abs(view.key[cell] * double{kLightDepthUnit} - depth));

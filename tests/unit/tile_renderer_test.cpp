@@ -190,6 +190,29 @@ TEST(StrandDetail, ChordsStayAQuarterOfAPixelOffTheirCurves) {
   EXPECT_EQ(choose_detail(facts, look, view, {}).segments_per_gap, 1u);
 }
 
+// The lattice as it is shades hair as one of 128 cells does, and a coarser one does not.
+TEST(TileRenderer, ShadowsAreThoseOfAFinerLattice) {
+  const SceneAsset asset = grown(1000);
+  SceneAsset bald = asset;
+  bald.strand_count = bald.vertex_count = 0;
+  bald.rest_position_m.clear();
+  bald.triangle.clear();
+  const auto picture = [](const SceneAsset& of, uint32_t cells) {
+    TileOptions options{2, simd::widest_set()};
+    options.light_cells = cells;
+    return drawn(of, {}, options, {320, 240});
+  };
+  const Image truth = picture(asset, 128);
+  const PictureMask hair = mask_of(truth, picture(bald, 128));
+  const auto rmse = [&](uint32_t cells) {
+    const auto error = picture_error(picture(asset, cells), truth, hair);
+    EXPECT_TRUE(error);
+    return error ? std::pow(10.0, -error->psnr_db / 20.0) : 1.0;
+  };
+  EXPECT_LT(rmse(TileOptions().light_cells), 0.0075);
+  EXPECT_GT(rmse(48), 0.0075);
+}
+
 // ---- one tile after another, from points made by hand
 
 uint16_t half_of(float x) {

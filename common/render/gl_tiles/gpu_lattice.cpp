@@ -87,8 +87,8 @@ void GpuLattice::build(const LatticeFrame& frame, const LightDirections& lights,
   key_.set("u_sum_unit", kLightSumUnit);
   key_.set("u_solid_depth", kSolidDepth);
   key_.set("u_solid_border", kSolidBorderCells);
-  key_.set("u_solid_inset_m", kSolidInsetCells * frame.cell_m);
-  key_.set("u_solid_ramp_m", kSolidRampCells * frame.cell_m);
+  key_.set("u_solid_inset_m", kSolidInset * frame.soft_m);
+  key_.set("u_solid_ramp_m", kSolidRamp * frame.soft_m);
   key_.set("u_solid_reach_m", solid_reach_m_);
   key_.set("u_solid_origin_m", solid_origin_m_);
   key_.set("u_solid_from_m", solid_from_m_);

@@ -19,7 +19,8 @@ namespace {
 
 // Points of all drawn strands at most: 256 MiB. More, and fewer strands are drawn.
 constexpr uint64_t kMaxPoints = uint64_t{8} << 20;
-constexpr float kShadowLiftCells = 1.5f;
+// Above the skin, in LatticeFrame::soft_m.
+constexpr float kShadowLift = 1.5f;
 
 /// Memory of an object that a pass writes, as it is now.
 template <class Object>
@@ -129,7 +130,7 @@ Status bin(TileState& state, RenderTurn& turn) {
   state.counts = state.bins.bin_segments(state.points, grid, turn.view.near_m, state.workers);
   turn.drawn_segments = state.counts.segments;
   if (state.head.mesh != nullptr) {
-    state.head.shadow_lift_m = kShadowLiftCells * state.lattice.view().cell_m;
+    state.head.shadow_lift_m = kShadowLift * state.lattice.view().soft_m;
     place_head(turn.view, state.workers, state.head);
   }
   state.bins.bin_boxes(state.head.box, grid);

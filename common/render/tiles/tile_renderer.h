@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "common/render/light_lattice.h"
 #include "common/render/renderer.h"
 #include "common/simd/variants.h"
 
@@ -14,8 +15,8 @@ namespace strandcast {
 struct TileOptions {
   uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
   simd::InstructionSet set = simd::widest_set();
-  uint32_t light_cells = 96;  // along the hair's largest side
-  bool is_finest = false;     // all followers and segments of the look, whatever the size of the picture
+  uint32_t light_cells = kLightCells;  // along the hair's largest side
+  bool is_finest = false;  // all followers and segments of the look, whatever the size of the picture
 };
 
 /// BadInput for an asset that does not fit together.
