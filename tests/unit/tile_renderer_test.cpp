@@ -192,7 +192,7 @@ TEST(StrandDetail, ChordsStayAQuarterOfAPixelOffTheirCurves) {
 
 // The lattice as it is shades hair as one of 128 cells does, and a coarser one does not.
 TEST(TileRenderer, ShadowsAreThoseOfAFinerLattice) {
-  const SceneAsset asset = grown(1000);
+  const SceneAsset asset = grown_hair(1000);
   SceneAsset bald = asset;
   bald.strand_count = bald.vertex_count = 0;
   bald.rest_position_m.clear();
