@@ -32,7 +32,7 @@ struct Pixels {
   vec4 blue;
   vec4 passed;     // share of what lies behind that is still seen
   vec4 depth;      // of the head, m
-  vec4 uncovered;  // share of the pixel that is no head
+  vec4 seen;       // share of the pixel that is head and has no strand in front of it yet
   vec4 y;          // middles
 };
 
@@ -82,7 +82,7 @@ Pixels begin_pixels(ivec2 top) {
   for (int i = 0; i < 4; ++i) {
     HeadPixel head = head_pixel(top + ivec2(0, i));
     p.depth[i] = head.depth;
-    p.uncovered[i] = 1.0 - head.share;
+    p.seen[i] = head.share;
   }
   p.y = float(top.y) + vec4(0.5, 1.5, 2.5, 3.5);
   return p;
@@ -148,10 +148,13 @@ void blend(Segment s, float x, inout Pixels p) {
   vec4 behind_b = (x - s.b.place.x) * s.b.mitre.x + (p.y - s.b.place.y) * s.b.mitre.y;
   vec4 opacity = max(cover, 0.0) * (s.a.opacity + part * (s.b.opacity - s.a.opacity));
   vec4 z = s.a.place.z + part * (s.b.place.z - s.a.place.z);
-  opacity *= mix(p.uncovered, vec4(1.0), lessThan(z, p.depth + kSkinDepthM));
   vec4 is_mine = vec4(greaterThanEqual(behind_a, vec4(0.0))) * vec4(lessThan(behind_b, vec4(0.0))) *
                  vec4(lessThanEqual(abs(along - part), vec4(s.beyond)));
-  vec4 share = p.passed * opacity * is_mine;
+  opacity *= is_mine;
+  // Behind the head there is only what it leaves of the pixel; in front of it a strand hides both alike.
+  vec4 is_front = vec4(lessThan(z, p.depth + kSkinDepthM));
+  vec4 share = (p.passed - (1.0 - is_front) * p.seen) * opacity;
+  p.seen -= is_front * p.seen * opacity;
   p.red += share * (s.a.light.r + part * (s.b.light.r - s.a.light.r));
   p.green += share * (s.a.light.g + part * (s.b.light.g - s.a.light.g));
   p.blue += share * (s.a.light.b + part * (s.b.light.b - s.a.light.b));
@@ -163,7 +166,7 @@ void write_pixels(Pixels p, ivec2 top) {
     ivec2 pixel = top + ivec2(0, i);
     if (any(greaterThanEqual(pixel, ivec2(u_frame.target.xy)))) continue;
     HeadPixel head = head_pixel(pixel);
-    float seen = p.passed[i] * head.share;
+    float seen = p.seen[i];
     vec3 scene = vec3(p.red[i], p.green[i], p.blue[i]) + (seen > 0.0 ? seen * head_light(head) : vec3(0.0));
     float drawn = 1.0 - p.passed[i] + seen;
     float height = 1.0 - p.y[i] / u_frame.target.y;

@@ -190,6 +190,48 @@ TEST(StrandDetail, ChordsStayAQuarterOfAPixelOffTheirCurves) {
   EXPECT_EQ(choose_detail(facts, look, view, {}).segments_per_gap, 1u);
 }
 
+// Half a pixel of head hides half of what is behind it, and only that, however much hair there is.
+TEST(TileRenderer, TheEdgeOfAHeadIsSeenBeforeDenseHair) {
+  SceneAsset asset;
+  constexpr uint32_t kRows = 60, kLayers = 20;
+  asset.strand_count = kRows * kLayers;
+  asset.vertex_count = 2;
+  for (const float x : {-0.2f, 0.2f})
+    for (uint32_t i = 0; i < asset.strand_count; ++i)
+      asset.rest_position_m.emplace_back(x, 0.003f * (static_cast<float>(i % kRows) - 0.5f * kRows),
+                                         -0.1f - 0.001f * static_cast<float>(i / kRows));
+  LookDesc look;
+  look.followers = 0;
+  look.strand_radius_m = 0.0015f;
+  look.style = {};
+  CameraDesc camera;
+  camera.offset_m = {0.0f, 0.0f, 0.6f};
+  camera.target_m = {0.0f, 0.0f, 0.0f};
+  const RenderSize size{64, 48};
+  const auto edge = [&](float right_m) {
+    asset.head.position_m = {
+        {-0.1f, -1.0f, 0.0f}, {right_m, -1.0f, 0.0f}, {right_m, 1.0f, 0.0f}, {-0.1f, 1.0f, 0.0f}};
+    asset.head.normal.assign(4, {0.0f, 0.0f, 1.0f});
+    asset.head.triangle = {{0, 1, 2}, {0, 2, 3}};
+    auto renderer = make_tile_renderer(asset, look, {1, simd::widest_set()});
+    EXPECT_TRUE(renderer && (*renderer)->draw({{}, asset.rest_position_m}, camera, size));
+    const Image image = (*renderer)->read_image();
+    std::vector<int> red;
+    for (uint32_t x = 0; x < size.width; ++x) red.push_back(image.rgba[(size_t{24} * size.width + x) * 4]);
+    return red;
+  };
+  int halves = 0;
+  // Its edge somewhere within a pixel.
+  for (int step = 0; step < 6; ++step) {
+    const std::vector<int> red = edge(0.0005f * static_cast<float>(step));
+    const int head = red[28], hair = red[40];
+    ASSERT_GT(std::abs(head - hair), 40);
+    const auto share = [&](int value) { return static_cast<double>(value - hair) / (head - hair); };
+    for (uint32_t x = 28; x < 40; ++x) halves += share(red[x]) > 0.3 && share(red[x]) < 0.85;
+  }
+  EXPECT_GE(halves, 2);
+}
+
 // The lattice as it is shades hair as one of 128 cells does, and a coarser one does not.
 TEST(TileRenderer, ShadowsAreThoseOfAFinerLattice) {
   const SceneAsset asset = grown_hair(1000);

@@ -35,8 +35,8 @@ struct TilePixels {
   uint32_t open[kBlocksDown];
 };
 struct TileHead {
-  simd::Float depth[kBlocks];      // m, nearest
-  simd::Float uncovered[kBlocks];  // share of the pixel
+  simd::Float depth[kBlocks];  // m, nearest
+  simd::Float seen[kBlocks];   // share of the pixel that is head and has no strand in front of it yet
   simd::Float red[kBlocks];
   simd::Float green[kBlocks];
   simd::Float blue[kBlocks];
@@ -197,8 +197,7 @@ STRANDCAST_LANES int last_block(float high, int side, int blocks) {
 }
 
 /// Blends one segment of a batch under what lies in front of it.
-STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, const TileHead* head,
-                                    TilePixels& pixels) {
+STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, TileHead* head, TilePixels& pixels) {
   using simd::Bool;
   using simd::Float;
   const float* const va = s.value[i];
@@ -238,12 +237,18 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, const Til
       const Bool is_mine =
           behind_a >= 0.0f && behind_b < 0.0f && simd::abs(along - part) <= s.beyond[i] && cover > 0.0f;
       const int block = y * kBlocksAcross + x;
-      Float opacity = fades ? cover * (va[kOpacity] + part * step[kOpacity]) : cover;
+      const Float opacity = fades ? cover * (va[kOpacity] + part * step[kOpacity]) : cover;
+      Float open = pixels.passed[block];
       if (head != nullptr) {
+        // Behind the head there is only what it leaves of the pixel; in front of it a strand hides both
+        // alike.
         const Float z = s.depth[i] + part * s.depth_step[i];
-        opacity = select(z < head->depth[block] + kSkinDepthM, opacity, opacity * head->uncovered[block]);
+        const Float seen = head->seen[block];
+        const Bool is_front = z < head->depth[block] + kSkinDepthM;
+        head->seen[block] -= simd::FloatBits((simd::IntBits)(seen * opacity).v & is_mine.v & is_front.v);
+        open = select(is_front, open, open - seen);
       }
-      const Float share = simd::FloatBits((simd::IntBits)(pixels.passed[block] * opacity).v & is_mine.v);
+      const Float share = simd::FloatBits((simd::IntBits)(open * opacity).v & is_mine.v);
       pixels.red[block] += share * (va[kRed] + part * step[kRed]);
       pixels.green[block] += share * (va[kGreen] + part * step[kGreen]);
       pixels.blue[block] += share * (va[kBlue] + part * step[kBlue]);
@@ -252,13 +257,16 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, const Til
   }
 }
 
-/// Closes the blocks that are opaque; true while any is open.
-STRANDCAST_LANES bool close_opaque_blocks(TilePixels& pixels) {
+/// Closes the blocks that are opaque; true while any is open. `head`: where all that comes lies behind it.
+STRANDCAST_LANES bool close_opaque_blocks(const TileHead* head, TilePixels& pixels) {
   uint32_t any = 0;
   for (int y = 0; y < kBlocksDown; ++y) {
     for (uint32_t left = pixels.open[y]; left != 0; left &= left - 1) {
       const int x = std::countr_zero(left);
-      if (!is_any(pixels.passed[y * kBlocksAcross + x] > kOpaque)) pixels.open[y] &= ~(1u << x);
+      const int block = y * kBlocksAcross + x;
+      const simd::Float open =
+          head != nullptr ? pixels.passed[block] - head->seen[block] : pixels.passed[block];
+      if (!is_any(open > kOpaque)) pixels.open[y] &= ~(1u << x);
     }
     any |= pixels.open[y];
   }

@@ -88,7 +88,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
-      float nearest[kLanes], uncovered[kLanes], seen_x[kLanes], seen_y[kLanes];
+      float nearest[kLanes], covered_share[kLanes], seen_x[kLanes], seen_y[kLanes];
       float corner_x[3][kLanes], corner_y[3][kLanes], corner_w[3][kLanes];
       float value[3][7][kLanes];  // position, normal, cover
       bool is_block = false;
@@ -114,7 +114,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
           seen_x[lane] = tile_x + (static_cast<float>(sample_x + sample % kHeadSamples) + 0.5f) * kStep;
           seen_y[lane] = tile_y + (static_cast<float>(sample_y + sample / kHeadSamples) + 0.5f) * kStep;
         }
-        uncovered[lane] = 1.0f - static_cast<float>(covered) / (kHeadSamples * kHeadSamples);
+        covered_share[lane] = static_cast<float>(covered) / (kHeadSamples * kHeadSamples);
         is_block |= covered > 0;
         const glm::uvec3& corner = head.mesh->triangle[covered > 0 ? triangle : 0];
         for (int c = 0; c < 3; ++c) {
@@ -132,7 +132,7 @@ STRANDCAST_LANES bool draw_head(const TileInput& in, uint32_t tile, TileHead& ou
         }
       }
       out.depth[block] = simd::load_lanes(nearest);
-      out.uncovered[block] = simd::load_lanes(uncovered);
+      out.seen[block] = simd::load_lanes(covered_share);
       out.red[block] = out.green[block] = out.blue[block] = Float(0.0f);
       if (!is_block) continue;
       is_there = true;
@@ -249,6 +249,13 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
     pixels.red[block] = pixels.green[block] = pixels.blue[block] = Float(0.0f);
     pixels.passed[block] = Float(1.0f);
   }
+  // From here on all is behind the head, but for segments that are longer than this along the view.
+  constexpr float kLongM = 0.04f;
+  float head_end = 0.0f;
+  if (has_head)
+    for (const Float& depth : head.depth)
+      for (uint32_t lane = 0; lane < kLanes; ++lane)
+        if (depth.v[lane] < kFar) head_end = std::max(head_end, depth.v[lane] + kLongM);
   if (count > 0) {
     const uint64_t* const order = sort_segments(in, begin, count, scratch);
     const StrandPoint* const points = in.points->point.data();
@@ -266,7 +273,10 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
       place_segments(points, order + i, some, static_cast<float>(left), static_cast<float>(top), batch);
       for (uint32_t lane = 0; lane < some; ++lane)
         blend_segment(batch, lane, has_head ? &head : nullptr, pixels);
-      if (i % kPairsBetweenChecks == 0 && !close_opaque_blocks(pixels)) break;
+      if (i % kPairsBetweenChecks != 0) continue;
+      const StrandPoint* const last = points + static_cast<uint32_t>(order[i]);
+      const bool is_behind = has_head && std::min(last[0].z, last[1].z) > head_end;
+      if (!close_opaque_blocks(is_behind ? &head : nullptr, pixels)) break;
     }
   }
 
@@ -283,7 +293,7 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
         Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};
         Float drawn = 1.0f - pixels.passed[block];
         if (has_head) {
-          const Float seen = pixels.passed[block] * (1.0f - head.uncovered[block]);
+          const Float seen = head.seen[block];
           scene[0] += seen * head.red[block];
           scene[1] += seen * head.green[block];
           scene[2] += seen * head.blue[block];
