@@ -36,7 +36,7 @@ struct RenderTurn : gl::PassTurn {
   View view;
   glm::uvec2 size_px;  // of the picture; view.target_px counts the samples
   const DrawTerms& terms;
-  float strands_shown = 1.0f;  // share of them that is drawn as strands; the rest is something else's
+  float strands_shown = 1.0f;  // of the pixels: they show strands, the others what stands for them
   // Counted by the passes.
   uint64_t drawn_strands = 0;
   uint64_t drawn_segments = 0;

@@ -40,4 +40,7 @@ LAW float line_coverage(float width_px, float distance_px) {
 const vec2 kPlasticStep = vec2(0.7548776662, 0.5698402910);
 
 float coverage_threshold(vec2 pixel, float strand_offset) { return fract(dot(pixel, kPlasticStep) + strand_offset); }
+
+// Whether this pixel is one of the share of all that shows strands, where the others show what stands for them.
+bool shows_strands(vec2 pixel, float share) { return coverage_threshold(floor(pixel), 0.0) < share; }
 #endif

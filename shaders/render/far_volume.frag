@@ -1,5 +1,6 @@
 // Hair as a volume: a ray per pixel sums what strands hide on its way and where they lie; the light of the mean of them
 // that is seen stands for all.
+#include "lib/coverage.glsl"
 #include "render/strand_light.glsl"
 
 uniform sampler3D u_way;            // mean way times depth, depth
@@ -7,7 +8,7 @@ uniform sampler3D u_along;          // times depth
 uniform vec3 u_far_origin_m;        // corner of the cube, head space
 uniform float u_far_side_m;
 uniform float u_depth_per_m;        // of a texel's value
-uniform float u_share;              // of the hair that is shown like this
+uniform float u_share;              // of the pixels that show this
 uniform mat4 u_head_from_clip;
 uniform sampler2D u_scene_depth;    // 2 x 2 samples per pixel
 uniform vec2 u_pixel_step;          // 1 / pixels of the target
@@ -24,6 +25,7 @@ vec3 in_head(vec2 clip_xy, float depth) {
 
 void main() {
   out_color = vec4(0.0);
+  if (shows_strands(gl_FragCoord.xy, 1.0 - u_share)) return;
   vec2 at = gl_FragCoord.xy * u_pixel_step;
   vec2 clip_xy = 2.0 * at - 1.0;
   // The middle of a pixel is the corner between its four samples.
@@ -64,5 +66,5 @@ void main() {
   float length_t = length(tangent);
   tangent = length_t > 1e-6 ? tangent / length_t : vec3(0.0, -1.0, 0.0);
   vec3 color = fibre_light(point_m / seen, tangent, mean_fibre(clamp(along / seen, 0.0, 1.0)));
-  out_color = u_share * seen * vec4(color, 1.0);
+  out_color = seen * vec4(color, 1.0);
 }

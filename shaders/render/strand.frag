@@ -16,12 +16,13 @@ flat in uint v_strand;
 in vec3 v_color;
 #endif
 
-uniform float u_shown;   // share of the strands that is drawn as strands
+uniform float u_shown;   // share of the pixels, 2 x 2 samples each, that show strands
 
 layout(location = 0) out vec4 out_color;
 
 void main() {
-  if (u_shown * line_coverage(v_width_px, v_across_px) <= coverage_threshold(gl_FragCoord.xy, v_threshold)) discard;
+  if (u_shown < 1.0 && !shows_strands(0.5 * gl_FragCoord.xy, u_shown)) discard;
+  if (line_coverage(v_width_px, v_across_px) <= coverage_threshold(gl_FragCoord.xy, v_threshold)) discard;
 #if IS_PER_FRAGMENT == 1
   vec3 color = strand_light(v_position_m, v_tangent / max(length(v_tangent), 1e-6), v_strand, v_along);
 #else

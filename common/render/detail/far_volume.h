@@ -1,6 +1,6 @@
 // Hair from far away as a volume (vkhr; reference: 003, 6.3 asks for a fall-back): where strands are much
-// thinner than a pixel, rays through their density show what all of them together look like. In between both
-// are seen, each by its share. All calls from the context's thread.
+// thinner than a pixel, rays through their density show what all of them together look like. In between some
+// pixels show the one and some the other. All calls from the context's thread.
 #pragma once
 
 #include "common/gl/objects.h"
