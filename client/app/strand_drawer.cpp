@@ -21,8 +21,8 @@ constexpr size_t kFirstHardwareStep = 0;
 
 bool is_same(const DrawView& a, const DrawView& b) {
   return a.camera.offset_m == b.camera.offset_m && a.camera.target_m == b.camera.target_m &&
-         a.camera.fov_y_rad == b.camera.fov_y_rad && a.size.width == b.size.width &&
-         a.size.height == b.size.height;
+         a.camera.fov_y_rad == b.camera.fov_y_rad && a.debug_view == b.debug_view &&
+         a.size.width == b.size.width && a.size.height == b.size.height;
 }
 
 /// No larger than a picture may be, of the same shape.
@@ -117,6 +117,7 @@ void StrandDrawer::run() {
       else
         newest_.device = device.error();
     }
+    if (device) log_info("render", "strands are drawn by {}", (*device)->info().name);
     config_.on_news();
     if (device) draw_until_stopped(**device);
     renderer_.reset();  // while its device is there
@@ -226,8 +227,9 @@ Status StrandDrawer::draw(const Job& job, PosedStrands strands, size_t step) {
     return is_stopping_ || (!is_asked && step < plan_.moving_step() && view_number_ != job.view_number);
   };
   const int64_t begin_ns = now_ns();
-  RETURN_IF_ERROR(renderer_->draw(strands, view.camera, size_of_step(step, view.size),
-                                  {static_cast<float>(kDrawSteps[step].strand_share), is_unwanted}));
+  RETURN_IF_ERROR(
+      renderer_->draw(strands, view.camera, size_of_step(step, view.size),
+                      {static_cast<float>(kDrawSteps[step].strand_share), is_unwanted, view.debug_view}));
   if (!renderer_->profile().is_whole) return {};
   auto image = std::make_shared<const Image>(renderer_->read_image());
   const int64_t end_ns = now_ns();
@@ -243,6 +245,9 @@ Status StrandDrawer::draw(const Job& job, PosedStrands strands, size_t step) {
     const std::lock_guard lock(mutex_);
     newest_.image = std::move(image);
     newest_.step = step;
+    newest_.profile = renderer_->profile();
+    newest_.passes = renderer_->passes().report();
+    newest_.renderer_bytes = renderer_->passes().live_bytes();
     newest_.asked_whole = drawn_->asked_whole;
     newest_.fair_ms = plan_.fair_ms(end_ns);
     ++newest_.count;

@@ -24,6 +24,7 @@ namespace strandcast {
 struct DrawView {
   CameraDesc camera;
   RenderSize size;  // of the window
+  DebugView debug_view = DebugView::None;
 };
 
 /// Newest of all.
@@ -33,10 +34,13 @@ struct DrawnState {
   std::optional<Error> look_trouble;               // why the look of before is drawn, not the newest
   std::shared_ptr<const Image> image;              // null before the first
   size_t step = 0;                                 // of image
-  uint64_t count = 0;                              // of pictures
-  uint64_t asked_whole = 0;                        // the last ask_whole() that image answers
-  StageTimer draw_timer;                           // of the whole run
-  double fair_ms = 0.0;                            // DrawPlan::fair_ms
+  RenderProfile profile;                           // likewise
+  gl::PassReports passes;                          // of the renderer
+  uint64_t renderer_bytes = 0;
+  uint64_t count = 0;        // of pictures
+  uint64_t asked_whole = 0;  // the last ask_whole() that image answers
+  StageTimer draw_timer;     // of the whole run
+  double fair_ms = 0.0;      // DrawPlan::fair_ms
 };
 
 class StrandDrawer {

@@ -45,6 +45,18 @@ std::string how_drawn(size_t step) {
   return text + ", until all stands still";
 }
 
+/// Passes that run, without their folder, in ms.
+std::string passes_text(const gl::PassReports& passes) {
+  std::string text;
+  for (const gl::PassReport& pass : passes) {
+    if (pass.fate != gl::PassFate::Kept || pass.median_ms <= 0.0) continue;
+    const size_t slash = pass.name.find('/');
+    text += fmt::format("{}{} {:.1f}", text.empty() ? "" : ", ",
+                        slash == std::string::npos ? pass.name : pass.name.substr(slash + 1), pass.median_ms);
+  }
+  return text + " ms";
+}
+
 /// Whose look is seen.
 std::string look_text(const ViewerState& now, const ViewFacts& facts) {
   if (facts.has_own_look && !shows_frames(now)) return "your own, seen here alone (L)";
@@ -122,6 +134,15 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   if (!is_frames) {
     add("shows", facts.playout == Playout::Smooth ? "smooth playout" : "the newest state");
     add("drawn", fmt::format("{} ({:.0f} ms)", how_drawn(facts.draw_step), facts.draw_ms));
+    if (!facts.drawn_by.empty()) add("by", facts.drawn_by);
+    if (!facts.passes.empty()) add("passes", passes_text(facts.passes));
+    if (facts.profile.drawn_strands > 0)
+      add("renderer",
+          fmt::format("{} strands, {} segments, {:.1f} MB", facts.profile.drawn_strands,
+                      facts.profile.drawn_segments, static_cast<double>(facts.renderer_bytes) * 1e-6));
+    if (const std::string lack = left_out_text(facts.profile); !lack.empty()) add("left out", lack);
+    if (facts.debug_view != DebugView::None)
+      add("view", fmt::format("{} (V: the next)", name_of(facts.debug_view)));
     if (now.quality_changes > 0)
       add("stream of",
           fmt::format("{:.3g} % of the strands every {} steps within {:.2g} mm",

@@ -7,6 +7,7 @@
 #include "client/app/draw_plan.h"
 #include "client/app/viewer_thread.h"
 #include "client/window/hud.h"
+#include "common/render/renderer.h"
 
 namespace strandcast {
 
@@ -36,7 +37,12 @@ struct ViewFacts {
   bool has_own_look = false;  // not the scene's
   bool is_starting = false;   // OpenGL
   size_t draw_step = 0;
-  double draw_ms = 0.0;      // median
+  double draw_ms = 0.0;    // median
+  std::string drawn_by;    // empty: not known yet
+  gl::PassReports passes;  // of what draws strands
+  uint64_t renderer_bytes = 0;
+  RenderProfile profile;  // of the newest picture of strands
+  DebugView debug_view = DebugView::None;
   double answer_ms = 0.0;    // median, from waking up to the picture on the display
   uint64_t shown_count = 0;  // different pictures
 };

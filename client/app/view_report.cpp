@@ -57,7 +57,7 @@ ViewReport make_report(ViewerSession& session) {
   const uint64_t received_frames = pictures.received_frames + strands.received_frames;
   const auto received_bytes = static_cast<double>(pictures.received_bytes + strands.received_bytes);
   const StageTimer& decode = is_frames ? session.picture_decode_timer() : session.replay().decode_timer();
-  const StageTimer& motion = session.replay().motion_latency_timer();
+  const StageTimer& motion = session.motion_latency_timer();
   const double seconds = session.connected_s();
 
   Builder out;

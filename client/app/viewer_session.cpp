@@ -61,6 +61,7 @@ Status ViewerSession::handle(ClientEvent& event) {
   if (const auto* status = std::get_if<ServerStatus>(&event)) {
     status_ = *status;
     has_status_ = true;
+    picture_latency_.add_motions(status_.picture_motions, client_->clock());
     if (!status_.slow_motion.empty()) last_slow_motion_ = status_.slow_motion;
   } else if (auto* notice = std::get_if<Notice>(&event)) {
     notices_.add(std::move(*notice));
@@ -94,6 +95,7 @@ void ViewerSession::show(StreamMode mode) {
   if (!modes_->note_shown(mode)) return;
   // Each stream counts its frames by itself, and those that were not sent to us are not missing.
   last_picture_sequence_ = 0;
+  picture_latency_.restart();
   if (mode == StreamMode::Frames) replay_->forget_sequence();
 }
 
@@ -182,6 +184,7 @@ void ViewerSession::take_picture(const MediaEvent& event) {
     picture_stats_.missed_frames += header.sequence - last_picture_sequence_ - 1;
   last_picture_sequence_ = header.sequence;
   last_picture_stream_ = header.stream_id;
+  picture_latency_.add_picture(header.sim_time_ns, now_ns(), client_->clock());
   picture_decode_timer_.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
   image_ = std::make_shared<const Image>(*pictures_.image());
   if (is_blank(*image_)) ++blank_pictures_;

@@ -14,6 +14,7 @@
 #include "client/app/line_budget.h"
 #include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
+#include "client/app/picture_latency.h"
 #include "client/net/viewer_client.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
@@ -99,6 +100,10 @@ class ViewerSession {
   std::vector<Notice> take_notices() { return notices_.take(); }
   const PictureStats& picture_stats() const { return picture_stats_; }
   const StageTimer& picture_decode_timer() const { return picture_decode_timer_; }
+  /// From the arrival of a motion sample at the server to what was decoded and shows it, in this mode, ms.
+  const StageTimer& motion_latency_timer() const {
+    return mode() == StreamMode::Frames ? picture_latency_.timer() : replay_->motion_latency_timer();
+  }
   /// Frames decoded so far, strands and pictures.
   uint64_t decoded_frames() const;
   double connected_s() const;
@@ -143,6 +148,7 @@ class ViewerSession {
   LineBudget log_lines_;  // that the server's messages cause
   PictureStats picture_stats_;
   StageTimer picture_decode_timer_;
+  PictureLatency picture_latency_;
   SnapshotListener listener_;
   int64_t opened_ns_ = 0;
 };

@@ -102,7 +102,7 @@ void ViewerThread::describe(ViewerState& state) {
   state.missed_frames = session.replay().stats().missed_frames + session.picture_stats().missed_frames;
   state.strand_decode_ms = session.replay().decode_timer().median_ms();
   state.picture_decode_ms = session.picture_decode_timer().median_ms();
-  state.motion_to_decoded_ms = session.replay().motion_latency_timer().median_ms();
+  state.motion_to_decoded_ms = session.motion_latency_timer().median_ms();
   state.playout_delay_ms = session.replay().playout_delay_ms();
   state.round_trip_ms = clock.has_value() ? 2.0 * static_cast<double>(clock.error_ns()) * kMsPerNs : 0.0;
   state.state_age_ms = session.replay().state_age_ms(time_ns, clock);

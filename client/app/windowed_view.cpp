@@ -26,7 +26,8 @@ constexpr int64_t kReportNs = 1000 * kNsPerMs;
 constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
 constexpr int64_t kPanelNs = 250 * kNsPerMs;          // how often its numbers change
 constexpr int64_t kSceneWaitNs = 5000 * kNsPerMs;
-constexpr milliseconds kLongestWait{50};       // how late a stop is noticed
+constexpr milliseconds kLongestWait{50};  // how late a stop is noticed
+constexpr const char* kDebugViewPath = "debug_view";
 constexpr const char* kLookAnswer = "look={";  // the slider says it already
 
 class WindowedView {
@@ -144,6 +145,7 @@ class WindowedView {
     if (actions.wants_view_reset) orbit_.reset();
     if (moves) is_camera_sent_ = false;
     if (actions.wants_screenshot) ask_screenshot();
+    if (actions.wants_debug_view) debug_view_ = next_of(debug_view_);
     if (saving_.valid() && saving_.wait_for(milliseconds(0)) == std::future_status::ready)
       show_message(saving_.get());
     if (viewer_ == nullptr) return;
@@ -164,8 +166,13 @@ class WindowedView {
     }
   }
 
-  void act(const FormActions& done) {
+  void act(FormActions done) {
     const int64_t time_ns = now_ns();
+    std::erase_if(done.edits, [&](const FormEdit& edit) {
+      if (edit.path != kDebugViewPath) return false;
+      debug_view_ = debug_view_named(std::get<std::string>(edit.value));
+      return true;
+    });
     if (const Status status = look_.edit(done.edits, time_ns); !status)
       show_message(status.error().to_string());
     if (done.wants_undo) look_.undo();
@@ -200,8 +207,9 @@ class WindowedView {
 
   void tell_drawer() {
     const bool is_wanted = is_visible() && state_->session_number > 0 && (!is_frames() || wants_whole_);
-    drawer_.set_view(is_wanted ? std::optional(DrawView{orbit_.camera(), window_->framebuffer_size()})
-                               : std::nullopt);
+    drawer_.set_view(is_wanted
+                         ? std::optional(DrawView{orbit_.camera(), window_->framebuffer_size(), debug_view_})
+                         : std::nullopt);
   }
 
   /// Tells the server about once a second what this machine makes of the stream.
@@ -258,8 +266,24 @@ class WindowedView {
     presented_ns_ = time_ns;
     const bool has_form = window_->is_form_visible() && state_->session_number > 0;
     window_->present(image_, fit_, hud_.write(*state_, facts(time_ns), time_ns),
-                     has_form ? std::optional(look_.form(is_frames(), time_ns)) : std::nullopt);
+                     has_form ? std::optional(form(time_ns)) : std::nullopt);
     answer_timer_.add_ms(static_cast<double>(now_ns() - woke_ns) / kNsPerMs);
+  }
+
+  /// The look, and below it what this window alone shows.
+  FormState form(int64_t time_ns) const {
+    FormState form = look_.form(is_frames(), time_ns);
+    FormField view;
+    view.path = kDebugViewPath;
+    view.section = "View";
+    view.title = "shows (V)";
+    view.help = "what the drawing on the processor is made of, in this window alone";
+    view.widget = FormWidget::Choice;
+    view.value = std::string(name_of(debug_view_));
+    view.is_idle = is_frames();
+    for (const DebugView choice : kDebugViews) view.choices.emplace_back(name_of(choice));
+    form.fields.push_back(std::move(view));
+    return form;
   }
 
   ViewFacts facts(int64_t time_ns) const {
@@ -272,6 +296,11 @@ class WindowedView {
     facts.is_starting = viewer_ == nullptr;
     facts.draw_step = drawn_.step;
     facts.draw_ms = drawn_.draw_timer.median_ms();
+    if (drawn_.device && drawn_.device->ok()) facts.drawn_by = drawn_.device->value().name;
+    facts.passes = drawn_.passes;
+    facts.renderer_bytes = drawn_.renderer_bytes;
+    facts.profile = drawn_.profile;
+    facts.debug_view = debug_view_;
     facts.answer_ms = answer_timer_.median_ms();
     facts.shown_count = shown_count_;
     return facts;
@@ -321,6 +350,7 @@ class WindowedView {
   std::string own_reason_;  // why this machine needs frames; empty = the server's reason counts
   Playout playout_;
   LookControl look_;
+  DebugView debug_view_ = DebugView::None;
   std::string look_trouble_;    // as it was told
   int64_t scene_asked_ns_ = 0;  // for saving it; 0 = not asked
   HudWriter hud_;

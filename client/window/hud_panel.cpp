@@ -116,7 +116,7 @@ PanelSize draw_hud_panel(const HudState& hud, HudFold fold) {
 }
 
 PanelSize draw_help_panel() {
-  static constexpr std::array<std::pair<const char*, const char*>, 13> kHelp{{
+  static constexpr std::array<std::pair<const char*, const char*>, 14> kHelp{{
       {"left drag", "turn about the head"},
       {"middle, right drag", "move the view"},
       {"wheel", "closer, farther"},
@@ -126,6 +126,7 @@ PanelSize draw_help_panel() {
       {"P", "newest state or smooth playout"},
       {"M", "auto, strands drawn here, or the server's pictures"},
       {"L", "look of the hair: colours, style, light; save it as a scene"},
+      {"V", "hair, or what its drawing is made of: tangents, density, shadow, layers, tiles"},
       {"S", "save a picture"},
       {"U", "details, nothing, or one line in the corner"},
       {"H, F1", "this help"},

@@ -93,6 +93,9 @@ struct Window::State {
       case GLFW_KEY_P:
         actions.wants_playout_toggle = true;
         break;
+      case GLFW_KEY_V:
+        actions.wants_debug_view = true;
+        break;
       case GLFW_KEY_U:
         fold = next_fold(fold);
         break;

@@ -27,6 +27,7 @@ struct WindowActions {
   bool wants_screenshot = false;      // S
   bool wants_mode_toggle = false;     // M: strands, frames or auto
   bool wants_playout_toggle = false;  // P: low latency or smooth
+  bool wants_debug_view = false;      // V: the next one
   glm::vec2 orbit_heights{0.0f};      // left drag, in window heights
   glm::vec2 pan_heights{0.0f};        // middle or right drag
   float zoom_steps = 0.0f;            // wheel

@@ -36,6 +36,15 @@ PictureCodecs encodable_picture_codecs();
 /// "jpeg", "tiles", "vp8" or "h264".
 const char* to_string(PictureCodec codec);
 
+/// A state that was drawn, the first with a motion sample.
+struct PictureMotion {
+  int64_t sim_time_ns = 0;
+  int64_t motion_time_ns = 0;  // server clock at the sample's arrival
+  bool operator==(const PictureMotion&) const = default;
+};
+/// That are told at once.
+inline constexpr uint32_t kMaxPictureMotions = 64;
+
 class Picture {
  public:
   virtual ~Picture() = default;

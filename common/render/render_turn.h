@@ -7,6 +7,7 @@
 
 #include "common/gl/pass_list.h"
 #include "common/gl/program.h"
+#include "common/render/debug_view.h"
 #include "common/render/view.h"
 #include "common/strands/posed_strands.h"
 #include "common/strands/scene_asset.h"
@@ -25,6 +26,8 @@ struct DrawTerms {
   /// Asked between batches of strands, which are small then: true leaves the picture unfinished. Empty:
   /// never.
   std::function<bool()> is_unwanted;
+  /// Instead of hair; renderers that have none draw hair.
+  DebugView debug_view = DebugView::None;
 };
 
 struct RenderTurn : gl::PassTurn {
@@ -42,6 +45,8 @@ struct RenderTurn : gl::PassTurn {
   uint64_t drawn_segments = 0;
   bool is_whole = true;
   uint64_t left_out_fragments = 0;
+  uint64_t left_out_strands = 0;
+  uint64_t unusable_segments = 0;
 };
 
 using RenderPass = gl::Pass<RenderTurn>;

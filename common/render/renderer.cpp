@@ -118,6 +118,17 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
 
 }  // namespace
 
+std::string left_out_text(const RenderProfile& profile) {
+  std::string text;
+  const auto add = [&](uint64_t count, const char* what) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, what);
+  };
+  add(profile.left_out_strands, "strands for lack of memory");
+  add(profile.left_out_fragments, "pieces of strands for lack of the method's memory");
+  add(profile.unusable_segments, "segments without usable positions");
+  return text;
+}
+
 Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize size,
                   const DrawTerms& terms) {
   if (strands.position_m.size() != position_count)

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include "common/base/picture_size.h"
@@ -27,7 +28,14 @@ struct RenderProfile {
   uint64_t drawn_segments = 0;
   bool is_whole = true;             // nobody gave it up half-way
   uint64_t left_out_fragments = 0;  // pieces of strands for which a method's memory was too small
+  uint64_t left_out_strands = 0;    // for which there was no room, evenly
+  uint64_t unusable_segments = 0;   // with a position that is no number
+
+  bool operator==(const RenderProfile&) const = default;
 };
+
+/// What a picture lacks, in words for people; empty when it has everything.
+std::string left_out_text(const RenderProfile& profile);
 
 class Renderer {
  public:

@@ -210,6 +210,10 @@ void visit(Visitor& v, ServerStatus& m) {
   v.value("quarantined_strands", m.quarantined_strands);
   v.value("overstretched_strands", m.overstretched_strands);
   v.text("slow_motion", m.slow_motion, kMaxTextChars);
+  v.repeated("picture_motions", m.picture_motions, kMaxPictureMotions, [&](PictureMotion& motion) {
+    v.value("sim_time_ns", motion.sim_time_ns);
+    v.value("motion_time_ns", motion.motion_time_ns);
+  });
 }
 
 template <>

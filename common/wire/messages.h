@@ -166,6 +166,8 @@ struct ServerStatus {  // about twice a second to every viewer
   uint64_t quarantined_strands = 0;    // without usable numbers
   uint64_t overstretched_strands = 0;  // stretched too far
   std::string slow_motion = {};        // for a person: how slow, and the cheapest ways out; empty = real time
+  // Who gets pictures: of those drawn since the last status, at most kMaxPictureMotions, oldest first.
+  std::vector<PictureMotion> picture_motions = {};
   bool operator==(const ServerStatus&) const = default;
 };
 struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on

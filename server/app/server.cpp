@@ -179,6 +179,7 @@ void Server::State::run_status() {
     status.quarantined_strands = now.sim.quarantined;
     status.overstretched_strands = now.sim.overstretched;
     status.slow_motion = slow_motion_;
+    status.picture_motions = hub_->take_picture_motions();
     net_->broadcast(status);
     lock.lock();
   }

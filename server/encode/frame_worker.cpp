@@ -123,6 +123,12 @@ FrameCounters FrameWorker::counters() const {
   return counters;
 }
 
+std::vector<PictureMotion> FrameWorker::take_motions() {
+  const std::lock_guard lock(mutex_);
+  const auto taken = std::exchange(motions_, {});
+  return {taken.begin(), taken.end()};
+}
+
 gl::PassReports FrameWorker::passes() const {
   const std::lock_guard lock(mutex_);
   if (painted_.empty()) return {};
@@ -364,6 +370,7 @@ void FrameWorker::paint_alike(const PictureView& view) {
   }
   if (!classes.empty())
     request_state(begin_ns + static_cast<int64_t>(drawn_[classes.front()].cost_ms / kMsPerNs));
+  note_motion();
   const bool had_painter = painter_ != nullptr;
   const Result<Image> image = paint(view);
   {
@@ -372,6 +379,7 @@ void FrameWorker::paint_alike(const PictureView& view) {
     paint_timer_.add_ms(ms_since(begin_ns));
     if (painter_ != nullptr) painted_ = painter_->passes();
   }
+  if (image) note_left_out();
   for (const uint32_t picture_class : classes) {
     if (image) {
       if (const Status encoded = encode(picture_class, *image); !encoded)
@@ -393,6 +401,28 @@ Result<Image> FrameWorker::paint(const PictureView& view) {
   }
   follow_look();
   return painter_->paint(snapshot_, view);
+}
+
+/// Told once: a scene that is too large is so in every picture.
+void FrameWorker::note_left_out() {
+  const RenderProfile profile = painter_->profile();
+  {
+    const std::lock_guard lock(mutex_);
+    counters_.left_out_strands = profile.left_out_strands;
+    counters_.unusable_segments = profile.unusable_segments;
+  }
+  const std::string text = left_out_text(profile);
+  if (text.empty() || std::exchange(was_left_out_, true)) return;
+  log_warn("render", "pictures lack {} ({} strands are drawn)", text, profile.drawn_strands);
+}
+
+/// The same sample in later states is not late, it is held.
+void FrameWorker::note_motion() {
+  if (snapshot_->motion_time_ns == std::exchange(motion_time_ns_, snapshot_->motion_time_ns)) return;
+  if (motion_time_ns_ == 0) return;
+  const std::lock_guard lock(mutex_);
+  motions_.push_back({snapshot_->sim_time_ns, motion_time_ns_});
+  if (motions_.size() > kMaxPictureMotions) motions_.pop_front();
 }
 
 /// Where the look that is wanted cannot be drawn, pictures go on with the one before.

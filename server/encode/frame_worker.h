@@ -18,6 +18,7 @@
 
 #include "common/base/profile.h"
 #include "common/base/result.h"
+#include "common/pictures/picture.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
@@ -30,15 +31,17 @@ namespace strandcast {
 
 /// Totals since start; medians cover the last kStageWindow frames.
 struct FrameCounters {
-  uint64_t frames = 0;           // encoded
-  uint64_t bytes = 0;            // of those, header and payload
-  uint64_t paints = 0;           // drawings
-  uint64_t unchanged = 0;        // not sent: nothing to be seen had changed
-  uint64_t stills = 0;           // encoded once more, finely, after standing still
-  uint64_t wholes = 0;           // given again, whole, because a viewer asked
-  uint64_t decoded = 0;          // strand frames
-  uint64_t chain_losses = 0;     // times the decoder had to wait for a keyframe
-  double paint_median_ms = 0.0;  // draw and read back
+  uint64_t frames = 0;             // encoded
+  uint64_t bytes = 0;              // of those, header and payload
+  uint64_t paints = 0;             // drawings
+  uint64_t unchanged = 0;          // not sent: nothing to be seen had changed
+  uint64_t stills = 0;             // encoded once more, finely, after standing still
+  uint64_t wholes = 0;             // given again, whole, because a viewer asked
+  uint64_t decoded = 0;            // strand frames
+  uint64_t chain_losses = 0;       // times the decoder had to wait for a keyframe
+  uint64_t left_out_strands = 0;   // of the newest drawing, for lack of memory
+  uint64_t unusable_segments = 0;  // likewise, with a position that is no number
+  double paint_median_ms = 0.0;    // draw and read back
   double encode_median_ms = 0.0;
 };
 
@@ -95,6 +98,9 @@ class FrameWorker {
   /// Why no frames can be had; nothing while all is well.
   std::optional<Error> failure() const;
   FrameCounters counters() const;
+  /// Of the states that were drawn since the last call those that hold a newer motion sample than the one
+  /// before, the newest kMaxPictureMotions.
+  std::vector<PictureMotion> take_motions();
   /// What the thread runs and how long it takes; empty while there is nothing to draw.
   gl::PassReports passes() const;
 
@@ -149,6 +155,8 @@ class FrameWorker {
   void paint_alike(const PictureView& view);
   Result<Image> paint(const PictureView& view);
   void follow_look();
+  void note_motion();
+  void note_left_out();
   Status encode(uint32_t picture_class, const Image& image);
   Status resend(const Due& due);
   PictureStamp stamp(uint32_t picture_class) const;
@@ -176,6 +184,7 @@ class FrameWorker {
   StageTimer paint_timer_;
   StageTimer encode_timer_;
   PictureTimers timers_;
+  std::deque<PictureMotion> motions_;
   gl::PassReports painted_;  // by the painter, with its times; empty without one
 
   // Of the worker's thread.
@@ -185,7 +194,9 @@ class FrameWorker {
   std::optional<LookDesc> wanted_look_;  // not yet tried
   std::shared_ptr<const Snapshot> snapshot_;
   uint64_t decode_count_ = 0;
-  bool is_chain_lost_ = true;  // until a keyframe comes
+  int64_t motion_time_ns_ = 0;  // of the newest drawing
+  bool was_left_out_ = false;   // of a drawing, and told
+  bool is_chain_lost_ = true;   // until a keyframe comes
   std::map<uint32_t, Drawn> drawn_;
   double ms_per_pixel_ = 0.0;     // of the newest drawing: the guess for views that were never drawn
   int64_t blocking_rest_ns_ = 0;  // until then no blocking view is drawn

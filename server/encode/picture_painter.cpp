@@ -30,6 +30,8 @@ class DevicePicturePainter : public PicturePainter {
 
   Status set_look(const LookDesc& look) override { return renderer_->set_look(look); }
 
+  RenderProfile profile() const override { return renderer_->profile(); }
+
   gl::PassReports passes() const override {
     gl::PassReports passes = renderer_->passes().report();
     passes.push_back(read_back_report(read_timer_));

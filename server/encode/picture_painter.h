@@ -26,6 +26,8 @@ class PicturePainter {
   virtual Result<Image> paint(const std::shared_ptr<const Snapshot>& snapshot, const PictureView& view) = 0;
   /// From the next picture on. On an error the look of before stays, and painting goes on.
   virtual Status set_look(const LookDesc&) { return {}; }
+  /// Of the newest picture.
+  virtual RenderProfile profile() const { return {}; }
   /// What it runs to paint.
   virtual gl::PassReports passes() const { return {}; }
 };

@@ -103,6 +103,7 @@ void Session::send(ServerMessage message) {
   if (state_ != State::Joined) return;
   if (auto* status = std::get_if<ServerStatus>(&message)) {
     status->dropped_frames = queue_.dropped_frames();
+    if (subscription_.mode() != StreamMode::Frames) status->picture_motions.clear();
     status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   }
   guarded([&] { queue_control(std::move(message)); });

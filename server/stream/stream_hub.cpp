@@ -278,6 +278,11 @@ FrameCounters StreamHub::frame_counters() const {
   return frames_ != nullptr ? frames_->counters() : FrameCounters{};
 }
 
+std::vector<PictureMotion> StreamHub::take_picture_motions() {
+  const std::lock_guard lock(mutex_);
+  return frames_ != nullptr ? frames_->take_motions() : std::vector<PictureMotion>();
+}
+
 std::vector<StrandEncodeCounters> StreamHub::encode_counters() const {
   const std::lock_guard lock(mutex_);
   std::vector<StrandEncodeCounters> counters;

@@ -72,6 +72,8 @@ class StreamHub : public StateSink, public DemandDesk {
   uint32_t strand_readers(uint16_t stream_id) const;
   SourceDemand total() const;
   FrameCounters frame_counters() const;
+  /// As FrameWorker::take_motions().
+  std::vector<PictureMotion> take_picture_motions();
   /// Of all classes that were ever needed, by stream_id.
   std::vector<StrandEncodeCounters> encode_counters() const;
   /// What the encoders run, and the frame thread; nothing of it while there is nothing to draw.

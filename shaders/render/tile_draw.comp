@@ -161,6 +161,18 @@ void blend(Segment s, float x, inout Pixels p) {
   p.passed -= share;
 }
 
+// Depth of the farthest head in four pixels, 0 where there is none.
+float head_depth(Pixels p) {
+  vec4 depth = mix(p.depth, vec4(0.0), greaterThan(p.depth, vec4(0.5 * kFar)));
+  return max(max(depth.x, depth.y), max(depth.z, depth.w));
+}
+
+// The most that is still seen of four pixels, of what lies behind the head (1) or anywhere (0).
+float most_open(Pixels p, float behind) {
+  vec4 open = p.passed - behind * p.seen;
+  return max(max(open.x, open.y), max(open.z, open.w));
+}
+
 void write_pixels(Pixels p, ivec2 top) {
   for (int i = 0; i < 4; ++i) {
     ivec2 pixel = top + ivec2(0, i);
@@ -188,14 +200,19 @@ void main() {
   int begin = int(texelFetch(u_first, tile).r);
   int end = min(int(texelFetch(u_first, tile + 1).r), begin + int(kMaxTileSegments));
   float x = float(top.x) + 0.5;
+  // From here on all is behind the head, but for segments that are longer than this along the view.
+  const float kLongM = 0.04;
+  float head_end = max(max(head_depth(first), head_depth(second)), max(head_depth(third), head_depth(fourth))) + kLongM;
   for (int i = begin; i < end; ++i) {
     Segment s = segment_at(int(texelFetch(u_order, i).g));
     blend(s, x, first);
     blend(s, x, second);
     blend(s, x, third);
     blend(s, x, fourth);
-    vec4 most = max(max(first.passed, second.passed), max(third.passed, fourth.passed));
-    if (max(max(most.x, most.y), max(most.z, most.w)) < kOpaque) break;
+    float behind = min(s.a.place.z, s.b.place.z) > head_end ? 1.0 : 0.0;
+    float most = max(max(most_open(first, behind), most_open(second, behind)),
+                     max(most_open(third, behind), most_open(fourth, behind)));
+    if (most < kOpaque) break;
   }
   write_pixels(first, top);
   write_pixels(second, top + ivec2(0, 4));

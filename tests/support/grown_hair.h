@@ -1,4 +1,4 @@
-// Hair that is grown on a head of spheres and ellipsoids, for tests of renderers.
+// Hair on a ball, and pictures of it drawn in tiles.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -6,21 +6,43 @@
 #include "common/groom/groom_asset.h"
 #include "common/groom/mesh.h"
 #include "common/groom/procedural.h"
-#include "common/strands/scene_asset.h"
+#include "common/render/tiles/tile_renderer.h"
 
 namespace strandcast {
 
-/// Key strands of 12 vertices and 0.2 m on a head of 0.095 m.
-inline SceneAsset grown_hair(uint32_t strands = 300) {
-  constexpr float kHeadRadiusM = 0.095f;
+inline constexpr float kHeadRadiusM = 0.095f;
+
+inline SceneAsset grown_hair(uint32_t strands = 300, uint32_t vertices = 12) {
   ProceduralGroomOptions options;
   options.strand_count = strands;
-  options.vertex_count = 12;
+  options.vertex_count = vertices;
   options.length_m = 0.2f;
   auto groom = grow_groom(make_scalp_cap(glm::vec3(0.0f), kHeadRadiusM, 1000), options);
-
   EXPECT_TRUE(groom);
   return make_scene_asset(*groom, make_head(kHeadRadiusM));
+}
+
+/// The head of an asset without its hair.
+inline SceneAsset bald(SceneAsset asset) {
+  asset.strand_count = asset.vertex_count = 0;
+  asset.rest_position_m.clear();
+  asset.triangle.clear();
+  return asset;
+}
+
+inline Image drawn(const SceneAsset& asset, const LookDesc& look,
+                   const TileOptions& options = {1, simd::widest_set()}, RenderSize size = {160, 120},
+                   const CameraDesc& camera = {}, DebugView debug_view = DebugView::None) {
+  auto renderer = make_tile_renderer(asset, look, options);
+  if (!renderer) {
+    ADD_FAILURE() << renderer.error().to_string();
+    return {};
+  }
+  PosedStrands strands{{}, asset.rest_position_m};
+  strands.world_from_head.rotation = glm::angleAxis(0.3, glm::dvec3(0.0, 1.0, 0.0));
+  const Status status = (*renderer)->draw(strands, camera, size, {1.0f, {}, debug_view});
+  EXPECT_TRUE(status) << status.error().to_string();
+  return (*renderer)->read_image();
 }
 
 }  // namespace strandcast

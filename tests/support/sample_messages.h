@@ -64,6 +64,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.quarantined_strands = 23;
   status.overstretched_strands = 29;
   status.queue_delay_ms = 31.5;
+  status.picture_motions = {{2'000'000'000, -5}, {INT64_MAX, INT64_MIN}};
   status.slow_motion = "half of real time; substeps=1 takes a third of the work away";
   return {
       welcome,

@@ -21,21 +21,6 @@
 namespace strandcast {
 namespace {
 
-Image drawn(const SceneAsset& asset, const LookDesc& look,
-            const TileOptions& options = {1, simd::widest_set()}, RenderSize size = {160, 120},
-            const CameraDesc& camera = {}) {
-  auto renderer = make_tile_renderer(asset, look, options);
-  if (!renderer) {
-    ADD_FAILURE() << renderer.error().to_string();
-    return {};
-  }
-  PosedStrands strands{{}, asset.rest_position_m};
-  strands.world_from_head.rotation = glm::angleAxis(0.3, glm::dvec3(0.0, 1.0, 0.0));
-  const Status status = (*renderer)->draw(strands, camera, size);
-  EXPECT_TRUE(status) << status.error().to_string();
-  return (*renderer)->read_image();
-}
-
 TEST(TileRenderer, ThreadsAndInstructionSetsDoNotShow) {
   const SceneAsset asset = grown_hair();
   // A look where no field has its default.
@@ -80,11 +65,7 @@ TEST(TileRenderer, TheDefaultBoundHardlyShows) {
     };
     coarse[i] += bound_m * glm::normalize(glm::vec3(part(0), part(1), part(2)));
   }
-  SceneAsset bald = asset;
-  bald.strand_count = bald.vertex_count = 0;
-  bald.rest_position_m.clear();
-  bald.triangle.clear();
-  auto without = make_tile_renderer(bald, {});
+  auto without = make_tile_renderer(bald(asset), {});
   ASSERT_TRUE(without && (*without)->draw({{}, {}}, {}, size));
   const auto error = picture_error(picture(coarse), exact, mask_of(exact, (*without)->read_image()));
   ASSERT_TRUE(error);

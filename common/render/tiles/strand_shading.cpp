@@ -80,6 +80,7 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
     extend(dx);
     extend(dy);
     extend(widths);
+    const bool counts = in.debug_view == DebugView::Overdraw;
     for (uint32_t k = 0; k < count; k += kLanes) {
       const uint32_t at = kFirst + k;
       const Float along = min((lane_numbers() + Float(static_cast<float>(k))) * along_step, 1.0f);
@@ -107,8 +108,12 @@ STRANDCAST_LANES void shade_strand_points_lanes(const ShadeArguments& a) {
         const vec3 to_eye = unit_or(eye - position, vec3(0.0f, 0.0f, 1.0f));
         const LightDepth depth = light_depth_at(in.lattice, position);
         light = hair_radiance(look, hair, lights, depth, along, tangent, to_eye);
+        if (in.debug_view == DebugView::Tangents) light = 0.5f * tangent + vec3(0.5f);
+        if (in.debug_view == DebugView::Shadow) light = vec3(kDebugWhite * exp(-depth.key));
+        if (counts) light = vec3(kDebugWhite);
       }
-      const Float opacity = strand_cover(along, along_step, in.tip_fade);
+      const Float opacity =
+          counts ? Float(1.0f / kOverdrawLayers) : strand_cover(along, along_step, in.tip_fade);
       const UintBits width_bits = half_bits(width);
       const UintBits opacity_bits = half_bits(opacity);
       const UintBits red = half_bits(light.x);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "common/base/worker_pool.h"
+#include "common/render/debug_view.h"
 #include "common/render/light_lattice.h"
 #include "common/render/look_lights.h"
 #include "common/render/tiles/tile_frame.h"
@@ -20,6 +21,7 @@ struct ShadeInput {
   float width_m;  // of a strand at its root
   float tip_scale;
   float tip_fade;
+  DebugView debug_view = DebugView::None;
 };
 
 /// Points in head space become points on the screen, in place.

@@ -86,11 +86,15 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
   const auto in_parts = [&](uint32_t drawn, auto work) {
     workers.for_ranges(parts, 1, [&](size_t begin_part, size_t) {
       const auto part = static_cast<uint32_t>(begin_part);
-      const auto begin = static_cast<uint32_t>(uint64_t{drawn} * part / parts);
-      const auto end = static_cast<uint32_t>(uint64_t{drawn} * (part + 1) / parts);
-      for (uint32_t strand = begin; strand < end; ++strand)
+      const auto begin = static_cast<uint32_t>(uint64_t{strands} * part / parts);
+      const auto end = static_cast<uint32_t>(uint64_t{strands} * (part + 1) / parts);
+      for (uint32_t strand = begin; strand < end; ++strand) {
+        // Of those that do not all fit every so many-th is left out.
+        if (drawn < strands && (uint64_t{strand} + 1) * drawn / strands == uint64_t{strand} * drawn / strands)
+          continue;
         for (uint32_t i = points.first_point[strand]; i + 1 < points.first_point[strand + 1]; ++i)
           work(part, i);
+      }
     });
   };
   uint32_t drawn = strands;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "common/render/light_lattice.h"
 #include "common/render/render_scene.h"
 #include "common/render/scalp_cover.h"
+#include "common/render/tiles/debug_picture.h"
 #include "common/render/tiles/strand_expansion.h"
 #include "common/render/tiles/strand_shading.h"
 #include "common/render/tiles/tile_bins.h"
@@ -98,6 +100,10 @@ class TilePass final : public RenderPass {
 Status expand(TileState& state, RenderTurn& turn) {
   if (state.expansion.key_count() == 0) return {};
   state.detail = choose_detail(state.detail_facts, state.look, turn.view, turn.terms);
+  DetailFacts roomy = state.detail_facts;
+  roomy.max_points = std::numeric_limits<uint64_t>::max() / 2;
+  const uint32_t wanted = choose_detail(roomy, state.look, turn.view, turn.terms).strand_count;
+  turn.left_out_strands = wanted - std::min(wanted, state.detail.strand_count);
   state.expansion.expand(turn.strands.position_m, state.detail, state.workers, state.set, state.points);
   turn.drawn_strands = state.detail.strand_count;
   return {};
@@ -121,6 +127,7 @@ Status shade(TileState& state, RenderTurn& turn) {
   state.shade.look = shading_numbers(state.look);
   state.shade.lattice = state.lattice.view();
   state.shade.view = turn.view;
+  state.shade.debug_view = turn.terms.debug_view;
   shade_points(state.shade, state.workers, state.set, state.points);
   return {};
 }
@@ -129,6 +136,8 @@ Status bin(TileState& state, RenderTurn& turn) {
   const TileGrid grid{turn.size_px};
   state.counts = state.bins.bin_segments(state.points, grid, turn.view.near_m, state.workers);
   turn.drawn_segments = state.counts.segments;
+  turn.left_out_strands += state.counts.left_out;
+  turn.unusable_segments = state.counts.not_finite;
   if (state.head.mesh != nullptr) {
     state.head.shadow_lift_m = kShadowLift * state.lattice.view().soft_m;
     place_head(turn.view, state.workers, state.head);
@@ -142,8 +151,18 @@ Status draw_tiles(TileState& state, RenderTurn& turn) {
   image.width = turn.size_px.x;
   image.height = turn.size_px.y;
   image.rgba.resize(size_t{image.width} * image.height * 4);
-  const TileInput input{&state.points,  &state.bins,           &state.head,       &state.shade,
-                        {turn.size_px}, state.look.background, state.srgb.data(), image.rgba.data()};
+  const DebugView debug_view = turn.terms.debug_view;
+  if (debug_view == DebugView::Density) {
+    draw_density(state.lattice.view(), turn.view, state.workers, image);
+    return {};
+  }
+  // Layers are counted over nothing.
+  const bool is_bare = debug_view == DebugView::Overdraw;
+  const HeadPicture no_head;
+  const TileInput input{
+      &state.points,     &state.bins,      is_bare ? &no_head : &state.head,
+      &state.shade,      {turn.size_px},   is_bare ? glm::vec3(0.0f) : state.look.background,
+      state.srgb.data(), image.rgba.data()};
   std::atomic<uint32_t> next{0};
   const uint32_t tiles = input.grid.count();
   std::atomic<bool> is_given_up{false};
@@ -155,6 +174,7 @@ Status draw_tiles(TileState& state, RenderTurn& turn) {
     }
   });
   if (is_given_up) turn.is_whole = false;
+  if (debug_view == DebugView::Tiles) mark_tiles(state.bins.segments(), input.grid, image);
   return {};
 }
 
@@ -188,6 +208,8 @@ class TileRenderer final : public Renderer {
     RenderTurn turn(strands, view, pixels, terms);
     RETURN_IF_ERROR(passes_.run(turn, nullptr));
     profile_ = {passes_.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
+    profile_.left_out_strands = turn.left_out_strands;
+    profile_.unusable_segments = turn.unusable_segments;
     return {};
   }
   Status set_look(const LookDesc& look) override {
