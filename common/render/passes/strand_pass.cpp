@@ -118,20 +118,12 @@ void set_shading(const RenderScene& scene, const gl::Program& program) {
   }
 }
 
-class StrandPass final : public RenderPass {
+class StrandPass final : public StrandDrawPass {
  public:
   StrandPass(RenderScene& scene, ExpandedStrands& expanded)
-      : Pass(strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene})),
-        scene_(scene),
-        expanded_(expanded) {}
-
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, StrandDraw::kShadedFragment));
-    return {};
-  }
+      : StrandDrawPass(scene, expanded,
+                       strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene}),
+                       StrandDraw::kShadedFragment) {}
 
   Status run(RenderTurn& turn) override {
     scene_.scene.begin();
@@ -140,11 +132,15 @@ class StrandPass final : public RenderPass {
     strands_.draw(scene_, expanded_);
     return {};
   }
+};
 
- private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
-  StrandDraw strands_;
+class ReadyPass final : public RenderPass {
+ public:
+  explicit ReadyPass(gl::PassDeclaration declaration) : Pass(std::move(declaration)) {}
+  Status run(RenderTurn&) override {
+    glTextureBarrier();
+    return {};
+  }
 };
 
 }  // namespace
@@ -237,6 +233,17 @@ gl::PassDeclaration strand_pass(const RenderScene& scene, std::string name, gl::
                                 gl::Resources writes) {
   return {std::move(name), with_tables(scene, std::move(reads)), std::move(writes),
           scene.features.has_strands.value, scene.features.has_strands.reason};
+}
+
+Status StrandDrawPass::prepare(const RenderSetup& setup) {
+  ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, fragment_stage_));
+  return {};
+}
+
+std::unique_ptr<RenderPass> make_ready_pass(const RenderScene& scene, std::string name, gl::Resources reads,
+                                            gl::Resources writes) {
+  return std::make_unique<ReadyPass>(
+      strand_pass(scene, std::move(name), std::move(reads), std::move(writes)));
 }
 
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "common/base/result.h"
 #include "common/gl/objects.h"
@@ -59,6 +60,31 @@ void set_strand_light(const RenderScene& scene, const gl::Program& program, cons
 gl::PassDeclaration strand_pass(const RenderScene& scene, std::string name, gl::Resources reads,
                                 gl::Resources writes);
 
+/// Draws the strands of each batch with a fragment stage of its own, as the camera sees them.
+class StrandDrawPass : public RenderPass {
+ public:
+  StrandDrawPass(RenderScene& scene, ExpandedStrands& expanded, gl::PassDeclaration declaration,
+                 std::string fragment_stage)
+      : Pass(std::move(declaration)),
+        scene_(scene),
+        expanded_(expanded),
+        fragment_stage_(std::move(fragment_stage)) {}
+  bool is_batched() const override { return true; }
+  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
+  Status prepare(const RenderSetup& setup) override;
+
+ protected:
+  RenderScene& scene_;
+  ExpandedStrands& expanded_;
+  StrandDraw strands_;
+
+ private:
+  std::string fragment_stage_;
+};
+
+/// Between two walks: what the first one drew is read in the second.
+std::unique_ptr<RenderPass> make_ready_pass(const RenderScene& scene, std::string name, gl::Resources reads,
+                                            gl::Resources writes);
 std::unique_ptr<RenderPass> make_strand_pass(RenderScene& scene, ExpandedStrands& expanded);
 
 }  // namespace strandcast

@@ -64,20 +64,13 @@ class DeepOpacityMap final : public LightMap {
   gl::Framebuffer to_layers_;
 };
 
-class FirstDepthPass final : public RenderPass {
+class FirstDepthPass final : public LightDrawPass {
  public:
   FirstDepthPass(RenderScene& scene, ExpandedStrands& expanded, DeepOpacityMap& map)
-      : Pass(strand_pass(scene, "render/first_depth", {&expanded}, {&map})),
-        scene_(scene),
-        expanded_(expanded),
+      : LightDrawPass(scene, expanded, strand_pass(scene, "render/first_depth", {&expanded}, {&map}),
+                      "render/first_depth.frag"),
         map_(map) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(draw_, LightDraw::make(setup, scene_, "render/first_depth.frag"));
-    return {};
-  }
   Status run(RenderTurn&) override {
     map_.begin_first_depth();
     draw_.draw(scene_, map_, expanded_);
@@ -85,37 +78,17 @@ class FirstDepthPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   DeepOpacityMap& map_;
-  LightDraw draw_;
 };
 
-/// Between the two walks.
-class FirstDepthReadyPass final : public RenderPass {
- public:
-  FirstDepthReadyPass(RenderScene& scene, DeepOpacityMap& map)
-      : Pass(strand_pass(scene, "render/first_depth_ready", {&map}, {&map})) {}
-  Status run(RenderTurn&) override {
-    glTextureBarrier();
-    return {};
-  }
-};
-
-class OpacityLayersPass final : public RenderPass {
+class OpacityLayersPass final : public LightDrawPass {
  public:
   OpacityLayersPass(RenderScene& scene, ExpandedStrands& expanded, DeepOpacityMap& map)
-      : Pass(strand_pass(scene, "render/opacity_layers", {&expanded, &map}, {&map, &scene.light})),
-        scene_(scene),
-        expanded_(expanded),
+      : LightDrawPass(scene, expanded,
+                      strand_pass(scene, "render/opacity_layers", {&expanded, &map}, {&map, &scene.light}),
+                      "render/opacity_layers.frag"),
         map_(map) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(draw_, LightDraw::make(setup, scene_, "render/opacity_layers.frag"));
-    return {};
-  }
   Status run(RenderTurn&) override {
     map_.begin_layers(draw_.program());
     draw_.draw(scene_, map_, expanded_);
@@ -124,10 +97,7 @@ class OpacityLayersPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   DeepOpacityMap& map_;
-  LightDraw draw_;
 };
 
 }  // namespace
@@ -138,7 +108,7 @@ void add_deep_opacity(RenderScene& scene, ExpandWalks& walks, RenderPassList& pa
   passes.add(make_light_frame_pass(scene, map));
   passes.add(walks.add("for_first_depth"));
   passes.add(std::make_unique<FirstDepthPass>(scene, walks.expanded(), map));
-  passes.add(std::make_unique<FirstDepthReadyPass>(scene, map));
+  passes.add(make_ready_pass(scene, "render/first_depth_ready", {&map}, {&map}));
   passes.add(walks.add("for_opacity"));
   passes.add(std::make_unique<OpacityLayersPass>(scene, walks.expanded(), map));
 }

@@ -70,4 +70,9 @@ void LightDraw::draw(const RenderScene& scene, const LightMap& map, const Expand
   strands_.draw(scene, expanded);
 }
 
+Status LightDrawPass::prepare(const RenderSetup& setup) {
+  ASSIGN_OR_RETURN(draw_, LightDraw::make(setup, scene_, fragment_stage_, variant_));
+  return {};
+}
+
 }  // namespace strandcast

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "common/render/passes/strand_pass.h"
 #include "common/render/shadow/light_frame.h"
@@ -50,6 +51,30 @@ class LightDraw {
 
  private:
   StrandDraw strands_;
+};
+
+/// Draws the strands of each batch as the light sees them.
+class LightDrawPass : public RenderPass {
+ public:
+  LightDrawPass(RenderScene& scene, ExpandedStrands& expanded, gl::PassDeclaration declaration,
+                std::string fragment_stage, gl::Variant variant = {})
+      : Pass(std::move(declaration)),
+        scene_(scene),
+        expanded_(expanded),
+        fragment_stage_(std::move(fragment_stage)),
+        variant_(std::move(variant)) {}
+  bool is_batched() const override { return true; }
+  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
+  Status prepare(const RenderSetup& setup) override;
+
+ protected:
+  RenderScene& scene_;
+  ExpandedStrands& expanded_;
+  LightDraw draw_;
+
+ private:
+  std::string fragment_stage_;
+  gl::Variant variant_;
 };
 
 }  // namespace strandcast

@@ -84,21 +84,14 @@ class SliceMap : public LightMap {
 };
 static_assert(kSliceTargets + 1 <= kShadowUnits);
 
-class SlicesPass final : public RenderPass {
+class SlicesPass final : public LightDrawPass {
  public:
   SlicesPass(RenderScene& scene, ExpandedStrands& expanded, SliceMap& map)
-      : Pass(strand_pass(scene, "render/opacity_slices", {&expanded}, {&map, &scene.light})),
-        scene_(scene),
-        expanded_(expanded),
+      : LightDrawPass(scene, expanded,
+                      strand_pass(scene, "render/opacity_slices", {&expanded}, {&map, &scene.light}),
+                      "render/opacity_slices.frag", {{"IS_HYBRID", map.has_first_depth() ? 1 : 0}}),
         map_(map) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(draw_, LightDraw::make(setup, scene_, "render/opacity_slices.frag",
-                                            {{"IS_HYBRID", map_.has_first_depth() ? 1 : 0}}));
-    return {};
-  }
   Status run(RenderTurn&) override {
     map_.begin_drawing(draw_.program());
     draw_.draw(scene_, map_, expanded_);
@@ -108,10 +101,7 @@ class SlicesPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   SliceMap& map_;
-  LightDraw draw_;
 };
 
 void add_slices(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes,

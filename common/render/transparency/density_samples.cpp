@@ -94,20 +94,14 @@ class SampleChoicePass final : public RenderPass {
   gl::Program program_;
 };
 
-class DensitySamplesPass final : public RenderPass {
+class DensitySamplesPass final : public StrandDrawPass {
  public:
   DensitySamplesPass(RenderScene& scene, ExpandedStrands& expanded, OneSampleTarget& deep)
-      : Pass(strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene, &deep})),
-        scene_(scene),
-        expanded_(expanded),
+      : StrandDrawPass(scene, expanded,
+                       strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene, &deep}),
+                       "render/strand.frag"),
         deep_(deep) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/strand.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     if (turn.batch_index == 0) {
       RETURN_IF_ERROR(deep_.resize(turn.size_px));
@@ -125,10 +119,7 @@ class DensitySamplesPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   OneSampleTarget& deep_;
-  StrandDraw strands_;
 };
 
 class StrandsMergePass final : public RenderPass {

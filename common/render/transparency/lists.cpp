@@ -84,20 +84,14 @@ class PixelLists final : public gl::Resource {
   glm::uvec2 size_px_{0};
 };
 
-class ListsPass final : public RenderPass {
+class ListsPass final : public StrandDrawPass {
  public:
   ListsPass(RenderScene& scene, ExpandedStrands& expanded, PixelLists& lists)
-      : Pass(strand_pass(scene, "render/lists", {&expanded, &scene.light, &scene.scene}, {&lists})),
-        scene_(scene),
-        expanded_(expanded),
+      : StrandDrawPass(scene, expanded,
+                       strand_pass(scene, "render/lists", {&expanded, &scene.light, &scene.scene}, {&lists}),
+                       "render/lists.frag"),
         lists_(lists) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/lists.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     if (turn.batch_index == 0) {
       RETURN_IF_ERROR(lists_.resize(turn.size_px));
@@ -112,38 +106,28 @@ class ListsPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   PixelLists& lists_;
-  StrandDraw strands_;
 };
 
-class ListsBlendPass final : public RenderPass {
+class ListsBlendPass final : public LayerBlendPass {
  public:
   ListsBlendPass(RenderScene& scene, PixelLists& lists)
-      : Pass(strand_pass(scene, "render/lists_blend", {&lists}, {&scene.strand_layer})),
-        layer_(scene.strand_layer),
-        lists_(lists) {}
+      : LayerBlendPass(scene, "render/lists_blend", {&lists}, "render/lists_blend.frag"), lists_(lists) {}
 
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(screen_, FullScreen::make(setup, "render/lists_blend.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
-    RETURN_IF_ERROR(layer_.resize(turn.size_px));
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-    layer_.begin();
-    lists_.bind();
-    screen_.program().set("u_width", static_cast<int>(lists_.width()));
-    screen_.draw();
+    RETURN_IF_ERROR(LayerBlendPass::run(turn));
     turn.left_out_fragments += lists_.left_out();
     return {};
   }
 
  private:
-  StrandLayer& layer_;
+  void bind(const gl::Program& program) const override {
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    lists_.bind();
+    program.set("u_width", static_cast<int>(lists_.width()));
+  }
+
   PixelLists& lists_;
-  FullScreen screen_;
 };
 
 }  // namespace

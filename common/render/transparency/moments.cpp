@@ -46,18 +46,10 @@ HairDistance hair_distance(const RenderTurn& turn) {
   return {near_m, std::max(far_m + margin_m, kLeastRatio * near_m)};
 }
 
-class MomentsPass : public RenderPass {
+class MomentsPass : public StrandDrawPass {
  public:
-  MomentsPass(RenderScene& scene, ExpandedStrands& expanded, gl::PassDeclaration declaration,
-              const char* fragment_stage)
-      : Pass(std::move(declaration)), scene_(scene), expanded_(expanded), fragment_stage_(fragment_stage) {}
+  using StrandDrawPass::StrandDrawPass;
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, fragment_stage_));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     RETURN_IF_ERROR(begin(turn));
     begin_adding();
@@ -74,12 +66,6 @@ class MomentsPass : public RenderPass {
   /// Binds the target, cleared in the first batch.
   virtual Status begin(const RenderTurn& turn) = 0;
   const gl::Program& program() const { return strands_.program(); }
-
- private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
-  const char* fragment_stage_;
-  StrandDraw strands_;
 };
 
 class SumPass final : public MomentsPass {
@@ -130,45 +116,22 @@ class ColorPass final : public MomentsPass {
   PixelTarget& sum_;
 };
 
-/// Between the two walks.
-class MomentsReadyPass final : public RenderPass {
- public:
-  MomentsReadyPass(RenderScene& scene, PixelTarget& moments, PixelTarget& sum)
-      : Pass(strand_pass(scene, "render/moments_ready", {&moments}, {&sum})) {}
-  Status run(RenderTurn&) override {
-    glTextureBarrier();
-    return {};
-  }
-};
-
-class MomentsBlendPass final : public RenderPass {
+class MomentsBlendPass final : public LayerBlendPass {
  public:
   MomentsBlendPass(RenderScene& scene, PixelTarget& moments, PixelTarget& sum)
-      : Pass(strand_pass(scene, "render/moments_blend", {&moments, &sum}, {&scene.strand_layer})),
-        layer_(scene.strand_layer),
+      : LayerBlendPass(scene, "render/moments_blend", {&moments, &sum}, "render/moments_blend.frag"),
         moments_(moments),
         sum_(sum) {}
 
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(screen_, FullScreen::make(setup, "render/moments_blend.frag"));
-    return {};
-  }
-  Status run(RenderTurn& turn) override {
-    RETURN_IF_ERROR(layer_.resize(turn.size_px));
-    layer_.begin();
+ private:
+  void bind(const gl::Program& program) const override {
     sum_.texture(0).bind(kMomentsUnit);
     moments_.texture(kAbsorbance).bind(kAbsorbanceUnit);
-    screen_.program().set("u_sum", static_cast<int>(kMomentsUnit));
-    screen_.program().set("u_absorbance", static_cast<int>(kAbsorbanceUnit));
-    screen_.draw();
-    return {};
+    program.set("u_sum", static_cast<int>(kMomentsUnit));
+    program.set("u_absorbance", static_cast<int>(kAbsorbanceUnit));
   }
-
- private:
-  StrandLayer& layer_;
   PixelTarget& moments_;
   PixelTarget& sum_;
-  FullScreen screen_;
 };
 
 }  // namespace
@@ -179,7 +142,7 @@ void add_moments(RenderScene& scene, ExpandWalks& walks, RenderPassList& passes)
   auto& sum = passes.keep(std::make_unique<PixelTarget>("moment colours", std::vector<uint32_t>{GL_RGBA16F}));
   add_camera_walk(scene, walks, passes, "for_moments");
   passes.add(std::make_unique<SumPass>(scene, walks.expanded(), moments));
-  passes.add(std::make_unique<MomentsReadyPass>(scene, moments, sum));
+  passes.add(make_ready_pass(scene, "render/moments_ready", {&moments}, {&sum}));
   add_camera_walk(scene, walks, passes);
   passes.add(std::make_unique<ColorPass>(scene, walks.expanded(), moments, sum));
   passes.add(std::make_unique<MomentsBlendPass>(scene, moments, sum));

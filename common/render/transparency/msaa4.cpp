@@ -6,19 +6,13 @@
 namespace strandcast {
 namespace {
 
-class Msaa4Pass final : public RenderPass {
+class Msaa4Pass final : public StrandDrawPass {
  public:
   Msaa4Pass(RenderScene& scene, ExpandedStrands& expanded)
-      : Pass(strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene})),
-        scene_(scene),
-        expanded_(expanded) {}
+      : StrandDrawPass(scene, expanded,
+                       strand_pass(scene, "render/strands", {&expanded, &scene.light}, {&scene.scene}),
+                       "render/strand_msaa.frag") {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/strand_msaa.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     scene_.scene.begin();
     strands_.begin(scene_, expanded_, turn, scene_.scene.size_px());
@@ -26,11 +20,6 @@ class Msaa4Pass final : public RenderPass {
     strands_.draw(scene_, expanded_);
     return {};
   }
-
- private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
-  StrandDraw strands_;
 };
 
 }  // namespace

@@ -58,20 +58,15 @@ class DepthKeys final : public gl::Resource {
   glm::uvec2 size_px_{0};
 };
 
-class KeysPass final : public RenderPass {
+class KeysPass final : public StrandDrawPass {
  public:
   KeysPass(RenderScene& scene, ExpandedStrands& expanded, DepthKeys& keys)
-      : Pass(strand_pass(scene, "render/three_depths", {&expanded, &scene.light, &scene.scene}, {&keys})),
-        scene_(scene),
-        expanded_(expanded),
+      : StrandDrawPass(
+            scene, expanded,
+            strand_pass(scene, "render/three_depths", {&expanded, &scene.light, &scene.scene}, {&keys}),
+            "render/three_depths_keys.frag"),
         keys_(keys) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/three_depths_keys.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     if (turn.batch_index == 0) {
       RETURN_IF_ERROR(keys_.resize(turn.size_px));
@@ -85,10 +80,7 @@ class KeysPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   DepthKeys& keys_;
-  StrandDraw strands_;
 };
 
 /// Between the two walks.
@@ -108,22 +100,16 @@ class KeysReadyPass final : public RenderPass {
   PixelTarget& colors_;
 };
 
-class KeyColorsPass final : public RenderPass {
+class KeyColorsPass final : public StrandDrawPass {
  public:
   KeyColorsPass(RenderScene& scene, ExpandedStrands& expanded, DepthKeys& keys, PixelTarget& colors)
-      : Pass(strand_pass(scene, "render/three_depths_color", {&expanded, &scene.light, &scene.scene, &keys},
-                         {&colors})),
-        scene_(scene),
-        expanded_(expanded),
+      : StrandDrawPass(scene, expanded,
+                       strand_pass(scene, "render/three_depths_color",
+                                   {&expanded, &scene.light, &scene.scene, &keys}, {&colors}),
+                       "render/three_depths_color.frag"),
         keys_(keys),
         colors_(colors) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/three_depths_color.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     colors_.begin();
     begin_adding();
@@ -135,42 +121,28 @@ class KeyColorsPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   DepthKeys& keys_;
   PixelTarget& colors_;
-  StrandDraw strands_;
 };
 
-class KeysBlendPass final : public RenderPass {
+class KeysBlendPass final : public LayerBlendPass {
  public:
   KeysBlendPass(RenderScene& scene, DepthKeys& keys, PixelTarget& colors)
-      : Pass(strand_pass(scene, "render/three_depths_blend", {&keys, &colors}, {&scene.strand_layer})),
-        layer_(scene.strand_layer),
+      : LayerBlendPass(scene, "render/three_depths_blend", {&keys, &colors},
+                       "render/three_depths_blend.frag"),
         keys_(keys),
         colors_(colors) {}
 
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(screen_, FullScreen::make(setup, "render/three_depths_blend.frag"));
-    return {};
-  }
-  Status run(RenderTurn& turn) override {
-    RETURN_IF_ERROR(layer_.resize(turn.size_px));
-    layer_.begin();
-    keys_.bind(screen_.program());
+ private:
+  void bind(const gl::Program& program) const override {
+    keys_.bind(program);
     colors_.texture(kNear).bind(kNear);
     colors_.texture(kFar).bind(kFar);
-    screen_.program().set("u_near", static_cast<int>(kNear));
-    screen_.program().set("u_far", static_cast<int>(kFar));
-    screen_.draw();
-    return {};
+    program.set("u_near", static_cast<int>(kNear));
+    program.set("u_far", static_cast<int>(kFar));
   }
-
- private:
-  StrandLayer& layer_;
   DepthKeys& keys_;
   PixelTarget& colors_;
-  FullScreen screen_;
 };
 
 }  // namespace

@@ -61,4 +61,17 @@ void FullScreen::draw() const {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
+Status LayerBlendPass::prepare(const RenderSetup& setup) {
+  ASSIGN_OR_RETURN(screen_, FullScreen::make(setup, fragment_stage_));
+  return {};
+}
+
+Status LayerBlendPass::run(RenderTurn& turn) {
+  RETURN_IF_ERROR(layer_.resize(turn.size_px));
+  layer_.begin();
+  bind(screen_.program());
+  screen_.draw();
+  return {};
+}
+
 }  // namespace strandcast

@@ -4,7 +4,8 @@
 // the scene.
 #pragma once
 
-#include <span>
+#include <string>
+#include <utility>
 
 #include "common/render/detail/culling.h"
 #include "common/render/passes/expand_walks.h"
@@ -48,6 +49,26 @@ class FullScreen {
  private:
   gl::Program program_;
   gl::VertexArray no_attributes_;
+};
+
+/// Lays what a method has drawn of the strands over the scene.
+class LayerBlendPass : public RenderPass {
+ public:
+  LayerBlendPass(RenderScene& scene, std::string name, gl::Resources reads, std::string fragment_stage)
+      : Pass(strand_pass(scene, std::move(name), std::move(reads), {&scene.strand_layer})),
+        layer_(scene.strand_layer),
+        fragment_stage_(std::move(fragment_stage)) {}
+  Status prepare(const RenderSetup& setup) override;
+  Status run(RenderTurn& turn) override;
+
+ protected:
+  /// Binds what the method has drawn.
+  virtual void bind(const gl::Program& program) const = 0;
+
+ private:
+  StrandLayer& layer_;
+  std::string fragment_stage_;
+  FullScreen screen_;
 };
 
 }  // namespace strandcast

@@ -14,20 +14,15 @@ namespace {
 constexpr size_t kSum = 0;
 constexpr size_t kPassing = 1;
 
-class WeightedPass final : public RenderPass {
+class WeightedPass final : public StrandDrawPass {
  public:
   WeightedPass(RenderScene& scene, ExpandedStrands& expanded, PixelTarget& target)
-      : Pass(strand_pass(scene, "render/weighted", {&expanded, &scene.light, &scene.scene}, {&target})),
-        scene_(scene),
-        expanded_(expanded),
+      : StrandDrawPass(
+            scene, expanded,
+            strand_pass(scene, "render/weighted", {&expanded, &scene.light, &scene.scene}, {&target}),
+            "render/weighted.frag"),
         target_(target) {}
 
-  bool is_batched() const override { return true; }
-  uint64_t size_bytes() const override { return StrandDraw::size_bytes(); }
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(strands_, StrandDraw::make(setup, scene_, "render/weighted.frag"));
-    return {};
-  }
   Status run(RenderTurn& turn) override {
     if (turn.batch_index == 0) {
       RETURN_IF_ERROR(target_.resize(turn.size_px));
@@ -44,38 +39,23 @@ class WeightedPass final : public RenderPass {
   }
 
  private:
-  RenderScene& scene_;
-  ExpandedStrands& expanded_;
   PixelTarget& target_;
-  StrandDraw strands_;
 };
 
-class WeightedBlendPass final : public RenderPass {
+class WeightedBlendPass final : public LayerBlendPass {
  public:
   WeightedBlendPass(RenderScene& scene, PixelTarget& target)
-      : Pass(strand_pass(scene, "render/weighted_blend", {&target}, {&scene.strand_layer})),
-        layer_(scene.strand_layer),
+      : LayerBlendPass(scene, "render/weighted_blend", {&target}, "render/weighted_blend.frag"),
         target_(target) {}
 
-  Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(screen_, FullScreen::make(setup, "render/weighted_blend.frag"));
-    return {};
-  }
-  Status run(RenderTurn& turn) override {
-    RETURN_IF_ERROR(layer_.resize(turn.size_px));
-    layer_.begin();
+ private:
+  void bind(const gl::Program& program) const override {
     target_.texture(kSum).bind(kSum);
     target_.texture(kPassing).bind(kPassing);
-    screen_.program().set("u_sum", static_cast<int>(kSum));
-    screen_.program().set("u_passing", static_cast<int>(kPassing));
-    screen_.draw();
-    return {};
+    program.set("u_sum", static_cast<int>(kSum));
+    program.set("u_passing", static_cast<int>(kPassing));
   }
-
- private:
-  StrandLayer& layer_;
   PixelTarget& target_;
-  FullScreen screen_;
 };
 
 }  // namespace
