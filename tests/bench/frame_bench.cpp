@@ -5,6 +5,9 @@
 //   of each mode frame_bench --match yes     instead: bits per pixel with which video in motion looks like
 //   tiles of a
 //                               quality, at the size and at half of it
+//   frame_bench --beside quads  instead: JPEG tiles' bytes of the pictures that the processor draws in tiles
+//                               beside those that OpenGL draws as quads, the same strands in motion, for each
+//                               quality; with `ratio` of the bytes and how far each is from its picture
 #include <fmt/format.h>
 #include <time.h>
 
@@ -18,6 +21,7 @@
 #include "common/base/quantile.h"
 #include "common/pictures/picture_decoder.h"
 #include "common/render/render_device.h"
+#include "common/render/tiles/tile_renderer.h"
 #include "common/strands/strand_codec.h"
 #include "server/encode/picture_encoder.h"
 #include "tests/bench/scene_run.h"
@@ -38,6 +42,7 @@ struct Options {
   std::filesystem::path png;
   std::string renderer = "auto";  // as RenderDeviceConfig
   bool is_matching = false;
+  bool is_beside_quads = false;
 };
 
 struct Mode {
@@ -61,14 +66,16 @@ Result<Options> parse(int argc, char** argv) {
       options.png = value;
     } else if (word == "--renderer") {
       options.renderer = value;
+    } else if (word == "--beside") {
+      options.is_beside_quads = value == "quads";
     } else if (word == "--match") {
       options.is_matching = value == "yes";
     } else if (word != "--size" ||
                std::sscanf(value.c_str(), "%ux%u", &options.size.width, &options.size.height) != 2) {
-      return make_error(
-          ErrorCode::BadInput,
-          "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes --renderer NAME)", word,
-          value);
+      return make_error(ErrorCode::BadInput,
+                        "unknown option {} {} (known: --pictures N --size WxH --png DIR --match yes --beside "
+                        "quads --renderer NAME)",
+                        word, value);
     }
   }
   return options;
@@ -256,9 +263,51 @@ Status measure(const Options& options, const Sequence& sequence, const Mode& mod
   return {};
 }
 
+/// Bytes of whole pictures: which tiles change is the same for both.
+Status compare(const std::vector<Image>& tiles, const std::vector<Image>& quads) {
+  fmt::print("quality,tiles_bytes,quads_bytes,ratio,tiles_psnr_db,quads_psnr_db\n");
+  for (const int quality : {95, 80, 50, 30}) {
+    ASSIGN_OR_RETURN(const Outcome ours, run_tiles(tiles, quality));
+    ASSIGN_OR_RETURN(const Outcome theirs, run_tiles(quads, quality));
+    const double bytes_per_bit = static_cast<double>(tiles[0].width) * tiles[0].height / 8.0;
+    fmt::print("{},{:.0f},{:.0f},{:.3f},{:.2f},{:.2f}\n", quality, ours.bits_per_pixel * bytes_per_bit,
+               theirs.bits_per_pixel * bytes_per_bit, ours.bits_per_pixel / theirs.bits_per_pixel,
+               ours.psnr_db, theirs.psnr_db);
+  }
+  return {};
+}
+
+Status beside_quads(const Options& options) {
+  BuiltInScene run(quantum_for_bound(kBoundM));
+  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make("auto"));
+  const SceneAsset asset = run.asset();
+  const LookDesc& look = run.scene().look;
+  ASSIGN_OR_RETURN(auto quads,
+                   Renderer::make(gl::ShaderLibrary(), context->info(), asset, look, segment_path()));
+  ASSIGN_OR_RETURN(auto tiles, make_tile_renderer(asset, look));
+  for (int step = 0; step < kWarmUpSteps; ++step) (void)run.next();
+  std::vector<Image> images[2];
+  while (images[0].size() < options.pictures) {
+    for (int step = 1; step < kStepsPerPicture; ++step) (void)run.next();
+    const Snapshot snapshot = run.next();
+    const PosedStrands strands{snapshot.world_from_head, positions_in_head(snapshot)};
+    RETURN_IF_ERROR(tiles->draw(strands, run.scene().camera, options.size));
+    images[0].push_back(tiles->read_image());
+    RETURN_IF_ERROR(context->make_current());
+    RETURN_IF_ERROR(quads->draw(strands, run.scene().camera, options.size));
+    images[1].push_back(quads->read_image());
+  }
+  if (!options.png.empty()) {
+    RETURN_IF_ERROR(save_png(options.png / "beside_tiles.png", images[0].back()));
+    RETURN_IF_ERROR(save_png(options.png / "beside_quads.png", images[1].back()));
+  }
+  return compare(images[0], images[1]);
+}
+
 Status run(int argc, char** argv) {
   ASSIGN_OR_RETURN(const Options options, parse(argc, argv));
   if (!options.png.empty()) std::filesystem::create_directories(options.png);
+  if (options.is_beside_quads) return beside_quads(options);
   ASSIGN_OR_RETURN(const auto sequences, draw(options));
   if (options.is_matching) return match(sequences.front());
   fmt::print(

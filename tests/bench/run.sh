@@ -35,6 +35,12 @@ echo "== codecs: $out/codec.csv"
 echo "== pictures: $out/frame.csv"
 "$bin/frame_bench" | tee "$out/frame.csv"
 
+echo "== bytes of pictures beside the quads': $out/frame_beside.csv"
+"$bin/frame_bench" --beside quads | tee "$out/frame_beside.csv"
+
+echo "== frames mode without a GPU: $out/frames.csv"
+bash tests/bench/frames.sh --bin "$bin" | tee "$out/frames.csv"
+
 echo "== methods of drawing: $out/render.csv"
 "$bin/render_bench" | tee "$out/render.csv"
 echo "== stages of the tiles beside what the machine can do: $out/stages.csv"
