@@ -505,6 +505,26 @@ TEST_F(StrandMethods, FieldsOfTheLookShowOnQuadsUnlessTheyAreSaidNotTo) {
   }
 }
 
+TEST_F(StrandMethods, TablesOfShadingFollowTheHighlightsWhileTheSceneRuns) {
+  const SceneAsset asset = grown();
+  for (const char* kind : {"shading", "scattering"}) {
+    LookDesc look = look_with({});
+    (std::string(kind) == "shading" ? look.methods.shading : look.methods.scattering) =
+        std::string(kind) == "shading" ? "marschner" : "dual";
+    auto renderer = Renderer::make(gl::ShaderLibrary(), context_->info(), asset, look, segment_path());
+    ASSERT_TRUE(renderer) << renderer.error().to_string();
+    const CameraDesc camera = camera_at({0.3f, 0.1f, 0.5f});
+    ASSERT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, camera, kSize));
+    const Image before = (*renderer)->read_image();
+    look.shading.highlight_width_deg = 18.0f;
+    ASSERT_TRUE((*renderer)->set_look(look));
+    ASSERT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, camera, kSize));
+    const Image after = (*renderer)->read_image();
+    EXPECT_FALSE(after == before) << kind;
+    EXPECT_TRUE(after == draw(asset, look, camera)) << kind;
+  }
+}
+
 // ---- Casters
 
 TEST_F(StrandMethods, CoarseCastersShadeNearlyAlike) {
