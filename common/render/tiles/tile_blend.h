@@ -40,7 +40,24 @@ struct TileHead {
   simd::Float red[kBlocks];
   simd::Float green[kBlocks];
   simd::Float blue[kBlocks];
+  float hides[kBlocks];  // m: nothing of what lies wholly beyond this is seen in the block
+  float hides_all;       // likewise in the whole tile
 };
+inline constexpr float kNothingHidden = 1e30f;
+
+/// Where whole blocks are covered.
+STRANDCAST_LANES void find_hidden(TileHead& head) {
+  constexpr float kRounding = 1e-5f;  // of a depth between two ends
+  head.hides_all = 0.0f;
+  for (int block = 0; block < kBlocks; ++block) {
+    float farthest = head.depth[block].v[0];
+    for (uint32_t lane = 1; lane < simd::kLanes; ++lane)
+      farthest = std::max(farthest, head.depth[block].v[lane]);
+    const bool is_covered = !is_any(head.seen[block] < 1.0f);
+    head.hides[block] = is_covered ? farthest + kSkinDepthM + kRounding : kNothingHidden;
+    head.hides_all = std::max(head.hides_all, head.hides[block]);
+  }
+}
 
 STRANDCAST_LANES simd::Float block_columns() {
   return simd::FloatBits{0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f, 0.5f, 1.5f};
@@ -204,6 +221,7 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, TileHead*
   const float* const step = s.step[i];
   const Float cx = block_columns();
   const Float cy = block_rows();
+  const float nearest = std::min(s.depth[i], s.depth[i] + s.depth_step[i]);
   const bool fades = step[kOpacity] != 0.0f || va[kOpacity] != 1.0f;
   const int y1 = last_block(s.high_y[i], kBlockRows, kBlocksDown);
   for (int y = first_block(s.low_y[i], kBlockRows); y <= y1; ++y) {
@@ -224,6 +242,7 @@ STRANDCAST_LANES void blend_segment(const SegmentBatch& s, uint32_t i, TileHead*
     const Float row_behind_b = py * s.behind_b[1][i] + s.behind_b[2][i];
     for (; left != 0; left &= left - 1) {
       const int x = std::countr_zero(left);
+      if (head != nullptr && nearest > head->hides[y * kBlocksAcross + x]) continue;
       const Float px = cx + static_cast<float>(x * kBlockColumns);
       const Float across = px * s.across[0][i] + row_across;
       const Float along = px * s.along[0][i] + row_along;

@@ -244,6 +244,7 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
 
   TileHead head;
   const bool has_head = in.head->mesh != nullptr && draw_head(in, tile, head);
+  if (has_head) find_hidden(head);
   TilePixels pixels;
   for (int block = 0; block < kBlocks; ++block) {
     pixels.red[block] = pixels.green[block] = pixels.blue[block] = Float(0.0f);
@@ -260,21 +261,31 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
     const uint64_t* const order = sort_segments(in, begin, count, scratch);
     const StrandPoint* const points = in.points->point.data();
     for (int y = 0; y < kBlocksDown; ++y) pixels.open[y] = (uint32_t{1} << kBlocksAcross) - 1;
-    for (uint32_t i = 0; i < count; i += kLanes) {
-      constexpr uint32_t kAhead = 2 * kLanes;
-      for (uint32_t lane = 0; lane < kLanes; ++lane) {
-        const uint32_t next = std::min(i + kAhead + lane, count - 1);
-        const StrandPoint* const ends = points + static_cast<uint32_t>(order[next]);
-        __builtin_prefetch(ends);
-        __builtin_prefetch(ends + 1);
+    const float hidden = has_head ? head.hides_all : kNothingHidden;
+    uint32_t until_check = kPairsBetweenChecks;
+    for (uint32_t i = 0; i < count;) {
+      // The next eight that are not behind the head.
+      uint64_t some[kLanes];
+      uint32_t found = 0;
+      for (; found < kLanes && i < count; ++i) {
+        constexpr uint32_t kAhead = 2 * kLanes;
+        const StrandPoint* const later =
+            points + static_cast<uint32_t>(order[std::min(i + kAhead, count - 1)]);
+        __builtin_prefetch(later);
+        __builtin_prefetch(later + 1);
+        const StrandPoint* const ends = points + static_cast<uint32_t>(order[i]);
+        if (std::min(ends[0].z, ends[1].z) > hidden) continue;
+        some[found++] = order[i];
       }
-      const uint32_t some = std::min(count - i, kLanes);
+      if (found == 0) break;
       SegmentBatch batch;
-      place_segments(points, order + i, some, static_cast<float>(left), static_cast<float>(top), batch);
-      for (uint32_t lane = 0; lane < some; ++lane)
+      place_segments(points, some, found, static_cast<float>(left), static_cast<float>(top), batch);
+      for (uint32_t lane = 0; lane < found; ++lane)
         blend_segment(batch, lane, has_head ? &head : nullptr, pixels);
-      if (i % kPairsBetweenChecks != 0) continue;
-      const StrandPoint* const last = points + static_cast<uint32_t>(order[i]);
+      until_check -= std::min(until_check, kLanes);
+      if (until_check > 0) continue;
+      until_check = kPairsBetweenChecks;
+      const StrandPoint* const last = points + static_cast<uint32_t>(some[found - 1]);
       const bool is_behind = has_head && std::min(last[0].z, last[1].z) > head_end;
       if (!close_opaque_blocks(is_behind ? &head : nullptr, pixels)) break;
     }
