@@ -239,6 +239,29 @@ TEST_F(FrameWork, AStateIsNotWantedBeforeItsPictureIsDue) {
   EXPECT_GT(states_wanted_ns_[0], now_ns() + kHourNs);
 }
 
+TEST_F(FrameWork, TellsWhichDrawingsWereTheFirstWithAMotionSample) {
+  const auto worker = start(kFastHz);
+  const auto offer = [&](int64_t motion_time_ns) {
+    Snapshot state = make_state(++tick_);
+    state.motion_time_ns = motion_time_ns;
+    return encoder_->encode(state);
+  };
+  offer(0);
+  worker->set_views(one_view());
+  join_chain(*worker);
+  ASSERT_TRUE(eventually([&] { return frame_count() == 1; }));
+  EXPECT_TRUE(worker->take_motions().empty()) << "there was none";
+  size_t drawn = 1;
+  for (const int64_t motion_time_ns : {500, 500, 900}) {
+    worker->offer(offer(motion_time_ns));
+    ++drawn;
+    ASSERT_TRUE(eventually([&] { return frame_count() == drawn; }));
+  }
+  EXPECT_EQ(worker->take_motions(), (std::vector<PictureMotion>{{2000, 500}, {4000, 900}}))
+      << "not what is held";
+  EXPECT_TRUE(worker->take_motions().empty()) << "each once";
+}
+
 TEST_F(FrameWork, WithoutANewStateNothingIsDrawnAgainUnlessTheCameraMoves) {
   const auto worker = start(kFastHz);
   next_delta();
