@@ -42,13 +42,16 @@ struct TileHead {
   simd::Float blue[kBlocks];
   float hides[kBlocks];  // m: nothing of what lies wholly beyond this is seen in the block
   float hides_all;       // likewise in the whole tile
+  float end;             // m: behind all that is head in the tile
 };
 inline constexpr float kNothingHidden = 1e30f;
 
-/// Where whole blocks are covered.
+/// Where whole blocks are covered, and how far back the head reaches.
 STRANDCAST_LANES void find_hidden(TileHead& head) {
   constexpr float kRounding = 1e-5f;  // of a depth between two ends
+  constexpr float kNoHead = 1e29f;    // from here on depths are of nothing
   head.hides_all = 0.0f;
+  head.end = 0.0f;
   for (int block = 0; block < kBlocks; ++block) {
     float farthest = head.depth[block].v[0];
     for (uint32_t lane = 1; lane < simd::kLanes; ++lane)
@@ -56,6 +59,8 @@ STRANDCAST_LANES void find_hidden(TileHead& head) {
     const bool is_covered = !is_any(head.seen[block] < 1.0f);
     head.hides[block] = is_covered ? farthest + kSkinDepthM + kRounding : kNothingHidden;
     head.hides_all = std::max(head.hides_all, head.hides[block]);
+    for (uint32_t lane = 0; lane < simd::kLanes; ++lane)
+      if (head.depth[block].v[lane] < kNoHead) head.end = std::max(head.end, head.depth[block].v[lane]);
   }
 }
 

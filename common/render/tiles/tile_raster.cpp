@@ -219,8 +219,11 @@ STRANDCAST_LANES Float background_gradient(const TileInput& in, Float middle) {
   return 1.0f + kGradient * (2.0f * high - 1.0f);
 }
 
-STRANDCAST_LANES void fill_background(const TileInput& in, uint32_t left, uint32_t top, uint32_t width,
-                                      uint32_t height) {
+STRANDCAST_LANES void fill_background(const TileInput& in, uint32_t tile) {
+  const uint32_t left = tile % in.grid.columns() * kTilePx;
+  const uint32_t top = tile / in.grid.columns() * kTilePx;
+  const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);
+  const uint32_t height = std::min(kTilePx, in.grid.size_px.y - top);
   for (uint32_t y = 0; y < height; ++y) {
     const glm::vec3 color = in.background * background_gradient(in, static_cast<float>(top + y) + 0.5f).v[0];
     uint32_t packed = 0xff000000u;
@@ -233,67 +236,54 @@ STRANDCAST_LANES void fill_background(const TileInput& in, uint32_t left, uint32
   }
 }
 
-STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
-  const TileInput& in = *arguments.input;
-  TileScratch& scratch = *arguments.scratch;
-  const uint32_t tile = arguments.tile;
+/// The strands of a tile from front to back; `head`: null where there is none.
+STRANDCAST_LANES void blend_strands(const TileInput& in, uint32_t tile, TileHead* head, TileScratch& scratch,
+                                    TilePixels& pixels) {
   const uint32_t begin = in.bins->segments().first[tile];
   const uint32_t count = in.bins->segments().first[tile + 1] - begin;
+  if (count == 0) return;
+  const auto left = static_cast<float>(tile % in.grid.columns() * kTilePx);
+  const auto top = static_cast<float>(tile / in.grid.columns() * kTilePx);
+  // Segments are sorted by their middles, and few are longer than this along the view.
+  constexpr float kLongM = 0.04f;
+  const uint64_t* const order = sort_segments(in, begin, count, scratch);
+  const StrandPoint* const points = in.points->point.data();
+  for (int y = 0; y < kBlocksDown; ++y) pixels.open[y] = (uint32_t{1} << kBlocksAcross) - 1;
+  const float hidden = head != nullptr ? head->hides_all : kNothingHidden;
+  uint32_t until_check = kPairsBetweenChecks;
+  for (uint32_t i = 0; i < count;) {
+    // The next eight that are not behind the head.
+    uint64_t some[kLanes];
+    uint32_t found = 0;
+    for (; found < kLanes && i < count; ++i) {
+      constexpr uint32_t kAhead = 2 * kLanes;
+      const StrandPoint* const later = points + static_cast<uint32_t>(order[std::min(i + kAhead, count - 1)]);
+      __builtin_prefetch(later);
+      __builtin_prefetch(later + 1);
+      const StrandPoint* const ends = points + static_cast<uint32_t>(order[i]);
+      if (std::min(ends[0].z, ends[1].z) > hidden) continue;
+      some[found++] = order[i];
+    }
+    if (found == 0) break;
+    SegmentBatch batch;
+    place_segments(points, some, found, left, top, batch);
+    for (uint32_t lane = 0; lane < found; ++lane) blend_segment(batch, lane, head, pixels);
+    until_check -= std::min(until_check, kLanes);
+    if (until_check > 0) continue;
+    until_check = kPairsBetweenChecks;
+    const StrandPoint* const last = points + static_cast<uint32_t>(some[found - 1]);
+    const bool is_behind = head != nullptr && std::min(last[0].z, last[1].z) > head->end + kLongM;
+    if (!close_opaque_blocks(is_behind ? head : nullptr, pixels)) break;
+  }
+}
+
+/// The picture's pixels of a tile: head and strands over the background, tone curve, sRGB.
+STRANDCAST_LANES void write_pixels(const TileInput& in, uint32_t tile, const TileHead* head,
+                                   const TilePixels& pixels) {
   const uint32_t left = tile % in.grid.columns() * kTilePx;
   const uint32_t top = tile / in.grid.columns() * kTilePx;
-
-  TileHead head;
-  const bool has_head = in.head->mesh != nullptr && draw_head(in, tile, head);
-  if (has_head) find_hidden(head);
-  TilePixels pixels;
-  for (int block = 0; block < kBlocks; ++block) {
-    pixels.red[block] = pixels.green[block] = pixels.blue[block] = Float(0.0f);
-    pixels.passed[block] = Float(1.0f);
-  }
-  // From here on all is behind the head, but for segments that are longer than this along the view.
-  constexpr float kLongM = 0.04f;
-  float head_end = 0.0f;
-  if (has_head)
-    for (const Float& depth : head.depth)
-      for (uint32_t lane = 0; lane < kLanes; ++lane)
-        if (depth.v[lane] < kFar) head_end = std::max(head_end, depth.v[lane] + kLongM);
-  if (count > 0) {
-    const uint64_t* const order = sort_segments(in, begin, count, scratch);
-    const StrandPoint* const points = in.points->point.data();
-    for (int y = 0; y < kBlocksDown; ++y) pixels.open[y] = (uint32_t{1} << kBlocksAcross) - 1;
-    const float hidden = has_head ? head.hides_all : kNothingHidden;
-    uint32_t until_check = kPairsBetweenChecks;
-    for (uint32_t i = 0; i < count;) {
-      // The next eight that are not behind the head.
-      uint64_t some[kLanes];
-      uint32_t found = 0;
-      for (; found < kLanes && i < count; ++i) {
-        constexpr uint32_t kAhead = 2 * kLanes;
-        const StrandPoint* const later =
-            points + static_cast<uint32_t>(order[std::min(i + kAhead, count - 1)]);
-        __builtin_prefetch(later);
-        __builtin_prefetch(later + 1);
-        const StrandPoint* const ends = points + static_cast<uint32_t>(order[i]);
-        if (std::min(ends[0].z, ends[1].z) > hidden) continue;
-        some[found++] = order[i];
-      }
-      if (found == 0) break;
-      SegmentBatch batch;
-      place_segments(points, some, found, static_cast<float>(left), static_cast<float>(top), batch);
-      for (uint32_t lane = 0; lane < found; ++lane)
-        blend_segment(batch, lane, has_head ? &head : nullptr, pixels);
-      until_check -= std::min(until_check, kLanes);
-      if (until_check > 0) continue;
-      until_check = kPairsBetweenChecks;
-      const StrandPoint* const last = points + static_cast<uint32_t>(some[found - 1]);
-      const bool is_behind = has_head && std::min(last[0].z, last[1].z) > head_end;
-      if (!close_opaque_blocks(is_behind ? &head : nullptr, pixels)) break;
-    }
-  }
-
   const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);
   const uint32_t height = std::min(kTilePx, in.grid.size_px.y - top);
-  if (count == 0 && !has_head) return fill_background(in, left, top, width, height);
   for (int y = 0; y < kBlocksDown; ++y)
     for (int x = 0; x < kBlocksAcross; ++x) {
       const int block = y * kBlocksAcross + x;
@@ -303,11 +293,11 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
       {
         Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};
         Float drawn = 1.0f - pixels.passed[block];
-        if (has_head) {
-          const Float seen = head.seen[block];
-          scene[0] += seen * head.red[block];
-          scene[1] += seen * head.green[block];
-          scene[2] += seen * head.blue[block];
+        if (head != nullptr) {
+          const Float seen = head->seen[block];
+          scene[0] += seen * head->red[block];
+          scene[1] += seen * head->green[block];
+          scene[2] += seen * head->blue[block];
           drawn += seen;
         }
         const Float per_drawn = 1.0f / simd::max(drawn, 1e-5f);
@@ -327,6 +317,23 @@ STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
         std::memcpy(in.rgba + 4 * (size_t{top + py} * in.grid.size_px.x + left + px), &value, sizeof value);
       }
     }
+}
+
+STRANDCAST_LANES void draw_any_tile_lanes(const TileArguments& arguments) {
+  const TileInput& in = *arguments.input;
+  const uint32_t tile = arguments.tile;
+  TileHead head;
+  const bool has_head = in.head->mesh != nullptr && draw_head(in, tile, head);
+  const bool has_strands = in.bins->segments().first[tile + 1] > in.bins->segments().first[tile];
+  if (!has_strands && !has_head) return fill_background(in, tile);
+  if (has_head) find_hidden(head);
+  TilePixels pixels;
+  for (int block = 0; block < kBlocks; ++block) {
+    pixels.red[block] = pixels.green[block] = pixels.blue[block] = Float(0.0f);
+    pixels.passed[block] = Float(1.0f);
+  }
+  blend_strands(in, tile, has_head ? &head : nullptr, *arguments.scratch, pixels);
+  write_pixels(in, tile, has_head ? &head : nullptr, pixels);
 }
 STRANDCAST_KERNEL(draw_any_tile, TileArguments);
 
