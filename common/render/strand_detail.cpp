@@ -10,9 +10,10 @@
 namespace strandcast {
 namespace {
 
-// Segments may be this far off the curve of a strand that bends as most do, and for strands thinner than
-// about this stand fewer and wider ones.
-constexpr float kBendErrorPx = 0.25f;
+// Another segment is worth it where even with it chords are this far off the curve of a strand that bends as
+// most do: with two or more they are about 0.3 px off at most. For strands thinner than about kThinnestPx
+// stand fewer and wider ones.
+constexpr float kBendErrorPx = 0.16f;
 constexpr float kThinnestPx = 0.45f;
 // Hair in motion bends at least so much from vertex to vertex, however straight it is at rest.
 constexpr float kLeastBendRad = 0.25f;
@@ -72,9 +73,7 @@ StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const
   // A chord of 1 / n of a gap is off its curve by an eighth of the second derivative over n^2.
   constexpr float kEighth = 0.125f;
   const float segments = std::sqrt(kEighth * bend_m(facts, look, gap_m) * px_per_m / kBendErrorPx);
-  // A little more than is allowed is not worth another segment for all.
-  constexpr float kSlack = 0.4f;
-  detail.segments_per_gap = at_most(segments - kSlack, look.segments);
+  detail.segments_per_gap = at_most(std::floor(segments), look.segments);
   const float followers = std::floor(static_cast<float>(max_followers) * width_px / kThinnestPx + 0.5f);
   detail.followers = at_most(followers, max_followers);
   if (facts.is_finest) {
