@@ -331,22 +331,29 @@ void LightLattice::sweep(const glm::vec3& to_light, const std::vector<float>& ha
   const int floor_v = static_cast<int>(std::floor(shift_v));
   const float part_u = shift_u - static_cast<float>(floor_u);
   const float part_v = shift_v - static_cast<float>(floor_v);
+  // What the slice before lets through behind its cells, none around them: rows are read one step beyond.
+  const auto row = static_cast<size_t>(size[u]) + 3;
+  std::vector<float> behind(row * (static_cast<size_t>(size[v]) + 3), 0.0f);
+  std::vector<float> next = behind;
+  const float kept_u = 1.0f - part_u;
+  const float kept_v = 1.0f - part_v;
   for (int slice = 0; slice < size[a]; ++slice) {
     const int here = first + direction * slice;
-    const auto behind = [&](int i, int j) {
-      if (slice == 0 || i < 0 || j < 0 || i >= size[u] || j >= size[v]) return 0.0f;
-      const auto cell = static_cast<size_t>((here - direction) * stride[a] + i * stride[u] + j * stride[v]);
-      return depth[cell] + half_step * halved[cell];
-    };
-    for (int j = 0; j < size[v]; ++j)
+    for (int j = 0; j < size[v]; ++j) {
+      const size_t begin = static_cast<size_t>(j + 1 + floor_v) * row + static_cast<size_t>(1 + floor_u);
+      const float* const near = behind.data() + begin;
+      const float* const far = near + row;
+      const auto cells = static_cast<size_t>(here * stride[a] + j * stride[v]);
+      float* const out = next.data() + static_cast<size_t>(j + 1) * row + 1;
       for (int i = 0; i < size[u]; ++i) {
-        const int i0 = i + floor_u;
-        const int j0 = j + floor_v;
-        const float near = (1.0f - part_u) * behind(i0, j0) + part_u * behind(i0 + 1, j0);
-        const float far = (1.0f - part_u) * behind(i0, j0 + 1) + part_u * behind(i0 + 1, j0 + 1);
-        const auto cell = static_cast<size_t>(here * stride[a] + i * stride[u] + j * stride[v]);
-        depth[cell] = (1.0f - part_v) * near + part_v * far + half_step * halved[cell];
+        const size_t cell = cells + static_cast<size_t>(i * stride[u]);
+        const float step = half_step * halved[cell];
+        depth[cell] = kept_v * (kept_u * near[i] + part_u * near[i + 1]) +
+                      part_v * (kept_u * far[i] + part_u * far[i + 1]) + step;
+        out[i] = depth[cell] + step;
       }
+    }
+    std::swap(behind, next);
   }
 }
 

@@ -20,7 +20,7 @@ namespace strandcast {
 struct StrandPoints;
 
 /// Cells along the hair's largest side, unless somebody wants more or fewer.
-inline constexpr uint32_t kLightCells = 96;
+inline constexpr uint32_t kLightCells = 112;
 
 /// What of a scene it needs and does not change from picture to picture.
 struct LightLatticeDesc {

@@ -221,7 +221,7 @@ Status bench_tiles(const char* name, const Options& options, const SceneDesc& sc
   std::vector<Setting> settings;
   settings.push_back({"detail", "finest", detail_of(true), nullptr, {}, {}});
   settings.push_back({"detail", "chosen", detail_of(false), nullptr, {}, {}});
-  for (const uint32_t cells : {128u, 96u, 64u, 32u}) {
+  for (const uint32_t cells : {128u, kLightCells, 96u, 64u, 32u}) {
     settings.push_back({"light cells", fmt::format("{}", cells), {}, nullptr, {}, {}});
     settings.back().tiles.light_cells = cells;
   }
