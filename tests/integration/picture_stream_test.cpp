@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "client/app/view_report.h"
 #include "tests/support/server_fixture.h"
 #include "tests/support/test_pictures.h"
 #include "tests/tools/chaos_relay.h"
@@ -60,6 +63,37 @@ TEST_F(PictureStream, EveryCodecIsGivenToWhoDecodesIt) {
     // Whole JPEGs all stand alone; of the others only the first.
     EXPECT_EQ(viewer->picture_stats().whole_frames == viewer->image_count(), codec == PictureCodec::Jpeg);
   }
+}
+
+TEST_F(PictureStream, AViewerKnowsHowLateMotionIs) {
+  if (!start()) return;
+  const auto viewer = join(PictureCodec::JpegTiles);
+  ASSERT_NE(viewer, nullptr);
+  const auto source = ViewerClient::connect(client_config(StreamMode::Frames, Role::Source));
+  ASSERT_TRUE(source) << source.error().to_string();
+  int64_t sent_ns = 0;
+  const auto feed = [&] {
+    constexpr int64_t kPauseNs = 10'000'000;
+    if (now_ns() - sent_ns < kPauseNs) return;
+    sent_ns = now_ns();
+    Pose pose;
+    pose.position_m.x = 1e-12 * static_cast<double>(sent_ns % 1'000'000'000);
+    ASSERT_TRUE((*source)->send(MotionSamples{{{sent_ns, pose}}}));
+  };
+  const int64_t begin_ns = now_ns();
+  EXPECT_TRUE(pump_until({viewer.get()}, [&] {
+    feed();
+    return viewer->motion_latency_timer().count() >= 5;
+  }));
+  const double longest_ms = viewer->motion_latency_timer().quantile_ms(1.0);
+  EXPECT_GT(longest_ms, 0.0);
+  EXPECT_LT(longest_ms, static_cast<double>(now_ns() - begin_ns) * 1e-6)
+      << "no sample is older than the first";
+  const ViewReport report = make_report(*viewer);
+  const auto line = std::find_if(report.begin(), report.end(),
+                                 [](const ReportEntry& entry) { return entry.key == "motion_samples_seen"; });
+  ASSERT_NE(line, report.end());
+  EXPECT_GE(std::stoi(line->text), 5);
 }
 
 TEST_F(PictureStream, ManyViewersOfOneClassCostOneEncodePerPicture) {
