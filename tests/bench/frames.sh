@@ -22,10 +22,10 @@ trap 'rm -rf "$work"' EXIT
 ticks() { awk '{print $14 + $15}' "/proc/$1/stat"; }  # user and system time, 1/100 s
 
 "$bin/strandcast-server" --port 0 --port-file "$work/port" --log-level warn --renderer tiles --set stream.frame_rate_hz=60 \
-  "$@" & server=$!
+  "$@" >/dev/null & server=$!
 for _ in $(seq 300); do [ -s "$work/port" ] && break; kill -0 "$server" || exit 2; sleep 0.1; done
 address=127.0.0.1:$(cat "$work/port")
-"$bin/strandcast-ctl" feed --connect "$address" --motion builtin --loop 2>/dev/null & feed=$!
+"$bin/strandcast-ctl" feed --connect "$address" --motion builtin --loop >/dev/null 2>&1 & feed=$!
 "$bin/strandcast-view" --connect "$address" --headless --mode frames --size "$size" --pictures "$pictures" \
   --seconds "$((seconds + 2))" --report "$work/report" >/dev/null & view=$!
 sleep 2  # the first picture is there
