@@ -27,8 +27,8 @@ const MethodTable<DetailMethod>& detail_methods();
 const MethodTable<CullingMethod>& culling_methods();
 const MethodTable<ShadowDetail>& shadow_details();
 
-/// Whether a field of a look (its path, as "style.clump") does anything where the look names other methods than
-/// the main ones: their quads have one light, and strands without a style of their own.
+/// Whether a field of a look (its path, as "style.clump") does anything where the look names other methods
+/// than the main ones: their quads have one light, and strands without a style of their own.
 bool is_drawn_by_methods(std::string_view field);
 
 }  // namespace strandcast

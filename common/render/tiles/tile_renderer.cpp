@@ -116,8 +116,8 @@ Status light(TileState& state, RenderTurn& turn) {
   state.shade.tip_fade = state.look.style.tip_fade;
   state.shade.lights = light_directions(state.look, turn.strands.world_from_head.rotation, turn.view.up);
   const StyleNumbers style = style_numbers(state.look, state.detail_facts.mean_length_m);
-  const LatticeFrame frame = fit_lattice(state.lattice.desc(), state.shade.lights, turn.strands.position_m,
-                                         style_room_m(style));
+  const LatticeFrame frame =
+      fit_lattice(state.lattice.desc(), state.shade.lights, turn.strands.position_m, style_room_m(style));
   state.lattice.build(frame, state.points, {state.shade.width_m, state.shade.tip_scale, state.shade.tip_fade},
                       state.shade.lights, state.workers);
   return {};
