@@ -17,11 +17,6 @@ bool is_renderer_name(const std::string& name) {
 
 namespace {
 
-/// Whether a look names nothing but what every kind of renderer draws in its own best way.
-bool has_main_methods(const LookDesc& look) {
-  return look.methods == RenderMethodsDesc{};
-}
-
 struct Choice {
   RendererKind kind;
   bool is_main;
@@ -129,7 +124,10 @@ RendererKind likely_renderer(const std::string& renderer, const LookDesc& look) 
 
 Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& look, RendererKind kind) {
   if (kind == RendererKind::Gl) return plan_renderer(asset, look, true, path_for(look));
-  ASSIGN_OR_RETURN(const auto renderer, make_tile_renderer(asset, look, {1, simd::InstructionSet::Plain}));
+  RETURN_IF_ERROR(check_asset(asset));
+  // All stages run whatever the scene: nothing of it has to be made ready to say so.
+  const SceneAsset nothing;
+  ASSIGN_OR_RETURN(const auto renderer, make_tile_renderer(nothing, look, {1, simd::InstructionSet::Plain}));
   return renderer->passes().report();
 }
 

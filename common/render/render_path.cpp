@@ -49,8 +49,12 @@ const RenderPath& segment_path() {
   return path;
 }
 
+bool has_main_methods(const LookDesc& look) {
+  return look.methods == RenderMethodsDesc{};
+}
+
 const RenderPath& path_for(const LookDesc& look) {
-  return look.methods == RenderMethodsDesc{} ? tile_path() : segment_path();
+  return has_main_methods(look) ? tile_path() : segment_path();
 }
 
 RenderPath segment_path_with(const RenderMethods& methods) {

@@ -27,6 +27,8 @@ struct RenderPath {
 const RenderPath& tile_path();
 /// Segments of strands as camera-facing quads with a depth test and a fixed pattern of coverage.
 const RenderPath& segment_path();
+/// Whether a look names nothing but what every renderer draws in its own best way.
+bool has_main_methods(const LookDesc& look);
 /// What draws a look: tiles where it names no other methods than the main ones.
 const RenderPath& path_for(const LookDesc& look);
 /// The same quads with other methods, which go together.

@@ -113,6 +113,8 @@ Status PathRenderer::draw(const PosedStrands& strands, const CameraDesc& camera,
   RETURN_IF_ERROR(passes_->list.run(turn, &timer_));
   profile_ = {passes_->list.last_total_ms(), turn.drawn_strands, turn.drawn_segments, turn.is_whole};
   profile_.left_out_fragments = turn.left_out_fragments;
+  profile_.left_out_strands = turn.left_out_strands;
+  profile_.unusable_segments = turn.unusable_segments;
   return {};
 }
 

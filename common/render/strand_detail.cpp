@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
+#include <limits>
 
 #include "common/render/passes/expand_pass.h"
 #include "common/render/strand_style.h"
@@ -95,6 +96,14 @@ StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const
   detail.strand_count =
       static_cast<uint32_t>(std::min<uint64_t>(detail.strand_count, facts.max_points / points()));
   return detail;
+}
+
+uint32_t strands_without_room(const DetailFacts& facts, const LookDesc& look, const View& view,
+                              const DrawTerms& terms, const StrandDetail& detail) {
+  DetailFacts roomy = facts;
+  roomy.max_points = std::numeric_limits<uint64_t>::max() / 2;
+  const uint32_t wanted = choose_detail(roomy, look, view, terms).strand_count;
+  return wanted - std::min(wanted, detail.strand_count);
 }
 
 }  // namespace strandcast

@@ -41,4 +41,8 @@ float drawn_width_m(const DetailFacts& facts, const LookDesc& look, uint32_t dra
 StrandDetail choose_detail(const DetailFacts& facts, const LookDesc& look, const View& view,
                            const DrawTerms& terms);
 
+/// Strands that there would be without DetailFacts::max_points, beyond those of `detail`.
+uint32_t strands_without_room(const DetailFacts& facts, const LookDesc& look, const View& view,
+                              const DrawTerms& terms, const StrandDetail& detail);
+
 }  // namespace strandcast

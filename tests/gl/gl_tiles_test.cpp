@@ -112,21 +112,18 @@ TEST_F(GlTiles, AShareOfTheStrandsIsDrawnAndCounted) {
 }
 
 TEST_F(GlTiles, WithoutStrandsThereIsTheHeadAndWithoutThatTheBackground) {
-  SceneAsset bald = grown_hair(40);
-  bald.strand_count = bald.vertex_count = 0;
-  bald.rest_position_m.clear();
-  bald.triangle.clear();
-  const auto with_head = make(bald);
-  auto truth = make_tile_renderer(bald, {});
+  SceneAsset head = bald(grown_hair(40));
+  const auto with_head = make(head);
+  auto truth = make_tile_renderer(head, {});
   ASSERT_TRUE(with_head && truth);
   const PictureMask all(size_t{kSize.width} * kSize.height, 1);
-  const auto error = picture_error(draw(*with_head, bald), draw(**truth, bald), all);
+  const auto error = picture_error(draw(*with_head, head), draw(**truth, head), all);
   ASSERT_TRUE(error);
   EXPECT_GE(error->psnr_db, 50.0);
 
-  bald.head = {};
-  const auto empty = make(bald);
-  const Image background = draw(*empty, bald);
+  head.head = {};
+  const auto empty = make(head);
+  const Image background = draw(*empty, head);
   for (size_t y = 0; y < kSize.height; ++y)
     for (size_t x = 1; x < kSize.width; ++x)
       for (size_t part = 0; part < 4; ++part)
@@ -139,29 +136,20 @@ TEST_F(GlTiles, WithoutStrandsThereIsTheHeadAndWithoutThatTheBackground) {
 // ---- impossible hair
 
 TEST_F(GlTiles, ImpossibleHairGivesAFinitePicture) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  const float inf = std::numeric_limits<float>::infinity();
-  const SceneAsset whole = grown_hair(40);
-  const auto with = [&](auto change) {
-    SceneAsset asset = whole;
-    change(asset);
+  for (const SceneAsset& asset : impossible_hair()) {
     const auto renderer = make(asset);
     ASSERT_TRUE(renderer);
     const Image image = draw(*renderer, asset, {}, {96, 64});
     // The background is there: nothing spreads over the picture.
     EXPECT_GT(image.rgba[0], 40);
     EXPECT_EQ(image.rgba[3], 255);
-  };
-  with([&](SceneAsset& asset) { asset.rest_position_m[45] = glm::vec3(nan); });
-  with([&](SceneAsset& asset) { asset.rest_position_m[45] = {inf, 0.0f, -inf}; });
-  with([&](SceneAsset& asset) { asset.rest_position_m[45] = glm::vec3(1e30f); });
-  with([&](SceneAsset& asset) {
-    std::fill(asset.rest_position_m.begin(), asset.rest_position_m.end(), glm::vec3(nan));
-  });
-  with([](SceneAsset& asset) {
-    std::fill(asset.rest_position_m.begin(), asset.rest_position_m.end(), glm::vec3(0.1f));
-  });
-  with([](SceneAsset& asset) { asset.triangle.clear(); });
+    // What is left out is told as by the processor.
+    auto processor = make_tile_renderer(asset, {}, {2, simd::widest_set()});
+    ASSERT_TRUE(processor);
+    draw(**processor, asset, {}, {96, 64});
+    EXPECT_EQ(renderer->profile().unusable_segments > 0, (*processor)->profile().unusable_segments > 0);
+    EXPECT_EQ(renderer->profile().left_out_strands, 0u);
+  }
 }
 
 TEST_F(GlTiles, ExtremeLooksAndViewsGiveAPicture) {

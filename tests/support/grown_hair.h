@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <vector>
+
 #include "common/groom/groom_asset.h"
 #include "common/groom/mesh.h"
 #include "common/groom/procedural.h"
@@ -28,6 +31,25 @@ inline SceneAsset bald(SceneAsset asset) {
   asset.rest_position_m.clear();
   asset.triangle.clear();
   return asset;
+}
+
+/// Hair that cannot be, each some key strands on a head: places that are no number, too far or all one, and
+/// no triangles.
+inline std::vector<SceneAsset> impossible_hair() {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  std::vector<SceneAsset> all;
+  for (const glm::vec3 place_m : {glm::vec3(kNan), glm::vec3(kInf, 0.0f, -kInf), glm::vec3(1e30f)}) {
+    all.push_back(grown_hair(40));
+    all.back().rest_position_m[45] = place_m;
+  }
+  for (const float place_m : {kNan, 0.1f}) {
+    all.push_back(grown_hair(40));
+    all.back().rest_position_m.assign(all.back().rest_position_m.size(), glm::vec3(place_m));
+  }
+  all.push_back(grown_hair(40));
+  all.back().triangle.clear();
+  return all;
 }
 
 inline Image drawn(const SceneAsset& asset, const LookDesc& look,

@@ -54,13 +54,10 @@ class GpuPoints final : public gl::Resource {
 class TileFrame final : public gl::Resource {
  public:
   explicit TileFrame(const RenderScene& scene)
-      : Resource("tile frame", sizeof(TileBlock)),
-        facts(detail_facts(scene)),
-        lattice_desc{scene.rest.extent_m, LightLatticeDesc().cells, scene.light_volume.has_skull,
-                     scene.light_volume.skull, nullptr} {}
+      : Resource("tile frame", sizeof(TileBlock)), facts(detail_facts(scene)) {}
 
   DetailFacts facts;
-  LightLatticeDesc lattice_desc;
+  LightLatticeDesc lattice_desc;  // once expansion is prepared
   gl::Buffer uniforms;
   TileBlock block;
   LightDirections lights;
@@ -103,6 +100,7 @@ class TileExpandPass final : public RenderPass {
     if (scene_.features.has_strands.value)
       key_texels_ = gl::Texture::view_of("key position", GL_RGB32F, scene_.key_strands.position());
     frame_.uniforms = gl::Buffer("tile frame", sizeof(TileBlock));
+    frame_.lattice_desc = describe_lattice(setup.asset, scene_, kLightCells);
     const gl::DeviceLimits limits = gl::read_device_limits();
     constexpr uint64_t kTexelsPerPoint = 2;
     frame_.facts.max_points =
@@ -131,6 +129,8 @@ class TileExpandPass final : public RenderPass {
     glDispatchCompute(groups_of(frame_.detail.strand_count, shader::kStrandLocalSize), 1, 1);
     glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
     turn.drawn_strands = strands;
+    turn.left_out_strands =
+        strands_without_room(frame_.facts, scene_.look, turn.view, turn.terms, frame_.detail);
     return {};
   }
 
@@ -146,15 +146,13 @@ class TileExpandPass final : public RenderPass {
 
 class TileLightPass final : public RenderPass {
  public:
-  TileLightPass(const RenderScene& scene, TileFrame& frame, GpuPoints& points, GpuLattice& lattice)
+  TileLightPass(TileFrame& frame, GpuPoints& points, GpuLattice& lattice)
       : Pass({"render/light", {&points}, {&lattice}, true, {}}),
-        scene_(scene),
         frame_(frame),
         points_(points),
         lattice_(lattice) {}
   Status prepare(const RenderSetup& setup) override {
-    const LightLatticeDesc desc = describe_lattice(setup.asset, scene_, frame_.lattice_desc.cells);
-    return lattice_.prepare(setup.shaders, *desc.solid);
+    return lattice_.prepare(setup.shaders, *frame_.lattice_desc.solid);
   }
   Status run(RenderTurn&) override {
     points_.bind();
@@ -163,7 +161,6 @@ class TileLightPass final : public RenderPass {
   }
 
  private:
-  const RenderScene& scene_;
   TileFrame& frame_;
   GpuPoints& points_;
   GpuLattice& lattice_;
@@ -220,6 +217,10 @@ class TileBinPass final : public RenderPass {
     }
     bins_.fill(tiles, segments(), counts.pairs);
     turn.drawn_segments = counts.segments;
+    turn.unusable_segments = counts.not_finite;
+    const uint64_t no_room = frame_.detail.strand_count - frame_.block.grid.z;
+    turn.drawn_strands -= no_room;
+    turn.left_out_strands += no_room;
     return {};
   }
 
@@ -324,7 +325,7 @@ void add_tile_passes(RenderScene& scene, RenderPassList& passes) {
   auto& bins = passes.keep(std::make_unique<GpuBins>());
   passes.add(make_upload_pass(scene));
   passes.add(std::make_unique<TileExpandPass>(scene, frame, points));
-  passes.add(std::make_unique<TileLightPass>(scene, frame, points, lattice));
+  passes.add(std::make_unique<TileLightPass>(frame, points, lattice));
   passes.add(std::make_unique<TileShadePass>(frame, points, lattice));
   passes.add(std::make_unique<TileBinPass>(frame, points, bins));
   passes.add(std::make_unique<TileHeadPass>(scene));

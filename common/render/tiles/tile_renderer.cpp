@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "common/render/light_lattice.h"
@@ -100,10 +99,8 @@ class TilePass final : public RenderPass {
 Status expand(TileState& state, RenderTurn& turn) {
   if (state.expansion.key_count() == 0) return {};
   state.detail = choose_detail(state.detail_facts, state.look, turn.view, turn.terms);
-  DetailFacts roomy = state.detail_facts;
-  roomy.max_points = std::numeric_limits<uint64_t>::max() / 2;
-  const uint32_t wanted = choose_detail(roomy, state.look, turn.view, turn.terms).strand_count;
-  turn.left_out_strands = wanted - std::min(wanted, state.detail.strand_count);
+  turn.left_out_strands =
+      strands_without_room(state.detail_facts, state.look, turn.view, turn.terms, state.detail);
   state.expansion.expand(turn.strands.position_m, state.detail, state.workers, state.set, state.points);
   turn.drawn_strands = state.detail.strand_count;
   return {};
