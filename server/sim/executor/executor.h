@@ -1,0 +1,128 @@
+// Executor: what runs the strand kernels of shaders/sim and keeps the strands' state for them: OpenGL
+// (gl_executor.h), or the processors, a strand per lane of a vector register (lanes_executor.h). Solvers are
+// written against this and know neither. Planes and programs live no longer than their executor. From one
+// thread.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/scene/features.h"
+#include "server/sim/step_block.h"
+#include "server/sim/strand_layout.h"
+
+namespace strandcast::gl {
+class GpuTimer;
+}  // namespace strandcast::gl
+
+namespace strandcast {
+
+/// A vec4 for every strand in each of its rows: for most planes a row is a vertex. Outside of the executor
+/// the order is row-major with the strand fastest, (rows x strand_count).
+class StrandPlane {
+ public:
+  virtual ~StrandPlane() = default;
+  /// As many values as the plane was made of.
+  virtual void write(std::span<const glm::vec4> values) = 0;
+  /// Waits until kernels have written it; resizes `values` on first use only.
+  virtual void read(std::vector<glm::vec4>& values) const = 0;
+  virtual uint64_t size_bytes() const = 0;
+};
+
+/// Turns xyz of every element, in double; w stays.
+void turn_plane(StrandPlane& plane, const glm::dquat& turn);
+
+/// What kernels call the planes (shaders/shared/bindings.h).
+enum class PlaneRole : uint32_t {
+  Rest,
+  Position,
+  Velocity,
+  Displacement,
+  VelocityChange,
+  RodEdge,
+  RodStrand,
+  RodAxis
+};
+inline constexpr size_t kPlaneRoleCount = 8;
+/// By role; nullptr = the kernel does not touch it.
+using BoundPlanes = std::array<StrandPlane*, kPlaneRoleCount>;
+inline StrandPlane*& plane_of(BoundPlanes& planes, PlaneRole role) {
+  return planes[static_cast<size_t>(role)];
+}
+
+/// What a model's parameters are to its kernel: uniforms by name, the same in every step. What changes from
+/// step to step is in the step's block (step_block.h).
+using ModelConstants = std::map<std::string, std::variant<double, uint32_t>>;
+
+struct KernelDesc {
+  std::string shader_path;             // below shaders/
+  std::map<std::string, int> variant;  // besides COLLIDERS and HAS_TURBULENCE
+  ModelConstants constants;
+  bool meets_air = true;       // false: it has no HAS_TURBULENCE
+  bool is_per_vertex = false;  // a group takes whole strands, an invocation per vertex; else one per strand
+  uint32_t scratch_rows = 0;   // per vertex, vec4 that the kernel keeps for itself during a dispatch
+};
+
+/// A kernel with its constants, ready to run.
+class KernelProgram {
+ public:
+  virtual ~KernelProgram() = default;
+  /// Once for all strands. What it stores is there for the next run and for read().
+  virtual void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) = 0;
+  /// Of its own, scratch above all.
+  virtual uint64_t size_bytes() const = 0;
+};
+
+enum class SimDevice { Gl, Lanes };
+const char* to_string(SimDevice device);
+
+struct ExecutorInfo {
+  SimDevice device = SimDevice::Gl;
+  std::string name;         // for people: "OpenGL, NVIDIA ...", "lanes (AVX-512, 2 threads)"
+  bool is_software = true;  // it runs on processor cores
+};
+
+class Executor {
+ public:
+  virtual ~Executor() = default;
+  virtual const ExecutorInfo& info() const = 0;
+  /// Binds what it needs to the calling thread.
+  virtual Status make_current() { return {}; }
+  /// Unsupported when planes of such strands are too large for it.
+  virtual Status check_size(const StrandLayout& layout) const = 0;
+  /// (rows x strand_count) values.
+  virtual std::unique_ptr<StrandPlane> make_plane(const std::string& label, uint32_t strand_count,
+                                                  std::span<const glm::vec4> values) = 0;
+  /// Compiles where it has to. BadInput for a constant that the kernel does not declare, Unsupported for a
+  /// kernel that this executor does not run or too many strands, Internal when it does not compile.
+  virtual Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc,
+                                                              const SceneFeatures& features,
+                                                              const StrandLayout& layout) = 0;
+  /// For timing what runs on a device of its own; nullptr: a clock of the calling thread does.
+  virtual gl::GpuTimer* timer() { return nullptr; }
+};
+
+struct ExecutorConfig {
+  std::string sim_device = "auto";  // lanes unless the OpenGL device is hardware; "gl", "lanes"
+  std::string gl_device = "auto";   // as EglContext::make
+  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary. Of OpenGL only
+};
+
+/// Names that ExecutorConfig::sim_device takes: "auto", "gl", "lanes".
+bool is_sim_device_name(const std::string& name);
+/// Makes it current. "gl", and an OpenGL device that is named, fail where it is not there: Unavailable, or
+/// BadInput for an unknown name.
+Result<std::unique_ptr<Executor>> open_executor(const ExecutorConfig& config);
+
+}  // namespace strandcast
