@@ -1,16 +1,44 @@
-// Lanes: the types and functions of GLSL over eight invocations side by side, so that a law written once in
-// shaders/lib runs on the CPU as well (common/simd/laws.h). Every operation is done for every lane as a
-// scalar would do it, without contraction, so all instruction sets give the same bits. Choices are made by
-// select(), never by branches. Everything is inline; instruction sets are chosen by common/simd/variants.h.
+// Lanes: the types and functions of GLSL over invocations side by side, so that what is written once in
+// shaders/ runs on the CPU as well (common/render/laws.h, server/sim/executor/lane_kernel_private.h). Every
+// operation is done for every lane as a scalar would do it, without contraction, so all instruction sets and
+// numbers of lanes give the same bits. Choices are made by select(), never by branches. Everything is inline;
+// instruction sets are chosen by common/simd/variants.h, and numbers of lanes by who compiles a file for one
+// set: STRANDCAST_LANE_COUNT is 8 unless it says 4 or 16.
 #pragma once
 
 #include <concepts>
 #include <cstdint>
 #include <cstring>
 
-namespace strandcast::simd {
+#ifndef STRANDCAST_LANE_COUNT
+#define STRANDCAST_LANE_COUNT 8
+#endif
+// Where the compiler may use what only the wider sets have, which generic vectors do not find.
+#if defined(__AVX512F__) && STRANDCAST_LANE_COUNT == 16
+#include <immintrin.h>
+#define STRANDCAST_HAS_MASKS 1
+#else
+#define STRANDCAST_HAS_MASKS 0
+#if defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8
+#include <immintrin.h>
+#endif
+#endif
 
-inline constexpr uint32_t kLanes = 8;
+#if STRANDCAST_LANE_COUNT == 16
+#define STRANDCAST_LANE_NAMESPACE lanes16
+#elif STRANDCAST_LANE_COUNT == 8
+#define STRANDCAST_LANE_NAMESPACE lanes8
+#elif STRANDCAST_LANE_COUNT == 4
+#define STRANDCAST_LANE_NAMESPACE lanes4
+#else
+#error "there are 4, 8 or 16 lanes"
+#endif
+
+namespace strandcast::simd {
+/// Types differ with the number of lanes, and so do their names.
+inline namespace STRANDCAST_LANE_NAMESPACE {
+
+inline constexpr uint32_t kLanes = STRANDCAST_LANE_COUNT;
 
 #define STRANDCAST_LANES inline __attribute__((always_inline))
 
@@ -18,9 +46,19 @@ using FloatBits = float __attribute__((vector_size(4 * kLanes)));
 using IntBits = int32_t __attribute__((vector_size(4 * kLanes)));
 using UintBits = uint32_t __attribute__((vector_size(4 * kLanes)));
 
-/// All bits of a lane, or none.
+/// True or false in each lane. It steers no branch: lanes may differ.
 struct Bool {
-  IntBits v;
+#if STRANDCAST_HAS_MASKS
+  __mmask16 v;
+#else
+  IntBits v;  // all bits of a lane, or none
+#endif
+  template <class Other>
+  operator Other() const {
+    static_assert(sizeof(Other) == 0,
+                  "what differs between strands cannot steer if, ?:, a loop or a bool: use any_lane(), "
+                  "select() or lane_bool");
+  }
 };
 
 struct Float;
@@ -42,6 +80,7 @@ struct Float {
   STRANDCAST_LANES constexpr Float(float value) : v(FloatBits{} + value) {}
   STRANDCAST_LANES constexpr Float(double value) : v(FloatBits{} + static_cast<float>(value)) {}
   STRANDCAST_LANES constexpr Float(int value) : v(FloatBits{} + static_cast<float>(value)) {}
+  STRANDCAST_LANES constexpr Float(uint32_t value) : v(FloatBits{} + static_cast<float>(value)) {}
   /// Of values below 2^31.
   STRANDCAST_LANES explicit Float(Uint value) : v(__builtin_convertvector((IntBits)value.v, FloatBits)) {}
 };
@@ -77,6 +116,34 @@ STRANDCAST_LANES Float& operator/=(Float& a, Float b) {
   return a = a / b;
 }
 
+#if STRANDCAST_HAS_MASKS
+#define STRANDCAST_COMPARISON(op, number)                          \
+  STRANDCAST_LANES Bool operator op(Float a, Float b) {            \
+    return {_mm512_cmp_ps_mask((__m512)a.v, (__m512)b.v, number)}; \
+  }
+STRANDCAST_COMPARISON(<, _CMP_LT_OQ)
+STRANDCAST_COMPARISON(>, _CMP_GT_OQ)
+STRANDCAST_COMPARISON(<=, _CMP_LE_OQ)
+STRANDCAST_COMPARISON(>=, _CMP_GE_OQ)
+STRANDCAST_COMPARISON(==, _CMP_EQ_OQ)
+STRANDCAST_COMPARISON(!=, _CMP_NEQ_UQ)
+#undef STRANDCAST_COMPARISON
+STRANDCAST_LANES Bool operator>=(Uint a, Uint b) {
+  return {_mm512_cmp_epu32_mask((__m512i)a.v, (__m512i)b.v, _MM_CMPINT_NLT)};
+}
+STRANDCAST_LANES Bool operator&&(Bool a, Bool b) {
+  return {static_cast<__mmask16>(a.v & b.v)};
+}
+STRANDCAST_LANES Bool operator||(Bool a, Bool b) {
+  return {static_cast<__mmask16>(a.v | b.v)};
+}
+STRANDCAST_LANES Bool operator!(Bool a) {
+  return {static_cast<__mmask16>(~a.v)};
+}
+STRANDCAST_LANES Bool lanes_that(bool value) {
+  return {static_cast<__mmask16>(value ? 0xffff : 0)};
+}
+#else
 STRANDCAST_LANES Bool operator<(Float a, Float b) {
   return {a.v < b.v};
 }
@@ -89,6 +156,15 @@ STRANDCAST_LANES Bool operator<=(Float a, Float b) {
 STRANDCAST_LANES Bool operator>=(Float a, Float b) {
   return {a.v >= b.v};
 }
+STRANDCAST_LANES Bool operator==(Float a, Float b) {
+  return {a.v == b.v};
+}
+STRANDCAST_LANES Bool operator!=(Float a, Float b) {
+  return {a.v != b.v};
+}
+STRANDCAST_LANES Bool operator>=(Uint a, Uint b) {
+  return {a.v >= b.v};
+}
 STRANDCAST_LANES Bool operator&&(Bool a, Bool b) {
   return {a.v & b.v};
 }
@@ -98,6 +174,10 @@ STRANDCAST_LANES Bool operator||(Bool a, Bool b) {
 STRANDCAST_LANES Bool operator!(Bool a) {
   return {~a.v};
 }
+STRANDCAST_LANES Bool lanes_that(bool value) {
+  return {IntBits{} - (value ? 1 : 0)};
+}
+#endif
 
 STRANDCAST_LANES Uint operator+(Uint a, Uint b) {
   return a.v + b.v;
@@ -128,6 +208,26 @@ STRANDCAST_LANES Uint& operator*=(Uint& a, Uint b) {
 }
 
 // ---- functions of GLSL on one number
+#if STRANDCAST_HAS_MASKS
+STRANDCAST_LANES Float select(Bool which, Float yes, Float no) {
+  return (FloatBits)_mm512_mask_blend_ps(which.v, (__m512)no.v, (__m512)yes.v);
+}
+STRANDCAST_LANES Uint select(Bool which, Uint yes, Uint no) {
+  return (UintBits)_mm512_mask_blend_epi32(which.v, (__m512i)no.v, (__m512i)yes.v);
+}
+STRANDCAST_LANES Float min(Float a, Float b) {
+  return (FloatBits)_mm512_min_ps((__m512)a.v, (__m512)b.v);
+}  // b where one is no number
+STRANDCAST_LANES Float max(Float a, Float b) {
+  return (FloatBits)_mm512_max_ps((__m512)a.v, (__m512)b.v);
+}
+STRANDCAST_LANES Uint max(Uint a, Uint b) {
+  return (UintBits)_mm512_max_epu32((__m512i)a.v, (__m512i)b.v);
+}
+STRANDCAST_LANES Float sqrt(Float x) {
+  return (FloatBits)_mm512_sqrt_ps((__m512)x.v);
+}
+#else
 STRANDCAST_LANES Float select(Bool which, Float yes, Float no) {
   return which.v ? yes.v : no.v;
 }
@@ -140,6 +240,19 @@ STRANDCAST_LANES Float min(Float a, Float b) {
 STRANDCAST_LANES Float max(Float a, Float b) {
   return a.v > b.v ? a.v : b.v;
 }
+STRANDCAST_LANES Uint max(Uint a, Uint b) {
+  return a.v > b.v ? a.v : b.v;
+}
+STRANDCAST_LANES Float sqrt(Float x) {
+#if defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8
+  return (FloatBits)_mm256_sqrt_ps((__m256)x.v);
+#else
+  FloatBits root;
+  for (uint32_t lane = 0; lane < kLanes; ++lane) root[lane] = __builtin_sqrtf(x.v[lane]);
+  return root;
+#endif
+}
+#endif
 STRANDCAST_LANES Float clamp(Float x, Float low, Float high) {
   return min(max(x, low), high);
 }
@@ -148,11 +261,6 @@ STRANDCAST_LANES Float mix(Float a, Float b, Float share) {
 }
 STRANDCAST_LANES Float abs(Float x) {
   return (FloatBits)((UintBits)x.v & 0x7fffffffu);
-}
-STRANDCAST_LANES Float sqrt(Float x) {
-  FloatBits root;
-  for (uint32_t lane = 0; lane < kLanes; ++lane) root[lane] = __builtin_sqrtf(x.v[lane]);
-  return root;
 }
 STRANDCAST_LANES Float inversesqrt(Float x) {
   return 1.0f / sqrt(x);
@@ -218,6 +326,24 @@ STRANDCAST_LANES Float sin(Float x) {
 STRANDCAST_LANES Float cos(Float x) {
   return sine_of_quarters(x, 1);
 }
+/// Angle of (x, y), within +-pi; error below 4e-7. 0 for (0, 0).
+STRANDCAST_LANES Float atan(Float y, Float x) {
+  // The Cephes library's atanf on [0, tan(pi / 8)], of the smaller over the larger side.
+  const Float tall = abs(y);
+  const Float wide = abs(x);
+  const Float larger = max(max(tall, wide), 1e-37f);
+  const Float ratio = min(tall, wide) / larger;
+  const Bool is_steep = ratio > 0.414213562f;
+  const Float t = select(is_steep, (ratio - 1.0f) / (ratio + 1.0f), ratio);
+  const Float z = t * t;
+  const Float series = t + t * z *
+                               (-3.33329491539e-1f +
+                                z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f)));
+  Float angle = select(is_steep, 0.785398163f + series, series);
+  angle = select(tall > wide, 1.57079633f - angle, angle);
+  angle = select(x < 0.0f, 3.14159265f - angle, angle);
+  return (FloatBits)((UintBits)angle.v | ((UintBits)y.v & 0x80000000u));
+}
 
 STRANDCAST_LANES Uint floatBitsToUint(Float x) {
   return (UintBits)x.v;
@@ -225,11 +351,17 @@ STRANDCAST_LANES Uint floatBitsToUint(Float x) {
 
 // ---- beyond GLSL
 STRANDCAST_LANES bool is_any(Bool which) {
+#if STRANDCAST_HAS_MASKS
+  return which.v != 0;
+#elif defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8
+  return _mm256_movemask_ps((__m256)which.v) != 0;
+#else
   uint64_t parts[sizeof(IntBits) / sizeof(uint64_t)];
   std::memcpy(parts, &which.v, sizeof parts);
   uint64_t all = 0;
   for (const uint64_t part : parts) all |= part;
   return all != 0;
+#endif
 }
 STRANDCAST_LANES Float load_lanes(const float* from) {
   FloatBits v;
@@ -239,10 +371,12 @@ STRANDCAST_LANES Float load_lanes(const float* from) {
 STRANDCAST_LANES void store_lanes(Float x, float* to) {
   std::memcpy(to, &x.v, sizeof x.v);
 }
+#if STRANDCAST_LANE_COUNT == 8
 /// 0, 1, 2 ...
 STRANDCAST_LANES Float lane_numbers() {
   return FloatBits{0, 1, 2, 3, 4, 5, 6, 7};
 }
+#endif
 /// Towards zero, of values within +-2^31.
 STRANDCAST_LANES IntBits to_integers(Float x) {
   return __builtin_convertvector(x.v, IntBits);
@@ -264,6 +398,10 @@ struct vec3 {
   template <class Vector>
   requires requires(const Vector& v) { v.x, v.y, v.z, v[2]; }
   STRANDCAST_LANES vec3(const Vector& v) : x(v.x), y(v.y), z(v.z) {}
+  STRANDCAST_LANES Float& operator[](uint32_t axis) { return (&x)[axis]; }
+  STRANDCAST_LANES const Float& operator[](uint32_t axis) const { return (&x)[axis]; }
+  STRANDCAST_LANES vec3& xyz() { return *this; }
+  STRANDCAST_LANES const vec3& xyz() const { return *this; }
 };
 
 STRANDCAST_LANES vec2 operator+(vec2 a, vec2 b) {
@@ -361,4 +499,5 @@ STRANDCAST_LANES vec3 select(Bool which, vec3 yes, vec3 no) {
   return {select(which, yes.x, no.x), select(which, yes.y, no.y), select(which, yes.z, no.z)};
 }
 
+}  // namespace STRANDCAST_LANE_NAMESPACE
 }  // namespace strandcast::simd

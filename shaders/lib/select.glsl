@@ -5,4 +5,12 @@
 #ifndef __cplusplus
 #define LAW
 #define select(which, yes, no) ((which) ? (yes) : (no))
+// What may differ between strands, for kernels that run over lanes of strands too: it is chosen by, never branched on.
+// is_any() asks whether work is needed for one of them at least.
+#define lane_bool bool
+#define lane_uint uint
+// The same in all strands, unlike any other float.
+#define uniform_float float
+#define is_any(which) (which)
+#define lanes_that(value) (value)
 #endif

@@ -30,7 +30,7 @@ Joint joint_at(Strand strand, uint i, Frame before, vec3 turn_before, float tens
 
 // Turns segment i by its two angles; `force` is on everything beyond, `before` and `turn_before` are of the
 // segment before. Returns the way of its end.
-vec3 turned_segment(Strand strand, uint i, vec3 force, Frame before, vec3 turn_before, inout bool is_bad) {
+vec3 turned_segment(Strand strand, uint i, vec3 force, Frame before, vec3 turn_before, inout lane_bool is_bad) {
   const vec4 edge = g_along[i];
   const float segment = max(edge.w, kMinLength);
   const float tension = dot(force, edge.xyz);
@@ -58,7 +58,7 @@ vec3 turned_segment(Strand strand, uint i, vec3 force, Frame before, vec3 turn_b
 vec3 turn_at(Strand strand, uint i) { return i < strand.first ? strand.clamp_turn : g_turn[i].xyz; }
 
 // From the tip to the root: gathers the loads and, unless it is the first time, turns the segments.
-void gather(Strand strand, vec3 position, bool is_turning, inout bool is_bad) {
+void gather(Strand strand, vec3 position, bool is_turning, inout lane_bool is_bad) {
   vec4 load = vec4(0.0);
   for (uint i = strand.last; i >= strand.first; --i) {
     load += vec4(g_aim[i].w * (g_aim[i].xyz - position), g_aim[i].w);
@@ -76,7 +76,7 @@ void gather(Strand strand, vec3 position, bool is_turning, inout bool is_bad) {
 
 // There and back: a sweep that treats root and tip alike never feeds energy into the strand, whatever the
 // step; one from root to tip alone does.
-vec3 turned_chain(Strand strand, vec3 position, inout bool is_bad) {
+vec3 turned_chain(Strand strand, vec3 position, inout lane_bool is_bad) {
   gather(strand, position, false, is_bad);
   vec3 start = strand.root;
   vec3 turn_before = strand.clamp_turn;

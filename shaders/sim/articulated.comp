@@ -114,7 +114,7 @@ void solve_backward(Strand strand, vec3 position) {
 }
 
 // Turns the segments; returns the position of the last vertex.
-vec3 solve_forward(Strand strand, inout bool is_bad) {
+vec3 solve_forward(Strand strand, inout lane_bool is_bad) {
   vec3 turn_before = vec3(0.0);
   vec3 moved = vec3(0.0);
   vec3 position = strand.root;
@@ -140,7 +140,7 @@ vec3 solve_forward(Strand strand, inout bool is_bad) {
   return position;
 }
 
-vec3 turned_chain(Strand strand, vec3 position, inout bool is_bad) {
+vec3 turned_chain(Strand strand, vec3 position, inout lane_bool is_bad) {
   solve_backward(strand, position);
   return solve_forward(strand, is_bad);
 }

@@ -36,13 +36,13 @@ struct Frame {
 };
 
 vec3 any_perpendicular(vec3 direction) {
-  const vec3 other = abs(direction.x) < 0.6 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+  const vec3 other = select(abs(direction.x) < 0.6, vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0));
   return normalize(cross(direction, other));
 }
 
 vec3 direction_or(vec3 edge, vec3 otherwise) {
   const float squared = dot(edge, edge);
-  return squared > kTinySquared ? edge * inversesqrt(squared) : otherwise;
+  return select(squared > kTinySquared, edge * inversesqrt(squared), otherwise);
 }
 
 // The frame turned by the smallest rotation that brings it to another direction.
@@ -188,7 +188,7 @@ vec3 begin(Strand strand) {
     old = carried_to(old, direction_or(vertex.old - before.old, before_the_turn(groomed)));
     now = carried_to(now, direction_or(guessed_edge(before, vertex), groomed));
     const float stored = texelFetch(u_velocity, int(at)).w;
-    const float spin = is_broken(vec3(stored, 0.0, 0.0)) ? 0.0 : stored;
+    const float spin = select(is_broken(vec3(stored, 0.0, 0.0)), 0.0, stored);
     const Frame turned_now = spun(now, spin);
     g_along[i] = vec4(turned_now.along, vertex.segment);
     g_axis[i] = vec4(turned_now.axis, 0.0);
@@ -220,7 +220,7 @@ void store_pinned(uint i, uint strand) {
 
 // Positions, turned out of colliders and back to a pinned tip where need be. What the solves leave of the
 // way to a pinned tip is spread over the strand: the last segments alone would answer to every rounding.
-void finish(Strand strand, vec3 last_position, bool is_bad) {
+void finish(Strand strand, vec3 last_position, lane_bool is_bad) {
   const uint stride = u_step.shape.x;
   const uint tail = u_step.shape.w;
   vec3 anchor = vec3(0.0);
@@ -239,10 +239,10 @@ void finish(Strand strand, vec3 last_position, bool is_bad) {
     const uint at = i * stride + strand.index;
     Vertex vertex = predict(at);
     const vec3 groomed = direction_or(vertex.target - start_target, strand.clamp.along);
-    const vec3 along = is_bad ? groomed : g_along[i].xyz;
+    const vec3 along = select(is_bad, groomed, g_along[i].xyz);
     untwisted = carried_to(untwisted, along);
-    const float spin = is_bad ? 0.0 : spin_between(untwisted, Frame(along, g_axis[i].xyz));
-    const bool is_shifted = start != solved;
+    const float spin = select(is_bad, 0.0, spin_between(untwisted, Frame(along, g_axis[i].xyz)));
+    const lane_bool is_shifted = start != solved;
     solved += vertex.segment * along;
     vec3 end = solved;
 #if COLLIDERS > 0 || HAS_PINNED_TAIL
@@ -259,10 +259,10 @@ void finish(Strand strand, vec3 last_position, bool is_bad) {
 #else
     const vec3 placed_end = placed(start, start_target, vertex, anchor, reach, is_last, pushed);
     // Without contact nothing moves, not by a rounding either.
-    end = is_shifted || dot(pushed, pushed) > 0.0 ? placed_end : solved;
+    end = select(is_shifted || dot(pushed, pushed) > 0.0, placed_end, solved);
 #endif
 #endif
-    const vec3 velocity = is_bad ? vec3(0.0) : (end - vertex.old) * u_step.push.w;
+    const vec3 velocity = select(is_bad, vec3(0.0), (end - vertex.old) * u_step.push.w);
     store(at, end, vertex.arc, velocity, spin);
     start = end;
     start_target = vertex.target;
@@ -283,7 +283,7 @@ Strand make_strand(uint index) {
 }
 
 // Of the model: turns all segments once; takes and returns the position of the last vertex.
-vec3 turned_chain(Strand strand, vec3 position, inout bool is_bad);
+vec3 turned_chain(Strand strand, vec3 position, inout lane_bool is_bad);
 
 void main() {
   const uint tail = u_step.shape.w;
@@ -292,7 +292,7 @@ void main() {
   const uint first = u_step.shape.z;
   if (tail > first) {
     const Strand strand = make_strand(index);
-    bool is_bad = false;
+    lane_bool is_bad = lanes_that(false);
     vec3 position = begin(strand);
 #if HAS_PINNED_TAIL
     const uint rounds = max(u_rounds, kHeldRounds);

@@ -2,8 +2,12 @@
 #pragma variant COLLIDERS 0 1 4 16
 #include "sim/step.glsl"
 
+// Where strands are lanes, one variant does for any number of colliders.
+#ifndef LANES
+#define COLLIDER_COUNT uint(COLLIDERS)
+#endif
 // Times a vertex inside several colliders is pushed, out of the deepest first.
-const int kPushRounds = COLLIDERS > 1 ? 2 : 1;
+#define PUSH_ROUNDS (COLLIDER_COUNT > 1u ? 2 : 1)
 
 // The end of a segment turned about its start until it lies on a sphere: both equations of 003 figure 4.1 at
 // once, by the law of cosines; the nearest end that can be had when there is none. `direction` is the
@@ -17,12 +21,12 @@ vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, 
   const float cosine = clamp(along / max(2.0 * segment, kTinySquared), -1.0, 1.0);
   vec3 side = direction - axis * dot(direction, axis);
   // Straight at the centre: any side will do.
-  const vec3 other = abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
-  side = dot(side, side) > 1e-12 ? side : other;
+  const vec3 other = select(abs(axis.x) < 0.6, vec3(0.0, axis.z, -axis.y), vec3(-axis.z, 0.0, axis.x));
+  side = select(dot(side, side) > 1e-12, side, other);
   side -= axis * dot(side, axis);  // once more: a short side is made of roundings along the axis
   const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
   const vec3 end = start + segment * (cosine * axis + sine * side);
-  return squared > kTinySquared ? end : start + segment * direction;
+  return select(squared > kTinySquared, end, start + segment * direction);
 }
 
 #if COLLIDERS >= 1
@@ -31,11 +35,11 @@ vec4 deepest_collider(vec3 point) {
   vec4 deepest = vec4(0.0);
   float most = 0.0;
   // Constant count and indices: uniform loads stay scalar on llvmpipe.
-  for (uint i = 0u; i < uint(COLLIDERS); ++i) {
+  for (uint i = 0u; i < COLLIDER_COUNT; ++i) {
     const vec4 sphere = u_step.collider[i];
     const vec3 outward = point - sphere.xyz;
     const float inside = sphere.w * sphere.w - dot(outward, outward);
-    deepest = inside > most ? sphere : deepest;
+    deepest = select(inside > most, sphere, deepest);
     most = max(inside, most);
   }
   return deepest;

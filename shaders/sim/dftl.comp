@@ -8,7 +8,7 @@ uint follow_head(uint at, uint begin, uint end, uint stride) {
   for (uint i = begin; i < end; ++i) {
     const vec4 state = texelFetch(u_position, int(at));
     const vec3 target = turned_with_head(texelFetch(u_rest, int(at)).xyz);
-    const vec3 velocity = is_broken(state.xyz) ? vec3(0.0) : (target - state.xyz) * u_step.push.w;
+    const vec3 velocity = select(is_broken(state.xyz), vec3(0.0), (target - state.xyz) * u_step.push.w);
     store_vertex(at, target, state.w);
     store_velocity(at, velocity);
     at += stride;

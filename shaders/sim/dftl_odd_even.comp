@@ -68,7 +68,7 @@ void restore_lengths() {
     const vec3 along = point.xyz - leader;
     const float squared = dot(along, along);
     leader = point.xyz;
-    end += squared > kTinySquared ? along * (point.w * inversesqrt(squared)) : g_target[i] - g_target[i - 1u];
+    end += select(squared > kTinySquared, along * (point.w * inversesqrt(squared)), g_target[i] - g_target[i - 1u]);
     g_point[i].xyz = end;
   }
 }

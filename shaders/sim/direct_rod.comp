@@ -42,8 +42,8 @@ void add_joint_between(Rod rod, uint vertex, Edge before, Edge edge, vec3 joint_
                        inout Row row1, inout Row row2) {
   float per_length = 2.0 / (before.length_m + edge.length_m);
   float bending = rod.stiffness * per_length;
-  Side start = edge_side(before.direction, before.axis, joint_tangent, 1.0, before.rate, before.length_m);
-  Side end = edge_side(edge.direction, edge.axis, joint_tangent, -1.0, edge.rate, edge.length_m);
+  Side start = edge_side(before.direction, before.axis, joint_tangent, 1, before.rate, before.length_m);
+  Side end = edge_side(edge.direction, edge.axis, joint_tangent, -1, edge.rate, edge.length_m);
   if (vertex == rod.first) {
     start = clamp_side(rod.clamp_direction, rod.clamp_axis);
     bending = clamp_stiffness(rod, edge.tension, edge.length_m);
@@ -151,23 +151,26 @@ void forward(Rod rod, uint solve) {
 // What an edge behind `vertex` that is too short for a direction of its own continues; else nothing.
 vec3 direction_before(Rod rod, uint vertex, float segment) {
   vec3 direction = rod.clamp_direction;
-  if (segment > rod.shortest) return direction;
-  for (uint i = vertex; i >= rod.first; --i) {
+  lane_bool is_open = segment <= rod.shortest;
+  for (uint i = vertex; is_any(is_open) && i >= rod.first; --i) {
     const uint at = element(rod, i);
     const float length = texelFetch(u_edge, int(at)).w;
-    if (length <= rod.shortest) continue;
+    const lane_bool is_here = is_open && length > rod.shortest;
     vec3 start = target_at(at - rod.stride);
     if (i > rod.first) start = scratch(rod, kPlaneIterate, i - 1u).xyz;
-    return edge_direction(rod, scratch(rod, kPlaneIterate, i).xyz - start, at, length, direction);
+    const vec3 found =
+        edge_direction(rod, scratch(rod, kPlaneIterate, i).xyz - start, at, length, direction);
+    direction = select(is_here, found, direction);
+    is_open = is_open && !is_here;
   }
   return direction;
 }
 
 // Solves from the tip, moves the iterate and updates the tensions; true when something came out broken.
-bool backward(Rod rod) {
+lane_bool backward(Rod rod) {
   Unknown moved1 = Unknown(0.0);
   Unknown moved2 = Unknown(0.0);
-  bool is_bad = false;
+  lane_bool is_bad = lanes_that(false);
   vec4 ahead = vec4(0.0);
 #if HAS_PINNED_TAIL
   ahead = scratch(rod, kPlaneIterate, rod.tail);
@@ -267,7 +270,7 @@ void finish(Rod rod) {
 #if HAS_PINNED_TAIL
     restored = iterate.xyz;
 #else
-    const bool is_shifted = start != restored;
+    const lane_bool is_shifted = start != restored;
     restored += segment * along;
 #endif
     vec3 end = restored;
@@ -286,7 +289,7 @@ void finish(Rod rod) {
 #else
     const vec3 placed_end = placed(start, vec3(0.0), vertex, vec3(0.0), 0.0, false, pushed);
     // Without contact nothing moves, not by a rounding either.
-    end = is_shifted || dot(pushed, pushed) > 0.0 ? placed_end : restored;
+    end = select(is_shifted || dot(pushed, pushed) > 0.0, placed_end, restored);
 #endif
 #endif
     const vec3 velocity = rate_at(rod, restored, node);
@@ -310,26 +313,32 @@ void finish(Rod rod) {
   }
 }
 
-// A broken strand starts again from the groomed shape, without twist.
-void reset(Rod rod) {
+// A broken strand starts again from the groomed shape, without twist. Of strands that are not, what finish()
+// stored stays.
+void reset(Rod rod, lane_bool is_bad) {
   vec3 before = rod.clamp_direction;
   vec3 axis = rod.clamp_axis;
   for (uint i = 0u; i < u_step.shape.y; ++i) {
     const uint at = element(rod, i);
     const vec3 target = target_at(at);
-    store_node(at, target, u_step.head_velocity.xyz, 0.0, vec3(0.0), vec3(0.0));
+    const vec4 position = texelFetch(u_position, int(at));
+    b_position.position[at] = vec4(select(is_bad, target, position.xyz), position.w);
+    b_velocity.velocity[at] =
+        select(is_bad, vec4(u_step.head_velocity.xyz, 0.0), texelFetch(u_velocity, int(at)));
+    b_displacement.value[at] = select(is_bad, vec4(0.0), texelFetch(u_displacement, int(at)));
+    b_velocity_change.value[at] = select(is_bad, vec4(0.0), texelFetch(u_velocity_change, int(at)));
 #if HAS_TWIST
     if (i >= rod.first) {
       const vec3 edge = target - target_at(at - rod.stride);
       const float segment = texelFetch(u_edge, int(at)).w;
-      const vec3 direction = segment > rod.shortest ? normalize(edge) : before;
+      const vec3 direction = select(segment > rod.shortest, normalize(edge), before);
       const vec3 c = i == rod.first ? vec3(0.0, 0.0, 1.0) : texelFetch(u_edge, int(at)).xyz;
       const vec3 tangent = c.x * axis + c.y * cross(before, axis) + c.z * before;
       const vec3 unstrained = 2.0 * dot(tangent, before) * tangent - before;
       axis = carried_axis(carried_axis(axis, before, unstrained), unstrained, direction);
       before = direction;
     }
-    b_axis.value[at] = vec4(axis, 0.0);
+    b_axis.value[at] = select(is_bad, vec4(axis, 0.0), texelFetch(u_axis, int(at)));
 #endif
   }
 }
@@ -345,14 +354,12 @@ Rod make_rod(uint strand) {
   rod.h = u_step.head_velocity.w;
   rod.inverse_h = u_step.push.w;
   rod.history_h = texelFetch(u_velocity, int(strand)).w;
-  rod.now = 1.0;
-  rod.before = 0.0;
-  rod.ratio = 0.0;
-  if (u_order > 1u && rod.history_h > 0.0 && rod.h <= kMaxStepRatio * rod.history_h) {
-    rod.ratio = rod.h / rod.history_h;
-    rod.now = (1.0 + 2.0 * rod.ratio) / (1.0 + rod.ratio);
-    rod.before = rod.ratio * rod.ratio / (1.0 + rod.ratio);
-  }
+  const lane_bool has_history =
+      u_order > 1u && rod.history_h > 0.0 && rod.h <= kMaxStepRatio * rod.history_h;
+  const float ratio = rod.h / rod.history_h;
+  rod.ratio = select(has_history, ratio, 0.0);
+  rod.now = select(has_history, (1.0 + 2.0 * ratio) / (1.0 + ratio), 1.0);
+  rod.before = select(has_history, ratio * ratio / (1.0 + ratio), 0.0);
   const vec4 clamp_and_mean = texelFetch(u_strand, int(strand));
   rod.clamp_direction = turned_with_head(clamp_and_mean.xyz);
   const vec4 axis_and_shortest = texelFetch(u_strand, int(rod.stride + strand));
@@ -383,14 +390,11 @@ void main() {
   const uint strand = u_strand_begin + gl_GlobalInvocationID.x;
   if (strand >= u_strand_end) return;
   const Rod rod = make_rod(strand);
-  bool is_bad = false;
+  lane_bool is_bad = lanes_that(false);
   for (uint solve = 0u; solve < u_solves; ++solve) {
     if (rod.tail > rod.first) forward(rod, solve);
     if (rod.tail > rod.first) is_bad = backward(rod) || is_bad;
   }
-  if (is_bad) {
-    reset(rod);
-  } else {
-    finish(rod);
-  }
+  if (is_any(!is_bad)) finish(rod);
+  if (is_any(is_bad)) reset(rod, is_bad);
 }

@@ -39,8 +39,8 @@ Side clamp_side(vec3 direction, vec3 axis) {
 #if HAS_TWIST
 
 // What the frame of an edge carries to the joint before it (sign = -1) or behind it (sign = 1).
-Side edge_side(vec3 direction, vec3 axis, vec3 joint_tangent, float sign, vec4 rate, float soft) {
-  const vec3 tangent = sign * (joint_tangent.x * axis + joint_tangent.y * cross(direction, axis)) +
+Side edge_side(vec3 direction, vec3 axis, vec3 joint_tangent, int sign, vec4 rate, float soft) {
+  const vec3 tangent = float(sign) * (joint_tangent.x * axis + joint_tangent.y * cross(direction, axis)) +
                        joint_tangent.z * direction;
   return Side(direction, tangent, carried_axis(axis, direction, tangent), rate, soft, 0.0);
 }
@@ -49,7 +49,7 @@ Side edge_side(vec3 direction, vec3 axis, vec3 joint_tangent, float sign, vec4 r
 // frame by t x e / length without spin, and the tangent v by t x e x v = e (t.v) - t (e.v); twist turns about
 // `mean`.
 mat4 response(Side side, vec3 mean, float bend_scale, float twist_scale) {
-  const float per_length = side.length_m > 0.0 ? 1.0 / side.length_m : 0.0;
+  const float per_length = select(side.length_m > 0.0, 1.0 / side.length_m, 0.0);
   const vec3 t = side.direction;
   const float bend = bend_scale * per_length;
   const float twist = twist_scale * per_length;
@@ -115,9 +115,9 @@ void add_joint(Rod rod, Side before, Side after, float bending, float twisting, 
 
 // The frame behind the joint is not needed: the tangent is the edge's direction, and the edge before carries
 // the rest direction.
-Side edge_side(vec3 direction, vec3 axis, vec3 rest, float sign, vec4 rate, float soft) {
+Side edge_side(vec3 direction, vec3 axis, vec3 rest, int sign, vec4 rate, float soft) {
   const vec3 tangent =
-      sign > 0.0 ? rest.x * axis + rest.y * cross(direction, axis) + rest.z * direction : direction;
+      sign > 0 ? rest.x * axis + rest.y * cross(direction, axis) + rest.z * direction : direction;
   return Side(direction, tangent, axis, rate, soft, 0.0);
 }
 
@@ -130,8 +130,8 @@ void add_joint(Rod rod, Side before_side, Side after_side, float bending, float 
   float weight = bending * angle_per_sine(min(0.25 * dot(d, d), kMaxHalfSineSquared));
   const float along = dot(before, rest);
   const vec3 side = rest - along * before;
-  const float to_before = before_side.length_m > 0.0 ? 1.0 / before_side.length_m : 0.0;
-  const float to_after = after_side.length_m > 0.0 ? 1.0 / after_side.length_m : 0.0;
+  const float to_before = select(before_side.length_m > 0.0, 1.0 / before_side.length_m, 0.0);
+  const float to_after = select(after_side.length_m > 0.0, 1.0 / after_side.length_m, 0.0);
 
   const vec3 moved_before =
       (before_side.rate.xyz - before * dot(before, before_side.rate.xyz)) * to_before;

@@ -95,10 +95,12 @@ Node load_node(Rod rod, uint at) {
   node.displacement = texelFetch(u_displacement, int(at)).xyz;
   node.velocity_change = texelFetch(u_velocity_change, int(at)).xyz;
   const vec3 relative = node.velocity - u_step.head_velocity.xyz;
-  if (dot(relative, relative) > u_step.style.w * u_step.style.w) {
-    node.velocity = u_step.head_velocity.xyz + within_speed_limit(relative);
-    node.displacement = rod.history_h * node.velocity;
-    node.velocity_change = vec3(0.0);
+  const lane_bool is_fast = dot(relative, relative) > u_step.style.w * u_step.style.w;
+  if (is_any(is_fast)) {
+    const vec3 limited = u_step.head_velocity.xyz + within_speed_limit(relative);
+    node.velocity = select(is_fast, limited, node.velocity);
+    node.displacement = select(is_fast, rod.history_h * limited, node.displacement);
+    node.velocity_change = select(is_fast, vec3(0.0), node.velocity_change);
   }
   return node;
 }
@@ -109,9 +111,12 @@ vec3 target_at(uint at) { return turned_with_head(texelFetch(u_rest, int(at)).xy
 // that of the edge before where it has no length to speak of.
 vec3 edge_direction(Rod rod, vec3 edge, uint at, float segment, vec3 before) {
   const float squared = dot(edge, edge);
-  if (segment > rod.shortest && squared > kTinySquared) return edge * inversesqrt(squared);
-  if (segment <= rod.shortest) return before;
-  return normalize(target_at(at) - target_at(at - rod.stride));
+  const lane_bool is_long = segment > rod.shortest;
+  const lane_bool has_direction = is_long && squared > kTinySquared;
+  const vec3 direction = edge * inversesqrt(squared);
+  if (!is_any(!has_direction)) return direction;
+  const vec3 groomed = normalize(target_at(at) - target_at(at - rod.stride));
+  return select(has_direction, direction, select(is_long, groomed, before));
 }
 
 vec3 carried_axis(vec3 axis, vec3 from, vec3 to) {

@@ -27,7 +27,7 @@ layout(std430, binding = kBindingRodAxis) writeonly restrict buffer AxisBlock { 
 const float kFoldedBack = 1e-6;
 
 vec3 any_side(vec3 axis) {
-  return abs(axis.x) < 0.6 ? vec3(0.0, axis.z, -axis.y) : vec3(-axis.z, 0.0, axis.x);
+  return select(abs(axis.x) < 0.6, vec3(0.0, axis.z, -axis.y), vec3(-axis.z, 0.0, axis.x));
 }
 
 // Cosine and sine of the angle from `axis` towards `side` at which a segment may stand: the limit, or less
@@ -37,18 +37,21 @@ vec3 any_side(vec3 axis) {
 vec2 held_angle(vec3 start, vec3 axis, vec3 side, float segment) {
   vec2 angle = vec2(u_step.follicle_cosine, u_step.follicle_sine);
 #if COLLIDERS >= 1
-  for (uint i = 0u; i < uint(COLLIDERS); ++i) {
+  for (uint i = 0u; i < COLLIDER_COUNT; ++i) {
     const vec4 sphere = u_step.collider[i];
     const vec3 away = start - sphere.xyz;
     const vec2 part = vec2(dot(away, axis), dot(away, side));
     // The end is outside where dot(direction, part) is at least this.
     const float least = (sphere.w * sphere.w - dot(away, away) - segment * segment) / (2.0 * segment);
-    if (!(sphere.w > 0.0) || part.x < least || dot(angle, part) >= least) continue;
+    const lane_bool is_in_the_way =
+        sphere.w > 0.0 && !(part.x < least) && !(dot(angle, part) >= least);
+    if (!is_any(is_in_the_way)) continue;
     const float reach = max(dot(part, part), kTinySquared);
     const float along = clamp(least * inversesqrt(reach), -1.0, 1.0);
     const vec2 turned = vec2(along, sqrt(1.0 - along * along));
-    angle = vec2(part.x * turned.x - part.y * turned.y, part.y * turned.x + part.x * turned.y) *
-            inversesqrt(reach);
+    const vec2 held = vec2(part.x * turned.x - part.y * turned.y, part.y * turned.x + part.x * turned.y) *
+                      inversesqrt(reach);
+    angle = select(is_in_the_way, held, angle);
   }
 #endif
   return angle;
@@ -57,28 +60,30 @@ vec2 held_angle(vec3 start, vec3 axis, vec3 side, float segment) {
 // `next` out of the colliders, at its distance from the vertex before it.
 vec3 outside(vec3 start, vec3 next) {
 #if COLLIDERS >= 1
-  for (int round = 0; round < kPushRounds; ++round) {
+  for (int round = 0; round < PUSH_ROUNDS; ++round) {
     const vec4 deepest = deepest_collider(next);
-    if (!(deepest.w > 0.0)) break;
+    const lane_bool is_inside = deepest.w > 0.0;
+    if (!is_any(is_inside)) break;
     const vec3 edge = next - start;
     const float segment = sqrt(max(dot(edge, edge), kTinySquared));
-    next = turned_onto_sphere(start, edge / segment, segment, deepest.xyz, deepest.w);
+    next = select(is_inside, turned_onto_sphere(start, edge / segment, segment, deepest.xyz, deepest.w), next);
   }
 #endif
   return next;
 }
 
 #if MEMORY == 2
-void turn_axis(uint at, vec3 from, vec3 to) {
+void turn_axis(lane_bool is_held, uint at, vec3 from, vec3 to) {
   const float squared = min(dot(from, from), dot(to, to));
-  if (!(squared > kTinySquared)) return;
+  const lane_bool is_turned = is_held && squared > kTinySquared;
+  if (!is_any(is_turned)) return;
   from = normalize(from);
   to = normalize(to);
   const vec4 axis = texelFetch(u_axis, int(at));
   const float sum = max(1.0 + dot(from, to), kFoldedBack);
   vec3 turned = axis.xyz - (dot(axis.xyz, to) / sum) * (from + to);
   turned -= to * dot(turned, to);
-  b_axis.value[at] = vec4(normalize(turned), axis.w);
+  b_axis.value[at] = vec4(select(is_turned, normalize(turned), axis.xyz), axis.w);
 }
 #endif
 
@@ -115,20 +120,22 @@ void main() {
   const float squared = dot(edge, edge);
   const float groomed_squared = dot(groomed, groomed);
   // No length has no direction, and what is no number is not this pass's to mend.
-  const bool is_outside = dot(edge, groomed) < u_step.follicle_cosine * sqrt(squared * groomed_squared);
-  if (!is_outside || !(min(squared, groomed_squared) > kTinySquared) || is_broken(edge)) return;
+  const lane_bool is_held = dot(edge, groomed) < u_step.follicle_cosine * sqrt(squared * groomed_squared) &&
+                            min(squared, groomed_squared) > kTinySquared && !is_broken(edge);
+  if (!is_any(is_held)) return;
 
   const vec3 axis = groomed * inversesqrt(groomed_squared);
   vec3 side = edge - axis * dot(edge, axis);
-  side = dot(side, side) > 1e-12 * squared ? normalize(side) : any_side(axis);
+  side = select(dot(side, side) > 1e-12 * squared, normalize(side), any_side(axis));
   side = normalize(side - axis * dot(side, axis));  // a short side is made of roundings
   const float segment = sqrt(squared);
   const vec2 angle = held_angle(start, axis, side, segment);
-  vec3 shift = start + segment * (angle.x * axis + angle.y * side) - position.xyz;
+  const vec3 held = start + segment * (angle.x * axis + angle.y * side);
+  vec3 shift = select(is_held, held - position.xyz, vec3(0.0));
 
   take_velocity(at, position.xyz, shift);
 #if MEMORY == 2
-  turn_axis(at, edge, edge + shift);
+  turn_axis(is_held, at, edge, edge + shift);
 #endif
   vec3 before = position.xyz;
   vec3 now = before + shift;
@@ -137,12 +144,13 @@ void main() {
     at += stride;
     position = texelFetch(u_position, int(at));
     const vec3 next = position.xyz + shift;
-    const vec3 end = outside(now, next);
+    const vec3 end = select(is_held, outside(now, next), next);
     // Without contact nothing turns, not by a rounding either.
-    if (end != next) {
-      shift = end - position.xyz;
+    const lane_bool is_moved = end != next;
+    if (is_any(is_moved)) {
+      shift = select(is_moved, end - position.xyz, shift);
 #if MEMORY == 2
-      turn_axis(at, position.xyz - before, end - now);
+      turn_axis(is_moved, at, position.xyz - before, end - now);
 #endif
     }
     move_vertex(at, position, shift);

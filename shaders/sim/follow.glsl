@@ -5,6 +5,10 @@
 #include "lib/hash.glsl"
 #include "sim/collider.glsl"
 
+#ifndef LANES
+#define GUST_COUNT kMaxGustWaves
+#endif
+
 struct Vertex {
   vec3 target;     // groomed shape, turned with the head
   float segment;   // rest length of the segment before it
@@ -21,7 +25,7 @@ vec2 g_thickness = vec2(1.0);
 
 void set_thickness(uint strand) {
   const uvec3 bits = floatBitsToUint(texelFetch(u_rest, int(strand)).xyz);
-  const uint hash = mix_u32(mix_u32(mix_u32(bits.x) ^ bits.y) ^ bits.z);
+  const lane_uint hash = mix_u32(mix_u32(mix_u32(bits.x) ^ bits.y) ^ bits.z);
   const float thickness = 1.0 + u_step.contact.w * (2.0 * unit_float(hash) - 1.0);
   g_thickness = vec2(thickness * thickness, 1.0 / (thickness * thickness));
 }
@@ -37,7 +41,7 @@ vec3 taken_back(vec3 correction, vec3 along) {
 vec3 gust_velocity(vec3 point) {
   vec3 gust = vec3(0.0);
 #if HAS_TURBULENCE
-  for (uint i = 0u; i < kMaxGustWaves; ++i) {
+  for (uint i = 0u; i < GUST_COUNT; ++i) {
     const vec4 amplitude = u_step.gust_amplitude[i];
     gust += amplitude.xyz * sin(dot(u_step.gust_wave[i].xyz, point) - amplitude.w);
   }
@@ -52,10 +56,10 @@ Vertex vertex_from(uint at, vec3 stored, float arc, vec3 stored_velocity) {
   vertex.target = turned_with_head(rest.xyz);
   vertex.segment = rest.w;
   vertex.arc = arc;
-  const bool is_sane = !is_broken(stored) && !is_broken(stored_velocity);
-  vertex.old = is_sane ? stored : vertex.target;
+  const lane_bool is_sane = !is_broken(stored) && !is_broken(stored_velocity);
+  vertex.old = select(is_sane, stored, vertex.target);
   vertex.predicted = vertex.old;
-  vertex.velocity = is_sane ? stored_velocity - u_step.head_velocity.xyz : vec3(0.0);
+  vertex.velocity = select(is_sane, stored_velocity - u_step.head_velocity.xyz, vec3(0.0));
   vertex.inertia = 1.0;
   return vertex;
 }
@@ -120,28 +124,30 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float rea
   float squared = dot(along, along);
   // No direction to keep: take the groomed one.
   const vec3 groomed = vertex.target - start_target;
-  const bool has_direction = squared > kTinySquared;
-  along = has_direction ? along : groomed;
-  squared = has_direction ? squared : max(dot(groomed, groomed), kTinySquared);
+  const lane_bool has_direction = squared > kTinySquared;
+  along = select(has_direction, along, groomed);
+  squared = select(has_direction, squared, max(dot(groomed, groomed), kTinySquared));
   vec3 direction = along * inversesqrt(squared);
   vec3 end = start + vertex.segment * direction;
 
 #if COLLIDERS >= 1
-  for (int round = 0; round < kPushRounds; ++round) {
+  for (int round = 0; round < PUSH_ROUNDS; ++round) {
     const vec4 deepest = deepest_collider(end);
-    if (!(deepest.w > 0.0)) break;
+    const lane_bool is_inside = deepest.w > 0.0;
+    if (!is_any(is_inside)) break;
     const float per_segment = 1.0 / max(vertex.segment, kTinySquared);
     const vec3 held = (held_by_friction(vertex.old, end, deepest) - start) * per_segment;
     const vec3 turned = turned_onto_sphere(start, held, vertex.segment, deepest.xyz, deepest.w);
-    pushed += turned - end;
-    end = turned;
-    direction = (end - start) * per_segment;
+    pushed = select(is_inside, pushed + (turned - end), pushed);
+    end = select(is_inside, turned, end);
+    direction = select(is_inside, (turned - start) * per_segment, direction);
   }
 #endif
 
 #if HAS_PINNED_TAIL
-  if (is_last || distance(end, anchor) > reach) {
-    end = turned_onto_sphere(start, direction, vertex.segment, anchor, reach);
+  const lane_bool is_too_far = is_last || distance(end, anchor) > reach;
+  if (is_any(is_too_far)) {
+    end = select(is_too_far, turned_onto_sphere(start, direction, vertex.segment, anchor, reach), end);
   }
 #endif
   return end;

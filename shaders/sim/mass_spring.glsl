@@ -30,9 +30,9 @@ float soft_length(float segment) { return max(segment, u_shortest_segment); }
 // Velocity before the substep relative to the head joint, as predict() sees it.
 vec3 velocity_before(uint at, bool is_free) {
   const vec3 stored = texelFetch(u_velocity, int(at)).xyz;
-  const bool is_sane = !is_broken(stored) && !is_broken(texelFetch(u_position, int(at)).xyz);
+  const lane_bool is_sane = !is_broken(stored) && !is_broken(texelFetch(u_position, int(at)).xyz);
   const vec3 with_head = (target_at(at) - position_before(at)) * u_step.push.w;
-  return is_free ? (is_sane ? stored - u_step.head_velocity.xyz : vec3(0.0)) : with_head;
+  return is_free ? select(is_sane, stored - u_step.head_velocity.xyz, vec3(0.0)) : with_head;
 }
 
 // How hard a vertex holds to its prediction: inertia, drag and pull.
@@ -45,14 +45,14 @@ float hold(float arc) {
 // The vector's direction, or the other one where it has none.
 vec3 direction_of(vec3 vector, vec3 other) {
   const float squared = dot(vector, vector);
-  return squared > kTinySquared ? vector * inversesqrt(squared) : other;
+  return select(squared > kTinySquared, vector * inversesqrt(squared), other);
 }
 
 // Quaternion of the smallest turn between two directions.
 vec4 smallest_turn(vec3 from, vec3 to) {
   const vec4 turn = vec4(cross(from, to), 1.0 + dot(from, to));
-  const vec3 side = abs(from.x) < 0.6 ? vec3(0.0, from.z, -from.y) : vec3(-from.z, 0.0, from.x);
-  return normalize(turn.w > kFoldedBack ? turn : vec4(side, 0.0));
+  const vec3 side = select(abs(from.x) < 0.6, vec3(0.0, from.z, -from.y), vec3(-from.z, 0.0, from.x));
+  return normalize(select(turn.w > kFoldedBack, turn, vec4(side, 0.0)));
 }
 
 vec3 turned_by(vec4 turn, vec3 vector) {

@@ -116,11 +116,11 @@ void main() {
     const vec3 impulse = g_force[i].xyz * (h / (g_point[i].w * hold(vertex.arc)));
     const vec3 velocity = within_speed_limit((vertex.predicted - vertex.old) * u_step.push.w + impulse);
     const vec3 solved = g_point[i].xyz + ((1.0 - u_middle) * h) * velocity;
-    const bool is_bad = is_broken(solved);
-    const vec3 end =
-        is_bad ? vertex.target : finished(at, start, start_target, solved, vertex.segment, vertex.arc);
+    const lane_bool is_bad = is_broken(solved);
+    const vec3 end = select(
+        is_bad, vertex.target, finished(at, start, start_target, solved, vertex.segment, vertex.arc));
     store_vertex(at, end, vertex.arc);
-    store_velocity(at, is_bad ? vec3(0.0) : velocity + (end - solved) * u_step.push.w);
+    store_velocity(at, select(is_bad, vec3(0.0), velocity + (end - solved) * u_step.push.w));
     start = end;
     start_target = vertex.target;
   }

@@ -349,11 +349,11 @@ void forward(uint strand, uint solve) {
 }
 
 // Solves from the tip and moves the iterate; true when something came out broken.
-bool backward() {
+lane_bool backward() {
   vec3 moved1 = vec3(0.0);
   vec3 moved2 = vec3(0.0);
   vec3 moved3 = vec3(0.0);
-  bool is_bad = false;
+  lane_bool is_bad = lanes_that(false);
   for (uint i = u_step.shape.w; i-- > u_step.shape.z;) {
     const uint begin = i * kReach * 3u;
     const vec4 n0 = g_solved[begin];
@@ -375,7 +375,7 @@ bool backward() {
   return is_bad;
 }
 
-void finish(uint strand, bool is_bad) {
+void finish(uint strand, lane_bool is_bad) {
   const uint first = u_step.shape.z;
   const uint tail = u_step.shape.w;
   store_pinned(strand, 0u, first);
@@ -388,9 +388,10 @@ void finish(uint strand, bool is_bad) {
     const float segment = texelFetch(u_rest, int(at)).w;
     const vec3 old = position_before(at);
     // A broken strand starts again from the groomed shape.
-    const vec3 end = is_bad ? target : finished(at, start, start_target, g_point[i].xyz, segment, arc);
+    const vec3 solved = finished(at, start, start_target, g_point[i].xyz, segment, arc);
+    const vec3 end = select(is_bad, target, solved);
     store_vertex(at, end, arc);
-    store_velocity(at, is_bad ? vec3(0.0) : (end - old) * u_step.push.w);
+    store_velocity(at, select(is_bad, vec3(0.0), (end - old) * u_step.push.w));
     start = end;
     start_target = target;
   }
@@ -400,7 +401,7 @@ void finish(uint strand, bool is_bad) {
 void main() {
   const uint strand = gl_GlobalInvocationID.x;
   if (strand >= u_step.shape.x) return;
-  bool is_bad = false;
+  lane_bool is_bad = lanes_that(false);
   for (uint solve = 0u; solve < u_solves; ++solve) {
     if (u_step.shape.w > u_step.shape.z) forward(strand, solve);
     is_bad = backward() || is_bad;

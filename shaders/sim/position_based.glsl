@@ -24,13 +24,13 @@ struct Link {
 vec4 g_point[kMaxVertexCount];  // w = segment before
 Link g_link[kMaxVertexCount];
 
-float inverse_mass(uint vertex) {
+uniform_float inverse_mass(uint vertex) {
   const bool is_pinned = vertex < u_step.shape.z || vertex >= u_step.shape.w;
   return is_pinned ? 0.0 : (vertex + 1u == u_step.shape.y ? 2.0 : 1.0);
 }
 
 // How far the constraint pushes masses of 1 apart.
-float push_apart(float error, float weights, float give, inout float multiplier) {
+float push_apart(float error, uniform_float weights, float give, inout float multiplier) {
 #if IS_COMPLIANT
   const float push = (-error - give * multiplier) / max(weights + give, kTinySquared);
   multiplier += push;
@@ -60,13 +60,13 @@ void sweep(uint strand, uint last, vec2 give) {
     const vec4 state = g_point[i];
     vec3 c = state.xyz;
     Link link = g_link[i];
-    const float w_a = i >= 2u ? inverse_mass(i - 2u) : 0.0;
-    const float w_b = inverse_mass(i - 1u);
-    const float w_c = inverse_mass(i);
+    const uniform_float w_a = i >= 2u ? inverse_mass(i - 2u) : 0.0;
+    const uniform_float w_b = inverse_mass(i - 1u);
+    const uniform_float w_c = inverse_mass(i);
     if (i >= 2u && w_a + w_c > 0.0) {
       const vec3 along = c - a;
       const float squared = dot(along, along);
-      const vec3 direction = squared > kTinySquared ? along * inversesqrt(squared) : vec3(0.0);
+      const vec3 direction = select(squared > kTinySquared, along * inversesqrt(squared), vec3(0.0));
       const float push = push_apart(sqrt(squared) - link.span, w_a + w_c, give.y, link.bend);
       a -= (w_a * push) * direction;
       c += (w_c * push) * direction;
@@ -76,8 +76,9 @@ void sweep(uint strand, uint last, vec2 give) {
       const float squared = dot(along, along);
       vec3 direction = along * inversesqrt(max(squared, kTinySquared));
       // A loop of one round rather than an if: llvmpipe skips it when no lane needs it.
-      for (bool is_lost = squared <= kTinySquared; is_lost; is_lost = false) {
-        direction = groomed_direction(i * u_step.shape.x + strand);
+      const lane_bool is_lost = squared <= kTinySquared;
+      for (bool is_any_lost = is_any(is_lost); is_any_lost; is_any_lost = false) {
+        direction = select(is_lost, groomed_direction(i * u_step.shape.x + strand), direction);
       }
       const float push = push_apart(sqrt(squared) - state.w, w_b + w_c, give.x, link.stretch);
       b -= (w_b * push) * direction;

@@ -31,7 +31,7 @@ struct Shock {
   float kept;     // of a velocity against the head's, after damping
 };
 
-float inverse_mass(uint vertex) {
+uniform_float inverse_mass(uint vertex) {
   return vertex < u_step.shape.z || vertex >= u_step.shape.w ? 0.0 : 1.0;
 }
 
@@ -49,10 +49,9 @@ Shock shock_of(uint strand) {
   shock.velocity = root.velocity;
   const vec3 now = rigid_velocity(root.old);
   // A broken root knows nothing of the step before.
-  if (is_broken(texelFetch(u_position, int(strand)).xyz) ||
-      is_broken(texelFetch(u_velocity, int(strand)).xyz)) {
-    shock.velocity = now;
-  }
+  const lane_bool is_lost = is_broken(texelFetch(u_position, int(strand)).xyz) ||
+                            is_broken(texelFetch(u_velocity, int(strand)).xyz);
+  shock.velocity = select(is_lost, now, shock.velocity);
   shock.root = root.old;
   const float acceleration = length(now - shock.velocity) * u_step.push.w;
   shock.fast = clamp(acceleration / u_fast - 1.0, 0.0, 1.0);
@@ -90,7 +89,7 @@ void advance(inout Vertex vertex, vec3 velocity, vec3 along) {
 // The unit vector, or `otherwise` for a vector without direction.
 vec3 direction_of(vec3 along, vec3 otherwise) {
   const float squared = dot(along, along);
-  return squared > kTinySquared ? along * inversesqrt(squared) : otherwise;
+  return select(squared > kTinySquared, along * inversesqrt(squared), otherwise);
 }
 
 // The vector turned as the shortest turn from one unit vector to another: mirrored twice.
@@ -110,8 +109,8 @@ void hold_shape(uint last, float give, float relaxation) {
     const vec4 state = g_point[i];
     vec3 b = state.xyz;
     const vec3 groomed = g_groomed[i];
-    const float w_a = inverse_mass(i - 1u);
-    const float w_b = inverse_mass(i);
+    const uniform_float w_a = inverse_mass(i - 1u);
+    const uniform_float w_b = inverse_mass(i);
     const vec3 wanted = state.w * turned_from_to(groomed_before, before, groomed);
     const vec3 multiplier = g_multiplier[i];
     vec3 push = -(b - a - wanted + give * multiplier) / (w_a + w_b + give);
@@ -127,12 +126,12 @@ void hold_shape(uint last, float give, float relaxation) {
   g_point[last].xyz = a;
 }
 
-void project_length(inout vec3 a, inout vec3 b, float w_a, float w_b, float segment, vec3 groomed) {
+void project_length(inout vec3 a, inout vec3 b, uniform_float w_a, uniform_float w_b, float segment, vec3 groomed) {
   const vec3 along = b - a;
   const float squared = dot(along, along);
-  const bool has_direction = squared > kTinySquared;
+  const lane_bool has_direction = squared > kTinySquared;
   const float inverse = inversesqrt(max(squared, kTinySquared));
-  const vec3 direction = has_direction ? along * inverse : groomed;
+  const vec3 direction = select(has_direction, along * inverse, groomed);
   const float share = (squared * inverse - segment) / max(w_a + w_b, 1.0);
   a += (w_a * share) * direction;
   b -= (w_b * share) * direction;
@@ -147,7 +146,7 @@ void hold_lengths(uint last) {
     vec3 a = state.xyz;
     vec3 b = a;
     const uint next = min(i + 1u, last);
-    const float w_a = inverse_mass(i);
+    const uniform_float w_a = inverse_mass(i);
     if (next > i) {
       const vec4 next_state = g_point[next];
       b = next_state.xyz;

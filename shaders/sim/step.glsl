@@ -3,6 +3,7 @@
 // strands.
 #include "shared/limits.h"
 #include "shared/bindings.h"
+#include "lib/select.glsl"
 
 layout(std140, binding = kBindingStep) uniform StepBlock {
   vec4 world_from_head[3];  // columns; w unused
@@ -42,7 +43,7 @@ const float kTinySquared = 1e-20;
 
 // True for NaN, infinity and absurdly large numbers (2^40 and up). By bits: compilers may turn comparisons
 // around, which changes what they say about NaN.
-bool is_broken(vec3 value) {
+lane_bool is_broken(vec3 value) {
   const uvec3 magnitude = floatBitsToUint(value) & 0x7fffffffu;
   return max(max(magnitude.x, magnitude.y), magnitude.z) >= 0x53800000u;
 }
@@ -60,7 +61,7 @@ vec3 carried_by_head(vec3 point) {
 vec3 within_speed_limit(vec3 velocity) {
   const float limit = u_step.style.w;
   const float squared = dot(velocity, velocity);
-  return squared > limit * limit ? velocity * (limit * inversesqrt(squared)) : velocity;
+  return select(squared > limit * limit, velocity * (limit * inversesqrt(squared)), velocity);
 }
 
 void store_vertex(uint at, vec3 position, float arc) { b_position.position[at] = vec4(position, arc); }

@@ -23,7 +23,7 @@ vec3 tractrix_turn(vec3 direction, vec3 shift, float segment) {
   const vec3 along = shift * inverse;
   const float x = squared * inverse / max(segment, kTinyLength);
   const float series = x * (1.0 - x * (1.0 / 2.0) * (1.0 - x * (1.0 / 3.0) * (1.0 - x * (1.0 / 4.0))));
-  const float lost = x < kSeriesBelow ? series : 1.0 - exp(-x);  // 1 - E
+  const float lost = select(x < kSeriesBelow, series, 1.0 - exp(-x));  // 1 - E
   const float kept = 1.0 - lost;
   // From the difference of the two unit vectors, so that a is exact where it is small: there a rounding is
   // what the push lets grow.
@@ -33,7 +33,7 @@ vec3 tractrix_turn(vec3 direction, vec3 shift, float segment) {
   const vec3 across = apart + a * along;
   const float sum = a + b * kept * kept;
   // Pushed along itself so far that E^2 is no number any more: as from the equilibrium.
-  const float scale = sum > 0.0 ? lost / sum : 0.0;
+  const float scale = select(sum > 0.0, lost / sum, 0.0);
   return scale * ((b * kept - a) * across - (a * b * (1.0 + kept)) * along);
 }
 
@@ -44,7 +44,7 @@ vec3 tractrix_followed(vec3 head_before, vec3 head, vec3 tail, float segment) {
   const vec3 shift = head - head_before;
   // A segment without a direction is carried along.
   const vec3 turn = tractrix_turn(edge * inversesqrt(max(squared, kTinySquared)), shift, segment);
-  return tail + (squared > kTinySquared ? shift + segment * turn : shift);
+  return tail + select(squared > kTinySquared, shift + segment * turn, shift);
 }
 
 // The same for a segment that does not have its length, which it gets.

@@ -33,6 +33,6 @@ void store_pinned(uint strand, uint begin, uint end) {
     const vec3 target = turned_with_head(texelFetch(u_rest, int(at)).xyz);
     const vec4 state = texelFetch(u_position, int(at));
     store_vertex(at, target, state.w);
-    store_velocity(at, is_broken(state.xyz) ? vec3(0.0) : (target - state.xyz) * u_step.push.w);
+    store_velocity(at, select(is_broken(state.xyz), vec3(0.0), (target - state.xyz) * u_step.push.w));
   }
 }

@@ -29,11 +29,11 @@ Before state_before(uint at) {
   const vec3 velocity = texelFetch(u_velocity, int(at)).xyz;
   const vec3 offset = texelFetch(u_offset, int(at)).xyz;
   const vec3 target = turned_with_head(texelFetch(u_rest, int(at)).xyz);
-  const bool is_sane = !is_broken(stored) && !is_broken(velocity);
+  const lane_bool is_sane = !is_broken(stored) && !is_broken(velocity);
   Before before;
-  before.shown = is_sane ? stored : target;
-  before.dragged = is_sane && !is_broken(offset) ? stored + offset : before.shown;
-  before.velocity = is_sane ? velocity : u_step.head_velocity.xyz;
+  before.shown = select(is_sane, stored, target);
+  before.dragged = select(is_sane && !is_broken(offset), stored + offset, before.shown);
+  before.velocity = select(is_sane, velocity, u_step.head_velocity.xyz);
   return before;
 }
 
@@ -45,13 +45,13 @@ vec3 mixed(vec3 dragged, vec3 groomed, float share) {
   const float squared = dot(side, side);
   const float angle = share * atan(sqrt(squared), cosine);
   const vec3 turned = cos(angle) * dragged + sin(angle) * side * inversesqrt(max(squared, kNoPlaneSquared));
-  const float straight = cosine > 0.0 ? share : floor(share + 0.5);
-  return squared > kNoPlaneSquared ? turned : mix(dragged, groomed, straight);
+  const float straight = select(cosine > 0.0, share, floor(share + 0.5));
+  return select(squared > kNoPlaneSquared, turned, mix(dragged, groomed, straight));
 }
 
 vec3 direction_of(vec3 edge, vec3 otherwise) {
   const float squared = dot(edge, edge);
-  return squared > kTinySquared ? edge * inversesqrt(squared) : otherwise;
+  return select(squared > kTinySquared, edge * inversesqrt(squared), otherwise);
 }
 
 void main() {

@@ -1,0 +1,263 @@
+#include "server/sim/executor/lanes_executor.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <thread>
+
+#include "common/base/check.h"
+#include "common/gl/program.h"
+#include "server/sim/executor/lane_kernel.h"
+#include "server/sim/strand_blocks.h"
+#include "shaders/shared/limits.h"
+
+namespace strandcast {
+namespace {
+
+/// Vertices that a worker takes at once: 20 to 200 microseconds of work.
+constexpr uint32_t kVerticesPerShare = 16 * 16 * kBlockStrands;
+
+/// Zeroed memory of one thread, for kernels one after the other; grows to what the largest needs.
+class ThreadMemory {
+ public:
+  ~ThreadMemory() { release(); }
+  std::byte* at_least(size_t size_bytes) {
+    if (size_bytes > size_bytes_) {
+      release();
+      memory_ = static_cast<std::byte*>(::operator new (size_bytes, std::align_val_t{kBlockAlignment}));
+      std::memset(memory_, 0, size_bytes);
+      size_bytes_ = size_bytes;
+    }
+    return memory_;
+  }
+
+ private:
+  void release() {
+    if (memory_ != nullptr) ::operator delete (memory_, std::align_val_t{kBlockAlignment});
+  }
+  std::byte* memory_ = nullptr;
+  size_t size_bytes_ = 0;
+};
+
+class LanePlane final : public StrandPlane {
+ public:
+  LanePlane(uint32_t strand_count, std::span<const glm::vec4> values)
+      : blocks_(strand_count, static_cast<uint32_t>(values.size() / strand_count)) {
+    LanePlane::write(values);
+  }
+
+  void write(std::span<const glm::vec4> values) override {
+    CHECK(values.size() == value_count());
+    for_each([&](float* at, size_t index) {
+      for (int axis = 0; axis < 4; ++axis) at[axis * kBlockStrands] = values[index][axis];
+    });
+    pad();
+  }
+  void read(std::vector<glm::vec4>& values) const override {
+    values.resize(value_count());
+    for_each([&](const float* at, size_t index) {
+      for (int axis = 0; axis < 4; ++axis) values[index][axis] = at[axis * kBlockStrands];
+    });
+  }
+  uint64_t size_bytes() const override { return blocks_.size() * sizeof(float); }
+
+  float* data() { return blocks_.data(); }
+  size_t block_floats() const { return blocks_.row_count() * kBlockRowFloats; }
+
+ private:
+  size_t value_count() const { return size_t{blocks_.strand_count()} * blocks_.row_count(); }
+
+  /// work(x of the value, its place outside of here) for all of them.
+  template <class Work>
+  void for_each(Work work) const {
+    const uint32_t strand_count = blocks_.strand_count();
+    for (uint32_t block = 0; block < block_count(strand_count); ++block) {
+      const uint32_t first = block * kBlockStrands;
+      const uint32_t count = std::min(kBlockStrands, strand_count - first);
+      for (uint32_t row = 0; row < blocks_.row_count(); ++row) {
+        float* at = const_cast<float*>(blocks_.view().row(block, row, 0));
+        for (uint32_t lane = 0; lane < count; ++lane)
+          work(at + lane, size_t{row} * strand_count + first + lane);
+      }
+    }
+  }
+  /// Strands that are not there do what the last one does.
+  void pad() {
+    const uint32_t strand_count = blocks_.strand_count();
+    const uint32_t used = strand_count % kBlockStrands;
+    if (used == 0) return;
+    const uint32_t last_block = block_count(strand_count) - 1;
+    for (uint32_t row = 0; row < blocks_.row_count(); ++row)
+      for (uint32_t axis = 0; axis < 4; ++axis) {
+        float* values = blocks_.row(last_block, row, axis);
+        std::fill(values + used, values + kBlockStrands, values[used - 1]);
+      }
+  }
+
+  mutable StrandBlocks blocks_;
+};
+
+class LaneProgram final : public KernelProgram {
+ public:
+  LaneProgram(const LaneKernel& kernel, const KernelDesc& desc, const StrandLayout& layout,
+              WorkerPool& workers)
+      : kernel_(kernel),
+        names_(desc.constants),
+        scratch_floats_(size_t{desc.scratch_rows} * (layout.vertex_count + 2) * kBlockRowFloats),
+        block_count_(block_count(layout.strand_count)),
+        blocks_per_share_(std::max(1u, kVerticesPerShare / (layout.vertex_count * kBlockStrands))),
+        workers_(workers) {
+    for (const auto& [name, value] : names_) {
+      const auto* number = std::get_if<double>(&value);
+      constants_.push_back({name.c_str(), number != nullptr ? static_cast<float>(*number) : 0.0f,
+                            number != nullptr ? 0u : std::get<uint32_t>(value)});
+    }
+    constants_.push_back({"u_strand_begin", 0.0f, 0});
+    constants_.push_back({"u_strand_end", 0.0f, 1});
+  }
+
+  void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) override {
+    StepBlock one_strand = step;
+    one_strand.shape.x = 1;
+    std::array<float*, kPlaneRoleCount> data{};
+    std::array<size_t, kPlaneRoleCount> block_floats{};
+    for (size_t role = 0; role < kPlaneRoleCount; ++role) {
+      if (planes[role] == nullptr) continue;
+      auto* plane = static_cast<LanePlane*>(planes[role]);
+      data[role] = plane->data();
+      block_floats[role] = plane->block_floats();
+    }
+    LaneRun run;
+    run.step = &one_strand;
+    run.collider_count = static_cast<uint32_t>(std::min<size_t>(collider_count, kMaxSphereColliders));
+    run.gust_count = gust_count(step);
+    run.planes = data.data();
+    run.block_floats = block_floats.data();
+    run.constants = constants_.data();
+    run.constant_count = static_cast<uint32_t>(constants_.size());
+    workers_.for_ranges(block_count_, blocks_per_share_, [&](size_t begin, size_t end) {
+      static thread_local ThreadMemory memory;
+      const size_t kernel_bytes =
+          (kernel_.memory_bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
+      LaneRun share = run;
+      std::byte* at = memory.at_least(kernel_bytes + scratch_floats_ * sizeof(float));
+      share.memory = at;
+      share.scratch = reinterpret_cast<float*>(at + kernel_bytes);
+      share.block_begin = static_cast<uint32_t>(begin);
+      share.block_end = static_cast<uint32_t>(end);
+      kernel_.run(share);
+    });
+  }
+
+  uint64_t size_bytes() const override {
+    return (kernel_.memory_bytes + scratch_floats_ * sizeof(float)) * workers_.size();
+  }
+
+ private:
+  /// Waves up to the last one with an amplitude.
+  static uint32_t gust_count(const StepBlock& step) {
+    uint32_t count = shader::kMaxGustWaves;
+    while (count > 0 && glm::vec3(step.gust_amplitude[count - 1]) == glm::vec3(0.0f)) --count;
+    return count;
+  }
+
+  const LaneKernel& kernel_;
+  const ModelConstants names_;
+  std::vector<LaneConstant> constants_;  // names point into names_
+  const size_t scratch_floats_;
+  const uint32_t block_count_;
+  const uint32_t blocks_per_share_;
+  WorkerPool& workers_;
+};
+
+std::string describe(const std::map<std::string, int>& variant) {
+  std::string text;
+  for (const auto& [name, value] : variant)
+    text += fmt::format("{}{}={}", text.empty() ? "" : " ", name, value);
+  return text;
+}
+
+Status check_constants(const KernelDesc& desc) {
+  ASSIGN_OR_RETURN(const gl::FlatSource source, gl::ShaderLibrary().flatten(desc.shader_path));
+  const auto declared = gl::declared_uniforms(source);
+  for (const auto& [name, value] : desc.constants) {
+    const std::string type = std::holds_alternative<double>(value) ? "float" : "uint";
+    const auto found = declared.find(name);
+    if (found == declared.end() || found->second != type)
+      return make_error(ErrorCode::BadInput, "{} declares no uniform {} {}", desc.shader_path, type, name);
+  }
+  return {};
+}
+
+class LanesExecutor final : public Executor {
+ public:
+  explicit LanesExecutor(const LaneOptions& options)
+      : own_workers_(options.workers == nullptr
+                         ? std::make_unique<WorkerPool>(std::max(1u, std::thread::hardware_concurrency()))
+                         : nullptr),
+        workers_(options.workers == nullptr ? *own_workers_ : *options.workers),
+        set_(options.set),
+        info_{SimDevice::Lanes,
+              fmt::format("lanes ({}, {} thread{})", simd::to_string(options.set), workers_.size(),
+                          workers_.size() == 1 ? "" : "s"),
+              true} {}
+
+  const ExecutorInfo& info() const override { return info_; }
+  Status check_size(const StrandLayout&) const override { return {}; }
+  std::unique_ptr<StrandPlane> make_plane(const std::string&, uint32_t strand_count,
+                                          std::span<const glm::vec4> values) override {
+    return std::make_unique<LanePlane>(strand_count, values);
+  }
+  Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc, const SceneFeatures&,
+                                                      const StrandLayout& layout) override {
+    const std::string variant = describe(desc.variant);
+    const LaneKernels all = lane_kernels();
+    for (size_t i = 0; i < all.count; ++i) {
+      const LaneKernel& kernel = *all.kernels[i];
+      if (kernel.set != static_cast<int>(set_) || kernel.shader_path != desc.shader_path ||
+          kernel.variant != variant)
+        continue;
+      RETURN_IF_ERROR(check_constants(desc));
+      return std::unique_ptr<KernelProgram>(std::make_unique<LaneProgram>(kernel, desc, layout, workers_));
+    }
+    return make_error(ErrorCode::Unsupported,
+                      "{} ({}) runs on OpenGL only: its vertices wait for each other (--sim-device gl)",
+                      desc.shader_path, variant);
+  }
+
+ private:
+  std::unique_ptr<WorkerPool> own_workers_;
+  WorkerPool& workers_;
+  const simd::InstructionSet set_;
+  const ExecutorInfo info_;
+};
+
+}  // namespace
+
+std::vector<simd::InstructionSet> lane_sets() {
+  std::vector<simd::InstructionSet> sets;
+  const LaneKernels all = lane_kernels();
+  for (const simd::InstructionSet set : simd::instruction_sets()) {
+    const bool is_built = std::any_of(all.kernels, all.kernels + all.count, [set](const LaneKernel* kernel) {
+      return kernel->set == static_cast<int>(set);
+    });
+    if (is_built) sets.push_back(set);
+  }
+  return sets;
+}
+
+Result<std::unique_ptr<Executor>> make_lanes_executor() {
+  const std::vector<simd::InstructionSet> sets = lane_sets();
+  if (sets.empty())
+    return make_error(ErrorCode::Unavailable,
+                      "no strand kernel was built for this processor (it needs SSE4.2): --sim-device gl");
+  return make_lanes_executor({sets.back()});
+}
+
+std::unique_ptr<Executor> make_lanes_executor(const LaneOptions& options) {
+  return std::make_unique<LanesExecutor>(options);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,28 @@
+// LanesExecutor: runs the strand kernels of shaders/sim on the processors, a strand per lane of a vector
+// register and blocks of 16 strands side by side on all threads, without OpenGL. The kernels are the same
+// GLSL, compiled as C++ (lane_kernel.h). Results are the same bits for every instruction set and number of
+// threads; those of OpenGL differ from them by roundings.
+#pragma once
+
+#include <memory>
+
+#include "common/base/worker_pool.h"
+#include "common/simd/variants.h"
+#include "server/sim/executor/executor.h"
+
+namespace strandcast {
+
+struct LaneOptions {
+  simd::InstructionSet set;
+  WorkerPool* workers = nullptr;  // outlives the executor; nullptr: all processors
+};
+
+/// Sets that this processor has and kernels were compiled for, the widest last; empty where there is none.
+std::vector<simd::InstructionSet> lane_sets();
+
+/// Unavailable when no kernel was compiled for what this processor has.
+Result<std::unique_ptr<Executor>> make_lanes_executor();
+/// `options.set` is one of lane_sets().
+std::unique_ptr<Executor> make_lanes_executor(const LaneOptions& options);
+
+}  // namespace strandcast

@@ -1,0 +1,54 @@
+# Makes C++ over lanes (common/simd/lanes.h) of the kernels' GLSL: reads ROOT/FILE and writes OUTPUT. README.md says which
+# GLSL such a file may use. What is left is included into a class (server/sim/executor/lane_kernel_private.h), in which
+# `float` is a lane each, and line numbers stay those of the GLSL.
+cmake_minimum_required(VERSION 3.25)
+file(READ ${ROOT}/${FILE} text)
+set(text "\n${text}")
+
+# What the class brings along, or the preprocessor.
+string(REGEX REPLACE "\n#include \"(shared|lib)/[^\n]*" "\n" text "${text}")
+string(REGEX REPLACE "\n#pragma [^\n]*" "\n" text "${text}")
+string(REGEX REPLACE "\nlayout\\(local_size_x[^\n]*" "\n" text "${text}")
+string(REGEX REPLACE "\n[a-z0-9_]+ [a-z0-9_]+\\([^{};\n]*\\);" "\n" text "${text}")  # declared where it is defined
+
+# The step's block: a struct of vectors that are the same in all lanes.
+string(FIND "${text}" "layout(std140" block_begin)
+if(NOT block_begin EQUAL -1)
+  string(SUBSTRING "${text}" ${block_begin} -1 block)
+  string(FIND "${block}" "} u_step;" block_size)
+  string(SUBSTRING "${block}" ${block_size} -1 after)
+  string(SUBSTRING "${block}" 0 ${block_size} block)
+  string(SUBSTRING "${text}" 0 ${block_begin} text)
+  string(REGEX REPLACE "layout\\(std140[^\n]*StepBlock {" "struct StepBlock {" block "${block}")
+  string(REGEX REPLACE "\n  vec4 " "\n  UniformVec4 " block "${block}")
+  string(REGEX REPLACE "\n  uvec4 " "\n  UniformUvec4 " block "${block}")
+  string(REGEX REPLACE "\n  float " "\n  number " block "${block}")
+  string(REGEX REPLACE "^} u_step;" "};LANE_STEP(StepBlock, u_step)" after "${after}")
+  string(APPEND text "${block}${after}")
+endif()
+
+# Planes, the scratch and the constants of a model.
+string(REGEX REPLACE "layout\\(binding = kUnit([A-Za-z]+)\\) uniform samplerBuffer ([a-z_]+);"
+  "samplerBuffer \\2{plane(PlaneRole::\\1)};" text "${text}")
+string(REGEX REPLACE "layout\\(std430, binding = kBindingRodScratch\\)[^{]*{([ \n]*)vec4 ([a-z]+)\\[\\];([ \n]*)} ([a-z_]+);"
+  "struct {\\1Scratch \\2;\\3} \\4{{scratch_memory()}};" text "${text}")
+string(REGEX REPLACE "layout\\(std430, binding = kBinding([A-Za-z]+)\\)[^{]*{([ \n]*)vec4 ([a-z]+)\\[\\];([ \n]*)} ([a-z_]+);"
+  "struct {\\2Sheet \\3;\\4} \\5{{plane(PlaneRole::\\1)}};" text "${text}")
+string(REGEX REPLACE "\nuniform float ([a-z0-9_]+);" "\nconst number \\1 = constant(\"\\1\");" text "${text}")
+string(REGEX REPLACE "\nuniform uint ([a-z0-9_]+);" "\nconst uint \\1 = count(\"\\1\");" text "${text}")
+
+# The language.
+string(REGEX REPLACE "\nconst (u?int) (k[A-Za-z]+)" "\nstatic constexpr \\1 \\2" text "${text}")
+string(REGEX REPLACE "\nconst float (k[A-Za-z]+)" "\nstatic constexpr number \\1" text "${text}")
+string(REGEX REPLACE "([(,\n ])(inout|out) ([A-Za-z0-9_]+) " "\\1\\3& " text "${text}")
+string(REGEX REPLACE "\\.xyz([^A-Za-z0-9_(])" ".xyz()\\1" text "${text}")
+string(REGEX REPLACE "([^A-Za-z0-9_.])([0-9]+\\.[0-9]+(e[-+]?[0-9]+)?)" "\\1\\2f" text "${text}")
+string(REGEX REPLACE "([^A-Za-z0-9_.])([0-9]+e[-+]?[0-9]+)" "\\1\\2f" text "${text}")
+string(REPLACE "void main()" "void run_strands()" text "${text}")
+
+string(REGEX REPLACE "^\n" "" text "${text}")
+set(guard "")
+if(FILE MATCHES "glsl$")
+  set(guard "#pragma once\n")
+endif()
+file(WRITE ${OUTPUT} "${guard}#line 1 \"shaders/${FILE}\"\n${text}")
