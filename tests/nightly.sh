@@ -4,7 +4,8 @@
 #   bash tests/nightly.sh                      all of it, 60 s for each fuzzer
 #   bash tests/nightly.sh --seconds 5 fuzz     the short form: only the fuzzers, 5 s each
 # Parts: fuzz, grids (property and comparing tests), dev (address and undefined behaviour, all tests), tsan (threads, all
-# tests but those of grids), lto (do all files agree on every type, and does each include what it uses). A part that fails
+# tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
+# kernels compile for NEON). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -16,11 +17,11 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | grids | dev | tsan | lto) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto | arm) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm)
 
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools spirv-tools
 log="$(mktemp)"
@@ -40,6 +41,7 @@ run_part() {
     # The laws of solvers take most of an hour here and have one thread of ours.
     tsan) build tsan && bash tests/run_preset.sh tsan build/tsan "$jobs" -LE 'property|compare' ;;
     lto) build lto && echo "all files agree" ;;
+    arm) bash tests/tools/compile_for_arm.sh ;;
   esac
 }
 

@@ -56,7 +56,7 @@ struct Bool {
   template <class Other>
   operator Other() const {
     static_assert(sizeof(Other) == 0,
-                  "what differs between strands cannot steer if, ?:, a loop or a bool: use any_lane(), "
+                  "what differs between strands cannot steer if, ?:, a loop or a bool: use is_any(), "
                   "select() or lane_bool");
   }
 };
