@@ -6,11 +6,13 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <glm/glm.hpp>
 #include <vector>
 
 #include "common/base/hash.h"
 #include "common/base/worker_pool.h"
 #include "common/render/laws.h"
+#include "common/simd/lane_matrices.h"
 #include "common/simd/variants.h"
 
 namespace strandcast {
@@ -81,6 +83,46 @@ TEST(Lanes, EveryInstructionSetGivesTheSameBits) {
     std::vector<float> y(plain.size());
     run_functions(set, {x.data(), y.data(), x.size()});
     EXPECT_EQ(std::memcmp(y.data(), plain.data(), y.size() * sizeof(float)), 0) << to_string(set);
+  }
+}
+
+TEST(Lanes, AnglesOfAllDirections) {
+  using namespace simd;
+  constexpr int kSteps = 8 * 1000;  // with all axes and diagonals
+  for (int i = 0; i < kSteps; i += static_cast<int>(kLanes)) {
+    Float x, y;
+    for (uint32_t lane = 0; lane < kLanes; ++lane) {
+      const double angle = 6.283185307179586 * (i + static_cast<int>(lane)) / kSteps;
+      const double size = std::exp(0.01 * (i % 1000) - 5.0);
+      x.v[lane] = static_cast<float>(size * std::cos(angle));
+      y.v[lane] = static_cast<float>(size * std::sin(angle));
+    }
+    const Float found = atan(y, x);
+    for (uint32_t lane = 0; lane < kLanes; ++lane)
+      ASSERT_NEAR(found.v[lane], std::atan2(double{y.v[lane]}, double{x.v[lane]}), 4e-7) << x.v[lane];
+  }
+  EXPECT_EQ(atan(Float(0.0f), Float(0.0f)).v[0], 0.0f);
+}
+
+TEST(Lanes, MatricesAreByColumns) {
+  const auto number = [](int i) { return unit_float(mix_u32(static_cast<uint32_t>(i))) - 0.5f; };
+  const glm::vec3 a(number(0), number(1), number(2));
+  const glm::vec3 b(number(3), number(4), number(5));
+  const glm::mat3 m(a, b, glm::cross(a, b) + a);
+  const glm::mat3 n(b, a + b, 2.0f * a);
+  const simd::mat3 lane_m{simd::vec3(m[0]), simd::vec3(m[1]), simd::vec3(m[2])};
+  const simd::mat3 lane_n{simd::vec3(n[0]), simd::vec3(n[1]), simd::vec3(n[2])};
+  const auto expect_near = [](const simd::vec3& found, const glm::vec3& expected) {
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(found[static_cast<uint32_t>(axis)].v[kLanes - 1], expected[axis], 1e-6f);
+  };
+  expect_near(lane_m * simd::vec3(a), m * a);
+  expect_near(simd::vec3(a) * lane_m, a * m);
+  for (uint32_t column = 0; column < 3; ++column) {
+    const auto c = static_cast<int>(column);
+    expect_near((lane_m * lane_n)[column], (m * n)[c]);
+    expect_near(simd::transpose(lane_m)[column], glm::transpose(m)[c]);
+    expect_near(simd::outerProduct(simd::vec3(a), simd::vec3(b))[column], glm::outerProduct(a, b)[c]);
   }
 }
 
