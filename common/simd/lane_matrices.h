@@ -7,12 +7,12 @@
 namespace strandcast::simd {
 inline namespace STRANDCAST_LANE_NAMESPACE {
 
-/// The same in all lanes.
-struct UniformVec4 {
+/// The same in all lanes; placed as in a uniform block.
+struct alignas(16) UniformVec4 {
   float x, y, z, w;
   STRANDCAST_LANES vec3 xyz() const { return {Float(x), Float(y), Float(z)}; }
 };
-struct UniformUvec4 {
+struct alignas(16) UniformUvec4 {
   uint32_t x, y, z, w;
 };
 

@@ -35,6 +35,7 @@ struct LaneKernel {
   const char* variant;      // "HAS_PINNED_TAIL=1 HAS_TWIST=0", in the order of their names
   int set;                  // simd::InstructionSet
   size_t memory_bytes;
+  size_t step_bytes;  // of the StepBlock that it reads
   void (*run)(const LaneRun& run);
 };
 

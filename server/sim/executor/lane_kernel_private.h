@@ -201,6 +201,7 @@ void run_kernel(const LaneRun& run) {
 }  // namespace
 
 extern const LaneKernel KERNEL_NAME;
-const LaneKernel KERNEL_NAME = {KERNEL_FILE, KERNEL_VARIANT, KERNEL_SET, sizeof(Kernel), run_kernel};
+const LaneKernel KERNEL_NAME = {
+    KERNEL_FILE, KERNEL_VARIANT, KERNEL_SET, sizeof(Kernel), sizeof(Kernel::StepBlock), run_kernel};
 
 }  // namespace strandcast

@@ -109,6 +109,7 @@ class LaneProgram final : public KernelProgram {
         block_count_(block_count(layout.strand_count)),
         blocks_per_share_(std::max(1u, kVerticesPerShare / (layout.vertex_count * kBlockStrands))),
         workers_(workers) {
+    CHECK(kernel.step_bytes == sizeof(StepBlock));
     for (const auto& [name, value] : names_) {
       const auto* number = std::get_if<double>(&value);
       constants_.push_back({name.c_str(), number != nullptr ? static_cast<float>(*number) : 0.0f,
