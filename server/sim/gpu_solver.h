@@ -24,6 +24,7 @@ class GpuSolver : public Solver {
   void read(SolverState& state) final { strands_->read(state); }
   void write(const SolverState& state) final;
   void rebase(const glm::dquat& world_from_head_rotation) final;
+  uint32_t strand_count() const final { return strands_->layout().strand_count; }
   uint64_t memory_bytes() const final;
   const StrandState* strands() const final { return strands_.get(); }
   Status follow() final;

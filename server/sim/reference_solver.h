@@ -35,6 +35,7 @@ class ReferenceSolver : public Solver {
   void read(SolverState& state) final;
   void write(const SolverState& state) final;
   void rebase(const glm::dquat& world_from_head_rotation) final;
+  uint32_t strand_count() const final { return layout_.strand_count; }
   uint64_t memory_bytes() const final;
 
  protected:

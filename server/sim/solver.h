@@ -19,6 +19,7 @@
 #include "common/groom/groom.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
+#include "server/sim/strand_blocks.h"
 
 namespace strandcast {
 
@@ -55,6 +56,12 @@ struct SolverState {
   std::vector<glm::vec3> velocity_mps;
 };
 
+/// The same to be read where it lies, or where it was put: rows are vertices. w is the solver's own.
+struct SolverBlocks {
+  StrandBlocksView position_m;
+  StrandBlocksView velocity_mps;
+};
+
 using SolverParameters = std::map<std::string, double>;
 
 class StrandState;
@@ -68,12 +75,17 @@ class Solver {
   virtual void substep(const StepInput& input) = 0;
   /// Copies the state out; resizes `state` on first use only.
   virtual void read(SolverState& state) = 0;
+  /// As read(), in blocks of strands; without a copy where the solver keeps its strands so. Valid until the
+  /// next call to this solver. Allocates on first use only.
+  virtual SolverBlocks read_blocks();
   /// Replaces positions and velocities (same layout as read). A strand that is given what it has goes on as
   /// if nothing had happened; another one starts without a history.
   virtual void write(const SolverState& state) = 0;
   /// The head has jumped to this rotation, wherever it is: strands jump along with all that the model knows
   /// of them. Seen from the head nothing has changed.
   virtual void rebase(const glm::dquat& world_from_head_rotation) = 0;
+  /// Of the groom that it was loaded with; 0 = none.
+  virtual uint32_t strand_count() const = 0;
   /// Bytes the solver keeps on its device.
   virtual uint64_t memory_bytes() const = 0;
 
@@ -81,6 +93,12 @@ class Solver {
   virtual const StrandState* strands() const { return nullptr; }
   /// Goes on with strands() as another solver left them; allocates. On an error the other one may go on.
   virtual Status follow() { return {}; }
+
+ private:
+  // Of read_blocks(), where strands are not kept in blocks.
+  SolverState read_state_;
+  StrandBlocks position_m_in_blocks_;
+  StrandBlocks velocity_mps_in_blocks_;
 };
 
 /// `to` goes on where `from` is, with the same strands: at once when both work on the same strands, else by

@@ -5,8 +5,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <memory>
 #include <new>
+#include <span>
 
 namespace strandcast {
 
@@ -64,5 +66,9 @@ class StrandBlocks {
   uint32_t row_count_ = 0;
   std::unique_ptr<float[], Free> values_;
 };
+
+/// Fills all of the blocks from (row_count x strand_count) values, the strand fastest; w of a vec3 is 0.
+void pack_blocks(std::span<const glm::vec3> values, StrandBlocks& blocks);
+void pack_blocks(std::span<const glm::vec4> values, StrandBlocks& blocks);
 
 }  // namespace strandcast

@@ -17,6 +17,7 @@ class FloatStrands final : public Solver {
   void read(SolverState& state) override;
   void write(const SolverState& state) override;
   void rebase(const glm::dquat& world_from_head_rotation) override;
+  uint32_t strand_count() const override { return layout_.strand_count; }
   uint64_t memory_bytes() const override;
 
  private:

@@ -102,6 +102,7 @@ class FakeModel : public Solver {
   void read(SolverState& state) override { state = state_; }
   void write(const SolverState& state) override { state_ = state; }
   void rebase(const glm::dquat&) override {}
+  uint32_t strand_count() const override { return groom_.strand_count(); }
   uint64_t memory_bytes() const override { return 0; }
 
  private:

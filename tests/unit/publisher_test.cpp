@@ -33,6 +33,7 @@ class FakeSolver : public Solver {
   }
   void write(const SolverState& in) override { state = in; }
   void rebase(const glm::dquat&) override {}
+  uint32_t strand_count() const override { return kStrands; }
   uint64_t memory_bytes() const override { return 0; }
 
   SolverState state;

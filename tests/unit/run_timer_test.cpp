@@ -15,6 +15,7 @@ class TimedModel : public Solver {
   void read(SolverState&) override {}
   void write(const SolverState&) override {}
   void rebase(const glm::dquat&) override {}
+  uint32_t strand_count() const override { return 0; }
   uint64_t memory_bytes() const override { return 0; }
 
  private:

@@ -97,6 +97,7 @@ class RecordingSolver final : public Solver {
   void rebase(const glm::dquat& world_from_head_rotation) override {
     jumps.push_back(world_from_head_rotation);
   }
+  uint32_t strand_count() const override { return 0; }
   uint64_t memory_bytes() const override { return 0; }
 
   SolverState state;
