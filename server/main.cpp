@@ -58,15 +58,19 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
   const auto choice = choose_codec(config.scene, asset);
   if (!choice) return fail(choice.error());
   config.scene.stream.codec = choice->codec;
-  auto passes = measure_passes(config.scene, *content, facts,
-                               {config.gl_device, config.renderer, config.shader_folder});
-  const std::optional<Error> unmeasured = passes ? std::nullopt : std::optional(passes.error());
-  if (unmeasured && unmeasured->code == ErrorCode::Unavailable)
-    passes = plan_server(config.scene, asset, facts);
-  if (!passes) return fail(passes.error());
+  auto measured =
+      measure_passes(config.scene, *content, facts,
+                     {config.sim_device, config.gl_device, config.renderer, config.shader_folder});
+  const std::optional<Error> unmeasured = measured ? std::nullopt : std::optional(measured.error());
+  if (unmeasured && unmeasured->code == ErrorCode::Unavailable) {
+    auto planned = plan_server(config.scene, asset, facts);
+    if (!planned) return fail(planned.error());
+    measured = Measured{{}, std::move(planned).value()};
+  }
+  if (!measured) return fail(measured.error());
   const auto notes = explain_groom(config.scene, content->groom);
   if (!notes) return fail(notes.error());
-  const auto text = explain_scene(config.scene, asset, facts, *passes, *notes);
+  const auto text = explain_scene(config.scene, asset, facts, *measured, *notes);
   if (!text) return fail(text.error());
   fmt::print("{}{}\n", *text, choice->reason);
   if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());
@@ -75,7 +79,7 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
 
 int check_command(const ServerOptions& options, const ServerConfig& config) {
   const auto text = check_groom(config.scene, options.check_folder,
-                                {config.gl_device, config.renderer, config.shader_folder});
+                                {config.sim_device, config.gl_device, config.renderer, config.shader_folder});
   if (!text) return fail(text.error());
   fmt::print("{}", *text);
   return 0;

@@ -3,8 +3,6 @@
 #include <utility>
 
 #include "common/base/profile.h"
-#include "common/gl/egl_context.h"
-#include "common/gl/timer.h"
 #include "common/groom/groom_asset.h"
 #include "common/render/render_device.h"
 #include "common/strands/strand_codec.h"
@@ -13,6 +11,7 @@
 #include "server/encode/picture_painter.h"
 #include "server/encode/picture_passes.h"
 #include "server/encode/strand_encode_worker.h"
+#include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
 #include "server/source/scene_change.h"
 #include "server/source/sim_stages.h"
@@ -37,8 +36,7 @@ struct Bench {
   const SceneDesc& scene;
   const SceneAsset& asset;
   const RuntimeFacts& facts;
-  const gl::ShaderLibrary& shaders;
-  const gl::DeviceInfo& device;  // that simulates
+  Executor& executor;
   RenderDeviceConfig render;
   ThreadPasses passes;                  // measured so far
   std::vector<EncodedFramePtr> frames;  // of the strands
@@ -54,10 +52,9 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
   const SceneFeatures features = analyse(scene, bench.facts);
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  ASSIGN_OR_RETURN(auto solver,
-                   row->make_gpu(parameters, {.shaders = &bench.shaders,
-                                              .features = features,
-                                              .groom_gravity_in_head_mps2 = scene.gravity_mps2}));
+  ASSIGN_OR_RETURN(auto solver, row->make(parameters, {.executor = &bench.executor,
+                                                       .features = features,
+                                                       .groom_gravity_in_head_mps2 = scene.gravity_mps2}));
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
   encoder->set_rest_shape(bench.asset.rest_position_m);
@@ -67,13 +64,12 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
   SimStages stages(stage_sizes(scene, bench.asset), explain(scene, bench.facts));
   stages.set_solver_bytes(solver->memory_bytes());
   stages.set_watched(is_watched(bench.facts));
-  gl::GpuTimer timer(bench.device);
   StageTimer encode_timer;
   for (int step = 1; step <= kMeasuredSteps; ++step) {
     StageTurn turn(builder, *solver, publisher);
     turn.end_time_s = step / scene.step_rate_hz;
     turn.publish.tick = static_cast<uint64_t>(step);
-    RETURN_IF_ERROR(stages.step(turn, &timer));
+    RETURN_IF_ERROR(stages.step(turn, bench.executor.timer()));
     RETURN_IF_ERROR(stages.publish(turn));
     if (!is_watched(bench.facts)) continue;
     const ScopedStage stage(encode_timer);
@@ -139,20 +135,13 @@ std::string list_solvers() {
   return text;
 }
 
-Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneContent& content,
-                                       const RuntimeFacts& facts, const MeasureConfig& config) {
-  ASSIGN_OR_RETURN(auto context, gl::EglContext::make(config.gl_device));
-  const gl::ShaderLibrary shaders =
-      config.shader_folder ? gl::ShaderLibrary(*config.shader_folder) : gl::ShaderLibrary();
+Result<Measured> measure_passes(const SceneDesc& scene, const SceneContent& content,
+                                const RuntimeFacts& facts, const MeasureConfig& config) {
+  ASSIGN_OR_RETURN(const auto executor,
+                   open_executor({config.sim_device, config.gl_device, config.shader_folder}));
   const SceneAsset asset = make_scene_asset(content.groom, content.head);
-  Bench bench{scene,
-              asset,
-              facts,
-              shaders,
-              context->info(),
-              {config.renderer, config.gl_device, config.shader_folder},
-              {},
-              {}};
+  Bench bench{scene, asset, facts, *executor, {config.renderer, config.gl_device, config.shader_folder},
+              {},    {}};
   RETURN_IF_ERROR(measure_strands(bench, content));
   if (facts.frame_viewers > 0) {
     RETURN_IF_ERROR(measure_pictures(bench));
@@ -160,7 +149,7 @@ Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneConten
     ASSIGN_OR_RETURN(bench.passes.pictures,
                      plan_picture_passes(asset, scene.look, likely_renderer(config.renderer, scene.look), 0));
   }
-  return join_passes(std::move(bench.passes), facts.frame_viewers > 0);
+  return Measured{executor->info().name, join_passes(std::move(bench.passes), facts.frame_viewers > 0)};
 }
 
 Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom) {
@@ -168,21 +157,21 @@ Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Gro
 }
 
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
-                                  const gl::PassReports& passes,
-                                  const std::vector<std::string>& groom_notes) {
+                                  const Measured& measured, const std::vector<std::string>& groom_notes) {
   RETURN_IF_ERROR(check_solver(scene));
   std::string text = fmt::format(
       "Scene '{}': {} strands x {} vertices, solver {}, {:g} steps of {} substeps per s\n", scene.name,
       asset.strand_count, asset.vertex_count, scene.solver.name, scene.step_rate_hz, scene.substeps);
+  if (!measured.sim_device.empty()) text += fmt::format("Simulated on: {}\n", measured.sim_device);
   text += fmt::format("Assumed: {} viewers of strands, {} of frames\n\nFacts\n", facts.strand_viewers,
                       facts.frame_viewers);
   for (const FeatureReason& reason : explain(scene, facts)) text += fact_text(reason);
   for (const FeatureReason& reason : explain(analyse_picture(asset, scene.look))) text += fact_text(reason);
   if (!groom_notes.empty()) text += "\nGroom\n";
   for (const std::string& note : groom_notes) text += fmt::format("  {}\n", note);
-  text += "\nPasses\n" + to_text(passes);
-  text += fmt::format("\nMemory: {} allocated, {} saved\n", size_text(kept_bytes(passes)),
-                      size_text(saved_bytes(passes)));
+  text += "\nPasses\n" + to_text(measured.passes);
+  text += fmt::format("\nMemory: {} allocated, {} saved\n", size_text(kept_bytes(measured.passes)),
+                      size_text(saved_bytes(measured.passes)));
   return text;
 }
 

@@ -17,23 +17,28 @@ namespace strandcast {
 std::string list_solvers();
 
 struct MeasureConfig {
+  std::string sim_device = "auto";                     // as ExecutorConfig
   std::string gl_device = "auto";                      // as EglContext::make
   std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
 };
 
-/// Plans the passes of a server with these viewers, makes those that run, in a GL context of its own, and
-/// runs them a few times.
-Result<gl::PassReports> measure_passes(const SceneDesc& scene, const SceneContent& content,
-                                       const RuntimeFacts& facts, const MeasureConfig& config);
+struct Measured {
+  std::string sim_device;  // for people: what simulated
+  gl::PassReports passes;
+};
+
+/// Plans the passes of a server with these viewers, makes those that run, on an executor and a renderer of
+/// its own, and runs them a few times.
+Result<Measured> measure_passes(const SceneDesc& scene, const SceneContent& content,
+                                const RuntimeFacts& facts, const MeasureConfig& config);
 
 /// What the scene's solver says of the groom, a sentence each.
 Result<std::vector<std::string>> explain_groom(const SceneDesc& scene, const Groom& groom);
 
-/// Facts with reasons, what its solver says of the groom, then the passes: kept, not requested or unread,
-/// with bytes and milliseconds.
+/// Facts with reasons, what its solver says of the groom, what simulated where it was measured, then the
+/// passes: kept, not requested or unread, with bytes and milliseconds.
 Result<std::string> explain_scene(const SceneDesc& scene, const SceneAsset& asset, const RuntimeFacts& facts,
-                                  const gl::PassReports& passes,
-                                  const std::vector<std::string>& groom_notes = {});
+                                  const Measured& measured, const std::vector<std::string>& groom_notes = {});
 
 }  // namespace strandcast

@@ -173,6 +173,12 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   app.add_option("--viewer-mbit", raw.viewer_mbit,
                  "most that the strands for one viewer may take, Mbit/s; 0 = no cap")
       ->check(in_range(0.0, kMaxViewerMbit));
+  app.add_option(
+         "--sim-device", options.config.sim_device,
+         "what simulates: lanes (the processors, without OpenGL), gl, or auto: gl where the device is "
+         "hardware or named")
+      ->check(CLI::IsMember({"auto", "gl", "lanes"}))
+      ->capture_default_str();
   app.add_option("--renderer", options.config.renderer,
                  "what draws pictures: tiles (the processor), gl, or auto: gl where the device is hardware")
       ->check(CLI::IsMember({"auto", "tiles", "gl"}))

@@ -37,7 +37,8 @@ Result<EncodedFramePtr> encode_asset(const SceneAsset& asset) {
 }  // namespace
 
 Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& config, InputHub& inputs) {
-  return make_simulation({config.scene, config.gl_device, config.shader_folder, config.on_publish}, inputs);
+  return make_simulation(
+      {config.scene, {config.sim_device, config.gl_device, config.shader_folder}, config.on_publish}, inputs);
 }
 
 class Server::State {

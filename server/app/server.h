@@ -27,6 +27,7 @@ Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& confi
 struct ServerConfig {
   SceneDesc scene;
   NetConfig net;
+  std::string sim_device = "auto";                     // as ExecutorConfig
   std::string gl_device = "auto";                      // as EglContext::make
   std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary

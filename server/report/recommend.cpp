@@ -7,8 +7,6 @@
 #include <cmath>
 #include <memory>
 
-#include "common/gl/egl_context.h"
-#include "common/gl/timer.h"
 #include "common/log/progress.h"
 #include "common/scene/scene_file.h"
 #include "server/report/report_commands.h"
@@ -78,8 +76,8 @@ std::string scene_lines(const RunSetting& setting, const SolverParameters& param
 class SceneMeasurement {
  public:
   SceneMeasurement(const SceneDesc& scene, const SceneContent& content, const MotionSet& motion,
-                   const gl::DeviceInfo& device)
-      : scene_(scene), content_(content), motion_(motion), device_(device), workbench_{&shaders_} {
+                   Executor& executor)
+      : scene_(scene), content_(content), motion_(motion), executor_(executor), workbench_{&executor} {
     for (uint32_t s = 0; s < content.groom.strand_count(); ++s)
       length_m_ += static_cast<double>(content.groom.length_m(s)) / content.groom.strand_count();
   }
@@ -93,10 +91,9 @@ class SceneMeasurement {
     SceneDesc scene = scene_;
     scene.substeps = setting.substeps;
     const SceneFeatures features = analyse(scene, {});
-    ASSIGN_OR_RETURN(auto solver, setting.row->make_gpu(parameters, {&shaders_, features}));
+    ASSIGN_OR_RETURN(auto solver, setting.row->make(parameters, {&executor_, features}));
     RETURN_IF_ERROR(solver->load(content_.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
     StepBuilder builder(scene, content_.colliders);
-    gl::GpuTimer timer(device_);
     double best_ms = std::numeric_limits<double>::infinity();
     for (int step = 1; step <= kWarmUpSteps + kTimedSteps; ++step) {
       const double time_s = step / scene.step_rate_hz;
@@ -104,9 +101,7 @@ class SceneMeasurement {
       frame.has_motion = true;
       frame.world_from_head = motion_.head_at(time_s);
       for (const StepInput& substep : builder.build(frame, features, time_s).substeps) {
-        timer.begin();
-        solver->substep(substep);
-        const double ms = timer.end_ms();
+        const double ms = timed_ms(executor_, [&] { solver->substep(substep); });
         if (step > kWarmUpSteps) best_ms = std::min(best_ms, ms);
       }
     }
@@ -122,8 +117,7 @@ class SceneMeasurement {
   const SceneDesc& scene_;
   const SceneContent& content_;
   const MotionSet& motion_;
-  const gl::DeviceInfo& device_;
-  gl::ShaderLibrary shaders_;
+  Executor& executor_;
   Workbench workbench_;
   double length_m_ = 0.0;
 };
@@ -132,13 +126,10 @@ Result<std::vector<const SolverRow*>> rows_to_choose_from(const std::vector<std:
   std::vector<const SolverRow*> rows;
   for (const std::string& name : names) {
     ASSIGN_OR_RETURN(const SolverRow* row, find_solver(name));
-    if (!row->make_gpu)
-      return make_error(ErrorCode::Unsupported, "solver '{}' has no GPU version to run a scene with", name);
     rows.push_back(row);
   }
   if (!names.empty()) return rows;
-  for (const SolverRow& row : solver_table())
-    if (row.make_gpu) rows.push_back(&row);
+  for (const SolverRow& row : solver_table()) rows.push_back(&row);
   return rows;
 }
 
@@ -193,13 +184,13 @@ Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions&
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
   const MotionHair hair = nearest_hair(content.groom);
   ASSIGN_OR_RETURN(const MotionSet motion, MotionSet::make({{}, kMotionS, kMotionStrands, hair}));
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(options.gl_device));
-  const SceneMeasurement measurement(scene, content, motion, context->info());
+  ASSIGN_OR_RETURN(const auto executor, open_executor(options.device));
+  const SceneMeasurement measurement(scene, content, motion, *executor);
   const double rate_hz = measured_rate_hz(scene);
 
   std::vector<Candidate> candidates = timed_candidates(measurement, rows, rate_hz);
   Recommendation result;
-  result.device = context->info().renderer;
+  result.device = executor->info().name;
   result.hair = hair;
   result.strand_count = content.groom.strand_count();
   result.vertex_count = content.groom.uniform_vertex_count();
@@ -267,8 +258,7 @@ void add_recommend_command(CLI::App& app, ReportAction& action) {
   command->add_option("--solver", options->solvers, "choose from this one; repeatable")
       ->expected(1)
       ->take_all();
-  command->add_option("--gl-device", options->gl_device, "auto, software, hardware or a device number")
-      ->capture_default_str();
+  add_sim_device_options(*command, options->device);
   command->callback([options, &action] {
     action = [options]() -> Status {
       ASSIGN_OR_RETURN(const SceneDesc scene, options->scene_path.empty()

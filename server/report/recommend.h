@@ -18,7 +18,7 @@ struct RecommendOptions {
   std::vector<std::string> overrides;  // path=value
   std::vector<std::string> solvers;    // rows to choose from; empty = all
   double budget_ms = 0.0;              // of simulation per step of the scene
-  std::string gl_device = "auto";
+  ExecutorConfig device;
 };
 
 /// One setting of one row, for the scene.
@@ -38,7 +38,7 @@ struct Recommendation {
   std::string scene_lines;         // of the first, to paste into a scene file
 };
 
-/// Measures the rows that have a GPU version. LimitExceeded when none fits the budget: names the fastest,
+/// Measures the rows that a server can run. LimitExceeded when none fits the budget: names the fastest,
 /// what it takes, and how many strands would fit.
 Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions& options);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "common/base/result.h"
 
@@ -15,6 +16,11 @@ namespace strandcast {
 struct MotionFileOptions;
 /// --unit, --up, --joint and --filter-glitches, as those of strandcast-ctl feed.
 void add_motion_file_options(CLI::App& command, MotionFileOptions& options);
+
+struct ExecutorConfig;
+/// --sim-device and --gl-device: what runs the simulation. `none`: what a GL device of that name stands for,
+/// "" = it is none.
+void add_sim_device_options(CLI::App& command, ExecutorConfig& config, const std::string& none = "");
 
 /// What the chosen subcommand does once the command line is read; the error ends the program with one
 /// sentence.

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <vector>
-
-#include "common/gl/timer.h"
 
 namespace strandcast {
 namespace {
@@ -26,8 +23,8 @@ double us_per_frame(double us_per_substep, const RunSetting& setting) {
 }
 
 uint32_t RunTimer::strand_count(const RunSetting& setting) const {
-  if (device_ == nullptr || !workbench_.runs_on_gpu(setting)) return kReferenceStrands;
-  return device_->is_software ? kSoftwareStrands : kHardwareStrands;
+  if (!workbench_.runs_kernel(setting)) return kReferenceStrands;
+  return workbench_.executor->info().is_software ? kSoftwareStrands : kHardwareStrands;
 }
 
 Result<StrandTime> RunTimer::time(const RunSetting& setting) {
@@ -39,20 +36,22 @@ Result<StrandTime> RunTimer::time(const RunSetting& setting) {
   return time;
 }
 
+double RunTimer::substep_ms(StrandRun& run, const StepInput& input) const {
+  if (workbench_.runs_kernel(run.setting()))
+    return timed_ms(*workbench_.executor, [&] { run.substep(input); });
+  const int64_t begin_ns = clock_ns_();
+  run.substep(input);
+  return static_cast<double>(clock_ns_() - begin_ns) * kMsPerNs;
+}
+
 Result<StrandTime> RunTimer::measure(const RunSetting& setting) const {
   const uint32_t strands = strand_count(setting);
-  const bool is_on_gpu = device_ != nullptr && workbench_.runs_on_gpu(setting);
   ASSIGN_OR_RETURN(StrandRun run, StrandRun::make(workbench_, setting, motion_.physics(),
                                                   motion_.groom(setting.vertex_count, strands)));
-  std::optional<gl::GpuTimer> timer;
-  if (is_on_gpu) timer.emplace(*device_);
   std::vector<double> sample_us;
   int count = 0;
   for (const StepInput& input : motion_.inputs(setting, kWarmUpSubsteps + kTimedSubsteps)) {
-    const int64_t begin_ns = clock_ns_();
-    if (timer) timer->begin();
-    run.substep(input);
-    const double ms = timer ? timer->end_ms() : static_cast<double>(clock_ns_() - begin_ns) * kMsPerNs;
+    const double ms = substep_ms(run, input);
     if (++count > kWarmUpSubsteps) sample_us.push_back(ms * kUsPerMs / strands);
   }
   std::sort(sample_us.begin(), sample_us.end());

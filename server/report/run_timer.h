@@ -1,5 +1,5 @@
 // RunTimer: how long one substep of a strand model takes, per strand, with many strands at once, so that a
-// dispatch does not measure its own overhead. Needs the thread's GL context for GPU runs.
+// dispatch does not measure its own overhead. From the thread of the executor.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "common/base/profile.h"
-#include "common/gl/egl_context.h"
 #include "server/report/motion_set.h"
 
 namespace strandcast {
@@ -24,10 +23,9 @@ double us_per_frame(double us_per_substep, const RunSetting& setting);
 
 class RunTimer {
  public:
-  /// `device` of the current context; nullptr when there is none. `clock_ns` times what does not run on it.
-  RunTimer(const Workbench& workbench, const gl::DeviceInfo* device, const MotionSet& motion,
-           std::function<int64_t()> clock_ns = now_ns)
-      : workbench_(workbench), device_(device), motion_(motion), clock_ns_(std::move(clock_ns)) {}
+  /// `clock_ns` times what does not run on a device of its own.
+  RunTimer(const Workbench& workbench, const MotionSet& motion, std::function<int64_t()> clock_ns = now_ns)
+      : workbench_(workbench), motion_(motion), clock_ns_(std::move(clock_ns)) {}
 
   /// Measured once for every row, vertex count and effort: rate and substeps change nothing in it.
   Result<StrandTime> time(const RunSetting& setting);
@@ -36,10 +34,10 @@ class RunTimer {
   uint32_t strand_count(const RunSetting& setting) const;
 
  private:
+  double substep_ms(StrandRun& run, const StepInput& input) const;
   Result<StrandTime> measure(const RunSetting& setting) const;
 
   const Workbench& workbench_;
-  const gl::DeviceInfo* device_;
   const MotionSet& motion_;
   std::function<int64_t()> clock_ns_;
   std::map<std::tuple<std::string, uint32_t, double>, StrandTime> measured_;

@@ -98,13 +98,13 @@ Pose head_at(const StreamMotion& motion, double time_s) {
 }
 
 Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, const SceneFeatures& features,
-                                            const gl::ShaderLibrary& shaders) {
+                                            Executor& executor) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
   RETURN_IF_ERROR(check_step(*row, parameters, 1.0 / (scene.step_rate_hz * scene.substeps)));
-  return row->make_gpu(
+  return row->make(
       parameters,
-      {.shaders = &shaders, .features = features, .groom_gravity_in_head_mps2 = scene.gravity_mps2});
+      {.executor = &executor, .features = features, .groom_gravity_in_head_mps2 = scene.gravity_mps2});
 }
 
 }  // namespace
@@ -192,7 +192,7 @@ double ScalpRun::growth_p95() const {
 }
 
 Result<ScalpRun> run_scalp(const ScalpRunDesc& desc, const gl::ShaderLibrary& shaders,
-                           const gl::DeviceInfo& device) {
+                           const gl::DeviceInfo& device, Executor& executor) {
   SceneDesc scene = desc.scene;
   scene.wind = {};
   const double seconds = std::min(desc.seconds, desc.motion.duration_s);
@@ -200,7 +200,7 @@ Result<ScalpRun> run_scalp(const ScalpRunDesc& desc, const gl::ShaderLibrary& sh
   const SceneAsset asset = make_scene_asset(content.groom, content.head);
   ASSIGN_OR_RETURN(ScalpView view, ScalpView::make(shaders, device, asset, scene, desc.size));
   const SceneFeatures features = analyse(scene, {});
-  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, features, shaders));
+  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, features, executor));
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
 
   ScalpRun run;

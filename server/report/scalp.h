@@ -14,10 +14,12 @@
 #include <string>
 #include <vector>
 
+#include "common/gl/egl_context.h"
 #include "common/motion/motion_file.h"
 #include "common/pictures/image_codec.h"
 #include "common/render/renderer.h"
 #include "server/report/stream_motion.h"
+#include "server/sim/executor/executor.h"
 
 namespace strandcast {
 
@@ -76,9 +78,10 @@ struct ScalpRun {
   double growth_p95() const;
 };
 
-/// The scene's solver under the motion, on the GPU where it has a kernel; colliders, no wind.
+/// The scene's solver under the motion; colliders, no wind. `device`: of the current context, the executor's
+/// where it has one.
 Result<ScalpRun> run_scalp(const ScalpRunDesc& desc, const gl::ShaderLibrary& shaders,
-                           const gl::DeviceInfo& device);
+                           const gl::DeviceInfo& device, Executor& executor);
 
 std::string scalp_text(const ScalpRunDesc& desc, const ScalpRun& run);
 std::string scalp_csv(const ScalpRun& run);

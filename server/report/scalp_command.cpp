@@ -20,7 +20,7 @@ struct ScalpOptions {
   std::filesystem::path motion_path;  // empty: the built-in walk
   MotionFileOptions motion_file;
   std::filesystem::path out;
-  std::string gl_device = "auto";
+  ExecutorConfig device;
   double seconds = ScalpRunDesc().seconds;
   double every_s = ScalpRunDesc().every_s;
 };
@@ -39,9 +39,14 @@ Status run_command(const ScalpOptions& options) {
   desc.seconds = options.seconds;
   desc.every_s = options.every_s;
   RETURN_IF_ERROR(make_report_folder(options.out));
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(options.gl_device));
+  ASSIGN_OR_RETURN(const auto executor, open_executor(options.device));
+  std::unique_ptr<gl::EglContext> context;  // that draws, where the executor has none
+  if (executor->info().device != SimDevice::Gl) {
+    ASSIGN_OR_RETURN(context, gl::EglContext::make(options.device.gl_device));
+  }
+  ASSIGN_OR_RETURN(const gl::DeviceInfo device, gl::read_device_info());
   const gl::ShaderLibrary shaders;
-  ASSIGN_OR_RETURN(const ScalpRun run, run_scalp(desc, shaders, context->info()));
+  ASSIGN_OR_RETURN(const ScalpRun run, run_scalp(desc, shaders, device, *executor));
   fmt::print("{}", scalp_text(desc, run));
   RETURN_IF_ERROR(save_text(options.out / "scalp.csv", scalp_csv(run)));
   RETURN_IF_ERROR(save_png(options.out / "scalp_groomed.png", run.groomed_picture));
@@ -69,8 +74,7 @@ void add_scalp_command(CLI::App& app, ReportAction& action) {
       ->check(CLI::Range(0.01, 60.0))
       ->capture_default_str();
   command->add_option("--out", options->out, "folder for the CSV and the pictures")->required();
-  command->add_option("--gl-device", options->gl_device, "auto, software, hardware or a device number")
-      ->capture_default_str();
+  add_sim_device_options(*command, options->device);
   command->callback([options, &action] { action = [options] { return run_command(*options); }; });
 }
 

@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
-#include "common/gl/egl_context.h"
 #include "common/log/progress.h"
 #include "server/report/csv_file.h"
 #include "server/report/report_commands.h"
@@ -29,8 +28,7 @@ Status run_stability(const StabilityOptions& options) {
   if (rows.empty())
     for (const SolverRow& row : solver_table()) rows.push_back(&row);
   RETURN_IF_ERROR(make_report_folder(options.out));
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(options.gl_device));
-  const gl::ShaderLibrary shaders;
+  ASSIGN_OR_RETURN(const auto executor, open_executor(options.device));
   const StabilityGrid grid = options.is_quick ? StabilityGrid::Quick : StabilityGrid::Full;
   const std::vector<StabilityTrial> trials = make_stability_trials(grid);
 
@@ -40,7 +38,7 @@ Status run_stability(const StabilityOptions& options) {
     for (const SolverRow* row : rows)
       for (const StabilityTrial& trial : trials)
         if (is_for(*row, trial)) progress.expect(1, steps_of(trial));
-    StabilityRunner runner(shaders);
+    StabilityRunner runner(executor.get());
     for (const SolverRow* row : rows) {
       for (const StabilityTrial& trial : trials) {
         if (!is_for(*row, trial)) continue;
@@ -55,7 +53,7 @@ Status run_stability(const StabilityOptions& options) {
   const std::filesystem::path csv_path = options.out / "stability.csv";
   const std::filesystem::path page_path = options.out / "stability.html";
   RETURN_IF_ERROR(save_text(csv_path, stability_csv(outcomes)));
-  RETURN_IF_ERROR(save_text(page_path, stability_page(outcomes, {context->info().renderer, grid})));
+  RETURN_IF_ERROR(save_text(page_path, stability_page(outcomes, {executor->info().name, grid})));
   fmt::print("{}\n{}\n", csv_path.string(), page_path.string());
   return {};
 }
@@ -66,8 +64,7 @@ void add_stability_command(CLI::App& app, ReportAction& action) {
       app.add_subcommand("stability", "every strand model against stiff and extreme cases, with limits");
   command->add_option("--out", options->out, "folder for the CSV and the page")->required();
   command->add_option("--solver", options->solvers, "only this one; repeatable")->expected(1)->take_all();
-  command->add_option("--gl-device", options->gl_device, "auto, software, hardware or a device number")
-      ->capture_default_str();
+  add_sim_device_options(*command, options->device);
   command->add_flag("--quick", options->is_quick, "fewer settings and shorter rests");
   command->callback([options, &action] { action = [options] { return run_stability(*options); }; });
 }

@@ -13,7 +13,7 @@ namespace strandcast {
 struct StabilityOptions {
   std::filesystem::path out;         // folder of the CSV and the page
   std::vector<std::string> solvers;  // rows of the table; empty = all
-  std::string gl_device = "auto";
+  ExecutorConfig device;
   bool is_quick = false;
 };
 

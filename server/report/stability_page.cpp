@@ -212,7 +212,7 @@ std::string stability_page(const std::vector<StabilityOutcome>& outcomes, const 
   page.paragraph(fmt::format(
       "Seven strands of 0.25 m and 16 vertices on a head, parameters at their defaults unless a setting says "
       "otherwise, 60 steps per second, no substeps, no colliders. Run on {}, in single precision; models "
-      "without a GPU kernel in double precision on one core.",
+      "without a kernel in double precision on one core.",
       setup.device));
   page.paragraph(fmt::format(
       "Hair at rest stands still for {:g} s; many steps are {}.{}", lengths.rest_s, lengths.many_steps,

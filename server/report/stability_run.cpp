@@ -134,10 +134,10 @@ Result<Solver*> StabilityRunner::solver_for(const SolverRow& row, const SolverPa
   if (row_name_ != row.name) solvers_.clear();
   row_name_ = row.name;
   std::unique_ptr<Solver>& solver = solvers_[complete];
-  if (solver == nullptr && row.make_gpu) {
+  if (solver == nullptr && row.make && executor_ != nullptr) {
     SceneFeatures features;
     features.has_wind = true;
-    ASSIGN_OR_RETURN(solver, row.make_gpu(complete, {&shaders_, features}));
+    ASSIGN_OR_RETURN(solver, row.make(complete, {executor_, features}));
   } else if (solver == nullptr) {
     solver = row.make_reference(complete);
   }

@@ -1,5 +1,5 @@
 // StabilityRunner: puts a row of the solver table through the trials and judges what it measures by the
-// row's promises. Needs a current GL context for rows that run on the GPU; one thread.
+// row's promises. From the executor's thread.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/gl/program.h"
 #include "server/report/stability_trial.h"
+#include "server/sim/executor/executor.h"
 
 namespace strandcast {
 
@@ -57,15 +57,17 @@ struct StabilityOutcome {
 
 class StabilityRunner {
  public:
-  explicit StabilityRunner(const gl::ShaderLibrary& shaders) : shaders_(shaders) {}
+  /// nullptr: references only.
+  explicit StabilityRunner(Executor* executor) : executor_(executor) {}
 
-  /// On the GPU where the row can, else its reference. The error names the row and what it would not do.
+  /// By its kernel where the row has one, else its reference. The error names the row and what it would not
+  /// do.
   Result<StabilityOutcome> run(const SolverRow& row, const StabilityTrial& trial);
 
  private:
   Result<Solver*> solver_for(const SolverRow& row, const SolverParameters& complete);
 
-  const gl::ShaderLibrary& shaders_;
+  Executor* executor_;
   std::string row_name_;  // of the solvers kept
   std::map<SolverParameters, std::unique_ptr<Solver>> solvers_;
 };

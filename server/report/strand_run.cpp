@@ -131,10 +131,10 @@ Result<StrandRun> StrandRun::make(const Workbench& workbench, const RunSetting& 
                                   const RunPhysics& physics, const Groom& groom) {
   ASSIGN_OR_RETURN(const SolverParameters parameters, run_parameters(setting, physics));
   std::unique_ptr<Solver> solver;
-  if (workbench.runs_on_gpu(setting)) {
+  if (workbench.runs_kernel(setting)) {
     SceneFeatures features;
     features.has_wind = features.has_turbulence = true;
-    ASSIGN_OR_RETURN(solver, setting.row->make_gpu(parameters, {workbench.shaders, features}));
+    ASSIGN_OR_RETURN(solver, setting.row->make(parameters, {workbench.executor, features}));
   } else {
     solver = setting.row->make_reference(parameters);
   }

@@ -1,6 +1,6 @@
-// StrandRun: one strand model at one setting, loaded with a groom and driven step by step, on the GPU or as
-// its double-precision reference. What every measurement of work-precision is made of. GPU runs need the
-// thread's GL context; reference runs may be on any thread.
+// StrandRun: one strand model at one setting, loaded with a groom and driven step by step, by its kernel
+// or as its double-precision reference. What every measurement of work-precision is made of. Kernels run on
+// the executor's thread; reference runs may be on any thread.
 #pragma once
 
 #include <limits>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/gl/program.h"
+#include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {
@@ -55,12 +55,16 @@ bool can_be_limp(const SolverRow& row);
 /// The values of a row's effort parameter to try around its default, ascending; {NaN} without one.
 std::vector<double> effort_values(const SolverRow& row, const std::vector<double>& factors);
 
-/// Whether and where GPU versions run.
+/// Whether and where kernels run.
 struct Workbench {
-  const gl::ShaderLibrary* shaders = nullptr;  // nullptr: every row runs as its reference
+  Executor* executor = nullptr;  // nullptr: every row runs as its reference
 
-  bool runs_on_gpu(const RunSetting& setting) const {
-    return shaders != nullptr && !setting.is_reference && setting.row->make_gpu != nullptr;
+  bool runs_kernel(const RunSetting& setting) const {
+    return executor != nullptr && !setting.is_reference && setting.row->make != nullptr;
+  }
+  /// "gl", "lanes"; "double" for a reference.
+  std::string name_of(const RunSetting& setting) const {
+    return runs_kernel(setting) ? to_string(executor->info().device) : "double";
   }
 };
 

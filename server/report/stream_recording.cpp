@@ -29,12 +29,12 @@ SceneDesc scene_for(const RecordingDesc& desc) {
   return scene;
 }
 
-Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, const gl::ShaderLibrary* shaders) {
+Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, Executor* executor) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
   RETURN_IF_ERROR(check_step(*row, parameters, kStreamFrameS / scene.substeps));
-  if (shaders == nullptr) return row->make_reference(parameters);
-  return row->make_gpu(parameters, {shaders, analyse(scene, {})});
+  if (executor == nullptr) return row->make_reference(parameters);
+  return row->make(parameters, {executor, analyse(scene, {})});
 }
 
 /// As the publisher does: head-relative world axes to head space, in double.
@@ -95,10 +95,11 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   RETURN_IF_ERROR(check_recording(desc));
   const SceneDesc scene = scene_for(desc);
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
-  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, desc.shaders));
+  ASSIGN_OR_RETURN(const auto solver, make_solver(scene, desc.executor));
 
   StreamRecording recording;
   recording.motion_name = desc.motion.name;
+  recording.moved_by = desc.executor != nullptr ? to_string(desc.executor->info().device) : "double";
   recording.shape = {desc.size.strand_count, desc.size.vertex_count,
                      make_scene_asset(content.groom, {}).rest_position_m};
   const MotionSurvey survey = survey_motion(desc.motion, desc.seconds);

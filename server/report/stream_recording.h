@@ -1,13 +1,13 @@
 // StreamRecording: strands as the server's own solver moves them under a head motion, kept as float positions
-// in head space, so that every codec gets the same frames. GPU solvers need the thread's GL context.
+// in head space, so that every codec gets the same frames. From the executor's thread.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "common/gl/program.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_motion.h"
+#include "server/sim/executor/executor.h"
 
 namespace strandcast {
 
@@ -27,15 +27,16 @@ struct RecordingDesc {
   StreamMotion motion;
   StreamSize size;
   double seconds = 3.0;
-  std::string solver;                          // empty: the built-in scene's
-  const gl::ShaderLibrary* shaders = nullptr;  // nullptr: the double-precision solver
+  std::string solver;            // empty: the built-in scene's
+  Executor* executor = nullptr;  // nullptr: the double-precision solver
   MotionPart part = MotionPart::Median;
 };
 
 struct StreamRecording {
   std::string motion_name;
-  HeadPace head;                                 // of the recorded part
-  double hair_rms_mps = 0.0;                     // of all vertices, in head space
+  std::string moved_by;       // the executor: "gl", "lanes"; "double". Others round otherwise
+  HeadPace head;              // of the recorded part
+  double hair_rms_mps = 0.0;  // of all vertices, in head space
   MotionLevel motion_level = MotionLevel::Idle;  // of the whole motion
   MotionPart part = MotionPart::Median;
   StreamShape shape;

@@ -11,9 +11,9 @@
 
 #include "common/base/check.h"
 #include "common/base/profile.h"
-#include "common/gl/egl_context.h"
 #include "common/log/progress.h"
 #include "server/report/peers/peer_codecs.h"
+#include "server/report/report_executor.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {
@@ -140,14 +140,14 @@ std::vector<StreamCodecRow> codecs_for(bool has_curve) {
 
 class StreamingRun {
  public:
-  StreamingRun(StreamingReport& report, const gl::ShaderLibrary* shaders, const StreamingOptions& options)
-      : report_(report), shaders_(shaders), solver_(options.solver), progress_({"streaming"}) {}
+  StreamingRun(StreamingReport& report, Executor* executor, const StreamingOptions& options)
+      : report_(report), executor_(executor), solver_(options.solver), progress_({"streaming"}) {}
 
   Status add(const StreamMotion& motion, const StreamSize& size, MotionPart part) {
     const std::string name = fmt::format("{}, {} part, {}", motion.name, to_string(part), to_string(size));
     progress_.expect(1, 0.0);
     progress_.begin_run(name + ": recording");
-    auto recorded = record_strands({motion, size, report_.seconds, solver_, shaders_, part});
+    auto recorded = record_strands({motion, size, report_.seconds, solver_, executor_, part});
     if (!recorded) return at(motion.name, recorded.error());
     progress_.end_run(0.0);
     StreamRecording& recording = *recorded;
@@ -175,7 +175,7 @@ class StreamingRun {
 
  private:
   StreamingReport& report_;
-  const gl::ShaderLibrary* shaders_;
+  Executor* executor_;
   std::string solver_;
   Progress progress_;
   std::set<std::tuple<MotionLevel, uint32_t, uint32_t>> seen_;
@@ -212,6 +212,7 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
 
   StreamingRow row;
   row.motion = recording.motion_name;
+  row.moved_by = recording.moved_by;
   row.motion_level = recording.motion_level;
   row.part = recording.part;
   row.size = {recording.shape.strand_count, recording.shape.vertex_count};
@@ -236,18 +237,14 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
 Result<StreamingReport> measure_streaming(const StreamingOptions& options,
                                           const std::function<Status(const StreamingReport&)>& on_recording) {
   ASSIGN_OR_RETURN(const Plan plan, make_plan(options));
-  std::unique_ptr<gl::EglContext> context;
-  if (options.gl_device != "none") {
-    ASSIGN_OR_RETURN(context, gl::EglContext::make(options.gl_device));
-  }
-  const gl::ShaderLibrary shaders;
+  ASSIGN_OR_RETURN(const auto executor, open_report_executor(options.device));
   StreamingReport report;
   report.is_quick = options.is_quick;
-  report.device = context ? context->info().renderer : "the processor, in double precision";
+  report.device = executor ? executor->info().name : "the processor, in double precision";
   report.solver = options.solver.empty() ? built_in_scene().solver.name : options.solver;
   report.processors = std::max(1u, std::thread::hardware_concurrency());
   report.seconds = plan.seconds;
-  StreamingRun run(report, context ? &shaders : nullptr, options);
+  StreamingRun run(report, executor.get(), options);
   for (const StreamSize& size : plan.sizes)
     for (const StreamMotion& motion : plan.motions) {
       for (const MotionPart part : kMotionParts) {

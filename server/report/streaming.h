@@ -20,7 +20,7 @@ struct StreamingOptions {
   MotionFileOptions motion_file;               // how to read them
   std::vector<std::string> sizes;              // "STRANDSxVERTICES"; empty: as the grid says
   std::string solver;                          // empty: the built-in scene's
-  std::string gl_device = "auto";              // "none": the solver's double-precision version
+  ExecutorConfig device;                       // kNoDevice: the solver's double-precision version
   double seconds = 0.0;                        // recorded of each part of a motion; 0 = half a second
   bool is_quick = false;
 };
@@ -34,6 +34,7 @@ inline constexpr size_t kStartFrames = 9;
 /// One codec at one bound on one recording. Times are medians over frames.
 struct StreamingRow {
   std::string motion;
+  std::string moved_by;  // as the recording
   MotionLevel motion_level = MotionLevel::Idle;
   MotionPart part = MotionPart::Median;
   StreamSize size;

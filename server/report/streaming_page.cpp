@@ -203,21 +203,49 @@ constexpr const char* kLatencyText =
 }  // namespace
 
 std::string streaming_csv(const StreamingReport& report) {
-  CsvFile csv({"clip", "part", "class", "strands", "vertices", "codec", "kind", "bound_mm", "bits_per_vertex",
-               "bits_per_vertex_with_start", "keyframe_bits_per_vertex", "mbit_per_s", "max_error_mm",
-               "rms_error_mm", "keeps_bound", "encode_cpu_ms", "decode_cpu_ms", "encode_wall_ms",
-               "decode_wall_ms"});
+  CsvFile csv({"clip",
+               "part",
+               "class",
+               "strands",
+               "vertices",
+               "codec",
+               "kind",
+               "bound_mm",
+               "bits_per_vertex",
+               "bits_per_vertex_with_start",
+               "keyframe_bits_per_vertex",
+               "mbit_per_s",
+               "max_error_mm",
+               "rms_error_mm",
+               "keeps_bound",
+               "encode_cpu_ms",
+               "decode_cpu_ms",
+               "encode_wall_ms",
+               "decode_wall_ms",
+               "moved_by"});
   for (const StreamingRow& row : report.rows) {
-    csv.add_row(
-        {row.motion, to_string(row.part), to_string(row.motion_level),
-         fmt::format("{}", row.size.strand_count), fmt::format("{}", row.size.vertex_count), row.codec,
-         row.is_ours       ? "ours"
-         : row.is_temporal ? "peer, temporal"
-                           : "peer, positions",
-         csv_number(mm(row.bound_m)), csv_number(row.bits), csv_number(row.all_bits),
-         csv_number(row.join_bits), csv_number(row.mbit_per_s()), csv_number(mm(row.max_error_m)),
-         csv_number(mm(row.rms_error_m)), row.keeps_bound() ? "yes" : "no", csv_number(row.encode_cpu_ms),
-         csv_number(row.decode_cpu_ms), csv_number(row.encode_wall_ms), csv_number(row.decode_wall_ms)});
+    csv.add_row({row.motion,
+                 to_string(row.part),
+                 to_string(row.motion_level),
+                 fmt::format("{}", row.size.strand_count),
+                 fmt::format("{}", row.size.vertex_count),
+                 row.codec,
+                 row.is_ours       ? "ours"
+                 : row.is_temporal ? "peer, temporal"
+                                   : "peer, positions",
+                 csv_number(mm(row.bound_m)),
+                 csv_number(row.bits),
+                 csv_number(row.all_bits),
+                 csv_number(row.join_bits),
+                 csv_number(row.mbit_per_s()),
+                 csv_number(mm(row.max_error_m)),
+                 csv_number(mm(row.rms_error_m)),
+                 row.keeps_bound() ? "yes" : "no",
+                 csv_number(row.encode_cpu_ms),
+                 csv_number(row.decode_cpu_ms),
+                 csv_number(row.encode_wall_ms),
+                 csv_number(row.decode_wall_ms),
+                 row.moved_by});
   }
   return csv.text();
 }

@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "common/base/profile.h"
-#include "common/gl/egl_context.h"
 #include "common/log/progress.h"
+#include "server/report/report_executor.h"
 #include "server/report/run_timer.h"
 
 namespace strandcast {
@@ -106,14 +106,9 @@ class Measurement {
  public:
   /// `motions`: of every hair, straight first or alone.
   Measurement(const WorkGrid& grid, const std::vector<MotionSet>& motions, std::vector<const SolverRow*> rows,
-              gl::EglContext* context)
-      : grid_(grid),
-        rows_(std::move(rows)),
-        workbench_{context != nullptr ? &shaders_ : nullptr},
-        progress_({"work-precision"}) {
-    for (const MotionSet& motion : motions)
-      sets_.push_back(
-          {&motion, RunTimer(workbench_, context != nullptr ? &context->info() : nullptr, motion)});
+              Executor* executor)
+      : grid_(grid), rows_(std::move(rows)), workbench_{executor}, progress_({"work-precision"}) {
+    for (const MotionSet& motion : motions) sets_.push_back({&motion, RunTimer(workbench_, motion)});
   }
 
   // Times first, while nothing else runs; then tests here and references on another thread; then the motion.
@@ -197,12 +192,12 @@ class Measurement {
   }
 
   WorkRecord record_for(const std::string& test, const RunSetting& setting) const {
-    return {test, setting, workbench_.runs_on_gpu(setting)};
+    return {test, setting, workbench_.name_of(setting)};
   }
 
   /// Not empty when a row that only runs in double would take too long for it.
   std::string too_slow(HairSet& set, const RunSetting& setting, double simulated_s, uint32_t strand_count) {
-    if (workbench_.runs_on_gpu(setting)) return "";
+    if (workbench_.runs_kernel(setting)) return "";
     const auto time = set.timer.time(setting);
     if (!time) return "";
     const double expected_s =
@@ -241,7 +236,7 @@ class Measurement {
     std::future<Result<Trajectory>> exact;
     const bool is_default_effort =
         std::isnan(setting.effort) || setting.effort == effort_values(*setting.row, {1.0}).front();
-    if (record.is_on_gpu && (is_default_effort || grid_.has_every_effort))
+    if (workbench_.runs_kernel(setting) && (is_default_effort || grid_.has_every_effort))
       exact = std::async(std::launch::async, [&] { return motion.run({}, in_double); });
     const std::string note = too_slow(set, setting, grid_.motion_s, grid_.strand_count);
     const auto run = note.empty() ? motion.run(workbench_, setting)
@@ -270,7 +265,6 @@ class Measurement {
 
   const WorkGrid& grid_;
   std::vector<const SolverRow*> rows_;
-  gl::ShaderLibrary shaders_;
   Workbench workbench_;
   Progress progress_;
   std::vector<HairSet> sets_;
@@ -379,12 +373,9 @@ Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options) {
     motions.push_back(std::move(motion));
   }
   report.motion_name = options.motion.empty() ? "built-in head motion" : options.motion.filename().string();
-  std::unique_ptr<gl::EglContext> context;
-  if (options.gl_device != "none") {
-    ASSIGN_OR_RETURN(context, gl::EglContext::make(options.gl_device));
-  }
-  report.device = context ? context->info().renderer : "none: every model as its double-precision reference";
-  RETURN_IF_ERROR(Measurement(report.grid, motions, std::move(rows), context.get()).run(report));
+  ASSIGN_OR_RETURN(const auto executor, open_report_executor(options.device));
+  report.device = executor ? executor->info().name : "none: every model as its double-precision reference";
+  RETURN_IF_ERROR(Measurement(report.grid, motions, std::move(rows), executor.get()).run(report));
   return report;
 }
 

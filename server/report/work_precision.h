@@ -18,7 +18,7 @@ struct WorkPrecisionOptions {
   std::vector<std::string> solvers;  // rows of the table; empty = all
   std::filesystem::path motion;      // .bvh; empty: the built-in head motion
   MotionFileOptions motion_file;     // how to read it
-  std::string gl_device = "auto";    // "none": every row as its reference
+  ExecutorConfig device;             // kNoDevice: every row as its reference
   bool is_quick = false;
   // Less than the whole grid; empty = all of it.
   std::vector<uint32_t> vertices;
@@ -48,7 +48,7 @@ struct WorkGrid {
   uint32_t refined_vertices = 64;
   double refined_rate_hz = 3840.0;
   double refined_effort_factor = 1.0;
-  // A row without a GPU version may be so slow that its runs take minutes: those beyond this are left out,
+  // A row without a kernel may be so slow that its runs take minutes: those beyond this are left out,
   // and refined versions take longer steps to keep it.
   double longest_run_s = 120.0;
 };
@@ -58,11 +58,11 @@ WorkGrid make_work_grid(const WorkPrecisionOptions& options);
 struct WorkRecord {
   std::string test;  // motion_test() or the name of an analytic one
   RunSetting setting;
-  bool is_on_gpu = false;
+  std::string ran_on;                                    // Workbench::name_of()
   double us = std::numeric_limits<double>::quiet_NaN();  // per strand and frame, best of several
   double median_us = std::numeric_limits<double>::quiet_NaN();
   // Of the motion set, all relative RMS position errors: the row refined against the rod, the run against the
-  // row refined, the GPU run against double precision at the same setting.
+  // row refined, the kernel's run against double precision at the same setting.
   double model_error = std::numeric_limits<double>::quiet_NaN();
   double discretisation_error = std::numeric_limits<double>::quiet_NaN();
   double float_error = std::numeric_limits<double>::quiet_NaN();

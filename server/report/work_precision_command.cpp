@@ -36,10 +36,7 @@ void add_work_precision_command(CLI::App& app, ReportAction& action) {
       ->take_all();
   command->add_option("--seconds", options->motion_s, "length of the measured motion")
       ->check(CLI::PositiveNumber);
-  command
-      ->add_option("--gl-device", options->gl_device,
-                   "auto, software, hardware, a device number, or none: double-precision references only")
-      ->capture_default_str();
+  add_sim_device_options(*command, options->device, "double-precision references only");
   command->add_flag("--quick", options->is_quick, "fewer runs: some minutes on two cores");
   command->callback([options, &action] { action = [options] { return run_work_precision(*options); }; });
 }

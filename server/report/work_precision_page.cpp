@@ -144,7 +144,7 @@ void add_error_parts(HtmlPage& page, const WorkReport& report, MotionHair hair) 
       "{} hair, every model's most exact run. Model: the model itself, refined ({} vertices, up to {:g} Hz, "
       "in "
       "double), "
-      "against the rod. Discretisation: this run against the model refined. Float: this run on the GPU "
+      "against the rod. Discretisation: this run against the model refined. Float: this run by its kernel "
       "against "
       "double precision. All are RMS distances of vertices over the strand's length.",
       to_string(hair), report.grid.refined_vertices, report.grid.refined_rate_hz);
@@ -304,7 +304,7 @@ void add_method(HtmlPage& page, const WorkReport& report) {
   page.paragraph(
       fmt::format("Times: {} strands at once on \"{}\", best of several substeps, the device waited for "
                   "after each; a frame is "
-                  "1/60 s whatever the rate. Rows without a GPU version are timed in double precision on one "
+                  "1/60 s whatever the rate. Rows without a kernel are timed in double precision on one "
                   "thread. Times are "
                   "of this machine; errors are the same on every one.",
                   report.timed_strands, report.device));
@@ -361,7 +361,7 @@ std::string work_precision_csv(const WorkReport& report) {
     csv.add_row({record.test,
                  setting.row->name,
                  to_string(setting.material),
-                 record.is_on_gpu ? "gpu" : "double",
+                 record.ran_on,
                  std::to_string(setting.vertex_count),
                  csv_number(setting.rate_hz),
                  std::to_string(setting.substeps),

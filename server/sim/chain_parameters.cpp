@@ -1,7 +1,6 @@
 #include "server/sim/chain_parameters.h"
 
 #include "server/sim/strand_kernel.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 
@@ -41,12 +40,11 @@ SolverParameters chain_as_hair(const HairConstants& hair) {
 
 Result<std::unique_ptr<Solver>> make_chain_kernel(const std::string& name, const std::string& effort_name,
                                                   const SolverParameters& parameters,
-                                                  const GpuSolverContext& context) {
+                                                  const SolverContext& context) {
   const ChainParameters chain = read_chain_parameters(parameters, effort_name);
   StrandKernelDesc desc;
   desc.name = name;
   desc.shader_path = "sim/" + name + ".comp";
-  desc.local_size = shader::kStrandLocalSize;
   desc.constants = {{"u_bend_stiffness", chain.bend_stiffness_m4ps2},
                     {"u_twist_stiffness", chain.twist_stiffness_m4ps2},
                     {"u_bending_damping", chain.damping_s},

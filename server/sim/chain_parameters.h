@@ -29,6 +29,6 @@ SolverParameters chain_as_hair(const HairConstants& hair);
 /// The kernel of a model of rigid segments, shaders/sim/NAME.comp on top of chain.glsl.
 Result<std::unique_ptr<Solver>> make_chain_kernel(const std::string& name, const std::string& effort_name,
                                                   const SolverParameters& parameters,
-                                                  const GpuSolverContext& context);
+                                                  const SolverContext& context);
 
 }  // namespace strandcast

@@ -1,5 +1,5 @@
 // Solver: one strand model behind a small interface; the table in solver_registry.h lists all of them. A
-// solver is used from one thread; GPU solvers need that thread's GL context. A solver never allocates in
+// solver is used from one thread, that of its executor if it has one. A solver never allocates in
 // substep().
 //
 // Frame of the state: world axes with the origin at the head joint of the current step ("head-relative"). It
@@ -89,7 +89,7 @@ class Solver {
   /// Bytes the solver keeps on its device.
   virtual uint64_t memory_bytes() const = 0;
 
-  /// The strands that it works on when these are on the GPU; nullptr for a solver that has its own.
+  /// The strands that it works on when an executor keeps these; nullptr for a solver that has its own.
   virtual const StrandState* strands() const { return nullptr; }
   /// Goes on with strands() as another solver left them; allocates. On an error the other one may go on.
   virtual Status follow() { return {}; }

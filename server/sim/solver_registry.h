@@ -8,11 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "common/gl/program.h"
 #include "server/sim/hair_constants.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
+
+class Executor;
 
 struct SolverParameterInfo {
   std::string name;
@@ -23,12 +24,13 @@ struct SolverParameterInfo {
   std::string summary;
 };
 
-/// How a kernel that comes in both forms spreads its work. Auto: as suits the device.
+/// How a kernel that comes in both forms spreads its work. Auto: per strand on processors, which pay more for
+/// the barriers between vertices than for the work, else per vertex.
 enum class KernelForm { Auto, PerVertex, PerStrand };
 
-/// What a GPU solver is built from besides the scene's parameters.
-struct GpuSolverContext {
-  const gl::ShaderLibrary* shaders = nullptr;
+/// What a solver is built from besides the scene's parameters.
+struct SolverContext {
+  Executor* executor = nullptr;  // outlives the solver
   SceneFeatures features;
   KernelForm form = KernelForm::Auto;
   /// The strands to work on, which outlive the solver as the caller likes; nullptr = the solver's own.
@@ -57,7 +59,7 @@ struct SolverRow {
   std::function<SolverParameters(const HairConstants&, double segment_m, double substep_s)> as_hair;
   /// The parameter that buys accuracy with time ("iterations", "solves"); "" = none.
   std::string effort_parameter;
-  /// False: there is no kernel. make_gpu then makes the double-precision solver as well, which runs on one
+  /// False: there is no kernel. make then makes the double-precision solver as well, which runs on one
   /// thread of the processor, slowly, through the same interface.
   bool has_kernel = true;
   /// Does ahead what takes long of loading a groom under this gravity, so that load() finds it done, and
@@ -67,7 +69,7 @@ struct SolverRow {
                                                  const glm::dvec3& groom_gravity_in_head_mps2,
                                                  const std::stop_token&)>
       prepare;
-  std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const GpuSolverContext&)> make_gpu;
+  std::function<Result<std::unique_ptr<Solver>>(const SolverParameters&, const SolverContext&)> make;
   std::function<std::unique_ptr<Solver>(const SolverParameters&)>
       make_reference;  // double precision, one thread
 };

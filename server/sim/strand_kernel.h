@@ -1,5 +1,4 @@
-// StrandKernel: a GPU solver with one compute dispatch per substep. Used from one thread with its GL context
-// current.
+// StrandKernel: a solver with one kernel run per substep. From the thread of its executor.
 #pragma once
 
 #include <cstdint>
@@ -7,44 +6,40 @@
 #include <string>
 #include <vector>
 
-#include "server/sim/gpu_solver.h"
+#include "server/sim/kernel_solver.h"
 
 namespace strandcast {
 
 /// What tells one kernel from another.
 struct StrandKernelDesc {
-  std::string name;         // labels
-  std::string shader_path;  // below shaders/
-  bool is_per_vertex =
-      false;  // group = whole strands, one invocation per vertex; else one invocation per strand
-  uint32_t local_size = 0;
-  bool has_offset = false;  // a strand beside the state; one that is written starts without any
+  std::string name;            // labels
+  std::string shader_path;     // below shaders/
+  bool is_per_vertex = false;  // as KernelDesc
+  bool has_offset = false;     // a strand beside the state; one that is written starts without any
   ModelConstants constants;
 };
 
-class StrandKernel final : public GpuSolver {
+class StrandKernel final : public KernelSolver {
  public:
-  /// Unsupported or Internal when a needed variant does not compile.
-  static Result<std::unique_ptr<Solver>> make(StrandKernelDesc desc, const StrandParameters& parameters,
-                                              const GpuSolverContext& context);
+  static std::unique_ptr<Solver> make(StrandKernelDesc desc, const StrandParameters& parameters,
+                                      const SolverContext& context) {
+    return std::unique_ptr<Solver>(new StrandKernel(std::move(desc), parameters, context));
+  }
 
  private:
-  StrandKernel(StrandKernelDesc desc, const StrandParameters& parameters, const GpuSolverContext& context)
-      : GpuSolver(context, parameters), desc_(std::move(desc)) {}
+  StrandKernel(StrandKernelDesc desc, const StrandParameters& parameters, const SolverContext& context)
+      : KernelSolver(context, parameters), desc_(std::move(desc)) {}
 
-  Status compile(bool has_pinned_tail);
-  uint32_t group_count() const;
-  Status prepare() override;
-  void run(const gl::Program& program) override;
+  void prepare() override;
+  KernelDesc kernel() const override;
+  void bind(BoundPlanes& planes) const override;
   void forget(const std::vector<bool>& is_changed) override;
   void turn_memory(const glm::dquat& turn) override;
-  const StrandPrograms& programs() const override { return programs_; }
-  uint64_t model_bytes() const override { return offset_.size_bytes(); }
+  uint64_t model_bytes() const override { return offset_ ? offset_->size_bytes() : 0; }
 
   StrandKernelDesc desc_;
-  StrandPrograms programs_;
-  bool is_compiled_for_tail_ = false;
-  StrandPlane offset_;  // (vertex_count x strand_count) second strand less the state, m; has_offset only
+  // (vertex_count x strand_count) second strand less the state, m; has_offset only
+  std::unique_ptr<StrandPlane> offset_;
 };
 
 }  // namespace strandcast

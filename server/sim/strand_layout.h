@@ -32,7 +32,7 @@ struct StrandLayout {
   uint32_t tail_begin() const { return vertex_count - pinned_tail_count; }
 };
 
-/// Vertices per strand of a reference that no GPU has to follow: converged solutions of reports.
+/// Vertices per strand of a reference that no kernel has to follow: converged solutions of reports.
 inline constexpr uint32_t kMaxReferenceVertexCount = 256;
 
 /// Whether roots are held in this substep; no number, and no angle, is no limit.

@@ -77,18 +77,15 @@ void SimLoop::run(std::function<void(Status)> on_ready) {
     const std::lock_guard lock(mutex_);
     failure_ = error;
   }
-  // GL objects go before their context, on this thread.
-  timer_.reset();
+  // What an executor made goes before it, on this thread.
   solver_.reset();
   strands_.reset();
-  context_.reset();
+  executor_.reset();
 }
 
 Status SimLoop::begin() {
-  ASSIGN_OR_RETURN(context_, gl::EglContext::make(config_.gl_device));
-  log_info("sim", "simulating on {}", context_->info().renderer);
-  if (config_.shader_folder) shaders_ = gl::ShaderLibrary(*config_.shader_folder);
-  timer_.emplace(context_->info());
+  ASSIGN_OR_RETURN(executor_, open_executor(config_.device));
+  log_info("sim", "simulating on {}", executor_->info().name);
   builder_.emplace(config_.scene, config_.content->colliders);
   const StreamDesc& stream = config_.scene.stream;
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
@@ -323,18 +320,18 @@ void SimLoop::follow_look() {
 Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& features) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  const bool are_on_gpu = solver_ != nullptr && solver_->strands() != nullptr;
-  const auto strands = are_on_gpu ? strands_ : std::make_shared<StrandState>();
+  const bool are_kept = solver_ != nullptr && solver_->strands() != nullptr;
+  const auto strands = are_kept ? strands_ : std::make_shared<StrandState>(*executor_);
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
-  const GpuSolverContext gpu = {&shaders_, features, KernelForm::Auto, strands, groom_gravity};
-  ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make_gpu(parameters, gpu));
+  const SolverContext context = {executor_.get(), features, KernelForm::Auto, strands, groom_gravity};
+  ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
                                      : hand_over(*solver_, *solver, config_.content->groom, rotation));
   solver_ = std::move(solver);
-  // A solver with strands of its own leaves none behind on the GPU.
+  // A solver with strands of its own leaves none behind on the executor.
   strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
@@ -386,7 +383,7 @@ void SimLoop::step(int64_t time_ns) {
   turn.end_time_s = end_time_s;
   turn.input_rate = input_clock_->rate();
   turn.is_stopping = &is_stopping_;
-  CHECK(stages_->step(turn, &*timer_).ok());  // stages of a step cannot fail
+  CHECK(stages_->step(turn, executor_->timer()).ok());  // stages of a step cannot fail
   if (is_stopping_) return;
   step_times_.add_ms(stages_->last_step_ms());
   last_step_ns_ = now_ns();
@@ -451,7 +448,9 @@ void SimLoop::update_stats() {
   stats.solver_name = config_.scene.solver.name;
   stats.substeps = config_.scene.substeps;
   stats.strand_rate_hz = config_.scene.stream.strand_rate_hz;
-  stats.is_software = context_->info().is_software;
+  stats.sim_device = to_string(executor_->info().device);
+  stats.sim_device_name = executor_->info().name;
+  stats.is_software = executor_->info().is_software;
   const std::lock_guard lock(mutex_);
   stats_ = std::move(stats);
 }

@@ -1,4 +1,4 @@
-// SimLoop: the simulation thread with its GL context: takes input, steps the solver, publishes. Commands and
+// SimLoop: the simulation thread with its executor: takes input, steps the solver, publishes. Commands and
 // facts reach it through a queue and are carried out between two steps, commands one at a time and within
 // kJobShare of the time. It never waits for a viewer.
 #pragma once
@@ -19,9 +19,6 @@
 #include "common/base/histogram.h"
 #include "common/base/profile.h"
 #include "common/base/result.h"
-#include "common/gl/egl_context.h"
-#include "common/gl/program.h"
-#include "common/gl/timer.h"
 #include "common/scene/features.h"
 #include "common/wire/messages.h"
 #include "server/input/input_hub.h"
@@ -30,6 +27,7 @@
 #include "server/scene/scene_content.h"
 #include "server/scene/sim_clock.h"
 #include "server/scene/step_builder.h"
+#include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
 #include "server/source/sim_stages.h"
@@ -43,9 +41,8 @@ using SnapshotObserver = std::function<void(const std::shared_ptr<const Snapshot
 struct SimLoopConfig {
   SceneDesc scene;
   std::shared_ptr<const SceneContent> content;
-  std::string gl_device = "auto";                      // as EglContext::make
-  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
-  SnapshotObserver on_publish;                         // may be empty; on the simulation thread
+  ExecutorConfig device;        // what simulates
+  SnapshotObserver on_publish;  // may be empty; on the simulation thread
 };
 
 /// Commands that may wait for the simulation thread; each can cost a new solver.
@@ -122,16 +119,14 @@ class SimLoop {
   StateSink& sink_;
 
   // Of the simulation thread.
-  std::unique_ptr<gl::EglContext> context_;
-  gl::ShaderLibrary shaders_;
-  std::shared_ptr<StrandState> strands_;  // of solvers on the GPU, one after the other; else null
+  std::unique_ptr<Executor> executor_;
+  std::shared_ptr<StrandState> strands_;  // of solvers with a kernel, one after the other; else null
   std::unique_ptr<Solver> solver_;
   SceneFeatures solver_features_;  // what the solver was built for
   std::optional<StepBuilder> builder_;
   std::optional<Publisher> publisher_;
   std::optional<SimClock> clock_;
   std::optional<InputClock> input_clock_;
-  std::optional<gl::GpuTimer> timer_;
   std::optional<SimStages> stages_;
   RuntimeFacts facts_;
   bool has_state_readers_ = false;

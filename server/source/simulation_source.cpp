@@ -20,8 +20,7 @@ class SimulationSource : public StateSource {
 
   std::shared_ptr<const SceneAsset> asset() const override { return asset_; }
   Status start(StateSink& sink, const StreamDesc& stream) override {
-    SimLoopConfig config{config_.scene, content_, config_.gl_device, config_.shader_folder,
-                         config_.on_publish};
+    SimLoopConfig config{config_.scene, content_, config_.device, config_.on_publish};
     config.scene.stream = stream;
     ASSIGN_OR_RETURN(loop_, SimLoop::start(std::move(config), inputs_, sink));
     return {};

@@ -13,12 +13,11 @@ namespace strandcast {
 
 struct SimulationConfig {
   SceneDesc scene;
-  std::string gl_device = "auto";                      // as EglContext::make
-  std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
-  SnapshotObserver on_publish;                         // may be empty
+  ExecutorConfig device;        // what simulates
+  SnapshotObserver on_publish;  // may be empty
 };
 
-/// Checks and loads the scene; OpenGL is asked for by start(). `inputs` outlives the source.
+/// Checks and loads the scene; the executor is opened by start(). `inputs` outlives the source.
 Result<std::unique_ptr<StateSource>> make_simulation(SimulationConfig config, InputHub& inputs);
 
 }  // namespace strandcast

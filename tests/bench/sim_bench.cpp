@@ -7,7 +7,6 @@
 // collider tested and about 90 per collider hit. Memory: 48 bytes read (rest, position, velocity) and 32
 // written. The floor printed is 80 bytes per vertex at the machine's own copy speed, measured at the start on
 // as many threads as it has.
-#include <epoxy/gl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,8 +22,8 @@
 #include <vector>
 
 #include "common/base/profile.h"
-#include "common/gl/egl_context.h"
 #include "common/groom/groom_file.h"
+#include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_parameters.h"
 #include "tests/bench/float_strands.h"
@@ -42,7 +41,7 @@ struct Options {
   int warm_up = 20;
   std::string csv_path;
   std::string groom_path;
-  std::string device = "auto";
+  ExecutorConfig device = {"gl", "auto", {}};
   std::string solver;  // empty = all
 };
 
@@ -57,17 +56,14 @@ struct Sample {
 };
 
 /// Median and minimum over options.steps steps of the same motion, after a warm-up.
-Sample time_steps(Solver& solver, const Options& options, int steps, bool has_colliders) {
+Sample time_steps(Executor& executor, Solver& solver, const Options& options, int steps, bool has_colliders) {
   std::vector<double> samples_ms;
   for (int step = 1; step <= options.warm_up + steps; ++step) {
     StepInput input = moving_input(step, kSubstepS);
     input.gusts.clear();
     if (!has_colliders) input.colliders.clear();
-    glFinish();
-    const int64_t begin_ns = now_ns();
-    solver.substep(input);
-    glFinish();
-    if (step > options.warm_up) samples_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    const double ms = timed_ms(executor, [&] { solver.substep(input); });
+    if (step > options.warm_up) samples_ms.push_back(ms);
   }
   std::sort(samples_ms.begin(), samples_ms.end());
   return {samples_ms[samples_ms.size() / 2], samples_ms.front()};
@@ -79,7 +75,7 @@ struct Held {
   double free_ms = 0.0;
   double held_ms = 0.0;
 };
-Held time_held(Solver& free, Solver& held, const Options& options, bool has_colliders) {
+Held time_held(Executor& executor, Solver& free, Solver& held, const Options& options, bool has_colliders) {
   constexpr double kLimitRad = 20.0 * 3.14159265358979 / 180.0;
   Held best{1e9, 1e9};
   for (int step = 1; step <= options.warm_up + options.steps; ++step) {
@@ -88,13 +84,9 @@ Held time_held(Solver& free, Solver& held, const Options& options, bool has_coll
     if (!has_colliders) input.colliders.clear();
     for (const bool is_held : {false, true}) {
       input.follicle_limit_rad = is_held ? kLimitRad : kFreeFollicleRad;
-      glFinish();
-      const int64_t begin_ns = now_ns();
-      (is_held ? held : free).substep(input);
-      glFinish();
+      const double ms = timed_ms(executor, [&] { (is_held ? held : free).substep(input); });
       double& least_ms = is_held ? best.held_ms : best.free_ms;
-      if (step > options.warm_up)
-        least_ms = std::min(least_ms, static_cast<double>(now_ns() - begin_ns) * 1e-6);
+      if (step > options.warm_up) least_ms = std::min(least_ms, ms);
     }
   }
   return best;
@@ -149,11 +141,12 @@ std::optional<std::vector<BenchSet>> make_sets(const Options& options) {
 }
 
 struct Row {
+  std::string executor;
   std::string set;
   std::string solver;
   bool has_colliders = false;
   uint64_t vertices = 0;
-  Sample gpu;
+  Sample kernel;
   double cpu_ms = 0.0;        // float, one thread; 0 = none for this solver
   double reference_ms = 0.0;  // double, one thread
   double floor_ms = 0.0;
@@ -162,31 +155,34 @@ struct Row {
 };
 
 const char* kCsvHeader =
-    "set,solver,colliders,vertices,gpu_median_ms,gpu_minimum_ms,vertices_per_s,cpu_float_ms,reference_ms,"
+    "executor,set,solver,colliders,vertices,kernel_median_ms,kernel_minimum_ms,vertices_per_s,cpu_float_ms,"
+    "reference_ms,"
     "floor_ms,"
     "memory_bytes,held_over_free\n";
 
 std::string to_csv(const Row& row) {
-  return fmt::format("{},{},{},{},{:.4f},{:.4f},{:.0f},{:.4f},{:.4f},{:.4f},{},{:.3f}\n", row.set, row.solver,
-                     row.has_colliders ? 2 : 0, row.vertices, row.gpu.median_ms, row.gpu.minimum_ms,
-                     static_cast<double>(row.vertices) / (row.gpu.median_ms * 1e-3), row.cpu_ms,
-                     row.reference_ms, row.floor_ms, row.memory_bytes, row.held.held_ms / row.held.free_ms);
+  return fmt::format("{},{},{},{},{},{:.4f},{:.4f},{:.0f},{:.4f},{:.4f},{:.4f},{},{:.3f}\n", row.executor,
+                     row.set, row.solver, row.has_colliders ? 2 : 0, row.vertices, row.kernel.median_ms,
+                     row.kernel.minimum_ms, static_cast<double>(row.vertices) / (row.kernel.median_ms * 1e-3),
+                     row.cpu_ms, row.reference_ms, row.floor_ms, row.memory_bytes,
+                     row.held.held_ms / row.held.free_ms);
 }
 
 void print(const Row& row) {
-  const double rate = static_cast<double>(row.vertices) / (row.gpu.median_ms * 1e-3) * 1e-6;
+  const double rate = static_cast<double>(row.vertices) / (row.kernel.median_ms * 1e-3) * 1e-6;
   fmt::print("{:22} {:14} {:>9} {:9.3f} {:9.3f} {:8.1f} {:>9} {:9.2f} {:8.1f} {:9.3f} {:8.1f} {:8.3f}\n",
-             row.set, row.solver, row.has_colliders ? "2 spheres" : "-", row.gpu.median_ms,
-             row.gpu.minimum_ms, rate, row.cpu_ms > 0.0 ? fmt::format("{:.3f}", row.cpu_ms) : "-",
-             row.reference_ms, row.reference_ms / row.gpu.median_ms, row.floor_ms,
-             row.gpu.median_ms / row.floor_ms, row.held.held_ms / row.held.free_ms);
+             row.set, row.solver, row.has_colliders ? "2 spheres" : "-", row.kernel.median_ms,
+             row.kernel.minimum_ms, rate, row.cpu_ms > 0.0 ? fmt::format("{:.3f}", row.cpu_ms) : "-",
+             row.reference_ms, row.reference_ms / row.kernel.median_ms, row.floor_ms,
+             row.kernel.median_ms / row.floor_ms, row.held.held_ms / row.held.free_ms);
 }
 
 class Bench {
  public:
-  explicit Bench(const Options& options) : options_(options), copy_speed_(measure_copy_speed()) {}
+  Bench(const Options& options, Executor& executor)
+      : options_(options), executor_(executor), copy_speed_(measure_copy_speed()) {}
 
-  void print_head(const gl::DeviceInfo& info) const {
+  void print_head() const {
     fmt::print(
         "{}; {} threads; copy {:.1f} GB/s; {} steps after {} to warm up; other programs may share the "
         "machine:\n"
@@ -194,7 +190,7 @@ class Bench {
         "x held: a step with roots held at 20 degrees over one without, side by side\n"
         "per free vertex: about {} flop + 8 per collider, {} bytes; floor = those bytes at the copy "
         "speed\n\n",
-        info.renderer, std::thread::hardware_concurrency(), copy_speed_ * 1e-9, options_.steps,
+        executor_.info().name, std::thread::hardware_concurrency(), copy_speed_ * 1e-9, options_.steps,
         options_.warm_up, kFlopsPerVertex, kBytesPerVertex);
     fmt::print("{:22} {:14} {:>9} {:>9} {:>9} {:>8} {:>9} {:>9} {:>8} {:>9} {:>8} {:>8}\n", "set", "solver",
                "colliders", "median ms", "min ms", "Mvert/s", "float ms", "double ms", "x double", "floor ms",
@@ -206,35 +202,37 @@ class Bench {
     const auto parameters = complete_parameters(solver_row, {});
     SceneFeatures features;
     features.has_colliders = has_colliders;
-    auto gpu = solver_row.make_gpu(*parameters, {&shaders_, features});
-    const Status loaded = gpu ? (*gpu)->load(set.groom, {1.0, 0.0, 0.0, 0.0}) : Status(gpu.error());
+    auto kernel = solver_row.make(*parameters, {&executor_, features});
+    const Status loaded = kernel ? (*kernel)->load(set.groom, {1.0, 0.0, 0.0, 0.0}) : Status(kernel.error());
     if (!loaded) {
       fmt::print(stderr, "{}: {}\n", solver_row.name, loaded.error().to_string());
       return false;
     }
     Row row;
+    row.executor = to_string(executor_.info().device);
     row.set = set.name;
     row.solver = solver_row.name;
     row.has_colliders = has_colliders;
     row.vertices = set.groom.rest_position_m.size();
     features.has_follicle_limit = true;
-    auto held = solver_row.make_gpu(*parameters, {&shaders_, features});
+    auto held = solver_row.make(*parameters, {&executor_, features});
     if (held && (*held)->load(set.groom, {1.0, 0.0, 0.0, 0.0}))
-      row.held = time_held(**gpu, **held, options_, has_colliders);
-    row.gpu = time_steps(**gpu, options_, options_.steps, has_colliders);
-    row.memory_bytes = (*gpu)->memory_bytes();
+      row.held = time_held(executor_, **kernel, **held, options_, has_colliders);
+    row.kernel = time_steps(executor_, **kernel, options_, options_.steps, has_colliders);
+    row.memory_bytes = (*kernel)->memory_bytes();
     row.floor_ms = static_cast<double>(row.vertices) * kBytesPerVertex / copy_speed_ * 1e3;
     const int few_steps = std::max(3, options_.steps / 10);
     const auto reference = solver_row.make_reference(*parameters);
     if (reference->load(set.groom, {1.0, 0.0, 0.0, 0.0})) {
       Options short_options = options_;
       short_options.warm_up = 1;
-      row.reference_ms = time_steps(*reference, short_options, few_steps, has_colliders).minimum_ms;
+      row.reference_ms =
+          time_steps(executor_, *reference, short_options, few_steps, has_colliders).minimum_ms;
     }
     if (solver_row.name == "dftl") {
       FloatStrands plain(read_strand_parameters(*parameters));
       if (plain.load(set.groom, {1.0, 0.0, 0.0, 0.0})) {
-        row.cpu_ms = time_steps(plain, options_, options_.steps, has_colliders).minimum_ms;
+        row.cpu_ms = time_steps(executor_, plain, options_, options_.steps, has_colliders).minimum_ms;
       }
     }
     print(row);
@@ -245,8 +243,8 @@ class Bench {
 
  private:
   Options options_;
+  Executor& executor_;
   double copy_speed_;
-  gl::ShaderLibrary shaders_;
 };
 
 std::optional<Options> parse(int argc, char** argv) {
@@ -263,11 +261,13 @@ std::optional<Options> parse(int argc, char** argv) {
     } else if (name == "--solver" && find_solver(value)) {
       options.solver = value;
     } else if (name == "--device" && !value.empty()) {
-      options.device = value;
+      options.device.gl_device = value;
+    } else if (name == "--sim-device" && is_sim_device_name(value)) {
+      options.device.sim_device = value;
     } else {
       fmt::print(stderr,
                  "usage: sim_bench [--steps N] [--csv FILE] [--groom FILE.tfx|FILE.hair] [--device auto] "
-                 "[--solver dftl|dftl_parallel]\n");
+                 "[--sim-device gl|lanes|auto] [--solver dftl|dftl_parallel]\n");
       return std::nullopt;
     }
     ++i;
@@ -276,15 +276,15 @@ std::optional<Options> parse(int argc, char** argv) {
 }
 
 int run_bench(const Options& options) {
-  const auto context = gl::EglContext::make(options.device);
-  if (!context) {
-    fmt::print(stderr, "{}\n", context.error().to_string());
+  const auto executor = open_executor(options.device);
+  if (!executor) {
+    fmt::print(stderr, "{}\n", executor.error().to_string());
     return 2;
   }
   const auto sets = make_sets(options);
   if (!sets) return 2;
-  Bench bench(options);
-  bench.print_head((*context)->info());
+  Bench bench(options, **executor);
+  bench.print_head();
   std::string csv = kCsvHeader;
   for (const BenchSet& set : *sets) {
     for (const SolverRow& row : solver_table()) {

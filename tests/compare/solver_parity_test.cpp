@@ -1,10 +1,11 @@
-// Every GPU solver against its double-precision reference over a few steps of the same motion.
+// Every solver on every executor against its double-precision reference over a few steps of the same motion.
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <tuple>
 
 #include "server/sim/solver_registry.h"
-#include "tests/support/gl_fixture.h"
+#include "tests/support/sim_devices.h"
 #include "tests/support/sim_scene.h"
 #include "tests/support/solver_bounds.h"
 #include "tests/support/test_grid.h"
@@ -137,10 +138,10 @@ bool is_on_grid(const ParityCase& test) {
          std::find(std::begin(kWholeOnly), std::end(kWholeOnly), test.name) == std::end(kWholeOnly);
 }
 
-class SolverParity : public GlTest, public testing::WithParamInterface<std::string> {
+class SolverParity : public testing::TestWithParam<std::tuple<std::string, SimDevice>> {
  protected:
   void compare(const SolverRow& row, const ParityCase& test);
-  gl::ShaderLibrary shaders_;
+  SimExecutors executors_;
 };
 
 void SolverParity::compare(const SolverRow& row, const ParityCase& test) {
@@ -151,31 +152,31 @@ void SolverParity::compare(const SolverRow& row, const ParityCase& test) {
   const Groom groom = make_test_groom(desc);
   const auto parameters = complete_parameters(row, known_parameters(row, test.parameters));
   ASSERT_TRUE(parameters);
-  auto gpu = row.make_gpu(*parameters, {&shaders_, features_for(test)});
-  ASSERT_TRUE(gpu) << gpu.error().to_string();
+  auto kernel = row.make(*parameters, {&executors_.on(std::get<SimDevice>(GetParam())), features_for(test)});
+  ASSERT_TRUE(kernel) << kernel.error().to_string();
   const auto reference = row.make_reference(*parameters);
   const glm::dquat start = moving_input(0, kSubstepS).world_from_head_rotation;
-  ASSERT_TRUE((*gpu)->load(groom, start));
+  ASSERT_TRUE((*kernel)->load(groom, start));
   ASSERT_TRUE(reference->load(groom, start));
-  SolverState from_gpu;
+  SolverState from_kernel;
   SolverState expected;
   for (int step = 1; step <= test.steps; ++step) {
     const double bound_m = bound_for(row, test, step);
-    (*gpu)->substep(input_for(test, step));
+    (*kernel)->substep(input_for(test, step));
     reference->substep(input_for(test, step));
-    (*gpu)->read(from_gpu);
+    (*kernel)->read(from_kernel);
     reference->read(expected);
-    ASSERT_LE(largest_distance_m(from_gpu.position_m, expected.position_m), bound_m) << "step " << step;
+    ASSERT_LE(largest_distance_m(from_kernel.position_m, expected.position_m), bound_m) << "step " << step;
     // A velocity is a difference of positions over the substep, twice with the correction.
-    ASSERT_LE(largest_distance_m(from_gpu.velocity_mps, expected.velocity_mps), 3.0 * bound_m / kSubstepS)
+    ASSERT_LE(largest_distance_m(from_kernel.velocity_mps, expected.velocity_mps), 3.0 * bound_m / kSubstepS)
         << "step " << step;
   }
   // The motion is not the rest: a kernel that does nothing would be seen.
-  ASSERT_GT(largest_distance_m(from_gpu.position_m, groom_positions(groom)), 1e-3);
+  ASSERT_GT(largest_distance_m(from_kernel.position_m, groom_positions(groom)), 1e-3);
 }
 
 TEST_P(SolverParity, TheKernelFollowsItsReference) {
-  const SolverRow& row = **find_solver(GetParam());
+  const SolverRow& row = **find_solver(std::get<std::string>(GetParam()));
   for (const ParityCase& test : parity_cases()) {
     if (!is_on_grid(test)) continue;
     SCOPED_TRACE(test.name);
@@ -190,8 +191,13 @@ std::vector<std::string> rows_with_kernel() {
   return names;
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryRow, SolverParity, testing::ValuesIn(rows_with_kernel()),
-                         [](const auto& row) { return row.param; });
+std::string case_name(const testing::TestParamInfo<SolverParity::ParamType>& info) {
+  return std::get<std::string>(info.param) + "_on_" + to_string(std::get<SimDevice>(info.param));
+}
+INSTANTIATE_TEST_SUITE_P(EveryRow, SolverParity,
+                         testing::Combine(testing::ValuesIn(rows_with_kernel()),
+                                          testing::ValuesIn(sim_devices())),
+                         case_name);
 
 // A row that is meant to have a kernel must not pass by saying that it has none.
 TEST(SolverTable, HasOneRowWithoutAKernel) {

@@ -1,11 +1,11 @@
-// A strand that loses its numbers on the GPU comes back, and its neighbours never notice: for every solver.
+// A strand that loses its numbers in a kernel comes back, and its neighbours never notice: for every solver.
 
 #include <cmath>
 #include <limits>
 
 #include "server/publish/publisher.h"
 #include "server/sim/solver_registry.h"
-#include "tests/support/gl_fixture.h"
+#include "tests/support/sim_devices.h"
 #include "tests/support/sim_scene.h"
 
 namespace strandcast {
@@ -17,15 +17,12 @@ constexpr double kStepS = 1.0 / 60.0;
 constexpr float kBoundM = 1e-4f;
 constexpr uint32_t kPoisoned = 9;
 
-class Quarantine : public GlTest {
+class Quarantine : public testing::TestWithParam<SimDevice> {
  protected:
   Quarantine() : groom_(make_test_groom({})) {}
 
   std::unique_ptr<Solver> make(const SolverRow& row) {
-    GpuSolverContext gpu;
-    gpu.shaders = &shaders_;
-    gpu.features = all_features();
-    auto solver = row.make_gpu(complete_parameters(row, {}).value(), gpu);
+    auto solver = row.make(complete_parameters(row, {}).value(), {&executor_, all_features()});
     EXPECT_TRUE(solver) << solver.error().to_string();
     if (!solver) return nullptr;
     EXPECT_TRUE((*solver)->load(groom_, glm::dquat(1.0, 0.0, 0.0, 0.0)));
@@ -87,11 +84,12 @@ class Quarantine : public GlTest {
     }
   }
 
-  gl::ShaderLibrary shaders_;
+  SimExecutors executors_;
+  Executor& executor_ = executors_.on(GetParam());
   Groom groom_;
 };
 
-TEST_F(Quarantine, APoisonedStrandReturnsAndItsNeighboursKeepTheirBits) {
+TEST_P(Quarantine, APoisonedStrandReturnsAndItsNeighboursKeepTheirBits) {
   for (const SolverRow& row : solver_table()) {
     for (const float value :
          {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
@@ -119,10 +117,9 @@ TEST_F(Quarantine, APoisonedStrandReturnsAndItsNeighboursKeepTheirBits) {
 }
 
 /// One strand's outer half is pulled away after every step, until the publisher has had enough of it.
-TEST_F(Quarantine, AnOverStretchedStrandReturnsAndItsNeighboursKeepTheirBits) {
+TEST_P(Quarantine, AnOverStretchedStrandReturnsAndItsNeighboursKeepTheirBits) {
   constexpr float kAwayM = 0.25f;  // a segment has at most 0.017 m
   for (const SolverRow& row : solver_table()) {
-    if (!row.make_gpu) continue;
     const auto clean_solver = make(row);
     const auto solver = make(row);
     ASSERT_TRUE(clean_solver && solver) << row.name;
@@ -145,7 +142,7 @@ TEST_F(Quarantine, AnOverStretchedStrandReturnsAndItsNeighboursKeepTheirBits) {
 
 /// A solver may heal a strand by itself; then it has a usable shape, and otherwise it is quarantined for one
 /// step.
-TEST_F(Quarantine, PoisonThatGoesThroughAStepIsGoneAfterIt) {
+TEST_P(Quarantine, PoisonThatGoesThroughAStepIsGoneAfterIt) {
   constexpr float kReachM = 1.0f;  // head radius and strand length are well below
   for (const SolverRow& row : solver_table()) {
     for (const float value :
@@ -167,6 +164,8 @@ TEST_F(Quarantine, PoisonThatGoesThroughAStepIsGoneAfterIt) {
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(EveryExecutor, Quarantine, testing::ValuesIn(sim_devices()), name_of_device);
 
 }  // namespace
 }  // namespace strandcast

@@ -2,10 +2,11 @@
 // the roots keeps it covered.
 #include "server/report/scalp.h"
 
+#include <gtest/gtest.h>
+
 #include "common/groom/groom_asset.h"
 #include "common/scene/scene_file.h"
 #include "server/scene/scene_content.h"
-#include "tests/support/gl_fixture.h"
 
 namespace strandcast {
 namespace {
@@ -14,7 +15,7 @@ using testing::HasSubstr;
 
 constexpr RenderSize kSize{160, 90};
 
-class Scalp : public GlTest {
+class Scalp : public testing::Test {
  protected:
   static SceneDesc scene(uint32_t strand_count, double follicle_limit_deg) {
     const auto made = built_in_scene_with({fmt::format("groom.procedural.strand_count={}", strand_count),
@@ -28,6 +29,9 @@ class Scalp : public GlTest {
     EXPECT_TRUE(content) << content.error().to_string();
     return make_scene_asset(content->groom, content->head);
   }
+
+  std::unique_ptr<Executor> executor_ = open_executor({"gl", "auto", {}}).value();
+  gl::DeviceInfo device_ = gl::read_device_info().value();
   gl::ShaderLibrary shaders_;
 };
 
@@ -36,7 +40,7 @@ TEST_F(Scalp, IsAllVisibleWithoutHairAndLessTheMoreThereIs) {
   for (const uint32_t strands : {100u, 400u, 1600u}) {
     const SceneDesc desc = scene(strands, 180.0);
     const SceneAsset asset = asset_of(desc);
-    auto view = ScalpView::make(shaders_, context_->info(), asset, desc, kSize);
+    auto view = ScalpView::make(shaders_, device_, asset, desc, kSize);
     ASSERT_TRUE(view) << view.error().to_string();
     std::vector<glm::vec3> gone = asset.rest_position_m;
     for (glm::vec3& point : gone) point.y += 1000.0f;
@@ -54,7 +58,7 @@ TEST_F(Scalp, IsAllVisibleWithoutHairAndLessTheMoreThereIs) {
 TEST_F(Scalp, ASceneWithoutAHeadHasNone) {
   SceneDesc desc = scene(100, 20.0);
   desc.head.is_visible = false;
-  const auto view = ScalpView::make(shaders_, context_->info(), asset_of(desc), desc, kSize);
+  const auto view = ScalpView::make(shaders_, device_, asset_of(desc), desc, kSize);
   ASSERT_FALSE(view);
   EXPECT_THAT(view.error().to_string(), HasSubstr("head.is_visible"));
 }
@@ -69,7 +73,7 @@ TEST_F(Scalp, HeldRootsCoverMoreOfIt) {
     desc.seconds = 1.5;
     desc.size = kSize;
     desc.every_s = 0.5;
-    auto run = run_scalp(desc, shaders_, context_->info());
+    auto run = run_scalp(desc, shaders_, device_, *executor_);
     ASSERT_TRUE(run) << run.error().to_string();
     runs[is_held] = std::move(*run);
     fmt::print("{}", scalp_text(desc, runs[is_held]));

@@ -181,8 +181,8 @@ TEST_F(ServerCost, WhatExplainMeasuresIsWhatItPlansAndAServerRuns) {
   const RuntimeFacts facts{.strand_viewers = 1, .frame_viewers = 1};
   const auto measured = measure_passes(scene, *content, facts, {});
   ASSERT_TRUE(measured) << measured.error().to_string();
-  EXPECT_EQ(decisions(*measured), decisions(planned(scene, facts)));
-  for (const gl::PassReport& pass : *measured)
+  EXPECT_EQ(decisions(measured->passes), decisions(planned(scene, facts)));
+  for (const gl::PassReport& pass : measured->passes)
     EXPECT_EQ(pass.runs > 0, pass.fate == gl::PassFate::Kept) << pass.name;
 }
 

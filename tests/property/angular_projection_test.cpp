@@ -23,8 +23,9 @@ class AngularProjection : public SolverTest {
     more.insert({{"air_drag_per_s", 0.0}, {"style_stiffness_per_s2", 0.0}, {"bending_damping_s", 0.0}});
     return more;
   }
-  std::unique_ptr<Solver> make_strand(bool is_gpu, const Groom& groom, const SolverParameters& given) {
-    return make({*find_solver("angular_projection"), is_gpu}, groom, given);
+  std::unique_ptr<Solver> make_strand(const SolverHost& host, const Groom& groom,
+                                      const SolverParameters& given) {
+    return make({*find_solver("angular_projection"), host}, groom, given);
   }
 };
 
@@ -55,7 +56,7 @@ TEST_F(AngularProjection, ACantileverHangsAsTheExactCurve) {
     SCOPED_TRACE(fmt::format("Gamma {}", shape.gamma));
     const double b = kGravityMps2 * std::pow(kLengthM, 3) / shape.gamma;
     auto solver = make_strand(
-        true, groom,
+        kGlHost, groom,
         {{"young_modulus_pa", modulus_for(b)}, {"air_drag_per_s", 20.0}, {"style_stiffness_per_s2", 0.0}});
     StepInput input;
     input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
@@ -71,7 +72,7 @@ TEST_F(AngularProjection, ACantileverHangsAsTheExactCurve) {
 TEST_F(AngularProjection, MoreSweepsApproachTheArticulatedChain) {
   const Groom groom = straight_strand(16, {1.0, 0.0, 0.0});
   const auto tip_after = [this, &groom](const char* name, const SolverParameters& given) {
-    auto solver = make({*find_solver(name), true}, groom, given);
+    auto solver = make({*find_solver(name), kGlHost}, groom, given);
     const StepInput input;
     for (int step = 0; step < 15; ++step) solver->substep(input);
     return glm::dvec3(read(*solver).position_m.back());
@@ -92,7 +93,7 @@ TEST_F(AngularProjection, MoreSweepsApproachTheArticulatedChain) {
 TEST_F(AngularProjection, AnUndampedSwingGainsNoEnergy) {
   for (const uint32_t vertex_count : {8u, 16u, 32u, 64u}) {
     for (const double rate_hz : {30.0, 60.0, 240.0}) {
-      auto solver = make_strand(true, straight_strand(vertex_count, {1.0, 0.0, 0.0}), bare());
+      auto solver = make_strand(kGlHost, straight_strand(vertex_count, {1.0, 0.0, 0.0}), bare());
       StepInput input;
       input.h_s = 1.0 / rate_hz;
       double highest_m = -kLengthM;
@@ -116,16 +117,16 @@ TEST_F(AngularProjection, NoDirectionIsSpecial) {
                                          glm::angleAxis(glm::radians(180.0), glm::dvec3(0.0, 0.0, 1.0)),
                                          glm::angleAxis(glm::radians(-90.0), glm::dvec3(0.0, 0.0, 1.0)),
                                          glm::angleAxis(glm::radians(90.0), glm::dvec3(0.0, 1.0, 0.0))};
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     glm::dvec3 expected(0.0);
     for (const glm::dquat& turn : turns) {
-      auto solver = make_strand(is_gpu, straight_strand(16, turn * glm::dvec3(1.0, 0.0, 0.0)), {});
+      auto solver = make_strand(host, straight_strand(16, turn * glm::dvec3(1.0, 0.0, 0.0)), {});
       StepInput input;
       input.gravity_mps2 = turn * glm::dvec3(-2.0, 6.0, -4.0);
       for (int step = 0; step < 30; ++step) solver->substep(input);
       const glm::dvec3 tip = glm::conjugate(turn) * glm::dvec3(read(*solver).position_m.back());
       if (turn == turns.front()) expected = tip;
-      EXPECT_LE(glm::distance(tip, expected), is_gpu ? 1e-5 : 1e-7);
+      EXPECT_LE(glm::distance(tip, expected), host.is_kernel() ? 1e-5 : 1e-7);
     }
     EXPECT_GE(glm::distance(expected, glm::dvec3(kLengthM, 0.0, 0.0)), 0.01);
   }
@@ -133,10 +134,10 @@ TEST_F(AngularProjection, NoDirectionIsSpecial) {
 
 TEST_F(AngularProjection, AMillionTimesStifferStaysFinite) {
   const Groom groom = make_test_groom({});
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double factor : {1e2, 1e4, 1e6}) {
-      SCOPED_TRACE(fmt::format("{}, stiffness x {}", is_gpu ? "GPU" : "double", factor));
-      auto solver = make_strand(is_gpu, groom, {{"young_modulus_pa", factor * 3e9}});
+      SCOPED_TRACE(fmt::format("{}, stiffness x {}", host.name(), factor));
+      auto solver = make_strand(host, groom, {{"young_modulus_pa", factor * 3e9}});
       for (int step = 1; step <= 240; ++step) {
         solver->substep(moving_input(step, 1.0 / 60.0));
         const SolverState state = read(*solver);

@@ -29,14 +29,15 @@ class Articulated : public SolverTest {
     more.insert({{"air_drag_per_s", 0.0}, {"style_stiffness_per_s2", 0.0}, {"bending_damping_s", 0.0}});
     return more;
   }
-  std::unique_ptr<Solver> make_chain(bool is_gpu, const Groom& groom, const SolverParameters& given) {
-    return make({*find_solver("articulated"), is_gpu}, groom, given);
+  std::unique_ptr<Solver> make_chain(const SolverHost& host, const Groom& groom,
+                                     const SolverParameters& given) {
+    return make({*find_solver("articulated"), host}, groom, given);
   }
   /// Angular frequency of the slowest mode after the faster ones have died away, rad/s.
   double slowest_mode_radps(const Groom& groom, const SolverParameters& given, const glm::dvec3& gravity) {
     constexpr int kFadingSteps = 450;
     constexpr int kFittedSteps = 100;
-    auto chain = make_chain(false, groom, given);
+    auto chain = make_chain(kReferenceHost, groom, given);
     SolverState state = read(*chain);
     const size_t n = state.position_m.size();
     for (size_t i = 1; i < n; ++i) {
@@ -104,12 +105,12 @@ TEST_F(Articulated, ACantileverHangsAsTheExactCurve) {
   constexpr double kRateHz = 60.0;
   constexpr double kSettlingS = 12.0;
   const Groom groom = straight_strand(32, {1.0, 0.0, 0.0});
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const CantileverShape& shape : shapes) {
-      SCOPED_TRACE(fmt::format("{}, Gamma {}", is_gpu ? "GPU" : "double", shape.gamma));
+      SCOPED_TRACE(fmt::format("{}, Gamma {}", host.name(), shape.gamma));
       const double b = kGravityMps2 * std::pow(kLengthM, 3) / shape.gamma;
       auto chain = make_chain(
-          is_gpu, groom,
+          host, groom,
           {{"young_modulus_pa", modulus_for(b)}, {"air_drag_per_s", 20.0}, {"style_stiffness_per_s2", 0.0}});
       StepInput input;
       input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
@@ -117,8 +118,7 @@ TEST_F(Articulated, ACantileverHangsAsTheExactCurve) {
       const glm::dvec3 tip = glm::dvec3(read(*chain).position_m.back()) / kLengthM;
       const double off = std::hypot(tip.x - shape.x, tip.y + shape.y);
       EXPECT_LE(off, 0.0025);
-      fmt::print("{}, Gamma {}: tip off by {:.3f} % of the length\n", is_gpu ? "GPU" : "double", shape.gamma,
-                 100.0 * off);
+      fmt::print("{}, Gamma {}: tip off by {:.3f} % of the length\n", host.name(), shape.gamma, 100.0 * off);
     }
   }
 }
@@ -143,16 +143,15 @@ TEST_F(Articulated, ACoilStretchesAsAHelicalSpring) {
   const double spring_npm =
       hair.shear_modulus_pa() * std::pow(hair.radius_m, 4) / (4.0 * kTurns * std::pow(kRadiusM, 3));
   const double expected_m = hair.linear_density_kgpm() * wire_m * kLoadMps2 / (2.0 * spring_npm);
-  for (const bool is_gpu : {false, true}) {
-    auto chain = make_chain(is_gpu, groom, {{"air_drag_per_s", 20.0}, {"style_stiffness_per_s2", 0.0}});
+  for (const SolverHost& host : solver_hosts()) {
+    auto chain = make_chain(host, groom, {{"air_drag_per_s", 20.0}, {"style_stiffness_per_s2", 0.0}});
     StepInput input;
     input.gravity_mps2 = {0.0, -kLoadMps2, 0.0};
     for (int step = 0; step < 600; ++step) chain->substep(input);
     const SolverState state = read(*chain);
     const double sunk_m = static_cast<double>(strand.back().y - state.position_m.back().y);
     EXPECT_NEAR(sunk_m / expected_m, 1.0, 0.03);
-    fmt::print("{}: the coil sinks by {:.3e} m, a spring by {:.3e} m\n", is_gpu ? "GPU" : "double", sunk_m,
-               expected_m);
+    fmt::print("{}: the coil sinks by {:.3e} m, a spring by {:.3e} m\n", host.name(), sunk_m, expected_m);
   }
 }
 
@@ -163,9 +162,9 @@ class DoublePendulum : public Articulated {
     glm::dvec3 tip_m{0.0};
     double energy_share = 0.0;  // change of the total energy over what the fall could give
   };
-  Fall fall(bool is_gpu, double h_s) {
+  Fall fall(const SolverHost& host, double h_s) {
     constexpr double kTimeS = 0.25;
-    auto chain = make_chain(is_gpu, straight_strand(3, {1.0, 0.0, 0.0}),
+    auto chain = make_chain(host, straight_strand(3, {1.0, 0.0, 0.0}),
                             bare({{"young_modulus_pa", 0.0}, {"max_speed_mps", 1000.0}}));
     StepInput input;
     input.h_s = h_s;
@@ -185,9 +184,9 @@ class DoublePendulum : public Articulated {
 };
 
 TEST_F(DoublePendulum, EnergyOnlyFallsAndTheLossHalvesWithTheStep) {
-  const double coarse = fall(false, 1.0 / 480.0).energy_share;
-  const double middle = fall(false, 1.0 / 960.0).energy_share;
-  const double fine = fall(false, 1.0 / 1920.0).energy_share;
+  const double coarse = fall(kReferenceHost, 1.0 / 480.0).energy_share;
+  const double middle = fall(kReferenceHost, 1.0 / 960.0).energy_share;
+  const double fine = fall(kReferenceHost, 1.0 / 1920.0).energy_share;
   EXPECT_LT(coarse, 0.0);
   EXPECT_GT(coarse, -0.1);
   EXPECT_NEAR(coarse / middle, 2.0, 0.3);
@@ -196,21 +195,22 @@ TEST_F(DoublePendulum, EnergyOnlyFallsAndTheLossHalvesWithTheStep) {
 }
 
 TEST_F(DoublePendulum, ThePathIsOfFirstOrder) {
-  const glm::dvec3 expected = 2.0 * fall(false, 1.0 / 61440.0).tip_m - fall(false, 1.0 / 30720.0).tip_m;
-  const double coarse_m = glm::distance(fall(false, 1.0 / 480.0).tip_m, expected);
-  const double middle_m = glm::distance(fall(false, 1.0 / 960.0).tip_m, expected);
-  const double fine_m = glm::distance(fall(false, 1.0 / 1920.0).tip_m, expected);
+  const glm::dvec3 expected =
+      2.0 * fall(kReferenceHost, 1.0 / 61440.0).tip_m - fall(kReferenceHost, 1.0 / 30720.0).tip_m;
+  const double coarse_m = glm::distance(fall(kReferenceHost, 1.0 / 480.0).tip_m, expected);
+  const double middle_m = glm::distance(fall(kReferenceHost, 1.0 / 960.0).tip_m, expected);
+  const double fine_m = glm::distance(fall(kReferenceHost, 1.0 / 1920.0).tip_m, expected);
   EXPECT_NEAR(coarse_m / middle_m, 2.0, 0.3);
   EXPECT_NEAR(middle_m / fine_m, 2.0, 0.15);
-  EXPECT_LE(glm::distance(fall(true, 1.0 / 480.0).tip_m, fall(false, 1.0 / 480.0).tip_m), 1e-5);
+  EXPECT_LE(glm::distance(fall(kGlHost, 1.0 / 480.0).tip_m, fall(kReferenceHost, 1.0 / 480.0).tip_m), 1e-5);
   fmt::print("tip off by {:.2e}, {:.2e}, {:.2e} m\n", coarse_m, middle_m, fine_m);
 }
 
 // Nothing pulls on a strand whose head falls with it.
 TEST_F(Articulated, AFallingHeadKeepsTheShape) {
   const Groom groom = make_test_groom({});
-  for (const bool is_gpu : {true, false}) {
-    auto chain = make_chain(is_gpu, groom, bare());
+  for (const SolverHost& host : solver_hosts()) {
+    auto chain = make_chain(host, groom, bare());
     const SolverState before = read(*chain);
     StepInput input;
     double speed_mps = 0.0;
@@ -219,17 +219,17 @@ TEST_F(Articulated, AFallingHeadKeepsTheShape) {
       input.head_shift_m = {0.0, input.h_s * speed_mps, 0.0};
       chain->substep(input);
     }
-    EXPECT_LE(largest_distance_m(read(*chain).position_m, before.position_m), is_gpu ? 1e-4 : 1e-6);
+    EXPECT_LE(largest_distance_m(read(*chain).position_m, before.position_m), host.is_kernel() ? 1e-4 : 1e-6);
   }
 }
 
 TEST_F(Articulated, AMillionTimesStifferKeepsTheGroom) {
   const Groom groom = make_test_groom({});
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double factor : {1e2, 1e4, 1e6}) {
-      SCOPED_TRACE(fmt::format("{}, stiffness x {}", is_gpu ? "GPU" : "double", factor));
+      SCOPED_TRACE(fmt::format("{}, stiffness x {}", host.name(), factor));
       auto chain =
-          make_chain(is_gpu, groom, {{"young_modulus_pa", factor * 3e9}, {"style_stiffness_per_s2", 0.0}});
+          make_chain(host, groom, {{"young_modulus_pa", factor * 3e9}, {"style_stiffness_per_s2", 0.0}});
       double off_m = 0.0;
       for (int step = 1; step <= 240; ++step) {
         StepInput input = moving_input(step, 1.0 / 60.0);
@@ -248,8 +248,7 @@ TEST_F(Articulated, AMillionTimesStifferKeepsTheGroom) {
       if (factor >= 1e6) {
         EXPECT_LE(off_m, 1e-3);
       }
-      fmt::print("{}, stiffness x {}: tips off the groom by {:.1e} m at most\n", is_gpu ? "GPU" : "double",
-                 factor, off_m);
+      fmt::print("{}, stiffness x {}: tips off the groom by {:.1e} m at most\n", host.name(), factor, off_m);
     }
   }
 }

@@ -18,11 +18,11 @@ class DirectRod : public SolverTest {
   static constexpr double kHairModulusPa = 3e9;
   static constexpr double kMassPerLengthKgpm = kDensityKgpm3 * std::numbers::pi * kRadiusM * kRadiusM;
 
-  static SolverKind kind(bool is_gpu) { return {*find_solver("direct_rod"), is_gpu}; }
-  static std::string name(bool is_gpu) { return is_gpu ? "GPU" : "double"; }
+  static SolverKind kind(const SolverHost& host) { return {*find_solver("direct_rod"), host}; }
 
-  std::unique_ptr<Solver> make_rod(bool is_gpu, const Groom& groom, const SolverParameters& given) {
-    return make(kind(is_gpu), groom, given);
+  std::unique_ptr<Solver> make_rod(const SolverHost& host, const Groom& groom,
+                                   const SolverParameters& given) {
+    return make(kind(host), groom, given);
   }
 
   /// Young's modulus with which a hair of the default radius and density has EI / (rho A) = b.

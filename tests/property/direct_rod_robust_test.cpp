@@ -50,12 +50,12 @@ class RodRobustness : public DirectRod {
   using Motion = std::function<StepInput(int)>;
 
   void expect_sound(const SolverParameters& parameters, const Motion& motion, int steps) {
-    for (const bool is_gpu : {true, false}) {
+    for (const SolverHost& host : solver_hosts()) {
       double worst = 0.0;
       for (const RodCase& test : rod_cases()) {
-        SCOPED_TRACE(name(is_gpu) + ", " + test.name);
+        SCOPED_TRACE(host.name() + ", " + test.name);
         const Groom groom = groom_from({test.strand}, Pinning::Root);
-        auto rod = make_rod(is_gpu, groom, parameters);
+        auto rod = make_rod(host, groom, parameters);
         for (int step = 1; step <= steps; ++step) {
           rod->substep(motion(step));
           const SolverState state = read(*rod);
@@ -65,7 +65,7 @@ class RodRobustness : public DirectRod {
         }
       }
       EXPECT_LE(worst, kStretchBound);
-      fmt::print("{}: largest stretch {:.1e}\n", name(is_gpu), worst);
+      fmt::print("{}: largest stretch {:.1e}\n", host.name(), worst);
     }
   }
 
@@ -138,11 +138,11 @@ TEST_F(RodRobustness, AnyStiffnessKeepsTheLength) {
 // only one at rest without weight. Stiff enough to be there within seconds.
 TEST_F(RodRobustness, AJumpOfAMetreSettlesInTheSameShape) {
   const SolverParameters parameters = {{"air_drag_per_s", 8.0}, {"young_modulus_pa", 10.0 * kHairModulusPa}};
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const RodCase& test : rod_cases()) {
-      SCOPED_TRACE(name(is_gpu) + ", " + test.name);
+      SCOPED_TRACE(host.name() + ", " + test.name);
       const Groom groom = groom_from({test.strand}, Pinning::Root);
-      auto rod = make_rod(is_gpu, groom, parameters);
+      auto rod = make_rod(host, groom, parameters);
       const std::vector<glm::vec3> groomed = read(*rod).position_m;
       StepInput input = calm_input(kSubstepS);
       for (int step = 0; step < 600; ++step) {

@@ -20,21 +20,22 @@ class RodShapes : public DirectRod {
   static constexpr double kBeadPerHair = 1000.0;
 
   /// A horizontal strand after it came to rest, b = EI / (rho A).
-  SolverState settled(bool is_gpu, uint32_t vertex_count, double b_m4ps2, SolverParameters parameters) {
+  SolverState settled(const SolverHost& host, uint32_t vertex_count, double b_m4ps2,
+                      SolverParameters parameters) {
     parameters["young_modulus_pa"] = modulus_for(b_m4ps2);
     parameters.insert({"air_drag_per_s", 20.0});
-    auto rod = make_rod(is_gpu, straight_strand(vertex_count, {1.0, 0.0, 0.0}), parameters);
+    auto rod = make_rod(host, straight_strand(vertex_count, {1.0, 0.0, 0.0}), parameters);
     run(*rod, falling_input(1.0 / kRateHz, {0.0, -kGravityMps2, 0.0}), 12.0);
     return read(*rod);
   }
 
-  SolverState under_end_load(bool is_gpu, uint32_t vertex_count, double alpha) {
+  SolverState under_end_load(const SolverHost& host, uint32_t vertex_count, double alpha) {
     const double b = kBeadPerHair * kGravityMps2 * std::pow(kLengthM, 3) / alpha;
-    return settled(is_gpu, vertex_count, b, {{"tip_mass_kg", kBeadPerHair * kMassPerLengthKgpm * kLengthM}});
+    return settled(host, vertex_count, b, {{"tip_mass_kg", kBeadPerHair * kMassPerLengthKgpm * kLengthM}});
   }
 
-  SolverState under_own_weight(bool is_gpu, uint32_t vertex_count, double gamma) {
-    return settled(is_gpu, vertex_count, kGravityMps2 * std::pow(kLengthM, 3) / gamma, {});
+  SolverState under_own_weight(const SolverHost& host, uint32_t vertex_count, double gamma) {
+    return settled(host, vertex_count, kGravityMps2 * std::pow(kLengthM, 3) / gamma, {});
   }
 
   static void run(Solver& rod, const StepInput& input, double time_s) {
@@ -53,14 +54,14 @@ TEST_F(RodShapes, AnEndLoadBendsAsTheElastica) {
   const std::vector<TipOfLoad> tips = {{0.5, 0.984081, 0.162144}, {1.0, 0.943567, 0.301721},
                                        {2.0, 0.839358, 0.493457}, {3.0, 0.745580, 0.603253},
                                        {5.0, 0.612372, 0.713792}, {10.0, 0.445004, 0.810609}};
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const TipOfLoad& tip : tips) {
-      SCOPED_TRACE(fmt::format("{}, load {}", name(is_gpu), tip.alpha));
+      SCOPED_TRACE(fmt::format("{}, load {}", host.name(), tip.alpha));
       const glm::dvec3 got =
-          glm::dvec3(under_end_load(is_gpu, claims::kRodVertices, tip.alpha).position_m.back()) / kLengthM;
+          glm::dvec3(under_end_load(host, claims::kRodVertices, tip.alpha).position_m.back()) / kLengthM;
       const double off = std::hypot(got.x - tip.x, got.y + tip.y);
       EXPECT_LE(off, claims::kEndLoadTip);
-      fmt::print("{}, load {}: tip off by {:.3f} % of the length\n", name(is_gpu), tip.alpha, 100.0 * off);
+      fmt::print("{}, load {}: tip off by {:.3f} % of the length\n", host.name(), tip.alpha, 100.0 * off);
     }
   }
 }
@@ -102,14 +103,14 @@ TEST_F(RodShapes, EveryVertexLiesOnTheExactCurve) {
   for (const double alpha : {1.0, 5.0, 10.0}) {
     const auto shape = shape_of(folder / "cantilever_end_load.csv", alpha);
     ASSERT_EQ(shape.size(), 101u);
-    const double away = away_from(shape, under_end_load(true, 26, alpha).position_m, kLengthM);
+    const double away = away_from(shape, under_end_load(kGlHost, 26, alpha).position_m, kLengthM);
     EXPECT_LE(away, 0.0015) << "load " << alpha;
     fmt::print("load {}: {:.3f} %\n", alpha, 100.0 * away);
   }
   for (const double gamma : {1.0, 10.0, 100.0}) {
     const auto shape = shape_of(folder / "cantilever_self_weight.csv", gamma);
     ASSERT_EQ(shape.size(), 101u);
-    const double away = away_from(shape, under_own_weight(true, 26, gamma).position_m, kLengthM);
+    const double away = away_from(shape, under_own_weight(kGlHost, 26, gamma).position_m, kLengthM);
     EXPECT_LE(away, 0.0015) << "Gamma " << gamma;
     fmt::print("Gamma {}: {:.3f} %\n", gamma, 100.0 * away);
   }
@@ -127,8 +128,8 @@ TEST_F(RodShapes, AnEndMomentRollsTheRodIntoARing) {
     const double angle = 2.0 * std::numbers::pi * i / (kVertexCount - 1);
     point += side_m * glm::dvec3(std::cos(angle), std::sin(angle), 0.0);
   }
-  for (const bool is_gpu : {false, true}) {
-    auto rod = make_rod(is_gpu, groom_from({ring}, Pinning::Root), {{"air_drag_per_s", 2.0}});
+  for (const SolverHost& host : solver_hosts()) {
+    auto rod = make_rod(host, groom_from({ring}, Pinning::Root), {{"air_drag_per_s", 2.0}});
     SolverState state = read(*rod);
     for (uint32_t i = 0; i < kVertexCount; ++i) state.position_m[i] = glm::vec3(side_m * i, 0.0, 0.0);
     rod->write(state);
@@ -136,7 +137,7 @@ TEST_F(RodShapes, AnEndMomentRollsTheRodIntoARing) {
     const std::vector<glm::vec3> position = read(*rod).position_m;
     const double gap = static_cast<double>(glm::distance(position.back(), position.front())) / kLengthM;
     EXPECT_LE(gap, 1e-4);
-    fmt::print("{}: the ends meet within {:.1e} of the length\n", name(is_gpu), gap);
+    fmt::print("{}: the ends meet within {:.1e} of the length\n", host.name(), gap);
   }
 }
 
@@ -148,9 +149,9 @@ struct Catenary {
 TEST_F(RodShapes, AChainHeldAtBothEndsHangsAsTheCatenary) {
   const std::vector<Catenary> cases = {{0.25, 0.463166}, {0.5, 0.398194}, {0.75, 0.294334}, {0.9, 0.190709}};
   constexpr uint32_t kVertexCount = 33;  // one in the middle
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const Catenary& test : cases) {
-      SCOPED_TRACE(fmt::format("{}, span {}", name(is_gpu), test.span));
+      SCOPED_TRACE(fmt::format("{}, span {}", host.name(), test.span));
       // Groomed as a V.
       std::vector<glm::vec3> strand;
       const double depth = 0.5 * std::sqrt(1.0 - test.span * test.span);
@@ -161,11 +162,11 @@ TEST_F(RodShapes, AChainHeldAtBothEndsHangsAsTheCatenary) {
       }
       Groom groom = groom_from({strand}, Pinning::Root);
       groom.pinned.back() = 1;
-      auto rod = make_rod(is_gpu, groom, {{"young_modulus_pa", 0.0}, {"air_drag_per_s", 20.0}});
+      auto rod = make_rod(host, groom, {{"young_modulus_pa", 0.0}, {"air_drag_per_s", 20.0}});
       run(*rod, falling_input(1.0 / kRateHz, {0.0, -kGravityMps2, 0.0}), 10.0);
       const double sag = -static_cast<double>(read(*rod).position_m[kVertexCount / 2].y) / kLengthM;
       EXPECT_NEAR(sag, test.sag, 0.0012);
-      fmt::print("{}, span {}: sag {:+.3f} % of the length\n", name(is_gpu), test.span,
+      fmt::print("{}, span {}: sag {:+.3f} % of the length\n", host.name(), test.span,
                  100.0 * (sag - test.sag));
     }
   }
@@ -174,11 +175,11 @@ TEST_F(RodShapes, AChainHeldAtBothEndsHangsAsTheCatenary) {
 // Greenhill: an upright rod stays up below Gamma = 7.83735 and falls above.
 TEST_F(RodShapes, AnUprightRodBucklesAtGreenhillsLength) {
   constexpr double kCritical = 7.83735;
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double share : {0.9, 1.0 - claims::kBuckling, 1.0 + claims::kBuckling, 1.1}) {
-      SCOPED_TRACE(fmt::format("{}, {} of the critical load", name(is_gpu), share));
+      SCOPED_TRACE(fmt::format("{}, {} of the critical load", host.name(), share));
       const double b = kGravityMps2 * std::pow(kLengthM, 3) / (share * kCritical);
-      auto rod = make_rod(is_gpu, straight_strand(32, {0.0, 1.0, 0.0}),
+      auto rod = make_rod(host, straight_strand(32, {0.0, 1.0, 0.0}),
                           {{"young_modulus_pa", modulus_for(b)}, {"air_drag_per_s", 1.0}});
       run(*rod, falling_input(1.0 / kRateHz, {0.02, -kGravityMps2, 0.0}), 0.2);
       run(*rod, falling_input(1.0 / kRateHz, {0.0, -kGravityMps2, 0.0}), 40.0);
@@ -188,7 +189,7 @@ TEST_F(RodShapes, AnUprightRodBucklesAtGreenhillsLength) {
       } else {
         EXPECT_GE(std::abs(aside), 0.1);
       }
-      fmt::print("{}, {} of the critical load: {:+.1e} of the length aside\n", name(is_gpu), share, aside);
+      fmt::print("{}, {} of the critical load: {:+.1e} of the length aside\n", host.name(), share, aside);
     }
   }
 }
@@ -198,7 +199,7 @@ TEST_F(RodShapes, SpaceDiscretisationIsOfSecondOrder) {
   const glm::dvec3 exact(0.991246, -0.123471, 0.0);
   std::vector<double> error;
   for (const uint32_t vertex_count : {9u, 17u, 33u}) {
-    const SolverState state = under_own_weight(false, vertex_count, 1.0);
+    const SolverState state = under_own_weight(kReferenceHost, vertex_count, 1.0);
     error.push_back(glm::distance(glm::dvec3(state.position_m.back()) / kLengthM, exact));
   }
   for (size_t k = 0; k + 1 < error.size(); ++k) {

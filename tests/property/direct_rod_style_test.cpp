@@ -243,11 +243,11 @@ TEST_F(RodStyle, StrandsThatNeedNothingKeepTheirBits) {
   const auto untouched = std::count(factors.begin(), factors.end(), 1.0f);
   ASSERT_GT(untouched, 2);
   ASSERT_LT(untouched + 2, static_cast<long>(factors.size()));
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     SolverState state[2];
     for (const int is_sought : {0, 1}) {
-      auto rod = make_rod(is_gpu, groom,
-                          {{"sag_free", 1.0}, {"style_margin", is_sought == 1 ? kHangingMargin : 0.0}});
+      auto rod =
+          make_rod(host, groom, {{"sag_free", 1.0}, {"style_margin", is_sought == 1 ? kHangingMargin : 0.0}});
       for (int k = 0; k < 60; ++k) rod->substep(moving_input(k, 1.0 / 60.0));
       state[is_sought] = read(*rod);
     }
@@ -258,7 +258,7 @@ TEST_F(RodStyle, StrandsThatNeedNothingKeepTheirBits) {
         is_same = is_same && state[0].position_m[at] == state[1].position_m[at] &&
                   state[0].velocity_mps[at] == state[1].velocity_mps[at];
       }
-      EXPECT_EQ(is_same, factors[s] == 1.0f) << name(is_gpu) << ", strand " << s << ", factor " << factors[s];
+      EXPECT_EQ(is_same, factors[s] == 1.0f) << host.name() << ", strand " << s << ", factor " << factors[s];
     }
   }
 }
@@ -277,11 +277,11 @@ class GroomLasts : public RodStyle {
 
   class Run {
    public:
-    Run(GroomLasts& test, bool is_gpu, const Groom& groom, const SolverParameters& given)
+    Run(GroomLasts& test, const SolverHost& host, const Groom& groom, const SolverParameters& given)
         : groom_(groom), limit_rad_(test.limit_rad_) {
       SceneFeatures features = all_features();
       features.has_follicle_limit = limit_rad_ < kFreeFollicleRad;
-      rod_ = test.make(test.kind(is_gpu), groom, given, {1.0, 0.0, 0.0, 0.0}, features);
+      rod_ = test.make(test.kind(host), groom, given, {1.0, 0.0, 0.0, 0.0}, features);
     }
 
     /// Moves the head for so long as `head` says from now on.
@@ -363,11 +363,11 @@ class GroomLasts : public RodStyle {
     return {glm::dvec3(0.0), glm::angleAxis(kPi * std::max(share, 0.0), glm::dvec3(1.0, 0.0, 0.0))};
   }
 
-  Hold hold(bool is_gpu, const Groom& groom, double rest_s = 20.0) {
+  Hold hold(const SolverHost& host, const Groom& groom, double rest_s = 20.0) {
     Hold result;
     const SolverParameters styled = {{"sag_free", 1.0}};
     {
-      Run run(*this, is_gpu, groom, styled);
+      Run run(*this, host, groom, styled);
       run.rest(rest_s);
       run.distances(&result.rms_m);
       run.move(2.0, shake);
@@ -375,13 +375,13 @@ class GroomLasts : public RodStyle {
       result.lost_share["10 g shake"] = run.lost_share();
     }
     {
-      Run run(*this, is_gpu, groom, styled);
+      Run run(*this, host, groom, styled);
       run.move(16.0 * kPi / 2.0 / (2600.0 * kPi / 180.0) * 2.0, turn);
       run.rest(10.0);
       result.lost_share["2,600 deg/s"] = run.lost_share();
     }
     {
-      Run run(*this, is_gpu, groom, styled);
+      Run run(*this, host, groom, styled);
       run.move(3.0, somersault);
       run.rest(10.0);
       result.lost_share["upside down"] = run.lost_share();
@@ -390,10 +390,10 @@ class GroomLasts : public RodStyle {
   }
 
   /// How far the tips swing after a push of the head, all added up, over how far they do without style.
-  double swing_share(bool is_gpu, const Groom& groom) {
+  double swing_share(const SolverHost& host, const Groom& groom) {
     double way_m[2] = {0.0, 0.0};
     for (const int is_styled : {0, 1}) {
-      Run run(*this, is_gpu, groom, {{"sag_free", static_cast<double>(is_styled)}});
+      Run run(*this, host, groom, {{"sag_free", static_cast<double>(is_styled)}});
       run.rest(10.0);
       const std::vector<glm::vec3> before = run.state().position_m;
       const uint32_t strands = groom.strand_count();
@@ -415,11 +415,11 @@ class GroomLasts : public RodStyle {
     return way_m[1] / way_m[0];
   }
 
-  void expect_lasting(bool is_gpu, const Groom& groom) {
-    SCOPED_TRACE(fmt::format("{}, {} strands, {}", groom.name, groom.strand_count(), name(is_gpu)));
-    const Hold held = hold(is_gpu, groom);
+  void expect_lasting(const SolverHost& host, const Groom& groom) {
+    SCOPED_TRACE(fmt::format("{}, {} strands, {}", groom.name, groom.strand_count(), host.name()));
+    const Hold held = hold(host, groom);
     EXPECT_LE(held.rms_m, kOffM);
-    fmt::print("{}, {} strands, {}: {:.1e} m rms at rest", groom.name, groom.strand_count(), name(is_gpu),
+    fmt::print("{}, {} strands, {}: {:.1e} m rms at rest", groom.name, groom.strand_count(), host.name(),
                held.rms_m);
     for (const auto& [what, share] : held.lost_share) {
       EXPECT_EQ(share, 0.0) << what;
@@ -446,26 +446,26 @@ TEST_F(GroomLasts, CurlsAndStubble) {
   }
   Groom groom = groom_from(strands, Pinning::RootPair);
   groom.name = "curls and stubble";
-  expect_lasting(true, groom);
-  if (test_grid() == TestGrid::Whole) expect_lasting(false, groom);
+  expect_lasting(kGlHost, groom);
+  if (test_grid() == TestGrid::Whole) expect_lasting(kReferenceHost, groom);
 }
 
 TEST_F(GroomLasts, BuiltInHair) {
   const Groom groom = groom_of_scene(built_in_scene());
-  expect_lasting(true, some_strands(groom, static_cast<uint32_t>(on_grid(24, 2000))));
+  expect_lasting(kGlHost, some_strands(groom, static_cast<uint32_t>(on_grid(24, 2000))));
 }
 
 // Roots that are turned back in the middle of a motion come to rest in the same style.
 TEST_F(GroomLasts, WithRootsHeldAsScenesHoldThem) {
   limit_rad_ = glm::radians(SceneDesc().follicle_limit_deg);
   const Groom groom = some_strands(groom_of_scene(built_in_scene()), 24);
-  expect_lasting(true, groom);
-  if (test_grid() == TestGrid::Whole) expect_lasting(false, groom);
+  expect_lasting(kGlHost, groom);
+  if (test_grid() == TestGrid::Whole) expect_lasting(kReferenceHost, groom);
 }
 
 // Held hair still swings: measured 0.91; the strands that are stiffened by themselves 0.76.
 TEST_F(GroomLasts, HeldStrandsSwingAlmostAsHairDoes) {
-  const double share = swing_share(true, some_strands(groom_of_scene(built_in_scene()), 48));
+  const double share = swing_share(kGlHost, some_strands(groom_of_scene(built_in_scene()), 48));
   EXPECT_GE(share, 0.8);
   EXPECT_LE(share, 1.1);
   fmt::print("swing {:.2f} of that without style\n", share);
@@ -474,7 +474,7 @@ TEST_F(GroomLasts, HeldStrandsSwingAlmostAsHairDoes) {
 // Without what holds them they are lost: it is the stiffness that does it, not the test that cannot see.
 TEST_F(GroomLasts, WithoutStiffnessStylesAreLost) {
   const Groom groom = some_strands(groom_of_scene(built_in_scene()), 24);
-  Run run(*this, true, groom, {{"sag_free", 1.0}, {"style_margin", 0.0}});
+  Run run(*this, kGlHost, groom, {{"sag_free", 1.0}, {"style_margin", 0.0}});
   run.rest(10.0);
   EXPECT_GT(run.lost_share(), 0.1);
 }
@@ -487,7 +487,7 @@ TEST_F(GroomLasts, EveryPublicGroom) {
     if (entry.path().extension() != ".tfx") continue;
     const auto scene = built_in_scene_with({"groom.file.path=" + entry.path().string()});
     ASSERT_TRUE(scene) << scene.error().to_string();
-    expect_lasting(true, groom_of_scene(*scene));
+    expect_lasting(kGlHost, groom_of_scene(*scene));
   }
 }
 

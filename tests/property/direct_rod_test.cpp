@@ -14,9 +14,9 @@ namespace {
 class RodMechanics : public DirectRod {
  protected:
   /// The tip of a horizontal strand, b = g L^3 / gamma, after it came to rest.
-  glm::dvec3 settled_tip(bool is_gpu, uint32_t vertex_count, double gamma, double rate_hz) {
+  glm::dvec3 settled_tip(const SolverHost& host, uint32_t vertex_count, double gamma, double rate_hz) {
     const double b = kGravityMps2 * kLengthM * kLengthM * kLengthM / gamma;
-    auto rod = make_rod(is_gpu, straight_strand(vertex_count, {1.0, 0.0, 0.0}),
+    auto rod = make_rod(host, straight_strand(vertex_count, {1.0, 0.0, 0.0}),
                         {{"young_modulus_pa", modulus_for(b)}, {"air_drag_per_s", 20.0}});
     StepInput input;
     input.h_s = 1.0 / rate_hz;
@@ -44,10 +44,10 @@ const std::vector<CantileverShape>& cantilever_shapes() {
 }
 
 TEST_F(RodMechanics, ACantileverHangsAsTheExactCurve) {
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const CantileverShape& shape : cantilever_shapes()) {
-      SCOPED_TRACE(fmt::format("{}, Gamma {}", is_gpu ? "GPU" : "double", shape.gamma));
-      const glm::dvec3 tip = settled_tip(is_gpu, claims::kRodVertices, shape.gamma, 60.0) / kLengthM;
+      SCOPED_TRACE(fmt::format("{}, Gamma {}", host.name(), shape.gamma));
+      const glm::dvec3 tip = settled_tip(host, claims::kRodVertices, shape.gamma, 60.0) / kLengthM;
       const double height_over_width = -tip.y / tip.x / (shape.y / shape.x) - 1.0;
       const double off = std::hypot(tip.x - shape.x, tip.y + shape.y);
       if (shape.gamma <= 20.0) {
@@ -59,8 +59,8 @@ TEST_F(RodMechanics, ACantileverHangsAsTheExactCurve) {
         ASSERT_LE(shape.gamma, claims::kHeavyCantileverGamma);
         EXPECT_LE(off, claims::kHeavyCantileverTip);
       }
-      fmt::print("{}, Gamma {}: H/W {:+.3f} %, tip off by {:.3f} % of the length\n",
-                 is_gpu ? "GPU" : "double", shape.gamma, 100.0 * height_over_width, 100.0 * off);
+      fmt::print("{}, Gamma {}: H/W {:+.3f} %, tip off by {:.3f} % of the length\n", host.name(), shape.gamma,
+                 100.0 * height_over_width, 100.0 * off);
     }
   }
 }
@@ -71,7 +71,7 @@ TEST_F(RodMechanics, DroopDependsOnNeitherVerticesNorRate) {
     double most = 0.0;
     for (const uint32_t vertex_count : {8u, 16u, 32u, 64u}) {
       for (const double rate_hz : {30.0, 60.0, 120.0, 240.0}) {
-        const double droop = -settled_tip(false, vertex_count, gamma, rate_hz).y / kLengthM;
+        const double droop = -settled_tip(kReferenceHost, vertex_count, gamma, rate_hz).y / kLengthM;
         least = std::min(least, droop);
         most = std::max(most, droop);
       }
@@ -124,10 +124,10 @@ TEST_F(RodMechanics, ACantileverLetGoSwingsAsTheBeam) {
     }
     return sum;
   }();
-  for (const bool is_gpu : {false, true}) {
-    SCOPED_TRACE(name(is_gpu));
+  for (const SolverHost& host : solver_hosts()) {
+    SCOPED_TRACE(host.name());
     auto rod =
-        make_rod(is_gpu, straight_strand(32, {1.0, 0.0, 0.0}),
+        make_rod(host, straight_strand(32, {1.0, 0.0, 0.0}),
                  {{"young_modulus_pa", modulus_for(b)}, {"air_drag_per_s", 0.0}, {"bending_damping_s", 0.0}});
     double largest = 0.0;
     double before = 0.0;
@@ -147,7 +147,7 @@ TEST_F(RodMechanics, ACantileverLetGoSwingsAsTheBeam) {
         (crossings_s.back() - crossings_s.front()) / static_cast<double>(crossings_s.size() - 1);
     EXPECT_NEAR(largest / 2.0253, 1.0, claims::kFirstSwing);
     EXPECT_NEAR(period_s / kPeriodS, 1.0, 0.002);
-    fmt::print("{}: first swing {:.4f} of the static deflection (2.0253), period {:+.3f} %\n", name(is_gpu),
+    fmt::print("{}: first swing {:.4f} of the static deflection (2.0253), period {:+.3f} %\n", host.name(),
                largest, 100.0 * (period_s / kPeriodS - 1.0));
   }
 }
@@ -162,7 +162,7 @@ TEST_F(RodMechanics, DampingIsWhatTheIntegratorPredicts) {
       SCOPED_TRACE(fmt::format("order {}, omega h {}", order, omega_h));
       const double omega = omega_h * kRateHz;
       const double b = std::pow(omega / kBeamBetaSquared, 2) * std::pow(kLengthM, 4);
-      auto rod = make_rod(false, straight_strand(32, {1.0, 0.0, 0.0}),
+      auto rod = make_rod(kReferenceHost, straight_strand(32, {1.0, 0.0, 0.0}),
                           {{"young_modulus_pa", modulus_for(b)},
                            {"air_drag_per_s", 0.0},
                            {"bending_damping_s", 0.0},
@@ -202,7 +202,7 @@ TEST_F(RodMechanics, WithoutStiffnessItIsAHeavyChain) {
   constexpr double kRateHz = 240.0;
   const auto mode = [](double s) { return std::cyl_bessel_j(0.0, kRoot * std::sqrt(1.0 - s)); };
   const double period_s = 4.0 * std::numbers::pi / kRoot * std::sqrt(kLengthM / kGravityMps2);
-  auto rod = make_rod(false, straight_strand(32, {0.0, 0.0, 1.0}),
+  auto rod = make_rod(kReferenceHost, straight_strand(32, {0.0, 0.0, 1.0}),
                       {{"young_modulus_pa", 0.0}, {"air_drag_per_s", 0.0}, {"bending_damping_s", 0.0}});
   SolverState state = read(*rod);
   for (size_t i = 1; i < state.position_m.size(); ++i)
@@ -231,11 +231,11 @@ TEST_F(RodMechanics, StretchStaysBelowAHundredthOfAPercentAtEveryMoment) {
   constexpr double kSubstepS = 1.0 / 60.0;
   constexpr double kShakeRadps = 2.0 * std::numbers::pi * 3.0;
   constexpr double kShakeM = claims::kShakeG * kGravityMps2 / (kShakeRadps * kShakeRadps);
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     double worst = 0.0;
     for (const uint32_t vertex_count : {16u, 32u, 48u, 64u}) {
       for (const bool is_shaken : {false, true}) {
-        auto rod = make_rod(is_gpu, straight_strand(vertex_count, {1.0, 0.0, 0.0}),
+        auto rod = make_rod(host, straight_strand(vertex_count, {1.0, 0.0, 0.0}),
                             {{"air_drag_per_s", 0.0}, {"bending_damping_s", 0.0}});
         const double segment_m = kLengthM / (vertex_count - 1);
         for (int step = 1; step <= 180; ++step) {
@@ -255,7 +255,7 @@ TEST_F(RodMechanics, StretchStaysBelowAHundredthOfAPercentAtEveryMoment) {
       }
     }
     EXPECT_LE(worst, claims::kShakeStretch);
-    fmt::print("{}: largest stretch {:.1e}\n", is_gpu ? "GPU" : "double", worst);
+    fmt::print("{}: largest stretch {:.1e}\n", host.name(), worst);
   }
 }
 
@@ -268,8 +268,8 @@ TEST_F(RodMechanics, HairLeansInABreezeAsAWispDoes) {
   const double drag_per_s = complete_parameters(**find_solver("direct_rod"), {})->at("air_drag_per_s");
   EXPECT_NEAR(drag_per_s, wisp_per_s, 0.3);
   const double lean_rad = std::atan(drag_per_s * kBreezeMps / kGravityMps2);  // of a chain, at rest
-  for (const bool is_gpu : {true, false}) {
-    auto rod = make_rod(is_gpu, straight_strand(32, {0.0, -1.0, 0.0}), {});
+  for (const SolverHost& host : solver_hosts()) {
+    auto rod = make_rod(host, straight_strand(32, {0.0, -1.0, 0.0}), {});
     StepInput input;
     input.wind_mps = {kBreezeMps, 0.0, 0.0};
     for (int step = 0; step < 900; ++step) rod->substep(input);
@@ -289,7 +289,7 @@ class SwayingRod : public DirectRod {
     constexpr double kTimeS = 0.8;
     constexpr double kSwayM = 0.1;
     const auto head_x = [](double t) { return kSwayM * std::pow(std::sin(std::numbers::pi * t / 1.6), 4); };
-    auto rod = make_rod(false, straight_strand(16, {0.0, -1.0, 0.0}), {{"air_drag_per_s", 1.0}});
+    auto rod = make_rod(kReferenceHost, straight_strand(16, {0.0, -1.0, 0.0}), {{"air_drag_per_s", 1.0}});
     double t = 0.0;
     for (size_t step = 0; t < kTimeS - 1e-9; ++step) {
       StepInput input;
@@ -339,10 +339,10 @@ TEST_F(RodMechanics, ASagFreeGroomStaysAsItWasLoaded) {
   }
   for (const Pinning pinning : {Pinning::Root, Pinning::RootPair}) {
     const Groom groom = groom_from(strands, pinning);
-    for (const bool is_gpu : {true, false}) {
+    for (const SolverHost& host : solver_hosts()) {
       double moved_m[2] = {0.0, 0.0};
       for (const int is_sag_free : {0, 1}) {
-        auto rod = make_rod(is_gpu, groom, {{"sag_free", is_sag_free}});
+        auto rod = make_rod(host, groom, {{"sag_free", is_sag_free}});
         const SolverState before = read(*rod);
         StepInput input;
         input.groom_gravity_in_head_mps2 = input.gravity_mps2;
@@ -350,18 +350,18 @@ TEST_F(RodMechanics, ASagFreeGroomStaysAsItWasLoaded) {
         moved_m[is_sag_free] = largest_distance_m(read(*rod).position_m, before.position_m);
       }
       EXPECT_GE(moved_m[0], 0.01);
-      EXPECT_LE(moved_m[1], is_gpu ? 1e-4 : 1e-6);
-      fmt::print("{}: sag {:.4f} m, sag-free {:.1e} m\n", is_gpu ? "GPU" : "double", moved_m[0], moved_m[1]);
+      EXPECT_LE(moved_m[1], host.is_kernel() ? 1e-4 : 1e-6);
+      fmt::print("{}: sag {:.4f} m, sag-free {:.1e} m\n", host.name(), moved_m[0], moved_m[1]);
     }
   }
 }
 
 TEST_F(RodMechanics, AMillionTimesStifferStaysFinite) {
   const Groom groom = make_test_groom({});
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double factor : {1e2, 1e4, 1e6}) {
-      SCOPED_TRACE(fmt::format("{}, stiffness x {}", is_gpu ? "GPU" : "double", factor));
-      auto rod = make_rod(is_gpu, groom, {{"young_modulus_pa", factor * kHairModulusPa}});
+      SCOPED_TRACE(fmt::format("{}, stiffness x {}", host.name(), factor));
+      auto rod = make_rod(host, groom, {{"young_modulus_pa", factor * kHairModulusPa}});
       for (int step = 1; step <= 240; ++step) {
         rod->substep(moving_input(step, 1.0 / 60.0));
         const SolverState state = read(*rod);

@@ -49,19 +49,19 @@ TEST_F(RodTwist, ACurlIsASpring) {
   const Helix helix;
   const auto strand = helix_strand(helix);
   const Groom groom = groom_from({strand}, Pinning::Root);
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double ratio : {0.0, 0.45, 1.2}) {
-      SCOPED_TRACE(fmt::format("{}, Poisson's ratio {}", name(is_gpu), ratio));
+      SCOPED_TRACE(fmt::format("{}, Poisson's ratio {}", host.name(), ratio));
       const double shear_pa = kHairModulusPa / (2.0 * (1.0 + ratio));
       const double stiffness_npm =
           shear_pa * std::pow(kRadiusM, 4) / (4.0 * helix.coil_count * std::pow(helix.radius_m, 3));
       const double expected_m = kMassPerLengthKgpm * helix.wire_m() * kLoadMps2 / (2.0 * stiffness_npm) *
                                 (1.0 - std::pow(0.5 / helix.coil_count, 2));
-      auto rod = make_rod(is_gpu, groom, {{"poisson_ratio", ratio}, {"air_drag_per_s", 20.0}});
+      auto rod = make_rod(host, groom, {{"poisson_ratio", ratio}, {"air_drag_per_s", 20.0}});
       advance(*rod, falling_input(1.0 / 60.0, {0.0, -kLoadMps2, 0.0}), 8.0);
       const double extended_m = last_coil_m(helix, strand) - last_coil_m(helix, read(*rod).position_m);
       EXPECT_NEAR(extended_m / expected_m, 1.0, claims::kCurlSpring);
-      fmt::print("{}, Poisson's ratio {}: extension {:.4f} of the spring's\n", name(is_gpu), ratio,
+      fmt::print("{}, Poisson's ratio {}: extension {:.4f} of the spring's\n", host.name(), ratio,
                  extended_m / expected_m);
     }
   }
@@ -73,11 +73,11 @@ TEST_F(RodTwist, OneSolvePerStepFollowsABouncingCurl) {
   const Helix helix;
   const Groom groom = groom_from({helix_strand(helix)}, Pinning::Root);
   const StepInput input = falling_input(1.0 / 60.0, {0.0, -0.5, 0.0});
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     SolverParameters undamped = {{"air_drag_per_s", 0.0}, {"bending_damping_s", 0.0}};
-    auto rod = make_rod(is_gpu, groom, undamped);
+    auto rod = make_rod(host, groom, undamped);
     undamped["solves"] = 4.0;
-    auto exact = make_rod(false, groom, undamped);
+    auto exact = make_rod(kReferenceHost, groom, undamped);
     const double start_m = last_coil_m(helix, read(*rod).position_m);
     double amplitude_m = 0.0;
     double apart_m = 0.0;
@@ -89,7 +89,7 @@ TEST_F(RodTwist, OneSolvePerStepFollowsABouncingCurl) {
       apart_m = std::max(apart_m, std::abs(last_coil_m(helix, read(*rod).position_m) - expected_m));
     }
     EXPECT_LE(apart_m, 0.005 * amplitude_m);
-    fmt::print("{}: {:.2f} % of the bounce apart\n", name(is_gpu), 100.0 * apart_m / amplitude_m);
+    fmt::print("{}: {:.2f} % of the bounce apart\n", host.name(), 100.0 * apart_m / amplitude_m);
   }
 }
 
@@ -102,7 +102,7 @@ TEST_F(RodTwist, ASwayingCurlIsOfSecondOrderInTime) {
   const Groom groom = groom_from({helix_strand(helix)}, Pinning::Root);
   const auto tip_after = [&](double rate_hz) {
     const auto head_m = [](double t) { return 0.02 * std::pow(std::sin(std::numbers::pi * t), 4); };
-    auto rod = make_rod(false, groom, {{"air_drag_per_s", 1.0}});
+    auto rod = make_rod(kReferenceHost, groom, {{"air_drag_per_s", 1.0}});
     StepInput input;
     input.h_s = 1.0 / rate_hz;
     for (int step = 1; step <= std::lround(kTimeS * rate_hz); ++step) {
@@ -128,8 +128,8 @@ TEST_F(RodTwist, ACurlPulledStraightComesBack) {
   const Helix helix;
   const auto strand = helix_strand(helix);
   const Groom groom = groom_from({strand}, Pinning::Root);
-  for (const bool is_gpu : {false, true}) {
-    auto rod = make_rod(is_gpu, groom, {{"air_drag_per_s", 20.0}});
+  for (const SolverHost& host : solver_hosts()) {
+    auto rod = make_rod(host, groom, {{"air_drag_per_s", 20.0}});
     SolverState state = read(*rod);
     const std::vector<glm::vec3> groomed = state.position_m;
     float length_m = 0.0f;
@@ -141,7 +141,7 @@ TEST_F(RodTwist, ACurlPulledStraightComesBack) {
     advance(*rod, calm_input(), 12.0);
     const double away_m = largest_distance_m(read(*rod).position_m, groomed);
     EXPECT_LE(away_m, 1e-3 * helix.radius_m);
-    fmt::print("{}: {:.1e} m from the groom\n", name(is_gpu), away_m);
+    fmt::print("{}: {:.1e} m from the groom\n", host.name(), away_m);
   }
 }
 
@@ -158,8 +158,8 @@ TEST_F(RodTwist, AShakenCurlComesBack) {
   const auto head_m = [&](double t) {
     return 10.0 * kGravityMps2 / (kShakeRadps * kShakeRadps) * std::sin(kShakeRadps * std::min(t, kShakenS));
   };
-  for (const bool is_gpu : {false, true}) {
-    auto rod = make_rod(is_gpu, groom, {});
+  for (const SolverHost& host : solver_hosts()) {
+    auto rod = make_rod(host, groom, {});
     const std::vector<glm::vec3> groomed = read(*rod).position_m;
     double swing_m = 0.0;
     for (int step = 1; step <= 25.0 * kRateHz; ++step) {
@@ -175,14 +175,14 @@ TEST_F(RodTwist, AShakenCurlComesBack) {
     const double away_m = largest_distance_m(read(*rod).position_m, groomed);
     EXPECT_GE(swing_m, 0.5 * helix.wire_m());
     EXPECT_LE(away_m, 1e-3 * helix.radius_m);
-    fmt::print("{}: swung by {:.2f} m, {:.1e} m from the groom\n", name(is_gpu), swing_m, away_m);
+    fmt::print("{}: swung by {:.2f} m, {:.1e} m from the groom\n", host.name(), swing_m, away_m);
   }
 }
 
 TEST_F(RodTwist, TwistDoesNothingToAStraightStrand) {
   const Groom groom = straight_strand(16, {1.0, 0.0, 0.0});
-  auto soft = make_rod(false, groom, {{"poisson_ratio", 5.0}});
-  auto stiff = make_rod(false, groom, {{"poisson_ratio", 0.0}});
+  auto soft = make_rod(kReferenceHost, groom, {{"poisson_ratio", 5.0}});
+  auto stiff = make_rod(kReferenceHost, groom, {{"poisson_ratio", 0.0}});
   for (int step = 1; step <= 60; ++step) {
     StepInput input = falling_input(1.0 / 60.0, {0.0, -kGravityMps2, 0.0});
     input.head_shift_m = {0.0, 0.0, 0.02 * std::sin(0.2 * step)};

@@ -143,7 +143,7 @@ class RootsInMotion : public FollicleLimits {
     ASSERT_TRUE(content) << content.error().to_string();
     double most_free_deg = 0.0;
     for (const SolverRow& row : solver_table()) {
-      const SolverKind kind{&row, row.has_kernel};
+      const SolverKind kind = kinds_of(row).front();
       // In double, on one thread.
       const Groom groom = test::some_strands(content->groom, row.has_kernel ? strand_count : 6);
       for (const Excitation& excitation : kExcitations) {
@@ -296,7 +296,7 @@ TEST_F(FollicleLimits, FreeRootsAreAsIfThereWereNoLimit) {
       plain->substep(moving_input(step, kSubstepS));
       able->substep(held(moving_input(step, kSubstepS), 180.0));
       // A kernel made without the feature has no pass to hold roots with; in double there is no kernel.
-      unable->substep(held(moving_input(step, kSubstepS), kind.is_gpu ? kLimitDeg : 180.0));
+      unable->substep(held(moving_input(step, kSubstepS), kind.host.is_kernel() ? kLimitDeg : 180.0));
     }
     for (const Solver* other : {able.get(), unable.get()}) {
       SolverState state;
@@ -348,26 +348,27 @@ TEST_F(FollicleLimits, TheKernelFollowsItsReference) {
   constexpr double kBoundM = 3e-5;
   constexpr double kTightDeg = 2.0;  // so that the stiffest model has something to hold
   const Groom groom = make_test_groom({});
-  for (const SolverRow& row : solver_table()) {
-    if (!row.has_kernel) continue;
-    SCOPED_TRACE(row.name);
+  for (const SolverKind& kind : all_kinds()) {
+    if (!kind.host.is_kernel()) continue;
+    SCOPED_TRACE(kind.name());
     const SolverParameters given = {{"style_stiffness_per_s2", 120.0}};
-    auto gpu = make_held({&row, true}, groom, given);
-    auto reference = make_held({&row, false}, groom, given);
-    auto free = make_held({&row, true}, groom, given);
-    const double growth = bounds_of(row).rounding_growth;
-    const double stiff_m = bounds_of(row).stiff_rounding_m * 16.0 * 16.0;
+    auto kernel = make_held(kind, groom, given);
+    auto reference = make_held({kind.row, kReferenceHost}, groom, given);
+    auto free = make_held(kind, groom, given);
+    const double growth = bounds_of(*kind.row).rounding_growth;
+    const double stiff_m = bounds_of(*kind.row).stiff_rounding_m * 16.0 * 16.0;
     for (int step = 1; step <= 4; ++step) {
-      gpu->substep(held(moving_input(step, kSubstepS), kTightDeg));
+      kernel->substep(held(moving_input(step, kSubstepS), kTightDeg));
       reference->substep(held(moving_input(step, kSubstepS), kTightDeg));
       free->substep(moving_input(step, kSubstepS));
       const double bound_m = kBoundM * std::pow(growth, step - 1) + stiff_m;
-      ASSERT_LE(largest_distance_m(read(*gpu).position_m, read(*reference).position_m), bound_m) << step;
-      ASSERT_LE(largest_distance_m(read(*gpu).velocity_mps, read(*reference).velocity_mps),
+      ASSERT_LE(largest_distance_m(read(*kernel).position_m, read(*reference).position_m), bound_m) << step;
+      ASSERT_LE(largest_distance_m(read(*kernel).velocity_mps, read(*reference).velocity_mps),
                 3.0 * bound_m / kSubstepS)
           << step;
     }
-    EXPECT_GT(largest_distance_m(read(*gpu).position_m, read(*free).position_m), 1e-3) << "roots were held";
+    EXPECT_GT(largest_distance_m(read(*kernel).position_m, read(*free).position_m), 1e-3)
+        << "roots were held";
   }
 }
 

@@ -87,18 +87,22 @@ TEST_F(FollowCures, WithoutThrustsStrandsComeToRestAfterFastReversals) {
   const Groom groom = make_test_groom({});
   struct Case {
     const char* name;
-    bool is_gpu;
+    SolverHost host;
     double speed_mps, rate_hz, style_per_s2, factor;
   };
   const std::vector<Case> cases = {
-      {"dftl", true, 1.5, 60.0, 400.0, 1.0},     {"dftl", true, 3.0, 60.0, 400.0, 1.0},
-      {"dftl", true, 1.5, 120.0, 400.0, 100.0},  {"dftl", true, 3.0, 120.0, 400.0, 100.0},
-      {"dftl", true, 1.5, 240.0, 400.0, 100.0},  {"dftl", true, 3.0, 240.0, 0.0, 100.0},
-      {"dftl", false, 1.5, 120.0, 400.0, 100.0}, {"dftl_parallel", true, 1.5, 120.0, 400.0, 100.0},
+      {"dftl", kGlHost, 1.5, 60.0, 400.0, 1.0},
+      {"dftl", kGlHost, 3.0, 60.0, 400.0, 1.0},
+      {"dftl", kGlHost, 1.5, 120.0, 400.0, 100.0},
+      {"dftl", kGlHost, 3.0, 120.0, 400.0, 100.0},
+      {"dftl", kGlHost, 1.5, 240.0, 400.0, 100.0},
+      {"dftl", kGlHost, 3.0, 240.0, 0.0, 100.0},
+      {"dftl", kReferenceHost, 1.5, 120.0, 400.0, 100.0},
+      {"dftl_parallel", kGlHost, 1.5, 120.0, 400.0, 100.0},
   };
   for (const Case& test : cases) {
     SCOPED_TRACE(test.name);
-    const SolverKind kind{*find_solver(test.name), test.is_gpu};
+    const SolverKind kind{*find_solver(test.name), test.host};
     const auto with_thrust = [&](double share) {
       return shake(kind, groom, {{"thrust_share", share}, {"style_stiffness_per_s2", test.style_per_s2}},
                    test.speed_mps, test.rate_hz);
@@ -134,7 +138,7 @@ TEST_F(FollowCures, StrandsOfDifferentThicknessMoveDifferently) {
     double correlation[2] = {0.0, 0.0};
     double apart[2] = {0.0, 0.0};
     for (const int is_spread : {0, 1}) {
-      auto solver = make({*find_solver(name), true}, groom, {{"thickness_spread", is_spread ? 0.2 : 0.0}});
+      auto solver = make({*find_solver(name), kGlHost}, groom, {{"thickness_spread", is_spread ? 0.2 : 0.0}});
       const SolverState groomed = read(*solver);
       double products = 0.0;
       double squares = 0.0;
@@ -200,9 +204,9 @@ TEST_F(FollowCures, BothVersionsOfASolverTakeTheSameThickness) {
   for (const char* name : {"dftl", "dftl_parallel", "ftl"}) {
     SCOPED_TRACE(name);
     const SolverParameters varied = {{"thickness_spread", 0.3}, {"style_stiffness_per_s2", 120.0}};
-    auto gpu = make({*find_solver(name), true}, groom, varied);
-    auto reference = make({*find_solver(name), false}, groom, varied);
-    auto even = make({*find_solver(name), false}, groom, {{"style_stiffness_per_s2", 120.0}});
+    auto gpu = make({*find_solver(name), kGlHost}, groom, varied);
+    auto reference = make({*find_solver(name), kReferenceHost}, groom, varied);
+    auto even = make({*find_solver(name), kReferenceHost}, groom, {{"style_stiffness_per_s2", 120.0}});
     for (int step = 1; step <= 6; ++step) {
       for (Solver* solver : {gpu.get(), reference.get(), even.get()})
         solver->substep(moving_input(step, 1.0 / 60.0));

@@ -34,18 +34,18 @@ class FollowLaws : public SolverTest {
 // Nothing goes from a follower to its leader: what hangs on a vertex weighs nothing to it. The dynamic form's
 // velocity correction is what carries it over.
 TEST_F(FollowLaws, InTheStaticFormFollowersWeighNothing) {
-  for (const bool is_gpu : {true, false}) {
-    EXPECT_EQ(shift_by_followers_m({*find_solver("ftl"), is_gpu}), 0.0);
-    EXPECT_GT(shift_by_followers_m({*find_solver("dftl"), is_gpu}), 0.01);
+  for (const SolverHost& host : solver_hosts()) {
+    EXPECT_EQ(shift_by_followers_m({*find_solver("ftl"), host}), 0.0);
+    EXPECT_GT(shift_by_followers_m({*find_solver("dftl"), host}), 0.01);
   }
 }
 
 // Why the table says that the static form does not come to rest: the row would be wrong if it did.
 TEST_F(FollowLaws, OnlyTheDynamicFormComesToRest) {
   const Groom groom = make_test_groom({});
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     const auto moved_in_a_step_m = [&](const char* name) {
-      auto solver = make({*find_solver(name), is_gpu}, groom);
+      auto solver = make({*find_solver(name), host}, groom);
       for (int step = 0; step < 600; ++step) solver->substep({});
       const SolverState before = read(*solver);
       solver->substep({});
@@ -67,8 +67,8 @@ TEST_F(FollowLaws, StaticStepMatchesTheEquationsByHand) {
   const glm::dvec3 q2 = q1 + glm::normalize(glm::dvec3(2.0, -0.1, 0.0) - q1);
   const glm::dvec3 v1 = (q1 - glm::dvec3(1.0, 0.0, 0.0)) / kStepS;
   const glm::dvec3 v2 = (q2 - glm::dvec3(2.0, 0.0, 0.0)) / kStepS;
-  for (const bool is_gpu : {true, false}) {
-    auto solver = make({*find_solver("ftl"), is_gpu}, groom, parameters);
+  for (const SolverHost& host : solver_hosts()) {
+    auto solver = make({*find_solver("ftl"), host}, groom, parameters);
     StepInput input;
     input.h_s = kStepS;
     input.gravity_mps2 = {0.0, -10.0, 0.0};

@@ -50,7 +50,8 @@ class GroomAtRest : public SolverTest {
     const auto content = load_scene_content(scene);
     ASSERT_TRUE(content) << content.error().to_string();
     for (const SolverKind& kind : all_kinds()) {
-      if (!kind.is_gpu || kind.row->name.rfind("dftl", 0) != 0) continue;  // parity covers the references
+      if (!kind.host.is_kernel() || kind.row->name.rfind("dftl", 0) != 0)
+        continue;  // parity covers the references
       SCOPED_TRACE(kind.name());
       auto solver = make(kind, content->groom, scene.solver.parameters);
       EXPECT_LE(largest_share(scene, *content, *solver), kShareOfLength);
@@ -88,7 +89,7 @@ TEST_F(GroomAtRest, EveryModelKeepsItsStyleForTwentySeconds) {
     const auto& known = kind.row->parameters;
     const bool has_style =
         std::ranges::any_of(known, [](const auto& info) { return info.name == "sag_free"; });
-    if (!kind.is_gpu || !has_style) continue;
+    if (!kind.host.is_kernel() || !has_style) continue;
     ++models;
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom, {{"sag_free", 1.0}});
@@ -121,7 +122,7 @@ TEST_F(GroomAtRest, ElasticRods) {
   ASSERT_TRUE(scene) << scene.error().to_string();
   const auto content = load_scene_content(*scene);
   ASSERT_TRUE(content) << content.error().to_string();
-  auto solver = make({*find_solver("direct_rod"), true}, content->groom, scene->solver.parameters);
+  auto solver = make({*find_solver("direct_rod"), kGlHost}, content->groom, scene->solver.parameters);
   EXPECT_LE(largest_share(*scene, *content, *solver), kShareOfLength);
 }
 
@@ -170,7 +171,7 @@ TEST_F(GroomAtRest, LongHairFallsOntoTheShoulders) {
     const Groom groom = level_hair();
     const SolverParameters limp = {
         {"style_stiffness_per_s2", 0.0}, {"sag_free", 0.0}, {"air_drag_per_s", 4.0}};
-    auto solver = make({*find_solver("dftl"), true}, groom, limp);
+    auto solver = make({*find_solver("dftl"), kGlHost}, groom, limp);
     StepBuilder builder(scene, colliders);
     SceneFeatures still;
     still.has_colliders = true;

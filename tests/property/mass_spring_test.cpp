@@ -44,17 +44,18 @@ SolverParameters bare(const SolverParameters& given) {
 
 class MassSpring : public SolverTest {
  protected:
-  static SolverKind kind(bool is_gpu) { return {*find_solver("mass_spring"), is_gpu}; }
+  static SolverKind kind(const SolverHost& host) { return {*find_solver("mass_spring"), host}; }
   /// Without gusts and colliders, so that one program is compiled and not four.
-  std::unique_ptr<Solver> make_plain(bool is_gpu, const Groom& groom, const SolverParameters& given) {
-    return make(kind(is_gpu), groom, given, {1.0, 0.0, 0.0, 0.0}, SceneFeatures{});
+  std::unique_ptr<Solver> make_plain(const SolverHost& host, const Groom& groom,
+                                     const SolverParameters& given) {
+    return make(kind(host), groom, given, {1.0, 0.0, 0.0, 0.0}, SceneFeatures{});
   }
   static Status check(const SolverParameters& given, double substep_s) {
     const SolverRow& row = **find_solver("mass_spring");
     return check_step(row, complete_parameters(row, given).value(), substep_s);
   }
 
-  bool is_stable(bool is_gpu, double integrator, double stretch_npm);
+  bool is_stable(const SolverHost& host, double integrator, double stretch_npm);
 };
 
 /// A helix of 12 mm radius and rise, turning by `angle_rad` per vertex.
@@ -101,9 +102,9 @@ double chain_limit_by_iteration_npm() {
 }
 
 /// Whether a chain that is pulled a little in the highest mode stays near its rest shape.
-bool MassSpring::is_stable(bool is_gpu, double integrator, double stretch_npm) {
+bool MassSpring::is_stable(const SolverHost& host, double integrator, double stretch_npm) {
   const Groom groom = straight_strand(kFreeMasses + 1, kSegmentM, {0.0, -1.0, 0.0});
-  auto solver = make_plain(is_gpu, groom,
+  auto solver = make_plain(host, groom,
                            bare({{"integrator", integrator},
                                  {"stretch_stiffness_n_per_m", stretch_npm},
                                  {"linear_density_kg_per_m", kMassKg / kSegmentM},
@@ -129,19 +130,19 @@ bool MassSpring::is_stable(bool is_gpu, double integrator, double stretch_npm) {
 TEST_F(MassSpring, ExplicitStepsFailExactlyWhereTheoryPutsTheLimit) {
   EXPECT_NEAR(chain_limit_npm() / chain_limit_by_iteration_npm(), 1.0, 1e-6);
   EXPECT_GT(chain_limit_npm(), kTextbookLimitNpm);
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double integrator : {kSymplecticEuler, kVerlet}) {
-      SCOPED_TRACE(fmt::format("{}, integrator {}", is_gpu ? "GPU" : "double", integrator));
+      SCOPED_TRACE(fmt::format("{}, integrator {}", host.name(), integrator));
       double stable_npm = 0.9 * kTextbookLimitNpm;
       double unstable_npm = 1.1 * kTextbookLimitNpm;
-      ASSERT_TRUE(is_stable(is_gpu, integrator, stable_npm));
-      ASSERT_FALSE(is_stable(is_gpu, integrator, unstable_npm));
+      ASSERT_TRUE(is_stable(host, integrator, stable_npm));
+      ASSERT_FALSE(is_stable(host, integrator, unstable_npm));
       while (unstable_npm - stable_npm > 2e-4 * kTextbookLimitNpm) {
         const double middle_npm = 0.5 * (stable_npm + unstable_npm);
-        (is_stable(is_gpu, integrator, middle_npm) ? stable_npm : unstable_npm) = middle_npm;
+        (is_stable(host, integrator, middle_npm) ? stable_npm : unstable_npm) = middle_npm;
       }
-      fmt::print("{}, integrator {}: stable up to {:.3f} N/m, chain {:.3f}, m / h^2 {:.3f}\n",
-                 is_gpu ? "GPU" : "double", integrator, stable_npm, chain_limit_npm(), kTextbookLimitNpm);
+      fmt::print("{}, integrator {}: stable up to {:.3f} N/m, chain {:.3f}, m / h^2 {:.3f}\n", host.name(),
+                 integrator, stable_npm, chain_limit_npm(), kTextbookLimitNpm);
       EXPECT_NEAR(stable_npm / chain_limit_npm(), 1.0, 1e-3);
       EXPECT_NEAR(stable_npm / kTextbookLimitNpm, 1.0, 0.01);
     }
@@ -195,7 +196,7 @@ TEST_F(MassSpring, TheLimitCoversAllSpringsTogether) {
               {"altitude_stiffness_n_per_m", load * altitude * unit_npm / kAltitudePerStretch},
               {"stretch_damping_ns_per_m", load * damping}});
     EXPECT_EQ(check(parameters, kStepS).ok(), load < 1.0);
-    auto solver = make_plain(false, groom, parameters);
+    auto solver = make_plain(kReferenceHost, groom, parameters);
     SolverState state = read(*solver);
     const SolverState rest = state;
     for (size_t i = 2; i < state.position_m.size(); ++i) {
@@ -227,8 +228,8 @@ TEST_F(MassSpring, ImplicitStepsSurviveAnyStiffness) {
     for (const char* name :
          {"stretch_stiffness_n_per_m", "bend_stiffness_nm_per_rad", "altitude_stiffness_n_per_m"})
       stiff[name] = factor * defaults.at(name);
-    auto gpu = make_plain(true, groom, stiff);
-    auto reference = make_plain(false, groom, stiff);
+    auto gpu = make_plain(kGlHost, groom, stiff);
+    auto reference = make_plain(kReferenceHost, groom, stiff);
     double largest = 0.0;
     double apart_m = 0.0;
     for (int step = 1; step <= 120; ++step) {
@@ -256,7 +257,7 @@ TEST_F(MassSpring, TheSecondSolveTakesTheStretchAway) {
   const Groom groom = make_test_groom({});
   std::vector<double> largest;
   for (const double solves : {1.0, 2.0, 4.0}) {
-    auto solver = make_plain(true, groom, {{"solves", solves}, {"stretch_limit", kNoLimit}});
+    auto solver = make_plain(kGlHost, groom, {{"solves", solves}, {"stretch_limit", kNoLimit}});
     largest.push_back(0.0);
     for (int step = 1; step <= 240; ++step) {
       solver->substep(moving_input(step, 1.0 / 60.0));
@@ -277,15 +278,15 @@ TEST_F(MassSpring, TwoMassesSwingAsEachIntegratorSays) {
   constexpr double kAmplitudeM = 2e-3;
   const Groom groom = straight_strand(3, kSpacingM, {0.0, -1.0, 0.0});
   const double mass_kg = kDensityKgpm * kSpacingM;
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double integrator : {kSymplecticEuler, kVerlet, kBackwardEuler}) {
       for (const double sign : {-1.0, 1.0}) {
         for (const double omega_h : {0.1, 0.5}) {
-          SCOPED_TRACE(fmt::format("{}, integrator {}, mode {}, w h {}", is_gpu ? "GPU" : "double",
-                                   integrator, sign, omega_h));
+          SCOPED_TRACE(
+              fmt::format("{}, integrator {}, mode {}, w h {}", host.name(), integrator, sign, omega_h));
           const double omega = omega_h / kStepS;
           const double stretch_npm = omega * omega * mass_kg / (2.0 + sign * std::sqrt(2.0));
-          auto solver = make_plain(is_gpu, groom,
+          auto solver = make_plain(host, groom,
                                    bare({{"integrator", integrator},
                                          {"stretch_stiffness_n_per_m", stretch_npm},
                                          {"linear_density_kg_per_m", kDensityKgpm}}));
@@ -305,8 +306,8 @@ TEST_F(MassSpring, TwoMassesSwingAsEachIntegratorSays) {
                                        ? 1.0 / Complex(1.0, -omega_h)
                                        : std::polar(1.0, 2.0 * std::asin(0.5 * omega_h));
           const Complex found = swing_root(q);
-          EXPECT_NEAR(std::arg(found) / std::arg(expected), 1.0, is_gpu ? 2e-3 : 5e-4);
-          EXPECT_NEAR(std::abs(found) / std::abs(expected), 1.0, is_gpu ? 3e-4 : 5e-5);
+          EXPECT_NEAR(std::arg(found) / std::arg(expected), 1.0, host.is_kernel() ? 2e-3 : 5e-4);
+          EXPECT_NEAR(std::abs(found) / std::abs(expected), 1.0, host.is_kernel() ? 3e-4 : 5e-5);
           if (integrator != kBackwardEuler) continue;
           const double per_period = std::pow(std::abs(found), 2.0 * std::numbers::pi / omega_h);
           const double predicted = std::pow(1.0 + omega_h * omega_h, -std::numbers::pi / omega_h);
@@ -368,7 +369,7 @@ TEST_F(MassSpring, ErrorsFallWithTheStepAsTheOrderSays) {
   const Groom groom = straight_strand(SwingingStrand::kVertices, SwingingStrand::kSpacingM, {1.0, 0.0, 0.0});
   constexpr double kEndS = 0.32;
   const auto end_of = [&](double integrator, double h_s) {
-    auto solver = make_plain(false, groom, SwingingStrand::parameters(integrator));
+    auto solver = make_plain(kReferenceHost, groom, SwingingStrand::parameters(integrator));
     StepInput input = calm_input(h_s);
     input.gravity_mps2 = {0.0, -9.81, 0.0};
     for (int step = 0; step < std::lround(kEndS / h_s); ++step) solver->substep(input);
@@ -394,10 +395,10 @@ TEST_F(MassSpring, EnergyIsKeptByExplicitStepsAndNeverGrowsInImplicitOnes) {
   input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
   // What the swing turns over: the fall of the middle by half its length.
   const double swing_j = SwingingStrand::kDensityKgpm * 0.4 * kGravityMps2 * 0.2;
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double integrator : {kSymplecticEuler, kVerlet, kBackwardEuler}) {
-      SCOPED_TRACE(fmt::format("{}, integrator {}", is_gpu ? "GPU" : "double", integrator));
-      auto solver = make_plain(is_gpu, groom, SwingingStrand::parameters(integrator));
+      SCOPED_TRACE(fmt::format("{}, integrator {}", host.name(), integrator));
+      auto solver = make_plain(host, groom, SwingingStrand::parameters(integrator));
       double before = energy_j(read(*solver), groom.rest_position_m, kGravityMps2);
       double largest_rise_j = 0.0;
       double late_j = 0.0;
@@ -412,7 +413,7 @@ TEST_F(MassSpring, EnergyIsKeptByExplicitStepsAndNeverGrowsInImplicitOnes) {
         if (step >= kSteps * 7 / 8) late_j += energy / (kSteps / 8);
       }
       fmt::print("{}, integrator {}: mean energy {:+.3f} % after 7 s, largest rise in a step {:.4f} %\n",
-                 is_gpu ? "GPU" : "double", integrator, 100.0 * (late_j - early_j) / swing_j,
+                 host.name(), integrator, 100.0 * (late_j - early_j) / swing_j,
                  100.0 * largest_rise_j / swing_j);
       if (integrator == kBackwardEuler) {
         EXPECT_LE(largest_rise_j, 1e-4 * swing_j);
@@ -432,8 +433,8 @@ TEST_F(MassSpring, ASwingingCurlKeepsItsEnergy) {
   const Groom groom = groom_from({curl}, Pinning::Root);
   StepInput input = calm_input(5e-4);
   input.gravity_mps2 = {0.0, -kGravityMps2, 0.0};
-  for (const bool is_gpu : {false, true}) {
-    auto solver = make_plain(is_gpu, groom, SwingingStrand::parameters(kVerlet));
+  for (const SolverHost& host : solver_hosts()) {
+    auto solver = make_plain(host, groom, SwingingStrand::parameters(kVerlet));
     const double begin_j = energy_j(read(*solver), curl, kGravityMps2);
     double least_j = begin_j;
     double most_j = begin_j;
@@ -448,8 +449,8 @@ TEST_F(MassSpring, ASwingingCurlKeepsItsEnergy) {
     }
     // What the swing turns over: the fall of the middle by half of the depth that the tip reached.
     const double swing_j = SwingingStrand::kDensityKgpm * 0.56 * kGravityMps2 * 0.5 * -lowest_m;
-    fmt::print("{}: energy of a curl that swings by {:.2f} m kept within {:.3f} %\n",
-               is_gpu ? "GPU" : "double", -lowest_m, 100.0 * (most_j - least_j) / swing_j);
+    fmt::print("{}: energy of a curl that swings by {:.2f} m kept within {:.3f} %\n", host.name(), -lowest_m,
+               100.0 * (most_j - least_j) / swing_j);
     EXPECT_LT(lowest_m, -0.3) << "it hardly moved";
     EXPECT_LE(most_j - least_j, 1e-3 * swing_j);
   }
@@ -469,8 +470,8 @@ TEST_F(MassSpring, EveryIntegratorFollowsItsReferenceOnTheGpu) {
           {"stretch_stiffness_n_per_m", 2.0},  {"stretch_damping_ns_per_m", 1e-3},
           {"bend_stiffness_nm_per_rad", 1e-5}, {"altitude_stiffness_n_per_m", 0.05}};
       ASSERT_TRUE(check(soft, 1.0 / 60.0));
-      auto gpu = make(kind(true), groom, soft);
-      auto reference = make(kind(false), groom, soft);
+      auto gpu = make(kind(kGlHost), groom, soft);
+      auto reference = make(kind(kReferenceHost), groom, soft);
       for (int step = 1; step <= 10; ++step) {
         gpu->substep(moving_input(step, 1.0 / 60.0));
         reference->substep(moving_input(step, 1.0 / 60.0));
@@ -492,7 +493,7 @@ TEST_F(MassSpring, EveryIntegratorFollowsItsReferenceOnTheGpu) {
 TEST_F(MassSpring, CurlsComeToRest) {
   const Groom groom = groom_from({curl_of(24, 0.5), curl_of(24, 1.1), curl_of(24, 1.6)}, Pinning::RootPair);
   for (const double factor : {1.0, 1000.0}) {
-    auto solver = make_plain(true, groom,
+    auto solver = make_plain(kGlHost, groom,
                              {{"style_stiffness_per_s2", 0.0},
                               {"air_drag_per_s", 2.0},
                               {"bend_stiffness_nm_per_rad", factor * 1e-6},
@@ -524,15 +525,15 @@ TEST_F(MassSpring, AngularSpringsBendAsTheBeam) {
                                                {20.0, 0.445232, 0.829881}};
   const HairConstants hair;
   const SolverRow& row = **find_solver("mass_spring");
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const CantileverShape& shape : shapes) {
-      SCOPED_TRACE(fmt::format("{}, Gamma {}", is_gpu ? "GPU" : "double", shape.gamma));
+      SCOPED_TRACE(fmt::format("{}, Gamma {}", host.name(), shape.gamma));
       const double segment_m = kLengthM / (kVertices - 1);
       SolverParameters parameters = row.as_hair(hair, segment_m, 1.0 / 60.0);
       // The hair's own bending in a gravity that gives this Gamma.
       const double weight_npm = shape.gamma * hair.bending_stiffness_nm2() / std::pow(kLengthM, 3);
       parameters["air_drag_per_s"] = 3.0;
-      auto solver = make_plain(is_gpu, straight_strand(kVertices, segment_m, {1.0, 0.0, 0.0}), parameters);
+      auto solver = make_plain(host, straight_strand(kVertices, segment_m, {1.0, 0.0, 0.0}), parameters);
       StepInput input = calm_input();
       input.gravity_mps2 = {0.0, -weight_npm / hair.linear_density_kgpm(), 0.0};
       constexpr double kSettlingS = 12.0;
@@ -540,8 +541,8 @@ TEST_F(MassSpring, AngularSpringsBendAsTheBeam) {
       const glm::dvec3 tip = glm::dvec3(read(*solver).position_m.back()) / kLengthM;
       const double off = std::hypot(tip.x - shape.x, tip.y + shape.y);
       const double height_over_width = -tip.y / tip.x / (shape.y / shape.x) - 1.0;
-      fmt::print("{}, Gamma {}: H/W {:+.3f} %, tip off by {:.3f} % of the length\n",
-                 is_gpu ? "GPU" : "double", shape.gamma, 100.0 * height_over_width, 100.0 * off);
+      fmt::print("{}, Gamma {}: H/W {:+.3f} %, tip off by {:.3f} % of the length\n", host.name(), shape.gamma,
+                 100.0 * height_over_width, 100.0 * off);
       EXPECT_LE(std::abs(height_over_width), 0.01);
       EXPECT_LE(off, 0.005);
     }
@@ -555,10 +556,10 @@ TEST_F(MassSpring, AStrandHangsByHookesLaw) {
   constexpr double kStretchNpm = 2.0;
   constexpr double kGravityMps2 = 9.81;
   const Groom groom = straight_strand(4, kSpacingM, {0.0, -1.0, 0.0});
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const auto& [integrator, h_s] : std::vector<std::pair<double, double>>{
              {kBackwardEuler, 1.0 / 60.0}, {kBackwardEuler, 1.0 / 240.0}, {kVerlet, 1.0 / 240.0}}) {
-      auto solver = make_plain(is_gpu, groom,
+      auto solver = make_plain(host, groom,
                                bare({{"integrator", integrator},
                                      {"stretch_stiffness_n_per_m", kStretchNpm},
                                      {"stretch_damping_ns_per_m", 0.02},
@@ -594,10 +595,10 @@ TEST_F(MassSpring, AltitudeSpringsOpenACollapsedCurl) {
   for (int i = 0; i < 12; ++i)
     curl.emplace_back(0.01 * std::cos(1.3 * i), -0.008 * i, 0.01 * std::sin(1.3 * i));
   const Groom groom = groom_from({curl}, Pinning::RootPair);
-  for (const bool is_gpu : {false, true}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const bool has_altitude : {false, true}) {
       for (const double integrator : {kSymplecticEuler, kBackwardEuler}) {
-        auto solver = make_plain(is_gpu, groom,
+        auto solver = make_plain(host, groom,
                                  bare({{"integrator", integrator},
                                        {"air_drag_per_s", 5.0},
                                        {"linear_density_kg_per_m", 0.1},
@@ -609,7 +610,7 @@ TEST_F(MassSpring, AltitudeSpringsOpenACollapsedCurl) {
         for (int step = 0; step < 3000; ++step) solver->substep(calm_input(2e-3));
         const double share = least_share_of_volume(read(*solver).position_m, curl);
         EXPECT_EQ(share > 0.9, has_altitude)
-            << (is_gpu ? "GPU" : "double") << ", integrator " << integrator << ": share of volume " << share;
+            << (host.name()) << ", integrator " << integrator << ": share of volume " << share;
       }
     }
   }

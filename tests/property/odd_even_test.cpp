@@ -12,7 +12,8 @@ class OddEvenForms : public SolverTest {
  protected:
   std::unique_ptr<Solver> make_form(KernelForm form, const Groom& groom, const SolverParameters& given = {}) {
     const SolverRow& row = **find_solver("dftl_parallel");
-    auto solver = row.make_gpu(complete_parameters(row, given).value(), {&shaders_, all_features(), form});
+    auto solver = row.make(complete_parameters(row, given).value(),
+                           {&executors_.on(SimDevice::Gl), all_features(), form});
     EXPECT_TRUE(solver) << solver.error().to_string();
     EXPECT_TRUE((*solver)->load(groom, {1.0, 0.0, 0.0, 0.0}));
     return std::move(solver).value();
@@ -46,7 +47,7 @@ TEST_F(OddEvenForms, HalfAsManyIterationsAsVerticesGiveTheSerialMotion) {
   const Groom groom = make_test_groom({});
   for (const KernelForm form : kForms) {
     auto solver = make_form(form, groom, {{"iterations", 8.0}, {"exact_length", 0.0}});
-    auto serial = make({*find_solver("dftl"), true}, groom);
+    auto serial = make({*find_solver("dftl"), kGlHost}, groom);
     for (int step = 1; step <= 60; ++step) {
       solver->substep(moving_input(step, kSubstepS));
       serial->substep(moving_input(step, kSubstepS));

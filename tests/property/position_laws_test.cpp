@@ -9,7 +9,7 @@ class PositionLaws : public SolverTest {
  protected:
   double stretch_under_motion(const char* name, double iterations, int substeps) {
     const Groom groom = make_test_groom({});
-    auto solver = make({*find_solver(name), true}, groom, {{"iterations", iterations}});
+    auto solver = make({*find_solver(name), kGlHost}, groom, {{"iterations", iterations}});
     double largest = 0.0;
     for (int step = 1; step <= 120 * substeps; ++step) {
       solver->substep(moving_input(step, 1.0 / 60.0 / substeps));
@@ -31,8 +31,8 @@ TEST_F(PositionLaws, OneIterationMatchesTheEquationByHand) {
   const glm::dvec3 x1 = q1 + error_m / 3.0 * along;
   const glm::dvec3 x2 = p2 - 2.0 * error_m / 3.0 * along;
   for (const char* name : {"pbd", "xpbd"}) {
-    for (const bool is_gpu : {true, false}) {
-      auto solver = make({*find_solver(name), is_gpu}, groom,
+    for (const SolverHost& host : solver_hosts()) {
+      auto solver = make({*find_solver(name), host}, groom,
                          {{"iterations", 1.0},
                           {"air_drag_per_s", 0.0},
                           {"style_stiffness_per_s2", 0.0},
@@ -64,9 +64,9 @@ TEST_F(PositionLaws, ACompliantStrandHangsByHookesLaw) {
   constexpr double kGravityMps2 = 9.81;
   const Groom groom =
       groom_from({{{0.f, 0.f, 0.f}, {0.f, -0.1f, 0.f}, {0.f, -0.2f, 0.f}, {0.f, -0.3f, 0.f}}}, Pinning::Root);
-  for (const bool is_gpu : {true, false}) {
+  for (const SolverHost& host : solver_hosts()) {
     for (const double h_s : {1.0 / 60.0, 1.0 / 240.0}) {
-      auto solver = make({*find_solver("xpbd"), is_gpu}, groom,
+      auto solver = make({*find_solver("xpbd"), host}, groom,
                          {{"iterations", 64.0},
                           {"air_drag_per_s", 0.0},
                           {"style_stiffness_per_s2", 0.0},

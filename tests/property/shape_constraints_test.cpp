@@ -6,10 +6,7 @@ namespace {
 
 class ShapeConstraints : public SolverTest {
  protected:
-  static std::vector<SolverKind> kinds() {
-    const SolverRow* row = *find_solver("shape_constraints");
-    return {{row, true}, {row, false}};
-  }
+  static std::vector<SolverKind> kinds() { return kinds_of(**find_solver("shape_constraints")); }
 
   /// Everything off, to switch on one part at a time.
   static SolverParameters bare(const SolverParameters& changes) {

@@ -148,7 +148,7 @@ TEST_F(SolverLaws, LengthsAreExactAfterEveryStep) {
 TEST_F(SolverLaws, WhatASceneLacksIsNotInItsKernel) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {
-    if (!kind.is_gpu) continue;
+    if (!kind.host.is_kernel()) continue;
     SCOPED_TRACE(kind.name());
     SceneFeatures features;
     features.has_wind = true;
@@ -347,7 +347,7 @@ TEST_F(SolverLaws, FrictionHoldsAStrandOnACollider) {
 TEST_F(SolverLaws, VariantsWithoutAFeatureMatchTheFeatureAtZero) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {
-    if (!kind.is_gpu) continue;
+    if (!kind.host.is_kernel()) continue;
     SCOPED_TRACE(kind.name());
     auto bare = make(kind, groom, {}, {1.0, 0.0, 0.0, 0.0}, SceneFeatures{});
     auto full = make(kind, groom);
@@ -365,7 +365,7 @@ TEST_F(SolverLaws, VariantsWithoutAFeatureMatchTheFeatureAtZero) {
 TEST_F(SolverLaws, TheSettledShapeDoesNotDependOnTheSubstep) {
   const Groom groom = make_test_groom({});
   for (const SolverKind& kind : all_kinds()) {
-    if (kind.is_gpu || !kind.row->comes_to_rest) continue;  // parity covers the GPU
+    if (kind.host.is_kernel() || !kind.row->comes_to_rest) continue;  // parity covers the kernels
     SCOPED_TRACE(kind.name());
     SolverState settled[2];
     const double substeps_s[2] = {1.0 / 60.0, 1.0 / 240.0};
@@ -442,10 +442,10 @@ class OddEven : public SolverTest {
   OddEvenError compare(double iterations, bool has_exact_length) {
     constexpr int kSteps = 120;
     const Groom groom = make_test_groom({});
-    const SolverKind odd_even{*find_solver("dftl_parallel"), true};
+    const SolverKind odd_even{*find_solver("dftl_parallel"), kGlHost};
     auto solver =
         make(odd_even, groom, {{"iterations", iterations}, {"exact_length", has_exact_length ? 1.0 : 0.0}});
-    auto serial = make({*find_solver("dftl"), true}, groom);
+    auto serial = make({*find_solver("dftl"), kGlHost}, groom);
     OddEvenError error;
     for (int step = 1; step <= kSteps; ++step) {
       solver->substep(moving_input(step, kSubstepS));

@@ -88,7 +88,7 @@ TEST_F(SolverRobustness, ARealGroomWithTinyStrandsStaysSound) {
   const auto groom = load_groom(options);
   ASSERT_TRUE(groom) << groom.error().to_string();
   for (const SolverKind& kind : all_kinds()) {
-    if (!kind.is_gpu) continue;
+    if (!kind.host.is_kernel()) continue;
     SCOPED_TRACE(kind.name());
     expect_sound_motion(kind, *groom, true, 30);
   }

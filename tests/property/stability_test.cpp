@@ -25,7 +25,7 @@ class Stability : public SolverTest, public testing::WithParamInterface<std::str
 
 TEST_P(Stability, PromisesAreKept) {
   const SolverRow& row = **find_solver(GetParam());
-  StabilityRunner runner(shaders_);
+  StabilityRunner runner(&executors_.on(SimDevice::Gl));
   std::vector<const KnownBreak*> seen;
   double violent_stretch = 0.0;
   for (const StabilityTrial& trial : make_stability_trials(StabilityGrid::Reduced)) {
@@ -130,8 +130,7 @@ StabilityTrial trial_of(const std::string& group, StabilityMeasure measure) {
 }
 
 StabilityCell cell_of(const FakeModel::Move& move, const std::string& group, StabilityMeasure measure) {
-  gl::ShaderLibrary shaders;
-  StabilityRunner runner(shaders);
+  StabilityRunner runner(nullptr);
   const auto outcome = runner.run(row_of(move), trial_of(group, measure));
   EXPECT_TRUE(outcome) << outcome.error().to_string();
   return outcome->cells[static_cast<size_t>(measure)].value();
@@ -208,8 +207,7 @@ TEST(StabilityMeasures, AStepThatARowRefusesIsNotRun) {
     if (substep_s < 0.05) return {};
     return make_error(ErrorCode::BadInput, "too long");
   };
-  gl::ShaderLibrary shaders;
-  StabilityRunner runner(shaders);
+  StabilityRunner runner(nullptr);
   int refused = 0;
   for (const StabilityTrial& trial : make_stability_trials(StabilityGrid::Reduced)) {
     if (trial.group != "step") continue;
@@ -228,8 +226,7 @@ TEST(StabilityMeasures, ExplicitTrialsStandOnEitherSideOfTheLimit) {
     if (parameters.at("integrator") == 2.0 || parameters.at("stretch_stiffness") < 100.0) return {};
     return make_error(ErrorCode::BadInput, "k is {:.0f}, the limit 100", parameters.at("stretch_stiffness"));
   };
-  gl::ShaderLibrary shaders;
-  StabilityRunner runner(shaders);
+  StabilityRunner runner(nullptr);
   std::vector<std::string> seen;
   for (const StabilityTrial& trial : make_stability_trials(StabilityGrid::Reduced)) {
     if (trial.group != "explicit") continue;

@@ -2,7 +2,7 @@
 // another one left it.
 #include "server/sim/strand_state.h"
 
-#include "server/sim/strand_programs.h"
+#include "common/gl/objects.h"
 #include "tests/support/solver_fixture.h"
 
 namespace strandcast {
@@ -15,16 +15,7 @@ constexpr double kVelocityRoundingMps = 2.0 * 5e-7;
 
 const glm::dquat kTurn = glm::angleAxis(2.1, glm::normalize(glm::dvec3(0.3, -1.0, 0.5)));
 
-class StrandStates : public SolverTest {
- protected:
-  /// A solver of the row's defaults on the given strands, not yet loaded.
-  std::unique_ptr<Solver> make_on(const SolverRow& row, std::shared_ptr<StrandState> strands) {
-    const auto parameters = complete_parameters(row, {});
-    auto made = row.make_gpu(*parameters, {&shaders_, all_features(), KernelForm::Auto, std::move(strands)});
-    EXPECT_TRUE(made) << made.error().to_string();
-    return std::move(made).value();
-  }
-};
+class StrandStates : public SolverTest {};
 
 std::vector<glm::vec3> turned(std::vector<glm::vec3> values, const glm::dquat& turn) {
   for (glm::vec3& value : values) value = glm::vec3(turn * glm::dvec3(value));
@@ -93,7 +84,21 @@ TEST_F(StrandStates, StrandsAsLoadedJumpBeforeTheirFirstStep) {
   }
 }
 
-TEST_F(StrandStates, ASolverGoesOnWhereAnotherLeftTheStrands) {
+/// Of one executor.
+class StrandsOf : public SolverTest, public testing::WithParamInterface<SimDevice> {
+ protected:
+  /// A solver of the row's defaults on the given strands, not yet loaded.
+  std::unique_ptr<Solver> make_on(const SolverRow& row, std::shared_ptr<StrandState> strands) {
+    const auto parameters = complete_parameters(row, {});
+    auto made = row.make(*parameters, {&executor_, all_features(), KernelForm::Auto, std::move(strands)});
+    EXPECT_TRUE(made) << made.error().to_string();
+    return std::move(made).value();
+  }
+
+  Executor& executor_ = executors_.on(GetParam());
+};
+
+TEST_P(StrandsOf, ASolverGoesOnWhereAnotherLeftTheStrands) {
   const Groom groom = make_test_groom({});
   const glm::dquat start = moving_input(0, kSubstepS).world_from_head_rotation;
   const std::vector<SolverRow>& table = solver_table();
@@ -102,7 +107,7 @@ TEST_F(StrandStates, ASolverGoesOnWhereAnotherLeftTheStrands) {
     const SolverRow& after = table[(i + 1) % table.size()];
     if (!before.has_kernel || !after.has_kernel) continue;
     SCOPED_TRACE(before.name + " to " + after.name);
-    const auto strands = std::make_shared<StrandState>();
+    const auto strands = std::make_shared<StrandState>(executor_);
     auto first = make_on(before, strands);
     ASSERT_TRUE(first->load(groom, start));
     StepInput input;
@@ -135,19 +140,19 @@ TEST_F(StrandStates, ASolverGoesOnWhereAnotherLeftTheStrands) {
   }
 }
 
-TEST_F(StrandStates, SolversWithAndWithoutStrandsOnTheGpuFollowEachOther) {
+TEST_P(StrandsOf, SolversWithAndWithoutStrandsOnAnExecutorFollowEachOther) {
   const Groom groom = make_test_groom({});
-  const auto strands = std::make_shared<StrandState>();
+  const auto strands = std::make_shared<StrandState>(executor_);
   const SolverRow& kernel = **find_solver("dftl");
   const SolverRow& helix = **find_solver("super_helix");
-  auto on_gpu = make_on(kernel, strands);
-  ASSERT_TRUE(on_gpu->load(groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
-  for (int step = 1; step <= 4; ++step) on_gpu->substep(moving_input(step, kSubstepS));
+  auto on_planes = make_on(kernel, strands);
+  ASSERT_TRUE(on_planes->load(groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
+  for (int step = 1; step <= 4; ++step) on_planes->substep(moving_input(step, kSubstepS));
   const glm::dquat rotation = moving_input(4, kSubstepS).world_from_head_rotation;
   auto own = make_on(helix, strands);
-  ASSERT_TRUE(hand_over(*on_gpu, *own, groom, rotation));
+  ASSERT_TRUE(hand_over(*on_planes, *own, groom, rotation));
   EXPECT_EQ(own->strands(), nullptr);
-  EXPECT_EQ(read(*own).position_m, read(*on_gpu).position_m);
+  EXPECT_EQ(read(*own).position_m, read(*on_planes).position_m);
   own->substep(moving_input(5, kSubstepS));
   auto back = make_on(kernel, strands);
   ASSERT_TRUE(hand_over(*own, *back, groom, moving_input(5, kSubstepS).world_from_head_rotation));
@@ -155,16 +160,65 @@ TEST_F(StrandStates, SolversWithAndWithoutStrandsOnTheGpuFollowEachOther) {
   EXPECT_EQ(read(*back).velocity_mps, read(*own).velocity_mps);
 }
 
-TEST_F(StrandStates, ConstantsThatNoKernelDeclaresAreErrors) {
-  const KernelDesc misspelt = {"sim/dftl_odd_even.comp", {}, {{"u_iteration", 4u}}};
-  const auto programs = StrandPrograms::make(shaders_, {}, misspelt);
-  ASSERT_FALSE(programs);
-  EXPECT_THAT(programs.error().to_string(), testing::HasSubstr("no variant declares a uniform u_iteration"));
-  const KernelDesc of_other_type = {"sim/dftl_odd_even.comp", {}, {{"u_iterations", 4.0}}};
-  const auto other = StrandPrograms::make(shaders_, {}, of_other_type);
-  ASSERT_FALSE(other);
-  EXPECT_THAT(other.error().to_string(), testing::HasSubstr("u_iterations is declared as uint"));
+TEST_P(StrandsOf, ConstantsThatNoKernelDeclaresAreErrors) {
+  const auto error_of = [this](const ModelConstants& constants) {
+    KernelDesc desc;
+    desc.shader_path = "sim/dftl_odd_even.comp";
+    desc.constants = constants;
+    StrandLayout layout;
+    layout.strand_count = 1;
+    layout.vertex_count = 3;
+    const auto program = executor_.make_program(desc, {}, layout);
+    return program ? "" : program.error().to_string();
+  };
+  EXPECT_EQ(error_of({{"u_iterations", 4u}}), "");
+  EXPECT_THAT(error_of({{"u_iteration", 4u}}), testing::HasSubstr("u_iteration"));
+  EXPECT_THAT(error_of({{"u_iterations", 4.0}}), testing::HasSubstr("u_iterations is declared as uint"));
 }
+
+TEST_P(StrandsOf, WhatIsReadInBlocksIsWhatIsRead) {
+  for (const char* name : {"dftl", "direct_rod"}) {
+    auto solver = make_on(**find_solver(name), nullptr);
+    const Groom groom = make_test_groom({});  // the last block is not full
+    ASSERT_TRUE(solver->load(groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
+    for (int step = 1; step <= 4; ++step) solver->substep(moving_input(step, kSubstepS));
+    const SolverState state = read(*solver);
+    const SolverBlocks blocks = solver->read_blocks();
+    const uint32_t strand_count = groom.strand_count();
+    ASSERT_EQ(solver->strand_count(), strand_count);
+    for (const auto& [view, values] : {std::pair(blocks.position_m, std::cref(state.position_m)),
+                                       std::pair(blocks.velocity_mps, std::cref(state.velocity_mps))}) {
+      ASSERT_EQ(view.strand_count, strand_count);
+      ASSERT_EQ(view.row_count, groom.uniform_vertex_count());
+      for (uint32_t i = 0; i < view.row_count * block_count(strand_count) * kBlockStrands; ++i) {
+        const uint32_t vertex = i / (block_count(strand_count) * kBlockStrands);
+        const uint32_t place = i % (block_count(strand_count) * kBlockStrands);
+        const uint32_t strand = std::min(place, strand_count - 1);
+        for (int axis = 0; axis < 3; ++axis)
+          EXPECT_EQ(
+              view.row(place / kBlockStrands, vertex, static_cast<uint32_t>(axis))[place % kBlockStrands],
+              values.get()[size_t{vertex} * strand_count + strand][axis])
+              << name << ", vertex " << vertex << ", strand " << place;
+      }
+    }
+  }
+}
+
+// A reset or another groom compiles nothing anew; other constants do.
+TEST_P(StrandsOf, WhatIsCompiledIsNotCompiledAgain) {
+  const auto compiled = [] { return gl::object_counts().compiled_programs; };
+  auto solver = make_on(**find_solver("dftl"), nullptr);
+  ASSERT_TRUE(solver->load(make_test_groom({}), glm::dquat(1.0, 0.0, 0.0, 0.0)));
+  const uint64_t before = compiled();
+  ASSERT_TRUE(solver->load(make_test_groom({}), glm::dquat(1.0, 0.0, 0.0, 0.0)));
+  ASSERT_TRUE(
+      solver->load(make_test_groom({.strand_count = 70, .vertex_count = 9}), glm::dquat(1.0, 0.0, 0.0, 0.0)));
+  auto second = make_on(**find_solver("dftl"), nullptr);
+  ASSERT_TRUE(second->load(make_test_groom({}), glm::dquat(1.0, 0.0, 0.0, 0.0)));
+  EXPECT_EQ(compiled(), before);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryExecutor, StrandsOf, testing::ValuesIn(sim_devices()), name_of_device);
 
 }  // namespace
 }  // namespace strandcast

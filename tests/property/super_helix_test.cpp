@@ -129,7 +129,7 @@ double modulus_for(double b_m4ps2) {
 class SuperHelix : public SolverTest {
  protected:
   std::unique_ptr<Solver> make_strand(const Groom& groom, const SolverParameters& given) {
-    return make({*find_solver("super_helix"), false}, groom, given);
+    return make({*find_solver("super_helix"), kReferenceHost}, groom, given);
   }
   /// How far the tip of a horizontal strand of Gamma 10 hangs from where it should, over the length.
   double cantilever_error(double elements) {

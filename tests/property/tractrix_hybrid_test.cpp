@@ -106,8 +106,8 @@ TEST_F(TractrixHybrid, TheGuessIsTheSameOnTheGpu) {
   for (const Pinning pinning : {Pinning::RootPair, Pinning::BothEnds}) {
     const Groom groom = make_test_groom({.pinning = pinning});
     const SolverParameters first = {{"tractrix_first", 1.0}, {"style_stiffness_per_s2", 120.0}};
-    auto gpu = make({*find_solver("tractrix_hybrid"), true}, groom, first);
-    auto reference = make({*find_solver("tractrix_hybrid"), false}, groom, first);
+    auto gpu = make({*find_solver("tractrix_hybrid"), kGlHost}, groom, first);
+    auto reference = make({*find_solver("tractrix_hybrid"), kReferenceHost}, groom, first);
     for (int step = 1; step <= 2; ++step) {
       gpu->substep(moving_input(step, kSubstepS));
       reference->substep(moving_input(step, kSubstepS));
@@ -118,9 +118,9 @@ TEST_F(TractrixHybrid, TheGuessIsTheSameOnTheGpu) {
 
 TEST_F(TractrixHybrid, WithoutSweepsItIsTheCompliantModel) {
   const Groom groom = make_test_groom({});
-  auto hybrid =
-      make({*find_solver("tractrix_hybrid"), true}, groom, {{"tractrix_sweeps", 0.0}, {"iterations", 9.0}});
-  auto plain = make({*find_solver("xpbd"), true}, groom, {{"iterations", 9.0}});
+  auto hybrid = make({*find_solver("tractrix_hybrid"), kGlHost}, groom,
+                     {{"tractrix_sweeps", 0.0}, {"iterations", 9.0}});
+  auto plain = make({*find_solver("xpbd"), kGlHost}, groom, {{"iterations", 9.0}});
   for (int step = 1; step <= 20; ++step) {
     hybrid->substep(moving_input(step, kSubstepS));
     plain->substep(moving_input(step, kSubstepS));

@@ -9,9 +9,7 @@ constexpr double kSubstepS = 1.0 / 60.0;
 
 class TractrixSplit : public SolverTest {
  protected:
-  static std::vector<SolverKind> kinds() {
-    return {{*find_solver("tractrix_split"), true}, {*find_solver("tractrix_split"), false}};
-  }
+  static std::vector<SolverKind> kinds() { return kinds_of(**find_solver("tractrix_split")); }
   /// A moving head without wind and colliders, its groom made under gravity.
   static StepInput bare_motion(int step) {
     StepInput input = moving_input(step, kSubstepS);

@@ -266,7 +266,7 @@ class TractrixStyle : public TractrixRows {
 // hanging, and nothing in the style carries that. Cured by a style that carries the weight (sag_free); moves
 // from the tip to the root with the reaction of each correction (s_damping) stop the shiver.
 TEST_F(TractrixStyle, TenMinutesLeaveTheStyleOnlyAsPublished) {
-  const SolverKind kind{*find_solver("tractrix_emulation"), true};
+  const SolverKind kind{*find_solver("tractrix_emulation"), kGlHost};
   const SolverParameters published = {{"sag_free", 0.0}, {"random_order", 1.0}, {"s_damping", 0.0}};
   const Wear before = wear(kind, published, 10);
   const Wear after = wear(kind, {}, 10);
@@ -283,8 +283,8 @@ TEST_F(TractrixStyle, TenMinutesLeaveTheStyleOnlyAsPublished) {
 
 TEST_F(TractrixStyle, TheRandomOrderIsSeededAndKeepsLengths) {
   const Groom groom = make_test_groom({});
-  for (const bool is_gpu : {true, false}) {
-    const SolverKind kind{*find_solver("tractrix_emulation"), is_gpu};
+  for (const SolverHost& host : solver_hosts()) {
+    const SolverKind kind{*find_solver("tractrix_emulation"), host};
     const auto run = [&](double seed) {
       auto solver = make(kind, groom, {{"random_order", 1.0}, {"order_seed", seed}});
       for (int step = 1; step <= 60; ++step) {
@@ -303,9 +303,9 @@ TEST_F(TractrixStyle, TheRandomOrderIsSeededAndKeepsLengths) {
 TEST_F(TractrixStyle, TheRandomOrderIsTheSameOnTheGpu) {
   const Groom groom = make_test_groom({});
   const SolverParameters random = {{"random_order", 1.0}, {"style_stiffness_per_s2", 120.0}};
-  auto gpu = make({*find_solver("tractrix_emulation"), true}, groom, random);
-  auto reference = make({*find_solver("tractrix_emulation"), false}, groom, random);
-  auto other = make({*find_solver("tractrix_emulation"), false}, groom,
+  auto gpu = make({*find_solver("tractrix_emulation"), kGlHost}, groom, random);
+  auto reference = make({*find_solver("tractrix_emulation"), kReferenceHost}, groom, random);
+  auto other = make({*find_solver("tractrix_emulation"), kReferenceHost}, groom,
                     {{"random_order", 1.0}, {"style_stiffness_per_s2", 120.0}, {"order_seed", 2.0}});
   for (int step = 1; step <= 4; ++step) {
     for (Solver* solver : {gpu.get(), reference.get(), other.get()})

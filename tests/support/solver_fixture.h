@@ -1,4 +1,4 @@
-// Fixture that walks the solver table: every row on the GPU and as its double-precision reference.
+// Fixture that walks the solver table: every row on every executor and as its double-precision reference.
 #pragma once
 
 #include <functional>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "server/sim/solver_registry.h"
-#include "tests/support/gl_fixture.h"
+#include "tests/support/sim_devices.h"
 #include "tests/support/sim_scene.h"
 
 namespace strandcast {
@@ -15,18 +15,24 @@ namespace strandcast {
 /// One way to make a solver of one row.
 struct SolverKind {
   const SolverRow* row = nullptr;
-  bool is_gpu = false;
-  std::string name() const { return row->name + (is_gpu ? " (GPU)" : " (reference)"); }
+  SolverHost host;
+  std::string name() const { return row->name + " (" + host.name() + ")"; }
 };
 
-class SolverTest : public GlTest {
+class SolverTest : public testing::Test {
  protected:
+  /// On every executor, then as its reference.
+  static std::vector<SolverKind> kinds_of(const SolverRow& row) {
+    std::vector<SolverKind> kinds;
+    if (row.has_kernel)
+      for (const SimDevice device : sim_devices()) kinds.push_back({&row, {device}});
+    kinds.push_back({&row, kReferenceHost});
+    return kinds;
+  }
   static std::vector<SolverKind> all_kinds() {
     std::vector<SolverKind> kinds;
-    for (const SolverRow& row : solver_table()) {
-      if (row.has_kernel) kinds.push_back({&row, true});
-      kinds.push_back({&row, false});
-    }
+    for (const SolverRow& row : solver_table())
+      for (const SolverKind& kind : kinds_of(row)) kinds.push_back(kind);
     return kinds;
   }
 
@@ -37,8 +43,8 @@ class SolverTest : public GlTest {
     const auto parameters = complete_parameters(*kind.row, known_parameters(*kind.row, given));
     EXPECT_TRUE(parameters) << parameters.error().to_string();
     std::unique_ptr<Solver> solver;
-    if (kind.is_gpu) {
-      auto made = kind.row->make_gpu(*parameters, {&shaders_, features});
+    if (kind.host.is_kernel()) {
+      auto made = kind.row->make(*parameters, {&executors_.on(*kind.host.device), features});
       EXPECT_TRUE(made) << made.error().to_string();
       solver = std::move(made).value();
     } else {
@@ -55,7 +61,7 @@ class SolverTest : public GlTest {
     return state;
   }
 
-  gl::ShaderLibrary shaders_;
+  SimExecutors executors_;
 };
 
 /// No gravity, no wind, no motion.

@@ -38,7 +38,7 @@ TEST(RunTimer, EveryRowsTimeIsWhatItsSubstepsTook) {
     row.make_reference = [&clock_ns](const SolverParameters&) {
       return std::make_unique<TimedModel>(clock_ns, kStepNs);
     };
-    RunTimer timer(workbench, nullptr, *motion, [&clock_ns] { return clock_ns; });
+    RunTimer timer(workbench, *motion, [&clock_ns] { return clock_ns; });
     WorkRecord record;
     record.test = motion_test(MotionHair::Straight);
     record.setting = {&row, Material::AsShipped, 8, 120.0, 2};

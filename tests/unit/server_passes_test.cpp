@@ -229,10 +229,11 @@ TEST(Explain, NamesEverySolverAndPrintsTheListAsItIs) {
   ASSERT_TRUE(passes);
   (*passes)[0].runs = 1;
   (*passes)[0].median_ms = 1.25;
-  const auto text = explain_scene(scene, asset, {}, *passes, {"half of the strands are stiffened"});
+  const auto text =
+      explain_scene(scene, asset, {}, {"an abacus", *passes}, {"half of the strands are stiffened"});
   ASSERT_TRUE(text) << text.error().to_string();
-  for (const char* part : {"half of the strands are stiffened", "has_wind", "has_head_mesh", "1.25 ms",
-                           "unread", "not requested", "saved"})
+  for (const char* part : {"Simulated on: an abacus", "half of the strands are stiffened", "has_wind",
+                           "has_head_mesh", "1.25 ms", "unread", "not requested", "saved"})
     EXPECT_THAT(*text, HasSubstr(part));
   size_t at = text->find("\nPasses\n");
   for (const gl::PassReport& pass : *passes) {

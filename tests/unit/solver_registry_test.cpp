@@ -19,7 +19,7 @@ TEST(SolverRegistry, RowsAreComplete) {
     EXPECT_TRUE(names.insert(row.name).second) << row.name << " twice";
     EXPECT_FALSE(row.summary.empty());
     EXPECT_FALSE(row.source.empty());
-    EXPECT_TRUE(row.make_gpu && row.make_reference);
+    EXPECT_TRUE(row.make && row.make_reference);
     for (const SolverParameterInfo& info : row.parameters) {
       EXPECT_LE(info.minimum, info.default_value) << info.name;
       EXPECT_GE(info.maximum, info.default_value) << info.name;

@@ -5,9 +5,11 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <glm/glm.hpp>
 #include <map>
 #include <memory>
@@ -20,6 +22,7 @@
 #include "common/base/result.h"
 #include "common/scene/features.h"
 #include "server/sim/step_block.h"
+#include "server/sim/strand_blocks.h"
 #include "server/sim/strand_layout.h"
 
 namespace strandcast::gl {
@@ -38,6 +41,8 @@ class StrandPlane {
   /// Waits until kernels have written it; resizes `values` on first use only.
   virtual void read(std::vector<glm::vec4>& values) const = 0;
   virtual uint64_t size_bytes() const = 0;
+  /// Its own memory where that is such blocks, until the next kernel runs or write(); else nothing.
+  virtual std::optional<StrandBlocksView> view() const { return {}; }
 };
 
 /// Turns xyz of every element, in double; w stays.
@@ -72,6 +77,7 @@ struct KernelDesc {
   bool meets_air = true;       // false: it has no HAS_TURBULENCE
   bool is_per_vertex = false;  // a group takes whole strands, an invocation per vertex; else one per strand
   uint32_t scratch_rows = 0;   // per vertex, vec4 that the kernel keeps for itself during a dispatch
+  auto operator<=>(const KernelDesc&) const = default;
 };
 
 /// A kernel with its constants, ready to run.
@@ -99,19 +105,24 @@ class Executor {
   virtual const ExecutorInfo& info() const = 0;
   /// Binds what it needs to the calling thread.
   virtual Status make_current() { return {}; }
-  /// Unsupported when planes of such strands are too large for it.
+  /// LimitExceeded when planes of such strands are too large for it.
   virtual Status check_size(const StrandLayout& layout) const = 0;
   /// (rows x strand_count) values.
   virtual std::unique_ptr<StrandPlane> make_plane(const std::string& label, uint32_t strand_count,
                                                   std::span<const glm::vec4> values) = 0;
-  /// Compiles where it has to. BadInput for a constant that the kernel does not declare, Unsupported for a
-  /// kernel that this executor does not run or too many strands, Internal when it does not compile.
+  /// Compiles where it has to: not while a program of the same kernel, constants and features is there. Of
+  /// `layout` only the counts matter. BadInput for a constant that the kernel does not declare, or when it
+  /// does not compile; Unsupported for a kernel that this executor does not run, LimitExceeded for too many
+  /// strands.
   virtual Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc,
                                                               const SceneFeatures& features,
                                                               const StrandLayout& layout) = 0;
   /// For timing what runs on a device of its own; nullptr: a clock of the calling thread does.
   virtual gl::GpuTimer* timer() { return nullptr; }
 };
+
+/// Milliseconds that `work` takes on the executor, which is waited for.
+double timed_ms(Executor& executor, const std::function<void()>& work);
 
 struct ExecutorConfig {
   std::string sim_device = "auto";  // lanes unless the OpenGL device is hardware; "gl", "lanes"

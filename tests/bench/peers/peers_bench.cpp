@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -34,7 +35,7 @@ constexpr double kIteratedTargetPerS = 60e6;  // vertex-iterations
 struct Options {
   ThesisOptions thesis;
   std::string csv_path;
-  std::string device = "auto";
+  ExecutorConfig device = {"gl", "auto", {}};
 };
 
 void print_swing_of_rope() {
@@ -62,7 +63,7 @@ std::string shown_share(double share) {
   return share < 1e-4 ? fmt::format("{:.1e}", share) : fmt::format("{:.2f}%", 100.0 * share);
 }
 
-Status print_swings(const gl::ShaderLibrary& shaders, std::string& csv) {
+Status print_swings(Executor& executor, std::string& csv) {
   fmt::print(
       "\nA hair of 0.3 m, clamped at one end, let go horizontally: largest stretch of a segment over 5 s\n");
   if (*rope_peer_name() != '\0') print_swing_of_rope();
@@ -72,7 +73,7 @@ Status print_swings(const gl::ShaderLibrary& shaders, std::string& csv) {
     fmt::print("{:<28}", row.name + (row.as_hair ? "" : " (limp)"));
     for (const double rate_hz : {60.0, 240.0}) {
       for (const uint32_t vertices : {32u, 64u}) {
-        const auto stretch = swing_stretch(row, {vertices, 1.0 / rate_hz, 5.0}, shaders);
+        const auto stretch = swing_stretch(row, {vertices, 1.0 / rate_hz, 5.0}, executor);
         fmt::print("{:>13} ", stretch ? shown_share(*stretch) : "refused");
         if (stretch)
           csv += fmt::format("swing,{}x{:g}Hz,{},stretch,{:.3e}\n", vertices, rate_hz, row.name, *stretch);
@@ -100,7 +101,7 @@ void print_rope_times(std::string& csv) {
 }
 
 /// Milliseconds per frame of every row, and the rates that are aimed at.
-Status print_times(const gl::ShaderLibrary& shaders, const Options& options, std::string& csv) {
+Status print_times(Executor& executor, const Options& options, std::string& csv) {
   fmt::print(
       "\nms per frame of 1/60 s, {} strands; million vertex-steps and vertex-iterations per second. Aims "
       "(two "
@@ -112,12 +113,12 @@ Status print_times(const gl::ShaderLibrary& shaders, const Options& options, std
   fmt::print("\n");
   print_rope_times(csv);
   for (const SolverRow& row : solver_table()) {
-    fmt::print("{:<22}", row.name + (row.make_gpu ? "" : " (double)"));
+    fmt::print("{:<22}", row.name + (row.has_kernel ? "" : " (double)"));
     double slowest_steps_per_s = INFINITY;
     for (const uint32_t vertices : kVertexCounts) {
       const Groom groom = bench_groom(kStrands, vertices);
-      const int steps = row.make_gpu ? options.thesis.steps : 2;
-      ASSIGN_OR_RETURN(const double ms, row_step_ms(row, groom, shaders, steps));
+      const int steps = row.has_kernel ? options.thesis.steps : 2;
+      ASSIGN_OR_RETURN(const double ms, row_step_ms(row, groom, executor, steps));
       const double per_s = kStrands * vertices / (ms * 1e-3);
       slowest_steps_per_s = std::min(slowest_steps_per_s, per_s);
       fmt::print("{:>9.2f}{:>9.1f}{:>9.1f}", ms, per_s * 1e-6, iterations_of(row) * per_s * 1e-6);
@@ -137,16 +138,19 @@ Status print_times(const gl::ShaderLibrary& shaders, const Options& options, std
 }
 
 Status measure(const Options& options, int thread_count, bool has_swings, std::string& csv) {
-  ASSIGN_OR_RETURN(const auto context, gl::EglContext::make(options.device));
-  const gl::ShaderLibrary shaders;
-  fmt::print("\n==== {}, {} thread{} ====\n", context->info().renderer, thread_count,
+  ASSIGN_OR_RETURN(const auto executor, open_executor(options.device));
+  std::unique_ptr<gl::EglContext> context;  // of what is drawn, where the executor has none
+  if (executor->info().device != SimDevice::Gl) {
+    ASSIGN_OR_RETURN(context, gl::EglContext::make(options.device.gl_device));
+  }
+  fmt::print("\n==== {}, {} thread{} ====\n", executor->info().name, thread_count,
              thread_count == 1 ? "" : "s");
-  if (has_swings) RETURN_IF_ERROR(print_swings(shaders, csv));
-  RETURN_IF_ERROR(print_times(shaders, options, csv));
+  if (has_swings) RETURN_IF_ERROR(print_swings(*executor, csv));
+  RETURN_IF_ERROR(print_times(*executor, options, csv));
   ThesisOptions thesis = options.thesis;
-  thesis.device = context->info();
-  RETURN_IF_ERROR(print_tables_of_000(thesis, shaders, csv));
-  return print_tables_of_003(thesis, shaders, csv);
+  ASSIGN_OR_RETURN(thesis.device, gl::read_device_info());
+  RETURN_IF_ERROR(print_tables_of_000(thesis, *executor, csv));
+  return print_tables_of_003(thesis, *executor, csv);
 }
 
 /// In a process of its own, since the driver reads the number of threads once.
@@ -187,9 +191,13 @@ std::optional<Options> parse(int argc, char** argv) {
     } else if (name == "--mohawk" && !value.empty()) {
       options.thesis.mohawk = value;
     } else if (name == "--device" && !value.empty()) {
-      options.device = value;
+      options.device.gl_device = value;
+    } else if (name == "--sim-device" && is_sim_device_name(value)) {
+      options.device.sim_device = value;
     } else {
-      fmt::print(stderr, "usage: peers_bench [--steps N] [--csv FILE] [--mohawk FILE.tfx] [--device auto]\n");
+      fmt::print(stderr,
+                 "usage: peers_bench [--steps N] [--csv FILE] [--mohawk FILE.tfx] [--device auto] "
+                 "[--sim-device gl|lanes|auto]\n");
       return std::nullopt;
     }
     ++i;

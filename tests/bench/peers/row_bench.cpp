@@ -1,23 +1,19 @@
 #include "tests/bench/peers/row_bench.h"
 
-#include <epoxy/gl.h>
-
 #include <algorithm>
 #include <vector>
 
-#include "common/base/profile.h"
 #include "tests/support/sim_scene.h"
 
 namespace strandcast {
 namespace {
 
 Result<std::unique_ptr<Solver>> make_solver(const SolverRow& row, const SolverParameters& given,
-                                            const gl::ShaderLibrary& shaders) {
+                                            Executor& executor) {
   ASSIGN_OR_RETURN(const SolverParameters complete, complete_parameters(row, given));
-  if (!row.make_gpu) return row.make_reference(complete);
   SceneFeatures features;
   features.has_wind = true;
-  return row.make_gpu(complete, {&shaders, features});
+  return row.make(complete, {&executor, features});
 }
 
 }  // namespace
@@ -35,28 +31,23 @@ double iterations_of(const SolverRow& row) {
   return 1.0;
 }
 
-Result<double> row_step_ms(const SolverRow& row, const Groom& groom, const gl::ShaderLibrary& shaders,
-                           int steps) {
+Result<double> row_step_ms(const SolverRow& row, const Groom& groom, Executor& executor, int steps) {
   constexpr double kStepS = 1.0 / 60.0;
   constexpr int kWarmUp = 5;
-  ASSIGN_OR_RETURN(const auto solver, make_solver(row, {}, shaders));
+  ASSIGN_OR_RETURN(const auto solver, make_solver(row, {}, executor));
   RETURN_IF_ERROR(solver->load(groom, {1.0, 0.0, 0.0, 0.0}));
   std::vector<double> samples_ms;
   for (int step = 1; step <= kWarmUp + steps; ++step) {
     StepInput input = moving_input(step, kStepS);
     input.gusts.clear();
     input.colliders.clear();
-    glFinish();
-    const int64_t begin_ns = now_ns();
-    solver->substep(input);
-    glFinish();
-    if (step > kWarmUp) samples_ms.push_back(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    const double ms = timed_ms(executor, [&] { solver->substep(input); });
+    if (step > kWarmUp) samples_ms.push_back(ms);
   }
   return *std::min_element(samples_ms.begin(), samples_ms.end());
 }
 
-Result<double> swing_stretch(const SolverRow& row, const SwingSetup& setup,
-                             const gl::ShaderLibrary& shaders) {
+Result<double> swing_stretch(const SolverRow& row, const SwingSetup& setup, Executor& executor) {
   constexpr double kLengthM = 0.3;
   const double segment_m = kLengthM / (setup.vertex_count - 1);
   std::vector<glm::vec3> strand;
@@ -66,7 +57,7 @@ Result<double> swing_stretch(const SolverRow& row, const SwingSetup& setup,
       known_parameters(row, {{"style_stiffness_per_s2", 0.0}, {"sag_free", 0.0}, {"air_drag_per_s", 0.0}});
   if (row.as_hair)
     for (const auto& [name, value] : row.as_hair({}, segment_m, setup.step_s)) given[name] = value;
-  ASSIGN_OR_RETURN(const auto solver, make_solver(row, given, shaders));
+  ASSIGN_OR_RETURN(const auto solver, make_solver(row, given, executor));
   RETURN_IF_ERROR(solver->load(groom, {1.0, 0.0, 0.0, 0.0}));
   StepInput input;
   input.h_s = setup.step_s;

@@ -54,12 +54,12 @@ Result<Groom> groom_of(const ThesisSet& set, const ThesisOptions& options) {
 }
 
 Result<double> step_ms(const char* name, const Groom& groom, const ThesisOptions& options,
-                       const gl::ShaderLibrary& shaders) {
+                       Executor& executor) {
   const auto row = find_solver(name);
   if (!row) return NAN;  // this build does not have the model
-  ASSIGN_OR_RETURN(const double probe_ms, row_step_ms(**row, groom, shaders, 1));
+  ASSIGN_OR_RETURN(const double probe_ms, row_step_ms(**row, groom, executor, 1));
   if (probe_ms > kSlowMs) return probe_ms;
-  return row_step_ms(**row, groom, shaders, options.steps);
+  return row_step_ms(**row, groom, executor, options.steps);
 }
 
 std::string shown_ms(double ms) {
@@ -92,12 +92,11 @@ struct SimulationTimes {
 };
 
 /// A row of the solver table with the groom loaded, without style.
-Result<std::unique_ptr<Solver>> make_limp(const char* name, const Groom& groom,
-                                          const gl::ShaderLibrary& shaders) {
+Result<std::unique_ptr<Solver>> make_limp(const char* name, const Groom& groom, Executor& executor) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(name));
   ASSIGN_OR_RETURN(const SolverParameters complete,
                    complete_parameters(*row, {{"style_stiffness_per_s2", 0.0}, {"sag_free", 0.0}}));
-  ASSIGN_OR_RETURN(auto solver, row->make_gpu(complete, {&shaders, SceneFeatures{}}));
+  ASSIGN_OR_RETURN(auto solver, row->make(complete, {&executor, SceneFeatures{}}));
   RETURN_IF_ERROR(solver->load(groom, {1.0, 0.0, 0.0, 0.0}));
   return solver;
 }
@@ -112,7 +111,7 @@ double substep_ms(Solver& solver, double h_s) {
 
 /// All stages in turn, step by step, so that whatever else runs meets all alike; the least of each.
 Result<SimulationTimes> time_simulation(const Groom& groom, const ThesisOptions& options,
-                                        const gl::ShaderLibrary& shaders) {
+                                        Executor& executor) {
   constexpr double kStepS = 1.0 / 60.0;
   const gl::ShaderLibrary naive_shaders(options.naive_shaders);
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver("dftl"));
@@ -120,8 +119,8 @@ Result<SimulationTimes> time_simulation(const Groom& groom, const ThesisOptions&
                    complete_parameters(*row, {{"style_stiffness_per_s2", 0.0}, {"sag_free", 0.0}}));
   ASSIGN_OR_RETURN(NaiveStrands naive,
                    NaiveStrands::make(groom, read_strand_parameters(complete), naive_shaders));
-  ASSIGN_OR_RETURN(const auto fused, make_limp("dftl", groom, shaders));
-  ASSIGN_OR_RETURN(const auto odd_even, make_limp("dftl_parallel", groom, shaders));
+  ASSIGN_OR_RETURN(const auto fused, make_limp("dftl", groom, executor));
+  ASSIGN_OR_RETURN(const auto odd_even, make_limp("dftl_parallel", groom, executor));
   ASSIGN_OR_RETURN(VoxelStages voxels, VoxelStages::make(groom.rest_position_m, naive_shaders));
   SimulationTimes result;
   std::array<std::vector<double>, NaiveStrands::kStages.size()> stage_ms;
@@ -301,7 +300,7 @@ void print_table_52(const SimulationTimes& times, const AllDrawTimes& drawn) {
 
 }  // namespace
 
-Status print_tables_of_000(const ThesisOptions& options, const gl::ShaderLibrary& shaders, std::string& csv) {
+Status print_tables_of_000(const ThesisOptions& options, Executor& executor, std::string& csv) {
   fmt::print("\nIn the form of 000, Table 4.1: test sets\n{:<14}{:>16}{:>22}{:>16}\n", "Name",
              "Number Strands", "Particles per Strand", "Particle count");
   for (const ThesisSet& set : kSets)
@@ -323,7 +322,7 @@ Status print_tables_of_000(const ThesisOptions& options, const gl::ShaderLibrary
     ASSIGN_OR_RETURN(const Groom groom, groom_of(set, options));
     std::array<double, std::size(kColumns)> times_ms{};
     for (size_t i = 0; i < times_ms.size(); ++i) {
-      ASSIGN_OR_RETURN(times_ms[i], step_ms(kColumns[i], groom, options, shaders));
+      ASSIGN_OR_RETURN(times_ms[i], step_ms(kColumns[i], groom, options, executor));
       demo_ms[i] += is_demo ? times_ms[i] : 0.0;
       if (!std::isnan(times_ms[i]))
         csv += fmt::format("000 table 4.2,{},{},step_ms,{:.4f}\n", set.name, kColumns[i], times_ms[i]);
@@ -339,12 +338,12 @@ Status print_tables_of_000(const ThesisOptions& options, const gl::ShaderLibrary
   return {};
 }
 
-Status print_tables_of_003(const ThesisOptions& options, const gl::ShaderLibrary& shaders, std::string& csv) {
+Status print_tables_of_003(const ThesisOptions& options, Executor& executor, std::string& csv) {
   constexpr uint32_t kStrands = 242;
   constexpr uint32_t kParticles = 8;
   const Groom groom = bench_groom(kStrands, kParticles);
-  ASSIGN_OR_RETURN(const SimulationTimes times, time_simulation(groom, options, shaders));
-  ASSIGN_OR_RETURN(const AllDrawTimes drawn, time_drawing(options, shaders));
+  ASSIGN_OR_RETURN(const SimulationTimes times, time_simulation(groom, options, executor));
+  ASSIGN_OR_RETURN(const AllDrawTimes drawn, time_drawing(options, gl::ShaderLibrary()));
   print_table_51(times, drawn);
   print_table_52(times, drawn);
   const auto add = [&](const char* model, const std::string& measure, double value) {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/gl/egl_context.h"
-#include "common/gl/program.h"
+#include "server/sim/executor/executor.h"
 
 namespace strandcast {
 
@@ -18,8 +18,9 @@ struct ThesisOptions {
   gl::DeviceInfo device;                // of the current context
 };
 
-/// Prints; lines for a CSV file are appended to `csv` (section, set, model, measure, value).
-Status print_tables_of_000(const ThesisOptions& options, const gl::ShaderLibrary& shaders, std::string& csv);
-Status print_tables_of_003(const ThesisOptions& options, const gl::ShaderLibrary& shaders, std::string& csv);
+/// Prints, with a current context: the executor's where it has one. Lines for a CSV file are appended to
+/// `csv` (section, set, model, measure, value).
+Status print_tables_of_000(const ThesisOptions& options, Executor& executor, std::string& csv);
+Status print_tables_of_003(const ThesisOptions& options, Executor& executor, std::string& csv);
 
 }  // namespace strandcast

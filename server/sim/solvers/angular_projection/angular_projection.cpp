@@ -24,7 +24,7 @@ SolverRow angular_projection_row() {
     parameters.erase("poisson_ratio");
     return parameters;
   };
-  row.make_gpu = [](const SolverParameters& parameters, const GpuSolverContext& context) {
+  row.make = [](const SolverParameters& parameters, const SolverContext& context) {
     return make_chain_kernel("angular_projection", "sweeps", parameters, context);
   };
   row.make_reference = make_angular_projection_reference;

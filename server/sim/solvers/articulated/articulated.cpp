@@ -17,7 +17,7 @@ SolverRow articulated_row() {
   row.parameters.push_back({"solves", 1.0, 1.0, 8.0, "", "linear solves per step (rounded)"});
   row.effort_parameter = "solves";
   row.as_hair = [](const HairConstants& hair, double, double) { return chain_as_hair(hair); };
-  row.make_gpu = [](const SolverParameters& parameters, const GpuSolverContext& context) {
+  row.make = [](const SolverParameters& parameters, const SolverContext& context) {
     return make_chain_kernel("articulated", "solves", parameters, context);
   };
   row.make_reference = make_articulated_reference;

@@ -9,8 +9,7 @@ namespace strandcast {
 
 SolverRow dftl_row();
 
-Result<std::unique_ptr<Solver>> make_dftl_gpu(const SolverParameters& parameters,
-                                              const GpuSolverContext& context);
+Result<std::unique_ptr<Solver>> make_dftl(const SolverParameters& parameters, const SolverContext& context);
 std::unique_ptr<Solver> make_dftl_reference(const SolverParameters& parameters);
 
 }  // namespace strandcast

@@ -15,8 +15,8 @@ inline constexpr uint32_t kMaxOddEvenIterations = 64;
 
 SolverRow dftl_parallel_row();
 
-Result<std::unique_ptr<Solver>> make_dftl_parallel_gpu(const SolverParameters& parameters,
-                                                       const GpuSolverContext& context);
+Result<std::unique_ptr<Solver>> make_dftl_parallel(const SolverParameters& parameters,
+                                                   const SolverContext& context);
 std::unique_ptr<Solver> make_dftl_parallel_reference(const SolverParameters& parameters);
 
 }  // namespace strandcast

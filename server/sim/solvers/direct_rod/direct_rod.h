@@ -43,8 +43,8 @@ RodParameters read_rod_parameters(const SolverParameters& parameters);
 
 SolverRow direct_rod_row();
 
-Result<std::unique_ptr<Solver>> make_direct_rod_gpu(const SolverParameters& parameters,
-                                                    const GpuSolverContext& context);
+Result<std::unique_ptr<Solver>> make_direct_rod(const SolverParameters& parameters,
+                                                const SolverContext& context);
 std::unique_ptr<Solver> make_direct_rod_reference(const SolverParameters& parameters);
 
 }  // namespace strandcast

@@ -324,7 +324,7 @@ SolverRow direct_rod_row() {
                             {"air_drag_per_s", 0.0}};
   };
   row.prepare = prepare_rod_style;
-  row.make_gpu = make_direct_rod_gpu;
+  row.make = make_direct_rod;
   row.make_reference = make_direct_rod_reference;
   return row;
 }

@@ -20,7 +20,7 @@ constexpr uint32_t kStrandsPerPart = 32;
 /// frequency squared is at least 1 / (1 + this / N^2) of it (solved for N = 1 to 63). Without this a strand
 /// of few vertices would be stiffened for nothing.
 constexpr double kLumping = 0.594;
-/// Stiffness over inertia, b h^2 / l^4, that a strand on the GPU may have with steps of the usual length h:
+/// Stiffness over inertia, b h^2 / l^4, that a strand in floats may have with steps of the usual length h:
 /// strands of many short edges with more (a hair of 18 mm in 31 of them has 3e6) are thrown about by
 /// roundings, with 3e6 one in 250 of them. What is softened to this is still stiff: it yields to its own
 /// weight by g h^2 N^4 / 8 over this, 0.04 mm for 15 edges.

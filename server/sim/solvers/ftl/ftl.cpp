@@ -3,7 +3,6 @@
 #include "server/sim/reference_strands.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 namespace {
@@ -20,12 +19,10 @@ class FtlReference final : public ReferenceStrands {
 };
 
 // The serial dynamic kernel without its velocity correction is the static form.
-Result<std::unique_ptr<Solver>> make_ftl_gpu(const SolverParameters& parameters,
-                                             const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_ftl(const SolverParameters& parameters, const SolverContext& context) {
   StrandKernelDesc desc;
   desc.name = "ftl";
   desc.shader_path = "sim/dftl.comp";
-  desc.local_size = shader::kStrandLocalSize;
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
@@ -44,7 +41,7 @@ SolverRow ftl_row() {
   row.parameters.push_back(thickness_spread_info());
   // The segments are a chain of followers that no reaction holds back: what one does, the next does larger.
   row.comes_to_rest = false;
-  row.make_gpu = make_ftl_gpu;
+  row.make = make_ftl;
   row.make_reference = [](const SolverParameters& parameters) {
     return std::make_unique<FtlReference>(parameters);
   };

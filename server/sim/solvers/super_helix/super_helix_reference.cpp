@@ -194,7 +194,7 @@ SolverRow super_helix_row() {
   // The arc keeps its length; the distance of two vertices shrinks as the arc between them bends.
   row.stretch_bound = 0.004;
   row.has_kernel = false;
-  row.make_gpu = [](const SolverParameters& parameters, const GpuSolverContext&) {
+  row.make = [](const SolverParameters& parameters, const SolverContext&) {
     return Result<std::unique_ptr<Solver>>(make_super_helix_reference(parameters));
   };
   row.make_reference = make_super_helix_reference;

@@ -1,31 +1,15 @@
-#include <epoxy/gl.h>
-
 #include <algorithm>
 
-#include "server/sim/gpu_solver.h"
+#include "server/sim/kernel_solver.h"
 #include "server/sim/solvers/direct_rod/direct_rod_rest.h"
 #include "server/sim/solvers/direct_rod/direct_rod_style.h"
-#include "shaders/shared/bindings.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 namespace {
 
-// Planes of the scratch buffer in shaders/sim/direct_rod_band.glsl without and with twist, and how much of it
-// is worth having: strands that do not fit wait for the next dispatch. A software device finds on the way
-// back what still fits its caches; hardware wants all strands at once.
-constexpr uint32_t kStrandPlanes = 4;  // of u_strand
-constexpr double kLongestM = 1e12;     // an edge beyond has no direction
-constexpr size_t kScratchPlanes[] = {7, 11};
-constexpr size_t kCachedScratchBytes = size_t{2} << 20;
-constexpr size_t kMaxScratchBytes = size_t{64} << 20;
-
-/// What the kernel is compiled for besides the scene's features.
-struct RodVariant {
-  bool has_pinned_tail = false;
-  bool has_twist = false;
-  bool operator==(const RodVariant&) const = default;
-};
+constexpr uint32_t kStrandPlanes = 4;         // of u_strand
+constexpr double kLongestM = 1e12;            // an edge beyond has no direction
+constexpr uint32_t kScratchRows[] = {7, 11};  // in shaders/sim/direct_rod_band.glsl without and with twist
 
 StrandParameters shared_parameters(const RodParameters& parameters) {
   StrandParameters shared;
@@ -40,38 +24,36 @@ glm::dvec3 rest_direction(const glm::dvec3& joint_tangent) {
   return 2.0 * joint_tangent.z * joint_tangent - glm::dvec3(0.0, 0.0, 1.0);
 }
 
-class DirectRodGpu final : public GpuSolver {
+class DirectRod final : public KernelSolver {
  public:
-  DirectRodGpu(const RodParameters& parameters, const GpuSolverContext& context)
-      : GpuSolver(context, shared_parameters(parameters)),
+  DirectRod(const RodParameters& parameters, const SolverContext& context)
+      : KernelSolver(context, shared_parameters(parameters)),
         parameters_(parameters),
         known_gravity_in_head_mps2_(limited(context.groom_gravity_in_head_mps2, kMaxGravityMps2)) {}
 
-  Status compile(const RodVariant& wanted) {
-    const KernelDesc kernel = {
-        "sim/direct_rod.comp",
-        {{"HAS_PINNED_TAIL", wanted.has_pinned_tail ? 1 : 0}, {"HAS_TWIST", wanted.has_twist ? 1 : 0}},
-        {{"u_tip_length", parameters_.tip_length_m},
-         {"u_spin_inertia", parameters_.spin_inertia_m2},
-         {"u_bending_damping", parameters_.bending_damping_s},
-         {"u_solves", parameters_.solves},
-         {"u_order", parameters_.order}}};
-    ASSIGN_OR_RETURN(programs_, StrandPrograms::make(shaders(), features(), kernel));
-    variant_ = wanted;
-    return {};
-  }
-
  private:
-  Status prepare() override {
+  void prepare() override {
     groom_gravity_in_head_mps2_ = known_gravity_in_head_mps2_;
     rest_shape_ = make_rest_arrays();
     // Under weight that is known later even a straight rod has a bent rest shape.
     const bool can_twist = parameters_.twist_stiffness_m4ps2 > 0.0;
     const bool is_bent = parameters_.sag_free > 0.0 || rest_shape_.most_turn_rad > kStraightTurnRad;
-    const RodVariant wanted = {layout().pinned_tail_count > 0, can_twist && is_bent};
-    if (wanted != variant_) RETURN_IF_ERROR(compile(wanted));
+    has_twist_ = can_twist && is_bent;
     make_planes();
-    return {};
+  }
+
+  KernelDesc kernel() const override {
+    KernelDesc desc;
+    desc.shader_path = "sim/direct_rod.comp";
+    desc.variant = {{"HAS_PINNED_TAIL", layout().pinned_tail_count > 0 ? 1 : 0},
+                    {"HAS_TWIST", has_twist_ ? 1 : 0}};
+    desc.constants = {{"u_tip_length", parameters_.tip_length_m},
+                      {"u_spin_inertia", parameters_.spin_inertia_m2},
+                      {"u_bending_damping", parameters_.bending_damping_s},
+                      {"u_solves", parameters_.solves},
+                      {"u_order", parameters_.order}};
+    desc.scratch_rows = kScratchRows[has_twist_ ? 1 : 0];
+    return desc;
   }
 
   void begin() override {
@@ -87,45 +69,34 @@ class DirectRodGpu final : public GpuSolver {
     write_rest();
   }
 
-  void run(const gl::Program& program) override {
-    displacement_.bind_storage(shader::kBindingDisplacement);
-    velocity_change_.bind_storage(shader::kBindingVelocityChange);
-    scratch_.bind_storage(shader::kBindingRodScratch);
-    axis_.bind_storage(shader::kBindingRodAxis);
-    displacement_.bind_view(shader::kUnitDisplacement);
-    velocity_change_.bind_view(shader::kUnitVelocityChange);
-    edge_.bind_view(shader::kUnitRodEdge);
-    strand_.bind_view(shader::kUnitRodStrand);
-    axis_.bind_view(shader::kUnitRodAxis);
-    for (uint32_t begin = 0; begin < layout().strand_count; begin += batch_) {
-      // The dispatch before used the same scratch.
-      if (begin > 0) glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-      const uint32_t end = std::min(begin + batch_, layout().strand_count);
-      program.set("u_strand_begin", begin);
-      program.set("u_strand_end", end);
-      glDispatchCompute((end - begin + shader::kStrandLocalSize - 1) / shader::kStrandLocalSize, 1, 1);
-    }
+  void bind(BoundPlanes& planes) const override {
+    plane_of(planes, PlaneRole::Displacement) = displacement_.get();
+    plane_of(planes, PlaneRole::VelocityChange) = velocity_change_.get();
+    plane_of(planes, PlaneRole::RodEdge) = edge_.get();
+    plane_of(planes, PlaneRole::RodStrand) = strand_.get();
+    plane_of(planes, PlaneRole::RodAxis) = axis_.get();
   }
 
   // Without tension, history or twist.
   void forget(const std::vector<bool>& is_changed) override {
     const bool is_any = std::count(is_changed.begin(), is_changed.end(), true) > 0;
-    if (variant_.has_twist && is_any) untwist(is_changed);
+    if (has_twist_ && is_any) untwist(is_changed);
   }
 
   // Its history is of the way that strands really went; velocity changes are without impulses.
-  CarriedPlanes carried() const override { return {&displacement_, variant_.has_twist ? &axis_ : nullptr}; }
+  CarriedPlanes carried() const override { return {displacement_.get(), axis_.get()}; }
 
   void turn_memory(const glm::dquat& turn) override {
-    turn_plane(displacement_, turn);
-    turn_plane(velocity_change_, turn);
-    if (variant_.has_twist) turn_plane(axis_, turn);
+    turn_plane(*displacement_, turn);
+    turn_plane(*velocity_change_, turn);
+    if (has_twist_) turn_plane(*axis_, turn);
   }
 
-  const StrandPrograms& programs() const override { return programs_; }
   uint64_t model_bytes() const override {
-    return displacement_.size_bytes() + velocity_change_.size_bytes() + edge_.size_bytes() +
-           strand_.size_bytes() + axis_.size_bytes() + scratch_.size_bytes();
+    uint64_t bytes = 0;
+    for (const auto* plane : {&edge_, &strand_, &axis_, &displacement_, &velocity_change_})
+      if (*plane) bytes += (*plane)->size_bytes();
+    return bytes;
   }
 
   /// The rest shape of all strands as the kernel takes it.
@@ -169,33 +140,25 @@ class DirectRodGpu final : public GpuSolver {
 
   void make_planes() {
     const std::vector<glm::vec4> zero(layout().size(), glm::vec4(0.0f));
-    edge_ = StrandPlane("direct_rod edge", rest_shape_.edge);
-    strand_ = StrandPlane("direct_rod strand", rest_shape_.strand);
+    edge_ = make_plane("direct_rod edge", rest_shape_.edge);
+    strand_ = make_plane("direct_rod strand", rest_shape_.strand);
     // A kernel without twist knows no axes.
-    axis_ = StrandPlane("direct_rod axis", variant_.has_twist ? rest_shape_.axis : std::vector<glm::vec4>(1));
-    displacement_ = StrandPlane("direct_rod displacement", zero);
-    velocity_change_ = StrandPlane("direct_rod velocity change", zero);
-    const size_t bytes_per_strand =
-        kScratchPlanes[variant_.has_twist ? 1 : 0] * sizeof(glm::vec4) * layout().vertex_count;
-    const size_t worthwhile_bytes = is_software_device() ? kCachedScratchBytes : kMaxScratchBytes;
-    const size_t fitting = std::max<size_t>(
-        worthwhile_bytes / bytes_per_strand / shader::kStrandLocalSize * shader::kStrandLocalSize,
-        shader::kStrandLocalSize);
-    batch_ = static_cast<uint32_t>(std::min<size_t>(fitting, layout().strand_count));
-    scratch_ = gl::Buffer("direct_rod scratch", bytes_per_strand * batch_);
+    axis_ = has_twist_ ? make_plane("direct_rod axis", rest_shape_.axis) : nullptr;
+    displacement_ = make_plane("direct_rod displacement", zero);
+    velocity_change_ = make_plane("direct_rod velocity change", zero);
   }
 
   /// What has not moved yet also starts with the tensions and frames of the rest shape.
   void write_rest() {
-    if (!variant_.has_twist) {
+    if (!has_twist_) {
       for (glm::vec4& edge : rest_shape_.edge)
         edge = glm::vec4(glm::vec3(rest_direction(glm::dvec3(edge))), edge.w);
     }
-    edge_.write(rest_shape_.edge);
-    strand_.write(rest_shape_.strand);
+    edge_->write(rest_shape_.edge);
+    strand_->write(rest_shape_.strand);
     if (state().is_at_rest()) {
       state().write_model(rest_shape_.tension_m2ps2);
-      if (variant_.has_twist) axis_.write(rest_shape_.axis);
+      if (has_twist_) axis_->write(rest_shape_.axis);
     }
     rest_shape_ = {};
   }
@@ -204,9 +167,10 @@ class DirectRodGpu final : public GpuSolver {
   void untwist(const std::vector<bool>& is_changed) {
     SolverState moved;
     state().read(moved);
-    const std::vector<glm::vec4> edge = edge_.read();
-    const std::vector<glm::vec4> strand = strand_.read();
-    std::vector<glm::vec4> axes = axis_.read();
+    std::vector<glm::vec4> edge, strand, axes;
+    edge_->read(edge);
+    strand_->read(strand);
+    axis_->read(axes);
     for (uint32_t s = 0; s < layout().strand_count; ++s) {
       if (!is_changed[s]) continue;
       glm::dvec3 before = state().head().world_from_head_rotation * glm::dvec3(strand[s]);
@@ -224,31 +188,29 @@ class DirectRodGpu final : public GpuSolver {
         before = direction;
       }
     }
-    axis_.write(axes);
+    axis_->write(axes);
   }
 
   RodParameters parameters_;
-  StrandPrograms programs_;
-  RodVariant variant_;
+  bool has_twist_ = false;
   glm::dvec3 known_gravity_in_head_mps2_;       // before any step tells
   glm::dvec3 groom_gravity_in_head_mps2_{0.0};  // under which the rest shape was found
   RestArrays rest_shape_;                       // on its way to the planes
-  uint32_t batch_ = 0;                          // strands per dispatch
-  StrandPlane edge_;    // (vertex_count x strand_count) joint in the frame before it; length, m
-  StrandPlane strand_;  // (kStrandPlanes x strand_count) clamps at root and tip, stiffness
-  StrandPlane axis_;    // (vertex_count x strand_count) material axis, world; spin in the last step, rad
-  StrandPlane displacement_;     // (vertex_count x strand_count) world, m, during the last step
-  StrandPlane velocity_change_;  // (vertex_count x strand_count) world, m/s, during the last step
-  gl::Buffer scratch_;           // (vertex_count x planes x batch) vec4
+  // (vertex_count x strand_count) joint in the frame before it; length, m
+  std::unique_ptr<StrandPlane> edge_;
+  // (kStrandPlanes x strand_count) clamps at root and tip, stiffness
+  std::unique_ptr<StrandPlane> strand_;
+  // (vertex_count x strand_count) material axis, world; spin in the last step, rad. With twist only
+  std::unique_ptr<StrandPlane> axis_;
+  std::unique_ptr<StrandPlane> displacement_;     // (vertex_count x strand_count) world, m, in the last step
+  std::unique_ptr<StrandPlane> velocity_change_;  // (vertex_count x strand_count) world, m/s, likewise
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Solver>> make_direct_rod_gpu(const SolverParameters& parameters,
-                                                    const GpuSolverContext& context) {
-  auto solver = std::make_unique<DirectRodGpu>(read_rod_parameters(parameters), context);
-  RETURN_IF_ERROR(solver->compile({}));
-  return std::unique_ptr<Solver>(std::move(solver));
+Result<std::unique_ptr<Solver>> make_direct_rod(const SolverParameters& parameters,
+                                                const SolverContext& context) {
+  return std::unique_ptr<Solver>(std::make_unique<DirectRod>(read_rod_parameters(parameters), context));
 }
 
 }  // namespace strandcast

@@ -3,18 +3,17 @@
 #include "server/sim/solvers/dftl_parallel/dftl_parallel.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 
-Result<std::unique_ptr<Solver>> make_dftl_parallel_gpu(const SolverParameters& parameters,
-                                                       const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_dftl_parallel(const SolverParameters& parameters,
+                                                   const SolverContext& context) {
   StrandKernelDesc desc;
   desc.name = "dftl_parallel";
-  const KernelForm suiting = is_software_device() ? KernelForm::PerStrand : KernelForm::PerVertex;
+  const bool is_software = context.executor->info().is_software;
+  const KernelForm suiting = is_software ? KernelForm::PerStrand : KernelForm::PerVertex;
   desc.is_per_vertex = (context.form == KernelForm::Auto ? suiting : context.form) == KernelForm::PerVertex;
   desc.shader_path = desc.is_per_vertex ? "sim/dftl_parallel.comp" : "sim/dftl_odd_even.comp";
-  desc.local_size = desc.is_per_vertex ? shader::kVertexLocalSize : shader::kStrandLocalSize;
   desc.constants = {{"u_iterations", read_count(parameters, "iterations")},
                     {"u_has_exact_length", parameters.at("exact_length") >= 0.5 ? 1u : 0u}};
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
@@ -37,7 +36,7 @@ SolverRow dftl_parallel_row() {
       {"exact_length", 1.0, 0.0, 1.0, "",
        "1 = lay the segments end to end with exact lengths at the end, 0 = as iterated"});
   row.effort_parameter = "iterations";
-  row.make_gpu = make_dftl_parallel_gpu;
+  row.make = make_dftl_parallel;
   row.make_reference = make_dftl_parallel_reference;
   return row;
 }

@@ -1,16 +1,13 @@
 #include "server/sim/solvers/dftl/dftl.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 
-Result<std::unique_ptr<Solver>> make_dftl_gpu(const SolverParameters& parameters,
-                                              const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_dftl(const SolverParameters& parameters, const SolverContext& context) {
   StrandKernelDesc desc;
   desc.name = "dftl";
   desc.shader_path = "sim/dftl.comp";
-  desc.local_size = shader::kStrandLocalSize;
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
@@ -25,7 +22,7 @@ SolverRow dftl_row() {
   row.parameters = shared_parameter_infos();
   row.parameters.push_back(thrust_share_info());
   row.parameters.push_back(thickness_spread_info());
-  row.make_gpu = make_dftl_gpu;
+  row.make = make_dftl;
   row.make_reference = make_dftl_reference;
   return row;
 }

@@ -1,7 +1,6 @@
 #include "server/sim/solvers/tractrix/tractrix.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 namespace {
@@ -10,22 +9,20 @@ constexpr double kDefaultStyleMix = 0.3;
 constexpr double kDefaultStyleReturnPerS = 0.5;
 constexpr double kMaxSeed = 65535.0;  // exact in the float that carries it
 
-Result<std::unique_ptr<Solver>> make_emulation_gpu(const SolverParameters& parameters,
-                                                   const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_emulation(const SolverParameters& parameters,
+                                               const SolverContext& context) {
   StrandKernelDesc desc;
   desc.name = "tractrix_emulation";
   desc.shader_path = "sim/tractrix_emulation.comp";
-  desc.local_size = shader::kStrandLocalSize;
   desc.constants = {{"u_order_seed", static_cast<uint32_t>(parameters.at("order_seed"))},
                     {"u_has_random_order", parameters.at("random_order") >= 0.5 ? 1u : 0u}};
   return StrandKernel::make(std::move(desc), read_strand_parameters(parameters), context);
 }
 
-Result<std::unique_ptr<Solver>> make_split_gpu(SolverParameters parameters, const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_split(SolverParameters parameters, const SolverContext& context) {
   StrandKernelDesc desc;
   desc.name = "tractrix_split";
   desc.shader_path = "sim/tractrix_split.comp";
-  desc.local_size = shader::kStrandLocalSize;
   desc.has_offset = true;
   desc.constants = {{"u_style_mix", parameters.at("style_mix")},
                     {"u_style_return", parameters.at("style_return_per_s")}};
@@ -48,7 +45,7 @@ SolverRow tractrix_emulation_row() {
                             "1 = vertices move in a new random order each step, as published, and shiver; 0 "
                             "= from the tip to the root"});
   row.parameters.push_back({"order_seed", 1.0, 0.0, kMaxSeed, "", "of the random order"});
-  row.make_gpu = make_emulation_gpu;
+  row.make = make_emulation;
   row.make_reference = make_tractrix_emulation_reference;
   return row;
 }
@@ -71,7 +68,7 @@ SolverRow tractrix_split_row() {
   // The style takes back slowly what the tip's weight, when the style does not carry it, pulls down; a strand
   // that stands against it folds over and over.
   row.comes_to_rest = false;
-  row.make_gpu = make_split_gpu;
+  row.make = make_split;
   row.make_reference = make_tractrix_split_reference;
   return row;
 }

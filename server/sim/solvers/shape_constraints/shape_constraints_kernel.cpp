@@ -3,7 +3,6 @@
 #include "server/sim/solvers/shape_constraints/shape_constraints.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 namespace {
@@ -26,12 +25,11 @@ constexpr double kDefaultStylePerS2 = 100.0;
 // 1.4 of TressFX's units, centimetres, per step and step at 60 Hz.
 constexpr double kDefaultFastMps2 = 50.0;
 
-Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_kernel(const SolverParameters& given, const SolverContext& context) {
   const ShapeConstraintsParameters model = read_shape_constraints(given);
   StrandKernelDesc desc;
   desc.name = "shape_constraints";
   desc.shader_path = "sim/shape_constraints.comp";
-  desc.local_size = shader::kStrandLocalSize;
   desc.constants = {{"u_iterations", model.length_iterations},
                     {"u_stretch_limit", model.stretch_limit},
                     {"u_bend_stiffness", model.bend_stiffness_m4ps2},
@@ -116,7 +114,7 @@ SolverRow shape_constraints_row() {
         {"shock_share", 0.0}};
   };
   row.stretch_bound = (1.0 + 1e-3) * kDefaultStretchLimit;  // lengths are rounded
-  row.make_gpu = make_gpu;
+  row.make = make_kernel;
   row.make_reference = make_shape_constraints_reference;
   return row;
 }

@@ -1,6 +1,6 @@
-// GpuSolver: what solvers on the GPU share around their kernels: the strands' state, the step's block, load,
-// read, write and rebase. A model says how to prepare and run its kernel, and what it keeps beside the state.
-// From one thread with its GL context current.
+// KernelSolver: what solvers with a kernel share around it: the strands' state, the step's block, load, read,
+// write and rebase. A model says what its kernel is, and what it keeps beside the state. From the thread of
+// its executor.
 #pragma once
 
 #include <memory>
@@ -8,36 +8,37 @@
 #include <string>
 #include <vector>
 
-#include "common/gl/objects.h"
 #include "server/sim/follicle_limit.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/step_block.h"
-#include "server/sim/strand_programs.h"
 #include "server/sim/strand_state.h"
 
 namespace strandcast {
 
-class GpuSolver : public Solver {
+class KernelSolver : public Solver {
  public:
   Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) final;
   void substep(const StepInput& input) final;
   void read(SolverState& state) final { strands_->read(state); }
+  SolverBlocks read_blocks() final { return strands_->read_blocks(); }
   void write(const SolverState& state) final;
   void rebase(const glm::dquat& world_from_head_rotation) final;
-  uint32_t strand_count() const final { return strands_->layout().strand_count; }
+  uint32_t strand_count() const final { return layout().strand_count; }
   uint64_t memory_bytes() const final;
   const StrandState* strands() const final { return strands_.get(); }
   Status follow() final;
 
  protected:
-  GpuSolver(const GpuSolverContext& context, const StrandParameters& parameters);
+  KernelSolver(const SolverContext& context, const StrandParameters& parameters);
 
-  /// The strands are known: compiles and allocates. Changes nothing of the state, also when it fails.
-  virtual Status prepare() = 0;
-  /// Starts without a history from the strands as they are, after prepare().
+  /// The strands are known: allocates. Changes nothing of the state.
+  virtual void prepare() {}
+  /// For the strands as they are, after prepare().
+  virtual KernelDesc kernel() const = 0;
+  /// Starts without a history from the strands as they are, when the kernel is compiled.
   virtual void begin() {}
-  /// Runs the kernels; state and step block are bound, barriers are set afterwards.
-  virtual void run(const gl::Program& program) = 0;
+  /// Puts in the planes that the model keeps beside the state, as far as its kernel touches them.
+  virtual void bind(BoundPlanes&) const {}
   /// Before a substep, for what depends on its input.
   virtual void adapt(const StepInput&) {}
   /// Strands that somebody else moved start without a history.
@@ -47,24 +48,25 @@ class GpuSolver : public Solver {
   virtual CarriedPlanes carried() const { return {}; }
   /// What is kept beside the state turns with it.
   virtual void turn_memory(const glm::dquat&) {}
-  virtual const StrandPrograms& programs() const = 0;
-  virtual uint64_t model_bytes() const = 0;
+  virtual uint64_t model_bytes() const { return 0; }
 
   const StrandLayout& layout() const { return strands_->layout(); }
   StrandState& state() { return *strands_; }
   const StrandState& state() const { return *strands_; }
-  const SceneFeatures& features() const { return features_; }
-  const gl::ShaderLibrary& shaders() const { return shaders_; }
+  /// (rows x strand_count) values.
+  std::unique_ptr<StrandPlane> make_plane(const std::string& label, std::span<const glm::vec4> values) const {
+    return executor_.make_plane(label, layout().strand_count, values);
+  }
 
  private:
   Status prepare_all();
 
+  Executor& executor_;
   std::shared_ptr<StrandState> strands_;
   StrandParameters parameters_;
   SceneFeatures features_;
-  gl::ShaderLibrary shaders_;
+  std::unique_ptr<KernelProgram> program_;
   std::optional<FollicleLimit> follicle_limit_;  // where the scene has one
-  gl::Buffer step_;                              // StepBlock
 };
 
 }  // namespace strandcast

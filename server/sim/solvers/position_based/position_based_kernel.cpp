@@ -3,7 +3,6 @@
 #include "server/sim/solvers/position_based/position_based.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 namespace {
@@ -15,13 +14,12 @@ constexpr double kDefaultCompliantIterations = 20.0;
 constexpr double kDefaultHybridIterations = 4.0;
 constexpr double kMaxIterations = 64.0;
 
-Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const GpuSolverContext& context,
-                                         bool is_compliant) {
+Result<std::unique_ptr<Solver>> make_kernel(const SolverParameters& given, const SolverContext& context,
+                                            bool is_compliant) {
   const PositionBasedParameters parameters = read_position_based(given, is_compliant);
   StrandKernelDesc desc;
   desc.name = is_compliant ? "xpbd" : "pbd";
   desc.shader_path = is_compliant ? "sim/xpbd.comp" : "sim/pbd.comp";
-  desc.local_size = shader::kStrandLocalSize;
   const double density = parameters.linear_density_kgpm;
   const glm::dvec2 give =
       is_compliant ? density * glm::dvec2(parameters.stretch_compliance_mpn, parameters.bend_compliance_mpn)
@@ -44,8 +42,8 @@ SolverRow common_row(bool is_compliant) {
                             1.0, kMaxIterations, "",
                             "times all constraints are solved per substep (rounded)"});
   row.effort_parameter = "iterations";
-  row.make_gpu = [is_compliant](const SolverParameters& parameters, const GpuSolverContext& context) {
-    return make_gpu(parameters, context, is_compliant);
+  row.make = [is_compliant](const SolverParameters& parameters, const SolverContext& context) {
+    return make_kernel(parameters, context, is_compliant);
   };
   row.make_reference = [is_compliant](const SolverParameters& parameters) {
     return make_position_based_reference(parameters, is_compliant);

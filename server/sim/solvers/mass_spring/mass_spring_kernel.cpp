@@ -4,18 +4,16 @@
 #include "server/sim/solvers/mass_spring/mass_spring.h"
 #include "server/sim/strand_kernel.h"
 #include "server/sim/strand_parameters.h"
-#include "shaders/shared/limits.h"
 
 namespace strandcast {
 namespace {
 
 constexpr const char* kIntegratorNames[] = {"symplectic Euler", "Verlet", "backward Euler"};
 
-Result<std::unique_ptr<Solver>> make_gpu(const SolverParameters& given, const GpuSolverContext& context) {
+Result<std::unique_ptr<Solver>> make_kernel(const SolverParameters& given, const SolverContext& context) {
   const MassSpringParameters parameters = read_mass_spring(given);
   StrandKernelDesc desc;
   desc.name = "mass_spring";
-  desc.local_size = shader::kStrandLocalSize;
   desc.constants = {{"u_stretch", parameters.stretch_mps2},
                     {"u_stretch_damping", parameters.stretch_damping_mps},
                     {"u_bend", parameters.bend_m3ps2},
@@ -125,7 +123,7 @@ SolverRow mass_spring_row() {
   row.as_hair = parameters_of_hair;
   // What the springs give: the weight and the pull of the head's motion over 1 N/m.
   row.stretch_bound = 0.006;
-  row.make_gpu = make_gpu;
+  row.make = make_kernel;
   row.make_reference = make_mass_spring_reference;
   return row;
 }

@@ -1,0 +1,57 @@
+#include "server/sim/executor/executor.h"
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "common/base/profile.h"
+#include "common/gl/timer.h"
+#include "server/sim/executor/gl_executor.h"
+
+namespace strandcast {
+namespace {
+
+// The lanes' executor is not there yet: make_lanes_executor() of lanes_executor.h takes the place of this
+// body, and the fallback to OpenGL in open_executor() goes.
+Result<std::unique_ptr<Executor>> open_lanes() {
+  return make_error(ErrorCode::Unavailable, "the simulation has no lanes in this build");
+}
+
+}  // namespace
+
+void turn_plane(StrandPlane& plane, const glm::dquat& turn) {
+  std::vector<glm::vec4> values;
+  plane.read(values);
+  for (glm::vec4& value : values) value = glm::vec4(glm::vec3(turn * glm::dvec3(value)), value.w);
+  plane.write(values);
+}
+
+double timed_ms(Executor& executor, const std::function<void()>& work) {
+  constexpr double kMsPerNs = 1e-6;
+  gl::GpuTimer* timer = executor.timer();
+  const int64_t begin_ns = now_ns();
+  if (timer != nullptr) timer->begin();
+  work();
+  return timer != nullptr ? timer->end_ms() : static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
+}
+
+const char* to_string(SimDevice device) {
+  return device == SimDevice::Gl ? "gl" : "lanes";
+}
+
+bool is_sim_device_name(const std::string& name) {
+  return name == "auto" || name == "gl" || name == "lanes";
+}
+
+Result<std::unique_ptr<Executor>> open_executor(const ExecutorConfig& config) {
+  if (!is_sim_device_name(config.sim_device))
+    return make_error(ErrorCode::BadInput, "sim device '{}' is not known (known: auto, gl, lanes)",
+                      config.sim_device);
+  if (config.sim_device == "lanes") return open_lanes();
+  // Who names an OpenGL device wants it.
+  if (config.sim_device == "gl" || config.gl_device != "auto")
+    return make_gl_executor(config.gl_device, config.shader_folder);
+  if (auto gl = make_gl_executor("hardware", config.shader_folder)) return gl;
+  if (auto lanes = open_lanes()) return lanes;
+  return make_gl_executor("auto", config.shader_folder);
+}
+
+}  // namespace strandcast

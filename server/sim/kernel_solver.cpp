@@ -1,0 +1,71 @@
+#include "server/sim/kernel_solver.h"
+
+#include "common/base/check.h"
+
+namespace strandcast {
+namespace {
+
+Executor& executor_of(const SolverContext& context) {
+  CHECK(context.executor != nullptr);
+  return *context.executor;
+}
+
+}  // namespace
+
+KernelSolver::KernelSolver(const SolverContext& context, const StrandParameters& parameters)
+    : executor_(executor_of(context)),
+      strands_(context.strands ? context.strands : std::make_shared<StrandState>(executor_)),
+      parameters_(parameters),
+      features_(context.features) {}
+
+Status KernelSolver::prepare_all() {
+  prepare();
+  // The program before stays until then: what is compiled is not compiled again.
+  ASSIGN_OR_RETURN(program_, executor_.make_program(kernel(), features_, layout()));
+  if (!features_.has_follicle_limit) return {};
+  ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(executor_, features_, layout(), carried()));
+  return {};
+}
+
+Status KernelSolver::load(const Groom& groom, const glm::dquat& world_from_head_rotation) {
+  RETURN_IF_ERROR(strands_->load(groom, world_from_head_rotation));
+  RETURN_IF_ERROR(prepare_all());
+  begin();
+  return {};
+}
+
+Status KernelSolver::follow() {
+  RETURN_IF_ERROR(prepare_all());
+  strands_->forget_model();
+  begin();
+  return {};
+}
+
+void KernelSolver::substep(const StepInput& input) {
+  adapt(input);
+  const StepBlock block = make_step_block(input, parameters_, layout(), strands_->head());
+  BoundPlanes planes = strands_->planes();
+  bind(planes);
+  program_->run(block, input.colliders.size(), planes);
+  if (follicle_limit_ && FollicleLimit::holds(input, layout()))
+    follicle_limit_->run(block, input.colliders.size(), strands_->planes(), carried());
+  strands_->advance(input);
+}
+
+// A strand that is written as it was read goes on as if nothing had happened; another one starts anew.
+void KernelSolver::write(const SolverState& state) {
+  forget(strands_->write(state));
+}
+
+void KernelSolver::rebase(const glm::dquat& world_from_head_rotation) {
+  turn_memory(strands_->rebase(world_from_head_rotation));
+}
+
+uint64_t KernelSolver::memory_bytes() const {
+  uint64_t bytes = strands_->memory_bytes() + model_bytes();
+  if (program_) bytes += program_->size_bytes();
+  if (follicle_limit_) bytes += follicle_limit_->size_bytes();
+  return bytes;
+}
+
+}  // namespace strandcast
