@@ -15,7 +15,7 @@ namespace strandcast {
 
 /// All executors. Fails where one is not there, because deploy/install_deps.sh brings llvmpipe.
 inline std::vector<SimDevice> sim_devices() {
-  return {SimDevice::Gl};
+  return {SimDevice::Gl, SimDevice::Lanes};
 }
 
 /// For tests that have one as their parameter.

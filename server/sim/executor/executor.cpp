@@ -5,18 +5,9 @@
 #include "common/base/profile.h"
 #include "common/gl/timer.h"
 #include "server/sim/executor/gl_executor.h"
+#include "server/sim/executor/lanes_executor.h"
 
 namespace strandcast {
-namespace {
-
-// The lanes' executor is not there yet: make_lanes_executor() of lanes_executor.h takes the place of this
-// body, and the fallback to OpenGL in open_executor() goes.
-Result<std::unique_ptr<Executor>> open_lanes() {
-  return make_error(ErrorCode::Unavailable, "the simulation has no lanes in this build");
-}
-
-}  // namespace
-
 void turn_plane(StrandPlane& plane, const glm::dquat& turn) {
   std::vector<glm::vec4> values;
   plane.read(values);
@@ -45,12 +36,12 @@ Result<std::unique_ptr<Executor>> open_executor(const ExecutorConfig& config) {
   if (!is_sim_device_name(config.sim_device))
     return make_error(ErrorCode::BadInput, "sim device '{}' is not known (known: auto, gl, lanes)",
                       config.sim_device);
-  if (config.sim_device == "lanes") return open_lanes();
+  if (config.sim_device == "lanes") return make_lanes_executor();
   // Who names an OpenGL device wants it.
   if (config.sim_device == "gl" || config.gl_device != "auto")
     return make_gl_executor(config.gl_device, config.shader_folder);
   if (auto gl = make_gl_executor("hardware", config.shader_folder)) return gl;
-  if (auto lanes = open_lanes()) return lanes;
+  if (auto lanes = make_lanes_executor()) return lanes;
   return make_gl_executor("auto", config.shader_folder);
 }
 

@@ -62,6 +62,7 @@ class LanePlane final : public StrandPlane {
     });
   }
   uint64_t size_bytes() const override { return blocks_.size() * sizeof(float); }
+  std::optional<StrandBlocksView> view() const override { return blocks_.view(); }
 
   float* data() { return blocks_.data(); }
   size_t block_floats() const { return blocks_.row_count() * kBlockRowFloats; }
@@ -101,9 +102,11 @@ class LanePlane final : public StrandPlane {
 
 class LaneProgram final : public KernelProgram {
  public:
-  LaneProgram(const LaneKernel& kernel, const KernelDesc& desc, const StrandLayout& layout,
-              WorkerPool& workers)
+  LaneProgram(const LaneKernel& kernel, const KernelDesc& desc, const SceneFeatures& features,
+              const StrandLayout& layout, WorkerPool& workers)
       : kernel_(kernel),
+        has_colliders_(features.has_colliders),
+        has_turbulence_(features.has_turbulence && desc.meets_air),
         names_(desc.constants),
         scratch_floats_(size_t{desc.scratch_rows} * (layout.vertex_count + 2) * kBlockRowFloats),
         block_count_(block_count(layout.strand_count)),
@@ -132,8 +135,10 @@ class LaneProgram final : public KernelProgram {
     }
     LaneRun run;
     run.step = &one_strand;
-    run.collider_count = static_cast<uint32_t>(std::min<size_t>(collider_count, kMaxSphereColliders));
-    run.gust_count = gust_count(step);
+    // What the scene lacks does not count, whatever the step says.
+    if (has_colliders_)
+      run.collider_count = static_cast<uint32_t>(std::min<size_t>(collider_count, kMaxSphereColliders));
+    if (has_turbulence_) run.gust_count = gust_count(step);
     run.planes = data.data();
     run.block_floats = block_floats.data();
     run.constants = constants_.data();
@@ -165,6 +170,8 @@ class LaneProgram final : public KernelProgram {
   }
 
   const LaneKernel& kernel_;
+  const bool has_colliders_;
+  const bool has_turbulence_;
   const ModelConstants names_;
   std::vector<LaneConstant> constants_;  // names point into names_
   const size_t scratch_floats_;
@@ -173,21 +180,31 @@ class LaneProgram final : public KernelProgram {
   WorkerPool& workers_;
 };
 
-std::string describe(const std::map<std::string, int>& variant) {
-  std::string text;
-  for (const auto& [name, value] : variant)
-    text += fmt::format("{}{}={}", text.empty() ? "" : " ", name, value);
-  return text;
+/// Whether a kernel's variant, "HAS_PINNED_TAIL=0 HAS_TWIST=1", is what is wanted: 0 where nothing is said.
+bool is_variant(std::string_view built, std::map<std::string, int> wanted) {
+  while (!built.empty()) {
+    const std::string_view axis = built.substr(0, built.find(' '));
+    built.remove_prefix(std::min(axis.size() + 1, built.size()));
+    const size_t equals = axis.find('=');
+    const std::string name(axis.substr(0, equals));
+    if (axis.substr(equals + 1) != std::to_string(wanted[name])) return false;
+    wanted.erase(name);
+  }
+  return wanted.empty();
 }
 
+/// As gl::Program::check_uniform says it.
 Status check_constants(const KernelDesc& desc) {
   ASSIGN_OR_RETURN(const gl::FlatSource source, gl::ShaderLibrary().flatten(desc.shader_path));
   const auto declared = gl::declared_uniforms(source);
   for (const auto& [name, value] : desc.constants) {
-    const std::string type = std::holds_alternative<double>(value) ? "float" : "uint";
     const auto found = declared.find(name);
-    if (found == declared.end() || found->second != type)
-      return make_error(ErrorCode::BadInput, "{} declares no uniform {} {}", desc.shader_path, type, name);
+    if (found == declared.end())
+      return at(desc.shader_path, make_error(ErrorCode::BadInput, "no variant declares a uniform {}", name));
+    const std::string type = std::holds_alternative<double>(value) ? "float" : "uint";
+    if (found->second != type)
+      return at(desc.shader_path, make_error(ErrorCode::BadInput, "uniform {} is declared as {}, not as {}",
+                                             name, found->second, type));
   }
   return {};
 }
@@ -211,21 +228,21 @@ class LanesExecutor final : public Executor {
                                           std::span<const glm::vec4> values) override {
     return std::make_unique<LanePlane>(strand_count, values);
   }
-  Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc, const SceneFeatures&,
+  Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc, const SceneFeatures& features,
                                                       const StrandLayout& layout) override {
-    const std::string variant = describe(desc.variant);
+    RETURN_IF_ERROR(check_constants(desc));
     const LaneKernels all = lane_kernels();
     for (size_t i = 0; i < all.count; ++i) {
       const LaneKernel& kernel = *all.kernels[i];
       if (kernel.set != static_cast<int>(set_) || kernel.shader_path != desc.shader_path ||
-          kernel.variant != variant)
+          !is_variant(kernel.variant, desc.variant))
         continue;
-      RETURN_IF_ERROR(check_constants(desc));
-      return std::unique_ptr<KernelProgram>(std::make_unique<LaneProgram>(kernel, desc, layout, workers_));
+      return std::unique_ptr<KernelProgram>(
+          std::make_unique<LaneProgram>(kernel, desc, features, layout, workers_));
     }
     return make_error(ErrorCode::Unsupported,
-                      "{} ({}) runs on OpenGL only: its vertices wait for each other (--sim-device gl)",
-                      desc.shader_path, variant);
+                      "{} runs on OpenGL only: its vertices wait for each other (--sim-device gl)",
+                      desc.shader_path);
   }
 
  private:
