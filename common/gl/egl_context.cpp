@@ -7,7 +7,9 @@
 
 #include <array>
 #include <charconv>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string_view>
 
 #include "common/gl/objects.h"
@@ -122,9 +124,20 @@ Result<EGLConfig> choose_config(EGLDisplay display) {
   return config;
 }
 
-/// Displays stay initialised until the process ends: every context of one device shares its display, so
-/// ending it for one context would end it for the others.
+struct Displays {
+  std::mutex mutex;           // guards the set, and that nobody ends a display that another thread is opening
+  std::set<EGLDisplay> used;  // had a context
+};
+Displays& displays() {
+  static Displays all;
+  return all;
+}
+
+/// Displays that had a context stay initialised until the process ends: every context of one device shares
+/// its display, so ending it for one would end it for the others. One that turned out not to be what was
+/// asked for, and that nobody uses, is ended, and the threads of its driver with it.
 Result<Opened> open(const Candidate& candidate) {
+  const std::lock_guard lock(displays().mutex);
   Opened opened;
   opened.display = eglGetPlatformDisplayEXT(candidate.platform, candidate.native, nullptr);
   if (opened.display == EGL_NO_DISPLAY) return egl_error("eglGetPlatformDisplay");
@@ -148,12 +161,14 @@ Result<Opened> open(const Candidate& candidate) {
   auto info = read_device_info();
   if (info && (info->is_software ? candidate.may_be_software : candidate.may_be_hardware)) {
     opened.info = std::move(info).value();
+    displays().used.insert(opened.display);
     return opened;
   }
   const Error error =
       info ? make_error(ErrorCode::Unavailable, "it renders with {}", info->renderer) : info.error();
   eglMakeCurrent(opened.display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   eglDestroyContext(opened.display, opened.context);
+  if (!displays().used.contains(opened.display)) eglTerminate(opened.display);
   return error;
 }
 

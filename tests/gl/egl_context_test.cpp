@@ -90,6 +90,30 @@ TEST(EglContext, OwnDriverThreadsAreANewSetAtThePriorityOfTheirMaker) {
   EXPECT_EXIT(_exit(own_threads_are_new() ? 0 : 1), testing::ExitedWithCode(0), "");
 }
 
+size_t count_threads() {
+  size_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) count += entry.exists();
+  return count;
+}
+
+/// Looks for hardware, and makes do without. True when a search in vain leaves nothing running, and takes
+/// nothing from a context that is there.
+bool search_leaves_nothing() {
+  const size_t before = count_threads();
+  if (const auto hardware = EglContext::make("hardware")) return true;  // not in vain
+  if (count_threads() != before) return false;
+  const auto own = EglContext::make("software", DriverThreads::Own);
+  if (!own) return false;
+  if (const auto hardware = EglContext::make("hardware")) return false;
+  if (!(*own)->make_current()) return false;
+  return Buffer::of("two", std::vector<int>{7, 8}).read_all<int>() == std::vector<int>{7, 8};
+}
+
+TEST(EglContext, ASearchForHardwareInVainLeavesNoThreadsBehind) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // a fresh process, in which no display was opened
+  EXPECT_EXIT(_exit(search_leaves_nothing() ? 0 : 1), testing::ExitedWithCode(0), "");
+}
+
 TEST(EglContext, MovesToAnotherThread) {
   auto context = EglContext::make("auto");
   ASSERT_TRUE(context);
