@@ -66,6 +66,7 @@ ViewReport make_report(ViewerSession& session) {
   out.count("mode_changes", session.mode_changes());
   out.count("blank_pictures", session.blank_pictures());
   out.word("scene", welcome.scene_name);
+  out.word("sim_device", welcome.sim_device.empty() ? "unknown" : welcome.sim_device);
   out.word("hair_color", session.look().look.hair_color);
   out.count("look_changes", session.look_changes());
   const FrameQuality quality = session.frame_quality().value_or(FrameQuality{});

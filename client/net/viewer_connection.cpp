@@ -44,8 +44,8 @@ void clean(ServerStatus&) {}
 void clean(LookChange&) {}
 void clean(SceneText&) {}  // whoever takes it parses it
 void clean(Welcome& welcome) {
-  for (std::string* text :
-       {&welcome.server_version, &welcome.scene_name, &welcome.mode_reason, &welcome.codec})
+  for (std::string* text : {&welcome.server_version, &welcome.scene_name, &welcome.mode_reason,
+                            &welcome.codec, &welcome.sim_device})
     *text = one_line(*text);
 }
 void clean(Notice& notice) {

@@ -180,6 +180,7 @@ void visit(Visitor& v, Welcome& m) {
   v.group("camera", [&] { scene_fields::visit_camera(v, m.camera); });
   v.side("frame_width", m.frame_width, scene_fields::kFrameWidth);
   v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
+  v.text("sim_device", m.sim_device, kMaxTextChars);
   v.choice("role", m.role, Role::Admin);
 }
 

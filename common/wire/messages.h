@@ -141,7 +141,8 @@ struct Welcome {
   LookDesc look;
   CameraDesc camera;
   uint32_t frame_width = 0, frame_height = 0;
-  Role role = Role::Viewer;  // as granted
+  std::string sim_device = {};  // for a person: what simulates; empty = nothing does
+  Role role = Role::Viewer;     // as granted
   bool operator==(const Welcome&) const = default;
 };
 struct Pong {

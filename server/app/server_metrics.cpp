@@ -87,6 +87,9 @@ constexpr Row kRows[] = {
 
 std::string format_server_metrics(const ServerCounters& counters, const char* version) {
   std::string text = format_build_info(version);
+  if (!counters.sim.sim_device.empty())
+    text += format_info("sim_device_info", "Always 1; the labels say what simulates.",
+                        {{"device", counters.sim.sim_device}, {"name", counters.sim.sim_device_name}});
   for (const Row& row : kRows)
     text += format_metric(row.name, row.name.ends_with("_total") ? "counter" : "gauge", row.help,
                           row.value(counters));

@@ -78,6 +78,7 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place) const {
   welcome.camera = look.camera;
   welcome.frame_width = place.size.width;
   welcome.frame_height = place.size.height;
+  welcome.sim_device = parts_.source.stats().sim_device_name;
   return welcome;
 }
 

@@ -47,6 +47,16 @@ std::string head(std::string_view name, const char* type, const char* help) {
   return fmt::format("# HELP strandcast_{0} {2}\n# TYPE strandcast_{0} {1}\n", name, type, help);
 }
 
+/// As a label's value.
+std::string escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '\\' || c == '"' || c == '\n') result += '\\';
+    result += c == '\n' ? 'n' : c;
+  }
+  return result;
+}
+
 }  // namespace
 
 std::string format_metric(std::string_view name, const char* type, const char* help, double value) {
@@ -67,9 +77,16 @@ std::string format_histogram(std::string_view name, const char* help, const Hist
              name, count, histogram.sum_ms());
 }
 
+std::string format_info(std::string_view name, const char* help,
+                        std::initializer_list<std::pair<const char*, std::string>> labels) {
+  std::string text;
+  for (const auto& [label, value] : labels)
+    text += fmt::format("{}{}=\"{}\"", text.empty() ? "" : ",", label, escaped(value));
+  return head(name, "gauge", help) + fmt::format("strandcast_{}{{{}}} 1\n", name, text);
+}
+
 std::string format_build_info(const char* version) {
-  return head("build_info", "gauge", "Always 1; the label says which version runs.") +
-         fmt::format("strandcast_build_info{{version=\"{}\"}} 1\n", version);
+  return format_info("build_info", "Always 1; the label says which version runs.", {{"version", version}});
 }
 
 std::string format_metrics(const NetCounters& counters) {

@@ -177,6 +177,7 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
       {fmt::format("work-precision --out '{}' --motion '{}'", out, (folder_.path() / "bad.bvh").string()),
        "bad.bvh"},
       {fmt::format("work-precision --out '{}' --gl-device nonsense", out), "nonsense"},
+      {fmt::format("stability --out '{}' --sim-device nonsense", out), "nonsense"},
       {fmt::format("work-precision --out '{}'", (folder_.path() / "file").string()), "folder"},
       {"streaming", "--out"},
       {fmt::format("streaming --out '{}' --size 10", out), "--size is '10'"},

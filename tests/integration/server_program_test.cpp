@@ -121,6 +121,7 @@ TEST_F(ServerProgram, BadInputIsExitCodeTwoAndOneSentence) {
       {{"--trusted-proxy", "10.0.0.7"}, "token"},
       {{"--token-file", "/no/such/token"}, "/no/such/token"},
       {{"--port", "0", "--gl-device", "nonsense"}, "nonsense"},
+      {{"--port", "0", "--sim-device", "nonsense"}, "nonsense"},
       {{"--explain", bad_scene}, "nonsense"}};
   for (const auto& [arguments, part] : cases) {
     std::vector<std::string> all = arguments;

@@ -49,6 +49,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   welcome.camera = sample_camera();
   welcome.frame_width = 1280;
   welcome.frame_height = 720;
+  welcome.sim_device = "lanes (AVX-512, 2 threads)";
   welcome.role = Role::Admin;
   ServerStatus status;
   status.tick = 1ull << 40;

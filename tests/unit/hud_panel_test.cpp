@@ -161,6 +161,21 @@ TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   EXPECT_TRUE(writer.write(state, facts, kS + 2 * kSlowMotionNs).warnings.empty());
 }
 
+TEST(ViewHud, SaysWhatSimulates) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = true;
+  state.session_number = 1;
+  const auto device = [&] {
+    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kS).rows)
+      if (row.label == "simulated by") return row.value;
+    return std::string("no row");
+  };
+  EXPECT_EQ(device(), "no row") << "an older server does not say";
+  state.welcome.sim_device = "lanes (AVX2, 4 threads)";
+  EXPECT_EQ(device(), "lanes (AVX2, 4 threads)");
+}
+
 TEST(ViewHud, SaysWhoseLookIsSeen) {
   HudWriter writer;
   ViewerState state;

@@ -652,6 +652,17 @@ TEST(ServerMetrics, FollowTheirFormat) {
   EXPECT_EQ(steps[Histogram::kBoundsMs.size()].second, 5.0);
 }
 
+TEST(ServerMetrics, SayWhatSimulates) {
+  ServerCounters counters;
+  EXPECT_THAT(format_server_metrics(counters, "1"), testing::Not(HasSubstr("sim_device_info")));
+  counters.sim.sim_device = "gl";
+  counters.sim.sim_device_name = "OpenGL, a \"quoted\" device \\ {x, 2}";
+  const std::string text = format_server_metrics(counters, "1");
+  EXPECT_THAT(test::metric_faults(text), testing::IsEmpty());
+  EXPECT_THAT(text, HasSubstr("\nstrandcast_sim_device_info{device=\"gl\",name=\"OpenGL, a \\\"quoted\\\" "
+                              "device \\\\ {x, 2}\"} 1\n"));
+}
+
 // The reader above finds what it is there to find.
 TEST(ServerMetrics, FaultsAreFound) {
   const std::string good = "# HELP a_total A.\n# TYPE a_total counter\na_total 1\n";
