@@ -1,7 +1,6 @@
 #include "common/render/light_lattice.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
 #include "common/base/hash.h"
@@ -138,14 +137,13 @@ void LightLattice::build(const LatticeFrame& frame, const StrandPoints& points, 
   static_cast<LatticeFrame&>(view_) = frame;
   sum_strands(points, strands, workers);
   sweep_key(workers);
-  workers.run([&](uint32_t worker) {
-    if (worker == 0) sweep(along_axes(lights.up, view_), halved_with(kSolidSkyDepth), sky_depth_);
-    if (worker == std::min(1u, workers.size() - 1)) {
-      if (lights.has_rim)
-        sweep(along_axes(lights.to_rim, view_), halved_with(kSolidRimDepth), rim_depth_);
-      else
-        rim_depth_.assign(halved_.size(), 0.0f);
-    }
+  workers.at(Priority::Drawing).for_ranges(2, 1, [&](size_t light, size_t) {
+    if (light == 0)
+      sweep(along_axes(lights.up, view_), halved_with(kSolidSkyDepth), sky_depth_);
+    else if (lights.has_rim)
+      sweep(along_axes(lights.to_rim, view_), halved_with(kSolidRimDepth), rim_depth_);
+    else
+      rim_depth_.assign(halved_.size(), 0.0f);
   });
   others_.resize(halved_.size());
   const auto stored = [](float depth) {
@@ -170,42 +168,46 @@ void LightLattice::sum_strands(const StrandPoints& points, const LightStrands& s
   const glm::vec3 origin = view_.origin_m / view_.cell_m;
   const float fade = 1.0f / std::max(strands.tip_fade, 1e-3f);
   const float pieces_per_m = kLightPiecesPerCell / view_.cell_m;
-  std::atomic<uint32_t> next{0};
-  workers.run([&](uint32_t worker) {
-    if (worker >= summing) return;
+  // Cleared by the worker whose they are, once it has something to add.
+  std::vector<uint8_t> is_used(summing);
+  const auto sum_range = [&](size_t begin, size_t end, uint32_t worker) {
     int32_t* const sums = sums_[worker].data();
-    std::fill_n(sums, cells, 0);
-    for (uint32_t begin = next.fetch_add(kStrandsPerRange); begin < points.strand_count();
-         begin = next.fetch_add(kStrandsPerRange)) {
-      const uint32_t end = std::min<uint32_t>(begin + kStrandsPerRange, points.strand_count());
-      for (uint32_t strand = begin; strand < end; ++strand) {
-        const uint32_t first = points.first_point[strand];
-        const uint32_t last = points.first_point[strand + 1] - 1;
-        const float along_step = 1.0f / static_cast<float>(std::max(last - first, 1u));
-        // Somewhere within each segment, elsewhere for each strand: roots in a row leave no bands.
-        const float phase = unit_float(mix_u32(points.index[strand]));
-        for (uint32_t i = first; i < last; ++i) {
-          const StrandPoint& a = points.point[i];
-          const StrandPoint& b = points.point[i + 1];
-          const glm::vec3 step(b.x - a.x, b.y - a.y, b.z - a.z);
-          const float length_m = std::sqrt(glm::dot(step, step));
-          if (!(length_m < kFarM)) continue;
-          const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
-          const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
-          const float amount = per_m * length_m * cover * (1.0f + (strands.tip_scale - 1.0f) * along * along);
-          const int pieces = std::clamp(static_cast<int>(length_m * pieces_per_m), 1, kMaxLightCellsPerAxis);
-          const float share = 1.0f / static_cast<float>(pieces);
-          for (int piece = 0; piece < pieces; ++piece) {
-            const float part = (static_cast<float>(piece) + phase) * share;
-            const glm::vec3 at(a.x + part * step.x, a.y + part * step.y, a.z + part * step.z);
-            const glm::vec3 cell(glm::dot(at, u) - origin.x, glm::dot(at, v) - origin.y,
-                                 glm::dot(at, w) - origin.z);
-            add_to_cells(cell, size, amount * share, sums);
-          }
+    if (is_used[worker] == 0) std::fill_n(sums, cells, 0);
+    is_used[worker] = 1;
+    for (size_t strand = begin; strand < end; ++strand) {
+      const uint32_t first = points.first_point[strand];
+      const uint32_t last = points.first_point[strand + 1] - 1;
+      const float along_step = 1.0f / static_cast<float>(std::max(last - first, 1u));
+      // Somewhere within each segment, elsewhere for each strand: roots in a row leave no bands.
+      const float phase = unit_float(mix_u32(points.index[strand]));
+      for (uint32_t i = first; i < last; ++i) {
+        const StrandPoint& a = points.point[i];
+        const StrandPoint& b = points.point[i + 1];
+        const glm::vec3 step(b.x - a.x, b.y - a.y, b.z - a.z);
+        const float length_m = std::sqrt(glm::dot(step, step));
+        if (!(length_m < kFarM)) continue;
+        const float along = (static_cast<float>(i - first) + 0.5f) * along_step;
+        const float cover = std::min((1.0f - along) * fade + 0.1f, 1.0f);
+        const float amount = per_m * length_m * cover * (1.0f + (strands.tip_scale - 1.0f) * along * along);
+        const int pieces = std::clamp(static_cast<int>(length_m * pieces_per_m), 1, kMaxLightCellsPerAxis);
+        const float share = 1.0f / static_cast<float>(pieces);
+        for (int piece = 0; piece < pieces; ++piece) {
+          const float part = (static_cast<float>(piece) + phase) * share;
+          const glm::vec3 at(a.x + part * step.x, a.y + part * step.y, a.z + part * step.z);
+          const glm::vec3 cell(glm::dot(at, u) - origin.x, glm::dot(at, v) - origin.y,
+                               glm::dot(at, w) - origin.z);
+          add_to_cells(cell, size, amount * share, sums);
         }
       }
     }
-  });
+  };
+  workers.at(Priority::Drawing, summing).for_ranges(points.strand_count(), kStrandsPerRange, sum_range);
+  summed_.clear();
+  for (uint32_t worker = 0; worker < summing; ++worker)
+    if (is_used[worker] != 0) summed_.push_back(sums_[worker].data());
+  if (!summed_.empty()) return;
+  std::fill_n(sums_[0].data(), cells, 0);
+  summed_.push_back(sums_[0].data());
 }
 
 // Shares of one row of cells. Far from the skin distances tell of how many cells nothing changes.
@@ -269,7 +271,7 @@ void LightLattice::sweep_key(WorkerPool& workers) {
   halved_.assign(static_cast<size_t>(view_.half_size.x) * view_.half_size.y * view_.half_size.z, 0.0f);
   halved_solid_.assign(has_solid() ? halved_.size() : 0, 0.0f);
   // Two rows at a time: they halve into one.
-  workers.for_ranges(static_cast<size_t>(size.y) / 2, 1, [&](size_t begin, size_t end) {
+  workers.at(Priority::Drawing).for_ranges(static_cast<size_t>(size.y) / 2, 1, [&](size_t begin, size_t end) {
     std::vector<float> passed(size.x);
     std::vector<float> here(size.x);
     std::vector<float> solid(size.x);
@@ -280,9 +282,9 @@ void LightLattice::sweep_key(WorkerPool& workers) {
       std::fill(most_solid.begin(), most_solid.end(), 0.0f);
       for (int z = 0; z < size.z; ++z) {
         const size_t row = static_cast<size_t>(z) * slice + y * size.x;
-        std::copy_n(sums_[0].data() + row, size.x, sum.data());
-        for (size_t other = 1; other < sums_.size(); ++other) {
-          const int32_t* const from = sums_[other].data() + row;
+        std::copy_n(summed_[0] + row, size.x, sum.data());
+        for (size_t other = 1; other < summed_.size(); ++other) {
+          const int32_t* const from = summed_[other] + row;
           for (int x = 0; x < size.x; ++x) sum[x] += from[x];
         }
         for (int x = 0; x < size.x; ++x) here[x] = static_cast<float>(sum[x]) * kLightSumUnit;

@@ -105,6 +105,7 @@ class LightLattice {
   LightLatticeDesc desc_;
   LightLatticeView view_;
   std::vector<std::vector<int32_t>> sums_;  // one lattice per worker that sums
+  std::vector<const int32_t*> summed_;      // those of the last build(), at least one
   std::vector<uint16_t> key_;
   std::vector<float> halved_;        // optical depth of strands across a halved cell
   std::vector<float> halved_solid_;  // likewise, how much of the way leads through the head, in whole cells

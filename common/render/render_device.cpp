@@ -76,7 +76,8 @@ Result<std::unique_ptr<RenderDevice>> RenderDevice::open(const RenderDeviceConfi
   const TileOptions options;
   device->info_ = {
       RendererKind::Tiles,
-      fmt::format("the processor ({} threads, {})", options.threads, simd::to_string(options.set)), true};
+      fmt::format("the processor ({} threads, {})", options.workers->size(), simd::to_string(options.set)),
+      true};
   return device;
 }
 
@@ -127,7 +128,9 @@ Result<gl::PassReports> plan_renderer(const SceneAsset& asset, const LookDesc& l
   RETURN_IF_ERROR(check_asset(asset));
   // All stages run whatever the scene: nothing of it has to be made ready to say so.
   const SceneAsset nothing;
-  ASSIGN_OR_RETURN(const auto renderer, make_tile_renderer(nothing, look, {1, simd::InstructionSet::Plain}));
+  WorkerPool alone(1);
+  ASSIGN_OR_RETURN(const auto renderer,
+                   make_tile_renderer(nothing, look, {&alone, simd::InstructionSet::Plain}));
   return renderer->passes().report();
 }
 

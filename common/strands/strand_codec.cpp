@@ -14,20 +14,30 @@ namespace {
 
 struct Row {
   StrandCodecInfo info;
-  std::unique_ptr<StrandEncoder> (*make_encoder)();
-  std::unique_ptr<StrandDecoder> (*make_decoder)(const StrandStreamLimits&);
+  std::unique_ptr<StrandEncoder> (*make_encoder)(WorkerPool&);
+  std::unique_ptr<StrandDecoder> (*make_decoder)(const StrandStreamLimits&, WorkerPool&);
   float (*lattice_step_m)(float bound_m);
 };
+
+// What makes a codec that needs no workers.
+template <std::unique_ptr<StrandEncoder> (*make)()>
+std::unique_ptr<StrandEncoder> on_calling_thread(WorkerPool&) {
+  return make();
+}
+template <std::unique_ptr<StrandDecoder> (*make)(const StrandStreamLimits&)>
+std::unique_ptr<StrandDecoder> on_calling_thread(const StrandStreamLimits& limits, WorkerPool&) {
+  return make(limits);
+}
 
 const std::vector<Row>& rows() {
   static const std::vector<Row> table = {
       {{"delta", "lattice steps predicted from the last frame and the neighbouring vertices, entropy coded"},
-       make_delta_encoder,
-       make_delta_decoder,
+       on_calling_thread<make_delta_encoder>,
+       on_calling_thread<make_delta_decoder>,
        quantum_for_bound},
       {{"raw", "32-bit lattice values as they are, every frame a keyframe: the reference for tests"},
-       make_raw_encoder,
-       make_raw_decoder,
+       on_calling_thread<make_raw_encoder>,
+       on_calling_thread<make_raw_decoder>,
        quantum_for_bound},
       {{"tangent",
         "motion predicted along strands of known lengths, corrected as cheaply as the bound allows"},
@@ -82,8 +92,12 @@ class PrefixEncoder final : public StrandEncoder {
 /// A decoder for as many strands as the newest keyframe has.
 class PrefixDecoder final : public StrandDecoder {
  public:
-  PrefixDecoder(const Row& row, const StrandStreamLimits& limits)
-      : row_(row), limits_(limits), strand_count_(limits.strand_count), decoder_(row.make_decoder(limits)) {}
+  PrefixDecoder(const Row& row, const StrandStreamLimits& limits, WorkerPool& workers)
+      : row_(row),
+        limits_(limits),
+        workers_(workers),
+        strand_count_(limits.strand_count),
+        decoder_(row.make_decoder(limits, workers)) {}
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
@@ -107,7 +121,7 @@ class PrefixDecoder final : public StrandDecoder {
 
  private:
   std::unique_ptr<StrandDecoder> make_decoder(uint32_t strand_count) const {
-    auto decoder = row_.make_decoder({strand_count, limits_.vertex_count});
+    auto decoder = row_.make_decoder({strand_count, limits_.vertex_count}, workers_);
     decoder->set_rest_shape(prefix_of_shape(rest_in_head_m_, limits_.vertex_count, strand_count));
     return decoder;
   }
@@ -123,6 +137,7 @@ class PrefixDecoder final : public StrandDecoder {
 
   const Row& row_;
   const StrandStreamLimits limits_;
+  WorkerPool& workers_;
   std::vector<glm::vec3> rest_in_head_m_;  // of all strands
   uint32_t strand_count_;                  // of decoder_
   std::unique_ptr<StrandDecoder> decoder_;
@@ -144,13 +159,14 @@ Result<float> lattice_step_m(const std::string& codec, float bound_m) {
   return row->lattice_step_m(bound_m);
 }
 
-Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec) {
+Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec, WorkerPool& workers) {
   ASSIGN_OR_RETURN(const Row* row, find_row(codec));
-  return std::unique_ptr<StrandEncoder>(std::make_unique<PrefixEncoder>(row->make_encoder()));
+  return std::unique_ptr<StrandEncoder>(std::make_unique<PrefixEncoder>(row->make_encoder(workers)));
 }
 
 Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& codec,
-                                                           const StrandStreamLimits& limits) {
+                                                           const StrandStreamLimits& limits,
+                                                           WorkerPool& workers) {
   ASSIGN_OR_RETURN(const Row* row, find_row(codec));
   if (limits.strand_count == 0 || limits.strand_count > kMaxStrandCount)
     return make_error(ErrorCode::LimitExceeded, "{} strands are not in 1..{}", limits.strand_count,
@@ -158,7 +174,7 @@ Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& co
   if (limits.vertex_count < kMinVertexCount || limits.vertex_count > kMaxVertexCount)
     return make_error(ErrorCode::LimitExceeded, "{} vertices per strand are not in {}..{}",
                       limits.vertex_count, kMinVertexCount, kMaxVertexCount);
-  return std::unique_ptr<StrandDecoder>(std::make_unique<PrefixDecoder>(*row, limits));
+  return std::unique_ptr<StrandDecoder>(std::make_unique<PrefixDecoder>(*row, limits, workers));
 }
 
 }  // namespace strandcast

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/base/worker_pool.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/snapshot.h"
 
@@ -69,9 +70,11 @@ const std::vector<StrandCodecInfo>& strand_codecs();
 /// own lattice for "delta" and "raw", which change nothing, a much finer one for "tangent", which rounds
 /// itself. `bound_m` is at least kMinBoundM. NotFound names the known codecs.
 Result<float> lattice_step_m(const std::string& codec, float bound_m);
-/// NotFound names the known codecs.
-Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec);
+/// NotFound names the known codecs. How many `workers` there are changes no bit; they outlive the codec.
+Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec,
+                                                           WorkerPool& workers = shared_workers());
 Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& codec,
-                                                           const StrandStreamLimits& limits);
+                                                           const StrandStreamLimits& limits,
+                                                           WorkerPool& workers = shared_workers());
 
 }  // namespace strandcast

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <thread>
 #include <vector>
 
 #include "common/base/quantile.h"
+#include "common/base/worker_pool.h"
 #include "common/math/pose.h"
 #include "common/strands/strand_codec.h"
 
@@ -53,7 +53,7 @@ Result<EncodeCost> measure(const SceneDesc& scene, const SceneAsset& asset) {
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(kFewestBits));
   encoder->set_rest_shape(asset.rest_position_m);
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(kFewestBits, scene.stream.bound_m));
-  EncodeCost cost{0.0, std::max(1u, std::thread::hardware_concurrency()), states_per_second(scene)};
+  EncodeCost cost{0.0, shared_workers().size(), states_per_second(scene)};
   std::vector<double> cpu_ms;
   for (int i = 0; i < kWarmUpStates + kMeasuredStates; ++i) {
     const std::vector<glm::vec3> points = swung(asset, i / cost.states_hz);

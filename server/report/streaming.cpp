@@ -7,10 +7,10 @@
 #include <charconv>
 #include <cmath>
 #include <set>
-#include <thread>
 
 #include "common/base/check.h"
 #include "common/base/profile.h"
+#include "common/base/worker_pool.h"
 #include "common/log/progress.h"
 #include "server/report/peers/peer_codecs.h"
 #include "server/report/report_executor.h"
@@ -242,7 +242,7 @@ Result<StreamingReport> measure_streaming(const StreamingOptions& options,
   report.is_quick = options.is_quick;
   report.device = executor ? executor->info().name : "the processor, in double precision";
   report.solver = options.solver.empty() ? built_in_scene().solver.name : options.solver;
-  report.processors = std::max(1u, std::thread::hardware_concurrency());
+  report.processors = shared_workers().size();
   report.seconds = plan.seconds;
   StreamingRun run(report, executor.get(), options);
   for (const StreamSize& size : plan.sizes)

@@ -114,7 +114,7 @@ using StageWork = std::map<std::string, Work>;
 
 /// Walks the stages by themselves, times and counts; not that of the tiles, which needs the head too.
 Result<StageWork> walk_stages(const Case& one, const SceneAsset& asset, const TileOptions& options) {
-  WorkerPool workers(options.threads);
+  WorkerPool& workers = *options.workers;
   const RenderScene scene(asset, one.scene.look, true);
   const glm::uvec2 size_px(one.size.width, one.size.height);
   const PosedStrands strands{{}, asset.rest_position_m};

@@ -71,7 +71,7 @@ TEST_F(GlTiles, DrawThePixelsOfTheProcessor) {
                                            {"far", LookDesc{}, far},
                                            {"thin", fine, front}}) {
     const auto gl = make(asset, look);
-    auto processor = make_tile_renderer(asset, look, {2, simd::widest_set()});
+    auto processor = make_tile_renderer(asset, look, {own_workers(2), simd::widest_set()});
     ASSERT_TRUE(gl && processor);
     const Image seen = draw(*gl, asset, camera);
     const Image truth = draw(**processor, asset, camera);
@@ -144,7 +144,7 @@ TEST_F(GlTiles, ImpossibleHairGivesAFinitePicture) {
     EXPECT_GT(image.rgba[0], 40);
     EXPECT_EQ(image.rgba[3], 255);
     // What is left out is told as by the processor.
-    auto processor = make_tile_renderer(asset, {}, {2, simd::widest_set()});
+    auto processor = make_tile_renderer(asset, {}, {own_workers(2), simd::widest_set()});
     ASSERT_TRUE(processor);
     draw(**processor, asset, {}, {96, 64});
     EXPECT_EQ(renderer->profile().unusable_segments > 0, (*processor)->profile().unusable_segments > 0);

@@ -10,6 +10,7 @@
 #include "common/groom/mesh.h"
 #include "common/groom/procedural.h"
 #include "common/render/tiles/tile_renderer.h"
+#include "tests/support/own_workers.h"
 
 namespace strandcast {
 
@@ -53,8 +54,9 @@ inline std::vector<SceneAsset> impossible_hair() {
 }
 
 inline Image drawn(const SceneAsset& asset, const LookDesc& look,
-                   const TileOptions& options = {1, simd::widest_set()}, RenderSize size = {160, 120},
-                   const CameraDesc& camera = {}, DebugView debug_view = DebugView::None) {
+                   const TileOptions& options = {own_workers(1), simd::widest_set()},
+                   RenderSize size = {160, 120}, const CameraDesc& camera = {},
+                   DebugView debug_view = DebugView::None) {
   auto renderer = make_tile_renderer(asset, look, options);
   if (!renderer) {
     ADD_FAILURE() << renderer.error().to_string();

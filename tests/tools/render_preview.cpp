@@ -33,6 +33,7 @@ struct Options {
   int repeat = 1;
   double turn_degrees = 0.0;  // of the head about the vertical
   std::string renderer = "tiles";
+  uint32_t threads = 0;  // 0: the workers that all share
   TileOptions tiles;
 };
 
@@ -59,7 +60,7 @@ Result<Options> parse(int argc, char** argv) {
     } else if (word == "--renderer") {
       options.renderer = value;
     } else if (word == "--threads") {
-      options.tiles.threads = static_cast<uint32_t>(std::max(1, std::atoi(value.c_str())));
+      options.threads = static_cast<uint32_t>(std::clamp(std::atoi(value.c_str()), 1, int{kMaxWorkers}));
     } else if (word == "--light-cells") {
       options.tiles.light_cells = static_cast<uint32_t>(std::max(1, std::atoi(value.c_str())));
     } else if (word == "--size") {
@@ -78,7 +79,9 @@ Result<Options> parse(int argc, char** argv) {
 }
 
 Status run(int argc, char** argv) {
-  ASSIGN_OR_RETURN(const Options options, parse(argc, argv));
+  ASSIGN_OR_RETURN(Options options, parse(argc, argv));
+  WorkerPool own(std::max(options.threads, 1u));
+  if (options.threads > 0) options.tiles.workers = &own;
   auto loaded = options.scene.empty() ? built_in_scene_with(options.overrides)
                                       : load_scene(options.scene, options.overrides);
   ASSIGN_OR_RETURN(const SceneDesc scene, std::move(loaded));
@@ -89,7 +92,7 @@ Status run(int argc, char** argv) {
   std::unique_ptr<gl::EglContext> context;
   std::unique_ptr<Renderer> renderer;
   std::string device =
-      fmt::format("tiles, {} threads, {}", options.tiles.threads, to_string(options.tiles.set));
+      fmt::format("tiles, {} threads, {}", options.tiles.workers->size(), to_string(options.tiles.set));
   if (options.renderer != "tiles") {
     ASSIGN_OR_RETURN(context, gl::EglContext::make("auto"));
     const RenderPath& path = options.renderer == "quads" ? segment_path() : path_for(scene.look);

@@ -44,7 +44,7 @@ TEST(DebugView, NamesComeBack) {
 
 TEST(DebugView, EachIsAPictureOfItsOwnAndLeavesNothingBehind) {
   const SceneAsset asset = grown_hair();
-  auto renderer = make_tile_renderer(asset, sample_look(), {2, simd::widest_set()});
+  auto renderer = make_tile_renderer(asset, sample_look(), {own_workers(2), simd::widest_set()});
   ASSERT_TRUE(renderer);
   const auto picture = [&](DebugView view) {
     EXPECT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, {}, {160, 120}, {1.0f, {}, view}));
@@ -57,8 +57,8 @@ TEST(DebugView, EachIsAPictureOfItsOwnAndLeavesNothingBehind) {
   EXPECT_TRUE(picture(DebugView::None) == all[0]);
   // Whatever runs them.
   for (const DebugView view : kDebugViews)
-    EXPECT_TRUE(drawn(asset, {}, {1, simd::InstructionSet::Plain}, {96, 64}, {}, view) ==
-                drawn(asset, {}, {3, simd::widest_set()}, {96, 64}, {}, view))
+    EXPECT_TRUE(drawn(asset, {}, {own_workers(1), simd::InstructionSet::Plain}, {96, 64}, {}, view) ==
+                drawn(asset, {}, {own_workers(3), simd::widest_set()}, {96, 64}, {}, view))
         << name_of(view);
 }
 
@@ -84,7 +84,8 @@ TEST(DebugView, OverdrawCountsLayers) {
   camera.offset_m = {0.0f, 0.0f, 0.5f};
   SceneAsset asset = one_strand({0.0f, -1.0f, 0.0f});
   const auto light_of = [&] {
-    const Image image = drawn(asset, thick(), {1, simd::widest_set()}, {64, 64}, camera, DebugView::Overdraw);
+    const Image image =
+        drawn(asset, thick(), {own_workers(1), simd::widest_set()}, {64, 64}, camera, DebugView::Overdraw);
     EXPECT_EQ(pixel(image, 2, 32)[0], 0) << "nothing beside the strand";
     const double srgb = pixel(image, 32, 32)[0] / 255.0;
     return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
@@ -101,7 +102,8 @@ TEST(DebugView, OverdrawCountsLayers) {
 }
 
 TEST(DebugView, TilesHaveBorders) {
-  const Image image = drawn(grown_hair(), {}, {1, simd::widest_set()}, {160, 120}, {}, DebugView::Tiles);
+  const Image image =
+      drawn(grown_hair(), {}, {own_workers(1), simd::widest_set()}, {160, 120}, {}, DebugView::Tiles);
   for (const uint32_t x : {0u, 32u, 64u})
     for (int c = 0; c < 3; ++c) EXPECT_EQ(pixel(image, x, 50)[c], 0);
   EXPECT_GT(pixel(image, 5, 5)[0], 0);

@@ -63,7 +63,7 @@ TEST(GoldenPictures, HairLooksAsItDid) {
   const char* const renew = std::getenv("STRANDCAST_RENEW_GOLDEN");
   const SceneAsset asset = grown_hair(800, 16);
   for (const Golden& golden : goldens()) {
-    const TileOptions options{2, simd::widest_set()};
+    const TileOptions options{own_workers(2), simd::widest_set()};
     const Image actual = drawn(asset, golden.look, options, kSize, golden.camera);
     const std::filesystem::path file = folder / (golden.name + ".png");
     if (renew != nullptr && std::string(renew) == "1") {

@@ -3,14 +3,12 @@
 
 #include <gmock/gmock.h>
 
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <glm/glm.hpp>
 #include <vector>
 
 #include "common/base/hash.h"
-#include "common/base/worker_pool.h"
 #include "common/render/laws.h"
 #include "common/simd/lane_matrices.h"
 #include "common/simd/variants.h"
@@ -152,19 +150,6 @@ TEST(Laws, StrandsComeOutOfTheSkinAlikeForAnySteps) {
   const double fine = cover_between(0.001f);
   EXPECT_LT(fine, 1.0);
   for (const float step : {0.01f, 0.03f, 0.06f, 0.12f}) EXPECT_NEAR(cover_between(step), fine, 1e-4) << step;
-}
-
-TEST(WorkerPool, DoesEveryPartOnceAndAgain) {
-  for (const uint32_t threads : {1u, 2u, 5u}) {
-    WorkerPool workers(threads);
-    for (int turn = 0; turn < 20; ++turn) {
-      std::vector<std::atomic<int>> done(1000);
-      workers.for_ranges(done.size(), 7, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) ++done[i];
-      });
-      for (const auto& count : done) ASSERT_EQ(count.load(), 1);
-    }
-  }
 }
 
 }  // namespace

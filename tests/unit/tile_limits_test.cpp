@@ -108,7 +108,7 @@ TEST(TileLimits, AHundredThousandStrandsAreDrawn) {
     }
   LookDesc look;
   look.followers = 0;
-  auto renderer = make_tile_renderer(asset, look, {2, simd::widest_set()});
+  auto renderer = make_tile_renderer(asset, look, {own_workers(2), simd::widest_set()});
   ASSERT_TRUE(renderer);
   ASSERT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, {}, {64, 64}));
   EXPECT_EQ((*renderer)->profile().drawn_strands, 100'000u);
@@ -118,7 +118,7 @@ TEST(TileLimits, AHundredThousandStrandsAreDrawn) {
 TEST(TileLimits, TheLongestSidesAreDrawn) {
   const SceneAsset asset = grown_hair(20);
   for (const RenderSize size : {RenderSize{kMaxImageSide, 8}, RenderSize{8, kMaxImageSide}}) {
-    const Image image = drawn(asset, {}, {2, simd::widest_set()}, size);
+    const Image image = drawn(asset, {}, {own_workers(2), simd::widest_set()}, size);
     EXPECT_EQ(image.rgba.size(), size_t{size.width} * size.height * 4);
     EXPECT_GT(image.rgba[0], 0);
   }
@@ -134,7 +134,7 @@ TEST(TileLimits, AnEyeInTheHairAndOneWhoseDepthHasNoLengthGiveAPicture) {
     CameraDesc camera;
     camera.target_m = {0.0f, 0.1f, 0.0f};  // on the scalp
     camera.offset_m = offset;
-    const Image image = drawn(asset, {}, {2, simd::widest_set()}, {64, 48}, camera);
+    const Image image = drawn(asset, {}, {own_workers(2), simd::widest_set()}, {64, 48}, camera);
     ASSERT_EQ(image.rgba.size(), 64u * 48u * 4u);
     for (size_t i = 3; i < image.rgba.size(); i += 4) ASSERT_EQ(image.rgba[i], 255);
   }

@@ -24,16 +24,16 @@ namespace {
 TEST(TileRenderer, ThreadsAndInstructionSetsDoNotShow) {
   const SceneAsset asset = grown_hair();
   // A look where no field has its default.
-  const Image first = drawn(asset, sample_look(), {1, simd::InstructionSet::Plain});
+  const Image first = drawn(asset, sample_look(), {own_workers(1), simd::InstructionSet::Plain});
   for (const uint32_t threads : {1u, 2u, 4u})
     for (const simd::InstructionSet set : simd::instruction_sets())
-      EXPECT_TRUE(drawn(asset, sample_look(), {threads, set}).rgba == first.rgba)
+      EXPECT_TRUE(drawn(asset, sample_look(), {own_workers(threads), set}).rgba == first.rgba)
           << threads << " threads, " << to_string(set);
 }
 
 TEST(TileRenderer, TenPicturesAreOne) {
   const SceneAsset asset = grown_hair();
-  auto renderer = make_tile_renderer(asset, {}, {3, simd::widest_set()});
+  auto renderer = make_tile_renderer(asset, {}, {own_workers(3), simd::widest_set()});
   ASSERT_TRUE(renderer);
   std::vector<uint8_t> first;
   for (int i = 0; i < 10; ++i) {
@@ -49,7 +49,7 @@ TEST(TileRenderer, TenPicturesAreOne) {
 // What the codec's bound does to a picture: every vertex a tenth of a millimetre off.
 TEST(TileRenderer, TheDefaultBoundHardlyShows) {
   const SceneAsset asset = grown_hair(1000);
-  auto renderer = make_tile_renderer(asset, {}, {2, simd::widest_set()});
+  auto renderer = make_tile_renderer(asset, {}, {own_workers(2), simd::widest_set()});
   ASSERT_TRUE(renderer);
   const RenderSize size{640, 360};
   const auto picture = [&](const std::vector<glm::vec3>& position_m) {
@@ -196,7 +196,7 @@ TEST(TileRenderer, TheEdgeOfAHeadIsSeenBeforeDenseHair) {
         {-0.1f, -1.0f, 0.0f}, {right_m, -1.0f, 0.0f}, {right_m, 1.0f, 0.0f}, {-0.1f, 1.0f, 0.0f}};
     asset.head.normal.assign(4, {0.0f, 0.0f, 1.0f});
     asset.head.triangle = {{0, 1, 2}, {0, 2, 3}};
-    auto renderer = make_tile_renderer(asset, look, {1, simd::widest_set()});
+    auto renderer = make_tile_renderer(asset, look, {own_workers(1), simd::widest_set()});
     EXPECT_TRUE(renderer && (*renderer)->draw({{}, asset.rest_position_m}, camera, size));
     const Image image = (*renderer)->read_image();
     std::vector<int> red;
@@ -223,7 +223,7 @@ TEST(TileRenderer, ShadowsAreThoseOfAFinerLattice) {
   bald.rest_position_m.clear();
   bald.triangle.clear();
   const auto picture = [](const SceneAsset& of, uint32_t cells) {
-    TileOptions options{2, simd::widest_set()};
+    TileOptions options{own_workers(2), simd::widest_set()};
     options.light_cells = cells;
     return drawn(of, {}, options, {320, 240});
   };
@@ -385,7 +385,7 @@ TEST(TileRenderer, ImpossibleHairGivesAFinitePicture) {
   assets.push_back(grown_hair(40));
   assets.back().head = {};
   for (size_t i = 0; i < assets.size(); ++i) {
-    const Image image = drawn(assets[i], {}, {2, simd::widest_set()}, {96, 64});
+    const Image image = drawn(assets[i], {}, {own_workers(2), simd::widest_set()}, {96, 64});
     ASSERT_EQ(image.rgba.size(), 96u * 64u * 4u) << i;
     // The background is there: nothing spreads over the picture.
     EXPECT_GT(image.rgba[0], 40) << i;
@@ -398,19 +398,19 @@ TEST(TileRenderer, ExtremeLooksAndViewsGiveAFinitePicture) {
   LookDesc look;
   look.strand_radius_m = 0.01f;
   look.followers = 64;
-  EXPECT_FALSE(drawn(asset, look, {2, simd::widest_set()}, {320, 200}).rgba.empty());
+  EXPECT_FALSE(drawn(asset, look, {own_workers(2), simd::widest_set()}, {320, 200}).rgba.empty());
   look = {};
   look.light_color = glm::vec3(0.0f);
   look.ambient = 0.0f;
   EXPECT_FALSE(drawn(asset, look).rgba.empty());
   for (const RenderSize size : {RenderSize{1, 1}, RenderSize{17, 3}, RenderSize{1920, 1080}}) {
-    const Image image = drawn(asset, {}, {2, simd::widest_set()}, size);
+    const Image image = drawn(asset, {}, {own_workers(2), simd::widest_set()}, size);
     EXPECT_EQ(image.rgba.size(), size_t{size.width} * size.height * 4);
   }
   CameraDesc inside;
   inside.offset_m = {0.0f, 0.02f, 0.001f};
   inside.target_m = {0.0f, 0.09f, 0.0f};
-  EXPECT_FALSE(drawn(asset, {}, {2, simd::widest_set()}, {160, 120}, inside).rgba.empty());
+  EXPECT_FALSE(drawn(asset, {}, {own_workers(2), simd::widest_set()}, {160, 120}, inside).rgba.empty());
 }
 
 TEST(TileRenderer, RefusesWhatDoesNotFit) {

@@ -35,7 +35,7 @@ void draw_density(const LightLatticeView& lattice, const View& view, WorkerPool&
     return glm::vec3(p) / p.w;
   };
   const glm::vec3 middle_ray = glm::normalize(point_at(0.0f, 0.0f, 0.0f) - view.eye_m);
-  workers.for_ranges(image.height, 8, [&](size_t begin, size_t end) {
+  workers.at(Priority::Drawing).for_ranges(image.height, 8, [&](size_t begin, size_t end) {
     for (size_t row = begin; row < end; ++row)
       for (size_t column = 0; column < image.width; ++column) {
         const float x = 2.0f * (static_cast<float>(column) + 0.5f) / view.target_px.x - 1.0f;

@@ -178,7 +178,7 @@ void StrandExpansion::expand(const std::vector<glm::vec3>& position_m, const Str
   const uint32_t segments = gaps * detail.segments_per_gap;
   const uint32_t axis_floats = kFrontSamples + segments + 1 + kBackSamples;
   samples_.resize(size_t{key_count_} * 3 * axis_floats);
-  workers.for_ranges(key_count_, kKeysPerRange, [&](size_t begin, size_t end) {
+  workers.at(Priority::Drawing).for_ranges(key_count_, kKeysPerRange, [&](size_t begin, size_t end) {
     for (size_t key = begin; key < end; ++key) {
       float* const row = samples_.data() + key * 3 * axis_floats;
       const auto vertex = [&](uint32_t v) { return position_m[size_t{v} * key_count_ + key]; };
@@ -235,12 +235,13 @@ void StrandExpansion::expand(const std::vector<glm::vec3>& position_m, const Str
   arguments.index = points.index.data();
   arguments.lock = points.lock.data();
   const auto in_ranges = [&](auto kernel) {
-    workers.for_ranges(detail.strand_count, kStrandsPerRange, [&](size_t begin, size_t end) {
-      ExpandArguments part = arguments;
-      part.begin = static_cast<uint32_t>(begin);
-      part.end = static_cast<uint32_t>(end);
-      kernel(set, part);
-    });
+    workers.at(Priority::Drawing)
+        .for_ranges(detail.strand_count, kStrandsPerRange, [&](size_t begin, size_t end) {
+          ExpandArguments part = arguments;
+          part.begin = static_cast<uint32_t>(begin);
+          part.end = static_cast<uint32_t>(end);
+          kernel(set, part);
+        });
   };
   in_ranges(count_points);
   for (uint32_t strand = 0; strand < detail.strand_count; ++strand)

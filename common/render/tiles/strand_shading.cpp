@@ -164,11 +164,12 @@ STRANDCAST_KERNEL(shade_strand_points, ShadeArguments);
 
 void shade_points(const ShadeInput& input, WorkerPool& workers, simd::InstructionSet set,
                   StrandPoints& points) {
-  workers.for_ranges(points.strand_count(), kStrandsPerRange, [&](size_t begin, size_t end) {
-    shade_strand_points(
-        set, {&input, static_cast<uint32_t>(begin), static_cast<uint32_t>(end), points.first_point.data(),
-              points.index.data(), points.lock.data(), points.point.data()});
-  });
+  workers.at(Priority::Drawing)
+      .for_ranges(points.strand_count(), kStrandsPerRange, [&](size_t begin, size_t end) {
+        shade_strand_points(
+            set, {&input, static_cast<uint32_t>(begin), static_cast<uint32_t>(end), points.first_point.data(),
+                  points.index.data(), points.lock.data(), points.point.data()});
+      });
 }
 
 }  // namespace strandcast

@@ -84,7 +84,7 @@ BinCounts TileBins::bin_segments(const StrandPoints& points, const TileGrid& gri
   std::vector<BinCounts> counted(parts);
   // Each part is a run of strands, so that the lists come out in their order.
   const auto in_parts = [&](uint32_t drawn, auto work) {
-    workers.for_ranges(parts, 1, [&](size_t begin_part, size_t) {
+    workers.at(Priority::Drawing).for_ranges(parts, 1, [&](size_t begin_part, size_t) {
       const auto part = static_cast<uint32_t>(begin_part);
       const auto begin = static_cast<uint32_t>(uint64_t{strands} * part / parts);
       const auto end = static_cast<uint32_t>(uint64_t{strands} * (part + 1) / parts);

@@ -358,14 +358,15 @@ void place_head(const View& view, WorkerPool& workers, HeadPicture& head) {
   const Mesh& mesh = *head.mesh;
   head.screen.resize(mesh.position_m.size());
   constexpr size_t kVerticesPerRange = 512;
-  workers.for_ranges(mesh.position_m.size(), kVerticesPerRange, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      const glm::vec4 clip = view.clip_from_head * glm::vec4(mesh.position_m[i], 1.0f);
-      const float per_away = 1.0f / std::max(clip.w, view.near_m);
-      head.screen[i] = {view.target_px.x * (0.5f + 0.5f * clip.x * per_away),
-                        view.target_px.y * (0.5f - 0.5f * clip.y * per_away), clip.w, per_away};
-    }
-  });
+  workers.at(Priority::Drawing)
+      .for_ranges(mesh.position_m.size(), kVerticesPerRange, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) {
+          const glm::vec4 clip = view.clip_from_head * glm::vec4(mesh.position_m[i], 1.0f);
+          const float per_away = 1.0f / std::max(clip.w, view.near_m);
+          head.screen[i] = {view.target_px.x * (0.5f + 0.5f * clip.x * per_away),
+                            view.target_px.y * (0.5f - 0.5f * clip.y * per_away), clip.w, per_away};
+        }
+      });
   head.box.resize(mesh.triangle.size());
   for (size_t i = 0; i < mesh.triangle.size(); ++i) {
     const glm::uvec3& corner = mesh.triangle[i];

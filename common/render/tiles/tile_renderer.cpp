@@ -45,7 +45,7 @@ struct TileState {
             const TileOptions& options)
       : look(wanted),
         detail_facts(strandcast::detail_facts(facts)),
-        workers(options.threads),
+        workers(*options.workers),
         set(options.set),
         expansion(asset, facts.rest.mean_length_m),
         lattice(describe_lattice(asset, facts, options.light_cells)),
@@ -64,7 +64,7 @@ struct TileState {
 
   LookDesc look;
   DetailFacts detail_facts;
-  WorkerPool workers;
+  WorkerPool& workers;
   simd::InstructionSet set;
   StrandExpansion expansion;
   StrandPoints points;
@@ -160,16 +160,12 @@ Status draw_tiles(TileState& state, RenderTurn& turn) {
       &state.points,     &state.bins,      is_bare ? &no_head : &state.head,
       &state.shade,      {turn.size_px},   is_bare ? glm::vec3(0.0f) : state.look.background,
       state.srgb.data(), image.rgba.data()};
-  std::atomic<uint32_t> next{0};
-  const uint32_t tiles = input.grid.count();
   std::atomic<bool> is_given_up{false};
-  state.workers.run([&](uint32_t worker) {
-    for (uint32_t tile = next++; tile < tiles; tile = next++) {
-      if (worker == 0 && turn.terms.is_unwanted && turn.terms.is_unwanted()) is_given_up = true;
-      if (is_given_up) return;
-      draw_tile(state.set, {&input, &state.scratch[worker], tile});
-    }
-  });
+  state.workers.at(Priority::Drawing)
+      .for_ranges(input.grid.count(), 1, [&](size_t tile, size_t, uint32_t worker) {
+        if (worker == 0 && turn.terms.is_unwanted && turn.terms.is_unwanted()) is_given_up = true;
+        if (!is_given_up) draw_tile(state.set, {&input, &state.scratch[worker], static_cast<uint32_t>(tile)});
+      });
   if (is_given_up) turn.is_whole = false;
   if (debug_view == DebugView::Tiles) mark_tiles(state.bins.segments(), input.grid, image);
   return {};

@@ -4,8 +4,8 @@
 #pragma once
 
 #include <memory>
-#include <thread>
 
+#include "common/base/worker_pool.h"
 #include "common/render/light_lattice.h"
 #include "common/render/renderer.h"
 #include "common/simd/variants.h"
@@ -13,7 +13,7 @@
 namespace strandcast {
 
 struct TileOptions {
-  uint32_t threads = std::max(1u, std::thread::hardware_concurrency());
+  WorkerPool* workers = &shared_workers();
   simd::InstructionSet set = simd::widest_set();
   uint32_t light_cells = kLightCells;  // along the hair's largest side
   bool is_finest = false;  // all followers and segments of the look, whatever the size of the picture

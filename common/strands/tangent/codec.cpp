@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/side_by_side.h"
+#include "common/base/worker_pool.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/symbols.h"
@@ -48,14 +48,14 @@ struct Chain {
 
 /// work(first, count) for all slices, `at_once` of them at a time.
 template <class Work>
-void for_each_slice(const Layout& layout, uint32_t at_once, Work work) {
+void for_each_slice(const Layout& layout, const WorkerPool::Terms& terms, uint32_t at_once, Work work) {
   const uint32_t count = layout.slice_count();
-  for_each_part((count + at_once - 1) / at_once, threads_for(layout),
+  for_each_part(terms, (count + at_once - 1) / at_once,
                 [&](uint32_t group) { work(group * at_once, std::min(at_once, count - group * at_once)); });
 }
 template <class Work>
-void for_each_slice(const Layout& layout, Work work) {
-  for_each_slice(layout, 1, [&](uint32_t slice, uint32_t) { work(slice); });
+void for_each_slice(const Layout& layout, const WorkerPool::Terms& terms, Work work) {
+  for_each_slice(layout, terms, 1, [&](uint32_t slice, uint32_t) { work(slice); });
 }
 
 // What decodes to within the bound of this is still a valid lattice value.
@@ -91,6 +91,8 @@ void set_lattice(const Layout& layout, const Planes<int32_t>& planes, uint32_t s
 
 class Encoder final : public StrandEncoder {
  public:
+  explicit Encoder(WorkerPool& workers) : workers_(workers) {}
+
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
     has_chain_ = false;
@@ -149,7 +151,7 @@ class Encoder final : public StrandEncoder {
   Snapshot begin(const Snapshot& snapshot) {
     target_ = planes_of(layout_, snapshot, std::move(target_));
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
-    fit_motion(layout_, chain_.history, target_, frame_);
+    fit_motion(layout_, chain_.history, target_, workers_, frame_);
     writers_.resize(layout_.slice_count());
     Snapshot decoded{snapshot, {}};
     decoded.lattice = std::move(lattice_);
@@ -162,7 +164,7 @@ class Encoder final : public StrandEncoder {
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
     Slices slices(layout_.slice_count());
-    for_each_slice(layout_, [&](uint32_t slice) {
+    for_each_slice(layout_, encode_terms(layout_, workers_), [&](uint32_t slice) {
       quantise_slice(layout_, chain_.history, target_, slice, frame_);
       write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables[slice], writers_[slice]);
       writers_[slice].finish(slices[slice]);
@@ -178,11 +180,11 @@ class Encoder final : public StrandEncoder {
 
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
     Snapshot decoded = begin(snapshot);
-    frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_);
+    frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
     Slices slices(layout_.slice_count());
     Slices shape_slices(layout_.slice_count());
-    for_each_slice(layout_, [&](uint32_t slice) {
+    for_each_slice(layout_, encode_terms(layout_, workers_), [&](uint32_t slice) {
       quantise_anchor(layout_, chain_.history, target_, slice, frame_);
       if (followers == Followers::Some) {
         Tables tables = chain_.tables;
@@ -254,6 +256,7 @@ class Encoder final : public StrandEncoder {
     return make_encoded_frame(header, payload);
   }
 
+  WorkerPool& workers_;
   std::vector<glm::vec3> rest_in_head_m_;
   Layout layout_;
   Chain chain_;
@@ -271,7 +274,7 @@ class Encoder final : public StrandEncoder {
 
 class Decoder final : public StrandDecoder {
  public:
-  explicit Decoder(const StrandStreamLimits& limits) : limits_(limits) {}
+  Decoder(const StrandStreamLimits& limits, WorkerPool& workers) : limits_(limits), workers_(workers) {}
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
@@ -383,16 +386,17 @@ class Decoder final : public StrandDecoder {
                         rest.size());
     std::vector<Tables> learnt(layout_.slice_count(), tables);
     snapshot.lattice.resize(3 * snapshot.plane_size());
-    for_each_slice(layout_, kSlicesAtOnce, [&](uint32_t begin, uint32_t count) {
-      std::vector<SliceSymbols> symbols;
-      for (uint32_t slice = begin; slice < begin + count; ++slice)
-        symbols.push_back({slice, learnt[slice], readers[slice]});
-      read_symbols(layout_, sizes, codes, next_sizes_, symbols);
-      for (const SliceSymbols& done : symbols) {
-        place(done.slice);
-        set_lattice(layout_, frame_.lattice, done.slice, snapshot);
-      }
-    });
+    for_each_slice(layout_, decode_terms(layout_, workers_), kSlicesAtOnce,
+                   [&](uint32_t begin, uint32_t count) {
+                     std::vector<SliceSymbols> symbols;
+                     for (uint32_t slice = begin; slice < begin + count; ++slice)
+                       symbols.push_back({slice, learnt[slice], readers[slice]});
+                     read_symbols(layout_, sizes, codes, next_sizes_, symbols);
+                     for (const SliceSymbols& done : symbols) {
+                       place(done.slice);
+                       set_lattice(layout_, frame_.lattice, done.slice, snapshot);
+                     }
+                   });
     RETURN_IF_ERROR(check_spent(readers));
     tables = mean_tables(learnt);
     return {};
@@ -429,6 +433,7 @@ class Decoder final : public StrandDecoder {
   }
 
   StrandStreamLimits limits_;
+  WorkerPool& workers_;
   Layout layout_;
   Chain chain_;
   Frame frame_;
@@ -445,11 +450,11 @@ float lattice_step_m(float bound_m) {
   return std::nextafter(bound_m / static_cast<float>(kStepsPerBound), 0.0f);
 }
 
-std::unique_ptr<StrandEncoder> make_encoder() {
-  return std::make_unique<Encoder>();
+std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers) {
+  return std::make_unique<Encoder>(workers);
 }
-std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits) {
-  return std::make_unique<Decoder>(limits);
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers) {
+  return std::make_unique<Decoder>(limits, workers);
 }
 
 }  // namespace strandcast::tangent

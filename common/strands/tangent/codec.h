@@ -7,8 +7,8 @@
 
 namespace strandcast::tangent {
 
-std::unique_ptr<StrandEncoder> make_encoder();
-std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits);
+std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers);
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers);
 /// As lattice_step_m() of strand_codec.h.
 float lattice_step_m(float bound_m);
 

@@ -7,11 +7,6 @@
 #include "common/strands/wrapping.h"
 
 namespace strandcast::tangent {
-Threads threads_for(const Layout& layout) {
-  constexpr size_t kManyEnough = 40'000;  // vertices
-  return layout.plane_size() >= kManyEnough ? Threads::All : Threads::One;
-}
-
 uint32_t motion_class_count(const Layout& layout) {
   const size_t vertices = size_t{layout.strand_count} * layout.vertex_count;
   if (vertices < kManyVertices) return kFewMotionClasses;

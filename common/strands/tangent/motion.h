@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/side_by_side.h"
+#include "common/base/worker_pool.h"
 #include "common/strands/tangent/head.h"
 #include "common/strands/tangent/layout.h"
 
@@ -106,18 +106,31 @@ struct Frame {
   void apply_weights();
 };
 
-/// Smaller grooms are coded on the calling thread.
-Threads threads_for(const Layout& layout);
+/// Smaller grooms are coded on the calling thread: a part is to take some tenths of a millisecond.
+inline WorkerPool::Terms encode_terms(const Layout& layout, WorkerPool& workers) {
+  return workers.at(Priority::Encoding, layout.plane_size() >= kManyVertices ? kMaxWorkers : 1);
+}
+inline WorkerPool::Terms decode_terms(const Layout& layout, WorkerPool& workers) {
+  constexpr size_t kManyDecoded = 40'000;
+  return workers.at(Priority::Encoding, layout.plane_size() >= kManyDecoded ? kMaxWorkers : 1);
+}
+/// work(part) for all parts below `count`, each once, in any order.
+template <class Work>
+void for_each_part(const WorkerPool::Terms& terms, uint32_t count, const Work& work) {
+  terms.for_ranges(count, 1, [&](size_t part, size_t) { work(static_cast<uint32_t>(part)); });
+}
 
 /// How many classes of weights a frame of this groom has.
 uint32_t motion_class_count(const Layout& layout);
 
 /// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
 /// sample of strands.
-void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target, Frame& frame);
+void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                WorkerPool& workers, Frame& frame);
 
 /// Weights that suit the shape of `target` best.
-ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target);
+ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
+                       WorkerPool& workers);
 
 /// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
 /// decode to. Of an anchor it fills both kinds of integers.

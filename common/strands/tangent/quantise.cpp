@@ -262,10 +262,11 @@ uint8_t fit_length_blend(const Layout& layout, const History& history, const Pla
 
 }  // namespace
 
-void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target, Frame& frame) {
+void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target,
+                WorkerPool& workers, Frame& frame) {
   const std::vector<uint32_t> sample = sample_places(layout);
   frame.length_blend = fit_length_blend(layout, history, target, sample);
-  for_each_part(motion_class_count(layout), threads_for(layout), [&](uint32_t c) {
+  for_each_part(encode_terms(layout, workers), motion_class_count(layout), [&](uint32_t c) {
     LeastSquares<kMotionFeatureCount> fit;
     for (uint32_t v = 0; v < layout.vertex_count; ++v)
       if (motion_class(layout, v) == c) add_row({layout, history, target, frame, v}, sample, fit);

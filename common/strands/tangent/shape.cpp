@@ -144,13 +144,14 @@ void add_block(const ShapeRow& row, const Planes<int32_t>& target, size_t place,
 
 }  // namespace
 
-ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target) {
+ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
+                       WorkerPool& workers) {
   constexpr size_t kStep = 4 * kLaneCount;
   constexpr double kNoise = 150.0;  // steps: what edges are off by
   std::array<double, kShapeFeatureCount> noise;
   noise.fill(kNoise);
   ShapeWeights weights;
-  for_each_part(kShapeClassCount, threads_for(layout), [&](uint32_t c) {
+  for_each_part(encode_terms(layout, workers), kShapeClassCount, [&](uint32_t c) {
     LeastSquares<kShapeFeatureCount> fit;
     for (uint32_t v = 0; v < layout.vertex_count; ++v) {
       if (shape_class(v) != c) continue;

@@ -9,13 +9,13 @@
 #include <span>
 
 #include "common/base/hash.h"
-#include "common/base/side_by_side.h"
+#include "common/base/worker_pool.h"
 
 namespace strandcast {
 namespace {
 
 constexpr size_t kMaxKeptFits = 4;
-constexpr uint32_t kStrandsPerPart = 32;
+constexpr size_t kStrandsPerRange = 8;
 /// A chain of N equal segments with its mass in the vertices hangs more slowly than a smooth one: its
 /// frequency squared is at least 1 / (1 + this / N^2) of it (solved for N = 1 to 63). Without this a strand
 /// of few vertices would be stiffened for nothing.
@@ -242,21 +242,21 @@ std::shared_ptr<const StyleFit> fit_rod_style(const StrandLayout& layout, const 
                       carried};
   if (auto kept = fit_cache().find(key)) return kept;
   std::atomic<uint32_t> unheld{0};
-  const uint32_t part_count = (layout.strand_count + kStrandsPerPart - 1) / kStrandsPerPart;
-  for_each_part(part_count, part_count > 1 ? Threads::All : Threads::One, [&](uint32_t part) {
-    const uint32_t end = std::min((part + 1) * kStrandsPerPart, layout.strand_count);
-    for (uint32_t s = part * kStrandsPerPart; s < end && !stop.stop_requested(); ++s) {
-      const RodShape shape = make_rod_shape(layout, s, parameters, groom_gravity_in_head_mps2);
-      const double length = std::max(shape.free_length_m, shape.mean_segment_m);
-      const double edges = shape.vertex_count() - shape.first;
-      const double rate_squared =
-          parameters.style_margin * glm::length(carried) / length / (1.0 + kLumping / (edges * edges));
-      const int step = least_step(shape, parameters, rate_squared, first_step(shape, parameters));
-      const double factor = std::min(stiffening_of(step), kMaxStiffening);
-      fit->stiffening[s] = static_cast<float>(factor);
-      if (stiffening_of(step) > kMaxStiffening) ++unheld;
-    }
-  });
+  WorkerPool& workers = shared_workers();
+  workers.at(Priority::Background)
+      .for_ranges(layout.strand_count, kStrandsPerRange, [&](size_t begin, size_t end) {
+        for (auto s = static_cast<uint32_t>(begin); s < end && !stop.stop_requested(); ++s) {
+          const RodShape shape = make_rod_shape(layout, s, parameters, groom_gravity_in_head_mps2);
+          const double length = std::max(shape.free_length_m, shape.mean_segment_m);
+          const double edges = shape.vertex_count() - shape.first;
+          const double rate_squared =
+              parameters.style_margin * glm::length(carried) / length / (1.0 + kLumping / (edges * edges));
+          const int step = least_step(shape, parameters, rate_squared, first_step(shape, parameters));
+          const double factor = std::min(stiffening_of(step), kMaxStiffening);
+          fit->stiffening[s] = static_cast<float>(factor);
+          if (stiffening_of(step) > kMaxStiffening) ++unheld;
+        }
+      });
   if (stop.stop_requested()) return nullptr;
   fit->unheld_count = unheld;
   fit_cache().keep(key, fit);
