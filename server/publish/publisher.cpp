@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <utility>
 
 #include "common/base/check.h"
 
 namespace strandcast {
 namespace {
-
-// Comparisons with a NaN are false, so this also refuses what is not finite.
-bool is_usable_position(const glm::vec3& point) {
-  return std::abs(point.x) <= kMaxStrandReachM && std::abs(point.y) <= kMaxStrandReachM &&
-         std::abs(point.z) <= kMaxStrandReachM;
-}
 
 bool is_usable_velocity(const glm::vec3& velocity) {
   return std::isfinite(velocity.x) && std::isfinite(velocity.y) && std::isfinite(velocity.z);
@@ -23,25 +19,36 @@ constexpr int64_t kNotOverstretched = std::numeric_limits<int64_t>::min();
 // What float positions a metre from the head leave of a segment without length.
 constexpr double kSegmentRoundingM = 1e-5;
 
+// Vertices that a worker takes at a time: a tenth of a millisecond. Fewer are not worth waking one.
+constexpr uint32_t kVerticesPerRange = 32'768;
+// Snapshots whose memory is kept: one is being encoded, drawn or looked at while the next is made.
+constexpr size_t kKeptSnapshots = 4;
+
 float squared(double value) {
   return static_cast<float>(value * value);
 }
 
 }  // namespace
 
+/// Snapshots that nobody has any more.
+struct Publisher::SnapshotMemory {
+  std::mutex mutex;
+  std::vector<std::unique_ptr<Snapshot>> free;
+};
+
 double overstretch_limit(double stretch_bound) {
   return std::max(kLeastOverstretch, kOverstretchPerBound * stretch_bound);
 }
 
-Publisher::Publisher(const Groom& groom, float quantum_m)
+Publisher::Publisher(const Groom& groom, float quantum_m, const PublishMeans& means)
     : strand_count_(groom.strand_count()),
       vertex_count_(groom.uniform_vertex_count()),
-      quantum_m_(quantum_m) {
+      quantum_m_(quantum_m),
+      means_(means),
+      memory_(std::make_shared<SnapshotMemory>()) {
   CHECK(strand_count_ > 0 && vertex_count_ > 0);
-  const size_t plane_size = static_cast<size_t>(strand_count_) * vertex_count_;
-  rest_position_m_.resize(plane_size);
-  position_in_head_m_.resize(plane_size);
-  is_broken_.resize(strand_count_);
+  rest_position_m_.resize(static_cast<size_t>(strand_count_) * vertex_count_);
+  findings_.resize(block_count(strand_count_));
   quarantined_.reserve(strand_count_);
   for (uint32_t strand = 0; strand < strand_count_; ++strand)
     for (uint32_t vertex = 0; vertex < vertex_count_; ++vertex)
@@ -52,117 +59,189 @@ Publisher::Publisher(const Groom& groom, float quantum_m)
 void Publisher::watch_stretch(double stretch_bound) {
   const double limit = overstretch_limit(stretch_bound);
   const double runaway = std::max(kRunawayStretch, limit);
-  longest_squared_m2_.assign(rest_position_m_.size(), 0.0f);
-  runaway_squared_m2_.assign(rest_position_m_.size(), 0.0f);
-  stretch_grade_.assign(strand_count_, 0);
+  const size_t size = size_t{block_count(strand_count_)} * kBlockStrands * vertex_count_;
+  longest_squared_m2_.assign(size, 0.0f);
+  runaway_squared_m2_.assign(size, 0.0f);
   overstretched_since_ns_.assign(strand_count_, kNotOverstretched);
-  std::vector<double> total_m(strand_count_, 0.0);
-  const auto segment_m = [this](size_t i) {
-    return glm::distance(glm::dvec3(rest_position_m_[i]), glm::dvec3(rest_position_m_[i - strand_count_]));
-  };
-  for (size_t i = strand_count_; i < rest_position_m_.size(); ++i) total_m[i % strand_count_] += segment_m(i);
-  for (size_t i = strand_count_; i < rest_position_m_.size(); ++i) {
-    const double unit_m = std::max(segment_m(i), total_m[i % strand_count_] / (vertex_count_ - 1));
-    longest_squared_m2_[i] = squared(segment_m(i) + limit * unit_m + kSegmentRoundingM);
-    runaway_squared_m2_[i] = squared(segment_m(i) + runaway * unit_m + kSegmentRoundingM);
+  overstretched_now_ = 0;
+  // Beyond the last strand of the last block are copies of it.
+  for (uint32_t place = 0; place < block_count(strand_count_) * kBlockStrands; ++place) {
+    const uint32_t strand = std::min(place, strand_count_ - 1);
+    const auto segment_m = [&](uint32_t vertex) {
+      const size_t i = static_cast<size_t>(vertex) * strand_count_ + strand;
+      return glm::distance(glm::dvec3(rest_position_m_[i]), glm::dvec3(rest_position_m_[i - strand_count_]));
+    };
+    double total_m = 0.0;
+    for (uint32_t vertex = 1; vertex < vertex_count_; ++vertex) total_m += segment_m(vertex);
+    for (uint32_t vertex = 1; vertex < vertex_count_; ++vertex) {
+      const double unit_m = std::max(segment_m(vertex), total_m / (vertex_count_ - 1));
+      const size_t i = place_in_blocks(place, vertex);
+      longest_squared_m2_[i] = squared(segment_m(vertex) + limit * unit_m + kSegmentRoundingM);
+      runaway_squared_m2_[i] = squared(segment_m(vertex) + runaway * unit_m + kSegmentRoundingM);
+    }
   }
 }
 
+/// Of one number per vertex, in blocks.
+size_t Publisher::place_in_blocks(uint32_t strand_index, uint32_t vertex) const {
+  const uint32_t block = strand_index / kBlockStrands;
+  return (size_t{block} * vertex_count_ + vertex) * kBlockStrands + strand_index % kBlockStrands;
+}
+
 void Publisher::read(Solver& solver) {
-  solver.read(state_);
-  CHECK(state_.position_m.size() == rest_position_m_.size());
-  CHECK(state_.velocity_mps.size() == rest_position_m_.size());
+  blocks_ = solver.read_blocks();
+  for (const StrandBlocksView& blocks : {blocks_.position_m, blocks_.velocity_mps})
+    CHECK(blocks.strand_count == strand_count_ && blocks.row_count == vertex_count_);
 }
 
 std::shared_ptr<const Snapshot> Publisher::quantise(const PublishInput& input) {
+  CHECK(blocks_.position_m.values != nullptr && quantum_m_ > 0.0f);
+  world_from_head_rotation_ = glm::mat3_cast(input.world_from_head.rotation);
+  head_velocity_mps_ = glm::vec3(input.head_velocity_mps);
+  if (!is_usable_velocity(head_velocity_mps_)) head_velocity_mps_ = glm::vec3(0.0f);
+  std::unique_ptr<Snapshot> snapshot = take_snapshot();
+  snapshot->tick = input.tick;
+  snapshot->sim_time_ns = input.sim_time_ns;
+  snapshot->motion_time_ns = input.motion_time_ns;
+  snapshot->world_from_head = input.world_from_head;
+  snapshot->strand_count = strand_count_;
+  snapshot->vertex_count = vertex_count_;
+  snapshot->quantum_m = quantum_m_;
+  snapshot->lattice.resize(3 * rest_position_m_.size());
+
+  const glm::dmat3 head_from_world = glm::transpose(world_from_head_rotation_);
+  walk_blocks(head_from_world, *snapshot);
   find_broken_strands();
   if (!longest_squared_m2_.empty()) find_overstretched_strands(input.sim_time_ns);
-  for (const uint32_t strand : quarantined_) put_to_rest(strand, input);
+  for (const uint32_t strand : quarantined_) show_at_rest(strand, head_from_world, *snapshot);
+  return {snapshot.release(), [memory = memory_](Snapshot* done) { give_back(*memory, done); }};
+}
 
+std::unique_ptr<Snapshot> Publisher::take_snapshot() {
+  const std::lock_guard lock(memory_->mutex);
+  if (memory_->free.empty()) return std::make_unique<Snapshot>();
+  std::unique_ptr<Snapshot> snapshot = std::move(memory_->free.back());
+  memory_->free.pop_back();
+  return snapshot;
+}
+
+void Publisher::give_back(SnapshotMemory& memory, Snapshot* snapshot) {
+  std::unique_ptr<Snapshot> done(snapshot);
+  const std::lock_guard lock(memory.mutex);
+  if (memory.free.size() < kKeptSnapshots) memory.free.push_back(std::move(done));
+}
+
+/// Fills the lattice and findings_.
+void Publisher::walk_blocks(const glm::dmat3& head_from_world, Snapshot& snapshot) {
+  BlockQuantise work;
+  work.position_m = blocks_.position_m;
+  work.velocity_mps = blocks_.velocity_mps;
+  work.reach_m = kMaxStrandReachM;
+  work.longest_squared_m2 = longest_squared_m2_.empty() ? nullptr : longest_squared_m2_.data();
   // In double, so that the one rounding to float is all that is added to the announced bound.
-  const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(input.world_from_head.rotation));
-  for (size_t i = 0; i < position_in_head_m_.size(); ++i)
-    position_in_head_m_[i] = glm::vec3(head_from_world * glm::dvec3(state_.position_m[i]));
-
-  QuantiseInput quantise_input;
-  quantise_input.tick = input.tick;
-  quantise_input.sim_time_ns = input.sim_time_ns;
-  quantise_input.motion_time_ns = input.motion_time_ns;
-  quantise_input.world_from_head = input.world_from_head;
-  quantise_input.strand_count = strand_count_;
-  quantise_input.vertex_count = vertex_count_;
-  quantise_input.quantum_m = quantum_m_;
-  quantise_input.position_in_head_m = position_in_head_m_;
-  quantise_input.fallback_m = rest_position_m_;
-  return std::make_shared<const Snapshot>(strandcast::quantise(quantise_input).snapshot);
+  for (int column = 0; column < 3; ++column)
+    for (int axis = 0; axis < 3; ++axis) work.head_from_world[column][axis] = head_from_world[column][axis];
+  work.quantum_m = quantum_m_;
+  work.findings = findings_.data();
+  work.lattice = snapshot.lattice.data();
+  const size_t grain = std::max(1u, kVerticesPerRange / (kBlockStrands * vertex_count_));
+  means_.workers->at(Priority::Simulation).for_ranges(findings_.size(), grain, [&](size_t begin, size_t end) {
+    quantise_blocks(means_.set, {&work, static_cast<uint32_t>(begin), static_cast<uint32_t>(end)});
+  });
 }
 
 void Publisher::find_broken_strands() {
-  uint64_t bad_vertices = 0;
-  const size_t plane_size = rest_position_m_.size();
-  for (size_t i = 0; i < plane_size; ++i)
-    bad_vertices +=
-        is_usable_position(state_.position_m[i]) && is_usable_velocity(state_.velocity_mps[i]) ? 0 : 1;
   quarantined_.clear();
-  if (bad_vertices == 0) return;
-
-  std::fill(is_broken_.begin(), is_broken_.end(), uint8_t{0});
-  for (size_t i = 0; i < plane_size; ++i)
-    if (!is_usable_position(state_.position_m[i]) || !is_usable_velocity(state_.velocity_mps[i]))
-      is_broken_[i % strand_count_] = 1;
-  for (uint32_t strand = 0; strand < strand_count_; ++strand)
-    if (is_broken_[strand] != 0) quarantined_.push_back(strand);
-  bad_vertex_count_ += bad_vertices;
+  for (uint32_t block = 0; block < findings_.size(); ++block) {
+    if (!findings_[block].has_bad) continue;
+    const uint32_t first = block * kBlockStrands;
+    for (uint32_t strand = first; strand < std::min(first + kBlockStrands, strand_count_); ++strand) {
+      const auto bad_vertices = static_cast<uint64_t>(findings_[block].bad_vertices[strand - first]);
+      if (bad_vertices == 0) continue;
+      bad_vertex_count_ += bad_vertices;
+      quarantined_.push_back(strand);
+    }
+  }
   quarantine_count_ += quarantined_.size();
 }
 
 void Publisher::find_overstretched_strands(int64_t sim_time_ns) {
-  // 0 = within the limit, 1 = beyond it, 2 = run away. A broken strand's comparisons are false or say run
-  // away; it is on the list already.
-  std::fill(stretch_grade_.begin(), stretch_grade_.end(), uint8_t{0});
-  for (uint32_t vertex = 1; vertex < vertex_count_; ++vertex) {
-    const size_t row = static_cast<size_t>(vertex) * strand_count_;
-    for (uint32_t strand = 0; strand < strand_count_; ++strand) {
-      const glm::vec3 edge =
-          state_.position_m[row + strand] - state_.position_m[row + strand - strand_count_];
-      const float length_squared = glm::dot(edge, edge);
-      const int grade = (length_squared > longest_squared_m2_[row + strand] ? 1 : 0) +
-                        (length_squared > runaway_squared_m2_[row + strand] ? 1 : 0);
-      stretch_grade_[strand] = std::max(stretch_grade_[strand], static_cast<uint8_t>(grade));
-    }
-  }
   const size_t broken_count = quarantined_.size();
-  for (uint32_t strand = 0; strand < strand_count_; ++strand) {
-    int64_t& since_ns = overstretched_since_ns_[strand];
-    if (stretch_grade_[strand] == 0) {
-      since_ns = kNotOverstretched;
-      continue;
+  for (uint32_t block = 0; block < findings_.size(); ++block) {
+    if (!findings_[block].has_stretched && overstretched_now_ == 0) continue;
+    const uint32_t first = block * kBlockStrands;
+    for (uint32_t strand = first; strand < std::min(first + kBlockStrands, strand_count_); ++strand) {
+      int64_t& since_ns = overstretched_since_ns_[strand];
+      const auto set_since = [&](int64_t time_ns) {
+        overstretched_now_ -= since_ns != kNotOverstretched ? 1 : 0;
+        since_ns = time_ns;
+        overstretched_now_ += since_ns != kNotOverstretched ? 1 : 0;
+      };
+      const bool is_stretched = findings_[block].stretched_segments[strand - first] > 0 &&
+                                has_segment_beyond(longest_squared_m2_, strand);
+      if (!is_stretched) {
+        set_since(kNotOverstretched);
+        continue;
+      }
+      // A clock that was set back starts the wait again.
+      if (since_ns == kNotOverstretched || since_ns > sim_time_ns) set_since(sim_time_ns);
+      const bool is_lasting = sim_time_ns - since_ns >= kOverstretchPatienceNs;
+      if (!is_lasting && !has_segment_beyond(runaway_squared_m2_, strand)) continue;
+      set_since(kNotOverstretched);
+      if (!std::binary_search(quarantined_.begin(),
+                              quarantined_.begin() + static_cast<ptrdiff_t>(broken_count), strand))
+        quarantined_.push_back(strand);
     }
-    // A clock that was set back starts the wait again.
-    if (since_ns == kNotOverstretched || since_ns > sim_time_ns) since_ns = sim_time_ns;
-    const bool is_lasting = sim_time_ns - since_ns >= kOverstretchPatienceNs;
-    if (!is_lasting && stretch_grade_[strand] < 2) continue;
-    since_ns = kNotOverstretched;
-    if (!std::binary_search(quarantined_.begin(), quarantined_.begin() + static_cast<ptrdiff_t>(broken_count),
-                            strand))
-      quarantined_.push_back(strand);
   }
   overstretch_count_ += quarantined_.size() - broken_count;
   std::sort(quarantined_.begin(), quarantined_.end());
 }
 
-void Publisher::put_to_rest(uint32_t strand_index, const PublishInput& input) {
-  const glm::dmat3 world_from_head_rotation = glm::mat3_cast(input.world_from_head.rotation);
-  const glm::vec3 head_velocity_mps(input.head_velocity_mps);
-  for (uint32_t vertex = 0; vertex < vertex_count_; ++vertex) {
-    const size_t i = static_cast<size_t>(vertex) * strand_count_ + strand_index;
-    state_.position_m[i] = glm::vec3(world_from_head_rotation * glm::dvec3(rest_position_m_[i]));
-    state_.velocity_mps[i] = is_usable_velocity(head_velocity_mps) ? head_velocity_mps : glm::vec3(0.0f);
+bool Publisher::has_segment_beyond(std::span<const float> squared_m2, uint32_t strand_index) const {
+  const auto point_m = [&](uint32_t vertex) {
+    const float* const row =
+        blocks_.position_m.row(strand_index / kBlockStrands, vertex, 0) + strand_index % kBlockStrands;
+    return glm::vec3(row[0], row[kBlockStrands], row[2 * kBlockStrands]);
+  };
+  for (uint32_t vertex = 1; vertex < vertex_count_; ++vertex) {
+    const glm::vec3 edge_m = point_m(vertex) - point_m(vertex - 1);
+    if (glm::dot(edge_m, edge_m) > squared_m2[place_in_blocks(strand_index, vertex)]) return true;
   }
+  return false;
+}
+
+glm::vec3 Publisher::rest_in_world_m(size_t i) const {
+  return glm::vec3(world_from_head_rotation_ * glm::dvec3(rest_position_m_[i]));
+}
+
+/// As if the solver's copy had been at rest already.
+void Publisher::show_at_rest(uint32_t strand_index, const glm::dmat3& head_from_world,
+                             Snapshot& snapshot) const {
+  std::vector<glm::vec3> in_head_m;
+  std::vector<glm::vec3> fallback_m;
+  for (size_t i = strand_index; i < rest_position_m_.size(); i += strand_count_) {
+    in_head_m.emplace_back(head_from_world * glm::dvec3(rest_in_world_m(i)));
+    fallback_m.push_back(rest_position_m_[i]);
+  }
+  QuantiseInput one;
+  one.strand_count = 1;
+  one.vertex_count = vertex_count_;
+  one.quantum_m = quantum_m_;
+  one.position_in_head_m = in_head_m;
+  one.fallback_m = fallback_m;
+  const std::vector<int32_t> lattice = strandcast::quantise(one).snapshot.lattice;
+  for (size_t k = 0; k < lattice.size(); ++k) snapshot.lattice[k * strand_count_ + strand_index] = lattice[k];
 }
 
 void Publisher::repair(Solver& solver) {
-  solver.write(state_);
+  SolverState state;
+  solver.read(state);
+  for (const uint32_t strand : quarantined_)
+    for (size_t i = strand; i < rest_position_m_.size(); i += strand_count_) {
+      state.position_m[i] = rest_in_world_m(i);
+      state.velocity_mps[i] = head_velocity_mps_;
+    }
+  solver.write(state);
 }
 
 }  // namespace strandcast

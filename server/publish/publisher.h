@@ -1,7 +1,8 @@
 // Publisher: reads the solver's state back and makes a Snapshot of it (head space, quantised). A strand with
 // a vertex that is no usable number, or that stays stretched beyond what its model does, is quarantined: it
 // is published at rest, and repair() puts the solver's copy back to rest relative to the head. Its neighbours
-// keep every bit. Used on the simulation thread; holds no GL objects of its own.
+// keep every bit. One walk over the strands, a block at a time, shared with the workers where there are many.
+// Used on the simulation thread; holds no GL objects of its own.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +10,11 @@
 #include <span>
 #include <vector>
 
+#include "common/base/worker_pool.h"
 #include "common/groom/groom.h"
+#include "common/simd/variants.h"
 #include "common/strands/snapshot.h"
+#include "server/publish/block_quantise.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
@@ -40,20 +44,27 @@ struct PublishInput {
   glm::dvec3 head_velocity_mps{0.0};  // of the head joint, world: what a strand at rest moves with
 };
 
+/// What publishing runs on; changes no bit.
+struct PublishMeans {
+  WorkerPool* workers = &shared_workers();
+  simd::InstructionSet set = simd::widest_set();
+};
+
 class Publisher {
  public:
   /// `groom` is uniform; `quantum_m` is the step of the lattice to publish on (lattice_step_m() of the
   /// codec).
-  Publisher(const Groom& groom, float quantum_m);
+  Publisher(const Groom& groom, float quantum_m, const PublishMeans& means = {});
 
-  /// Both stages. Allocates nothing but the snapshot (after the first call).
+  /// Both stages. The memory of snapshots that nobody has any more is used again.
   std::shared_ptr<const Snapshot> publish(Solver& solver, const PublishInput& input) {
     read(solver);
     return quantise(input);
   }
   /// The state to the processor; waits for the device.
   void read(Solver& solver);
-  /// What was read, as it is published: quarantine, head space, the lattice.
+  /// What was read, as it is published: quarantine, head space, the lattice. The solver has not been called
+  /// since.
   std::shared_ptr<const Snapshot> quantise(const PublishInput& input);
 
   /// From now on strands that stretch beyond overstretch_limit() are quarantined as well. `stretch_bound` as
@@ -63,8 +74,8 @@ class Publisher {
   /// Strands that the last publish() found broken or over-stretched, ascending. Valid until the next
   /// publish().
   std::span<const uint32_t> quarantined() const { return quarantined_; }
-  /// Gives the solver the state of the last publish() with the quarantined strands at rest under that head
-  /// pose and the others untouched. Call before the next substep when quarantined() is not empty.
+  /// Puts the solver's quarantined strands to rest under the head pose of the last publish(), and leaves the
+  /// others untouched. Call before the next substep when quarantined() is not empty.
   void repair(Solver& solver);
 
   /// Vertices without a usable position or velocity, since start.
@@ -78,23 +89,35 @@ class Publisher {
   void set_quantum_m(float quantum_m) { quantum_m_ = quantum_m; }
 
  private:
+  struct SnapshotMemory;
+
+  std::unique_ptr<Snapshot> take_snapshot();
+  static void give_back(SnapshotMemory& memory, Snapshot* snapshot);
+  void walk_blocks(const glm::dmat3& head_from_world, Snapshot& snapshot);
   void find_broken_strands();
   void find_overstretched_strands(int64_t sim_time_ns);
-  void put_to_rest(uint32_t strand_index, const PublishInput& input);
+  bool has_segment_beyond(std::span<const float> squared_m2, uint32_t strand_index) const;
+  void show_at_rest(uint32_t strand_index, const glm::dmat3& head_from_world, Snapshot& snapshot) const;
+  glm::vec3 rest_in_world_m(size_t i) const;
+  size_t place_in_blocks(uint32_t strand_index, uint32_t vertex) const;
 
   uint32_t strand_count_ = 0;
   uint32_t vertex_count_ = 0;
   float quantum_m_ = 0.0f;
-  std::vector<glm::vec3> rest_position_m_;     // (vertex_count x strand_count) head space
-  std::vector<glm::vec3> position_in_head_m_;  // same shape
-  SolverState state_;
-  std::vector<uint8_t> is_broken_;  // (strand_count)
-  // (vertex_count x strand_count) squares of the longest that the segment before a vertex may be; empty =
+  PublishMeans means_;
+  std::vector<glm::vec3> rest_position_m_;  // (vertex_count x strand_count) head space
+  SolverBlocks blocks_;                     // the solver's own, from read() on
+  std::vector<BlockFindings> findings_;     // (blocks) of the last publish()
+  std::shared_ptr<SnapshotMemory> memory_;  // lasts as long as snapshots do
+  // (blocks x vertex_count x 16) squares of the longest that the segment before a vertex may be; empty =
   // stretch is not watched.
   std::vector<float> longest_squared_m2_;
   std::vector<float> runaway_squared_m2_;
-  std::vector<uint8_t> stretch_grade_;           // (strand_count) of the last publish()
   std::vector<int64_t> overstretched_since_ns_;  // (strand_count) kNotOverstretched = not
+  uint32_t overstretched_now_ = 0;               // strands that are
+  // Of the last publish().
+  glm::dmat3 world_from_head_rotation_{1.0};
+  glm::vec3 head_velocity_mps_{0.0f};
   std::vector<uint32_t> quarantined_;
   uint64_t bad_vertex_count_ = 0;
   uint64_t quarantine_count_ = 0;

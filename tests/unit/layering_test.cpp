@@ -52,7 +52,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"server/input", kWire},
       {"server/sim", with(kGl, kScene)},
       {"server/scene", with(with({"server/input", "server/sim"}, kGl), kScene)},
-      {"server/publish", with(with({"server/sim"}, kGl), kScene)},
+      {"server/publish", with(with({"server/sim", "common/simd"}, kGl), kScene)},
       {"server/encode", with({"server/publish"}, kRender)},
       {"server/net", with({"server/input", "common/net"}, kWire)},
       {"server/stream", with({"server/encode", "server/publish", "server/net"}, with(kRender, kWire))},

@@ -97,10 +97,11 @@ class RecordingSolver final : public Solver {
   void rebase(const glm::dquat& world_from_head_rotation) override {
     jumps.push_back(world_from_head_rotation);
   }
-  uint32_t strand_count() const override { return 0; }
+  uint32_t strand_count() const override { return strands_in_groom; }
   uint64_t memory_bytes() const override { return 0; }
 
   SolverState state;
+  uint32_t strands_in_groom = 0;
   std::vector<StepInput> steps;
   std::vector<glm::dquat> jumps;
   size_t stop_after = 0;
@@ -122,7 +123,9 @@ struct StageWorld {
         content(load_scene_content(scene).value()),
         builder(scene, content.colliders),
         publisher(content.groom, 1e-4f),
-        stages(stage_sizes(scene, make_scene_asset(content.groom, {})), explain(scene, {})) {}
+        stages(stage_sizes(scene, make_scene_asset(content.groom, {})), explain(scene, {})) {
+    solver.strands_in_groom = content.groom.strand_count();
+  }
   Status step(int step) {
     StageTurn turn(builder, solver, publisher);
     turn.input = turned(step);
