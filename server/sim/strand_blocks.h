@@ -45,6 +45,9 @@ class StrandBlocks {
   size_t size() const { return size_t{block_count(strand_count_)} * row_count_ * kBlockRowFloats; }  // floats
   float* data() { return values_.get(); }
   const float* data() const { return values_.get(); }
+  const float* row(uint32_t block, uint32_t vertex, uint32_t axis) const {
+    return view().row(block, vertex, axis);
+  }
   float* row(uint32_t block, uint32_t vertex, uint32_t axis) {
     return data() + (static_cast<size_t>(block) * row_count_ + vertex) * kBlockRowFloats +
            axis * kBlockStrands;

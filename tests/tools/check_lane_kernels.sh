@@ -19,7 +19,7 @@ try() {
       -P "$source_folder/shaders/lanes.cmake"
   done
   printf '%s\n' '#define STRANDCAST_LANE_COUNT 4' '#define HAS_PINNED_TAIL 0' '#define KERNEL_FILE "sim/bad.comp"' \
-    '#define KERNEL_NAME bad' '#define KERNEL_VARIANT ""' '#define KERNEL_SET 0' \
+    '#define KERNEL_NAME bad' '#define KERNEL_VARIANT ""' '#define KERNEL_SET 0' '#define KERNEL_PARTS 1' \
     '#include "server/sim/executor/lane_kernel_private.h"' >"$folder/bad.cpp"
   "$compiler" -std=c++20 -Wno-psabi -fsyntax-only -I"$folder/lanes" -I"$source_folder/shaders" -I"$source_folder" \
     "$folder/bad.cpp" 2>&1 || true

@@ -27,13 +27,14 @@ struct LaneRun {
   uint32_t block_begin = 0;
   uint32_t block_end = 0;
   void* memory = nullptr;    // LaneKernel::memory_bytes, 64-byte aligned, of this thread
-  float* scratch = nullptr;  // scratch rows x vertices x 4 x 16 floats, of this thread
+  float* scratch = nullptr;  // scratch rows x vertices x 4 x LaneKernel::strands floats, of this thread
 };
 
 struct LaneKernel {
   const char* shader_path;  // below shaders/
   const char* variant;      // "HAS_PINNED_TAIL=1 HAS_TWIST=0", in the order of their names
   int set;                  // simd::InstructionSet
+  uint32_t strands;         // that it works on side by side: rows of its scratch are as wide
   size_t memory_bytes;
   size_t step_bytes;  // of the StepBlock that it reads
   void (*run)(const LaneRun& run);

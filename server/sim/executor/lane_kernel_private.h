@@ -5,6 +5,7 @@
 //   KERNEL_NAME     identifier of the LaneKernel
 //   KERNEL_VARIANT  "HAS_PINNED_TAIL=0"; each also defined as a macro
 //   KERNEL_SET      number of the instruction set
+//   KERNEL_PARTS    registers that are worked on side by side: 1, or 2 (common/simd/lane_pairs.h)
 // Nothing here may come from the standard library's inline functions (lane_kernel.h).
 #pragma once
 
@@ -13,6 +14,7 @@
 #include <new>
 
 #include "common/simd/lane_matrices.h"
+#include "common/simd/lane_pairs.h"
 #include "server/sim/executor/lane_kernel.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
@@ -26,7 +28,11 @@
 namespace strandcast {
 namespace {
 
-using namespace simd;    // NOLINT: kernels are written in GLSL's names
+#if KERNEL_PARTS == 2
+using namespace simd::pairs;  // NOLINT: kernels are written in GLSL's names
+#else
+using namespace simd;  // NOLINT
+#endif
 using namespace shader;  // NOLINT
 using uint = uint32_t;
 using number = float;
@@ -47,46 +53,76 @@ enum class PlaneRole : uint32_t {
 };
 
 constexpr size_t kRowFloats = 64;  // of one vertex of a block: x y z w of 16 strands
+constexpr uint kStrands = KERNEL_PARTS * simd::kLanes;
 
-STRANDCAST_LANES vec4 load_vec4(const float* from, size_t stride) {
+/// Where a plane's rows of the strands at hand begin, for each register.
+struct Rows {
+  float* of[KERNEL_PARTS];
+};
+STRANDCAST_LANES Float load_row(const Rows& rows, size_t offset) {
+#if KERNEL_PARTS == 2
+  return {simd::load_lanes(rows.of[0] + offset), simd::load_lanes(rows.of[1] + offset)};
+#else
+  return simd::load_lanes(rows.of[0] + offset);
+#endif
+}
+STRANDCAST_LANES void store_row(Float value, const Rows& rows, size_t offset) {
+#if KERNEL_PARTS == 2
+  simd::store_lanes(value.a, rows.of[0] + offset);
+  simd::store_lanes(value.b, rows.of[1] + offset);
+#else
+  simd::store_lanes(value, rows.of[0] + offset);
+#endif
+}
+STRANDCAST_LANES vec4 load_vec4(const Rows& rows, size_t offset, size_t stride) {
   vec4 value;
-  value.x = load_lanes(from);
-  value.y = load_lanes(from + stride);
-  value.z = load_lanes(from + 2 * stride);
-  value.w = load_lanes(from + 3 * stride);
+  value.x = load_row(rows, offset);
+  value.y = load_row(rows, offset + stride);
+  value.z = load_row(rows, offset + 2 * stride);
+  value.w = load_row(rows, offset + 3 * stride);
   return value;
 }
-STRANDCAST_LANES void store_vec4(const vec4& value, float* to, size_t stride) {
-  store_lanes(value.x, to);
-  store_lanes(value.y, to + stride);
-  store_lanes(value.z, to + 2 * stride);
-  store_lanes(value.w, to + 3 * stride);
+STRANDCAST_LANES void store_vec4(const vec4& value, const Rows& rows, size_t offset, size_t stride) {
+  store_row(value.x, rows, offset);
+  store_row(value.y, rows, offset + stride);
+  store_row(value.z, rows, offset + 2 * stride);
+  store_row(value.w, rows, offset + 3 * stride);
 }
 
 /// A plane as kernels read it, and as they write it. Elements are rows of the block at hand.
 struct samplerBuffer {
-  float* const* at;
+  const Rows* rows;
 };
 STRANDCAST_LANES vec4 texelFetch(const samplerBuffer& plane, int element) {
-  return load_vec4(*plane.at + static_cast<size_t>(element) * kRowFloats, kRowFloats / 4);
+  return load_vec4(*plane.rows, static_cast<size_t>(element) * kRowFloats, kRowFloats / 4);
 }
 struct Sheet {
   struct Element {
-    float* to;
-    STRANDCAST_LANES void operator=(const vec4& value) const { store_vec4(value, to, kRowFloats / 4); }
+    const Rows* rows;
+    size_t offset;
+    STRANDCAST_LANES void operator=(const vec4& value) const {
+      store_vec4(value, *rows, offset, kRowFloats / 4);
+    }
   };
-  float* const* at;
-  STRANDCAST_LANES Element operator[](uint element) const { return {*at + size_t{element} * kRowFloats}; }
+  const Rows* rows;
+  STRANDCAST_LANES Element operator[](uint element) const { return {rows, size_t{element} * kRowFloats}; }
 };
 /// Memory that only the strands at hand see.
 struct Scratch {
   struct Element {
-    float* at;
-    STRANDCAST_LANES void operator=(const vec4& value) const { store_vec4(value, at, kLanes); }
-    STRANDCAST_LANES operator vec4() const { return load_vec4(at, kLanes); }
+    Rows rows;
+    STRANDCAST_LANES void operator=(const vec4& value) const { store_vec4(value, rows, 0, kStrands); }
+    STRANDCAST_LANES operator vec4() const { return load_vec4(rows, 0, kStrands); }
   };
   float* at;
-  STRANDCAST_LANES Element operator[](uint element) const { return {at + size_t{element} * 4 * kLanes}; }
+  STRANDCAST_LANES Element operator[](uint element) const {
+    float* begin = at + size_t{element} * 4 * kStrands;
+#if KERNEL_PARTS == 2
+    return {{{begin, begin + simd::kLanes}}};
+#else
+    return {{{begin}}};
+#endif
+  }
 };
 
 STRANDCAST_LANES uint max(uint a, uint b) {
@@ -124,7 +160,11 @@ STRANDCAST_LANES Bool operator&&(Bool a, bool b) {
 #undef float
 /// Of what is the same in all strands.
 STRANDCAST_LANES uint mix_u32(uint value) {
+#if KERNEL_PARTS == 2
+  return mix_u32(Uint(value)).a.v[0];
+#else
   return mix_u32(Uint(value)).v[0];
+#endif
 }
 
 /// What a kernel's class has besides its GLSL.
@@ -150,13 +190,13 @@ class KernelBase {
     const LaneConstant* found = find(name);
     return found == nullptr ? 0u : found->count;
   }
-  float* const* plane(PlaneRole role) const { return &plane_[static_cast<uint>(role)]; }
+  const Rows* plane(PlaneRole role) const { return &plane_[static_cast<uint>(role)]; }
   float* scratch_memory() const { return run_.scratch; }
   uint collider_count() const { return run_.collider_count; }
   uint gust_count() const { return run_.gust_count; }
 
   const LaneRun& run_;
-  float* plane_[8] = {};  // the strands at hand
+  Rows plane_[8] = {};  // of the strands at hand
   struct {
     uint x;
   } gl_GlobalInvocationID{0};
@@ -181,14 +221,20 @@ class Kernel : public KernelBase {
   }
 
   void run_blocks() {
-    for (uint block = run_.block_begin; block < run_.block_end; ++block) {
-      for (uint lane = 0; lane < 16; lane += kLanes) {
+    const uint begin = run_.block_begin * 16;
+    const uint end = run_.block_end * 16;
+    for (uint strand = begin; strand < end; strand += kStrands) {
+      for (uint part = 0; part < KERNEL_PARTS; ++part) {
+        // Behind the last block, once more what the register before has: the same values to the same places.
+        uint first = strand + part * simd::kLanes;
+        if (first >= end) first = strand;
         for (uint role = 0; role < 8; ++role)
-          plane_[role] = run_.planes[role] == nullptr
-                             ? nullptr
-                             : run_.planes[role] + run_.block_floats[role] * block + lane;
-        run_group();
+          plane_[role].of[part] =
+              run_.planes[role] == nullptr
+                  ? nullptr
+                  : run_.planes[role] + run_.block_floats[role] * (first / 16) + first % 16;
       }
+      run_group();
     }
   }
 };
@@ -202,6 +248,6 @@ void run_kernel(const LaneRun& run) {
 
 extern const LaneKernel KERNEL_NAME;
 const LaneKernel KERNEL_NAME = {
-    KERNEL_FILE, KERNEL_VARIANT, KERNEL_SET, sizeof(Kernel), sizeof(Kernel::StepBlock), run_kernel};
+    KERNEL_FILE, KERNEL_VARIANT, KERNEL_SET, kStrands, sizeof(Kernel), sizeof(Kernel::StepBlock), run_kernel};
 
 }  // namespace strandcast

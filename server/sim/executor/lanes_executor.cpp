@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
-#include <thread>
 
 #include "common/base/check.h"
 #include "common/gl/program.h"
@@ -16,29 +15,25 @@
 namespace strandcast {
 namespace {
 
-/// Vertices that a worker takes at once: 20 to 200 microseconds of work.
-constexpr uint32_t kVerticesPerShare = 16 * 16 * kBlockStrands;
+/// Vertices that a worker takes at once, 20 to 200 microseconds of work, and those that are worth one more
+/// worker: waking one costs more than it takes off below.
+constexpr uint32_t kVerticesPerShare = 4096;
+constexpr uint32_t kVerticesPerWorker = 32768;
 
-/// Zeroed memory of one thread, for kernels one after the other; grows to what the largest needs.
-class ThreadMemory {
+/// Zeroed memory of one worker.
+class WorkerMemory {
  public:
-  ~ThreadMemory() { release(); }
-  std::byte* at_least(size_t size_bytes) {
-    if (size_bytes > size_bytes_) {
-      release();
-      memory_ = static_cast<std::byte*>(::operator new (size_bytes, std::align_val_t{kBlockAlignment}));
-      std::memset(memory_, 0, size_bytes);
-      size_bytes_ = size_bytes;
-    }
-    return memory_;
+  explicit WorkerMemory(size_t size_bytes)
+      : bytes_(static_cast<std::byte*>(::operator new (size_bytes, std::align_val_t{kBlockAlignment}))) {
+    std::memset(bytes_.get(), 0, size_bytes);
   }
+  std::byte* data() const { return bytes_.get(); }
 
  private:
-  void release() {
-    if (memory_ != nullptr) ::operator delete (memory_, std::align_val_t{kBlockAlignment});
-  }
-  std::byte* memory_ = nullptr;
-  size_t size_bytes_ = 0;
+  struct Free {
+    void operator()(std::byte* bytes) const { ::operator delete (bytes, std::align_val_t{kBlockAlignment}); }
+  };
+  std::unique_ptr<std::byte, Free> bytes_;
 };
 
 class LanePlane final : public StrandPlane {
@@ -50,14 +45,14 @@ class LanePlane final : public StrandPlane {
 
   void write(std::span<const glm::vec4> values) override {
     CHECK(values.size() == value_count());
-    for_each([&](float* at, size_t index) {
+    for_each(blocks_, [&](float* at, size_t index) {
       for (int axis = 0; axis < 4; ++axis) at[axis * kBlockStrands] = values[index][axis];
     });
     pad();
   }
   void read(std::vector<glm::vec4>& values) const override {
     values.resize(value_count());
-    for_each([&](const float* at, size_t index) {
+    for_each(blocks_, [&](const float* at, size_t index) {
       for (int axis = 0; axis < 4; ++axis) values[index][axis] = at[axis * kBlockStrands];
     });
   }
@@ -71,17 +66,15 @@ class LanePlane final : public StrandPlane {
   size_t value_count() const { return size_t{blocks_.strand_count()} * blocks_.row_count(); }
 
   /// work(x of the value, its place outside of here) for all of them.
-  template <class Work>
-  void for_each(Work work) const {
-    const uint32_t strand_count = blocks_.strand_count();
+  template <class Blocks, class Work>
+  static void for_each(Blocks& blocks, Work work) {
+    const uint32_t strand_count = blocks.strand_count();
     for (uint32_t block = 0; block < block_count(strand_count); ++block) {
       const uint32_t first = block * kBlockStrands;
       const uint32_t count = std::min(kBlockStrands, strand_count - first);
-      for (uint32_t row = 0; row < blocks_.row_count(); ++row) {
-        float* at = const_cast<float*>(blocks_.view().row(block, row, 0));
+      for (uint32_t row = 0; row < blocks.row_count(); ++row)
         for (uint32_t lane = 0; lane < count; ++lane)
-          work(at + lane, size_t{row} * strand_count + first + lane);
-      }
+          work(blocks.row(block, row, 0) + lane, size_t{row} * strand_count + first + lane);
     }
   }
   /// Strands that are not there do what the last one does.
@@ -97,7 +90,7 @@ class LanePlane final : public StrandPlane {
       }
   }
 
-  mutable StrandBlocks blocks_;
+  StrandBlocks blocks_;
 };
 
 class LaneProgram final : public KernelProgram {
@@ -108,10 +101,15 @@ class LaneProgram final : public KernelProgram {
         has_colliders_(features.has_colliders),
         has_turbulence_(features.has_turbulence && desc.meets_air),
         names_(desc.constants),
-        scratch_floats_(size_t{desc.scratch_rows} * (layout.vertex_count + 2) * kBlockRowFloats),
+        kernel_bytes_((kernel.memory_bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment),
+        memory_bytes_(kernel_bytes_ +
+                      size_t{desc.scratch_rows} * layout.vertex_count * 4 * kernel.strands * sizeof(float)),
         block_count_(block_count(layout.strand_count)),
         blocks_per_share_(std::max(1u, kVerticesPerShare / (layout.vertex_count * kBlockStrands))),
+        most_workers_(
+            std::clamp(layout.strand_count * layout.vertex_count / kVerticesPerWorker, 1u, workers.size())),
         workers_(workers) {
+    for (uint32_t worker = 0; worker < most_workers_; ++worker) memory_.emplace_back(memory_bytes_);
     CHECK(kernel.step_bytes == sizeof(StepBlock));
     for (const auto& [name, value] : names_) {
       const auto* number = std::get_if<double>(&value);
@@ -143,23 +141,19 @@ class LaneProgram final : public KernelProgram {
     run.block_floats = block_floats.data();
     run.constants = constants_.data();
     run.constant_count = static_cast<uint32_t>(constants_.size());
-    workers_.for_ranges(block_count_, blocks_per_share_, [&](size_t begin, size_t end) {
-      static thread_local ThreadMemory memory;
-      const size_t kernel_bytes =
-          (kernel_.memory_bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
+    const auto run_share = [&](size_t begin, size_t end, uint32_t worker) {
       LaneRun share = run;
-      std::byte* at = memory.at_least(kernel_bytes + scratch_floats_ * sizeof(float));
-      share.memory = at;
-      share.scratch = reinterpret_cast<float*>(at + kernel_bytes);
+      std::byte* memory = memory_[worker].data();
+      share.memory = memory;
+      share.scratch = reinterpret_cast<float*>(memory + kernel_bytes_);
       share.block_begin = static_cast<uint32_t>(begin);
       share.block_end = static_cast<uint32_t>(end);
       kernel_.run(share);
-    });
+    };
+    workers_.at(Priority::Simulation, most_workers_).for_ranges(block_count_, blocks_per_share_, run_share);
   }
 
-  uint64_t size_bytes() const override {
-    return (kernel_.memory_bytes + scratch_floats_ * sizeof(float)) * workers_.size();
-  }
+  uint64_t size_bytes() const override { return memory_bytes_ * most_workers_; }
 
  private:
   /// Waves up to the last one with an amplitude.
@@ -174,10 +168,13 @@ class LaneProgram final : public KernelProgram {
   const bool has_turbulence_;
   const ModelConstants names_;
   std::vector<LaneConstant> constants_;  // names point into names_
-  const size_t scratch_floats_;
+  const size_t kernel_bytes_;            // of a worker: the kernel's, then its scratch
+  const size_t memory_bytes_;
   const uint32_t block_count_;
   const uint32_t blocks_per_share_;
+  const uint32_t most_workers_;
   WorkerPool& workers_;
+  std::vector<WorkerMemory> memory_;
 };
 
 /// Whether a kernel's variant, "HAS_PINNED_TAIL=0 HAS_TWIST=1", is what is wanted: 0 where nothing is said.
@@ -212,10 +209,7 @@ Status check_constants(const KernelDesc& desc) {
 class LanesExecutor final : public Executor {
  public:
   explicit LanesExecutor(const LaneOptions& options)
-      : own_workers_(options.workers == nullptr
-                         ? std::make_unique<WorkerPool>(std::max(1u, std::thread::hardware_concurrency()))
-                         : nullptr),
-        workers_(options.workers == nullptr ? *own_workers_ : *options.workers),
+      : workers_(options.workers == nullptr ? shared_workers() : *options.workers),
         set_(options.set),
         info_{SimDevice::Lanes,
               fmt::format("lanes ({}, {} thread{})", simd::to_string(options.set), workers_.size(),
@@ -246,7 +240,6 @@ class LanesExecutor final : public Executor {
   }
 
  private:
-  std::unique_ptr<WorkerPool> own_workers_;
   WorkerPool& workers_;
   const simd::InstructionSet set_;
   const ExecutorInfo info_;

@@ -14,7 +14,7 @@ namespace strandcast {
 
 struct LaneOptions {
   simd::InstructionSet set;
-  WorkerPool* workers = nullptr;  // outlives the executor; nullptr: all processors
+  WorkerPool* workers = nullptr;  // outlives the executor; nullptr: the process's
 };
 
 /// Sets that this processor has and kernels were compiled for, the widest last; empty where there is none.
