@@ -6,6 +6,7 @@
 #include <exception>
 #include <utility>
 
+#include "common/base/worker_pool.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -38,6 +39,7 @@ DrawView limited(DrawView view) {
 }  // namespace
 
 StrandDrawer::StrandDrawer(Config config) : config_(std::move(config)) {
+  shared_workers();  // no nicer than this thread, as the one that draws is
   thread_ = std::thread([this] { run(); });
 }
 

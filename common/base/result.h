@@ -89,8 +89,8 @@ using Status = Result<void>;
 #define STRANDCAST_CONCAT(a, b) STRANDCAST_CONCAT_(a, b)
 
 /// Returns the error of `expression` from the enclosing function, if it has one.
-#define RETURN_IF_ERROR(expression)                                             \
-  do {                                                                          \
+#define RETURN_IF_ERROR(expression)                                                               \
+  do {                                                                                            \
     if (auto return_if_error_ = (expression); !return_if_error_) return return_if_error_.error(); \
   } while (false)
 

@@ -5,12 +5,12 @@
 #include <system_error>
 
 #ifdef __linux__
-#include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 #endif
 
 #include "common/base/check.h"
+#include "common/base/thread_name.h"
 
 namespace strandcast {
 namespace {
@@ -24,7 +24,6 @@ constexpr uint32_t rank(Priority priority) {
 /// Of the calling thread. What the system refuses changes nothing but who waits for whom.
 void stand_back() {
 #ifdef __linux__
-  pthread_setname_np(pthread_self(), "worker");
   const auto thread = static_cast<id_t>(gettid());
   setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + kWorkerNiceness);
 #endif
@@ -34,6 +33,12 @@ void stand_back() {
 
 WorkerPool::WorkerPool(uint32_t threads) : size_(threads), urgency_(kNothingUrgent) {
   CHECK(threads >= 1 && threads <= kMaxWorkers);
+  threads_.reserve(size_ - 1);
+  try {
+    for (uint32_t thread = 1; thread < size_; ++thread) threads_.emplace_back([this] { serve(); });
+  } catch (const std::system_error&) {
+    // Fewer threads than wanted are slower and no fault.
+  }
 }
 
 WorkerPool::~WorkerPool() {
@@ -52,7 +57,6 @@ void WorkerPool::share(Call& call, uint32_t workers) {
   uint32_t woken = 0;
   {
     const std::lock_guard lock(mutex_);
-    start_threads();
     const auto after = std::find_if(calls_.begin(), calls_.end(),
                                     [&](const Call* other) { return other->priority > call.priority; });
     calls_.insert(after, &call);
@@ -79,6 +83,7 @@ bool WorkerPool::take_ranges(Call& call, uint32_t worker, Patience patience) {
 }
 
 void WorkerPool::serve() {
+  name_thread("worker");
   stand_back();
   std::unique_lock lock(mutex_);
   while (!is_stopping_) {
@@ -102,17 +107,6 @@ void WorkerPool::serve() {
     tell_most_urgent();
     // Still locked: the caller cannot go on, and take the call with it, before this is over.
     if (call->helpers == 0) call->is_left.notify_one();
-  }
-}
-
-/// Locked. Fewer threads than wanted are slower and no fault.
-void WorkerPool::start_threads() {
-  if (is_started_) return;
-  is_started_ = true;
-  threads_.reserve(size_ - 1);
-  try {
-    for (uint32_t thread = 1; thread < size_; ++thread) threads_.emplace_back([this] { serve(); });
-  } catch (const std::system_error&) {
   }
 }
 

@@ -26,8 +26,8 @@ inline constexpr int kWorkerNiceness = 2;
 
 class WorkerPool {
  public:
-  /// The caller of for_ranges() is one of `threads`, 1 to kMaxWorkers; the others are started by the first
-  /// call that has work to share, and sleep while there is none.
+  /// The caller of for_ranges() is one of `threads`, 1 to kMaxWorkers. The others begin here, a little nicer
+  /// than the thread that makes the pool, and sleep while there is nothing to do.
   explicit WorkerPool(uint32_t threads);
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
@@ -63,7 +63,6 @@ class WorkerPool {
   void share(Call& call, uint32_t workers);
   bool take_ranges(Call& call, uint32_t worker, Patience patience);
   void serve();
-  void start_threads();
   Call* most_urgent() const;
   void remove(Call& call);
   void tell_most_urgent();
@@ -75,8 +74,7 @@ class WorkerPool {
   std::atomic<uint32_t> urgency_;  // of the most urgent call that has room for one more
   uint32_t idle_ = 0;
   bool is_stopping_ = false;
-  bool is_started_ = false;
-  std::vector<std::thread> threads_;
+  std::vector<std::thread> threads_;  // last: they start when everything else is there
 };
 
 class WorkerPool::Terms {
@@ -123,7 +121,8 @@ void WorkerPool::for_ranges(size_t count, size_t grain, const Work& work) {
   at(Priority::Simulation).for_ranges(count, grain, work);
 }
 
-/// The pool of the process: as many threads as there are processors, at most kMaxWorkers.
+/// The pool of the process: as many threads as there are processors, at most kMaxWorkers, made by the first
+/// call. That is for a thread as nice as the program; a nicer one's workers could never be made less so.
 WorkerPool& shared_workers();
 
 }  // namespace strandcast

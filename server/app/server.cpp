@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/thread_name.h"
 #include "common/base/version.h"
+#include "common/base/worker_pool.h"
 #include "common/log/log.h"
 #include "common/strands/scene_asset.h"
 #include "server/app/codec_choice.h"
@@ -89,6 +91,7 @@ class Server::State {
 };
 
 Status Server::State::start() {
+  shared_workers();  // no nicer than this thread, as the one that draws is
   SceneDesc& scene = config_.scene;
   // A wrong codec is told before anything is loaded.
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
@@ -162,6 +165,7 @@ void Server::State::wait() {
 }
 
 void Server::State::run_status() {
+  name_thread("status");
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kStatusInterval, [this] { return has_stopped_; })) {
     lock.unlock();

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "common/base/thread_name.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -138,6 +139,7 @@ gl::PassReports FrameWorker::passes() const {
 }
 
 void FrameWorker::run() {
+  name_thread("frames");
   // Drawing in software takes every core it gets; the simulation goes first. On Linux this is the thread's
   // own value, and the driver's threads inherit it.
   setpriority(PRIO_PROCESS, 0, kFrameThreadNice);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "common/strands/strand_prefix.h"
 
@@ -138,6 +139,7 @@ SnapshotSlot::View StrandEncodeWorker::wait_for_work() const {
 }
 
 void StrandEncodeWorker::run() {
+  name_thread("encode");
   while (true) {
     const SnapshotSlot::View view = wait_for_work();
     if (view.is_stopped || is_stopping_) return;

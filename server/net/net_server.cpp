@@ -11,6 +11,7 @@
 
 #include "common/base/check.h"
 #include "common/base/profile.h"
+#include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "server/net/access.h"
 #include "server/net/connection_private.h"
@@ -160,6 +161,7 @@ void NetServer::State::end_if_done(int64_t time_ns) {
 }
 
 void NetServer::State::run() {
+  name_thread("network");
   while (!context.io.stopped()) {
     try {
       context.io.run();

@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/base/text.h"
+#include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/scene_change.h"
@@ -39,6 +40,7 @@ Result<std::unique_ptr<SimLoop>> SimLoop::start(SimLoopConfig config, InputHub& 
   std::unique_ptr<SimLoop> loop(new SimLoop(std::move(config), hub, sink));
   auto ready = std::make_shared<std::promise<Status>>();
   loop->thread_ = std::thread([self = loop.get(), ready] {
+    name_thread("simulation");
     self->run([ready](Status status) { ready->set_value(std::move(status)); });
   });
   const Status status = ready->get_future().get();
