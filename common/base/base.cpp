@@ -48,8 +48,7 @@ uint64_t hash_bytes(std::span<const std::byte> bytes, uint64_t seed) {
   for (; offset + 8 <= bytes.size(); offset += 8) {
     uint64_t word;
     std::memcpy(&word, bytes.data() + offset, 8);
-    hash = (hash ^ word) * kPrime;
-    hash ^= hash >> 32;  // FNV over words alone leaves the low bits of high bytes unmixed
+    hash = hash_word(word, hash);
   }
   for (; offset < bytes.size(); ++offset) hash = (hash ^ static_cast<uint64_t>(bytes[offset])) * kPrime;
   return hash;

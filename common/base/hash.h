@@ -12,6 +12,12 @@ namespace strandcast {
 /// security.
 uint64_t hash_bytes(std::span<const std::byte> bytes, uint64_t seed = 0xcbf29ce484222325ull);
 
+/// What hash_bytes does with one word.
+constexpr uint64_t hash_word(uint64_t word, uint64_t hash) {
+  hash = (hash ^ word) * 0x100000001b3ull;
+  return hash ^ (hash >> 32);  // FNV over words alone leaves the low bits of high bytes unmixed
+}
+
 /// Well-mixed 32-bit hash of one integer (the lowbias32 finaliser by Chris Wellons, public domain).
 constexpr uint32_t mix_u32(uint32_t x) {
   x ^= x >> 16;

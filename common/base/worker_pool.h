@@ -102,6 +102,8 @@ class WorkerPool::Terms {
     else
       pool_.take_ranges(call, 0, Patience::ToTheEnd);
   }
+  /// Threads that take part at most.
+  uint32_t workers() const { return std::min(pool_.size(), most_workers_); }
 
  private:
   friend class WorkerPool;

@@ -41,6 +41,7 @@ inline namespace STRANDCAST_LANE_NAMESPACE {
 inline constexpr uint32_t kLanes = STRANDCAST_LANE_COUNT;
 
 #define STRANDCAST_LANES inline __attribute__((always_inline))
+#define STRANDCAST_LANES_LAMBDA __attribute__((always_inline))  // behind a lambda's parameters
 
 using FloatBits = float __attribute__((vector_size(4 * kLanes)));
 using IntBits = int32_t __attribute__((vector_size(4 * kLanes)));

@@ -1,7 +1,7 @@
 // One kernel for several instruction sets, chosen at run time. STRANDCAST_KERNEL(name, Arguments) behind an
 // always-inline function `name_lanes(const Arguments&)` makes `name(InstructionSet, const Arguments&)`. All
-// of them give the same bits (common/simd/lanes.h). No lambdas in kernels: they would not be compiled for the
-// set.
+// of them give the same bits (common/simd/lanes.h). Lambdas in kernels need STRANDCAST_LANES_LAMBDA: others
+// would not be compiled for the set.
 #pragma once
 
 #include <span>

@@ -110,7 +110,7 @@ class DeltaEncoder : public StrandEncoder {
     std::vector<int32_t> residual = find_residual(chain_, weights, velocity);
 
     std::vector<std::byte> payload;
-    append_fixed_part(snapshot, kDeltaCodecNumber, payload);
+    append_fixed_part(snapshot, state_hash(snapshot), kDeltaCodecNumber, payload);
     ByteWriter(payload).put_bytes(std::as_bytes(std::span(&weights, 1)));
     planes_.append(residual, kDeltaLevel, payload);
 
@@ -126,7 +126,7 @@ class DeltaEncoder : public StrandEncoder {
       shape[i] = wrapping_difference(chain_.lattice[i], guess);
     });
     std::vector<std::byte> payload;
-    append_fixed_part(snapshot, kDeltaCodecNumber, payload);
+    append_fixed_part(snapshot, state_hash(snapshot), kDeltaCodecNumber, payload);
     planes_.append(neighbour_distances(chain_.neighbour), kKeyframeLevel, payload);
     planes_.append(neighbour_distances(chain_.second_neighbour), kKeyframeLevel, payload);
     planes_.append(shape, kKeyframeLevel, payload);

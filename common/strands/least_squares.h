@@ -6,6 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+
+#include "common/simd/raw_lanes.h"
 
 namespace strandcast {
 
@@ -42,50 +45,122 @@ std::array<int16_t, kCount> solve_weights(const Gram<kCount>& gram, double floor
   return weights;
 }
 
-/// Collects samples (features, wanted value, by how much it counts). Sums of a batch are floats, those of all
-/// batches doubles.
+/// Collects samples (features, wanted value, by how much it counts). Sums of a batch are floats in eight
+/// lanes, those of all batches doubles, in an order that is the same for every instruction set. In a kernel
+/// of common/simd it is compiled for the kernel's set.
 template <uint32_t kCount>
 class LeastSquares {
  public:
-  void add(const std::array<float, kCount>& value, float wanted, float trust) {
-    for (uint32_t k = 0; k < kCount; ++k) lanes_[k][filled_] = trust * value[k];
-    lanes_[kCount][filled_] = trust * wanted;
-    trust_ += static_cast<double>(trust * trust);
-    if (++filled_ == kLanes) flush();
+  static constexpr uint32_t kTerms = kCount + 1;
+  /// Terms (features and, last, the wanted value) of eight samples, each times how much the samples count.
+  using Eight = simd::FloatBits[kTerms];
+
+  STRANDCAST_LANES void add(const std::array<float, kCount>& value, float wanted, float trust) {
+    auto& eight = batch_[filled_ / simd::kLanes];
+    const uint32_t lane = filled_ % simd::kLanes;
+    for (uint32_t k = 0; k < kCount; ++k) eight[k][lane] = trust * value[k];
+    eight[kCount][lane] = trust * wanted;
+    count(trust);
+    if (++filled_ == kBatch) flush();
   }
 
+  /// For samples eight by eight, when only whole eights were added since the last flush(): the next room + 0
+  /// .. kSpare - 1 of them, to be filled; add_eights() adds the first `count`.
+  static constexpr uint32_t kSpare = 3;
+  STRANDCAST_LANES simd::FloatBits* room(uint32_t i) { return batch_[filled_ / simd::kLanes + i]; }
+  STRANDCAST_LANES void add_eights(uint32_t count) {
+    filled_ += count * simd::kLanes;
+    if (filled_ < kBatch) return;
+    const uint32_t rest = filled_ - kBatch;
+    filled_ = kBatch;
+    flush();
+    std::memcpy(batch_[0], batch_[kEights], rest / simd::kLanes * sizeof batch_[0]);
+    filled_ = rest;
+  }
+  /// Of one sample, in their order.
+  STRANDCAST_LANES void count(float trust) { trust_ += static_cast<double>(trust * trust); }
+
   /// Ends a batch; needed before weights().
-  void flush() {
+  STRANDCAST_LANES void flush() {
     if (filled_ == 0) return;
-    for (auto& term : lanes_) std::fill(term.begin() + filled_, term.end(), 0.0f);
+    for (; filled_ % simd::kLanes != 0; ++filled_)
+      for (uint32_t k = 0; k < kTerms; ++k) batch_[filled_ / simd::kLanes][k][filled_ % simd::kLanes] = 0.0f;
+    for (; filled_ < kBatch; filled_ += simd::kLanes)
+      for (uint32_t k = 0; k < kTerms; ++k) batch_[filled_ / simd::kLanes][k] = simd::FloatBits{};
     filled_ = 0;
-    for (uint32_t a = 0; a <= kCount; ++a) {
-      for (uint32_t b = 0; b <= a; ++b) {
-        std::array<float, 8> sum{};
-        for (uint32_t i = 0; i < kLanes; i += 8)
-          for (uint32_t lane = 0; lane < 8; ++lane) sum[lane] += lanes_[a][i + lane] * lanes_[b][i + lane];
-        for (uint32_t half = 4; half > 0; half /= 2)
-          for (uint32_t lane = 0; lane < half; ++lane) sum[lane] += sum[lane + half];
-        gram_[b][a] += static_cast<double>(sum[0]);
-      }
-    }
+    for (uint32_t a = 0; a < kTerms; a += kTile)
+      for (uint32_t b = 0; b < std::min(a + kTile, kTerms); b += 2) add_products(a, b);
   }
 
   /// In units of `unit`. Features will be off by `noise` when they are used: what moves less predicts
   /// nothing.
   std::array<int16_t, kCount> weights(double unit, const std::array<double, kCount>& noise) const {
     constexpr double kLeast = 1e-9;
-    Gram<kCount> blurred = gram_;
+    Gram<kCount> blurred;
+    for (uint32_t a = 0; a < kTerms; ++a) std::copy_n(gram_[a].begin(), kTerms, blurred[a].begin());
     for (uint32_t k = 0; k < kCount; ++k) blurred[k][k] += noise[k] * noise[k] * trust_;
     return solve_weights<kCount>(blurred, kLeast, unit);
   }
 
  private:
-  static constexpr uint32_t kLanes = 128;
-  std::array<std::array<float, kLanes>, kCount + 1> lanes_{};
+  static constexpr uint32_t kBatch = 128;
+  static constexpr uint32_t kEights = kBatch / simd::kLanes;
+  static constexpr uint32_t kTile = 4;
+  static constexpr uint32_t kPadded = (kTerms + kTile - 1) / kTile * kTile;
+
+  using Pair = float __attribute__((vector_size(2 * sizeof(simd::FloatBits))));
+  using Four = float __attribute__((vector_size(16)));
+  using Doubles = double __attribute__((vector_size(32)));
+
+  /// Four times four lanes; their sums, (0 + 2) + (1 + 3).
+  STRANDCAST_LANES static Four sums(const Four (&x)[kTile]) {
+    const Four low =
+        __builtin_shufflevector(x[0], x[1], 0, 1, 4, 5) + __builtin_shufflevector(x[0], x[1], 2, 3, 6, 7);
+    const Four high =
+        __builtin_shufflevector(x[2], x[3], 0, 1, 4, 5) + __builtin_shufflevector(x[2], x[3], 2, 3, 6, 7);
+    return __builtin_shufflevector(low, high, 0, 2, 4, 6) + __builtin_shufflevector(low, high, 1, 3, 5, 7);
+  }
+
+  STRANDCAST_LANES Pair pair(uint32_t i, uint32_t k) const {
+    Pair both;
+    std::memcpy(&both, &batch_[i][k], sizeof both);
+    return both;
+  }
+
+  /// Products of four terms from a on with two from b on: as many as fit into registers. Pairs of terms, in
+  /// one register where it is wide enough, times pairs as they are and swapped.
+  STRANDCAST_LANES void add_products(uint32_t a, uint32_t b) {
+    Pair straight[2] = {};
+    Pair crossed[2] = {};
+    for (uint32_t i = 0; i < kEights; ++i) {
+      const Pair two = pair(i, b);
+      const Pair swapped =
+          __builtin_shufflevector(two, two, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7);
+      for (uint32_t k = 0; k < 2; ++k) {
+        const Pair other = pair(i, a + 2 * k);
+        straight[k] += other * two;
+        crossed[k] += other * swapped;
+      }
+    }
+    for (uint32_t which = 0; which < 2; ++which) {
+      Four halved[kTile];
+      for (uint32_t k = 0; k < kTile; ++k) {
+        Four part[4];  // two for each term of a pair
+        std::memcpy(part, (k % 2 == which ? straight : crossed) + k / 2, sizeof part);
+        halved[k] = part[2 * (k % 2)] + part[2 * (k % 2) + 1];
+      }
+      Doubles total;
+      double* const to = gram_[b + which].data() + a;
+      std::memcpy(&total, to, sizeof total);
+      total += __builtin_convertvector(sums(halved), Doubles);
+      std::memcpy(to, &total, sizeof total);
+    }
+  }
+
+  simd::FloatBits batch_[kEights + kSpare][kPadded] = {};
   uint32_t filled_ = 0;
   double trust_ = 0.0;  // sum of squares
-  Gram<kCount> gram_{};
+  std::array<std::array<double, kPadded>, kPadded> gram_{};
 };
 
 }  // namespace strandcast

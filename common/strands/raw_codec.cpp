@@ -13,7 +13,7 @@ class RawEncoder : public StrandEncoder {
     CHECK(snapshot.lattice.size() == 3 * snapshot.plane_size());
     std::vector<std::byte> payload;
     payload.reserve(kStrandFixedBytes + snapshot.lattice.size() * sizeof(int32_t));
-    append_fixed_part(snapshot, kRawCodecNumber, payload);
+    append_fixed_part(snapshot, state_hash(snapshot), kRawCodecNumber, payload);
     ByteWriter(payload).put_bytes(std::as_bytes(std::span(snapshot.lattice)));
     FrameHeader header;
     header.opcode = Opcode::StrandKeyframe;

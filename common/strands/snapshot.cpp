@@ -74,17 +74,20 @@ std::vector<glm::vec3> positions_in_head(const Snapshot& snapshot) {
   return positions;
 }
 
-uint64_t state_hash(const Snapshot& snapshot) {
-  const Pose& pose = snapshot.world_from_head;
+uint64_t info_hash(const SnapshotInfo& info) {
+  const Pose& pose = info.world_from_head;
   const double pose_numbers[7] = {pose.position_m.x, pose.position_m.y, pose.position_m.z, pose.rotation.w,
                                   pose.rotation.x,   pose.rotation.y,   pose.rotation.z};
-  uint64_t hash = hash_value(snapshot.tick, hash_bytes({}));
-  hash = hash_value(snapshot.sim_time_ns, hash);
+  uint64_t hash = hash_value(info.tick, hash_bytes({}));
+  hash = hash_value(info.sim_time_ns, hash);
   hash = hash_value(pose_numbers, hash);
-  hash = hash_value(snapshot.strand_count, hash);
-  hash = hash_value(snapshot.vertex_count, hash);
-  hash = hash_value(snapshot.quantum_m, hash);
-  return hash_bytes(std::as_bytes(std::span(snapshot.lattice)), hash);
+  hash = hash_value(info.strand_count, hash);
+  hash = hash_value(info.vertex_count, hash);
+  return hash_value(info.quantum_m, hash);
+}
+
+uint64_t state_hash(const Snapshot& snapshot) {
+  return hash_bytes(std::as_bytes(std::span(snapshot.lattice)), info_hash(snapshot));
 }
 
 }  // namespace strandcast

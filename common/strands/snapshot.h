@@ -61,6 +61,10 @@ Quantised quantise(const QuantiseInput& input);
 /// Head-space positions in metres, (vertex_count x strand_count x vec3), vertex-major, strand fastest.
 std::vector<glm::vec3> positions_in_head(const Snapshot& snapshot);
 
+/// Hash of everything in a snapshot but motion_time_ns and the positions: what that of the positions goes on
+/// from.
+uint64_t info_hash(const SnapshotInfo& info);
+
 /// Hash of everything in a snapshot but motion_time_ns; equal on server and client for the same tick.
 uint64_t state_hash(const Snapshot& snapshot);
 

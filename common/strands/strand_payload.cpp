@@ -24,7 +24,8 @@ Status check_pose(const StrandFixedPart& fixed) {
 
 }  // namespace
 
-void append_fixed_part(const Snapshot& snapshot, uint8_t codec_number, std::vector<std::byte>& payload) {
+void append_fixed_part(const SnapshotInfo& snapshot, uint64_t state_hash, uint8_t codec_number,
+                       std::vector<std::byte>& payload) {
   const size_t begin = payload.size();
   const Pose& pose = snapshot.world_from_head;
   ByteWriter writer(payload);
@@ -40,7 +41,7 @@ void append_fixed_part(const Snapshot& snapshot, uint8_t codec_number, std::vect
   writer.put(pose.rotation.x);
   writer.put(pose.rotation.y);
   writer.put(pose.rotation.z);
-  writer.put(state_hash(snapshot));
+  writer.put(state_hash);
   CHECK(payload.size() - begin == kStrandFixedBytes);
 }
 
@@ -108,12 +109,16 @@ Snapshot make_snapshot(const StrandMessage& message) {
 Status check_decoded(const Snapshot& snapshot, const StrandMessage& message) {
   bool is_inside = true;
   for (const int32_t value : snapshot.lattice) is_inside &= value > -kMaxLattice && value < kMaxLattice;
-  if (!is_inside)
-    return make_error(ErrorCode::BadInput, "tick {} holds a lattice value outside +-{}", snapshot.tick,
+  return check_decoded(is_inside, is_inside ? state_hash(snapshot) : 0, message);
+}
+
+Status check_decoded(bool is_in_range, uint64_t state_hash, const StrandMessage& message) {
+  if (!is_in_range)
+    return make_error(ErrorCode::BadInput, "tick {} holds a lattice value outside +-{}", message.fixed.tick,
                       kMaxLattice - 1);
-  if (const uint64_t hash = state_hash(snapshot); hash != message.fixed.state_hash)
+  if (state_hash != message.fixed.state_hash)
     return make_error(ErrorCode::BadInput, "tick {} decodes to state {:016x}, the server announced {:016x}",
-                      snapshot.tick, hash, message.fixed.state_hash);
+                      message.fixed.tick, state_hash, message.fixed.state_hash);
   return {};
 }
 

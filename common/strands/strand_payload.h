@@ -31,8 +31,9 @@ struct StrandMessage {
   std::span<const std::byte> body;  // codec data, points into the message
 };
 
-/// Appends the fixed part of `snapshot` for the codec with this wire number.
-void append_fixed_part(const Snapshot& snapshot, uint8_t codec_number, std::vector<std::byte>& payload);
+/// Appends the fixed part of a snapshot with this hash for the codec with this wire number.
+void append_fixed_part(const SnapshotInfo& snapshot, uint64_t state_hash, uint8_t codec_number,
+                       std::vector<std::byte>& payload);
 
 /// Checks header, codec, counts and finite numbers of an untrusted strand message.
 Result<StrandMessage> read_strand_message(std::span<const std::byte> message, uint8_t codec_number,
@@ -43,6 +44,8 @@ Snapshot make_snapshot(const StrandMessage& message);
 
 /// BadInput unless every lattice value is in range and the state hash is the announced one.
 Status check_decoded(const Snapshot& snapshot, const StrandMessage& message);
+/// The same of what is known of the lattice.
+Status check_decoded(bool is_in_range, uint64_t state_hash, const StrandMessage& message);
 
 /// Unavailable unless `message` is a keyframe or follows `last_sequence` (0 = nothing decoded yet).
 Status check_chain(const FrameHeader& header, uint32_t last_sequence);

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include "common/base/check.h"
+#include "common/simd/raw_lanes.h"
 #include "common/strands/least_squares.h"
 #include "common/strands/morton.h"
 #include "common/strands/strand_rows.h"
-#include "common/strands/wide.h"
 
 namespace strandcast {
 
@@ -37,28 +38,34 @@ RowFeatures row_features(const StrandChain& chain, const int32_t* now, const int
   return features;
 }
 
-STRANDCAST_WIDE
-void sum_rows(const RowFeatures& features, const RowWeights& weights, size_t begin, uint32_t* sum,
-              size_t count) {
-  const int32_t* const f0 = features.row[0] + begin;
-  const int32_t* const f1 = features.row[1] + begin;
-  const int32_t* const f2 = features.row[2] + begin;
-  const int32_t* const f3 = features.row[3] + begin;
-  const int32_t* const f4 = features.row[4] + begin;
-  const int32_t* const f5 = features.row[5] + begin;
-  const int32_t* const f6 = features.row[6] + begin;
-  const int32_t* const f7 = features.row[7] + begin;
-  const int32_t* const f8 = features.row[8] + begin;
+namespace {
+
+STRANDCAST_LANES void sum_rows_lanes(const RowSums& of) {
+  const auto f = of.features.row;
   std::array<uint32_t, kRowFeatureCount> w;
-  for (uint32_t k = 0; k < kRowFeatureCount; ++k) w[k] = static_cast<uint32_t>(int32_t{weights[k]});
-  for (size_t s = 0; s < count; ++s) {
-    sum[s] = kPredictionRound + w[0] * static_cast<uint32_t>(f0[s]) + w[1] * static_cast<uint32_t>(f1[s]) +
-             w[2] * static_cast<uint32_t>(f2[s]) + w[3] * static_cast<uint32_t>(f3[s]) +
-             w[4] * static_cast<uint32_t>(f4[s]) + w[5] * static_cast<uint32_t>(f5[s]) +
-             w[6] * static_cast<uint32_t>(f6[s]) + w[7] * static_cast<uint32_t>(f7[s]) +
-             w[8] * static_cast<uint32_t>(f8[s]);
-  }
+  for (uint32_t k = 0; k < kRowFeatureCount; ++k) w[k] = static_cast<uint32_t>(int32_t{of.weights[k]});
+  const auto add_block = [&](size_t s, auto load, auto store) STRANDCAST_LANES_LAMBDA {
+    auto block = load(f[0] + s) * w[0] + kPredictionRound;
+    for (uint32_t k = 1; k < kRowFeatureCount; ++k) block += load(f[k] + s) * w[k];
+    store(block, of.sum + s);
+  };
+  size_t s = 0;
+  for (; s + simd::kLanes <= of.count; s += simd::kLanes)
+    add_block(
+        s,
+        [](const int32_t* from)
+            STRANDCAST_LANES_LAMBDA { return (simd::UintBits)simd::raw::load_lanes(from); },
+        [](const simd::UintBits& block, uint32_t* to)
+            STRANDCAST_LANES_LAMBDA { std::memcpy(to, &block, sizeof block); });
+  for (; s < of.count; ++s)
+    add_block(
+        s, [](const int32_t* from) STRANDCAST_LANES_LAMBDA { return static_cast<uint32_t>(*from); },
+        [](uint32_t one, uint32_t* to) STRANDCAST_LANES_LAMBDA { *to = one; });
 }
+
+}  // namespace
+
+STRANDCAST_KERNEL(sum_rows, RowSums);
 
 namespace {
 
@@ -254,9 +261,10 @@ template <class Work>
 void for_each_prediction(const StrandChain& chain, const PredictorWeights& weights, const int32_t* velocity,
                          Work work) {
   std::vector<uint32_t> sum(chain.strand_count);
+  const simd::InstructionSet set = simd::widest_set();
   for_each_row(chain, weights, velocity,
                [&](size_t begin, const RowFeatures& features, const RowWeights& row_weights) {
-                 sum_rows(features, row_weights, 0, sum.data(), sum.size());
+                 sum_rows(set, {features, row_weights, sum.data(), sum.size()});
                  const NeighbourTerms neighbours(row_weights);
                  for (size_t s = 0; s < sum.size(); ++s)
                    work(begin + s, neighbours.predict(chain, features, sum[s], s));

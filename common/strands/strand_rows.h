@@ -2,6 +2,7 @@
 // that go row by row. Private to common/strands; one thread.
 #pragma once
 
+#include "common/simd/variants.h"
 #include "common/strands/strand_predictor.h"
 
 namespace strandcast {
@@ -34,10 +35,15 @@ inline uint32_t row_class(uint32_t vertex_index, uint32_t vertex_count) {
 RowFeatures row_features(const StrandChain& chain, const int32_t* now, const int32_t* zeros, size_t axis,
                          uint32_t vertex_index);
 
-/// sum[s - begin] = rounding + weighted sum of the features that lie in whole rows, for s in [begin, begin +
-/// count).
-void sum_rows(const RowFeatures& features, const RowWeights& weights, size_t begin, uint32_t* sum,
-              size_t count);
+struct RowSums {
+  const RowFeatures& features;
+  const RowWeights& weights;
+  uint32_t* sum;
+  size_t count;
+};
+/// sum[s] = rounding + weighted sum of the features that lie in whole rows, for all s below `count`. A kernel
+/// for every instruction set, all with the same bits.
+void sum_rows(simd::InstructionSet set, const RowSums& of);
 
 /// The neighbours' share.
 struct NeighbourTerms {

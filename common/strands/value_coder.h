@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/simd/lanes.h"
 
 namespace strandcast {
 
@@ -27,14 +28,15 @@ inline constexpr int32_t kProbabilityOne = 1 << kProbabilityBits;
 inline constexpr uint32_t kRansLow = 1u << 16;  // the state stays in [kRansLow, 2^32)
 
 /// Where each symbol's share of [0, kProbabilityOne) begins; strictly increasing from 0.
-struct alignas(16) SymbolTable {
+struct alignas(32) SymbolTable {
   std::array<int16_t, kSymbolCount> start;
 
-  int32_t share(uint32_t symbol) const {
-    return (symbol + 1 < kSymbolCount ? start[symbol + 1] : kProbabilityOne) - start[symbol];
+  STRANDCAST_LANES int32_t share(uint32_t symbol) const {
+    // Behind the last symbol comes the first, which begins at 0, so at kProbabilityOne when wrapped around.
+    return (start[(symbol + 1) % kSymbolCount] - start[symbol]) & (kProbabilityOne - 1);
   }
   /// Moves the shares 1/2^rate of the way to where only `symbol` occurs.
-  void learn(uint32_t symbol);
+  STRANDCAST_LANES void learn(uint32_t symbol);
 
   bool operator==(const SymbolTable&) const = default;
 };
@@ -43,7 +45,7 @@ inline constexpr int32_t kLeastShare = 4;
 inline constexpr int kLearnShift = 7;
 
 /// Targets of SymbolTable::learn, one row for each symbol.
-alignas(16) inline constexpr auto kLearnTargets = [] {
+alignas(32) inline constexpr auto kLearnTargets = [] {
   std::array<std::array<int16_t, kSymbolCount>, kSymbolCount> rows{};
   for (uint32_t symbol = 0; symbol < kSymbolCount; ++symbol) {
     for (uint32_t k = 0; k < kSymbolCount; ++k) {
@@ -56,7 +58,7 @@ alignas(16) inline constexpr auto kLearnTargets = [] {
 }();
 
 /// The last symbol whose share begins at or before `place`.
-inline uint32_t find_symbol(const SymbolTable& table, int32_t place) {
+STRANDCAST_LANES uint32_t find_symbol(const SymbolTable& table, int32_t place) {
 #if defined(__SSE2__)
   const __m128i wanted = _mm_set1_epi16(static_cast<int16_t>(place));
   const auto* const start = reinterpret_cast<const __m128i*>(table.start.data());
@@ -71,20 +73,14 @@ inline uint32_t find_symbol(const SymbolTable& table, int32_t place) {
 #endif
 }
 
-inline void SymbolTable::learn(uint32_t symbol) {
-  const auto& target = kLearnTargets[symbol];
-#if defined(__SSE2__)
-  auto* const at = reinterpret_cast<__m128i*>(start.data());
-  const auto* const to = reinterpret_cast<const __m128i*>(target.data());
-  for (int half = 0; half < 2; ++half) {
-    const __m128i now = _mm_load_si128(at + half);
-    const __m128i step = _mm_srai_epi16(_mm_sub_epi16(_mm_load_si128(to + half), now), kLearnShift);
-    _mm_store_si128(at + half, _mm_add_epi16(now, step));
-  }
-#else
-  for (uint32_t k = 0; k < kSymbolCount; ++k)
-    start[k] = static_cast<int16_t>(start[k] + ((target[k] - start[k]) >> kLearnShift));
-#endif
+STRANDCAST_LANES void SymbolTable::learn(uint32_t symbol) {
+  using Starts = int16_t __attribute__((vector_size(sizeof(start))));
+  Starts now;
+  Starts target;
+  std::memcpy(&now, start.data(), sizeof now);
+  std::memcpy(&target, kLearnTargets[symbol].data(), sizeof target);
+  now += (target - now) >> kLearnShift;
+  std::memcpy(start.data(), &now, sizeof now);
 }
 
 // A folded value u below kFirstTail is its own symbol; the symbols above stand for ranges of growing size,
@@ -95,31 +91,29 @@ inline constexpr std::array<uint32_t, 4> kTailBegin = {12, 14, 18, 34};
 inline constexpr uint32_t kLengthBits = 5;  // of an escaped value
 
 /// 0, 1, -1, 2, -2, ... become 0, 1, 2, 3, 4, ...; one to one for all 32-bit values.
-inline uint32_t fold_sign(int32_t value) {
+constexpr uint32_t fold_sign(int32_t value) {
   const uint32_t negated = 0u - static_cast<uint32_t>(value);
   return (negated << 1) ^ (0u - (negated >> 31));
 }
-inline int32_t unfold_sign(uint32_t folded) {
+constexpr int32_t unfold_sign(uint32_t folded) {
   const uint32_t negated = (folded >> 1) ^ (0u - (folded & 1u));
   return static_cast<int32_t>(0u - negated);
 }
+
+/// Where the share of a symbol begins and ends.
+struct SymbolStep {
+  uint16_t begin;
+  uint16_t end;
+};
 
 /// Collects one slice.
 class ValueWriter {
  public:
   /// The value's lowest `shift` bits are written plainly, the rest with `table`, which learns.
   void put(uint32_t folded, SymbolTable& table, uint32_t shift) {
-    const uint32_t value = folded >> shift;
-    uint32_t symbol = value;
-    if (value >= kFirstTail) {
-      symbol = kFirstTail;
-      while (symbol + 1 < kSymbolCount && value >= kTailBegin[symbol + 1 - kFirstTail]) ++symbol;
-      put_tail(value, symbol);
-    }
-    steps_.push_back(
-        {static_cast<uint16_t>(table.start[symbol]), static_cast<uint16_t>(table.share(symbol))});
-    table.learn(symbol);
-    if (shift != 0) put_bits(folded & ((1u << shift) - 1u), shift);
+    SymbolStep* next = begin_run(1);
+    put(folded, table, shift, next);
+    end_run(next);
   }
   void put_bits(uint32_t value, uint32_t count) {
     pending_ |= static_cast<uint64_t>(value) << pending_count_;
@@ -130,51 +124,104 @@ class ValueWriter {
       pending_count_ -= 8;
     }
   }
+
+  /// Many values at a time: room for so many, to be given to put() and, moved on by it, to end_run().
+  SymbolStep* begin_run(size_t value_count) {
+    if (steps_.size() < step_count_ + value_count)
+      steps_.resize(std::max(2 * steps_.size(), step_count_ + value_count));
+    return steps_.data() + step_count_;
+  }
+  STRANDCAST_LANES void put(uint32_t folded, SymbolTable& table, uint32_t shift, SymbolStep*& next) {
+    const uint32_t value = folded >> shift;
+    uint32_t symbol = value;
+    if (value >= kFirstTail) [[unlikely]]
+      symbol = put_tail(value);
+    // Two entries side by side, for all symbols but the last.
+    if (symbol + 1 < kSymbolCount) [[likely]]
+      std::memcpy(next, &table.start[symbol], sizeof *next);
+    else
+      *next = {static_cast<uint16_t>(table.start[symbol]), static_cast<uint16_t>(kProbabilityOne)};
+    ++next;
+    table.learn(symbol);
+    if (shift != 0) [[unlikely]]
+      put_bits(folded & ((1u << shift) - 1u), shift);
+  }
+  void end_run(const SymbolStep* next) { step_count_ = static_cast<size_t>(next - steps_.data()); }
+
   /// Appends two u32 lengths, the symbols' words and the plain bits, and starts anew.
   void finish(std::vector<std::byte>& destination);
-  void reserve(size_t value_count) { steps_.reserve(value_count); }
+  /// The same for several, in less time: the states of rANS wait for themselves, but for no other.
+  static void finish_all(std::span<ValueWriter> writers, std::span<std::vector<std::byte>> destinations);
 
  private:
-  struct Step {
-    uint16_t start;
-    uint16_t share;
-  };
-  void put_tail(uint32_t value, uint32_t symbol) {
+  /// Gives the symbol.
+  uint32_t put_tail(uint32_t value) {
+    uint32_t symbol = kFirstTail;
+    while (symbol + 1 < kSymbolCount && value >= kTailBegin[symbol + 1 - kFirstTail]) ++symbol;
     const uint32_t beyond = value - kTailBegin[symbol - kFirstTail];
-    if (symbol + 1 < kSymbolCount) return put_bits(beyond, kTailBits[symbol - kFirstTail]);
-    const auto length = static_cast<uint32_t>(std::bit_width(beyond + 1)) - 1;
-    put_bits(length, kLengthBits);
-    put_bits(beyond + 1 - (1u << length), length);
+    if (symbol + 1 < kSymbolCount) {
+      put_bits(beyond, kTailBits[symbol - kFirstTail]);
+    } else {
+      const auto length = static_cast<uint32_t>(std::bit_width(beyond + 1)) - 1;
+      put_bits(length, kLengthBits);
+      put_bits(beyond + 1 - (1u << length), length);
+    }
+    return symbol;
   }
+  class Packer;
+  void append_to(std::vector<std::byte>& destination, std::span<const uint16_t> words);
 
-  std::vector<Step> steps_;
-  std::vector<uint16_t> words_;
+  std::vector<SymbolStep> steps_;  // the first step_count_ count
+  size_t step_count_ = 0;
+  std::vector<uint16_t> words_;  // lent to a packer
   std::vector<std::byte> bits_;
   uint64_t pending_ = 0;
   uint32_t pending_count_ = 0;
 };
 
+/// The state of a reader while it reads many symbols.
+struct SymbolCursor {
+  uint32_t state;
+  const uint16_t* next;
+
+  /// The next symbol of `table`, which learns.
+  STRANDCAST_LANES uint32_t take(SymbolTable& table) {
+    const auto place = static_cast<int32_t>(state & (kProbabilityOne - 1));
+    const uint32_t symbol = find_symbol(table, place);
+    pass(table, symbol, place, table.start[symbol], static_cast<uint32_t>(table.share(symbol)));
+    return symbol;
+  }
+  /// Takes a 0 if it is next: a guess of the processor's where that is likely, instead of a search that it
+  /// must wait for.
+  STRANDCAST_LANES bool take_zero(SymbolTable& table) {
+    const auto place = static_cast<int32_t>(state & (kProbabilityOne - 1));
+    const int32_t share = table.start[1];
+    if (place >= share) [[unlikely]]
+      return false;
+    pass(table, 0, place, 0, static_cast<uint32_t>(share));
+    return true;
+  }
+
+ private:
+  STRANDCAST_LANES void pass(SymbolTable& table, uint32_t symbol, int32_t place, int32_t start,
+                             uint32_t share) {
+    state = share * (state >> kProbabilityBits) + static_cast<uint32_t>(place - start);
+    if (state < kRansLow) state = state << 16 | *next++;
+    table.learn(symbol);
+  }
+};
+
 /// Reads one slice from untrusted bytes: any bytes give some values; ask is_spent() afterwards.
 class ValueReader {
  public:
-  /// Takes the slice from the front of `source` and gives the bytes behind it.
+  /// Takes the slice from the front of `source` and gives the bytes behind it; the bytes must stay.
   Result<std::span<const std::byte>> open(std::span<const std::byte> source);
 
   uint32_t take(SymbolTable& table, uint32_t shift) {
-    const auto place = static_cast<int32_t>(state_ & (kProbabilityOne - 1));
-    const uint32_t symbol = find_symbol(table, place);
-    pass(table, symbol, place);
-    const uint32_t value = symbol < kFirstTail ? symbol : take_tail(symbol);
-    return shift == 0 ? value : (value << shift) | take_bits(shift);
-  }
-  /// take(table, 0) where 0 is by far the most frequent: a guess of the processor's, instead of a search
-  /// that it must wait for.
-  uint32_t take_likely_zero(SymbolTable& table) {
-    const auto place = static_cast<int32_t>(state_ & (kProbabilityOne - 1));
-    if (place >= table.start[1]) [[unlikely]]
-      return take(table, 0);
-    pass(table, 0, place);
-    return 0;
+    SymbolCursor cursor = begin_run(1);
+    const uint32_t symbol = cursor.take(table);
+    end_run(cursor);
+    return value_of(symbol, shift);
   }
   uint32_t take_bits(uint32_t count);
   /// True when exactly the bytes of the slice were needed.
@@ -182,27 +229,26 @@ class ValueReader {
   /// True when more was asked for than there is: everything since then is made up.
   bool is_short() const { return is_short_; }
 
- private:
-  uint32_t next_word() {
-    if (words_.size() < sizeof(uint16_t)) {
-      is_short_ = true;
-      return 0;
-    }
-    uint16_t word;
-    std::memcpy(&word, words_.data(), sizeof(word));
-    words_ = words_.subspan(sizeof(word));
-    return word;
+  /// Many symbols at a time, at most so many; value_of() makes values of them, and end_run() takes the cursor
+  /// back.
+  SymbolCursor begin_run(size_t symbol_count);
+  STRANDCAST_LANES uint32_t value_of(uint32_t symbol, uint32_t shift) {
+    uint32_t value = symbol;
+    if (symbol >= kFirstTail) [[unlikely]]
+      value = take_tail(symbol);
+    if (shift != 0) [[unlikely]]
+      value = (value << shift) | take_bits(shift);
+    return value;
   }
-  uint32_t take_tail(uint32_t symbol);
-  /// Goes on to the state before `symbol`.
-  void pass(SymbolTable& table, uint32_t symbol, int32_t place) {
-    state_ = static_cast<uint32_t>(table.share(symbol)) * (state_ >> kProbabilityBits) +
-             static_cast<uint32_t>(place - table.start[symbol]);
-    if (state_ < kRansLow) state_ = (state_ << 16) | next_word();
-    table.learn(symbol);
-  }
+  void end_run(const SymbolCursor& cursor);
 
-  std::span<const std::byte> words_;
+ private:
+  uint32_t take_tail(uint32_t symbol);
+
+  std::vector<uint16_t> words_;  // of the slice, then zeros for what hostile bytes ask for
+  size_t word_count_ = 0;
+  size_t next_word_ = 0;
+  bool has_half_word_ = false;
   std::span<const std::byte> bits_;
   uint64_t pending_ = 0;
   uint32_t pending_count_ = 0;

@@ -39,7 +39,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/log", kBase},
       {"common/math", kBase},
       // The core: a viewer in a browser, a relay or a fuzzer links these and nothing else of ours.
-      {"common/strands", kMath},
+      {"common/strands", with({"common/simd"}, kMath)},
       {"common/replay", kStrands},
       {"common/pictures", kPictures},
       {"common/motion", kMath},

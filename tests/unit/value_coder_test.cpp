@@ -92,22 +92,68 @@ TEST(ValueCoder, ReadsBackValuesOfEverySizeAndShift) {
   }
 }
 
-// Values that are mostly 0 and now and then of any size, read both ways.
-TEST(ValueCoder, TakesALikelyZeroAsItTakesAnyValue) {
+// Symbols that are mostly 0, many at a time and with a guess that they are.
+TEST(ValueCoder, TakesManySymbolsAsItTakesOne) {
+  constexpr size_t kRun = 1000;
   std::mt19937 random(5);
   std::vector<uint32_t> values;
-  for (int i = 0; i < 20'000; ++i) values.push_back(random() % 16 == 0 ? random() >> (random() % 32) : 0);
-  ValueWriter writer;
+  for (size_t i = 0; i < 20 * kRun; ++i)
+    values.push_back(random() % 16 == 0 ? random() >> (random() % 32) : 0);
+  ValueWriter one;
+  ValueWriter many;
   SymbolTable table = even_table();
-  for (const uint32_t value : values) writer.put(value, table, 0);
+  SymbolTable same_table = even_table();
+  for (size_t i = 0; i < values.size(); i += kRun) {
+    SymbolStep* next = many.begin_run(kRun);
+    for (size_t k = i; k < i + kRun; ++k) {
+      one.put(values[k], table, 0);
+      many.put(values[k], same_table, 0, next);
+    }
+    many.end_run(next);
+  }
   std::vector<std::byte> bytes;
-  writer.finish(bytes);
+  std::vector<std::byte> same_bytes;
+  one.finish(bytes);
+  many.finish(same_bytes);
+  EXPECT_TRUE(same_bytes == bytes);
   ValueReader reader;
   ASSERT_TRUE(reader.open(bytes));
   SymbolTable read_table = even_table();
-  for (size_t i = 0; i < values.size(); ++i) ASSERT_EQ(reader.take_likely_zero(read_table), values[i]) << i;
+  for (size_t i = 0; i < values.size(); i += kRun) {
+    SymbolCursor cursor = reader.begin_run(kRun);
+    for (size_t k = i; k < i + kRun; ++k) {
+      const uint32_t symbol = cursor.take_zero(read_table) ? 0 : cursor.take(read_table);
+      ASSERT_EQ(reader.value_of(symbol, 0), values[k]) << k;
+    }
+    reader.end_run(cursor);
+  }
   EXPECT_TRUE(reader.is_spent());
   EXPECT_EQ(read_table, table);
+}
+
+// Any number of slices of any length, packed side by side, are what each is alone.
+TEST(ValueCoder, PacksManySlicesAsItPacksOne) {
+  std::mt19937 random(7);
+  for (const size_t count : {1u, 3u, 4u, 6u, 9u}) {
+    std::vector<ValueWriter> writers(count);
+    std::vector<std::vector<std::byte>> alone(count);
+    std::vector<std::vector<std::byte>> together(count);
+    for (int round = 0; round < 2; ++round) {
+      for (size_t i = 0; i < count; ++i) {
+        ValueWriter single;
+        SymbolTable table = even_table();
+        SymbolTable same_table = even_table();
+        for (size_t k = random() % 500; k > 0; --k) {
+          const uint32_t value = random() >> (random() % 32);
+          single.put(value, table, 1);
+          writers[i].put(value, same_table, 1);
+        }
+        single.finish(alone[i]);
+      }
+      ValueWriter::finish_all(writers, together);
+    }
+    EXPECT_TRUE(together == alone);
+  }
 }
 
 TEST(ValueCoder, CostsLittleMoreThanTheEntropyOfItsSource) {

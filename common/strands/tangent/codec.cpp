@@ -2,15 +2,19 @@
 // neighbours and from the known length of each segment; what is coded are two small integers across the
 // segment, chosen as cheap as the announced bound allows. Every decoded vertex lies within that bound.
 // Layout in proto/WIRE.md.
+#include "common/strands/tangent/codec.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <thread>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/base/worker_pool.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/strand_payload.h"
+#include "common/strands/tangent/order.h"
 #include "common/strands/tangent/symbols.h"
 #include "common/strands/zstd_block.h"
 
@@ -46,52 +50,23 @@ struct Chain {
   }
 };
 
-/// work(first, count) for all slices, `at_once` of them at a time.
+/// How many slices a thread works on side by side, so that every thread has some.
+uint32_t slices_at_once(const Layout& layout, const WorkerPool::Terms& terms) {
+  return std::clamp(layout.slice_count() / terms.workers(), 1u, kMostSlicesAtOnce);
+}
+
+/// work(first, count) for all slices, some of them at a time.
 template <class Work>
-void for_each_slice(const Layout& layout, const WorkerPool::Terms& terms, uint32_t at_once, Work work) {
+void for_each_slices(const Layout& layout, const WorkerPool::Terms& terms, Work work) {
   const uint32_t count = layout.slice_count();
+  const uint32_t at_once = slices_at_once(layout, terms);
   for_each_part(terms, (count + at_once - 1) / at_once,
                 [&](uint32_t group) { work(group * at_once, std::min(at_once, count - group * at_once)); });
-}
-template <class Work>
-void for_each_slice(const Layout& layout, const WorkerPool::Terms& terms, Work work) {
-  for_each_slice(layout, terms, 1, [&](uint32_t slice, uint32_t) { work(slice); });
-}
-
-// What decodes to within the bound of this is still a valid lattice value.
-constexpr int32_t kFarthestTarget = kMaxLattice - 2 * kStepsPerBound;
-
-/// `planes` lends its memory.
-Planes<int32_t> planes_of(const Layout& layout, const Snapshot& snapshot, Planes<int32_t> planes = {}) {
-  for (size_t axis = 0; axis < 3; ++axis) {
-    planes[axis].assign(layout.plane_size(), 0);
-    for (size_t v = 0; v < layout.vertex_count; ++v) {
-      const int32_t* from = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
-      int32_t* to = planes[axis].data() + v * layout.stride;
-      for (size_t place = 0; place < layout.stride; ++place)
-        if (layout.strand_at[place] != kNoStrand)
-          to[place] = std::clamp(from[layout.strand_at[place]], -kFarthestTarget, kFarthestTarget);
-    }
-  }
-  return planes;
-}
-
-/// Of one slice; `snapshot` has room for all.
-void set_lattice(const Layout& layout, const Planes<int32_t>& planes, uint32_t slice, Snapshot& snapshot) {
-  const size_t end = layout.slice_begin[slice + 1];
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t v = 0; v < layout.vertex_count; ++v) {
-      const int32_t* from = planes[axis].data() + v * layout.stride;
-      int32_t* to = snapshot.lattice.data() + axis * snapshot.plane_size() + v * layout.strand_count;
-      for (size_t place = layout.slice_begin[slice]; place < end; ++place)
-        if (layout.strand_at[place] != kNoStrand) to[layout.strand_at[place]] = from[place];
-    }
-  }
 }
 
 class Encoder final : public StrandEncoder {
  public:
-  explicit Encoder(WorkerPool& workers) : workers_(workers) {}
+  Encoder(WorkerPool& workers, simd::InstructionSet set) : workers_(workers), set_(set) {}
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
@@ -116,6 +91,11 @@ class Encoder final : public StrandEncoder {
   /// Whether anybody has the frame before an anchor.
   enum class Followers { None, Some };
   using Slices = std::vector<std::vector<std::byte>>;
+  /// Of what a frame decodes to.
+  struct State {
+    const SnapshotInfo& info;
+    uint64_t hash;
+  };
 
   bool continues(const Snapshot& snapshot) const {
     return has_chain_ && snapshot.strand_count == layout_.strand_count &&
@@ -132,7 +112,9 @@ class Encoder final : public StrandEncoder {
     chain_.reset(layout_);
     chain_.history.quantum_m = snapshot.quantum_m;
     // As if the strands had always been where they are: the first frame is an anchor that nobody follows.
-    chain_.history.lattice = planes_of(layout_, snapshot);
+    for (auto& plane : target_) plane.assign(layout_.plane_size(), 0);
+    take(snapshot);
+    chain_.history.lattice = target_;
     chain_.history.head.pose = snapshot.world_from_head;
     frame_.resize(layout_);
     next_sizes_.reset(layout_);
@@ -147,70 +129,85 @@ class Encoder final : public StrandEncoder {
     return frame;
   }
 
-  /// What every frame begins with; gives the snapshot that will be what it decodes to.
-  Snapshot begin(const Snapshot& snapshot) {
-    target_ = planes_of(layout_, snapshot, std::move(target_));
+  void take(const Snapshot& snapshot) {
+    for_each_part(encode_terms(layout_, workers_), 3 * layout_.vertex_count, [&](uint32_t row) {
+      take_row(set_, {layout_, snapshot, target_, row % 3, row / 3});
+    });
+  }
+
+  /// What every frame begins with.
+  void begin(const Snapshot& snapshot) {
+    take(snapshot);
     frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
-    fit_motion(layout_, chain_.history, target_, workers_, frame_);
+    fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
     writers_.resize(layout_.slice_count());
-    Snapshot decoded{snapshot, {}};
-    decoded.lattice = std::move(lattice_);
-    decoded.lattice.resize(3 * snapshot.plane_size());
-    return decoded;
   }
 
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
-    Snapshot decoded = begin(snapshot);
+    begin(snapshot);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
     Slices slices(layout_.slice_count());
-    for_each_slice(layout_, encode_terms(layout_, workers_), [&](uint32_t slice) {
-      quantise_slice(layout_, chain_.history, target_, slice, frame_);
-      write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables[slice], writers_[slice]);
-      writers_[slice].finish(slices[slice]);
-      set_lattice(layout_, frame_.lattice, slice, decoded);
+    for_each_slices(layout_, encode_terms(layout_, workers_), [&](uint32_t first, uint32_t count) {
+      for (uint32_t slice = first; slice < first + count; ++slice) {
+        quantise_slice(set_, {{layout_, chain_.history, slice, frame_}, target_});
+        write_symbols(
+            set_, {layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables[slice], writers_[slice]});
+      }
+      finish(first, count, slices);
     });
     chain_.tables = mean_tables(tables);
     remember(chain_.history, frame_);
     std::swap(chain_.sizes, next_sizes_);
-    const EncodedFramePtr frame = make_delta(snapshot, decoded, 0, slices);
-    lattice_ = std::move(decoded.lattice);
-    return frame;
+    return make_delta(state_of(snapshot), 0, slices);
   }
 
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
-    Snapshot decoded = begin(snapshot);
+    begin(snapshot);
     frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
     Slices slices(layout_.slice_count());
     Slices shape_slices(layout_.slice_count());
-    for_each_slice(layout_, encode_terms(layout_, workers_), [&](uint32_t slice) {
-      quantise_anchor(layout_, chain_.history, target_, slice, frame_);
-      if (followers == Followers::Some) {
+    for_each_slices(layout_, encode_terms(layout_, workers_), [&](uint32_t first, uint32_t count) {
+      for (uint32_t slice = first; slice < first + count; ++slice) {
+        quantise_anchor(set_, {{layout_, chain_.history, slice, frame_}, target_});
+        if (followers == Followers::None) continue;
         Tables tables = chain_.tables;
-        write_symbols(layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]);
-        writers_[slice].finish(slices[slice]);
+        write_symbols(set_,
+                      {layout_, slice, frame_.codes, chain_.sizes, next_sizes_, tables, writers_[slice]});
       }
-      Tables tables = chain_.tables;
-      write_symbols(layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]);
-      writers_[slice].finish(shape_slices[slice]);
-      set_lattice(layout_, frame_.lattice, slice, decoded);
+      if (followers == Followers::Some) finish(first, count, slices);
+      for (uint32_t slice = first; slice < first + count; ++slice) {
+        Tables tables = chain_.tables;
+        write_symbols(set_,
+                      {layout_, slice, frame_.shape_codes, no_sizes_, next_sizes_, tables, writers_[slice]});
+      }
+      finish(first, count, shape_slices);
     });
     remember(chain_.history, frame_);
     chain_.forget_motion(layout_);
+    const State state = state_of(snapshot);
     JoinFrames frames;
     if (followers == Followers::Some)
-      frames.frame = make_delta(snapshot, decoded, kAnchorFlag, slices);
+      frames.frame = make_delta(state, kAnchorFlag, slices);
     else
       ++sequence_;
-    frames.keyframe = make_keyframe(snapshot, decoded, shape_slices);
-    lattice_ = std::move(decoded.lattice);
+    frames.keyframe = make_keyframe(state, shape_slices);
     return frames;
   }
 
+  void finish(uint32_t first, uint32_t count, Slices& slices) {
+    ValueWriter::finish_all(std::span(writers_).subspan(first, count),
+                            std::span(slices).subspan(first, count));
+  }
+
+  /// Of the history's last frame.
+  State state_of(const SnapshotInfo& info) const {
+    return {info, hash_planes(layout_, chain_.history.lattice, info)};
+  }
+
   /// Of the next frame of the chain, with a body for everybody who follows.
-  EncodedFramePtr make_delta(const Snapshot& snapshot, const Snapshot& decoded, uint8_t flags,
-                             const Slices& slices) {
+  EncodedFramePtr make_delta(const State& state, uint8_t flags, const Slices& slices) {
     const BodyHead head{flags, frame_.length_blend};
     std::vector<std::byte> body;
     body.reserve(sizeof(head) + sizeof(frame_.weights) + sizeof(frame_.shape_weights) + layout_.plane_size());
@@ -225,12 +222,12 @@ class Encoder final : public StrandEncoder {
     header.opcode = Opcode::StrandDelta;
     header.base_sequence = sequence_++;
     header.sequence = sequence_;
-    header.sim_time_ns = snapshot.sim_time_ns;
-    return make_frame(header, decoded, body);
+    header.sim_time_ns = state.info.sim_time_ns;
+    return make_frame(header, state, body);
   }
 
   /// Of the same frame, for a joiner.
-  EncodedFramePtr make_keyframe(const Snapshot& snapshot, const Snapshot& decoded, const Slices& slices) {
+  EncodedFramePtr make_keyframe(const State& state, const Slices& slices) {
     std::vector<std::byte> packed;
     zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, packed);
     std::vector<std::byte> body;
@@ -243,20 +240,21 @@ class Encoder final : public StrandEncoder {
     FrameHeader header;
     header.opcode = Opcode::StrandKeyframe;
     header.sequence = sequence_;
-    header.sim_time_ns = snapshot.sim_time_ns;
-    return make_frame(header, decoded, body);
+    header.sim_time_ns = state.info.sim_time_ns;
+    return make_frame(header, state, body);
   }
 
-  static EncodedFramePtr make_frame(const FrameHeader& header, const Snapshot& decoded,
+  static EncodedFramePtr make_frame(const FrameHeader& header, const State& state,
                                     std::span<const std::byte> body) {
     std::vector<std::byte> payload;
     payload.reserve(kStrandFixedBytes + body.size());
-    append_fixed_part(decoded, kCodecNumber, payload);
+    append_fixed_part(state.info, state.hash, kCodecNumber, payload);
     ByteWriter(payload).put_bytes(body);
     return make_encoded_frame(header, payload);
   }
 
   WorkerPool& workers_;
+  simd::InstructionSet set_;
   std::vector<glm::vec3> rest_in_head_m_;
   Layout layout_;
   Chain chain_;
@@ -266,7 +264,6 @@ class Encoder final : public StrandEncoder {
   // Kept for their memory.
   Planes<int32_t> target_;
   std::vector<ValueWriter> writers_;
-  std::vector<int32_t> lattice_;
   ZstdCompressor zstd_;
   uint32_t sequence_ = 0;
   bool has_chain_ = false;
@@ -274,7 +271,8 @@ class Encoder final : public StrandEncoder {
 
 class Decoder final : public StrandDecoder {
  public:
-  Decoder(const StrandStreamLimits& limits, WorkerPool& workers) : limits_(limits), workers_(workers) {}
+  Decoder(const StrandStreamLimits& limits, WorkerPool& workers, simd::InstructionSet set)
+      : set_(set), limits_(limits), workers_(workers) {}
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
@@ -318,10 +316,10 @@ class Decoder final : public StrandDecoder {
       return at("symbol tables", filled.error());
     RETURN_IF_ERROR(check_tables(chain.tables));
     Tables tables = chain.tables;
-    RETURN_IF_ERROR(
-        read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, snapshot,
-                    [&](uint32_t slice) { place_shape(layout_, chain.history.quantum_m, slice, frame_); }));
-    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    RETURN_IF_ERROR(read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, [&](uint32_t slice) {
+      place_shape(set_, {layout_, chain.history, slice, frame_});
+    }));
+    RETURN_IF_ERROR(give(message, snapshot));
     // Only now, with everything checked, the state moves on.
     frame_.head = {snapshot.world_from_head, {}};
     remember(chain.history, frame_);
@@ -358,11 +356,11 @@ class Decoder final : public StrandDecoder {
       return make_error(ErrorCode::BadInput, "the weights do not end where their symbols end");
     frame_.apply_weights();
     Tables tables = chain_.tables;
-    RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, snapshot, [&](uint32_t slice) {
+    RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, [&](uint32_t slice) {
       const auto place = is_anchor ? place_anchor : place_slice;
-      place(layout_, chain_.history, slice, frame_);
+      place(set_, {layout_, chain_.history, slice, frame_});
     }));
-    RETURN_IF_ERROR(check_decoded(snapshot, message));
+    RETURN_IF_ERROR(give(message, snapshot));
     // Only now, with everything checked, the state moves on.
     remember(chain_.history, frame_);
     if (is_anchor) {
@@ -378,28 +376,30 @@ class Decoder final : public StrandDecoder {
   /// that the slices end with.
   template <class Place>
   Status read_slices(std::span<const std::byte> source, Tables& tables, const SymbolSizes& sizes,
-                     Codes& codes, Snapshot& snapshot, Place place) {
+                     Codes& codes, Place place) {
     std::vector<ValueReader> readers(layout_.slice_count());
     ASSIGN_OR_RETURN(const auto rest, open_slices(source, readers));
     if (!rest.empty())
       return make_error(ErrorCode::BadInput, "{} bytes follow the last slice of a strand payload",
                         rest.size());
     std::vector<Tables> learnt(layout_.slice_count(), tables);
-    snapshot.lattice.resize(3 * snapshot.plane_size());
-    for_each_slice(layout_, decode_terms(layout_, workers_), kSlicesAtOnce,
-                   [&](uint32_t begin, uint32_t count) {
-                     std::vector<SliceSymbols> symbols;
-                     for (uint32_t slice = begin; slice < begin + count; ++slice)
-                       symbols.push_back({slice, learnt[slice], readers[slice]});
-                     read_symbols(layout_, sizes, codes, next_sizes_, symbols);
-                     for (const SliceSymbols& done : symbols) {
-                       place(done.slice);
-                       set_lattice(layout_, frame_.lattice, done.slice, snapshot);
-                     }
-                   });
+    for_each_slices(layout_, decode_terms(layout_, workers_), [&](uint32_t begin, uint32_t count) {
+      std::vector<SliceSymbols> symbols;
+      for (uint32_t slice = begin; slice < begin + count; ++slice)
+        symbols.push_back({slice, learnt[slice], readers[slice]});
+      read_symbols(set_, {layout_, sizes, codes, next_sizes_, symbols});
+      for (const SliceSymbols& done : symbols) place(done.slice);
+    });
     RETURN_IF_ERROR(check_spent(readers));
     tables = mean_tables(learnt);
     return {};
+  }
+
+  /// The decoded positions, once they are checked.
+  Status give(const StrandMessage& message, Snapshot& snapshot) const {
+    snapshot.lattice.resize(3 * snapshot.plane_size());
+    const HashedLattice given = give_planes(layout_, frame_.lattice, snapshot);
+    return check_decoded(given.is_valid, given.state_hash, message);
   }
 
   static Result<std::span<const std::byte>> open_slices(std::span<const std::byte> rest,
@@ -432,6 +432,7 @@ class Decoder final : public StrandDecoder {
     if (bytes.size() == sizeof(T)) std::memcpy(&value, bytes.data(), sizeof(T));
   }
 
+  simd::InstructionSet set_;
   StrandStreamLimits limits_;
   WorkerPool& workers_;
   Layout layout_;
@@ -451,10 +452,17 @@ float lattice_step_m(float bound_m) {
 }
 
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers) {
-  return std::make_unique<Encoder>(workers);
+  return make_encoder(workers, simd::widest_set());
 }
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers) {
-  return std::make_unique<Decoder>(limits, workers);
+  return make_decoder(limits, workers, simd::widest_set());
+}
+std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers, simd::InstructionSet set) {
+  return std::make_unique<Encoder>(workers, set);
+}
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
+                                            simd::InstructionSet set) {
+  return std::make_unique<Decoder>(limits, workers, set);
 }
 
 }  // namespace strandcast::tangent

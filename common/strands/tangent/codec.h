@@ -3,12 +3,17 @@
 
 #include <memory>
 
+#include "common/simd/variants.h"
 #include "common/strands/strand_codec.h"
 
 namespace strandcast::tangent {
 
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers);
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers);
+/// For one instruction set of those that the processor has: the same bytes and states with all of them.
+std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers, simd::InstructionSet set);
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
+                                            simd::InstructionSet set);
 /// As lattice_step_m() of strand_codec.h.
 float lattice_step_m(float bound_m);
 

@@ -88,13 +88,19 @@ Layout make_layout(uint32_t strand_count, uint32_t vertex_count, std::span<const
   layout.vertex_count = vertex_count;
   for (const auto& slice : slices) {
     layout.slice_begin.push_back(static_cast<uint32_t>(layout.strand_at.size()));
+    layout.strands_in.push_back(static_cast<uint32_t>(slice.size()));
     layout.strand_at.insert(layout.strand_at.end(), slice.begin(), slice.end());
     while (layout.strand_at.size() % kBlockSize != 0) layout.strand_at.push_back(kNoStrand);
   }
   layout.slice_begin.push_back(static_cast<uint32_t>(layout.strand_at.size()));
   layout.strand_at.insert(layout.strand_at.end(), kBlockSize, kNoStrand);
   layout.stride = static_cast<uint32_t>(layout.strand_at.size());
-  for (const uint32_t strand : layout.strand_at) layout.presence.push_back(strand == kNoStrand ? 0.0f : 1.0f);
+  layout.place_of.resize(strand_count);
+  for (uint32_t place = 0; place < layout.stride; ++place) {
+    const uint32_t strand = layout.strand_at[place];
+    layout.presence.push_back(strand == kNoStrand ? 0.0f : 1.0f);
+    if (strand != kNoStrand) layout.place_of[strand] = place;
+  }
   find_neighbours(layout, rest_in_head_m);
 
   layout.rest_length_m.assign(layout.plane_size(), 0.0f);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/strands/tangent/shape.h"
+#include "common/strands/tangent/row.h"
 #include "common/strands/wrapping.h"
 
 namespace strandcast::tangent {
@@ -34,24 +34,6 @@ FeatureRows feature_rows(const Layout& layout, const History& history, const Fra
     rows[k] = is_there ? plane + static_cast<size_t>(vertex) * layout.stride : frame.zeros.data();
   }
   return rows;
-}
-
-void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
-              std::span<float> sum) {
-  constexpr size_t kParts = kBlockSize / kLaneCount;
-  const FeatureRows row = rows;
-  for (size_t i = 0; i < sum.size(); i += kBlockSize) {
-    Lanes block[kParts];
-    for (size_t part = 0; part < kParts; ++part) {
-      const size_t at = i + part * kLaneCount;
-      block[part] =
-          to_floats(wrapping_differences(load_lanes(positions.last + at), load_lanes(positions.base + at)));
-    }
-    for (uint32_t k = 0; k < kOwnFeatureCount; ++k)
-      for (size_t part = 0; part < kParts; ++part)
-        block[part] += weights[k] * load_lanes(row[k] + i + part * kLaneCount);
-    for (size_t part = 0; part < kParts; ++part) store_lanes(block[part], sum.data() + i + part * kLaneCount);
-  }
 }
 
 Escape make_escape(size_t at, const Lattice& target, const Lattice& from) {
@@ -122,77 +104,6 @@ void Frame::apply_weights() {
         for (size_t k = 0; k < kHeadStepCount; ++k)
           sum += static_cast<float>(head.step[k].row[axis][i]) * by.weights[kHeadFeature + k];
       }
-    }
-  }
-}
-
-namespace {
-
-CodeLanes load_codes(const Codes& codes, size_t at) {
-  return {load_lanes(codes.first.data() + at), load_lanes(codes.second.data() + at),
-          load_lanes(codes.length.data() + at)};
-}
-
-/// Goes through the escapes of a slice with its blocks.
-class EscapeWalk {
- public:
-  explicit EscapeWalk(const std::vector<Escape>& escapes) : next_(escapes.begin()), end_(escapes.end()) {}
-
-  /// Puts the escaped vertices of the block that begins at `at` where they belong; from(lane) is where their
-  /// escapes count from.
-  template <class From>
-  void place(size_t at, IntLaneVectors& position, From from) {
-    for (; next_ != end_ && next_->at < at + kLaneCount; ++next_) {
-      const size_t lane = next_->at - at;
-      const Lattice point = escaped(*next_, from(lane));
-      for (size_t axis = 0; axis < 3; ++axis) position.axis[axis][lane] = point[axis];
-    }
-  }
-
- private:
-  std::vector<Escape>::const_iterator next_;
-  std::vector<Escape>::const_iterator end_;
-};
-
-}  // namespace
-
-void place_slice(const Layout& layout, const History& history, uint32_t slice, Frame& frame) {
-  EscapeWalk escapes(frame.codes.escapes[slice]);
-  for_each_block(layout, history, slice, frame,
-                 [&](const MotionRow& row, size_t place, const Expected& moved) {
-                   const size_t at = row.at(place);
-                   IntLaneVectors position = moved.placed(load_codes(frame.codes, at));
-                   escapes.place(at, position, [&](size_t lane) { return row.last(at + lane); });
-                   row.store(moved, place, position);
-                 });
-}
-
-void place_anchor(const Layout& layout, const History& history, uint32_t slice, Frame& frame) {
-  EscapeWalk escapes(frame.codes.escapes[slice]);
-  for_each_block(layout, history, slice, frame,
-                 [&](const MotionRow& row, size_t place, const Expected& moved) {
-                   const ShapeRow shape(layout, history.quantum_m, frame.lattice, row.vertex());
-                   const Expected expected = shape.expect(place, frame.shape_weights);
-                   const size_t at = row.at(place);
-                   IntLaneVectors position =
-                       expected.placed(sum_of(expected.codes_of(moved), load_codes(frame.codes, at)));
-                   escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
-                   row.store(moved, place, position);
-                 });
-}
-
-void place_shape(const Layout& layout, float quantum_m, uint32_t slice, Frame& frame) {
-  EscapeWalk escapes(frame.shape_codes.escapes[slice]);
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    const ShapeRow shape(layout, quantum_m, frame.lattice, v);
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
-         place += kLaneCount) {
-      const Expected expected = shape.expect(place, frame.shape_weights);
-      const size_t at = shape.at(place);
-      IntLaneVectors position = expected.placed(load_codes(frame.shape_codes, at));
-      escapes.place(at, position, [&](size_t lane) { return lane_of(expected.base, lane); });
-      for (size_t axis = 0; axis < 3; ++axis)
-        store_lanes(position.axis[axis], frame.lattice[axis].data() + at);
     }
   }
 }

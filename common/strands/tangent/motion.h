@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "common/base/worker_pool.h"
+#include "common/simd/variants.h"
 #include "common/strands/tangent/head.h"
 #include "common/strands/tangent/layout.h"
+#include "common/strands/value_coder.h"
 
 namespace strandcast::tangent {
 
@@ -28,6 +30,7 @@ inline constexpr float kDriftShare = 0.85f;         // of the drift that is left
 inline constexpr float kLengthWeight = 1.0f / 16;   // unit of the length blend
 inline constexpr uint8_t kMaxLengthBlend = 16;      // all of the last length
 inline constexpr int32_t kEscapedLength = 1 << 20;  // in place of a length correction
+inline constexpr uint32_t kEscapedFolded = fold_sign(kEscapedLength);
 inline constexpr uint32_t kShapeFeatureCount = 16;
 inline constexpr uint32_t kShapeClassCount = 16;  // roots; first segments; and so on; the rest
 
@@ -68,11 +71,11 @@ struct Escape {
   std::array<int32_t, 3> step{};
 };
 
-/// The integers of one frame.
+/// The integers of one frame, folded (fold_sign).
 struct Codes {
-  std::vector<int32_t> first;  // (vertex_count x stride) first coordinate across the segment
-  std::vector<int32_t> second;
-  std::vector<int32_t> length;               // correction along the segment, or kEscapedLength
+  std::vector<uint32_t> first;  // (vertex_count x stride) first coordinate across the segment
+  std::vector<uint32_t> second;
+  std::vector<uint32_t> length;              // correction along the segment, or kEscapedFolded
   std::vector<std::vector<Escape>> escapes;  // of each slice, in coding order
 
   void resize(const Layout& layout);
@@ -125,25 +128,35 @@ uint32_t motion_class_count(const Layout& layout);
 
 /// Weights and length blend that suit `target` (planes of lattice positions) best, by least squares over a
 /// sample of strands.
-void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                WorkerPool& workers, Frame& frame);
+void fit_motion(simd::InstructionSet set, const Layout& layout, const History& history,
+                const Planes<int32_t>& target, WorkerPool& workers, Frame& frame);
 
 /// Weights that suit the shape of `target` best.
 ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
                        WorkerPool& workers);
 
+/// Of one frame; `frame` is filled.
+struct SliceWork {
+  const Layout& layout;
+  const History& history;
+  uint32_t slice;
+  Frame& frame;
+};
+struct QuantiseWork {
+  SliceWork of;
+  const Planes<int32_t>& target;
+};
+
+// Kernels for every instruction set, all with the same bits (common/simd/variants.h).
 /// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
 /// decode to. Of an anchor it fills both kinds of integers.
-void quantise_slice(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                    uint32_t slice, Frame& frame);
-void quantise_anchor(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                     uint32_t slice, Frame& frame);
-
+void quantise_slice(simd::InstructionSet set, const QuantiseWork& work);
+void quantise_anchor(simd::InstructionSet set, const QuantiseWork& work);
 /// Decoder: positions, velocities and residuals of a slice from its integers.
-void place_slice(const Layout& layout, const History& history, uint32_t slice, Frame& frame);
-void place_anchor(const Layout& layout, const History& history, uint32_t slice, Frame& frame);
+void place_slice(simd::InstructionSet set, const SliceWork& work);
+void place_anchor(simd::InstructionSet set, const SliceWork& work);
 /// Decoder: positions of a slice of an anchor from the integers for who has no history.
-void place_shape(const Layout& layout, float quantum_m, uint32_t slice, Frame& frame);
+void place_shape(simd::InstructionSet set, const SliceWork& work);
 
 /// The frame becomes history.
 void remember(History& history, Frame& frame);

@@ -1,14 +1,8 @@
-// What the encoder of the "tangent" codec decides: weights for a frame, and the cheapest integers that keep
-// every vertex within the bound.
-#include <algorithm>
-#include <cmath>
-#include <span>
-#include <utility>
+// What the encoder of the "tangent" codec decides: the cheapest integers that keep every vertex within the
+// bound.
 #include <vector>
 
-#include "common/strands/least_squares.h"
-#include "common/strands/tangent/shape.h"
-#include "common/strands/wrapping.h"
+#include "common/strands/tangent/shape_row.h"
 
 namespace strandcast::tangent {
 namespace {
@@ -28,14 +22,14 @@ struct Found {
   IntLaneVectors position{};
 
   /// How far the integers are from the origin, unless escaped.
-  STRANDCAST_INLINE CodeLanes apart() const {
+  STRANDCAST_LANES CodeLanes apart() const {
     return {is_found ? wrapping_differences(codes.first, origin.first) : codes.first,
             is_found ? wrapping_differences(codes.second, origin.second) : codes.second,
             is_found ? wrapping_differences(codes.length, origin.length) : codes.length};
   }
 
   /// Takes these integers for open lanes in which they reach the target.
-  STRANDCAST_INLINE void consider(const CodeLanes& tried) {
+  STRANDCAST_LANES void consider(const CodeLanes& tried) {
     const IntLaneVectors reached = expected.placed(tried);
     LaneVectors away;
     for (size_t axis = 0; axis < 3; ++axis)
@@ -60,7 +54,7 @@ struct Corners {
   IntLanes high_b;
   IntLanes is_a_farther;
 
-  STRANDCAST_INLINE Corners(const Expected::Coordinates& of, const CodeLanes& origin) {
+  STRANDCAST_LANES Corners(const Expected::Coordinates& of, const CodeLanes& origin) {
     const IntLanes one = IntLanes{} + 1;
     const Lanes a = of.first - to_floats(origin.first);
     const Lanes b = of.second - to_floats(origin.second);
@@ -74,7 +68,7 @@ struct Corners {
   }
 
   /// Towards the origin first: the corner of the cell nearest to it, then its sides, then opposite.
-  STRANDCAST_INLINE void try_with(const IntLanes& correction, Found& found) const {
+  STRANDCAST_LANES void try_with(const IntLanes& correction, Found& found) const {
     found.consider({low_a, low_b, correction});
     if (!is_any(found.is_open)) return;
     found.consider({is_a_farther ? high_a : low_a, is_a_farther ? low_b : high_b, correction});
@@ -85,7 +79,7 @@ struct Corners {
   }
 };
 
-STRANDCAST_INLINE void find_codes(Found& found) {
+STRANDCAST_LANES void find_codes(Found& found) {
   LaneVectors edge;
   for (size_t axis = 0; axis < 3; ++axis)
     edge.axis[axis] =
@@ -104,7 +98,7 @@ STRANDCAST_INLINE void find_codes(Found& found) {
 /// Escapes the vertices of the block that begins at `at` for which nothing was found; from(lane) is where
 /// their escapes count from.
 template <class From>
-STRANDCAST_INLINE void escape_others(Found& found, size_t at, std::vector<Escape>& escapes, From from) {
+STRANDCAST_LANES void escape_others(Found& found, size_t at, std::vector<Escape>& escapes, From from) {
   if (!is_any(~found.is_found)) return;
   for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
     if (found.is_found[lane] != 0) continue;
@@ -117,196 +111,53 @@ STRANDCAST_INLINE void escape_others(Found& found, size_t at, std::vector<Escape
   }
 }
 
-STRANDCAST_INLINE IntLaneVectors load_vectors(const Planes<int32_t>& planes, size_t at) {
+STRANDCAST_LANES IntLaneVectors load_vectors(const Planes<int32_t>& planes, size_t at) {
   IntLaneVectors vectors;
   for (size_t axis = 0; axis < 3; ++axis) vectors.axis[axis] = load_lanes(planes[axis].data() + at);
   return vectors;
 }
 
-STRANDCAST_INLINE void store_codes(const CodeLanes& codes, Codes& to, size_t at) {
-  store_lanes(codes.first, to.first.data() + at);
-  store_lanes(codes.second, to.second.data() + at);
-  store_lanes(codes.length, to.length.data() + at);
+STRANDCAST_LANES void store_codes(const CodeLanes& codes, Codes& to, size_t at) {
+  store_lanes(fold_lanes(codes.first), to.first.data() + at);
+  store_lanes(fold_lanes(codes.second), to.second.data() + at);
+  store_lanes(fold_lanes(codes.length), to.length.data() + at);
 }
 
-constexpr size_t kSampleStrands = 768;
-constexpr size_t kRun = 4;      // side by side in memory: one of them alone would fetch as much
-constexpr double kNoise = 8.0;  // steps; a thirtieth of the bound is not worth predicting
-// Samples are made of true positions. What is decoded in their place lies 0.63 bounds beside them along two
-// axes of three: 93 steps for each, of which a part is shared with the wanted position.
-constexpr double kNoiseNow = 80.0;
-
-/// Strands to fit to: runs at even distances.
-std::vector<uint32_t> sample_places(const Layout& layout) {
-  const size_t step = kRun * std::max<size_t>(1, layout.stride / kSampleStrands);
-  std::vector<uint32_t> places;
-  for (size_t run = step / 2 / kRun * kRun; run < layout.no_neighbour(); run += step)
-    for (size_t place = run; place < run + kRun; ++place)
-      if (layout.strand_at[place] != kNoStrand) places.push_back(static_cast<uint32_t>(place));
-  return places;
+STRANDCAST_LANES void quantise_slice_lanes(const QuantiseWork& work) {
+  const SliceWork& of = work.of;
+  for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
+    const size_t at = row.at(place);
+    const IntLaneVectors wanted = load_vectors(work.target, at);
+    Found found{moved, wanted};
+    find_codes(found);
+    escape_others(found, at, of.frame.codes.escapes[of.slice],
+                  [&](uint32_t lane) STRANDCAST_LANES_LAMBDA { return row.last(at + lane); });
+    store_codes(found.codes, of.frame.codes, at);
+    row.store(moved, place, found.position);
+  });
 }
 
-/// The vertices of a row as samples: like MotionRow, but with `target` in place of what is yet to be decoded.
-class SampleRow {
- public:
-  SampleRow(const Layout& layout, const History& history, const Planes<int32_t>& target, const Frame& frame,
-            uint32_t v)
-      : layout_(layout), history_(history), target_(target), frame_(frame), v_(v) {
-    for (size_t axis = 0; axis < 3; ++axis) rows_[axis] = feature_rows(layout, history, frame, axis, v);
-  }
-
-  size_t at(size_t place) const { return v_ * size_t{layout_.stride} + place; }
-
-  /// What is to become the change of position of the vertex so far from this row.
-  float now(size_t axis, size_t place, int tipward) const {
-    if (tipward < 0 && v_ < static_cast<uint32_t>(-tipward)) return 0.0f;
-    const size_t at = (v_ - static_cast<uint32_t>(-tipward)) * size_t{layout_.stride} + place;
-    return static_cast<float>(wrapping_difference(target_[axis][at], history_.lattice[axis][at]));
-  }
-
-  std::array<float, kMotionFeatureCount> features(size_t axis, size_t place) const {
-    std::array<float, kMotionFeatureCount> value;
-    set_features(value, axis, place, std::make_index_sequence<kMotionFeatures.size()>());
-    for (uint32_t k = 0; k < kHeadStepCount; ++k) {
-      const auto& step = frame_.head.step[k].row[axis];
-      double change = step[3];
-      for (size_t i = 0; i < 3; ++i) change += step[i] * history_.lattice[i][at(place)];
-      value[kHeadFeature + k] = static_cast<float>(change);
-    }
-    return value;
-  }
-
-  /// Vertices that were predicted badly would rule the sums, though they need few bits more than others.
-  float trust(size_t place) const {
-    constexpr float kTypical = 300.0f;  // steps
-    float squares = 0.0f;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const float own = history_.residual[axis][at(place)];
-      const float child =
-          v_ + 1 < layout_.vertex_count ? history_.residual[axis][at(place) + layout_.stride] : 0.0f;
-      squares += own * own + child * child;
-    }
-    return 1.0f / std::sqrt(1.0f + squares / (kTypical * kTypical));
-  }
-
- private:
-  // The table is read while compiling: one load and no branch for each feature.
-  template <size_t... k>
-  void set_features(std::array<float, kMotionFeatureCount>& value, size_t axis, size_t place,
-                    std::index_sequence<k...>) const {
-    ((value[k] = feature<kMotionFeatures[k].quantity, kMotionFeatures[k].tipward>(
-          axis, k, place_of(kMotionFeatures[k].strand, place))),
-     ...);
-  }
-  template <MotionQuantity quantity, int tipward>
-  float feature(size_t axis, size_t k, size_t place) const {
-    if constexpr (quantity == MotionQuantity::Now) return now(axis, place, tipward);
-    return rows_[axis][k][place];
-  }
-  size_t place_of(MotionStrand strand, size_t place) const {
-    if (strand == MotionStrand::Own) return place;
-    return layout_.neighbour[strand == MotionStrand::Neighbour ? 0 : 1][place];
-  }
-
-  const Layout& layout_;
-  const History& history_;
-  const Planes<int32_t>& target_;
-  const Frame& frame_;
-  uint32_t v_;
-  std::array<FeatureRows, 3> rows_;
-};
-
-std::array<double, kMotionFeatureCount> feature_noise() {
-  std::array<double, kMotionFeatureCount> noise;
-  noise.fill(kNoise);
-  for (size_t k = 0; k < kMotionFeatures.size(); ++k)
-    if (kMotionFeatures[k].quantity == MotionQuantity::Now) noise[k] = kNoiseNow;
-  return noise;
-}
-
-void add_row(const SampleRow& row, std::span<const uint32_t> sample, LeastSquares<kMotionFeatureCount>& fit) {
-  for (const uint32_t place : sample) {
-    const float trust = row.trust(place);
-    for (size_t axis = 0; axis < 3; ++axis) {
-      fit.add(row.features(axis, place), row.now(axis, place, 0), trust);
-    }
-  }
-  fit.flush();
-}
-
-/// Share of the last decoded length that predicts the next one best, in 1/16.
-uint8_t fit_length_blend(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                         std::span<const uint32_t> sample) {
-  double numerator = 0.0;
-  double denominator = 0.0;
-  for (uint32_t v = 1; v < layout.vertex_count; ++v) {
-    for (const uint32_t place : sample) {
-      const size_t at = v * static_cast<size_t>(layout.stride) + place;
-      double now = 0.0;
-      double then = 0.0;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const double edge_now = static_cast<double>(target[axis][at]) - target[axis][at - layout.stride];
-        const double edge_then =
-            static_cast<double>(history.lattice[axis][at]) - history.lattice[axis][at - layout.stride];
-        now += edge_now * edge_now;
-        then += edge_then * edge_then;
-      }
-      const double rest = static_cast<double>(layout.rest_length_m[at]) / history.quantum_m;
-      numerator += (std::sqrt(now) - rest) * (std::sqrt(then) - rest);
-      denominator += (std::sqrt(then) - rest) * (std::sqrt(then) - rest);
-    }
-  }
-  if (!(denominator > 0.0)) return 0;
-  return static_cast<uint8_t>(std::lrint(std::clamp(numerator / denominator, 0.0, 1.0) / kLengthWeight));
+STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
+  const SliceWork& of = work.of;
+  for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
+    const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, row.vertex());
+    const Expected expected = shape.expect(place, of.frame.shape_weights);
+    const size_t at = row.at(place);
+    const IntLaneVectors wanted = load_vectors(work.target, at);
+    Found found{expected, wanted, expected.codes_of(moved)};
+    find_codes(found);
+    escape_others(found, at, of.frame.shape_codes.escapes[of.slice],
+                  [&](uint32_t lane) STRANDCAST_LANES_LAMBDA { return lane_of(expected.base, lane); });
+    store_codes(found.codes, of.frame.shape_codes, at);
+    store_codes(found.apart(), of.frame.codes, at);
+    row.store(moved, place, found.position);
+  });
+  of.frame.codes.escapes[of.slice] = of.frame.shape_codes.escapes[of.slice];
 }
 
 }  // namespace
 
-void fit_motion(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                WorkerPool& workers, Frame& frame) {
-  const std::vector<uint32_t> sample = sample_places(layout);
-  frame.length_blend = fit_length_blend(layout, history, target, sample);
-  for_each_part(encode_terms(layout, workers), motion_class_count(layout), [&](uint32_t c) {
-    LeastSquares<kMotionFeatureCount> fit;
-    for (uint32_t v = 0; v < layout.vertex_count; ++v)
-      if (motion_class(layout, v) == c) add_row({layout, history, target, frame, v}, sample, fit);
-    frame.weights[c] = fit.weights(kMotionWeight, feature_noise());
-  });
-  frame.apply_weights();
-}
-
-void quantise_slice(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                    uint32_t slice, Frame& frame) {
-  for_each_block(layout, history, slice, frame,
-                 [&](const MotionRow& row, size_t place, const Expected& moved) {
-                   const size_t at = row.at(place);
-                   const IntLaneVectors wanted = load_vectors(target, at);
-                   Found found{moved, wanted};
-                   find_codes(found);
-                   escape_others(found, at, frame.codes.escapes[slice],
-                                 [&](uint32_t lane) { return row.last(at + lane); });
-                   store_codes(found.codes, frame.codes, at);
-                   row.store(moved, place, found.position);
-                 });
-}
-
-void quantise_anchor(const Layout& layout, const History& history, const Planes<int32_t>& target,
-                     uint32_t slice, Frame& frame) {
-  for_each_block(layout, history, slice, frame,
-                 [&](const MotionRow& row, size_t place, const Expected& moved) {
-                   const ShapeRow shape(layout, history.quantum_m, frame.lattice, row.vertex());
-                   const Expected expected = shape.expect(place, frame.shape_weights);
-                   const size_t at = row.at(place);
-                   const IntLaneVectors wanted = load_vectors(target, at);
-                   Found found{expected, wanted, expected.codes_of(moved)};
-                   find_codes(found);
-                   escape_others(found, at, frame.shape_codes.escapes[slice],
-                                 [&](uint32_t lane) { return lane_of(expected.base, lane); });
-                   store_codes(found.codes, frame.shape_codes, at);
-                   store_codes(found.apart(), frame.codes, at);
-                   row.store(moved, place, found.position);
-                 });
-  frame.codes.escapes[slice] = frame.shape_codes.escapes[slice];
-}
+STRANDCAST_KERNEL(quantise_slice, QuantiseWork);
+STRANDCAST_KERNEL(quantise_anchor, QuantiseWork);
 
 }  // namespace strandcast::tangent

@@ -1,4 +1,4 @@
-// MotionRow: where the vertices of one row (one vertex index, all strands) are expected, four strands at a
+// MotionRow: where the vertices of one row (one vertex index, all strands) are expected, eight strands at a
 // time; what encoder and decoder of the "tangent" codec share. Private to common/strands/tangent.
 //
 // What a vertex costs: 240 floating-point operations (2 x 3 x 25 of them for the prediction), two divisions
@@ -12,12 +12,14 @@
 #include <cstddef>
 #include <span>
 
-#include "common/strands/lanes.h"
+#include "common/simd/raw_lanes.h"
 #include "common/strands/tangent/motion.h"
 
 namespace strandcast::tangent {
 
-static_assert(kBlockSize % kLaneCount == 0);
+using namespace simd::raw;
+
+static_assert(kBlockSize == kLaneCount);
 
 /// What a feature is a value of; "then" is the last frame, "before" the one before that.
 enum class MotionQuantity : uint8_t {
@@ -88,7 +90,7 @@ inline constexpr float kLargestEdge = 4e6f;     // in steps; rounding by adding 
 inline constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23: floats there are whole numbers
 
 /// Nearest whole numbers, ties to even, limited to +-kLargestEdge; -kLargestEdge for NaN.
-STRANDCAST_INLINE IntLanes nearest_lanes(const Lanes& value) {
+STRANDCAST_LANES IntLanes nearest_lanes(const Lanes& value) {
   const Lanes low = value > -kLargestEdge ? value : Lanes{} - kLargestEdge;
   const Lanes within = low < kLargestEdge ? low : Lanes{} + kLargestEdge;
   return to_integers((within + kRounder) - kRounder);
@@ -109,8 +111,15 @@ struct LastAndBase {
 };
 /// sum = (last - base) + weighted features, for as many places; whole blocks. A pass of its own: nothing in
 /// it waits for other places, while the rest of a prediction is one long chain for each block.
-void sum_rows(const FeatureRows& rows, const FloatWeights& weights, const LastAndBase& positions,
-              std::span<float> sum);
+STRANDCAST_LANES void sum_rows(const FeatureRows& rows, const FloatWeights& weights,
+                               const LastAndBase& positions, std::span<float> sum) {
+  for (size_t i = 0; i < sum.size(); i += kLaneCount) {
+    Lanes block =
+        to_floats(wrapping_differences(load_lanes(positions.last + i), load_lanes(positions.base + i)));
+    for (uint32_t k = 0; k < kOwnFeatureCount; ++k) block += weights[k] * load_lanes(rows[k] + i);
+    store_lanes(block, sum.data() + i);
+  }
+}
 
 /// The integers of a block.
 struct CodeLanes {
@@ -119,7 +128,17 @@ struct CodeLanes {
   IntLanes length{};
 };
 
-STRANDCAST_INLINE CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
+/// As fold_sign() and unfold_sign().
+STRANDCAST_LANES UintLanes fold_lanes(const IntLanes& value) {
+  const UintLanes negated = 0u - (UintLanes)value;
+  return (negated << 1) ^ (0u - (negated >> 31));
+}
+STRANDCAST_LANES IntLanes unfold_lanes(const UintLanes& folded) {
+  const UintLanes negated = (folded >> 1) ^ (0u - (folded & 1u));
+  return (IntLanes)(0u - negated);
+}
+
+STRANDCAST_LANES CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
   return {wrapping_sums(a.first, b.first), wrapping_sums(a.second, b.second),
           wrapping_sums(a.length, b.length)};
 }
@@ -128,7 +147,7 @@ STRANDCAST_INLINE CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
 using Lattice = std::array<int32_t, 3>;
 Escape make_escape(size_t at, const Lattice& target, const Lattice& from);
 Lattice escaped(const Escape& escape, const Lattice& from);
-inline Lattice lane_of(const IntLaneVectors& vectors, size_t lane) {
+STRANDCAST_LANES Lattice lane_of(const IntLaneVectors& vectors, size_t lane) {
   return {vectors.axis[0][lane], vectors.axis[1][lane], vectors.axis[2][lane]};
 }
 
@@ -141,7 +160,7 @@ struct Expected {
   Lanes length;
 
   /// Along `edge` and as long.
-  STRANDCAST_INLINE void aim(const LaneVectors& edge) {
+  STRANDCAST_LANES void aim(const LaneVectors& edge) {
     const Lanes squared = dots(edge, edge);
     length = square_roots(squared);
     const Lanes scale = squared > kTinySquared ? 1.0f / length : Lanes{};
@@ -154,7 +173,7 @@ struct Expected {
 
   /// Fills the directions across `along`: an orthonormal basis without branches (Duff et al. 2017, Building
   /// an Orthonormal Basis, Revisited).
-  STRANDCAST_INLINE void find_frames() {
+  STRANDCAST_LANES void find_frames() {
     const auto& [x, y, z] = along.axis;
     const Lanes one = Lanes{} + 1.0f;
     const Lanes sign = z >= 0.0f ? one : -one;
@@ -175,7 +194,7 @@ struct Expected {
     Lanes length;
     IntLanes is_possible;
   };
-  STRANDCAST_INLINE Coordinates coordinates(const LaneVectors& edge) const {
+  STRANDCAST_LANES Coordinates coordinates(const LaneVectors& edge) const {
     constexpr float kSteepest = 0.2f;
     constexpr float kFarthest = 1e5f;
     const Lanes beside = dots(edge, along);
@@ -192,7 +211,7 @@ struct Expected {
     return of;
   }
   /// The integers that come nearest to what `other` expects from the same base.
-  STRANDCAST_INLINE CodeLanes codes_of(const Expected& other) const {
+  STRANDCAST_LANES CodeLanes codes_of(const Expected& other) const {
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) edge.axis[axis] = other.along.axis[axis] * other.length;
     const Coordinates of = coordinates(edge);
@@ -204,7 +223,7 @@ struct Expected {
   }
 
   /// Positions, limited to where rounding holds, that the integers tell.
-  STRANDCAST_INLINE IntLaneVectors placed(const CodeLanes& codes) const {
+  STRANDCAST_LANES IntLaneVectors placed(const CodeLanes& codes) const {
     const Lanes across = to_floats(codes.first) * kTangentStep;
     const Lanes also = to_floats(codes.second) * kTangentStep;
     LaneVectors edge;
@@ -233,7 +252,7 @@ class MotionRow {
   size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
 
   /// The part of the prediction that comes from whole rows, for a slice; before its blocks are expected.
-  void sum_features(uint32_t slice) const {
+  STRANDCAST_LANES void sum_features(uint32_t slice) const {
     const size_t begin = layout_.slice_begin[slice];
     const size_t count = layout_.slice_begin[slice + 1] - begin;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -246,7 +265,7 @@ class MotionRow {
   }
 
   /// Blocks of a slice come in order.
-  STRANDCAST_INLINE void expect(size_t place, Expected& expected) const {
+  STRANDCAST_LANES void expect(size_t place, Expected& expected) const {
     LaneVectors last;
     for (size_t axis = 0; axis < 3; ++axis)
       last.axis[axis] = to_floats(load_lanes(history_.lattice[axis].data() + at(place)));
@@ -266,7 +285,7 @@ class MotionRow {
   }
 
   /// Stores positions and what follows from them.
-  STRANDCAST_INLINE void store(const Expected& expected, size_t place, const IntLaneVectors& position) const {
+  STRANDCAST_LANES void store(const Expected& expected, size_t place, const IntLaneVectors& position) const {
     for (size_t axis = 0; axis < 3; ++axis) {
       const size_t begin = at(place);
       const IntLanes& now = position.axis[axis];
@@ -292,7 +311,7 @@ class MotionRow {
 
  private:
   template <MotionStrand strand>
-  STRANDCAST_INLINE void store_neighbour_sum(size_t axis, size_t place) const {
+  STRANDCAST_LANES void store_neighbour_sum(size_t axis, size_t place) const {
     constexpr uint32_t kFirst = first_feature_of(strand);
     Lanes sum = by_.weights[kFirst] * load_lanes(features_[axis][kFirst] + place);
     for (uint32_t k = kFirst + 1; k < kHeadFeature && kMotionFeatures[k].strand == strand; ++k)
@@ -300,7 +319,7 @@ class MotionRow {
     constexpr size_t kWhich = strand == MotionStrand::Neighbour ? 0 : 1;
     store_lanes(sum, frame_.neighbour_sum[kWhich][axis].data() + place);
   }
-  STRANDCAST_INLINE Lanes known_length(size_t place) const {
+  STRANDCAST_LANES Lanes known_length(size_t place) const {
     const Lanes rest = load_lanes(layout_.rest_length_m.data() + at(place)) / history_.quantum_m;
     if (frame_.length_blend == 0) return rest;
     LaneVectors edge;
@@ -327,13 +346,13 @@ class MotionRow {
 /// row of the block, its first place, and where the motion lets expect its vertices, and stores what they
 /// become.
 template <class Work>
-STRANDCAST_INLINE void for_each_block(const Layout& layout, const History& history, uint32_t slice,
-                                      Frame& frame, Work work) {
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    const MotionRow row(layout, history, frame, v);
-    row.sum_features(slice);
-    for (size_t place = layout.slice_begin[slice]; place < layout.slice_begin[slice + 1];
-         place += kLaneCount) {
+STRANDCAST_LANES void for_each_block(const SliceWork& of, Work work) {
+  const uint32_t begin = of.layout.slice_begin[of.slice];
+  const uint32_t end = of.layout.slice_begin[of.slice + 1];
+  for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
+    const MotionRow row(of.layout, of.history, of.frame, v);
+    row.sum_features(of.slice);
+    for (size_t place = begin; place < end; place += kLaneCount) {
       Expected moved;
       row.expect(place, moved);
       work(row, place, moved);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <utility>
 
 #include "common/base/check.h"
@@ -9,184 +10,287 @@
 namespace strandcast::tangent {
 namespace {
 
-constexpr uint16_t kLargestSize = 4000;  // sums of nine stay small
-constexpr uint16_t kEscapeSize = 64;
-constexpr uint8_t kLargestLengthSize = 2;
+constexpr uint32_t kLargestSize = 4000;  // sums of nine stay small
+constexpr uint32_t kEscapeSize = 64;
+constexpr uint32_t kLargestLengthSize = 2;
 constexpr uint32_t kSizeBits = 8;  // of a sum of sizes; larger sums are halved until they have as many
-
-/// Which table to use and how many low bits to leave out of it, from a weighted sum of the sizes near by.
-struct Size {
-  uint32_t index;
-  uint32_t shift;
-};
+constexpr uint32_t kEscapeLengthBits = 6;
+constexpr uint32_t kLengthSums = 5;  // of what two lengths near by can be together
 
 constexpr uint32_t size_class(uint32_t sum) {
   const auto width = static_cast<uint32_t>(std::bit_width(sum));
   return width < 3 ? sum : std::min(4 * (width - 2) + ((sum >> (width - 3)) & 3u), kSizeCount - 1);
 }
 
-/// Of all sums that need no shift.
-constexpr auto kSizeClasses = [] {
+/// Of sums with no more than kSizeBits bits: which tables for both coordinates, and the first of those for
+/// the length.
+template <class Class>
+constexpr auto classes_of(Class class_of) {
   std::array<uint8_t, 1u << kSizeBits> classes{};
-  for (uint32_t sum = 0; sum < classes.size(); ++sum) classes[sum] = static_cast<uint8_t>(size_class(sum));
+  for (uint32_t sum = 0; sum < classes.size(); ++sum) classes[sum] = static_cast<uint8_t>(class_of(sum));
   return classes;
-}();
+}
+constexpr auto kSizeClasses = classes_of(size_class);
+constexpr auto kLengthClasses = classes_of([](uint32_t sum) {
+  return kLengthSums * (sum < 8 ? 0u : sum < 32 ? 1u : 2u);
+});
 
-Size size_of(uint32_t sum) {
-  if (sum < kSizeClasses.size()) return {kSizeClasses[sum], 0};
-  const uint32_t shift = static_cast<uint32_t>(std::bit_width(sum)) - kSizeBits;
-  return {kSizeClasses[sum >> shift], shift};
+/// Of what is folded (fold_sign).
+STRANDCAST_LANES uint32_t magnitude(uint32_t folded) {
+  return (folded >> 1) + (folded & 1u);
 }
 
-uint32_t magnitude(int32_t value) {
-  const auto bits = static_cast<uint32_t>(value);
-  return value < 0 ? 0u - bits : bits;
-}
+/// Which tables to use and how many low bits to leave out of them. Sums are mostly so small that no bits are.
+template <bool has_shift>
+struct Size {
+  uint32_t size;
+  uint32_t length;
+  uint32_t shift = 0;
 
-/// Writes values that are known.
-struct WritePort {
-  ValueWriter& writer;
-  void code(int32_t& value, SymbolTable& table, uint32_t shift) {
-    writer.put(fold_sign(value), table, shift);
+  STRANDCAST_LANES explicit Size(uint32_t near) {
+    if constexpr (has_shift) shift = static_cast<uint32_t>(std::bit_width(near)) - kSizeBits;
+    size = kSizeClasses[near >> shift];
+    length = kLengthClasses[near >> shift];
   }
-  void code_likely_zero(int32_t& value, SymbolTable& table) { code(value, table, 0); }
-  void code_escape(std::vector<Escape>::const_iterator& next) {
-    for (const int32_t step : next->step) {
-      const uint32_t folded = fold_sign(step);
-      const auto length = static_cast<uint32_t>(std::bit_width(folded));
-      writer.put_bits(length, kEscapeLengthBits);
-      writer.put_bits(folded, length);
-    }
-    ++next;
-  }
-  static constexpr uint32_t kEscapeLengthBits = 6;
-};
-
-/// Reads values and stores them.
-struct ReadPort {
-  ValueReader& reader;
-  void code(int32_t& value, SymbolTable& table, uint32_t shift) {
-    value = unfold_sign(reader.take(table, shift));
-  }
-  void code_likely_zero(int32_t& value, SymbolTable& table) {
-    value = unfold_sign(reader.take_likely_zero(table));
-  }
-  std::array<int32_t, 3> take_escape() {
-    std::array<int32_t, 3> step;
-    for (int32_t& one : step) {
-      const uint32_t length = std::min(reader.take_bits(WritePort::kEscapeLengthBits), 32u);
-      one = unfold_sign(reader.take_bits(length));
-    }
-    return step;
+  /// Of the second coordinate.
+  STRANDCAST_LANES uint32_t second_table(uint32_t first) const {
+    const uint32_t first_size = magnitude(first) >> shift;
+    return size * kFirstSizes + (first_size < kFirstSizes ? first_size : kFirstSizes - 1);
   }
 };
 
-/// Sizes around a row.
-struct SizeRows {
-  const uint16_t* own_then;
-  const uint16_t* child_then;
-  const uint16_t* parent;
-  const uint16_t* grandparent;
-  uint16_t* now;
-  const uint8_t* length_then;
-  const uint8_t* length_parent;
-  uint8_t* length_now;
+/// work(size) for a sum.
+template <class Work>
+STRANDCAST_LANES void with_size(uint32_t near, Work work) {
+  if (near < kSizeClasses.size()) [[likely]]
+    work(Size<false>(near));
+  else
+    work(Size<true>(near));
+}
+
+/// Twice the magnitude of what is folded, limited.
+STRANDCAST_LANES uint32_t doubled(uint32_t folded) {
+  constexpr uint32_t kLimit = 2 * kLargestSize;
+  return ((folded < kLimit ? folded : kLimit) + 1u) & ~1u;
+}
+STRANDCAST_LANES uint16_t across_size(uint32_t first, uint32_t second) {
+  const uint32_t sum = doubled(first) + doubled(second);
+  return static_cast<uint16_t>(sum < kLargestSize ? sum : kLargestSize);
+}
+STRANDCAST_LANES uint8_t length_size(uint32_t length) {
+  constexpr uint32_t kLimit = 2 * kLargestLengthSize;
+  return static_cast<uint8_t>(((length < kLimit ? length : kLimit) + 1u) >> 1);
+}
+
+/// The tables of a slice by what they are for.
+struct TableSet {
+  SymbolTable* first;
+  SymbolTable* second;
+  SymbolTable* length;
+
+  explicit TableSet(Tables& tables)
+      : first(tables.data()), second(first + kSizeCount), length(second + kSizeCount * kFirstSizes) {}
+};
+
+/// A row and the sizes around it. Only pointers, to be kept in registers.
+struct SymbolRow {
+  const uint16_t* known;        // sum of sizes that do not wait for others of the row
+  const uint8_t* known_length;  // likewise of lengths
   const uint32_t* neighbour;
   const uint32_t* second_neighbour;
+  uint16_t* across;  // sizes of the row, to be filled
+  uint8_t* length;
 
-  SizeRows(const Layout& layout, const SymbolSizes& then, SymbolSizes& sizes, uint32_t v,
-           const uint16_t* zeros, const uint8_t* zero_bytes) {
-    const size_t stride = layout.stride;
-    const size_t begin = v * stride;
-    now = sizes.across.data() + begin;
-    own_then = then.across.data() + begin;
-    child_then = v + 1 < layout.vertex_count ? own_then + stride : zeros;
-    parent = v >= 1 ? now - stride : zeros;
-    grandparent = v >= 2 ? now - 2 * stride : zeros;
-    length_now = sizes.length.data() + begin;
-    length_then = then.length.data() + begin;
-    length_parent = v >= 1 ? length_now - stride : zero_bytes;
-    neighbour = layout.neighbour[0].data();
-    second_neighbour = layout.neighbour[1].data();
-  }
-  uint32_t near(size_t place) const {
-    return 2u * own_then[place] + 2u * parent[place] + grandparent[place] + child_then[place] +
-           2u * now[neighbour[place]] + now[second_neighbour[place]];
+  STRANDCAST_LANES uint32_t near(size_t place) const {
+    return known[place] + 2u * across[neighbour[place]] + across[second_neighbour[place]];
   }
 };
 
-uint32_t length_table(uint32_t near, const SizeRows& rows, size_t place) {
-  const uint32_t calm = near < 8 ? 0u : near < 32 ? 1u : 2u;
-  return 5u * calm + rows.length_parent[place] + rows.length_then[place];
-}
-
-/// The integers of one vertex; true when it is escaped.
-template <class Port>
-bool code_vertex(uint32_t near, SizeRows& rows, size_t place, int32_t& first, int32_t& second,
-                 int32_t& length, Tables& tables, Port& port) {
-  SymbolTable* const firsts = tables.data();
-  SymbolTable* const seconds = firsts + kSizeCount;
-  SymbolTable* const lengths = seconds + kSizeCount * kFirstSizes;
-  port.code_likely_zero(length, lengths[length_table(near, rows, place)]);
-  if (length == kEscapedLength) {
-    first = second = 0;
-    rows.now[place] = kEscapeSize;
-    rows.length_now[place] = kLargestLengthSize;
-    return true;
-  }
-  const Size size = size_of(near);
-  port.code(first, firsts[size.index], size.shift);
-  const uint32_t first_size = std::min(magnitude(first) >> size.shift, kFirstSizes - 1);
-  port.code(second, seconds[size.index * kFirstSizes + first_size], size.shift);
-  const uint32_t across = std::min<uint32_t>(magnitude(first), kLargestSize) +
-                          std::min<uint32_t>(magnitude(second), kLargestSize);
-  rows.now[place] = static_cast<uint16_t>(std::min<uint32_t>(2 * across, kLargestSize));
-  rows.length_now[place] = static_cast<uint8_t>(std::min<uint32_t>(magnitude(length), kLargestLengthSize));
-  return false;
-}
-
-/// Strands of a slice; places without one are the last.
-size_t strands_in(const Layout& layout, uint32_t slice) {
-  size_t end = layout.slice_begin[slice + 1];
-  while (end > layout.slice_begin[slice] && layout.strand_at[end - 1] == kNoStrand) --end;
-  return end - layout.slice_begin[slice];
-}
-
-/// What goes through the integers of a slice row by row; coder(at, rows around it, place) does one vertex.
-template <class Coder>
-class SymbolWalk {
+/// Sizes of the frame before and of this one.
+class SizeRows {
  public:
-  SymbolWalk(const Layout& layout, uint32_t slice, const SymbolSizes& then, SymbolSizes& now, Coder coder)
+  SizeRows(const Layout& layout, const SymbolSizes& then, SymbolSizes& now)
       : layout_(layout),
-        begin_(layout.slice_begin[slice]),
-        count_(strands_in(layout, slice)),
-        zeros_(layout.stride, 0),
-        zero_bytes_(layout.stride, 0),
         then_(then),
         now_(now),
-        rows_(layout, then, now, 0, zeros_.data(), zero_bytes_.data()),
-        coder_(std::move(coder)) {}
+        zeros_(layout.stride, 0),
+        zero_bytes_(layout.stride, 0),
+        known_(layout.stride, 0),
+        known_length_(layout.stride, 0) {}
 
-  size_t strand_count() const { return count_; }
-  void begin_row(uint32_t v) {
-    row_ = v * static_cast<size_t>(layout_.stride);
-    rows_ = SizeRows(layout_, then_, now_, v, zeros_.data(), zero_bytes_.data());
+  /// Row v, with what is known of `count` places from `begin` on. The sizes of their lengths are 0.
+  STRANDCAST_LANES SymbolRow begin_row(uint32_t v, size_t begin, size_t count) {
+    const size_t stride = layout_.stride;
+    uint16_t* const across = now_.across.data() + v * stride;
+    uint8_t* const length = now_.length.data() + v * stride;
+    const uint16_t* const own = then_.across.data() + v * stride + begin;
+    const uint16_t* const child = v + 1 < layout_.vertex_count ? own + stride : zeros_.data() + begin;
+    const uint16_t* const parent = (v >= 1 ? across - stride : zeros_.data()) + begin;
+    const uint16_t* const grandparent = (v >= 2 ? across - 2 * stride : zeros_.data()) + begin;
+    const uint8_t* const own_length = then_.length.data() + v * stride + begin;
+    const uint8_t* const parent_length = (v >= 1 ? length - stride : zero_bytes_.data()) + begin;
+    uint16_t* __restrict sum = known_.data() + begin;
+    for (size_t i = 0; i < count; ++i)
+      sum[i] = static_cast<uint16_t>(2u * (uint32_t{own[i]} + parent[i]) + grandparent[i] + child[i]);
+    uint8_t* __restrict length_sum = known_length_.data() + begin;
+    for (size_t i = 0; i < count; ++i) length_sum[i] = static_cast<uint8_t>(own_length[i] + parent_length[i]);
+    std::memset(length + begin, 0, count);
+    return {
+        known_.data(), known_length_.data(), layout_.neighbour[0].data(), layout_.neighbour[1].data(), across,
+        length};
   }
-  /// The strand at position i of the slice.
-  void code(size_t i) { coder_(row_ + begin_ + i, rows_, begin_ + i); }
 
  private:
   const Layout& layout_;
-  size_t begin_;
-  size_t count_;
-  std::vector<uint16_t> zeros_;
-  std::vector<uint8_t> zero_bytes_;
   const SymbolSizes& then_;
   SymbolSizes& now_;
-  size_t row_ = 0;
-  SizeRows rows_;
-  Coder coder_;
+  std::vector<uint16_t> zeros_;
+  std::vector<uint8_t> zero_bytes_;
+  std::vector<uint16_t> known_;
+  std::vector<uint8_t> known_length_;
 };
+
+void write_escape(const Escape& escape, ValueWriter& writer) {
+  for (const int32_t step : escape.step) {
+    const uint32_t folded = fold_sign(step);
+    const auto length = static_cast<uint32_t>(std::bit_width(folded));
+    writer.put_bits(length, kEscapeLengthBits);
+    writer.put_bits(folded, length);
+  }
+}
+
+std::array<int32_t, 3> read_escape(ValueReader& reader) {
+  std::array<int32_t, 3> step;
+  for (int32_t& one : step) {
+    const uint32_t length = std::min(reader.take_bits(kEscapeLengthBits), 32u);
+    one = unfold_sign(reader.take_bits(length));
+  }
+  return step;
+}
+
+STRANDCAST_LANES void write_symbols_lanes(const SymbolWriting& of) {
+  const size_t begin = of.layout.slice_begin[of.slice];
+  const size_t count = of.layout.strands_in[of.slice];
+  const TableSet tables(of.tables);
+  auto escape = of.codes.escapes[of.slice].begin();
+  SizeRows sizes(of.layout, of.then, of.now);
+  for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
+    const size_t at = v * static_cast<size_t>(of.layout.stride);
+    const uint32_t* const first = of.codes.first.data() + at;
+    const uint32_t* const second = of.codes.second.data() + at;
+    const uint32_t* const length = of.codes.length.data() + at;
+    const SymbolRow row = sizes.begin_row(v, begin, count);
+    for (size_t place = begin; place < begin + count; ++place)
+      row.across[place] = length[place] == kEscapedFolded ? static_cast<uint16_t>(kEscapeSize)
+                                                          : across_size(first[place], second[place]);
+    for (size_t place = begin; place < begin + count; ++place) row.length[place] = length_size(length[place]);
+    SymbolStep* next = of.writer.begin_run(3 * count);
+    for (size_t place = begin; place < begin + count; ++place) {
+      with_size(row.near(place), [&](const auto size) STRANDCAST_LANES_LAMBDA {
+        of.writer.put(length[place], tables.length[size.length + row.known_length[place]], 0, next);
+        if (length[place] == kEscapedFolded) [[unlikely]]
+          return write_escape(*escape++, of.writer);
+        of.writer.put(first[place], tables.first[size.size], size.shift, next);
+        of.writer.put(second[place], tables.second[size.second_table(first[place])], size.shift, next);
+      });
+    }
+    of.writer.end_run(next);
+  }
+}
+
+/// One of the slices that are read side by side.
+struct SliceReader {
+  size_t begin;
+  size_t count;
+  TableSet tables;
+  ValueReader& reader;
+  std::vector<Escape>& escapes;
+};
+
+/// The integers of a row.
+struct CodeRow {
+  uint32_t* first;
+  uint32_t* second;
+  uint32_t* length;  // zeros
+  size_t at;         // in a plane
+
+  STRANDCAST_LANES CodeRow(Codes& codes, size_t begin)
+      : first(codes.first.data() + begin),
+        second(codes.second.data() + begin),
+        length(codes.length.data() + begin),
+        at(begin) {}
+};
+
+/// A length that is not 0; true when the vertex is escaped.
+STRANDCAST_LANES bool read_length(const SliceReader& slice, SymbolCursor& cursor, SymbolTable& table,
+                                  const SymbolRow& row, const CodeRow& codes, size_t place) {
+  const uint32_t length = slice.reader.value_of(cursor.take(table), 0);
+  codes.length[place] = length;
+  row.length[place] = length_size(length);
+  if (length != kEscapedFolded) return false;
+  codes.first[place] = codes.second[place] = 0;
+  row.across[place] = kEscapeSize;
+  if (!slice.reader.is_short()) slice.escapes.push_back({codes.at + place, read_escape(slice.reader)});
+  return true;
+}
+
+STRANDCAST_LANES void read_vertex(const SliceReader& slice, SymbolCursor& cursor, const SymbolRow& row,
+                                  const CodeRow& codes, size_t place) {
+  with_size(row.near(place), [&](const auto size) STRANDCAST_LANES_LAMBDA {
+    SymbolTable& lengths = slice.tables.length[size.length + row.known_length[place]];
+    if (!cursor.take_zero(lengths)) [[unlikely]]
+      if (read_length(slice, cursor, lengths, row, codes, place)) return;
+    const uint32_t first = slice.reader.value_of(cursor.take(slice.tables.first[size.size]), size.shift);
+    const uint32_t second =
+        slice.reader.value_of(cursor.take(slice.tables.second[size.second_table(first)]), size.shift);
+    codes.first[place] = first;
+    codes.second[place] = second;
+    row.across[place] = across_size(first, second);
+  });
+}
+
+/// As many slices side by side as there are k.
+template <size_t... k>
+STRANDCAST_LANES void read_slices(const SymbolReading& of, std::index_sequence<k...>) {
+  constexpr size_t kAtOnce = sizeof...(k);
+  const auto make_reader = [&](const SliceSymbols& symbols) STRANDCAST_LANES_LAMBDA {
+    of.codes.escapes[symbols.slice].clear();
+    return SliceReader{of.layout.slice_begin[symbols.slice], of.layout.strands_in[symbols.slice],
+                       TableSet(symbols.tables), symbols.reader, of.codes.escapes[symbols.slice]};
+  };
+  const std::array<SliceReader, kAtOnce> slices = {make_reader(of.slices[k])...};
+  const size_t common = std::min({slices[k].count...});
+  SizeRows sizes(of.layout, of.then, of.now);
+  for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
+    const CodeRow codes(of.codes, v * static_cast<size_t>(of.layout.stride));
+    for (const SliceReader& slice : slices)
+      std::memset(codes.length + slice.begin, 0, slice.count * sizeof(uint32_t));
+    const std::array<SymbolRow, kAtOnce> rows = {sizes.begin_row(v, slices[k].begin, slices[k].count)...};
+    std::array<SymbolCursor, kAtOnce> cursors = {slices[k].reader.begin_run(3 * slices[k].count)...};
+    for (size_t i = 0; i < common; ++i)
+      (read_vertex(slices[k], cursors[k], rows[0], codes, slices[k].begin + i), ...);
+    const auto read_rest = [&](const SliceReader& slice, SymbolCursor cursor) STRANDCAST_LANES_LAMBDA {
+      for (size_t i = common; i < slice.count; ++i)
+        read_vertex(slice, cursor, rows[0], codes, slice.begin + i);
+      slice.reader.end_run(cursor);
+    };
+    (read_rest(slices[k], cursors[k]), ...);
+  }
+}
+
+STRANDCAST_LANES void read_symbols_lanes(const SymbolReading& of) {
+  switch (of.slices.size()) {
+    case 1:
+      return read_slices(of, std::make_index_sequence<1>());
+    case 2:
+      return read_slices(of, std::make_index_sequence<2>());
+    case 3:
+      return read_slices(of, std::make_index_sequence<3>());
+    default:
+      CHECK(of.slices.size() == kMostSlicesAtOnce);
+      return read_slices(of, std::make_index_sequence<kMostSlicesAtOnce>());
+  }
+}
 
 SymbolTable first_table() {
   // Shares fall by a quarter from symbol to symbol; a few hundred values later that is forgotten.
@@ -217,7 +321,7 @@ void code_weights(uint32_t class_count, MotionWeights& weights, Code code) {
       const int32_t difference = code(weights[c][k] - before[k], table, width < 2 ? 0 : width - 2);
       weights[c][k] =
           static_cast<int16_t>(static_cast<uint32_t>(int32_t{before[k]}) + static_cast<uint32_t>(difference));
-      left = std::min(magnitude(difference), kLargest);
+      left = std::min(magnitude(fold_sign(difference)), kLargest);
       size[k] = left;
     }
     before = weights[c];
@@ -264,50 +368,7 @@ void SymbolSizes::reset(const Layout& layout) {
   length.assign(layout.plane_size(), 0);
 }
 
-void write_symbols(const Layout& layout, uint32_t slice, const Codes& codes, const SymbolSizes& then,
-                   SymbolSizes& now, Tables& tables, ValueWriter& writer) {
-  WritePort port{writer};
-  auto escape = codes.escapes[slice].begin();
-  SymbolWalk walk(layout, slice, then, now, [&](size_t at, SizeRows& rows, size_t place) {
-    int32_t first = codes.first[at];
-    int32_t second = codes.second[at];
-    int32_t length = codes.length[at];
-    if (code_vertex(rows.near(place), rows, place, first, second, length, tables, port))
-      port.code_escape(escape);
-  });
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    walk.begin_row(v);
-    for (size_t i = 0; i < walk.strand_count(); ++i) walk.code(i);
-  }
-}
-
-void read_symbols(const Layout& layout, const SymbolSizes& then, Codes& codes, SymbolSizes& now,
-                  std::span<SliceSymbols> slices) {
-  const auto make_walk = [&](SliceSymbols& symbols) {
-    codes.escapes[symbols.slice].clear();
-    return SymbolWalk(layout, symbols.slice, then, now,
-                      [&, port = ReadPort{symbols.reader}](size_t at, SizeRows& rows, size_t place) mutable {
-                        if (code_vertex(rows.near(place), rows, place, codes.first[at], codes.second[at],
-                                        codes.length[at], symbols.tables, port) &&
-                            !symbols.reader.is_short())
-                          codes.escapes[symbols.slice].push_back({at, port.take_escape()});
-                      });
-  };
-  CHECK(!slices.empty() && slices.size() <= kSlicesAtOnce);
-  auto one = make_walk(slices.front());
-  auto other = make_walk(slices.back());
-  const size_t other_count = slices.size() == 1 ? 0 : other.strand_count();
-  const size_t common = std::min(one.strand_count(), other_count);
-  for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-    one.begin_row(v);
-    other.begin_row(v);
-    for (size_t i = 0; i < common; ++i) {
-      one.code(i);
-      other.code(i);
-    }
-    for (size_t i = common; i < one.strand_count(); ++i) one.code(i);
-    for (size_t i = common; i < other_count; ++i) other.code(i);
-  }
-}
+STRANDCAST_KERNEL(write_symbols, SymbolWriting);
+STRANDCAST_KERNEL(read_symbols, SymbolReading);
 
 }  // namespace strandcast::tangent

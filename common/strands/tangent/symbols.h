@@ -37,9 +37,18 @@ void write_weights(uint32_t class_count, const MotionWeights& weights, ValueWrit
 /// The inverse, from untrusted bytes: any bytes give some weights.
 void read_weights(uint32_t class_count, MotionWeights& weights, ValueReader& reader);
 
-/// Writes a slice's integers and escapes; `then` are the sizes of the frame before, `now` is filled.
-void write_symbols(const Layout& layout, uint32_t slice, const Codes& codes, const SymbolSizes& then,
-                   SymbolSizes& now, Tables& tables, ValueWriter& writer);
+/// A slice to be written; `then` are the sizes of the frame before, `now` is filled.
+struct SymbolWriting {
+  const Layout& layout;
+  uint32_t slice;
+  const Codes& codes;
+  const SymbolSizes& then;
+  SymbolSizes& now;
+  Tables& tables;
+  ValueWriter& writer;
+};
+/// Writes a slice's integers and escapes. A kernel for every instruction set.
+void write_symbols(simd::InstructionSet set, const SymbolWriting& of);
 
 /// A slice to be read.
 struct SliceSymbols {
@@ -48,10 +57,16 @@ struct SliceSymbols {
   ValueReader& reader;
 };
 /// As many are read side by side: a symbol waits for the one before it in its slice, but for no other slice.
-inline constexpr uint32_t kSlicesAtOnce = 2;
-/// The inverse, from untrusted bytes, for one to kSlicesAtOnce slices: any bytes give some integers; escapes
-/// take bytes, so there are no more than there is room for.
-void read_symbols(const Layout& layout, const SymbolSizes& then, Codes& codes, SymbolSizes& now,
-                  std::span<SliceSymbols> slices);
+inline constexpr uint32_t kMostSlicesAtOnce = 4;
+struct SymbolReading {
+  const Layout& layout;
+  const SymbolSizes& then;
+  Codes& codes;
+  SymbolSizes& now;
+  std::span<SliceSymbols> slices;  // one to kMostSlicesAtOnce
+};
+/// The inverse, from untrusted bytes: any bytes give some integers; escapes take bytes, so there are no more
+/// than there is room for. A kernel for every instruction set.
+void read_symbols(simd::InstructionSet set, const SymbolReading& of);
 
 }  // namespace strandcast::tangent

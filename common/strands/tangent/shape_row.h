@@ -1,19 +1,36 @@
-#include "common/strands/tangent/shape.h"
+// ShapeRow: where the vertices of one row are expected from the shape of the strands alone, eight strands at
+// a time: from the edges nearer to the root, the neighbours and the rest shape, without any frame before.
+// What keyframes of the "tangent" codec are predicted by. Private to common/strands/tangent.
+#pragma once
 
-#include "common/strands/least_squares.h"
+#include "common/strands/tangent/row.h"
 
 namespace strandcast::tangent {
-namespace {
+
+// Features of a vertex, each a vector: an edge (for a root its position, which tells nothing to others) or
+// what follows from edges. A bend is an edge less what it would be had it turned from its rest edge like its
+// parent; an edge x *turned* by another one is x after the smallest rotation that takes that one's rest edge
+// to its direction.
+//   0 rest             1 parent            2 grandparent      3 parent's rest
+//   4 neighbour        5 its parent        6 its rest         7 to 9 second neighbour likewise
+//  10 rest turned by the parent           11 by the neighbour                 12 by the second neighbour
+//  13 parent's bend                       14 neighbour's bend                 15 second neighbour's bend
+using ShapeFeatures = std::array<LaneVectors, kShapeFeatureCount>;
+
+/// Which weights serve a row.
+inline uint32_t shape_class(uint32_t v) {
+  return std::min(v, kShapeClassCount - 1);
+}
 
 using Places = std::array<uint32_t, kLaneCount>;
 
-STRANDCAST_INLINE LaneVectors difference(const LaneVectors& a, const LaneVectors& b) {
+STRANDCAST_LANES LaneVectors difference(const LaneVectors& a, const LaneVectors& b) {
   return {a.axis[0] - b.axis[0], a.axis[1] - b.axis[1], a.axis[2] - b.axis[2]};
 }
 
 /// `x` turned by the smallest rotation that takes the direction of `from` to that of `to`; zero where there
 /// is none.
-STRANDCAST_INLINE LaneVectors turned(const LaneVectors& x, const LaneVectors& from, const LaneVectors& to) {
+STRANDCAST_LANES LaneVectors turned(const LaneVectors& x, const LaneVectors& from, const LaneVectors& to) {
   constexpr float kTiny = 1.0f;
   constexpr float kLargest = 1e15f;
   constexpr float kLeastSum = 0.05f;  // of one and the cosine
@@ -48,7 +65,7 @@ struct Edges {
   float quantum_m;
   const Planes<int32_t>& position;
 
-  STRANDCAST_INLINE LaneVectors now(const uint32_t* place, uint32_t v) const {
+  STRANDCAST_LANES LaneVectors now(const uint32_t* place, uint32_t v) const {
     const size_t row = v * static_cast<size_t>(layout.stride);
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -59,7 +76,7 @@ struct Edges {
     }
     return edge;
   }
-  STRANDCAST_INLINE LaneVectors rest(const uint32_t* place, uint32_t v) const {
+  STRANDCAST_LANES LaneVectors rest(const uint32_t* place, uint32_t v) const {
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
       const float* plane = layout.rest_edge_m[axis].data() + v * static_cast<size_t>(layout.stride);
@@ -69,9 +86,26 @@ struct Edges {
   }
 };
 
-}  // namespace
+class ShapeRow {
+ public:
+  /// `position` is known for earlier rows and for earlier blocks of this one.
+  ShapeRow(const Layout& layout, float quantum_m, const Planes<int32_t>& position, uint32_t v)
+      : layout_(layout), quantum_m_(quantum_m), position_(position), v_(v) {}
 
-IntLaneVectors ShapeRow::base(size_t place) const {
+  ShapeFeatures features(size_t place) const;
+  Expected expect(size_t place, const ShapeWeights& weights) const;
+  size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
+  /// Of the vertices before, or the origin.
+  IntLaneVectors base(size_t place) const;
+
+ private:
+  const Layout& layout_;
+  float quantum_m_;
+  const Planes<int32_t>& position_;
+  uint32_t v_;
+};
+
+STRANDCAST_LANES IntLaneVectors ShapeRow::base(size_t place) const {
   IntLaneVectors base{};
   if (v_ == 0) return base;
   for (size_t axis = 0; axis < 3; ++axis)
@@ -79,7 +113,7 @@ IntLaneVectors ShapeRow::base(size_t place) const {
   return base;
 }
 
-ShapeFeatures ShapeRow::features(size_t place) const {
+STRANDCAST_LANES ShapeFeatures ShapeRow::features(size_t place) const {
   const Edges edges{layout_, quantum_m_, position_};
   Places own;
   for (uint32_t lane = 0; lane < kLaneCount; ++lane) own[lane] = static_cast<uint32_t>(place) + lane;
@@ -110,7 +144,7 @@ ShapeFeatures ShapeRow::features(size_t place) const {
   return value;
 }
 
-Expected ShapeRow::expect(size_t place, const ShapeWeights& weights) const {
+STRANDCAST_LANES Expected ShapeRow::expect(size_t place, const ShapeWeights& weights) const {
   const ShapeFeatures value = features(place);
   const auto& weight = weights[shape_class(v_)];
   LaneVectors edge{};
@@ -123,46 +157,6 @@ Expected ShapeRow::expect(size_t place, const ShapeWeights& weights) const {
   const Lanes rest = load_lanes(layout_.rest_length_m.data() + at(place)) / quantum_m_;
   expected.length = rest > 0.0f ? rest : expected.length;
   return expected;
-}
-
-namespace {
-
-void add_block(const ShapeRow& row, const Planes<int32_t>& target, size_t place,
-               LeastSquares<kShapeFeatureCount>& fit) {
-  const ShapeFeatures value = row.features(place);
-  const IntLaneVectors base = row.base(place);
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const IntLanes end = load_lanes(target[axis].data() + row.at(place));
-    const Lanes wanted = to_floats(wrapping_differences(end, base.axis[axis]));
-    for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
-      std::array<float, kShapeFeatureCount> sample;
-      for (uint32_t k = 0; k < kShapeFeatureCount; ++k) sample[k] = value[k].axis[axis][lane];
-      fit.add(sample, wanted[lane], 1.0f);
-    }
-  }
-}
-
-}  // namespace
-
-ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
-                       WorkerPool& workers) {
-  constexpr size_t kStep = 4 * kLaneCount;
-  constexpr double kNoise = 150.0;  // steps: what edges are off by
-  std::array<double, kShapeFeatureCount> noise;
-  noise.fill(kNoise);
-  ShapeWeights weights;
-  for_each_part(encode_terms(layout, workers), kShapeClassCount, [&](uint32_t c) {
-    LeastSquares<kShapeFeatureCount> fit;
-    for (uint32_t v = 0; v < layout.vertex_count; ++v) {
-      if (shape_class(v) != c) continue;
-      const ShapeRow row(layout, quantum_m, target, v);
-      for (size_t place = 0; place < layout.no_neighbour(); place += kStep)
-        add_block(row, target, place, fit);
-    }
-    fit.flush();
-    weights[c] = fit.weights(kShapeWeight, noise);
-  });
-  return weights;
 }
 
 }  // namespace strandcast::tangent

@@ -1,0 +1,84 @@
+// What the decoder of the "tangent" codec does with the integers of a slice: positions and what follows from
+// them.
+#include <vector>
+
+#include "common/strands/tangent/shape_row.h"
+
+namespace strandcast::tangent {
+namespace {
+
+STRANDCAST_LANES CodeLanes load_codes(const Codes& codes, size_t at) {
+  return {unfold_lanes(load_lanes(codes.first.data() + at)),
+          unfold_lanes(load_lanes(codes.second.data() + at)),
+          unfold_lanes(load_lanes(codes.length.data() + at))};
+}
+
+/// Goes through the escapes of a slice with its blocks.
+class EscapeWalk {
+ public:
+  explicit EscapeWalk(const std::vector<Escape>& escapes) : next_(escapes.begin()), end_(escapes.end()) {}
+
+  /// Puts the escaped vertices of the block that begins at `at` where they belong; from(lane) is where their
+  /// escapes count from.
+  template <class From>
+  STRANDCAST_LANES void place(size_t at, IntLaneVectors& position, From from) {
+    for (; next_ != end_ && next_->at < at + kLaneCount; ++next_) {
+      const size_t lane = next_->at - at;
+      const Lattice point = escaped(*next_, from(lane));
+      for (size_t axis = 0; axis < 3; ++axis) position.axis[axis][lane] = point[axis];
+    }
+  }
+
+ private:
+  std::vector<Escape>::const_iterator next_;
+  std::vector<Escape>::const_iterator end_;
+};
+
+STRANDCAST_LANES void place_slice_lanes(const SliceWork& of) {
+  EscapeWalk escapes(of.frame.codes.escapes[of.slice]);
+  for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
+    const size_t at = row.at(place);
+    IntLaneVectors position = moved.placed(load_codes(of.frame.codes, at));
+    escapes.place(at, position, [&](size_t lane) STRANDCAST_LANES_LAMBDA { return row.last(at + lane); });
+    row.store(moved, place, position);
+  });
+}
+
+STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
+  EscapeWalk escapes(of.frame.codes.escapes[of.slice]);
+  for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
+    const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, row.vertex());
+    const Expected expected = shape.expect(place, of.frame.shape_weights);
+    const size_t at = row.at(place);
+    IntLaneVectors position =
+        expected.placed(sum_of(expected.codes_of(moved), load_codes(of.frame.codes, at)));
+    escapes.place(at, position,
+                  [&](size_t lane) STRANDCAST_LANES_LAMBDA { return lane_of(expected.base, lane); });
+    row.store(moved, place, position);
+  });
+}
+
+STRANDCAST_LANES void place_shape_lanes(const SliceWork& of) {
+  EscapeWalk escapes(of.frame.shape_codes.escapes[of.slice]);
+  for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
+    const ShapeRow shape(of.layout, of.history.quantum_m, of.frame.lattice, v);
+    for (size_t place = of.layout.slice_begin[of.slice]; place < of.layout.slice_begin[of.slice + 1];
+         place += kLaneCount) {
+      const Expected expected = shape.expect(place, of.frame.shape_weights);
+      const size_t at = shape.at(place);
+      IntLaneVectors position = expected.placed(load_codes(of.frame.shape_codes, at));
+      escapes.place(at, position,
+                    [&](size_t lane) STRANDCAST_LANES_LAMBDA { return lane_of(expected.base, lane); });
+      for (size_t axis = 0; axis < 3; ++axis)
+        store_lanes(position.axis[axis], of.frame.lattice[axis].data() + at);
+    }
+  }
+}
+
+}  // namespace
+
+STRANDCAST_KERNEL(place_slice, SliceWork);
+STRANDCAST_KERNEL(place_anchor, SliceWork);
+STRANDCAST_KERNEL(place_shape, SliceWork);
+
+}  // namespace strandcast::tangent
