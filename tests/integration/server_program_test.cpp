@@ -17,6 +17,7 @@
 #include "tests/support/eventually.h"
 #include "tests/support/lacks_gl.h"
 #include "tests/support/raw_client.h"
+#include "tests/support/sim_devices.h"
 #include "tests/support/temporary_folder.h"
 
 extern char** environ;
@@ -153,6 +154,35 @@ TEST_F(ServerProgram, ServesUntilTerminated) {
   EXPECT_THAT(test::http_get(port, "/healthz"), HasSubstr("ok"));
   ASSERT_EQ(kill(process_, SIGTERM), 0);
   EXPECT_EQ(wait(process_), 0) << err();
+}
+
+// Whatever simulates, it is said, and strands move. What needs no OpenGL does without any driver for it.
+TEST_F(ServerProgram, SaysWhatSimulates) {
+  for (const SimDevice device : sim_devices()) {
+    const std::string name = to_string(device);
+    SCOPED_TRACE(name);
+    if (device != SimDevice::Gl) setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent", 1);
+    const uint16_t port = serve({"--sim-device", name, "--log-level", "info"});
+    unsetenv("__EGL_VENDOR_LIBRARY_DIRS");
+    ASSERT_NE(port, 0) << err();
+    EXPECT_THAT(err(), HasSubstr("simulating on "));
+    const auto metrics = [&] { return test::http_get(port, "/metrics"); };
+    EXPECT_TRUE(eventually([&] {
+      return metrics().find("sim_device_info{device=\"" + name) != std::string::npos;
+    })) << metrics();
+    EXPECT_TRUE(
+        eventually([&] { return metrics().find("\nstrandcast_sim_steps_total 0\n") == std::string::npos; }));
+    test::RawClient client(port);
+    ASSERT_TRUE(client.handshake());
+    client.send(Hello{});
+    const auto welcome = client.read_control<Welcome>();
+    ASSERT_TRUE(welcome);
+    EXPECT_FALSE(welcome->sim_device.empty());
+    EXPECT_THAT(err(), HasSubstr("simulating on " + welcome->sim_device));
+    ASSERT_EQ(kill(process_, SIGTERM), 0);
+    EXPECT_EQ(wait(process_), 0) << err();
+    std::filesystem::remove(folder_.path() / "port");
+  }
 }
 
 // What `systemctl reload` sends, whether or not there is a certificate to read again.

@@ -202,7 +202,9 @@ TEST_F(DoublePendulum, ThePathIsOfFirstOrder) {
   const double fine_m = glm::distance(fall(kReferenceHost, 1.0 / 1920.0).tip_m, expected);
   EXPECT_NEAR(coarse_m / middle_m, 2.0, 0.3);
   EXPECT_NEAR(middle_m / fine_m, 2.0, 0.15);
-  EXPECT_LE(glm::distance(fall(kGlHost, 1.0 / 480.0).tip_m, fall(kReferenceHost, 1.0 / 480.0).tip_m), 1e-5);
+  for (const SolverHost& host : kernel_hosts())
+    EXPECT_LE(glm::distance(fall(host, 1.0 / 480.0).tip_m, fall(kReferenceHost, 1.0 / 480.0).tip_m), 1e-5)
+        << host.name();
   fmt::print("tip off by {:.2e}, {:.2e}, {:.2e} m\n", coarse_m, middle_m, fine_m);
 }
 

@@ -42,6 +42,14 @@ SolverParameters bare(const SolverParameters& given) {
   return parameters;
 }
 
+/// Every executor with every value.
+std::vector<std::pair<SolverHost, double>> hosts_times(std::initializer_list<double> values) {
+  std::vector<std::pair<SolverHost, double>> all;
+  for (const SolverHost& host : kernel_hosts())
+    for (const double value : values) all.emplace_back(host, value);
+  return all;
+}
+
 class MassSpring : public SolverTest {
  protected:
   static SolverKind kind(const SolverHost& host) { return {*find_solver("mass_spring"), host}; }
@@ -223,12 +231,13 @@ TEST_F(MassSpring, ImplicitStepsSurviveAnyStiffness) {
   const Groom groom = make_test_groom({});
   const SolverRow& row = **find_solver("mass_spring");
   const SolverParameters defaults = complete_parameters(row, {}).value();
-  for (const double factor : {1.0, 1e3, 1e6, 1e9}) {
+  for (const auto& [host, factor] : hosts_times({1.0, 1e3, 1e6, 1e9})) {
+    SCOPED_TRACE(host.name());
     SolverParameters stiff = {{"stretch_limit", kNoLimit}};
     for (const char* name :
          {"stretch_stiffness_n_per_m", "bend_stiffness_nm_per_rad", "altitude_stiffness_n_per_m"})
       stiff[name] = factor * defaults.at(name);
-    auto gpu = make_plain(kGlHost, groom, stiff);
+    auto kernel = make_plain(host, groom, stiff);
     auto reference = make_plain(kReferenceHost, groom, stiff);
     double largest = 0.0;
     double apart_m = 0.0;
@@ -236,9 +245,9 @@ TEST_F(MassSpring, ImplicitStepsSurviveAnyStiffness) {
       StepInput input = moving_input(step, 1.0 / 60.0);
       input.gusts.clear();
       input.colliders.clear();
-      gpu->substep(input);
+      kernel->substep(input);
       reference->substep(input);
-      const SolverState state = read(*gpu);
+      const SolverState state = read(*kernel);
       const SolverState expected = read(*reference);
       ASSERT_TRUE(is_finite(state) && is_finite(expected));
       largest = std::max({largest, largest_stretch(groom, state), largest_stretch(groom, expected)});
@@ -470,19 +479,21 @@ TEST_F(MassSpring, EveryIntegratorFollowsItsReferenceOnTheGpu) {
           {"stretch_stiffness_n_per_m", 2.0},  {"stretch_damping_ns_per_m", 1e-3},
           {"bend_stiffness_nm_per_rad", 1e-5}, {"altitude_stiffness_n_per_m", 0.05}};
       ASSERT_TRUE(check(soft, 1.0 / 60.0));
-      auto gpu = make(kind(kGlHost), groom, soft);
-      auto reference = make(kind(kReferenceHost), groom, soft);
-      for (int step = 1; step <= 10; ++step) {
-        gpu->substep(moving_input(step, 1.0 / 60.0));
-        reference->substep(moving_input(step, 1.0 / 60.0));
-      }
       SolverState& state = end[std::lround(integrator)];
-      state = read(*gpu);
-      const SolverState expected = read(*reference);
-      EXPECT_LE(largest_distance_m(state.position_m, expected.position_m), 1e-5)
-          << "integrator " << integrator;
-      EXPECT_LE(largest_distance_m(state.velocity_mps, expected.velocity_mps), 1e-4)
-          << "integrator " << integrator;
+      for (const SolverHost& host : kernel_hosts()) {
+        auto kernel = make(kind(host), groom, soft);
+        auto reference = make(kind(kReferenceHost), groom, soft);
+        for (int step = 1; step <= 10; ++step) {
+          kernel->substep(moving_input(step, 1.0 / 60.0));
+          reference->substep(moving_input(step, 1.0 / 60.0));
+        }
+        state = read(*kernel);
+        const SolverState expected = read(*reference);
+        EXPECT_LE(largest_distance_m(state.position_m, expected.position_m), 1e-5)
+            << host.name() << ", integrator " << integrator;
+        EXPECT_LE(largest_distance_m(state.velocity_mps, expected.velocity_mps), 1e-4)
+            << host.name() << ", integrator " << integrator;
+      }
     }
     EXPECT_GT(largest_distance_m(end[0].position_m, end[1].position_m), 1e-4);
     EXPECT_GT(largest_distance_m(end[1].position_m, end[2].position_m), 1e-4);
@@ -492,8 +503,8 @@ TEST_F(MassSpring, EveryIntegratorFollowsItsReferenceOnTheGpu) {
 // Forces that are no gradient of an energy would keep a limp curl moving for ever.
 TEST_F(MassSpring, CurlsComeToRest) {
   const Groom groom = groom_from({curl_of(24, 0.5), curl_of(24, 1.1), curl_of(24, 1.6)}, Pinning::RootPair);
-  for (const double factor : {1.0, 1000.0}) {
-    auto solver = make_plain(kGlHost, groom,
+  for (const auto& [host, factor] : hosts_times({1.0, 1000.0})) {
+    auto solver = make_plain(host, groom,
                              {{"style_stiffness_per_s2", 0.0},
                               {"air_drag_per_s", 2.0},
                               {"bend_stiffness_nm_per_rad", factor * 1e-6},

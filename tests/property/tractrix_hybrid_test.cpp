@@ -102,30 +102,35 @@ TEST_F(TractrixHybrid, SweepsSaveIterationsForTheLengthsNotForThePositions) {
   EXPECT_LT(finished[32].rms_m, 0.4 * finished[1].rms_m) << "iterations still pay";
 }
 
-TEST_F(TractrixHybrid, TheGuessIsTheSameOnTheGpu) {
+TEST_F(TractrixHybrid, TheGuessIsTheSameInKernelAndReference) {
   for (const Pinning pinning : {Pinning::RootPair, Pinning::BothEnds}) {
     const Groom groom = make_test_groom({.pinning = pinning});
     const SolverParameters first = {{"tractrix_first", 1.0}, {"style_stiffness_per_s2", 120.0}};
-    auto gpu = make({*find_solver("tractrix_hybrid"), kGlHost}, groom, first);
-    auto reference = make({*find_solver("tractrix_hybrid"), kReferenceHost}, groom, first);
-    for (int step = 1; step <= 2; ++step) {
-      gpu->substep(moving_input(step, kSubstepS));
-      reference->substep(moving_input(step, kSubstepS));
-      EXPECT_LE(largest_distance_m(read(*gpu).position_m, read(*reference).position_m), 2e-5) << step;
+    for (const SolverHost& host : kernel_hosts()) {
+      auto kernel = make({*find_solver("tractrix_hybrid"), host}, groom, first);
+      auto reference = make({*find_solver("tractrix_hybrid"), kReferenceHost}, groom, first);
+      for (int step = 1; step <= 2; ++step) {
+        kernel->substep(moving_input(step, kSubstepS));
+        reference->substep(moving_input(step, kSubstepS));
+        EXPECT_LE(largest_distance_m(read(*kernel).position_m, read(*reference).position_m), 2e-5)
+            << host.name() << ", step " << step;
+      }
     }
   }
 }
 
 TEST_F(TractrixHybrid, WithoutSweepsItIsTheCompliantModel) {
   const Groom groom = make_test_groom({});
-  auto hybrid = make({*find_solver("tractrix_hybrid"), kGlHost}, groom,
-                     {{"tractrix_sweeps", 0.0}, {"iterations", 9.0}});
-  auto plain = make({*find_solver("xpbd"), kGlHost}, groom, {{"iterations", 9.0}});
-  for (int step = 1; step <= 20; ++step) {
-    hybrid->substep(moving_input(step, kSubstepS));
-    plain->substep(moving_input(step, kSubstepS));
+  for (const SolverHost& host : kernel_hosts()) {
+    auto hybrid =
+        make({*find_solver("tractrix_hybrid"), host}, groom, {{"tractrix_sweeps", 0.0}, {"iterations", 9.0}});
+    auto plain = make({*find_solver("xpbd"), host}, groom, {{"iterations", 9.0}});
+    for (int step = 1; step <= 20; ++step) {
+      hybrid->substep(moving_input(step, kSubstepS));
+      plain->substep(moving_input(step, kSubstepS));
+    }
+    EXPECT_EQ(read(*hybrid).position_m, read(*plain).position_m) << host.name();
   }
-  EXPECT_EQ(read(*hybrid).position_m, read(*plain).position_m);
 }
 
 }  // namespace

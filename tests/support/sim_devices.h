@@ -33,10 +33,16 @@ struct SolverHost {
 inline constexpr SolverHost kReferenceHost = {};
 inline constexpr SolverHost kGlHost = {SimDevice::Gl};
 
+/// Every executor.
+inline std::vector<SolverHost> kernel_hosts() {
+  std::vector<SolverHost> hosts;
+  for (const SimDevice device : sim_devices()) hosts.push_back({device});
+  return hosts;
+}
 /// The reference, then every executor.
 inline std::vector<SolverHost> solver_hosts() {
-  std::vector<SolverHost> hosts = {kReferenceHost};
-  for (const SimDevice device : sim_devices()) hosts.push_back({device});
+  std::vector<SolverHost> hosts = kernel_hosts();
+  hosts.insert(hosts.begin(), kReferenceHost);
   return hosts;
 }
 
