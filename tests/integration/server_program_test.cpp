@@ -245,7 +245,7 @@ std::set<std::string> calls_in(const std::string& group) {
   return calls;
 }
 
-// The frame thread would ask in vain to stand behind the simulation.
+// The frame thread would ask in vain to stand behind the simulation, and workers behind other programs.
 TEST_F(ServerProgram, TheUnitAllowsWhatTheServerCalls) {
   const std::set<std::string> service = calls_in("@system-service");
   if (service.empty()) GTEST_SKIP() << "systemd-analyze is not installed, which knows the groups of calls";
@@ -263,7 +263,8 @@ TEST_F(ServerProgram, TheUnitAllowsWhatTheServerCalls) {
         is_denied ? (void)allowed.erase(call) : (void)allowed.insert(call);
     }
   }
-  for (const char* call : {"setpriority", "poll", "sendmsg", "accept4", "rt_sigtimedwait", "clone3"})
+  for (const char* call : {"setpriority", "getpriority", "gettid", "futex", "poll", "sendmsg", "accept4",
+                           "rt_sigtimedwait", "clone3"})
     EXPECT_TRUE(allowed.contains(call)) << call;
   for (const char* call : {"mount", "ptrace", "setuid", "sched_setscheduler"})
     EXPECT_FALSE(allowed.contains(call)) << call;
