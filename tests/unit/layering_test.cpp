@@ -50,7 +50,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/gl", kGl},
       {"common/render", kRender},
       {"server/input", kWire},
-      {"server/sim", with(kGl, kScene)},
+      {"server/sim", with(with({"common/simd", "shaders/lib"}, kGl), kScene)},
       {"server/scene", with(with({"server/input", "server/sim"}, kGl), kScene)},
       {"server/publish", with(with({"server/sim", "common/simd"}, kGl), kScene)},
       {"server/encode", with({"server/publish"}, kRender)},
