@@ -15,6 +15,8 @@
 namespace strandcast {
 
 inline constexpr size_t kMaxQueuedControl = 64;
+/// A session is not read while so many wait: what it asked for before still finds room.
+inline constexpr size_t kMostUnreadAnswers = kMaxQueuedControl / 4;
 
 class SendQueue {
  public:
@@ -27,6 +29,7 @@ class SendQueue {
 
   /// False when the queue is full: the session must be closed. A LookChange replaces one that waits.
   [[nodiscard]] bool push_control(ServerMessage message);
+  size_t control_count() const { return control_.size(); }
   /// First media of a session; strand frames wait until it is written.
   void set_asset(EncodedFramePtr asset);
   /// From now on the session wants strand frames, beginning with a keyframe.

@@ -76,6 +76,13 @@ void Session::read() {
   });
 }
 
+/// Not while many answers wait: who floods is heard as fast as it reads.
+void Session::read_on() {
+  if (state_ != State::AwaitHello && state_ != State::Joined) return;
+  is_reading_held_ = queue_.control_count() >= kMostUnreadAnswers;
+  if (!is_reading_held_) read();
+}
+
 void Session::on_read(const beast::error_code& error) {
   if (state_ == State::Closed) return;
   if (error) {
@@ -96,7 +103,7 @@ void Session::on_read(const beast::error_code& error) {
   received_ns_ = arrival_ns;
   on_message({static_cast<const std::byte*>(data.data()), data.size()}, arrival_ns);
   read_buffer_.consume(read_buffer_.size());
-  if (state_ == State::AwaitHello || state_ == State::Joined) read();
+  read_on();
 }
 
 void Session::send(ServerMessage message) {
@@ -204,6 +211,7 @@ void Session::on_written(const beast::error_code& error, size_t byte_count) {
     context_.count(&NetCounters::frames_sent);
   }
   ask_for_keyframe(now_ns());
+  if (is_reading_held_) read_on();
   pump();
 }
 

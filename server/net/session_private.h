@@ -52,6 +52,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void guarded(Work&& work);
   void on_open(bool has_room);
   void read();
+  void read_on();
   void on_read(const beast::error_code& error);
   void on_message(std::span<const std::byte> bytes, int64_t arrival_ns);
   bool check_token(const Hello& hello);
@@ -110,6 +111,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::vector<std::byte> control_bytes_;  // being written, or
   EncodedFramePtr media_;                 // this
   std::span<const std::byte> unwritten_;
+  bool is_reading_held_ = false;
   bool is_writing_ = false;
   bool is_close_started_ = false;
   CloseCode close_code_ = CloseCode::Normal;
