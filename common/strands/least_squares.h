@@ -108,7 +108,6 @@ class LeastSquares {
   static constexpr uint32_t kTile = 4;
   static constexpr uint32_t kPadded = (kTerms + kTile - 1) / kTile * kTile;
 
-  using Pair = float __attribute__((vector_size(2 * sizeof(simd::FloatBits))));
   using Four = float __attribute__((vector_size(16)));
   using Doubles = double __attribute__((vector_size(32)));
 
@@ -121,33 +120,21 @@ class LeastSquares {
     return __builtin_shufflevector(low, high, 0, 2, 4, 6) + __builtin_shufflevector(low, high, 1, 3, 5, 7);
   }
 
-  STRANDCAST_LANES Pair pair(uint32_t i, uint32_t k) const {
-    Pair both;
-    std::memcpy(&both, &batch_[i][k], sizeof both);
-    return both;
-  }
-
-  /// Products of four terms from a on with two from b on: as many as fit into registers. Pairs of terms, in
-  /// one register where it is wide enough, times pairs as they are and swapped.
+  /// Products of four terms from a on with two from b on: as many as fit into registers.
   STRANDCAST_LANES void add_products(uint32_t a, uint32_t b) {
-    Pair straight[2] = {};
-    Pair crossed[2] = {};
+    simd::FloatBits sum[2][kTile] = {};
     for (uint32_t i = 0; i < kEights; ++i) {
-      const Pair two = pair(i, b);
-      const Pair swapped =
-          __builtin_shufflevector(two, two, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7);
-      for (uint32_t k = 0; k < 2; ++k) {
-        const Pair other = pair(i, a + 2 * k);
-        straight[k] += other * two;
-        crossed[k] += other * swapped;
+      for (uint32_t k = 0; k < kTile; ++k) {
+        sum[0][k] += batch_[i][a + k] * batch_[i][b];
+        sum[1][k] += batch_[i][a + k] * batch_[i][b + 1];
       }
     }
     for (uint32_t which = 0; which < 2; ++which) {
       Four halved[kTile];
       for (uint32_t k = 0; k < kTile; ++k) {
-        Four part[4];  // two for each term of a pair
-        std::memcpy(part, (k % 2 == which ? straight : crossed) + k / 2, sizeof part);
-        halved[k] = part[2 * (k % 2)] + part[2 * (k % 2) + 1];
+        Four part[2];
+        std::memcpy(part, &sum[which][k], sizeof part);
+        halved[k] = part[0] + part[1];
       }
       Doubles total;
       double* const to = gram_[b + which].data() + a;

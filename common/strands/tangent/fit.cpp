@@ -79,19 +79,6 @@ struct SampleEight {
 };
 
 using WideDoubles = double __attribute__((vector_size(sizeof(double) * kLaneCount)));
-/// For each quantity of the past the feature that lies nearest to the tip.
-constexpr auto kFarthest = [] {
-  std::array<size_t, 5> farthest{};
-  for (size_t k = 0; k < kOwnFeatureCount; ++k) {
-    if (kMotionFeatures[k].quantity == MotionQuantity::Now) continue;
-    size_t& best = farthest[static_cast<size_t>(kMotionFeatures[k].quantity) - 1];
-    if (kMotionFeatures[best].quantity != kMotionFeatures[k].quantity ||
-        kMotionFeatures[best].tipward < kMotionFeatures[k].tipward)
-      best = k;
-  }
-  return farthest;
-}();
-
 using MotionFit = LeastSquares<kMotionFeatureCount>;
 
 /// The vertices of a row as samples: like MotionRow, but with `target` in place of what is yet to be decoded.
@@ -135,7 +122,7 @@ class SampleRow {
       for (const uint32_t place : eight.piece) {
         __builtin_prefetch(now_[axis][0] + place);
         __builtin_prefetch(last_[axis][0] + place);
-        for (const size_t k : kFarthest) __builtin_prefetch(rows_[axis][k] + place);
+        for (const size_t k : kFarthestFeatures) __builtin_prefetch(rows_[axis][k] + place);
       }
     }
   }

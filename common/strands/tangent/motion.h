@@ -135,7 +135,7 @@ void fit_motion(simd::InstructionSet set, const Layout& layout, const History& h
 ShapeWeights fit_shape(const Layout& layout, float quantum_m, const Planes<int32_t>& target,
                        WorkerPool& workers);
 
-/// Of one frame; `frame` is filled.
+/// A slice of one frame; `frame` is filled.
 struct SliceWork {
   const Layout& layout;
   const History& history;
@@ -148,8 +148,8 @@ struct QuantiseWork {
 };
 
 // Kernels for every instruction set, all with the same bits (common/simd/variants.h).
-/// Encoder: fills a slice's integers such that every vertex ends within the bound of `target`, and what they
-/// decode to. Of an anchor it fills both kinds of integers.
+/// Encoder: fills the integers of a slice such that every vertex ends within the bound of `target`, and what
+/// they decode to. Of an anchor it fills both kinds of integers.
 void quantise_slice(simd::InstructionSet set, const QuantiseWork& work);
 void quantise_anchor(simd::InstructionSet set, const QuantiseWork& work);
 /// Decoder: positions, velocities and residuals of a slice from its integers.

@@ -16,22 +16,27 @@ STRANDCAST_LANES CodeLanes load_codes(const Codes& codes, size_t at) {
 /// Goes through the escapes of a slice with its blocks.
 class EscapeWalk {
  public:
-  explicit EscapeWalk(const std::vector<Escape>& escapes) : next_(escapes.begin()), end_(escapes.end()) {}
+  explicit EscapeWalk(const std::vector<Escape>& escapes)
+      : next_(escapes.data()), end_(escapes.data() + escapes.size()) {}
 
-  /// Puts the escaped vertices of the block that begins at `at` where they belong; from(lane) is where their
+  /// Puts the escaped vertices of the block that begins at `at` where they belong; from() is where their
   /// escapes count from.
   template <class From>
   STRANDCAST_LANES void place(size_t at, IntLaneVectors& position, From from) {
+    if (next_ == end_ || next_->at >= at + kLaneCount) [[likely]]
+      return;
+    BlockPositions points(position);
+    const BlockPositions begin(from());
     for (; next_ != end_ && next_->at < at + kLaneCount; ++next_) {
       const size_t lane = next_->at - at;
-      const Lattice point = escaped(*next_, from(lane));
-      for (size_t axis = 0; axis < 3; ++axis) position.axis[axis][lane] = point[axis];
+      points.set(lane, escaped(*next_, begin.get(lane)));
     }
+    position = points.load();
   }
 
  private:
-  std::vector<Escape>::const_iterator next_;
-  std::vector<Escape>::const_iterator end_;
+  const Escape* next_;
+  const Escape* end_;
 };
 
 STRANDCAST_LANES void place_slice_lanes(const SliceWork& of) {
@@ -39,7 +44,7 @@ STRANDCAST_LANES void place_slice_lanes(const SliceWork& of) {
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
     const size_t at = row.at(place);
     IntLaneVectors position = moved.placed(load_codes(of.frame.codes, at));
-    escapes.place(at, position, [&](size_t lane) STRANDCAST_LANES_LAMBDA { return row.last(at + lane); });
+    escapes.place(at, position, [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
     row.store(moved, place, position);
   });
 }
@@ -52,8 +57,7 @@ STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
     const size_t at = row.at(place);
     IntLaneVectors position =
         expected.placed(sum_of(expected.codes_of(moved), load_codes(of.frame.codes, at)));
-    escapes.place(at, position,
-                  [&](size_t lane) STRANDCAST_LANES_LAMBDA { return lane_of(expected.base, lane); });
+    escapes.place(at, position, [&]() STRANDCAST_LANES_LAMBDA { return expected.base; });
     row.store(moved, place, position);
   });
 }
@@ -67,8 +71,7 @@ STRANDCAST_LANES void place_shape_lanes(const SliceWork& of) {
       const Expected expected = shape.expect(place, of.frame.shape_weights);
       const size_t at = shape.at(place);
       IntLaneVectors position = expected.placed(load_codes(of.frame.shape_codes, at));
-      escapes.place(at, position,
-                    [&](size_t lane) STRANDCAST_LANES_LAMBDA { return lane_of(expected.base, lane); });
+      escapes.place(at, position, [&]() STRANDCAST_LANES_LAMBDA { return expected.base; });
       for (size_t axis = 0; axis < 3; ++axis)
         store_lanes(position.axis[axis], of.frame.lattice[axis].data() + at);
     }

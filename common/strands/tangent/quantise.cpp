@@ -15,11 +15,17 @@ constexpr int32_t kReach = kStepsPerBound - 3;
 struct Found {
   const Expected& expected;
   const IntLaneVectors& target;
-  CodeLanes origin{};
-  IntLanes is_open{};  // worth trying
-  IntLanes is_found{};
-  CodeLanes codes{};
-  IntLaneVectors position{};
+  const CodeLanes& origin;
+  IntLanes is_open;  // worth trying
+  IntLanes is_found;
+  CodeLanes codes;
+  IntLaneVectors position;
+
+  STRANDCAST_LANES Found(const Expected& where, const IntLaneVectors& wanted, const CodeLanes& near)
+      : expected(where), target(wanted), origin(near) {
+    is_found = codes.first = codes.second = codes.length = IntLanes{};
+    for (IntLanes& axis : position.axis) axis = IntLanes{};
+  }
 
   /// How far the integers are from the origin, unless escaped.
   STRANDCAST_LANES CodeLanes apart() const {
@@ -95,20 +101,42 @@ STRANDCAST_LANES void find_codes(Found& found) {
   if (is_any(found.is_open)) corners.try_with(rounded, found);
 }
 
-/// Escapes the vertices of the block that begins at `at` for which nothing was found; from(lane) is where
-/// their escapes count from.
+/// A block of which some vertices are to be escaped.
+struct EscapingBlock {
+  size_t at;
+  BlockPositions target;
+  BlockPositions from;  // where escapes count from
+  BlockPositions position;
+  BlockPositions codes;  // first, second and length
+  int32_t is_found[kLaneCount];
+};
+
+__attribute__((noinline)) void escape_others(EscapingBlock& block, std::vector<Escape>& escapes) {
+  for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
+    if (block.is_found[lane] != 0) continue;
+    escapes.push_back(make_escape(block.at + lane, block.target.get(lane), block.from.get(lane)));
+    block.codes.set(lane, {0, 0, kEscapedLength});
+    block.position.set(lane, escaped(escapes.back(), block.from.get(lane)));
+  }
+}
+
+/// Escapes the vertices of the block that begins at `at` for which nothing was found; from() is where their
+/// escapes count from.
 template <class From>
 STRANDCAST_LANES void escape_others(Found& found, size_t at, std::vector<Escape>& escapes, From from) {
-  if (!is_any(~found.is_found)) return;
-  for (uint32_t lane = 0; lane < kLaneCount; ++lane) {
-    if (found.is_found[lane] != 0) continue;
-    escapes.push_back(make_escape(at + lane, lane_of(found.target, lane), from(lane)));
-    found.codes.first[lane] = 0;
-    found.codes.second[lane] = 0;
-    found.codes.length[lane] = kEscapedLength;
-    const Lattice point = escaped(escapes.back(), from(lane));
-    for (size_t axis = 0; axis < 3; ++axis) found.position.axis[axis][lane] = point[axis];
-  }
+  if (!is_any(~found.is_found)) [[likely]]
+    return;
+  EscapingBlock block{at,
+                      BlockPositions(found.target),
+                      BlockPositions(from()),
+                      BlockPositions(found.position),
+                      BlockPositions({found.codes.first, found.codes.second, found.codes.length}),
+                      {}};
+  store_lanes(found.is_found, block.is_found);
+  escape_others(block, escapes);
+  const IntLaneVectors codes = block.codes.load();
+  found.codes = {codes.axis[0], codes.axis[1], codes.axis[2]};
+  found.position = block.position.load();
 }
 
 STRANDCAST_LANES IntLaneVectors load_vectors(const Planes<int32_t>& planes, size_t at) {
@@ -128,10 +156,11 @@ STRANDCAST_LANES void quantise_slice_lanes(const QuantiseWork& work) {
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
     const size_t at = row.at(place);
     const IntLaneVectors wanted = load_vectors(work.target, at);
-    Found found{moved, wanted};
+    const CodeLanes origin{};
+    Found found(moved, wanted, origin);
     find_codes(found);
     escape_others(found, at, of.frame.codes.escapes[of.slice],
-                  [&](uint32_t lane) STRANDCAST_LANES_LAMBDA { return row.last(at + lane); });
+                  [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
     store_codes(found.codes, of.frame.codes, at);
     row.store(moved, place, found.position);
   });
@@ -144,10 +173,11 @@ STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
     const Expected expected = shape.expect(place, of.frame.shape_weights);
     const size_t at = row.at(place);
     const IntLaneVectors wanted = load_vectors(work.target, at);
-    Found found{expected, wanted, expected.codes_of(moved)};
+    const CodeLanes origin = expected.codes_of(moved);
+    Found found(expected, wanted, origin);
     find_codes(found);
     escape_others(found, at, of.frame.shape_codes.escapes[of.slice],
-                  [&](uint32_t lane) STRANDCAST_LANES_LAMBDA { return lane_of(expected.base, lane); });
+                  [&]() STRANDCAST_LANES_LAMBDA { return expected.base; });
     store_codes(found.codes, of.frame.shape_codes, at);
     store_codes(found.apart(), of.frame.codes, at);
     row.store(moved, place, found.position);

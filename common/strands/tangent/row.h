@@ -70,6 +70,11 @@ constexpr uint32_t first_feature_of(MotionStrand strand) {
   while (k < kMotionFeatures.size() && kMotionFeatures[k].strand < strand) ++k;
   return k;
 }
+constexpr uint32_t feature_count_of(MotionStrand strand) {
+  return static_cast<uint32_t>(
+      std::count_if(kMotionFeatures.begin(), kMotionFeatures.end(),
+                    [strand](const MotionFeature& feature) { return feature.strand == strand; }));
+}
 inline constexpr uint32_t kOwnFeatureCount = first_feature_of(MotionStrand::Neighbour);
 inline constexpr uint32_t kHeadFeature = kMotionFeatures.size();
 static_assert(kHeadFeature + kHeadStepCount == kMotionFeatureCount);
@@ -147,9 +152,22 @@ STRANDCAST_LANES CodeLanes sum_of(const CodeLanes& a, const CodeLanes& b) {
 using Lattice = std::array<int32_t, 3>;
 Escape make_escape(size_t at, const Lattice& target, const Lattice& from);
 Lattice escaped(const Escape& escape, const Lattice& from);
-STRANDCAST_LANES Lattice lane_of(const IntLaneVectors& vectors, size_t lane) {
-  return {vectors.axis[0][lane], vectors.axis[1][lane], vectors.axis[2][lane]};
-}
+
+/// Positions of a block one by one.
+struct BlockPositions {
+  int32_t axis[3][kLaneCount];
+
+  STRANDCAST_LANES explicit BlockPositions(const IntLaneVectors& from) {
+    for (size_t i = 0; i < 3; ++i) store_lanes(from.axis[i], axis[i]);
+  }
+  Lattice get(size_t lane) const { return {axis[0][lane], axis[1][lane], axis[2][lane]}; }
+  void set(size_t lane, const Lattice& point) {
+    for (size_t i = 0; i < 3; ++i) axis[i][lane] = point[i];
+  }
+  STRANDCAST_LANES IntLaneVectors load() const {
+    return {load_lanes(axis[0]), load_lanes(axis[1]), load_lanes(axis[2])};
+  }
+};
 
 /// Where the vertices of a block are expected: `length` along `along` from `base`, and two directions across.
 struct Expected {
@@ -239,107 +257,158 @@ struct Expected {
   }
 };
 
+/// For each quantity of the past the own feature that lies nearest to the tip: no row nearer to the root has
+/// read it.
+inline constexpr auto kFarthestFeatures = [] {
+  std::array<size_t, 5> farthest{};
+  for (size_t k = 0; k < kOwnFeatureCount; ++k) {
+    if (kMotionFeatures[k].quantity == MotionQuantity::Now) continue;
+    size_t& best = farthest[static_cast<size_t>(kMotionFeatures[k].quantity) - 1];
+    if (kMotionFeatures[best].quantity != kMotionFeatures[k].quantity ||
+        kMotionFeatures[best].tipward < kMotionFeatures[k].tipward)
+      best = k;
+  }
+  return farthest;
+}();
+
+/// Of one row, for all slices. Only pointers and numbers, which stores into planes cannot have changed.
 class MotionRow {
  public:
   MotionRow(const Layout& layout, const History& history, Frame& frame, uint32_t v)
-      : layout_(layout), history_(history), frame_(frame), v_(v), by_(frame.motion[motion_class(layout, v)]) {
-    length_blend_ = static_cast<float>(frame.length_blend) * kLengthWeight;
-    for (size_t axis = 0; axis < 3; ++axis) features_[axis] = feature_rows(layout, history, frame, axis, v);
+      : vertex_(v),
+        stride_(layout.stride),
+        begin_(v * static_cast<size_t>(layout.stride)),
+        by_(frame.motion[motion_class(layout, v)]),
+        length_blend_(static_cast<float>(frame.length_blend) * kLengthWeight),
+        quantum_m_(history.quantum_m),
+        presence_(layout.presence.data()),
+        rest_length_m_(layout.rest_length_m.data() + begin_) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      features_[axis] = feature_rows(layout, history, frame, axis, v);
+      last_[axis] = history.lattice[axis].data() + begin_;
+      now_[axis] = frame.lattice[axis].data() + begin_;
+      base_[axis] = v == 0 ? frame.zero_lattice.data() : now_[axis] - stride_;
+      edge_[axis] = frame.edge[axis].data();
+      velocity_[axis] = frame.velocity[axis].data() + begin_;
+      residual_[axis] = frame.residual[axis].data() + begin_;
+      last_drift_[axis] = history.drift[axis].data() + begin_;
+      drift_[axis] = frame.drift[axis].data() + begin_;
+    }
+    for (size_t which = 0; which < 2; ++which) {
+      neighbour_[which] = layout.neighbour[which].data();
+      for (size_t axis = 0; axis < 3; ++axis)
+        neighbour_sum_[which][axis] = frame.neighbour_sum[which][axis].data();
+    }
   }
 
-  uint32_t vertex() const { return v_; }
+  uint32_t vertex() const { return vertex_; }
   /// Of a place in this row, in a plane.
-  size_t at(size_t place) const { return v_ * static_cast<size_t>(layout_.stride) + place; }
+  size_t at(size_t place) const { return begin_ + place; }
 
-  /// The part of the prediction that comes from whole rows, for a slice; before its blocks are expected.
-  STRANDCAST_LANES void sum_features(uint32_t slice) const {
-    const size_t begin = layout_.slice_begin[slice];
-    const size_t count = layout_.slice_begin[slice + 1] - begin;
+  /// The part of the prediction that comes from whole rows, for `count` places; before their blocks are
+  /// expected.
+  STRANDCAST_LANES void sum_features(size_t begin, size_t count) const {
     for (size_t axis = 0; axis < 3; ++axis) {
       FeatureRows rows = features_[axis];
       for (const float*& row : rows) row += begin;
-      const int32_t* last = history_.lattice[axis].data() + at(begin);
-      const int32_t* base = v_ == 0 ? frame_.zero_lattice.data() : bases(axis) + begin;
-      sum_rows(rows, by_.weights, {last, base}, std::span(frame_.edge[axis]).subspan(begin, count));
+      sum_rows(rows, by_.weights, {last_[axis] + begin, base_[axis] + begin}, {edge_[axis] + begin, count});
+    }
+  }
+
+  /// Fetches what the next row reads first around a place: it lies in too many pieces for the processor to
+  /// guess.
+  STRANDCAST_LANES void prefetch_next(size_t place) const {
+    constexpr size_t kPlacesInLine = 16;
+    if (place % kPlacesInLine != 0) return;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      for (const size_t k : kFarthestFeatures) __builtin_prefetch(features_[axis][k] + stride_ + place);
+      __builtin_prefetch(last_[axis] + stride_ + place);
     }
   }
 
   /// Blocks of a slice come in order.
   STRANDCAST_LANES void expect(size_t place, Expected& expected) const {
     LaneVectors last;
-    for (size_t axis = 0; axis < 3; ++axis)
-      last.axis[axis] = to_floats(load_lanes(history_.lattice[axis].data() + at(place)));
-    const Lanes presence = load_lanes(layout_.presence.data() + place);
+    for (size_t axis = 0; axis < 3; ++axis) last.axis[axis] = to_floats(load_lanes(last_[axis] + place));
+    const Lanes presence = load_lanes(presence_ + place);
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
-      expected.base.axis[axis] = v_ == 0 ? IntLanes{} : load_lanes(bases(axis) + place);
+      expected.base.axis[axis] = load_lanes(base_[axis] + place);
       const auto& head = by_.head[axis];
       const Lanes turned = (head[0] * last.axis[0] + head[1] * last.axis[1]) + head[2] * last.axis[2];
-      edge.axis[axis] = load_lanes(frame_.edge[axis].data() + place) + (turned + head[3] * presence);
+      edge.axis[axis] = load_lanes(edge_[axis] + place) + (turned + head[3] * presence);
       for (uint32_t which = 0; which < 2; ++which)
-        edge.axis[axis] +=
-            gather_lanes(frame_.neighbour_sum[which][axis].data(), layout_.neighbour[which].data() + place);
+        edge.axis[axis] += gather_lanes(neighbour_sum_[which][axis], neighbour_[which] + place);
     }
     expected.aim(edge);
-    if (v_ != 0) expected.length = known_length(place);
+    if (vertex_ != 0) expected.length = known_length(place);
   }
 
   /// Stores positions and what follows from them.
   STRANDCAST_LANES void store(const Expected& expected, size_t place, const IntLaneVectors& position) const {
     for (size_t axis = 0; axis < 3; ++axis) {
-      const size_t begin = at(place);
-      const IntLanes& now = position.axis[axis];
-      const IntLanes last = load_lanes(history_.lattice[axis].data() + begin);
-      const Lanes velocity = to_floats(wrapping_differences(now, last));
+      const IntLanes now = position.axis[axis];
+      const Lanes velocity = to_floats(wrapping_differences(now, load_lanes(last_[axis] + place)));
       const Lanes edge = to_floats(wrapping_differences(now, expected.base.axis[axis]));
-      store_lanes(now, frame_.lattice[axis].data() + begin);
-      store_lanes(velocity, frame_.velocity[axis].data() + begin);
-      store_lanes(edge - expected.along.axis[axis] * expected.length, frame_.residual[axis].data() + begin);
-      const Lanes drift = load_lanes(history_.drift[axis].data() + begin);
-      store_lanes(kDriftShare * drift + velocity, frame_.drift[axis].data() + begin);
+      store_lanes(now, now_[axis] + place);
+      store_lanes(velocity, velocity_[axis] + place);
+      store_lanes(edge - expected.along.axis[axis] * expected.length, residual_[axis] + place);
+      store_lanes(kDriftShare * load_lanes(last_drift_[axis] + place) + velocity, drift_[axis] + place);
       // What later blocks add for this neighbour.
-      store_neighbour_sum<MotionStrand::Neighbour>(axis, place);
-      store_neighbour_sum<MotionStrand::SecondNeighbour>(axis, place);
+      store_neighbour_sum<MotionStrand::Neighbour>(axis, place, velocity);
+      store_neighbour_sum<MotionStrand::SecondNeighbour>(axis, place, velocity);
     }
   }
 
-  /// Of a vertex of the row: its last position, which escapes count from.
-  Lattice last(size_t at) const {
-    return {history_.lattice[0][at], history_.lattice[1][at], history_.lattice[2][at]};
+  /// Last positions of the vertices of a block, which escapes count from.
+  STRANDCAST_LANES IntLaneVectors last(size_t place) const {
+    return {load_lanes(last_[0] + place), load_lanes(last_[1] + place), load_lanes(last_[2] + place)};
   }
-  Frame& frame() const { return frame_; }
 
  private:
   template <MotionStrand strand>
-  STRANDCAST_LANES void store_neighbour_sum(size_t axis, size_t place) const {
+  STRANDCAST_LANES void store_neighbour_sum(size_t axis, size_t place, const Lanes& velocity) const {
     constexpr uint32_t kFirst = first_feature_of(strand);
-    Lanes sum = by_.weights[kFirst] * load_lanes(features_[axis][kFirst] + place);
-    for (uint32_t k = kFirst + 1; k < kHeadFeature && kMotionFeatures[k].strand == strand; ++k)
+    static_assert(kMotionFeatures[kFirst].quantity == MotionQuantity::Now &&
+                  kMotionFeatures[kFirst].tipward == 0);
+    constexpr uint32_t kEnd = kFirst + feature_count_of(strand);
+    Lanes sum = by_.weights[kFirst] * velocity;
+    for (uint32_t k = kFirst + 1; k < kEnd; ++k)
       sum += by_.weights[k] * load_lanes(features_[axis][k] + place);
     constexpr size_t kWhich = strand == MotionStrand::Neighbour ? 0 : 1;
-    store_lanes(sum, frame_.neighbour_sum[kWhich][axis].data() + place);
+    store_lanes(sum, neighbour_sum_[kWhich][axis] + place);
   }
+  /// Not of roots.
   STRANDCAST_LANES Lanes known_length(size_t place) const {
-    const Lanes rest = load_lanes(layout_.rest_length_m.data() + at(place)) / history_.quantum_m;
-    if (frame_.length_blend == 0) return rest;
+    const Lanes rest = load_lanes(rest_length_m_ + place) / quantum_m_;
+    if (length_blend_ == 0.0f) return rest;
     LaneVectors edge;
     for (size_t axis = 0; axis < 3; ++axis) {
-      const int32_t* own = history_.lattice[axis].data() + at(place);
-      edge.axis[axis] = to_floats(wrapping_differences(load_lanes(own), load_lanes(own - layout_.stride)));
+      const int32_t* own = last_[axis] + place;
+      edge.axis[axis] = to_floats(wrapping_differences(load_lanes(own), load_lanes(own - stride_)));
     }
     return rest + length_blend_ * (square_roots(dots(edge, edge)) - rest);
   }
 
-  /// Decoded positions of the parents; not for roots.
-  const int32_t* bases(size_t axis) const { return frame_.lattice[axis].data() + at(0) - layout_.stride; }
-
-  const Layout& layout_;
-  const History& history_;
-  Frame& frame_;
-  uint32_t v_;
+  uint32_t vertex_;
+  size_t stride_;
+  size_t begin_;
   MotionClass by_;
   float length_blend_;
+  float quantum_m_;
   std::array<FeatureRows, 3> features_;
+  std::array<const int32_t*, 3> last_;
+  std::array<const int32_t*, 3> base_;  // decoded positions of the parents
+  std::array<int32_t*, 3> now_;
+  std::array<float*, 3> edge_;
+  std::array<float*, 3> velocity_;
+  std::array<float*, 3> residual_;
+  std::array<const float*, 3> last_drift_;
+  std::array<float*, 3> drift_;
+  std::array<std::array<float*, 3>, 2> neighbour_sum_;
+  std::array<const uint32_t*, 2> neighbour_;
+  const float* presence_;
+  const float* rest_length_m_;
 };
 
 /// Goes through the vertices of a slice block by block, from the roots on: work(row, place, moved) gets the
@@ -347,15 +416,16 @@ class MotionRow {
 /// become.
 template <class Work>
 STRANDCAST_LANES void for_each_block(const SliceWork& of, Work work) {
-  const uint32_t begin = of.layout.slice_begin[of.slice];
-  const uint32_t end = of.layout.slice_begin[of.slice + 1];
+  const size_t begin = of.layout.slice_begin[of.slice];
+  const size_t end = of.layout.slice_begin[of.slice + 1];
   for (uint32_t v = 0; v < of.layout.vertex_count; ++v) {
     const MotionRow row(of.layout, of.history, of.frame, v);
-    row.sum_features(of.slice);
+    row.sum_features(begin, end - begin);
     for (size_t place = begin; place < end; place += kLaneCount) {
       Expected moved;
       row.expect(place, moved);
       work(row, place, moved);
+      row.prefetch_next(place);
     }
   }
 }
