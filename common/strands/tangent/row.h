@@ -2,9 +2,8 @@
 // time; what encoder and decoder of the "tangent" codec share. Private to common/strands/tangent.
 //
 // What a vertex costs: 240 floating-point operations (2 x 3 x 25 of them for the prediction), two divisions
-// and two roots; 135 bytes from and to memory (30 planes, the integers); three symbols, each of which waits
-// for the one before it, about 25 cycles (find 10, table 5, multiply and add 5, refill 5). At 2.45 GHz and
-// four lanes that is 60 cycles of arithmetic, 33 of memory at 10 GB/s and 75 of waiting.
+// and two roots; 135 bytes from and to memory (30 planes, the integers). What all of a frame costs stands in
+// motion.h.
 #pragma once
 
 #include <algorithm>
