@@ -5,11 +5,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 
 #include "common/log/progress.h"
 #include "common/scene/scene_file.h"
 #include "server/report/report_commands.h"
+#include "server/report/report_executor.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
 
@@ -83,6 +85,7 @@ class SceneMeasurement {
   }
 
   double length_m() const { return length_m_; }
+  SimDevice device() const { return executor_.info().device; }
   uint32_t vertex_count() const { return content_.groom.uniform_vertex_count(); }
 
   /// Milliseconds per substep on the scene's own strands, colliders and wind: the best of several.
@@ -133,8 +136,26 @@ Result<std::vector<const SolverRow*>> rows_to_choose_from(const std::vector<std:
   return rows;
 }
 
-/// Every setting with its time; those that a row or its stable range refuses are left out.
-std::vector<Candidate> timed_candidates(const SceneMeasurement& measurement,
+/// Every setting of a row with its time on every executor; those that the row or its stable range refuses are
+/// left out.
+void add_timed_candidates(const std::vector<SceneMeasurement>& measurements, RunSetting setting,
+                          std::vector<Candidate>& candidates) {
+  // A substep takes the same time whatever its length; the shortest is the likeliest to be stable.
+  setting.substeps = kSubsteps[std::size(kSubsteps) - 1];
+  for (const SceneMeasurement& measurement : measurements) {
+    const auto ms = measurement.substep_ms(setting);
+    if (!ms) continue;
+    Candidate candidate{setting, measurement.device(), 0.0, std::numeric_limits<double>::infinity()};
+    for (const uint32_t substeps : kSubsteps) {
+      candidate.setting.substeps = substeps;
+      candidate.ms_per_step = *ms * substeps;
+      candidates.push_back(candidate);
+    }
+  }
+}
+
+/// The fastest first.
+std::vector<Candidate> timed_candidates(const std::vector<SceneMeasurement>& measurements,
                                         const std::vector<const SolverRow*>& rows, double rate_hz) {
   Progress progress({"recommend"});
   std::vector<Candidate> candidates;
@@ -142,19 +163,13 @@ std::vector<Candidate> timed_candidates(const SceneMeasurement& measurement,
   for (const SolverRow* row : rows)
     progress.expect(static_cast<uint32_t>(effort_values(*row, factors).size()),
                     static_cast<double>(effort_values(*row, factors).size()));
+  const uint32_t vertex_count = measurements.front().vertex_count();
   for (const SolverRow* row : rows) {
     for (const double effort : effort_values(*row, factors)) {
-      RunSetting setting{
-          row,   row->as_hair ? Material::Hair : Material::AsShipped, measurement.vertex_count(), rate_hz, 1,
-          effort};
+      const RunSetting setting{
+          row, row->as_hair ? Material::Hair : Material::AsShipped, vertex_count, rate_hz, 1, effort};
       progress.begin_run("time of " + to_string(setting));
-      // A substep takes the same time whatever its length; the shortest is the likeliest to be stable.
-      setting.substeps = kSubsteps[std::size(kSubsteps) - 1];
-      const auto ms = measurement.substep_ms(setting);
-      for (const uint32_t substeps : kSubsteps) {
-        setting.substeps = substeps;
-        if (ms) candidates.push_back({setting, *ms * substeps, std::numeric_limits<double>::infinity()});
-      }
+      add_timed_candidates(measurements, setting, candidates);
       progress.end_run(1.0);
     }
   }
@@ -163,16 +178,45 @@ std::vector<Candidate> timed_candidates(const SceneMeasurement& measurement,
   return candidates;
 }
 
+/// Errors of candidates that fit; of a setting on several executors by the fastest, since float differs by
+/// less than anybody sees. The most exact first.
+void add_errors(const std::vector<SceneMeasurement>& measurements, const Trajectory& reference,
+                std::vector<Candidate>& fitting) {
+  Progress progress({"recommend"});
+  progress.expect(static_cast<uint32_t>(fitting.size()), static_cast<double>(fitting.size()));
+  std::map<std::string, double> errors;
+  for (Candidate& candidate : fitting) {
+    const std::string words = to_string(candidate.setting);
+    progress.begin_run("error of " + words);
+    const auto [known, is_new] = errors.try_emplace(words, candidate.error);
+    const auto own = std::find_if(
+        measurements.begin(), measurements.end(),
+        [&](const SceneMeasurement& measurement) { return measurement.device() == candidate.device; });
+    // A step outside the model's stable range stays at an unbounded error.
+    if (is_new)
+      if (const auto error = own->error(candidate.setting, reference)) known->second = *error;
+    candidate.error = known->second;
+    progress.end_run(1.0);
+  }
+  std::stable_sort(fitting.begin(), fitting.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
+}
+
+std::string on_what(const Candidate& candidate) {
+  return fmt::format("{} on {}", to_string(candidate.setting), to_string(candidate.device));
+}
+
 Error nothing_fits(const std::vector<Candidate>& candidates, const Groom& groom, double budget_ms) {
   if (candidates.empty())
     return make_error(ErrorCode::Unsupported, "no strand model can be run for this scene");
   const Candidate& fastest = candidates.front();
   return make_error(
       ErrorCode::LimitExceeded,
-      "nothing fits {:g} ms per step: the fastest, {}, takes {:.3g} ms for {} strands of {} vertices; "
+      "nothing fits {:g} ms per step: the fastest, {} on {}, takes {:.3g} ms for {} strands of {} vertices; "
       "give a larger budget, or about {:.0f} strands",
-      budget_ms, fastest.setting.row->name, fastest.ms_per_step, groom.strand_count(),
-      groom.uniform_vertex_count(), std::floor(groom.strand_count() * budget_ms / fastest.ms_per_step));
+      budget_ms, fastest.setting.row->name, to_string(fastest.device), fastest.ms_per_step,
+      groom.strand_count(), groom.uniform_vertex_count(),
+      std::floor(groom.strand_count() * budget_ms / fastest.ms_per_step));
 }
 
 }  // namespace
@@ -184,13 +228,18 @@ Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions&
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
   const MotionHair hair = nearest_hair(content.groom);
   ASSIGN_OR_RETURN(const MotionSet motion, MotionSet::make({{}, kMotionS, kMotionStrands, hair}));
-  ASSIGN_OR_RETURN(const auto executor, open_executor(options.device));
-  const SceneMeasurement measurement(scene, content, motion, *executor);
+  ASSIGN_OR_RETURN(const auto executors, open_report_executors(options.device));
+  if (executors.empty())
+    return make_error(ErrorCode::BadInput, "--gl-device {} leaves nothing to measure on", kNoDevice);
+  Recommendation result;
+  std::vector<SceneMeasurement> measurements;
+  for (const auto& executor : executors) {
+    result.executors.push_back(executor->info());
+    measurements.emplace_back(scene, content, motion, *executor);
+  }
   const double rate_hz = measured_rate_hz(scene);
 
-  std::vector<Candidate> candidates = timed_candidates(measurement, rows, rate_hz);
-  Recommendation result;
-  result.device = executor->info().name;
+  std::vector<Candidate> candidates = timed_candidates(measurements, rows, rate_hz);
   result.hair = hair;
   result.strand_count = content.groom.strand_count();
   result.vertex_count = content.groom.uniform_vertex_count();
@@ -202,20 +251,12 @@ Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions&
   if (result.fitting.empty()) return nothing_fits(candidates, content.groom, options.budget_ms);
 
   ASSIGN_OR_RETURN(const Trajectory reference, run_rod(motion, kReferenceVertices, kReferenceRateHz));
-  Progress progress({"recommend"});
-  progress.expect(static_cast<uint32_t>(result.fitting.size()), static_cast<double>(result.fitting.size()));
-  for (Candidate& candidate : result.fitting) {
-    progress.begin_run("error of " + to_string(candidate.setting));
-    // A step outside the model's stable range stays at an unbounded error.
-    if (const auto error = measurement.error(candidate.setting, reference)) candidate.error = *error;
-    progress.end_run(1.0);
-  }
-  std::stable_sort(result.fitting.begin(), result.fitting.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
+  add_errors(measurements, reference, result.fitting);
   if (!std::isfinite(result.fitting.front().error))
     return nothing_fits(candidates, content.groom, options.budget_ms);
   const RunSetting& best = result.fitting.front().setting;
-  ASSIGN_OR_RETURN(const SolverParameters parameters, scene_parameters(best, motion, measurement.length_m()));
+  ASSIGN_OR_RETURN(const SolverParameters parameters,
+                   scene_parameters(best, motion, measurements.front().length_m()));
   result.scene_lines = scene_lines(best, parameters);
   return result;
 }
@@ -223,27 +264,32 @@ Result<Recommendation> recommend(const SceneDesc& scene, const RecommendOptions&
 std::string recommendation_text(const Recommendation& recommendation, const SceneDesc& scene,
                                 double budget_ms) {
   const Candidate& best = recommendation.fitting.front();
+  std::vector<std::string> names;
+  for (const ExecutorInfo& executor : recommendation.executors) names.push_back(executor.name);
   std::string text = fmt::format(
-      "Scene '{}': {} strands of {} vertices, {:g} steps per second, on {}.\n\n{:<58} {:>9} {:>9}\n",
+      "Scene '{}': {} strands of {} vertices, {:g} steps per second, on {}.\n\n{:<58} {:>6} {:>9} {:>9}\n",
       scene.name, recommendation.strand_count, recommendation.vertex_count, scene.step_rate_hz,
-      recommendation.device, "setting", "ms/step", "error");
+      fmt::join(names, " and on "), "setting", "on", "ms/step", "error");
   for (size_t i = 0; i < std::min(kShownCandidates, recommendation.fitting.size()); ++i) {
     const Candidate& candidate = recommendation.fitting[i];
-    text += fmt::format("{:<58} {:>9.3g} {:>8.3g} %\n", to_string(candidate.setting), candidate.ms_per_step,
-                        100.0 * candidate.error);
+    text += fmt::format("{:<58} {:>6} {:>9.3g} {:>8.3g} %\n", to_string(candidate.setting),
+                        to_string(candidate.device), candidate.ms_per_step, 100.0 * candidate.error);
   }
   text += fmt::format(
       "\nTake {}: of the {} settings that fit {:g} ms per step it is the most exact, {:.3g} % of the "
       "strand's "
       "length from a converged rod, and takes {:.3g} ms of simulation per step. Times are of the scene's own "
       "strands; errors are not, but of {} hair of {:g} m on the built-in head motion, without colliders.\n",
-      to_string(best.setting), recommendation.fitting.size(), budget_ms, 100.0 * best.error, best.ms_per_step,
+      on_what(best), recommendation.fitting.size(), budget_ms, 100.0 * best.error, best.ms_per_step,
       to_string(recommendation.hair), MotionSet::kLengthM);
   if (recommendation.next.setting.row != nullptr) {
-    text += fmt::format("The first that does not fit is {} with {:.3g} ms.\n",
-                        to_string(recommendation.next.setting), recommendation.next.ms_per_step);
+    text += fmt::format("The first that does not fit is {} with {:.3g} ms.\n", on_what(recommendation.next),
+                        recommendation.next.ms_per_step);
   }
-  return text + "\nFor the scene file:\n\n" + recommendation.scene_lines;
+  text += "\nFor the scene file:\n\n" + recommendation.scene_lines;
+  if (recommendation.executors.size() > 1)
+    text += fmt::format("\nand strandcast-server --sim-device {}\n", to_string(best.device));
+  return text;
 }
 
 void add_recommend_command(CLI::App& app, ReportAction& action) {
@@ -258,7 +304,7 @@ void add_recommend_command(CLI::App& app, ReportAction& action) {
   command->add_option("--solver", options->solvers, "choose from this one; repeatable")
       ->expected(1)
       ->take_all();
-  add_sim_device_options(*command, options->device);
+  add_sim_device_options(*command, options->device, {true});
   command->callback([options, &action] {
     action = [options]() -> Status {
       ASSIGN_OR_RETURN(const SceneDesc scene, options->scene_path.empty()

@@ -18,22 +18,23 @@ struct RecommendOptions {
   std::vector<std::string> overrides;  // path=value
   std::vector<std::string> solvers;    // rows to choose from; empty = all
   double budget_ms = 0.0;              // of simulation per step of the scene
-  ExecutorConfig device;
+  ExecutorConfig device;               // kAllDevices: on each executor, beside each other
 };
 
 /// One setting of one row, for the scene.
 struct Candidate {
   RunSetting setting;
-  double ms_per_step = 0.0;  // measured on the scene's own strands
-  double error = 0.0;        // relative RMS on the motion set's hair, at the scene's vertices and rate
+  SimDevice device = SimDevice::Gl;  // what its time was measured on
+  double ms_per_step = 0.0;          // on the scene's own strands
+  double error = 0.0;  // relative RMS on the motion set's hair, at the scene's vertices and rate
 };
 
 struct Recommendation {
-  std::string device;
+  std::vector<ExecutorInfo> executors;     // that times were measured on
   MotionHair hair = MotionHair::Straight;  // of the motion set, nearest to the scene's: what errors are of
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
-  std::vector<Candidate> fitting;  // within the budget, the most exact first
+  std::vector<Candidate> fitting;  // within the budget, the most exact first; of equals the fastest
   Candidate next;                  // the least slow beyond the budget; row is nullptr when all fit
   std::string scene_lines;         // of the first, to paste into a scene file
 };

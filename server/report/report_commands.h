@@ -18,9 +18,12 @@ struct MotionFileOptions;
 void add_motion_file_options(CLI::App& command, MotionFileOptions& options);
 
 struct ExecutorConfig;
-/// --sim-device and --gl-device: what runs the simulation. `none`: what a GL device of that name stands for,
-/// "" = it is none.
-void add_sim_device_options(CLI::App& command, ExecutorConfig& config, const std::string& none = "");
+struct SimDeviceHelp {
+  bool has_all = false;   // the report can run on every executor (kAllDevices)
+  std::string none = {};  // what a GL device of that name stands for; "" = it is none
+};
+/// --sim-device and --gl-device: what runs the simulation.
+void add_sim_device_options(CLI::App& command, ExecutorConfig& config, const SimDeviceHelp& help = {});
 
 /// What the chosen subcommand does once the command line is read; the error ends the program with one
 /// sentence.

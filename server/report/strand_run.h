@@ -55,6 +55,9 @@ bool can_be_limp(const SolverRow& row);
 /// The values of a row's effort parameter to try around its default, ascending; {NaN} without one.
 std::vector<double> effort_values(const SolverRow& row, const std::vector<double>& factors);
 
+/// What runs were made without a kernel are said to have run on.
+inline constexpr const char* kRanInDouble = "double";
+
 /// Whether and where kernels run.
 struct Workbench {
   Executor* executor = nullptr;  // nullptr: every row runs as its reference
@@ -64,7 +67,7 @@ struct Workbench {
   }
   /// "gl", "lanes"; "double" for a reference.
   std::string name_of(const RunSetting& setting) const {
-    return runs_kernel(setting) ? to_string(executor->info().device) : "double";
+    return runs_kernel(setting) ? to_string(executor->info().device) : kRanInDouble;
   }
 };
 

@@ -38,7 +38,7 @@ void add_streaming_command(CLI::App& app, ReportAction& action) {
       ->add_option("--seconds", options->seconds,
                    "recorded of each part of a motion, the median and the wildest; default: 0.5")
       ->check(CLI::PositiveNumber);
-  add_sim_device_options(*command, options->device, "the solver in double precision");
+  add_sim_device_options(*command, options->device, {false, "the solver in double precision"});
   command->add_flag("--quick", options->is_quick, "fewer and shorter: less than a minute on two cores");
   command->callback([options, &action] { action = [options] { return run_streaming(*options); }; });
 }

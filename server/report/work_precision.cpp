@@ -105,17 +105,22 @@ Result<References> make_references(const MotionSet& motion, const WorkGrid& grid
 class Measurement {
  public:
   /// `motions`: of every hair, straight first or alone.
+  /// `benches` outlive it; at least one.
   Measurement(const WorkGrid& grid, const std::vector<MotionSet>& motions, std::vector<const SolverRow*> rows,
-              Executor* executor)
-      : grid_(grid), rows_(std::move(rows)), workbench_{executor}, progress_({"work-precision"}) {
-    for (const MotionSet& motion : motions) sets_.push_back({&motion, RunTimer(workbench_, motion)});
+              const std::vector<Workbench>& benches)
+      : grid_(grid), rows_(std::move(rows)), benches_(benches), progress_({"work-precision"}) {
+    for (const MotionSet& motion : motions) {
+      HairSet set{&motion};
+      for (const Workbench& bench : benches_) set.timers.emplace_back(bench, motion);
+      sets_.push_back(std::move(set));
+    }
   }
 
   // Times first, while nothing else runs; then tests here and references on another thread; then the motion.
   Status run(WorkReport& report) {
     plan();
     for (HairSet& set : sets_)
-      for (const RunSetting& setting : set.runs) time_run(set, setting);
+      for (const Run& run : set.runs) time_run(set, run);
     auto references = std::async(std::launch::async, [this]() -> Result<std::vector<References>> {
       std::vector<References> all;
       for (const HairSet& set : sets_) {
@@ -131,24 +136,39 @@ class Measurement {
     progress_.end_run(0.0);
     for (size_t i = 0; i < sets_.size(); ++i) {
       report.converged.push_back((*converged)[i].converged);
-      for (const RunSetting& setting : sets_[i].runs)
-        report.records.push_back(run_motion(sets_[i], setting, (*converged)[i]));
+      for (const Run& run : sets_[i].runs)
+        report.records.push_back(run_motion(sets_[i], run, (*converged)[i]));
     }
     const HairSet& first = sets_.front();
-    if (!first.runs.empty()) report.timed_strands = first.timer.strand_count(first.runs.front());
+    if (!first.runs.empty())
+      report.timed_strands = first.timers.front().strand_count(first.runs.front().setting);
     return {};
   }
 
  private:
+  struct Run {
+    RunSetting setting;
+    size_t bench = 0;
+  };
   struct Planned {
     const AnalyticTest* test = nullptr;
-    RunSetting setting;
+    Run run;
   };
   struct HairSet {
     const MotionSet* motion = nullptr;
-    RunTimer timer;
-    std::vector<RunSetting> runs = {};
+    std::vector<RunTimer> timers = {};  // by bench
+    std::vector<Run> runs = {};
+    std::map<std::string, Trajectory> exact = {};  // of runs on more than one bench, by setting
   };
+
+  /// The setting on every executor, one after the other, so that what else the machine does disturbs all
+  /// alike; a row without a kernel runs once.
+  std::vector<Run> on_each_bench(const RunSetting& setting) const {
+    std::vector<Run> runs;
+    for (size_t bench = 0; bench < benches_.size(); ++bench)
+      if (bench == 0 || benches_[bench].runs_kernel(setting)) runs.push_back({setting, bench});
+    return runs;
+  }
 
   void plan() {
     for (const SolverRow* row : rows_) {
@@ -161,11 +181,11 @@ class Measurement {
     }
     uint32_t timed_runs = 0;
     for (const HairSet& set : sets_) {
-      for (const RunSetting& setting : set.runs) progress_.expect(1, cost_of(setting, grid_.motion_s));
+      for (const Run& run : set.runs) progress_.expect(1, cost_of(run.setting, grid_.motion_s));
       timed_runs += static_cast<uint32_t>(set.runs.size());
     }
     for (const Planned& planned : analytic_runs_)
-      progress_.expect(1, cost_of(planned.setting, planned.test->simulated_s));
+      progress_.expect(1, cost_of(planned.run.setting, planned.test->simulated_s));
     progress_.expect(1 + timed_runs, 0.0);
   }
 
@@ -174,7 +194,8 @@ class Measurement {
       for (const uint32_t vertex_count : grid_.vertices)
         for (const double rate_hz : grid_.rates_hz)
           for (const uint32_t substeps : grid_.substeps)
-            set.runs.push_back({&row, material, vertex_count, rate_hz, substeps, effort});
+            for (const Run& run : on_each_bench({&row, material, vertex_count, rate_hz, substeps, effort}))
+              set.runs.push_back(run);
   }
 
   void plan_analytic(const SolverRow& row, const AnalyticTest& test) {
@@ -188,58 +209,75 @@ class Measurement {
     for (const double effort : effort_values(row, factors))
       for (const uint32_t vertex_count : vertices)
         for (const double rate_hz : rates)
-          analytic_runs_.push_back({&test, {&row, test.material, vertex_count, rate_hz, 1, effort}});
+          for (const Run& run : on_each_bench({&row, test.material, vertex_count, rate_hz, 1, effort}))
+            analytic_runs_.push_back({&test, run});
   }
 
-  WorkRecord record_for(const std::string& test, const RunSetting& setting) const {
-    return {test, setting, workbench_.name_of(setting)};
+  WorkRecord record_for(const std::string& test, const Run& run) const {
+    return {test, run.setting, benches_[run.bench].name_of(run.setting)};
   }
 
   /// Not empty when a row that only runs in double would take too long for it.
-  std::string too_slow(HairSet& set, const RunSetting& setting, double simulated_s, uint32_t strand_count) {
-    if (workbench_.runs_kernel(setting)) return "";
-    const auto time = set.timer.time(setting);
+  std::string too_slow(HairSet& set, const Run& run, double simulated_s, uint32_t strand_count) {
+    const RunSetting& setting = run.setting;
+    if (benches_[run.bench].runs_kernel(setting)) return "";
+    const auto time = set.timers[run.bench].time(setting);
     if (!time) return "";
     const double expected_s =
         time->best_us * 1e-6 * strand_count * simulated_s * setting.rate_hz * setting.substeps;
     return expected_s > grid_.longest_run_s ? fmt::format("left out: {:.0f} s", expected_s) : "";
   }
 
-  void time_run(HairSet& set, const RunSetting& setting) {
-    progress_.begin_run("time of " + to_string(setting));
-    (void)set.timer.time(setting);  // asked for again, with its error, when the run is recorded
+  std::string words_of(const Run& run) const {
+    return fmt::format("{}, {}", to_string(run.setting), benches_[run.bench].name_of(run.setting));
+  }
+
+  void time_run(HairSet& set, const Run& run) {
+    progress_.begin_run("time of " + words_of(run));
+    (void)set.timers[run.bench].time(run.setting);  // asked for again, with its error, when it is recorded
     progress_.end_run(0.0);
   }
 
-  void add_time(HairSet& set, WorkRecord& record) {
-    if (const auto time = set.timer.time(record.setting)) strandcast::add_time(record, *time);
+  void add_time(HairSet& set, const Run& run, WorkRecord& record) {
+    if (const auto time = set.timers[run.bench].time(run.setting)) strandcast::add_time(record, *time);
   }
 
   WorkRecord run_analytic(const Planned& planned) {
-    progress_.begin_run(planned.test->name + ", " + to_string(planned.setting));
-    WorkRecord record = record_for(planned.test->name, planned.setting);
-    record.result.note = too_slow(sets_.front(), planned.setting, planned.test->simulated_s, 1);
-    if (record.result.note.empty()) record.result = planned.test->run(workbench_, planned.setting);
+    const RunSetting& setting = planned.run.setting;
+    progress_.begin_run(planned.test->name + ", " + words_of(planned.run));
+    WorkRecord record = record_for(planned.test->name, planned.run);
+    record.result.note = too_slow(sets_.front(), planned.run, planned.test->simulated_s, 1);
+    if (record.result.note.empty()) record.result = planned.test->run(benches_[planned.run.bench], setting);
     const auto& sizes = grid_.vertices;
-    if (std::find(sizes.begin(), sizes.end(), planned.setting.vertex_count) != sizes.end())
-      add_time(sets_.front(), record);
-    progress_.end_run(cost_of(planned.setting, planned.test->simulated_s));
+    if (std::find(sizes.begin(), sizes.end(), setting.vertex_count) != sizes.end())
+      add_time(sets_.front(), planned.run, record);
+    progress_.end_run(cost_of(setting, planned.test->simulated_s));
     return record;
   }
 
-  WorkRecord run_motion(HairSet& set, const RunSetting& setting, const References& references) {
+  /// The setting in double; run once, whatever it is compared with.
+  Result<Trajectory> in_double(HairSet& set, RunSetting setting) {
+    const std::string key = to_string(setting);
+    if (const auto known = set.exact.find(key); known != set.exact.end()) return known->second;
+    setting.is_reference = true;
+    ASSIGN_OR_RETURN(Trajectory trajectory, set.motion->run({}, setting));
+    if (benches_.size() > 1) set.exact[key] = trajectory;
+    return trajectory;
+  }
+
+  WorkRecord run_motion(HairSet& set, const Run& planned, const References& references) {
     const MotionSet& motion = *set.motion;
-    WorkRecord record = record_for(motion_test(motion.hair()), setting);
-    progress_.begin_run(record.test + ", " + to_string(setting));
-    RunSetting in_double = setting;
-    in_double.is_reference = true;
+    const RunSetting& setting = planned.setting;
+    const Workbench& bench = benches_[planned.bench];
+    WorkRecord record = record_for(motion_test(motion.hair()), planned);
+    progress_.begin_run(record.test + ", " + words_of(planned));
     std::future<Result<Trajectory>> exact;
     const bool is_default_effort =
         std::isnan(setting.effort) || setting.effort == effort_values(*setting.row, {1.0}).front();
-    if (workbench_.runs_kernel(setting) && (is_default_effort || grid_.has_every_effort))
-      exact = std::async(std::launch::async, [&] { return motion.run({}, in_double); });
-    const std::string note = too_slow(set, setting, grid_.motion_s, grid_.strand_count);
-    const auto run = note.empty() ? motion.run(workbench_, setting)
+    if (bench.runs_kernel(setting) && (is_default_effort || grid_.has_every_effort))
+      exact = std::async(std::launch::async, [&] { return in_double(set, setting); });
+    const std::string note = too_slow(set, planned, grid_.motion_s, grid_.strand_count);
+    const auto run = note.empty() ? motion.run(bench, setting)
                                   : Result<Trajectory>(Error{ErrorCode::LimitExceeded, note, {}});
     if (run) {
       record.result.error = relative_rms(*run, references.rod);
@@ -251,7 +289,7 @@ class Measurement {
         record.model_error = relative_rms(refined->second.trajectory, references.rod);
         record.discretisation_error = relative_rms(*run, refined->second.trajectory);
       }
-      add_time(set, record);
+      add_time(set, planned, record);
     } else {
       record.result.note = run.error().to_string();
     }
@@ -265,7 +303,7 @@ class Measurement {
 
   const WorkGrid& grid_;
   std::vector<const SolverRow*> rows_;
-  Workbench workbench_;
+  const std::vector<Workbench>& benches_;
   Progress progress_;
   std::vector<HairSet> sets_;
   std::vector<Planned> analytic_runs_;
@@ -373,9 +411,14 @@ Result<WorkReport> measure_work_precision(const WorkPrecisionOptions& options) {
     motions.push_back(std::move(motion));
   }
   report.motion_name = options.motion.empty() ? "built-in head motion" : options.motion.filename().string();
-  ASSIGN_OR_RETURN(const auto executor, open_report_executor(options.device));
-  report.device = executor ? executor->info().name : "none: every model as its double-precision reference";
-  RETURN_IF_ERROR(Measurement(report.grid, motions, std::move(rows), executor.get()).run(report));
+  ASSIGN_OR_RETURN(const auto executors, open_report_executors(options.device));
+  std::vector<Workbench> benches;
+  for (const auto& executor : executors) {
+    report.executors.push_back(executor->info());
+    benches.push_back({executor.get()});
+  }
+  if (benches.empty()) benches.emplace_back();
+  RETURN_IF_ERROR(Measurement(report.grid, motions, std::move(rows), benches).run(report));
   return report;
 }
 

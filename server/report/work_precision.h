@@ -18,7 +18,7 @@ struct WorkPrecisionOptions {
   std::vector<std::string> solvers;  // rows of the table; empty = all
   std::filesystem::path motion;      // .bvh; empty: the built-in head motion
   MotionFileOptions motion_file;     // how to read it
-  ExecutorConfig device;             // kNoDevice: every row as its reference
+  ExecutorConfig device;             // kNoDevice: every row as its reference; kAllDevices: on each executor
   bool is_quick = false;
   // Less than the whole grid; empty = all of it.
   std::vector<uint32_t> vertices;
@@ -80,9 +80,9 @@ void add_time(WorkRecord& record, const StrandTime& time);
 struct WorkReport {
   WorkGrid grid;
   bool is_quick = false;
-  std::string device;  // as GL names it, or why there is none
+  std::vector<ExecutorInfo> executors;  // empty: every row ran as its double-precision reference
   std::string motion_name;
-  uint32_t timed_strands = 0;
+  uint32_t timed_strands = 0;  // on the first of the executors
   /// How far the converged rod is from others, relative RMS.
   struct Converged {
     MotionHair hair = MotionHair::Straight;

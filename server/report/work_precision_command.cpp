@@ -36,7 +36,7 @@ void add_work_precision_command(CLI::App& app, ReportAction& action) {
       ->take_all();
   command->add_option("--seconds", options->motion_s, "length of the measured motion")
       ->check(CLI::PositiveNumber);
-  add_sim_device_options(*command, options->device, "double-precision references only");
+  add_sim_device_options(*command, options->device, {true, "double-precision references only"});
   command->add_flag("--quick", options->is_quick, "fewer runs: some minutes on two cores");
   command->callback([options, &action] { action = [options] { return run_work_precision(*options); }; });
 }

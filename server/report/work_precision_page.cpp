@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <optional>
 
@@ -13,6 +12,7 @@
 #include "server/report/html_page.h"
 #include "server/report/report_folder.h"
 #include "server/report/svg_plot.h"
+#include "server/report/work_precision_devices.h"
 
 namespace strandcast {
 namespace {
@@ -23,8 +23,6 @@ constexpr double kFramesPerS = 1.0 / MotionSet::kFrameS;
 constexpr double kPickStrands = 10'000.0;
 constexpr double kUsPerMs = 1e3;
 constexpr double kBudgetsMs[] = {2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0};
-// An error above this is no picture of the same motion.
-constexpr double kWorstPlotted = 3.0;
 
 std::string percent(double value) {
   if (std::isnan(value)) return "";
@@ -70,10 +68,6 @@ std::string front_plot(const WorkReport& report, const std::vector<WorkPoint>& p
                  [&](const WorkPoint& point) { return point.method == method; });
     PlotSeries all{method, {}, PlotMark::Dots, style_of(report, method), true, false};
     PlotSeries front{method, {}, PlotMark::LineAndDots, style_of(report, method)};
-    const auto plotted = [](const WorkPoint& point) {
-      return PlotPoint{point.us, point.error,
-                       fmt::format("{}: {:.3g} % at {:.3g} us", point.label, 100.0 * point.error, point.us)};
-    };
     for (const WorkPoint& point : own) {
       if (point.error < kWorstPlotted) all.points.push_back(plotted(point));
     }
@@ -85,40 +79,44 @@ std::string front_plot(const WorkReport& report, const std::vector<WorkPoint>& p
     fronts.push_back(std::move(front));
   }
   desc.series.insert(desc.series.end(), fronts.begin(), fronts.end());
-  desc.x.title = "microseconds per strand and frame of 1/60 s";
+  desc.x.title = kFrameTimeTitle;
   return make_svg_plot(desc);
 }
 
 std::vector<WorkPoint> points_of(const WorkReport& report, const std::string& test,
-                                 const std::function<double(const WorkRecord&)>& error) {
+                                 const std::string& device) {
   std::vector<WorkPoint> points;
   for (const WorkRecord& record : report.records) {
-    if (record.test == test)
-      points.push_back({record.setting.row->name, record.us, error(record), to_string(record.setting)});
+    if (record.test == test && is_of_device(record, device))
+      points.push_back({record.setting.row->name, record.us, record.result.error, to_string(record.setting)});
   }
   return points;
 }
 
-double error_of(const WorkRecord& record) {
-  return record.result.error;
-}
-
 /// Whether any model beats the champion on this hair, in a sentence.
-std::string hair_summary(const WorkReport& report, MotionHair hair) {
+std::string hair_summary(const WorkReport& report, MotionHair hair, const std::string& device) {
   return fmt::format(
-      "On {} hair, {}: does any other model beat {}, in error and time, below an error of {:g} %? {}",
-      to_string(hair), report.motion_name, kChampion, 100.0 * kChampionErrorLimit,
-      beaten_sentence(motion_points(report, hair), kChampion, kChampionErrorLimit));
+      "On {} hair, {}{}: does any other model beat {}, in error and time, below an error of {:g} %? {}",
+      to_string(hair), report.motion_name, device.empty() ? "" : "," + on_device(device), kChampion,
+      100.0 * kChampionErrorLimit,
+      beaten_sentence(motion_points(report, hair, device), kChampion, kChampionErrorLimit));
 }
 
-void add_picks(HtmlPage& page, const WorkReport& report, MotionHair hair) {
-  const std::vector<WorkPoint> points = motion_points(report, hair);
+std::string executors_words(const WorkReport& report) {
+  if (report.executors.empty()) return "none: every model as its double-precision reference";
+  std::vector<std::string> names;
+  for (const ExecutorInfo& executor : report.executors) names.push_back(executor.name);
+  return fmt::format("{}", fmt::join(names, " and on "));
+}
+
+void add_picks(HtmlPage& page, const WorkReport& report, MotionHair hair, const std::string& device) {
+  const std::vector<WorkPoint> points = motion_points(report, hair, device);
   HtmlTable table;
   table.caption = fmt::format(
-      "The most exact setting within a budget for {:.0f} {} strands at 60 frames per second, simulation "
+      "The most exact setting within a budget for {:.0f} {} strands at 60 frames per second{}, simulation "
       "only. "
       "\"strandcast-report recommend\" answers for a scene of yours.",
-      kPickStrands, to_string(hair));
+      kPickStrands, to_string(hair), on_device(device));
   table.columns = {"budget per frame", "pick", "takes", "error"};
   std::optional<size_t> before;
   for (const double budget_ms : kBudgetsMs) {
@@ -139,22 +137,24 @@ void add_picks(HtmlPage& page, const WorkReport& report, MotionHair hair) {
 
 /// The three errors of each row: at one common setting, and of its most exact run.
 void add_error_parts(HtmlPage& page, const WorkReport& report, MotionHair hair) {
+  const std::string device = front_devices(report).front();
   HtmlTable table;
   table.caption = fmt::format(
-      "{} hair, every model's most exact run. Model: the model itself, refined ({} vertices, up to {:g} Hz, "
+      "{} hair{}, every model's most exact run. Model: the model itself, refined ({} vertices, up to {:g} "
+      "Hz, "
       "in "
       "double), "
       "against the rod. Discretisation: this run against the model refined. Float: this run by its kernel "
       "against "
       "double precision. All are RMS distances of vertices over the strand's length.",
-      to_string(hair), report.grid.refined_vertices, report.grid.refined_rate_hz);
+      to_string(hair), on_device(device), report.grid.refined_vertices, report.grid.refined_rate_hz);
   table.columns = {"model", "setting",        "microseconds", "error",
                    "model", "discretisation", "float",        "largest stretch"};
   for (const std::string& method : methods_of(report)) {
     const WorkRecord* best = nullptr;
     for (const WorkRecord& record : report.records) {
       if (record.test != motion_test(hair) || record.setting.row->name != method) continue;
-      if (!std::isfinite(record.result.error)) continue;
+      if (!std::isfinite(record.result.error) || !is_of_device(record, device)) continue;
       if (best == nullptr || record.result.error < best->result.error) best = &record;
     }
     if (best == nullptr) {
@@ -232,7 +232,7 @@ void add_analytic_tables(HtmlPage& page, const WorkReport& report) {
 
 void add_analytic_plot(HtmlPage& page, const WorkReport& report, const std::string& test,
                        const std::string& title) {
-  const std::vector<WorkPoint> points = points_of(report, test, error_of);
+  const std::vector<WorkPoint> points = points_of(report, test, front_devices(report).front());
   page.figure(analytic_plot(report, test, title),
               fmt::format("Does another model beat {} here? {}", kChampion,
                           beaten_sentence(points, kChampion, kChampionErrorLimit)));
@@ -307,7 +307,7 @@ void add_method(HtmlPage& page, const WorkReport& report) {
                   "1/60 s whatever the rate. Rows without a kernel are timed in double precision on one "
                   "thread. Times are "
                   "of this machine; errors are the same on every one.",
-                  report.timed_strands, report.device));
+                  report.timed_strands, executors_words(report)));
   page.paragraph(
       "Models without constants of hair are measured as limp chains and as they ship, and skip the tests "
       "that "
@@ -319,14 +319,24 @@ void add_method(HtmlPage& page, const WorkReport& report) {
 
 }  // namespace
 
-std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair) {
-  return points_of(report, motion_test(hair), error_of);
+PlotPoint plotted(const WorkPoint& point) {
+  return {point.us, point.error,
+          fmt::format("{}: {:.3g} % at {:.3g} us", point.label, 100.0 * point.error, point.us)};
+}
+
+std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair, const std::string& device) {
+  return points_of(report, motion_test(hair), device);
 }
 
 std::string work_precision_summary(const WorkReport& report) {
   std::string text;
-  for (const MotionHair hair : report.grid.hairs)
-    text += fmt::format("{}{}", text.empty() ? "" : "\n", hair_summary(report, hair));
+  const auto add = [&](const std::string& line) {
+    if (!line.empty()) text += (text.empty() ? "" : "\n") + line;
+  };
+  for (const MotionHair hair : report.grid.hairs) {
+    for (const std::string& device : front_devices(report)) add(hair_summary(report, hair, device));
+    add(devices_summary(report, hair));
+  }
   return text;
 }
 
@@ -385,13 +395,13 @@ std::string work_precision_csv(const WorkReport& report) {
   return csv.text();
 }
 
-std::string motion_plot(const WorkReport& report, MotionHair hair) {
+std::string motion_plot(const WorkReport& report, MotionHair hair, const std::string& device) {
   PlotDesc desc;
-  desc.title = fmt::format("Error against time, {} hair, {}: below and left is better", to_string(hair),
-                           report.motion_name);
+  desc.title = fmt::format("Error against time{}, {} hair, {}: below and left is better", on_device(device),
+                           to_string(hair), report.motion_name);
   desc.y.title = "RMS position error over the length";
   desc.guides = {{"1 %", kChampionErrorLimit}};
-  return front_plot(report, motion_points(report, hair), std::move(desc));
+  return front_plot(report, motion_points(report, hair, device), std::move(desc));
 }
 
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title) {
@@ -399,22 +409,25 @@ std::string analytic_plot(const WorkReport& report, const std::string& test, con
   desc.title = title;
   desc.y.title = "relative error";
   desc.height = 400.0;
-  return front_plot(report, points_of(report, test, error_of), std::move(desc));
+  return front_plot(report, points_of(report, test, front_devices(report).front()), std::move(desc));
 }
 
 std::string work_precision_page(const WorkReport& report) {
   HtmlPage page("Strand models: error against run time");
   page.paragraph(
-      fmt::format("{} runs on {}.{}", report.records.size(), report.device,
+      fmt::format("{} runs on {}.{}", report.records.size(), executors_words(report),
                   report.is_quick ? " A quick report: fewer settings and a coarser reference." : ""));
   for (const MotionHair hair : report.grid.hairs) {
     page.heading(fmt::format("What to pick for {} hair", to_string(hair)));
-    page.answer(hair_summary(report, hair));
-    add_picks(page, report, hair);
-    page.figure(
-        motion_plot(report, hair),
-        "Lines join the runs of a model that no other run of it beats; faint marks are all other runs. Rest "
-        "the mouse on a mark for its setting.");
+    for (const std::string& device : front_devices(report)) {
+      page.answer(hair_summary(report, hair, device));
+      add_picks(page, report, hair, device);
+      page.figure(
+          motion_plot(report, hair, device),
+          "Lines join the runs of a model that no other run of it beats; faint marks are all other runs. "
+          "Rest the mouse on a mark for its setting.");
+    }
+    add_devices(page, report, hair);
   }
   page.heading("Where the error comes from");
   for (const MotionHair hair : report.grid.hairs) add_error_parts(page, report, hair);
@@ -429,9 +442,14 @@ std::string work_precision_page(const WorkReport& report) {
 
 Status save_work_precision(const WorkReport& report, const std::filesystem::path& folder) {
   RETURN_IF_ERROR(save_text(folder / kWorkPrecisionCsv, work_precision_csv(report)));
-  for (const MotionHair hair : report.grid.hairs)
-    RETURN_IF_ERROR(
-        save_text(folder / fmt::format("work_precision_{}.svg", to_string(hair)), motion_plot(report, hair)));
+  const std::vector<std::string> devices = front_devices(report);
+  for (const MotionHair hair : report.grid.hairs) {
+    const std::string name = fmt::format("work_precision_{}", to_string(hair));
+    if (devices.size() > 1) RETURN_IF_ERROR(save_text(folder / (name + ".svg"), devices_plot(report, hair)));
+    for (const std::string& device : devices)
+      RETURN_IF_ERROR(save_text(folder / (name + (device.empty() ? "" : "_" + device) + ".svg"),
+                                motion_plot(report, hair, device)));
+  }
   RETURN_IF_ERROR(save_text(folder / "cantilever.svg", analytic_plot(report, "T1 Gamma 10", "T1, Gamma 10")));
   RETURN_IF_ERROR(save_text(folder / "pendulum.svg", analytic_plot(report, "T4, T7", "T4: period")));
   return save_text(folder / kWorkPrecisionPage, work_precision_page(report));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/report/pareto.h"
+#include "server/report/svg_plot.h"
 #include "server/report/work_precision.h"
 
 namespace strandcast {
@@ -16,18 +17,26 @@ inline constexpr const char* kWorkPrecisionCsv = "work_precision.csv";
 inline constexpr const char* kChampion = "direct_rod";
 inline constexpr double kChampionErrorLimit = 0.01;
 
-/// Runs of the motion set as points of time and error, in the order of the records.
-std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair);
+inline constexpr const char* kFrameTimeTitle = "microseconds per strand and frame of 1/60 s";
+/// An error above this is no picture of the same motion.
+inline constexpr double kWorstPlotted = 3.0;
+PlotPoint plotted(const WorkPoint& point);
 
-/// Whether any model beats the champion, in a sentence for each kind of hair.
+/// Runs of the motion set as points of time and error, in the order of the records; of one executor
+/// (front_devices()), "" = of all.
+std::vector<WorkPoint> motion_points(const WorkReport& report, MotionHair hair,
+                                     const std::string& device = "");
+
+/// Whether any model beats the champion, in a sentence for each kind of hair and executor; where there are
+/// several, also what they save.
 std::string work_precision_summary(const WorkReport& report);
 
 std::string work_precision_csv(const WorkReport& report);
 std::string work_precision_page(const WorkReport& report);
 
 /// Error against time on the motion set: all runs faint, each model's front as a line.
-std::string motion_plot(const WorkReport& report, MotionHair hair);
-/// Error against time of one analytic test.
+std::string motion_plot(const WorkReport& report, MotionHair hair, const std::string& device = "");
+/// Error against time of one analytic test, on the first executor.
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title);
 
 Status save_work_precision(const WorkReport& report, const std::filesystem::path& folder);

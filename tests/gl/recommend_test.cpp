@@ -1,8 +1,12 @@
 // What strandcast-report recommends for a scene.
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "common/scene/scene_file.h"
 #include "server/report/recommend.h"
+#include "server/report/report_executor.h"
+#include "tests/support/sim_devices.h"
 
 namespace strandcast {
 namespace {
@@ -46,6 +50,36 @@ TEST(Recommend, WithTimeEnoughItNamesTheRodInLinesThatASceneTakes) {
   EXPECT_THAT(text, HasSubstr(found->scene_lines));
   EXPECT_EQ(found->hair, MotionHair::Styled) << "the built-in hair falls over the head";
   EXPECT_THAT(text, HasSubstr("errors are not, but of styled hair of 0.25 m"));
+}
+
+// The same setting has one error, whatever runs it, and a time on each executor; the text says which.
+TEST(Recommend, OnEveryExecutorItSaysWhichATimeIsOf) {
+  constexpr double kAmpleMs = 1e4;
+  const SceneDesc scene = small_scene();
+  RecommendOptions options = options_for(kAmpleMs);
+  options.solvers = {"dftl"};
+  options.device.sim_device = kAllDevices;
+  const auto found = recommend(scene, options);
+  ASSERT_TRUE(found) << found.error().to_string();
+  ASSERT_EQ(found->executors.size(), sim_devices().size());
+  std::map<std::string, std::vector<Candidate>> by_setting;
+  for (const Candidate& candidate : found->fitting)
+    by_setting[to_string(candidate.setting)].push_back(candidate);
+  for (const auto& [setting, candidates] : by_setting) {
+    SCOPED_TRACE(setting);
+    std::set<SimDevice> devices;
+    for (const Candidate& candidate : candidates) {
+      devices.insert(candidate.device);
+      EXPECT_EQ(candidate.error, candidates.front().error);
+      EXPECT_GE(candidate.ms_per_step, candidates.front().ms_per_step) << "of equals the fastest first";
+    }
+    EXPECT_EQ(devices.size(), sim_devices().size());
+  }
+  const std::string device = to_string(found->fitting.front().device);
+  const std::string text = recommendation_text(*found, scene, kAmpleMs);
+  EXPECT_THAT(text, HasSubstr(" on " + device + ": of the "));
+  EXPECT_THAT(text, HasSubstr("strandcast-server --sim-device " + device));
+  for (const ExecutorInfo& executor : found->executors) EXPECT_THAT(text, HasSubstr(executor.name));
 }
 
 TEST(Recommend, SaysWhatWouldFitWhenNothingDoes) {

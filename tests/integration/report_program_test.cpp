@@ -121,6 +121,41 @@ TEST_F(ReportProgram, ASmallWorkPrecisionKeepsTheLaws) {
   EXPECT_THAT(load_text(out / "work_precision_curled.svg", 1u << 24).value(), HasSubstr("direct_rod"));
 }
 
+// Each executor runs the same settings, with the same errors but for float, and has a front and files of its
+// own.
+TEST_F(ReportProgram, WorkPrecisionRunsOnEveryExecutorBesideEachOther) {
+  const auto out = folder_.path() / "report";
+  const Outcome outcome =
+      run_report(folder_, fmt::format("work-precision --quick --solver dftl --vertices 8 "
+                                      "--rate 30 --seconds 0.2 --hair straight --sim-device all --out '{}'",
+                                      out.string()));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_THAT(outcome.output,
+              AllOf(HasSubstr("built-in head motion, on gl: does any"),
+                    HasSubstr("built-in head motion, on lanes: does any"), HasSubstr("lanes take ")));
+  std::map<std::string, std::map<std::string, double>> errors;  // of each setting, by device
+  rows_ = parse_csv(load_text(out / "work_precision.csv", 1u << 20).value());
+  for (const auto& row : rows_) {
+    EXPECT_THAT(row.at("note"), IsEmpty());
+    if (row.at("test") != "motion, straight hair") continue;
+    EXPECT_GT(number(row, "us_per_strand_frame"), 0.0);
+    EXPECT_LE(number(row, "float_error"), 1e-3) << row.at("device");
+    const std::string setting =
+        fmt::format("{}, {}, {}", row.at("solver"), row.at("material"), row.at("effort"));
+    EXPECT_TRUE(errors[setting].emplace(row.at("device"), number(row, "error")).second) << setting;
+  }
+  EXPECT_EQ(errors.size(), 2u) << "a chain and as shipped";
+  for (const auto& [setting, of_device] : errors) {
+    ASSERT_EQ(of_device.size(), 2u) << setting;
+    EXPECT_NEAR(of_device.at("gl"), of_device.at("lanes"), 2e-3) << setting;
+  }
+  for (const char* name : {"work_precision_straight_gl.svg", "work_precision_straight_lanes.svg"})
+    EXPECT_THAT(load_text(out / name, 1u << 24).value(), HasSubstr("dftl")) << name;
+  EXPECT_THAT(load_text(out / "work_precision_straight.svg", 1u << 24).value(), HasSubstr(">lanes</text>"));
+  EXPECT_THAT(load_text(out / "work_precision.html", 1u << 24).value(),
+              HasSubstr("gl, lanes beside each other"));
+}
+
 // Few strands, half a second: every codec at every bound, and none of ours beyond it.
 TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
   const auto out = folder_.path() / "report";
@@ -178,6 +213,7 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
        "bad.bvh"},
       {fmt::format("work-precision --out '{}' --gl-device nonsense", out), "nonsense"},
       {fmt::format("stability --out '{}' --sim-device nonsense", out), "nonsense"},
+      {fmt::format("stability --out '{}' --sim-device all", out), "all"},
       {fmt::format("work-precision --out '{}'", (folder_.path() / "file").string()), "folder"},
       {"streaming", "--out"},
       {fmt::format("streaming --out '{}' --size 10", out), "--size is '10'"},
