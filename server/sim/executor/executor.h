@@ -21,6 +21,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/features.h"
+#include "server/sim/executor/plane_role.h"
 #include "server/sim/step_block.h"
 #include "server/sim/strand_blocks.h"
 #include "server/sim/strand_layout.h"
@@ -48,18 +49,6 @@ class StrandPlane {
 /// Turns xyz of every element, in double; w stays.
 void turn_plane(StrandPlane& plane, const glm::dquat& turn);
 
-/// What kernels call the planes (shaders/shared/bindings.h).
-enum class PlaneRole : uint32_t {
-  Rest,
-  Position,
-  Velocity,
-  Displacement,
-  VelocityChange,
-  RodEdge,
-  RodStrand,
-  RodAxis
-};
-inline constexpr size_t kPlaneRoleCount = 8;
 /// By role; nullptr = the kernel does not touch it.
 using BoundPlanes = std::array<StrandPlane*, kPlaneRoleCount>;
 inline StrandPlane*& plane_of(BoundPlanes& planes, PlaneRole role) {

@@ -16,6 +16,7 @@
 #include "common/simd/lane_matrices.h"
 #include "common/simd/lane_pairs.h"
 #include "server/sim/executor/lane_kernel.h"
+#include "server/sim/executor/plane_role.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 
@@ -39,18 +40,6 @@ using number = float;
 using uniform_float = float;
 using lane_bool = Bool;
 using lane_uint = Uint;
-
-/// As server/sim/executor/executor.h has it; bindings and units of the kernels in one.
-enum class PlaneRole : uint32_t {
-  Rest,
-  Position,
-  Velocity,
-  Displacement,
-  VelocityChange,
-  RodEdge,
-  RodStrand,
-  RodAxis
-};
 
 constexpr size_t kRowFloats = 64;  // of one vertex of a block: x y z w of 16 strands
 constexpr uint kStrands = KERNEL_PARTS * simd::kLanes;
@@ -196,7 +185,7 @@ class KernelBase {
   uint gust_count() const { return run_.gust_count; }
 
   const LaneRun& run_;
-  Rows plane_[8] = {};  // of the strands at hand
+  Rows plane_[kPlaneRoleCount] = {};  // of the strands at hand
   struct {
     uint x;
   } gl_GlobalInvocationID{0};
@@ -228,7 +217,7 @@ class Kernel : public KernelBase {
         // Behind the last block, once more what the register before has: the same values to the same places.
         uint first = strand + part * simd::kLanes;
         if (first >= end) first = strand;
-        for (uint role = 0; role < 8; ++role)
+        for (uint role = 0; role < kPlaneRoleCount; ++role)
           plane_[role].of[part] =
               run_.planes[role] == nullptr
                   ? nullptr
