@@ -81,6 +81,11 @@ Result<std::unique_ptr<RenderDevice>> RenderDevice::open(const RenderDeviceConfi
   return device;
 }
 
+bool is_drawn_by_processors(const RenderDeviceConfig& config) {
+  const auto device = RenderDevice::open(config);
+  return !device || (*device)->info().is_software;
+}
+
 Status RenderDevice::make_current() {
   return context_ ? context_->make_current() : Status();
 }

@@ -57,6 +57,10 @@ class RenderDevice {
   bool has_no_gl_ = false;                   // was looked for, for such methods
 };
 
+/// Whether pictures drawn with this configuration take processor cores: looks for what would draw, and lets
+/// go of it. True as well where nothing can draw.
+bool is_drawn_by_processors(const RenderDeviceConfig& config);
+
 /// What will draw a look where the renderer was asked for by this name and there is no hardware GPU.
 RendererKind likely_renderer(const std::string& renderer, const LookDesc& look);
 

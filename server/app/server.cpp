@@ -68,6 +68,7 @@ class Server::State {
   gl::PassReports idle_picture_passes() const;
 
   ServerConfig config_;
+  bool is_drawn_by_processors_ = true;  // pictures, whatever simulates
   InputHub inputs_;
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
@@ -107,14 +108,14 @@ Status Server::State::start() {
                                           asset,
                                           config_.make_painter(painter),
                                           {scene.look, scene.camera}}));
+  is_drawn_by_processors_ = config_.is_drawn_by_processors(painter.device);
   ASSIGN_OR_RETURN(idle_picture_passes_,
                    plan_picture_passes(*asset, scene.look, likely_renderer(config_.renderer, scene.look), 0));
   idle_look_ = scene.look;
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
   RETURN_IF_ERROR(source_->start(*hub_, scene.stream));
-  // Pictures are drawn by the device that simulates.
-  hub_->set_picture_budget(source_->stats().is_software ? kSoftwareBudget : kHardwareBudget);
+  hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   net_->start();
   status_thread_ = std::thread([this] { run_status(); });
@@ -136,8 +137,8 @@ Status Server::State::choose_stream(const SceneAsset& asset) {
 }
 
 Status Server::State::connect(EncodedFramePtr asset_frame) {
-  desk_ = std::make_unique<SessionDesk>(
-      SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, std::move(asset_frame)});
+  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_,
+                                                           std::move(asset_frame), is_drawn_by_processors_});
   desk_->set_metrics([this] { return metrics(); });
   NetConfig net = config_.net;
   net.strand_classes = hub_->strand_classes();

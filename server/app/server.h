@@ -34,6 +34,9 @@ struct ServerConfig {
   SnapshotObserver on_publish;                         // may be empty
   std::function<MakePicturePainter(PainterConfig)> make_painter =
       device_picture_painter;  // of the frame thread
+  /// Whether that painter takes processor cores: how large pictures may be, and what they are guessed to
+  /// take.
+  std::function<bool(const RenderDeviceConfig&)> is_drawn_by_processors = strandcast::is_drawn_by_processors;
   /// What feeds the stream; its states have the scene's codec, bound and rate.
   std::function<Result<std::unique_ptr<StateSource>>(const ServerConfig&, InputHub&)> make_source =
       simulation_source;

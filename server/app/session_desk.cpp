@@ -170,7 +170,7 @@ LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_
                             .report = viewers_.report(session),
                             .pictures = hub.frame_counters(),
                             .paint_trouble = failure ? failure->to_string() : std::string(),
-                            .is_software = parts_.source.stats().is_software,
+                            .is_software = parts_.is_drawn_by_processors,
                             .picture_size = viewers_.picture_size(session),
                             .view_count = std::max<size_t>(view_count, 1),
                             .picture_rate_hz = parts_.scene.stream.frame_rate_hz};

@@ -27,6 +27,7 @@ class SessionDesk : public NetHandler {
     StateSource& source;
     InputHub& inputs;
     EncodedFramePtr asset;
+    bool is_drawn_by_processors = true;  // pictures
   };
   explicit SessionDesk(Parts parts);
 

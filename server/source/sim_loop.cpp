@@ -452,7 +452,6 @@ void SimLoop::update_stats() {
   stats.strand_rate_hz = config_.scene.stream.strand_rate_hz;
   stats.sim_device = to_string(executor_->info().device);
   stats.sim_device_name = executor_->info().name;
-  stats.is_software = executor_->info().is_software;
   const std::lock_guard lock(mutex_);
   stats_ = std::move(stats);
 }

@@ -39,7 +39,6 @@ struct SimStats {
   uint64_t solver_bytes = 0;
   std::string sim_device;       // what simulates: "gl", "lanes"; empty = nothing does
   std::string sim_device_name;  // for people
-  bool is_software = true;      // there is no GPU, as far as is known
   std::string solver_name;
   uint32_t substeps = 0;        // of now; 0 = nothing is simulated
   double strand_rate_hz = 0.0;  // of now; 0 = every step

@@ -38,6 +38,10 @@ TEST_F(RenderDevices, TilesDrawUnlessTheDeviceIsHardware) {
   const auto chosen = open("auto");
   EXPECT_EQ(chosen->info().kind, context_->info().is_software ? RendererKind::Tiles : RendererKind::Gl);
   EXPECT_EQ(chosen->info().is_software, context_->info().is_software);
+  for (const char* renderer : {"auto", "gl"})
+    EXPECT_EQ(is_drawn_by_processors({renderer, "auto", {}}), context_->info().is_software) << renderer;
+  EXPECT_TRUE(is_drawn_by_processors({"tiles", "auto", {}}));
+  EXPECT_TRUE(is_drawn_by_processors({"gl", "999", {}})) << "nothing draws";
   EXPECT_FALSE(chosen->info().name.empty());
 }
 

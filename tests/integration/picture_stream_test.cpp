@@ -7,6 +7,7 @@
 
 #include "client/app/view_report.h"
 #include "tests/support/server_fixture.h"
+#include "tests/support/sim_devices.h"
 #include "tests/support/test_pictures.h"
 #include "tests/tools/chaos_relay.h"
 
@@ -206,6 +207,29 @@ TEST_F(PictureStream, ASlowLinkStepsDownTheLadderAndTheOthersDoNot) {
     const uint64_t shown = slow->image_count();
     ASSERT_TRUE(pump_until({good.get(), slow.get()}, [&] { return slow->image_count() > shown + 3; }));
     EXPECT_EQ(slow->picture_stats().rejected_frames, 0u) << "what was dropped is made up for by the server";
+  }
+}
+
+// A server whose strands are simulated by processors may draw with a GPU, and the other way round.
+TEST_F(PictureStream, HowLargePicturesMayBeFollowsWhatDrawsNotWhatSimulates) {
+  for (const SimDevice device : sim_devices()) {
+    for (const bool is_drawn_by_processors : {false, true}) {
+      SCOPED_TRACE(fmt::format("{}, {}", to_string(device), is_drawn_by_processors));
+      ServerConfig config;
+      config.scene = windy_scene({480, 360});
+      config.sim_device = to_string(device);
+      config.renderer = "tiles";
+      config.is_drawn_by_processors = [&](const RenderDeviceConfig& asked) {
+        EXPECT_EQ(asked.renderer, "tiles");
+        return is_drawn_by_processors;
+      };
+      if (!start(std::move(config))) return;
+      EXPECT_EQ(server_->counters().sim.sim_device, to_string(device));
+      const PictureBudget budget = server_->hub().picture_budget();
+      EXPECT_EQ(budget.picture_pixels,
+                (is_drawn_by_processors ? kSoftwareBudget : kHardwareBudget).picture_pixels);
+      server_->stop();
+    }
   }
 }
 
