@@ -91,14 +91,16 @@ TEST_F(FollowCures, WithoutThrustsStrandsComeToRestAfterFastReversals) {
     double speed_mps, rate_hz, style_per_s2, factor;
   };
   const std::vector<Case> cases = {
-      {"dftl", kGlHost, 1.5, 60.0, 400.0, 1.0},
-      {"dftl", kGlHost, 3.0, 60.0, 400.0, 1.0},
       {"dftl", kGlHost, 1.5, 120.0, 400.0, 100.0},
-      {"dftl", kGlHost, 3.0, 120.0, 400.0, 100.0},
-      {"dftl", kGlHost, 1.5, 240.0, 400.0, 100.0},
-      {"dftl", kGlHost, 3.0, 240.0, 0.0, 100.0},
+      {"dftl", kLanesHost, 1.5, 60.0, 400.0, 1.0},
+      {"dftl", kLanesHost, 3.0, 60.0, 400.0, 1.0},
+      {"dftl", kLanesHost, 1.5, 120.0, 400.0, 100.0},
+      {"dftl", kLanesHost, 3.0, 120.0, 400.0, 100.0},
+      {"dftl", kLanesHost, 1.5, 240.0, 400.0, 100.0},
+      {"dftl", kLanesHost, 3.0, 240.0, 0.0, 100.0},
       {"dftl", kReferenceHost, 1.5, 120.0, 400.0, 100.0},
       {"dftl_parallel", kGlHost, 1.5, 120.0, 400.0, 100.0},
+      {"dftl_parallel", kLanesHost, 1.5, 120.0, 400.0, 100.0},
   };
   for (const Case& test : cases) {
     SCOPED_TRACE(test.name);
@@ -133,12 +135,15 @@ TEST_F(FollowCures, StrandsOfDifferentThicknessMoveDifferently) {
   }
   const Groom groom = groom_from(strands, Pinning::RootPair);
   const uint32_t strand_count = groom.strand_count();
-  for (const char* name : {"dftl", "dftl_parallel", "ftl"}) {
-    SCOPED_TRACE(name);
+  // All by lanes, and one of them by OpenGL.
+  const std::vector<std::pair<const char*, SolverHost>> kinds = {
+      {"dftl", kGlHost}, {"dftl", kLanesHost}, {"dftl_parallel", kLanesHost}, {"ftl", kLanesHost}};
+  for (const auto& [name, host] : kinds) {
+    SCOPED_TRACE(fmt::format("{}, {}", name, host.name()));
     double correlation[2] = {0.0, 0.0};
     double apart[2] = {0.0, 0.0};
     for (const int is_spread : {0, 1}) {
-      auto solver = make({*find_solver(name), kGlHost}, groom, {{"thickness_spread", is_spread ? 0.2 : 0.0}});
+      auto solver = make({*find_solver(name), host}, groom, {{"thickness_spread", is_spread ? 0.2 : 0.0}});
       const SolverState groomed = read(*solver);
       double products = 0.0;
       double squares = 0.0;

@@ -439,13 +439,13 @@ struct OddEvenError {
 
 class OddEven : public SolverTest {
  protected:
-  OddEvenError compare(double iterations, bool has_exact_length) {
+  OddEvenError compare(const SolverHost& host, double iterations, bool has_exact_length) {
     constexpr int kSteps = 120;
     const Groom groom = make_test_groom({});
-    const SolverKind odd_even{*find_solver("dftl_parallel"), kGlHost};
+    const SolverKind odd_even{*find_solver("dftl_parallel"), host};
     auto solver =
         make(odd_even, groom, {{"iterations", iterations}, {"exact_length", has_exact_length ? 1.0 : 0.0}});
-    auto serial = make({*find_solver("dftl"), kGlHost}, groom);
+    auto serial = make({*find_solver("dftl"), host}, groom);
     OddEvenError error;
     for (int step = 1; step <= kSteps; ++step) {
       solver->substep(moving_input(step, kSubstepS));
@@ -465,21 +465,25 @@ class OddEven : public SolverTest {
 
 TEST_F(OddEven, HalfAsManyIterationsAsVerticesGiveTheSerialMotion) {
   // Not a bit differs: every vertex is placed by the same arithmetic, once its leader is final.
-  EXPECT_EQ(compare(8.0, false).largest_m, 0.0);
+  for (const SolverHost& host : kernel_hosts())
+    EXPECT_EQ(compare(host, 8.0, false).largest_m, 0.0) << host.name();
 }
 
 // 003 section 4.2.3: as few as five iterations look like the serial version. Strands here are 0.17 to 0.25 m
 // long and move as fast as a person can shake a head.
 TEST_F(OddEven, FiveIterationsComeClose) {
-  const OddEvenError iterated = compare(5.0, false);
-  EXPECT_LE(iterated.mean_m, 0.0025);
-  EXPECT_LE(iterated.stretch_m, 0.25 / 15);  // one segment
-  const OddEvenError finished = compare(5.0, true);
-  EXPECT_LE(finished.mean_m, 0.0025);  // a hundredth of a strand
-  EXPECT_LE(finished.stretch_m, kLengthTolerance * 0.25);
-  EXPECT_GT(compare(2.0, true).mean_m, 2.0 * finished.mean_m) << "iterations do nothing";
-  fmt::print("five iterations: mean {:.6f} m, largest {:.4f} m, stretch before the finish {:.4f} m\n",
-             finished.mean_m, finished.largest_m, iterated.stretch_m);
+  for (const SolverHost& host : kernel_hosts()) {
+    SCOPED_TRACE(host.name());
+    const OddEvenError iterated = compare(host, 5.0, false);
+    EXPECT_LE(iterated.mean_m, 0.0025);
+    EXPECT_LE(iterated.stretch_m, 0.25 / 15);  // one segment
+    const OddEvenError finished = compare(host, 5.0, true);
+    EXPECT_LE(finished.mean_m, 0.0025);  // a hundredth of a strand
+    EXPECT_LE(finished.stretch_m, kLengthTolerance * 0.25);
+    EXPECT_GT(compare(host, 2.0, true).mean_m, 2.0 * finished.mean_m) << "iterations do nothing";
+    fmt::print("five iterations: mean {:.6f} m, largest {:.4f} m, stretch before the finish {:.4f} m\n",
+               finished.mean_m, finished.largest_m, iterated.stretch_m);
+  }
 }
 
 }  // namespace

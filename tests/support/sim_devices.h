@@ -32,6 +32,7 @@ struct SolverHost {
 };
 inline constexpr SolverHost kReferenceHost = {};
 inline constexpr SolverHost kGlHost = {SimDevice::Gl};
+inline constexpr SolverHost kLanesHost = {SimDevice::Lanes};
 
 /// Every executor.
 inline std::vector<SolverHost> kernel_hosts() {
