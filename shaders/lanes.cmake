@@ -1,5 +1,5 @@
 # Makes C++ over lanes (common/simd/lanes.h) of the kernels' GLSL: reads ROOT/FILE and writes OUTPUT. README.md says which
-# GLSL such a file may use. What is left is included into a class (server/sim/executor/lane_kernel_private.h), in which
+# GLSL such a file may use. What is left is included into a class (common/kernels/lane_kernel_private.h), in which
 # `float` is a lane each, and line numbers stay those of the GLSL.
 cmake_minimum_required(VERSION 3.25)
 file(READ ${ROOT}/${FILE} text)

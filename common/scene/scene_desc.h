@@ -14,6 +14,7 @@
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
 #include "common/math/pose.h"
+#include "common/math/sphere_collider.h"
 #include "common/scene/render_methods.h"
 
 namespace strandcast {
@@ -51,13 +52,6 @@ struct FileGroomDesc {
   bool operator==(const FileGroomDesc&) const = default;
 };
 
-struct SphereCollider {
-  glm::vec3 center_m{0.0f};  // head space: colliders follow the head
-  float radius_m = 0.1f;
-
-  bool operator==(const SphereCollider&) const = default;
-};
-inline constexpr uint32_t kMaxSphereColliders = 16;
 inline constexpr size_t kMaxMeshFiles = 8;  // that one head is drawn from
 
 /// Wind from the scene itself; a wind stream, once one is connected, replaces it.

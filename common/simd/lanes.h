@@ -1,5 +1,5 @@
 // Lanes: the types and functions of GLSL over invocations side by side, so that what is written once in
-// shaders/ runs on the CPU as well (common/render/laws.h, server/sim/executor/lane_kernel_private.h). Every
+// shaders/ runs on the CPU as well (common/render/laws.h, common/kernels/lane_kernel_private.h). Every
 // operation is done for every lane as a scalar would do it, without contraction, so all instruction sets and
 // numbers of lanes give the same bits. Choices are made by select(), never by branches. Everything is inline;
 // instruction sets are chosen by common/simd/variants.h, and numbers of lanes by who compiles a file for one

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "common/simd/variants.h"
-#include "server/sim/strand_blocks.h"
+#include "common/kernels/strand_blocks.h"
 
 namespace strandcast {
 

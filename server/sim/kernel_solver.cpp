@@ -43,7 +43,7 @@ Status KernelSolver::follow() {
 
 void KernelSolver::substep(const StepInput& input) {
   adapt(input);
-  const StepBlock block = make_step_block(input, parameters_, layout(), strands_->head());
+  const StepBlock block = make_step_block(input, parameters_, layout().counts(), strands_->head());
   BoundPlanes planes = strands_->planes();
   bind(planes);
   program_->run(block, input.colliders.size(), planes);

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "common/kernels/step_block.h"
 #include "server/sim/follicle_limit.h"
 #include "server/sim/solver_registry.h"
-#include "server/sim/step_block.h"
 #include "server/sim/strand_state.h"
 
 namespace strandcast {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "server/sim/head_path.h"
+#include "common/kernels/head_path.h"
 #include "server/sim/solver.h"
 #include "server/sim/strand_layout.h"
 

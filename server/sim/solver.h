@@ -1,54 +1,24 @@
 // Solver: one strand model behind a small interface; the table in solver_registry.h lists all of them. A
 // solver is used from one thread, that of its executor if it has one. A solver never allocates in
 // substep().
-//
-// Frame of the state: world axes with the origin at the head joint of the current step ("head-relative"). It
-// keeps float precision anywhere in the world; each step the origin moves by head_shift_m.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <map>
-#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/groom/groom.h"
+#include "common/kernels/step_input.h"
+#include "common/kernels/strand_blocks.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
-#include "server/sim/strand_blocks.h"
 
 namespace strandcast {
-
-/// A travelling wave of the gust field: velocity += amplitude * sin(dot(wave_vector, x) - phase).
-struct GustWave {
-  glm::vec3 amplitude_mps{0.0f};
-  glm::vec3 wave_vector_rad_per_m{0.0f};
-  float phase_rad = 0.0f;
-};
-inline constexpr uint32_t kMaxGustWaves = 8;
-
-/// No angle of a root is larger.
-inline constexpr double kFreeFollicleRad = std::numbers::pi;
-
-/// Everything one substep needs, at its end time.
-struct StepInput {
-  double h_s = 1.0 / 60.0;                                  // substep
-  glm::dquat world_from_head_rotation{1.0, 0.0, 0.0, 0.0};  // at the end of the substep
-  glm::dvec3 head_shift_m{0.0};  // movement of the head joint during the substep, world
-  glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
-  /// Gravity under which the groom has its shape, in head space: what a solver with a sag-free groom lets the
-  /// pull to the groomed shape carry. Zero: the groom is the shape without gravity.
-  glm::dvec3 groom_gravity_in_head_mps2{0.0};
-  glm::dvec3 wind_mps{0.0};     // mean wind at the head, world
-  std::vector<GustWave> gusts;  // at most kMaxGustWaves; x is relative to the head joint
-  /// Most that the first free segment leans from its groomed direction, turned with the head; pi = free.
-  double follicle_limit_rad = kFreeFollicleRad;
-  std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
-};
 
 /// State as read back, head-relative world axes. (vertex_count x strand_count) vertex-major, strand fastest.
 struct SolverState {

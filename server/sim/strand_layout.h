@@ -1,14 +1,14 @@
-// StrandLayout: a groom in the order the strand kernels use, vertex-major with the strand index fastest, and
-// the limits every solver puts on its inputs. Plain data, any thread; no GL.
+// StrandLayout: a groom in the order the strand kernels use, vertex-major with the strand index fastest.
+// Plain data, any thread; no GL.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/groom/groom.h"
+#include "common/kernels/step_block.h"
 #include "server/sim/solver.h"
 
 namespace strandcast {
@@ -30,42 +30,14 @@ struct StrandLayout {
   }
   /// First vertex of the pinned tail, vertex_count when the tip is free.
   uint32_t tail_begin() const { return vertex_count - pinned_tail_count; }
+  StrandCounts counts() const { return {strand_count, vertex_count, pinned_root_count, tail_begin()}; }
 };
 
 /// Vertices per strand of a reference that no kernel has to follow: converged solutions of reports.
 inline constexpr uint32_t kMaxReferenceVertexCount = 256;
 
-/// Whether roots are held in this substep; no number, and no angle, is no limit.
-inline bool has_follicle_limit(const StepInput& input) {
-  return input.follicle_limit_rad >= 0.0 && input.follicle_limit_rad < kFreeFollicleRad;
-}
-
 /// BadInput unless all strands have the same vertex count (2..most_vertices) and the same pinned vertices: a
 /// run at the root, optionally a run at the tip, nothing between.
 Result<StrandLayout> make_strand_layout(const Groom& groom, uint32_t most_vertices = kMaxVertexCount);
-
-// Bounds on what a step may ask for. Far outside anything physical; they keep squares of floats finite.
-inline constexpr double kMaxSubstepS = 0.1;
-inline constexpr double kMinSubstepS = 1e-6;
-inline constexpr double kMaxHeadShiftM = 1e4;
-inline constexpr double kMaxGravityMps2 = 1e5;
-inline constexpr double kMaxWindMps = 1e4;
-inline constexpr double kMaxColliderM = 1e4;  // |centre| and radius
-inline constexpr double kMaxPhaseRad = 1e6;   // phases and wave numbers of gusts
-
-/// The value within [-bound, bound]; 0 for NaN.
-inline double limited(double value, double bound) {
-  if (std::isnan(value)) return 0.0;
-  return std::fmin(std::fmax(value, -bound), bound);
-}
-inline glm::dvec3 limited(const glm::dvec3& value, double bound) {
-  return {limited(value.x, bound), limited(value.y, bound), limited(value.z, bound)};
-}
-
-/// The input's substep within its bounds; kMinSubstepS for NaN and non-positive values.
-double limited_substep_s(const StepInput& input);
-
-/// Unit quaternion; the identity for a zero or non-finite one.
-glm::dquat limited_rotation(const glm::dquat& rotation);
 
 }  // namespace strandcast

@@ -10,8 +10,8 @@
 #include <memory>
 #include <vector>
 
+#include "common/kernels/head_path.h"
 #include "server/sim/executor/executor.h"
-#include "server/sim/head_path.h"
 #include "server/sim/solver.h"
 #include "server/sim/strand_layout.h"
 

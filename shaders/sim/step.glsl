@@ -1,4 +1,4 @@
-// What a strand kernel reads: the step's uniform block (server/sim/step_block.h) and the state of the
+// What a strand kernel reads: the step's uniform block (common/kernels/step_block.h) and the state of the
 // strands. Element of vertex i of strand s: i * strand_count + s, so that neighbouring lanes are neighbouring
 // strands.
 #include "shared/limits.h"

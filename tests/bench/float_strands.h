@@ -4,8 +4,9 @@
 
 #include <vector>
 
+#include "common/kernels/step_block.h"
 #include "server/sim/solver.h"
-#include "server/sim/step_block.h"
+#include "server/sim/strand_layout.h"
 
 namespace strandcast {
 

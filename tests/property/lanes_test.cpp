@@ -12,7 +12,7 @@
 #include "common/base/worker_pool.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/solver_registry.h"
-#include "server/sim/strand_blocks.h"
+#include "common/kernels/strand_blocks.h"
 #include "tests/support/sim_scene.h"
 
 namespace strandcast {

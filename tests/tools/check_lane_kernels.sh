@@ -2,7 +2,7 @@
 # check_lane_kernels.sh SOURCE COMPILER [LIBRARY]: what shaders/README.md says of the GLSL of strand kernels. A kernel that
 # branches on what differs between strands does not compile, and the message names its line and what to use; every
 # uniform and buffer of shaders/sim is translated; in the LIBRARY of kernels no function is shared with other files, which
-# may be compiled for other instruction sets (server/sim/executor/lane_kernel.h).
+# may be compiled for other instruction sets (common/kernels/lane_kernel.h).
 set -euo pipefail
 source_folder="$1"
 compiler="$2"
@@ -20,7 +20,7 @@ try() {
   done
   printf '%s\n' '#define STRANDCAST_LANE_COUNT 4' '#define HAS_PINNED_TAIL 0' '#define KERNEL_FILE "sim/bad.comp"' \
     '#define KERNEL_NAME bad' '#define KERNEL_VARIANT ""' '#define KERNEL_SET 0' '#define KERNEL_PARTS 1' \
-    '#include "server/sim/executor/lane_kernel_private.h"' >"$folder/bad.cpp"
+    '#include "common/kernels/lane_kernel_private.h"' >"$folder/bad.cpp"
   "$compiler" -std=c++20 -Wno-psabi -fsyntax-only -I"$folder/lanes" -I"$source_folder/shaders" -I"$source_folder" \
     "$folder/bad.cpp" 2>&1 || true
 }

@@ -22,7 +22,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
     return names;
   };
   static const std::set<std::string> kMath = with({"common/math"}, kBase);
-  static const std::set<std::string> kStrands = with({"common/strands"}, kMath);
+  static const std::set<std::string> kKernels = with({"common/kernels"}, kMath);
+  static const std::set<std::string> kStrands = with({"common/strands"}, kKernels);
   static const std::set<std::string> kReplay = with({"common/replay"}, kStrands);
   static const std::set<std::string> kPictures = with({"common/pictures"}, kStrands);
   static const std::set<std::string> kScene =
@@ -39,7 +40,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/log", kBase},
       {"common/math", kBase},
       // The core: a viewer in a browser, a relay or a fuzzer links these and nothing else of ours.
-      {"common/strands", with({"common/simd"}, kMath)},
+      {"common/kernels", with({"common/simd", "shaders/shared", "shaders/lib"}, kMath)},
+      {"common/strands", with({"common/simd"}, kKernels)},
       {"common/replay", kStrands},
       {"common/pictures", kPictures},
       {"common/motion", kMath},

@@ -1,6 +1,6 @@
 // Blocks of strands hold what was put into them, row by row, and what read_blocks() shows is what read()
 // copies.
-#include "server/sim/strand_blocks.h"
+#include "common/kernels/strand_blocks.h"
 
 #include <gtest/gtest.h>
 

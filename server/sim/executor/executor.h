@@ -5,25 +5,23 @@
 #pragma once
 
 #include <array>
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <glm/glm.hpp>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/kernels/kernel_desc.h"
+#include "common/kernels/plane_role.h"
+#include "common/kernels/step_block.h"
+#include "common/kernels/strand_blocks.h"
 #include "common/scene/features.h"
-#include "server/sim/executor/plane_role.h"
-#include "server/sim/step_block.h"
-#include "server/sim/strand_blocks.h"
 #include "server/sim/strand_layout.h"
 
 namespace strandcast::gl {
@@ -54,20 +52,6 @@ using BoundPlanes = std::array<StrandPlane*, kPlaneRoleCount>;
 inline StrandPlane*& plane_of(BoundPlanes& planes, PlaneRole role) {
   return planes[static_cast<size_t>(role)];
 }
-
-/// What a model's parameters are to its kernel: uniforms by name, the same in every step. What changes from
-/// step to step is in the step's block (step_block.h).
-using ModelConstants = std::map<std::string, std::variant<double, uint32_t>>;
-
-struct KernelDesc {
-  std::string shader_path;             // below shaders/
-  std::map<std::string, int> variant;  // besides COLLIDERS and HAS_TURBULENCE
-  ModelConstants constants;
-  bool meets_air = true;       // false: it has no HAS_TURBULENCE
-  bool is_per_vertex = false;  // a group takes whole strands, an invocation per vertex; else one per strand
-  uint32_t scratch_rows = 0;   // per vertex, vec4 that the kernel keeps for itself during a dispatch
-  auto operator<=>(const KernelDesc&) const = default;
-};
 
 /// A kernel with its constants, ready to run.
 class KernelProgram {

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "common/base/worker_pool.h"
-#include "common/simd/variants.h"
+#include "common/kernels/lane_program.h"
 #include "server/sim/executor/executor.h"
 
 namespace strandcast {
@@ -16,9 +16,6 @@ struct LaneOptions {
   simd::InstructionSet set;
   WorkerPool* workers = nullptr;  // outlives the executor; nullptr: the process's
 };
-
-/// Sets that this processor has and kernels were compiled for, the widest last; empty where there is none.
-std::vector<simd::InstructionSet> lane_sets();
 
 /// Unavailable when no kernel was compiled for what this processor has.
 Result<std::unique_ptr<Executor>> make_lanes_executor();

@@ -1,4 +1,4 @@
-#include "server/sim/strand_blocks.h"
+#include "common/kernels/strand_blocks.h"
 
 #include <algorithm>
 

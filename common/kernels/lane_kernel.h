@@ -20,7 +20,7 @@ struct LaneRun {
   const void* step = nullptr;   // StepBlock with one strand in `shape`: a kernel sees one strand of a block
   uint32_t collider_count = 0;  // the first ones of the step
   uint32_t gust_count = 0;      // the first ones of the step
-  float* const* planes = nullptr;  // kPlaneRoleCount, in blocks (server/sim/strand_blocks.h); null = none
+  float* const* planes = nullptr;  // kPlaneRoleCount, in blocks (common/kernels/strand_blocks.h); null = none
   const size_t* block_floats = nullptr;  // of each plane
   const LaneConstant* constants = nullptr;
   uint32_t constant_count = 0;

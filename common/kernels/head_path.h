@@ -5,7 +5,7 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include "server/sim/solver.h"
+#include "common/kernels/step_input.h"
 
 namespace strandcast {
 

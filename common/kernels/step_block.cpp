@@ -1,4 +1,4 @@
-#include "server/sim/step_block.h"
+#include "common/kernels/step_block.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ std::array<glm::vec4, 3> block_columns(const glm::dmat3& matrix) {
 }  // namespace
 
 StepBlock make_step_block(const StepInput& input, const StrandParameters& parameters,
-                          const StrandLayout& layout, const HeadPath& head) {
+                          const StrandCounts& counts, const HeadPath& head) {
   const double h_s = limited_substep_s(input);
   const glm::dquat rotation = limited_rotation(input.world_from_head_rotation);
   const glm::dvec3 head_velocity = limited(input.head_shift_m, kMaxHeadShiftM) / h_s;
@@ -43,7 +43,7 @@ StepBlock make_step_block(const StepInput& input, const StrandParameters& parame
   block.follicle_cosine = static_cast<float>(std::cos(input.follicle_limit_rad));
   block.follicle_sine = static_cast<float>(std::sin(input.follicle_limit_rad));
   block.previous_turn = block_columns(head.turn_per_s);
-  block.shape = {layout.strand_count, layout.vertex_count, layout.pinned_root_count, layout.tail_begin()};
+  block.shape = {counts.strand_count, counts.vertex_count, counts.pinned_root_count, counts.tail_begin};
   const size_t wave_count = std::min<size_t>(input.gusts.size(), kMaxGustWaves);
   for (size_t i = 0; i < wave_count; ++i) {
     const GustWave& wave = input.gusts[i];

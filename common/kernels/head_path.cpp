@@ -1,6 +1,4 @@
-#include "server/sim/head_path.h"
-
-#include "server/sim/strand_layout.h"
+#include "common/kernels/head_path.h"
 
 namespace strandcast {
 

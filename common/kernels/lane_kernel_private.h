@@ -16,10 +16,10 @@
 #include <immintrin.h>
 #endif
 
+#include "common/kernels/lane_kernel.h"
+#include "common/kernels/plane_role.h"
 #include "common/simd/lane_matrices.h"
 #include "common/simd/lane_pairs.h"
-#include "server/sim/executor/lane_kernel.h"
-#include "server/sim/executor/plane_role.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 

@@ -1,0 +1,77 @@
+// StepInput: what one substep of a strand model needs from outside, and the limits that every model puts on
+// it. Plain data, any thread.
+//
+// Frame of the state: world axes with the origin at the head joint of the current step ("head-relative"). It
+// keeps float precision anywhere in the world; each step the origin moves by head_shift_m.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <numbers>
+#include <vector>
+
+#include "common/math/sphere_collider.h"
+
+namespace strandcast {
+
+/// A travelling wave of the gust field: velocity += amplitude * sin(dot(wave_vector, x) - phase).
+struct GustWave {
+  glm::vec3 amplitude_mps{0.0f};
+  glm::vec3 wave_vector_rad_per_m{0.0f};
+  float phase_rad = 0.0f;
+
+  bool operator==(const GustWave&) const = default;
+};
+inline constexpr uint32_t kMaxGustWaves = 8;
+
+/// No angle of a root is larger.
+inline constexpr double kFreeFollicleRad = std::numbers::pi;
+
+/// Everything one substep needs, at its end time.
+struct StepInput {
+  double h_s = 1.0 / 60.0;                                  // substep
+  glm::dquat world_from_head_rotation{1.0, 0.0, 0.0, 0.0};  // at the end of the substep
+  glm::dvec3 head_shift_m{0.0};  // movement of the head joint during the substep, world
+  glm::dvec3 gravity_mps2{0.0, -9.81, 0.0};
+  /// Gravity under which the groom has its shape, in head space: what a solver with a sag-free groom lets the
+  /// pull to the groomed shape carry. Zero: the groom is the shape without gravity.
+  glm::dvec3 groom_gravity_in_head_mps2{0.0};
+  glm::dvec3 wind_mps{0.0};     // mean wind at the head, world
+  std::vector<GustWave> gusts;  // at most kMaxGustWaves; x is relative to the head joint
+  /// Most that the first free segment leans from its groomed direction, turned with the head; pi = free.
+  double follicle_limit_rad = kFreeFollicleRad;
+  std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
+};
+
+/// Whether roots are held in this substep; no number, and no angle, is no limit.
+inline bool has_follicle_limit(const StepInput& input) {
+  return input.follicle_limit_rad >= 0.0 && input.follicle_limit_rad < kFreeFollicleRad;
+}
+
+// Bounds on what a step may ask for. Far outside anything physical; they keep squares of floats finite.
+inline constexpr double kMaxSubstepS = 0.1;
+inline constexpr double kMinSubstepS = 1e-6;
+inline constexpr double kMaxHeadShiftM = 1e4;
+inline constexpr double kMaxGravityMps2 = 1e5;
+inline constexpr double kMaxWindMps = 1e4;
+inline constexpr double kMaxColliderM = 1e4;  // |centre| and radius
+inline constexpr double kMaxPhaseRad = 1e6;   // phases and wave numbers of gusts
+
+/// The value within [-bound, bound]; 0 for NaN.
+inline double limited(double value, double bound) {
+  if (std::isnan(value)) return 0.0;
+  return std::fmin(std::fmax(value, -bound), bound);
+}
+inline glm::dvec3 limited(const glm::dvec3& value, double bound) {
+  return {limited(value.x, bound), limited(value.y, bound), limited(value.z, bound)};
+}
+
+/// The input's substep within its bounds; kMinSubstepS for NaN and non-positive values.
+double limited_substep_s(const StepInput& input);
+
+/// Unit quaternion; the identity for a zero or non-finite one.
+glm::dquat limited_rotation(const glm::dquat& rotation);
+
+}  // namespace strandcast
