@@ -13,6 +13,8 @@
 
 namespace strandcast {
 
+struct StepTrail;
+
 /// What a state is of, and how its positions are kept: all but the positions themselves.
 struct SnapshotInfo {
   uint64_t tick = 0;           // simulation step number
@@ -22,6 +24,9 @@ struct SnapshotInfo {
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;  // per strand
   float quantum_m = 0.0f;     // lattice step; error of a vertex <= quantum * sqrt(3) / 2
+  /// How the simulation got here, for codecs that predict by its steps; nullptr = nobody knows. No part of
+  /// the state hash.
+  std::shared_ptr<const StepTrail> trail = {};
 
   size_t plane_size() const { return static_cast<size_t>(strand_count) * vertex_count; }
 };

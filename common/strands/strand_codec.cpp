@@ -44,6 +44,11 @@ const std::vector<Row>& rows() {
        tangent::make_encoder,
        tangent::make_decoder,
        tangent::lattice_step_m},
+      {{"step",
+        "as tangent, predicted by steps of the announced solver: a tenth of its bits, for a step's work"},
+       tangent::make_step_encoder,
+       tangent::make_step_decoder,
+       tangent::lattice_step_m},
   };
   return table;
 }

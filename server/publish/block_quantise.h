@@ -6,8 +6,8 @@
 #include <array>
 #include <cstdint>
 
-#include "common/simd/variants.h"
 #include "common/kernels/strand_blocks.h"
+#include "common/simd/variants.h"
 
 namespace strandcast {
 

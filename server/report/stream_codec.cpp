@@ -8,8 +8,6 @@
 namespace strandcast {
 namespace {
 
-constexpr double kFrameNs = 1e9 / 60.0;
-
 /// A strand codec of common/strands, used as server and viewer use it.
 class OwnCodec final : public StreamCodec {
  public:
@@ -25,10 +23,10 @@ class OwnCodec final : public StreamCodec {
 
   // Publishing: it happens once for all codecs and classes of a server.
   Status take(const StreamFrame& frame) override {
-    ++tick_;
     QuantiseInput input;
-    input.tick = tick_;
-    input.sim_time_ns = std::llround(static_cast<double>(tick_) * kFrameNs);
+    input.tick = frame.tick;
+    input.sim_time_ns = frame.sim_time_ns;
+    input.trail = frame.trail;
     input.world_from_head = frame.world_from_head;
     input.strand_count = shape_.strand_count;
     input.vertex_count = shape_.vertex_count;
@@ -79,7 +77,6 @@ class OwnCodec final : public StreamCodec {
   float quantum_m_ = 0.0f;
   std::unique_ptr<StrandEncoder> encoder_;
   std::unique_ptr<StrandDecoder> decoder_;
-  uint64_t tick_ = 0;
   Snapshot snapshot_;
   std::shared_ptr<const Snapshot> decoded_;
 };

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/kernels/step_model.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -25,7 +26,10 @@ struct StreamShape {
 
 /// One recorded state.
 struct StreamFrame {
+  uint64_t tick = 0;
+  int64_t sim_time_ns = 0;
   Pose world_from_head;
+  std::shared_ptr<const StepTrail> trail;     // as in Snapshot
   std::vector<glm::vec3> position_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
 };
 

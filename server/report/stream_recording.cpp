@@ -10,6 +10,7 @@
 #include "common/strands/scene_asset.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
+#include "server/scene/step_log.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {
@@ -114,6 +115,9 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   RETURN_IF_ERROR(solver->load(content.groom, head_at(-kSettleS).rotation));
   const auto settle_frames = static_cast<int>(std::lround(kSettleS / kStreamFrameS));
   const auto frame_count = static_cast<int>(std::lround(desc.seconds / kStreamFrameS));
+  StepLog log;
+  log.set_model(solver->step_model());
+  log.set_scene(builder.step_scene(features));
   std::vector<Pose> poses;
   SolverState state;
   for (int i = -settle_frames; i < frame_count; ++i) {
@@ -124,11 +128,16 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
     const int64_t begin_ns = now_ns();
     const SceneStep& step = builder.build(input, features, kSettleS + t_s);
     for (const StepInput& substep : step.substeps) solver->substep(substep);
+    const auto tick = static_cast<uint64_t>(i + settle_frames + 1);
+    log.add(builder.step_tick(tick));
     if (i < 0) continue;
     solver->read(state);
     recording.step_ms.push_back(elapsed_ms(begin_ns));
     poses.push_back(input.world_from_head);
     ASSIGN_OR_RETURN(StreamFrame frame, frame_of(state, input.world_from_head));
+    frame.tick = tick;
+    frame.sim_time_ns = std::llround((kSettleS + t_s) * 1e9);
+    frame.trail = log.trail();
     recording.frames.push_back(std::move(frame));
   }
   recording.head = measure_pace(poses, kStreamFrameS);

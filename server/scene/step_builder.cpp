@@ -171,4 +171,33 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   step_.world_from_head = target;
 }
 
+StepScene StepBuilder::step_scene(const SceneFeatures& features) const {
+  StepScene scene;
+  scene.step_s = 1.0 / scene_.step_rate_hz;
+  scene.substeps = scene_.substeps;
+  scene.gravity_mps2 = scene_.gravity_mps2;
+  scene.groom_gravity_in_head_mps2 = groom_gravity_in_head_mps2_;
+  if (features.has_follicle_limit) scene.follicle_limit_rad = glm::radians(scene_.follicle_limit_deg);
+  scene.follicle_cosine = static_cast<float>(std::cos(scene.follicle_limit_rad));
+  scene.follicle_sine = static_cast<float>(std::sin(scene.follicle_limit_rad));
+  if (features.has_colliders) scene.colliders = colliders_;
+  scene.mean_wind_mps = scene_.wind.mean_mps;
+  if (features.has_turbulence) scene.waves = waves_;
+  return scene;
+}
+
+StepTick StepBuilder::step_tick(uint64_t tick) const {
+  StepTick result;
+  result.tick = tick;
+  result.world_from_head = world_from_head_;
+  if (step_.substeps.empty()) return result;
+  glm::dvec3 shift_m(0.0);
+  for (const StepInput& substep : step_.substeps) shift_m += substep.head_shift_m;
+  if (step_.carried_to_rotation)
+    result.carried_to = Pose{world_from_head_.position_m - shift_m, *step_.carried_to_rotation};
+  result.wind_mps = step_.substeps.back().wind_mps;
+  result.has_waves = !step_.substeps.back().gusts.empty();
+  return result;
+}
+
 }  // namespace strandcast

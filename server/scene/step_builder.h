@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "common/kernels/step_model.h"
 #include "common/motion/motion_clip.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
@@ -49,6 +50,10 @@ class StepBuilder {
 
   /// All of that; wind, gusts and the limit of the roots for these facts.
   const SceneStep& build(const InputFrame& input, const SceneFeatures& features, double end_time_s);
+
+  /// The same as others need it who take the step too.
+  StepScene step_scene(const SceneFeatures& features) const;
+  StepTick step_tick(uint64_t tick) const;
 
   const Pose& world_from_head() const { return world_from_head_; }
   /// Of the head joint during the last substep of the newest step, world.

@@ -61,6 +61,22 @@ void KernelSolver::rebase(const glm::dquat& world_from_head_rotation) {
   turn_memory(strands_->rebase(world_from_head_rotation));
 }
 
+std::shared_ptr<const StepModel> KernelSolver::step_model() {
+  auto model = std::make_shared<StepModel>();
+  model->kernel = kernel();
+  if (find_step_kernel(model->kernel.shader_path) == nullptr) return nullptr;
+  model->parameters = parameters_;
+  model->strand_count = layout().strand_count;
+  model->vertex_count = layout().vertex_count;
+  model->pinned_root_count = layout().pinned_root_count;
+  model->pinned_tail_count = layout().pinned_tail_count;
+  BoundPlanes planes{};
+  bind(planes);
+  if (const StrandPlane* edge = plane_of(planes, PlaneRole::RodEdge)) edge->read(model->rod_edge);
+  if (const StrandPlane* strand = plane_of(planes, PlaneRole::RodStrand)) strand->read(model->rod_strand);
+  return model;
+}
+
 uint64_t KernelSolver::memory_bytes() const {
   uint64_t bytes = strands_->memory_bytes() + model_bytes();
   if (program_) bytes += program_->size_bytes();

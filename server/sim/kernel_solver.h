@@ -25,6 +25,7 @@ class KernelSolver : public Solver {
   void rebase(const glm::dquat& world_from_head_rotation) final;
   uint32_t strand_count() const final { return layout().strand_count; }
   uint64_t memory_bytes() const final;
+  std::shared_ptr<const StepModel> step_model() final;
   const StrandState* strands() const final { return strands_.get(); }
   Status follow() final;
 

@@ -14,6 +14,7 @@
 #include "common/base/result.h"
 #include "common/groom/groom.h"
 #include "common/kernels/step_input.h"
+#include "common/kernels/step_model.h"
 #include "common/kernels/strand_blocks.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
@@ -58,6 +59,10 @@ class Solver {
   virtual uint32_t strand_count() const = 0;
   /// Bytes the solver keeps on its device.
   virtual uint64_t memory_bytes() const = 0;
+
+  /// What somebody else needs to take the same steps; nullptr for a model without a kernel that others run.
+  /// Reads planes back.
+  virtual std::shared_ptr<const StepModel> step_model() { return nullptr; }
 
   /// The strands that it works on when an executor keeps these; nullptr for a solver that has its own.
   virtual const StrandState* strands() const { return nullptr; }

@@ -337,6 +337,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
+  step_log_.set_model(solver_->step_model());
   stages_->plan_step(scene.substeps, explain(scene, facts_));
   stages_->set_solver_bytes(solver_->memory_bytes());
   ++solver_builds_;
@@ -388,6 +389,7 @@ void SimLoop::step(int64_t time_ns) {
   CHECK(stages_->step(turn, executor_->timer()).ok());  // stages of a step cannot fail
   if (is_stopping_) return;
   step_times_.add_ms(stages_->last_step_ms());
+  step_log_.add(builder_->step_tick(tick_));
   last_step_ns_ = now_ns();
   if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
@@ -399,6 +401,8 @@ void SimLoop::publish() {
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
   input.motion_time_ns = input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
+  step_log_.set_scene(builder_->step_scene(solver_features_));
+  input.trail = step_log_.trail();
   CHECK(stages_->publish(turn).ok());  // likewise
   std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
   if (config_.on_publish) config_.on_publish(snapshot);

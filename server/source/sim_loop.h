@@ -27,6 +27,7 @@
 #include "server/scene/scene_content.h"
 #include "server/scene/sim_clock.h"
 #include "server/scene/step_builder.h"
+#include "server/scene/step_log.h"
 #include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
@@ -124,6 +125,7 @@ class SimLoop {
   std::unique_ptr<Solver> solver_;
   SceneFeatures solver_features_;  // what the solver was built for
   std::optional<StepBuilder> builder_;
+  StepLog step_log_;  // for a codec that predicts by steps
   std::optional<Publisher> publisher_;
   std::optional<SimClock> clock_;
   std::optional<InputClock> input_clock_;

@@ -13,6 +13,7 @@
 #include "common/base/check.h"
 #include "common/base/worker_pool.h"
 #include "common/strands/byte_io.h"
+#include "common/strands/step/steps.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/order.h"
 #include "common/strands/tangent/symbols.h"
@@ -21,7 +22,8 @@
 namespace strandcast::tangent {
 namespace {
 
-constexpr uint8_t kCodecNumber = 5;
+constexpr uint8_t kTangentNumber = 5;
+constexpr uint8_t kStepNumber = 6;
 constexpr int kTableLevel = 3;
 constexpr uint8_t kAnchorFlag = 1;
 
@@ -31,6 +33,12 @@ struct BodyHead {
   uint8_t flags = 0;
   uint8_t length_blend = 0;
 };
+
+/// By what frames may be predicted.
+enum class Prediction { Motion, Steps };
+constexpr uint8_t codec_number(Prediction prediction) {
+  return prediction == Prediction::Steps ? kStepNumber : kTangentNumber;
+}
 
 /// What a stream remembers on both sides.
 struct Chain {
@@ -66,10 +74,14 @@ void for_each_slices(const Layout& layout, const WorkerPool::Terms& terms, Work 
 
 class Encoder final : public StrandEncoder {
  public:
-  Encoder(WorkerPool& workers, simd::InstructionSet set) : workers_(workers), set_(set) {}
+  Encoder(WorkerPool& workers, simd::InstructionSet set, Prediction prediction)
+      : workers_(workers), set_(set), number_(codec_number(prediction)) {
+    if (prediction == Prediction::Steps) steps_.emplace(workers, set);
+  }
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
+    if (steps_) steps_->set_rest_shape(rest_in_head_m);
     has_chain_ = false;
   }
 
@@ -120,6 +132,7 @@ class Encoder final : public StrandEncoder {
     next_sizes_.reset(layout_);
     no_sizes_.reset(layout_);
     has_chain_ = true;
+    if (steps_) steps_->restart(snapshot, layout_);
     return checked(encode_anchor(snapshot, Followers::None).keyframe);
   }
 
@@ -136,15 +149,27 @@ class Encoder final : public StrandEncoder {
   }
 
   /// What every frame begins with.
-  void begin(const Snapshot& snapshot) {
+  void begin(const Snapshot& snapshot, Followers followers) {
     take(snapshot);
-    frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
+    flags_ = 0;
+    if (steps_ && followers == Followers::Some)
+      flags_ = steps_->begin(snapshot, layout_, chain_.history, target_);
+    if ((flags_ & step::kStepFlag) != 0)
+      frame_.head = {snapshot.world_from_head, {}};
+    else
+      frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
     writers_.resize(layout_.slice_count());
   }
 
+  /// What every frame ends with.
+  void end(const Snapshot& snapshot) {
+    remember(chain_.history, frame_);
+    if (steps_) steps_->finish(snapshot, frame_, chain_.history);
+  }
+
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
-    begin(snapshot);
+    begin(snapshot, Followers::Some);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
     Slices slices(layout_.slice_count());
@@ -157,13 +182,14 @@ class Encoder final : public StrandEncoder {
       finish(first, count, slices);
     });
     chain_.tables = mean_tables(tables);
-    remember(chain_.history, frame_);
+    end(snapshot);
     std::swap(chain_.sizes, next_sizes_);
-    return make_delta(state_of(snapshot), 0, slices);
+    return make_delta(state_of(snapshot), slices);
   }
 
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
-    begin(snapshot);
+    begin(snapshot, followers);
+    flags_ |= kAnchorFlag;
     frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
     Slices slices(layout_.slice_count());
@@ -184,12 +210,13 @@ class Encoder final : public StrandEncoder {
       }
       finish(first, count, shape_slices);
     });
-    remember(chain_.history, frame_);
+    end(snapshot);
     chain_.forget_motion(layout_);
+    if (steps_) steps_->settle(chain_.history);
     const State state = state_of(snapshot);
     JoinFrames frames;
     if (followers == Followers::Some)
-      frames.frame = make_delta(state, kAnchorFlag, slices);
+      frames.frame = make_delta(state, slices);
     else
       ++sequence_;
     frames.keyframe = make_keyframe(state, shape_slices);
@@ -207,13 +234,14 @@ class Encoder final : public StrandEncoder {
   }
 
   /// Of the next frame of the chain, with a body for everybody who follows.
-  EncodedFramePtr make_delta(const State& state, uint8_t flags, const Slices& slices) {
-    const BodyHead head{flags, frame_.length_blend};
+  EncodedFramePtr make_delta(const State& state, const Slices& slices) {
+    const BodyHead head{flags_, frame_.length_blend};
     std::vector<std::byte> body;
     body.reserve(sizeof(head) + sizeof(frame_.weights) + sizeof(frame_.shape_weights) + layout_.plane_size());
     ByteWriter writer(body);
     writer.put_bytes(std::as_bytes(std::span(&head, 1)));
-    if ((flags & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
+    if (steps_) steps_->append_bytes(body);
+    if ((flags_ & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
     ValueWriter weights;
     write_weights(motion_class_count(layout_), frame_.weights, weights);
     weights.finish(body);
@@ -228,13 +256,13 @@ class Encoder final : public StrandEncoder {
 
   /// Of the same frame, for a joiner.
   EncodedFramePtr make_keyframe(const State& state, const Slices& slices) {
-    std::vector<std::byte> packed;
-    zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, packed);
-    std::vector<std::byte> body;
-    body.reserve(packed.size() + 2 * layout_.plane_size());
+    std::vector<std::byte> body(sizeof(uint32_t));
+    body.reserve(2 * layout_.plane_size());
+    zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, body);
+    const auto packed_bytes = static_cast<uint32_t>(body.size() - sizeof(uint32_t));
+    std::memcpy(body.data(), &packed_bytes, sizeof packed_bytes);
     ByteWriter writer(body);
-    writer.put(static_cast<uint32_t>(packed.size()));
-    writer.put_bytes(packed);
+    if (steps_) steps_->append_state(body);
     writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
     for (const auto& slice : slices) writer.put_bytes(slice);
     FrameHeader header;
@@ -244,20 +272,23 @@ class Encoder final : public StrandEncoder {
     return make_frame(header, state, body);
   }
 
-  static EncodedFramePtr make_frame(const FrameHeader& header, const State& state,
-                                    std::span<const std::byte> body) {
+  EncodedFramePtr make_frame(const FrameHeader& header, const State& state,
+                             std::span<const std::byte> body) const {
     std::vector<std::byte> payload;
     payload.reserve(kStrandFixedBytes + body.size());
-    append_fixed_part(state.info, state.hash, kCodecNumber, payload);
+    append_fixed_part(state.info, state.hash, number_, payload);
     ByteWriter(payload).put_bytes(body);
     return make_encoded_frame(header, payload);
   }
 
   WorkerPool& workers_;
   simd::InstructionSet set_;
+  const uint8_t number_;
+  std::optional<step::EncoderSteps> steps_;
   std::vector<glm::vec3> rest_in_head_m_;
   Layout layout_;
   Chain chain_;
+  uint8_t flags_ = 0;  // of the frame at work
   Frame frame_;
   SymbolSizes next_sizes_;
   SymbolSizes no_sizes_;
@@ -271,8 +302,11 @@ class Encoder final : public StrandEncoder {
 
 class Decoder final : public StrandDecoder {
  public:
-  Decoder(const StrandStreamLimits& limits, WorkerPool& workers, simd::InstructionSet set)
-      : set_(set), limits_(limits), workers_(workers) {}
+  Decoder(const StrandStreamLimits& limits, WorkerPool& workers, simd::InstructionSet set,
+          Prediction prediction)
+      : set_(set), number_(codec_number(prediction)), limits_(limits), workers_(workers) {
+    if (prediction == Prediction::Steps) steps_.emplace(workers, set);
+  }
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
@@ -280,7 +314,7 @@ class Decoder final : public StrandDecoder {
   }
 
   Result<std::shared_ptr<const Snapshot>> decode(std::span<const std::byte> bytes) override {
-    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, kCodecNumber, limits_));
+    ASSIGN_OR_RETURN(const StrandMessage message, read_strand_message(bytes, number_, limits_));
     RETURN_IF_ERROR(check_chain(message.header, sequence_));
     if (layout_.strand_count == 0) reset_layout({});
     auto snapshot = std::make_shared<Snapshot>(make_snapshot(message));
@@ -299,6 +333,7 @@ class Decoder final : public StrandDecoder {
     next_sizes_.reset(layout_);
     no_sizes_.reset(layout_);
     sequence_ = 0;
+    if (steps_) steps_->restart(rest_in_head_m);
   }
 
   Status read_keyframe(const StrandMessage& message, Snapshot& snapshot) {
@@ -308,6 +343,11 @@ class Decoder final : public StrandDecoder {
     ByteReader body(message.body);
     const auto table_bytes = body.take<uint32_t>();
     const auto packed = body.take_bytes(table_bytes);
+    const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
+    step::DecoderSteps::Joined joined;
+    if (steps_ && body.ok()) {
+      ASSIGN_OR_RETURN(joined, steps_->read_state(body, moment, layout_));
+    }
     take_into(body, frame_.shape_weights);
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
@@ -325,6 +365,7 @@ class Decoder final : public StrandDecoder {
     remember(chain.history, frame_);
     chain.forget_motion(layout_);
     chain_ = std::move(chain);
+    if (steps_) steps_->take_over(std::move(joined), moment, chain_.history);
     return {};
   }
 
@@ -333,43 +374,65 @@ class Decoder final : public StrandDecoder {
       return make_error(ErrorCode::BadInput, "lattice step changes from {} to {} m within a chain",
                         chain_.history.quantum_m, message.fixed.quantum_m);
     ByteReader body(message.body);
+    ASSIGN_OR_RETURN(const BodyHead head, read_head(body));
+    const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
+    if (steps_) RETURN_IF_ERROR(steps_->begin(head.flags, moment, layout_, body, chain_.history));
+    Tables tables = chain_.tables;
+    if (Status status = read_positions(head, body, message, snapshot, tables); !status) {
+      if (steps_) steps_->abandon(chain_.history);
+      return status;
+    }
+    // Only now, with everything checked, the state moves on.
+    remember(chain_.history, frame_);
+    if (steps_) steps_->finish(moment, frame_, chain_.history);
+    if ((head.flags & kAnchorFlag) != 0) {
+      chain_.forget_motion(layout_);
+      if (steps_) steps_->settle(chain_.history);
+    } else {
+      chain_.tables = tables;
+      std::swap(chain_.sizes, next_sizes_);
+    }
+    return {};
+  }
+
+  Result<BodyHead> read_head(ByteReader& body) const {
     BodyHead head;
     take_into(body, head);
-    const bool is_anchor = head.flags == kAnchorFlag;
-    if (is_anchor) take_into(body, frame_.shape_weights);
-    if (!body.ok())
-      return make_error(ErrorCode::BadInput, "{} bytes have no room for what a delta begins with",
-                        message.body.size());
-    if (head.flags > kAnchorFlag)
-      return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags,
-                        kAnchorFlag);
+    if (!body.ok()) return make_error(ErrorCode::BadInput, "a delta has no room for what it begins with");
+    const auto known = static_cast<uint8_t>(kAnchorFlag | (steps_ ? step::kFlags : 0));
+    if ((head.flags & ~known) != 0)
+      return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags, known);
     if (head.length_blend > kMaxLengthBlend)
       return make_error(ErrorCode::BadInput,
                         "strand payload blends lengths by {}/16, at most {} are possible", head.length_blend,
                         kMaxLengthBlend);
+    return head;
+  }
+
+  /// What follows the steps of a delta; `tables` learn.
+  Status read_positions(const BodyHead& head, ByteReader& body, const StrandMessage& message,
+                        Snapshot& snapshot, Tables& tables) {
+    const bool is_anchor = (head.flags & kAnchorFlag) != 0;
+    if (is_anchor) take_into(body, frame_.shape_weights);
+    if (!body.ok())
+      return make_error(ErrorCode::BadInput, "{} bytes have no room for what a delta begins with",
+                        message.body.size());
     frame_.length_blend = head.length_blend;
-    frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
+    if ((head.flags & step::kStepFlag) != 0)
+      frame_.head = {snapshot.world_from_head, {}};
+    else
+      frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
     ValueReader weights;
     ASSIGN_OR_RETURN(const auto slices, weights.open(body.rest()));
     read_weights(motion_class_count(layout_), frame_.weights, weights);
     if (!weights.is_spent())
       return make_error(ErrorCode::BadInput, "the weights do not end where their symbols end");
     frame_.apply_weights();
-    Tables tables = chain_.tables;
     RETURN_IF_ERROR(read_slices(slices, tables, chain_.sizes, frame_.codes, [&](uint32_t slice) {
       const auto place = is_anchor ? place_anchor : place_slice;
       place(set_, {layout_, chain_.history, slice, frame_});
     }));
-    RETURN_IF_ERROR(give(message, snapshot));
-    // Only now, with everything checked, the state moves on.
-    remember(chain_.history, frame_);
-    if (is_anchor) {
-      chain_.forget_motion(layout_);
-    } else {
-      chain_.tables = tables;
-      std::swap(chain_.sizes, next_sizes_);
-    }
-    return {};
+    return give(message, snapshot);
   }
 
   /// Reads `codes` of all slices, to the last byte; place(slice) finds their positions. `tables` become those
@@ -433,6 +496,8 @@ class Decoder final : public StrandDecoder {
   }
 
   simd::InstructionSet set_;
+  const uint8_t number_;
+  std::optional<step::DecoderSteps> steps_;
   StrandStreamLimits limits_;
   WorkerPool& workers_;
   Layout layout_;
@@ -457,12 +522,25 @@ std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers) {
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers) {
   return make_decoder(limits, workers, simd::widest_set());
 }
+std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers) {
+  return make_step_encoder(workers, simd::widest_set());
+}
+std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers) {
+  return make_step_decoder(limits, workers, simd::widest_set());
+}
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers, simd::InstructionSet set) {
-  return std::make_unique<Encoder>(workers, set);
+  return std::make_unique<Encoder>(workers, set, Prediction::Motion);
 }
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                             simd::InstructionSet set) {
-  return std::make_unique<Decoder>(limits, workers, set);
+  return std::make_unique<Decoder>(limits, workers, set, Prediction::Motion);
+}
+std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers, simd::InstructionSet set) {
+  return std::make_unique<Encoder>(workers, set, Prediction::Steps);
+}
+std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
+                                                 simd::InstructionSet set) {
+  return std::make_unique<Decoder>(limits, workers, set, Prediction::Steps);
 }
 
 }  // namespace strandcast::tangent

@@ -1,0 +1,108 @@
+// Predictor: strands as a decoder knows them, moved by the solver that the stream announces. Encoder and
+// decoder of the "step" codec both have one; they do the same with the same numbers and so expect every
+// vertex in the same place, bit for bit. What was decoded then corrects positions and velocities. Strands lie
+// in the order of places (tangent/layout.h), in blocks of 16. Private to common/strands; one thread.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/kernels/head_path.h"
+#include "common/kernels/lane_program.h"
+#include "common/kernels/step_model.h"
+#include "common/strands/byte_io.h"
+#include "common/strands/step/wire.h"
+#include "common/strands/tangent/motion.h"
+
+namespace strandcast::step {
+
+/// What both sides know of the strands before the first frame. All of it outlives the predictor.
+struct PredictorGround {
+  const tangent::Layout& layout;
+  std::span<const glm::vec3> rest_in_head_m;  // (vertex_count x strand_count), strand fastest
+  WorkerPool& workers;
+  simd::InstructionSet set;
+};
+
+class Predictor {
+ public:
+  /// Unsupported where there is no rest shape or this build has no such kernel.
+  static Result<std::unique_ptr<Predictor>> make(StepModel model, const PredictorGround& ground);
+
+  const StepModel& model() const { return model_; }
+  void set_scene(const StepScene& scene);
+
+  /// Strands are where they were decoded, under this pose of the head, and move as from where they were
+  /// `seconds` before (0: not at all).
+  struct Decoded {
+    const tangent::Planes<int32_t>& lattice;
+    Pose world_from_head;
+  };
+  void start(const Decoded& now, const Decoded& before, double seconds, float quantum_m);
+
+  /// One step each; `end_time_s` of the last one.
+  void advance(std::span<const StepTick> ticks, double end_time_s);
+  /// Where strands are, on the lattice; 0 where there is no strand.
+  void expect(float quantum_m, tangent::Planes<int32_t>& lattice) const;
+  /// They were expected there, and are here. `seconds` that the frame took.
+  struct Correction {
+    const tangent::Planes<int32_t>& expected;
+    const tangent::Planes<int32_t>& decoded;
+    double seconds;
+    float quantum_m;
+  };
+  void correct(const Correction& correction);
+
+  /// For joiners: goes on with the numbers that write_state() says and no others. Positions are those
+  /// decoded.
+  void settle(const tangent::Planes<int32_t>& decoded, float quantum_m);
+  /// After settle().
+  void write_state(std::vector<std::byte>& bytes) const;
+  /// The other side of it, all but where strands are; BadInput for what is no state.
+  Status read_state(ByteReader& bytes, const Pose& world_from_head);
+  /// Strands are where they were decoded.
+  void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
+  /// Bytes that write_state() may have at most.
+  size_t most_state_bytes() const;
+
+  /// What may be put back after a frame that failed its checks.
+  void save();
+  void restore();
+
+ private:
+  Predictor(StepModel model, const PredictorGround& ground);
+  Status prepare();
+  void fill_rest();
+  void fill_fixed();
+  void find_axes();
+  void turn(const glm::dquat& by);
+  void run(const StepInput& input);
+  StrandBlocks* moving(PlaneRole role) const;
+  template <class Visit>
+  void for_state_planes(Visit visit) const;
+  uint32_t block_count() const;
+
+  /// What changes from frame to frame.
+  struct State {
+    std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> planes;
+    HeadPath head;
+    Pose pose;
+  };
+
+  StepModel model_;
+  StepScene scene_;
+  PredictorGround ground_;
+  const StepKernel& kernel_;
+  uint32_t places_ = 0;  // of the layout, without its block of zeros
+  std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> fixed_;
+  State state_;
+  State saved_;
+  std::optional<LaneProgram> program_;
+  std::optional<LaneProgram> follicle_program_;
+};
+
+}  // namespace strandcast::step

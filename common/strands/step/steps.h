@@ -1,0 +1,130 @@
+// Steps: what the "step" codec adds to a chain of "tangent": whether a frame is predicted by steps of the
+// announced solver or by motion, and the bytes that say so. One class for each side. Private to
+// common/strands; one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/strands/byte_io.h"
+#include "common/strands/snapshot.h"
+#include "common/strands/step/predictor.h"
+#include "common/strands/step/wire.h"
+#include "common/strands/tangent/motion.h"
+#include "common/strands/zstd_block.h"
+
+namespace strandcast::step {
+
+// Of a delta, beside that of anchors.
+inline constexpr uint8_t kStepFlag = 2;   // predicted by steps, whose ticks follow
+inline constexpr uint8_t kSceneFlag = 4;  // a scene follows
+inline constexpr uint8_t kModelFlag = 8;  // a model follows, from the next frame on; not with kStepFlag
+inline constexpr uint8_t kFlags = kStepFlag | kSceneFlag | kModelFlag;
+
+/// A frame of which something is predicted.
+struct Moment {
+  uint64_t tick = 0;
+  int64_t sim_time_ns = 0;
+  Pose world_from_head;
+};
+
+/// What both sides know.
+class Steps {
+ public:
+  /// Positions were expected there while the frame that begins is coded, if it is one of steps.
+  bool is_stepping() const { return is_stepping_; }
+  /// Has strands to predict.
+  bool can_step() const { return predictor_ != nullptr; }
+
+ protected:
+  Steps(WorkerPool& workers, simd::InstructionSet set) : workers_(workers), set_(set) {}
+  PredictorGround ground(const tangent::Layout& layout) const {
+    return {layout, rest_in_head_m_, workers_, set_};
+  }
+  /// The history holds where steps lead to instead of the last positions, which expected_ then holds.
+  void step(std::span<const StepTick> ticks, const Moment& now, const tangent::Layout& layout,
+            tangent::History& history);
+  /// The frame is history: `frame.lattice` holds what `history.lattice` was before.
+  void follow(const Moment& now, const tangent::Frame& frame, const tangent::History& history);
+
+  WorkerPool& workers_;
+  simd::InstructionSet set_;
+  std::vector<glm::vec3> rest_in_head_m_;
+  std::unique_ptr<Predictor> predictor_;
+  std::unique_ptr<Predictor> next_predictor_;  // of a model that came with the frame
+  StepScene scene_;
+  WindSteps wind_{};
+  Moment last_;
+  tangent::Planes<int32_t> expected_;
+  bool is_stepping_ = false;
+};
+
+class EncoderSteps : public Steps {
+ public:
+  EncoderSteps(WorkerPool& workers, simd::InstructionSet set) : Steps(workers, set) {}
+  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
+  /// A chain begins: nobody knows anything.
+  void restart(const SnapshotInfo& snapshot, const tangent::Layout& layout);
+  /// Decides how the frame is predicted. Gives its flags, which append_bytes() follow on the wire.
+  uint8_t begin(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
+                const tangent::Planes<int32_t>& target);
+  void append_bytes(std::vector<std::byte>& body) const;
+  void finish(const SnapshotInfo& snapshot, const tangent::Frame& frame, const tangent::History& history);
+  /// After an anchor: goes on with what joiners are told, and appends that.
+  void settle(const tangent::History& history);
+  void append_state(std::vector<std::byte>& body);
+
+ private:
+  std::span<const StepTick> ticks_since(const SnapshotInfo& snapshot) const;
+  bool pays(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
+            const tangent::Planes<int32_t>& before, const tangent::Planes<int32_t>& target) const;
+  void take_scene(const StepScene& scene);
+  bool take_model(const std::shared_ptr<const StepModel>& model, const tangent::Layout& layout);
+
+  std::shared_ptr<const StepModel> told_model_;
+  bool has_model_ = false;  // that this build can step
+  std::shared_ptr<const StepScene> told_scene_;
+  std::vector<std::byte> model_bytes_;
+  std::vector<std::byte> bytes_;
+  ZstdCompressor zstd_;
+};
+
+class DecoderSteps : public Steps {
+ public:
+  DecoderSteps(WorkerPool& workers, simd::InstructionSet set) : Steps(workers, set) {}
+  /// Forgets everything.
+  void restart(std::span<const glm::vec3> rest_in_head_m);
+  /// Reads what follows the flags of a delta and, for a frame of steps, takes them. Nothing has changed after
+  /// an error.
+  Status begin(uint8_t flags, const Moment& now, const tangent::Layout& layout, ByteReader& body,
+               tangent::History& history);
+  /// The frame failed its checks: all is as before begin().
+  void abandon(tangent::History& history);
+  void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history);
+  /// Of an anchor that was decoded as a delta.
+  void settle(const tangent::History& history);
+
+  /// What a keyframe says of steps, all but where strands are.
+  struct Joined {
+    std::unique_ptr<Predictor> predictor;  // nullptr: nothing is predicted by steps yet
+    StepScene scene;
+  };
+  Result<Joined> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout);
+  /// The keyframe has become history.
+  void take_over(Joined joined, const Moment& now, const tangent::History& history);
+
+ private:
+  Result<std::vector<std::byte>> unpack(ByteReader& body, size_t most_bytes);
+
+  ZstdDecompressor zstd_;
+  StepScene saved_scene_;
+  WindSteps saved_wind_{};
+  bool is_saved_ = false;
+};
+
+}  // namespace strandcast::step

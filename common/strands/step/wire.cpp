@@ -1,0 +1,313 @@
+#include "common/strands/step/wire.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "common/strands/strand_limits.h"
+#include "common/strands/strand_payload.h"
+
+namespace strandcast::step {
+namespace {
+
+constexpr double kWindStepMps = 1.0 / 512.0;
+constexpr int32_t kMostWindSteps = 1 << 22;
+constexpr size_t kMostConstants = 24;
+constexpr size_t kMostNameBytes = 40;
+constexpr float kUnitStep = 1.0f / 32767.0f;  // of directions
+constexpr uint8_t kWaves = 1;
+constexpr uint8_t kCarried = 2;
+constexpr uint8_t kCarriedElsewhere = 4;  // not to where the tick ends
+constexpr uint8_t kTickFlags = kWaves | kCarried | kCarriedElsewhere;
+
+void put_varint(uint32_t value, std::vector<std::byte>& bytes) {
+  for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::byte>(value | 0x80u));
+  bytes.push_back(static_cast<std::byte>(value));
+}
+uint32_t take_varint(ByteReader& bytes) {
+  uint32_t value = 0;
+  for (uint32_t shift = 0; shift < 32; shift += 7) {
+    const auto byte = bytes.take<uint8_t>();
+    value |= static_cast<uint32_t>(byte & 0x7fu) << shift;
+    if ((byte & 0x80u) == 0) break;
+  }
+  return value;
+}
+uint32_t folded(int32_t value) {
+  return (static_cast<uint32_t>(value) << 1) ^ static_cast<uint32_t>(value >> 31);
+}
+int32_t unfolded(uint32_t value) {
+  return static_cast<int32_t>((value >> 1) ^ (0u - (value & 1u)));
+}
+
+/// Writes and reads vectors, and remembers whether all that was read were usable numbers.
+struct Numbers {
+  ByteReader& bytes;
+  bool are_usable = true;
+
+  template <class T>
+  T take(double most) {
+    const T value = bytes.take<T>();
+    are_usable &= std::isfinite(value) && std::abs(static_cast<double>(value)) <= most;
+    return value;
+  }
+  template <class T, class Vector>
+  Vector vector(double most) {
+    const T x = take<T>(most);
+    const T y = take<T>(most);
+    const T z = take<T>(most);
+    return {x, y, z};
+  }
+  Status status(const char* what) const {
+    if (!bytes.ok()) return make_error(ErrorCode::BadInput, "{} of a step is cut off", what);
+    if (!are_usable)
+      return make_error(ErrorCode::BadInput, "{} of a step has numbers that none can be", what);
+    return {};
+  }
+};
+
+template <class Vector>
+void put_vector(const Vector& vector, ByteWriter& to) {
+  to.put(vector.x);
+  to.put(vector.y);
+  to.put(vector.z);
+}
+
+/// Directions in 16 bits an axis, all x first: bytes that are alike lie together.
+void put_plane(std::span<const glm::vec4> values, size_t row, size_t count, ByteWriter& to) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (size_t begin = 0; begin < values.size(); begin += row)
+      for (size_t i = begin; i < begin + count; ++i)
+        to.put(static_cast<int16_t>(std::lrint(std::clamp(values[i][axis], -1.0f, 1.0f) / kUnitStep)));
+  for (size_t begin = 0; begin < values.size(); begin += row)
+    for (size_t i = begin; i < begin + count; ++i) to.put(values[i].w);
+}
+std::vector<glm::vec4> take_plane(size_t size, Numbers& from) {
+  constexpr double kLargest = 1e20;
+  std::vector<glm::vec4> values(size);
+  for (int axis = 0; axis < 3; ++axis)
+    for (glm::vec4& value : values) value[axis] = static_cast<float>(from.bytes.take<int16_t>()) * kUnitStep;
+  for (glm::vec4& value : values) value.w = from.take<float>(kLargest);
+  return values;
+}
+
+// In their order on the wire.
+template <class Parameters, class Visit>
+void visit_parameters(Parameters& p, Visit visit) {
+  for (auto* value :
+       {&p.s_damping, &p.air_drag_per_s, &p.style_stiffness_per_s2, &p.style_tip_share, &p.sag_free,
+        &p.collider_friction, &p.max_speed_mps, &p.thrust_share, &p.thickness_spread})
+    visit(*value);
+}
+
+Result<ModelConstants> read_constants(ByteReader& bytes) {
+  ModelConstants constants;
+  const auto count = bytes.take<uint8_t>();
+  if (count > kMostConstants)
+    return make_error(ErrorCode::LimitExceeded, "a step's kernel has {} constants, most are {}", count,
+                      kMostConstants);
+  for (size_t i = 0; i < count; ++i) {
+    const auto length = bytes.take<uint8_t>();
+    const auto text = bytes.take_bytes(std::min<size_t>(length, kMostNameBytes));
+    const std::string name(reinterpret_cast<const char*>(text.data()), text.size());
+    if (bytes.take<uint8_t>() == 0) {
+      const auto value = bytes.take<double>();
+      if (!std::isfinite(value)) return make_error(ErrorCode::BadInput, "a step's constant is no number");
+      constants[name] = value;
+      continue;
+    }
+    const auto value = bytes.take<uint32_t>();
+    if (value > kMostRounds && name.find("seed") == std::string::npos)
+      return make_error(ErrorCode::LimitExceeded, "a step's count is {}, most are {}", value, kMostRounds);
+    constants[name] = value;
+  }
+  return constants;
+}
+
+/// A pose near another one, in 28 bytes.
+void put_near(const Pose& pose, const Pose& near, ByteWriter& to) {
+  put_vector(glm::vec3(pose.position_m - near.position_m), to);
+  const glm::quat rotation(pose.rotation);
+  to.put(rotation.w);
+  to.put(rotation.x);
+  to.put(rotation.y);
+  to.put(rotation.z);
+}
+Pose take_near(const Pose& near, Numbers& from) {
+  const auto moved = from.vector<float, glm::vec3>(kMaxHeadPositionM);
+  const auto w = from.take<float>(2.0);
+  const auto axis = from.vector<float, glm::vec3>(2.0);
+  return {near.position_m + glm::dvec3(moved), limited_rotation(glm::dquat(w, axis.x, axis.y, axis.z))};
+}
+
+}  // namespace
+
+void write_model(const StepModel& model, uint32_t strand_count, std::vector<std::byte>& bytes) {
+  ByteWriter to(bytes);
+  const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
+  to.put(kernel->number);
+  const auto twist = model.kernel.variant.find("HAS_TWIST");
+  to.put(static_cast<uint8_t>(twist != model.kernel.variant.end() && twist->second != 0 ? 1 : 0));
+  to.put(static_cast<uint8_t>(model.pinned_root_count));
+  to.put(static_cast<uint8_t>(model.pinned_tail_count));
+  visit_parameters(model.parameters, [&](const double& value) { to.put(value); });
+  to.put(static_cast<uint8_t>(model.kernel.constants.size()));
+  for (const auto& [name, value] : model.kernel.constants) {
+    to.put(static_cast<uint8_t>(name.size()));
+    to.put_bytes(std::as_bytes(std::span(name)));
+    to.put(static_cast<uint8_t>(value.index()));
+    std::visit([&](auto number) { to.put(number); }, value);
+  }
+  put_plane(model.rod_edge, model.strand_count, strand_count, to);
+  put_plane(model.rod_strand, model.strand_count, strand_count, to);
+}
+
+Result<StepModel> read_model(ByteReader& bytes, uint32_t strand_count, uint32_t vertex_count) {
+  constexpr double kLargest = 1e20;
+  Numbers from{bytes};
+  StepModel model;
+  const auto number = bytes.take<uint8_t>();
+  const StepKernel* kernel = find_step_kernel(number);
+  if (kernel == nullptr)
+    return make_error(ErrorCode::Unsupported, "a step of kernel {}, which this build does not know", number);
+  const bool has_twist = bytes.take<uint8_t>() != 0 && kernel->has_twist_variant;
+  model.strand_count = strand_count;
+  model.vertex_count = vertex_count;
+  model.pinned_root_count = bytes.take<uint8_t>();
+  model.pinned_tail_count = bytes.take<uint8_t>();
+  if (model.pinned_root_count < 1 || model.pinned_root_count + model.pinned_tail_count > vertex_count)
+    return make_error(ErrorCode::BadInput, "a step pins {} and {} of {} vertices", model.pinned_root_count,
+                      model.pinned_tail_count, vertex_count);
+  visit_parameters(model.parameters, [&](double& value) { value = from.take<double>(kLargest); });
+  ASSIGN_OR_RETURN(model.kernel.constants, read_constants(bytes));
+  model.kernel.shader_path = kernel->shader_path;
+  model.kernel.variant = {{"HAS_PINNED_TAIL", model.pinned_tail_count > 0 ? 1 : 0}};
+  if (kernel->has_twist_variant) model.kernel.variant["HAS_TWIST"] = has_twist ? 1 : 0;
+  model.kernel.scratch_rows = kernel->scratch_rows[has_twist ? 1 : 0];
+  for (const PlaneRole role : kernel->fixed) {
+    const bool is_edge = role == PlaneRole::RodEdge;
+    const size_t rows = is_edge ? vertex_count : kRodStrandRows;
+    (is_edge ? model.rod_edge : model.rod_strand) = take_plane(rows * strand_count, from);
+  }
+  RETURN_IF_ERROR(from.status("the model"));
+  return model;
+}
+
+void write_scene(const StepScene& scene, std::vector<std::byte>& bytes) {
+  ByteWriter to(bytes);
+  to.put(scene.step_s);
+  to.put(static_cast<uint8_t>(scene.substeps));
+  put_vector(scene.gravity_mps2, to);
+  put_vector(scene.groom_gravity_in_head_mps2, to);
+  to.put(scene.follicle_limit_rad);
+  to.put(scene.follicle_cosine);
+  to.put(scene.follicle_sine);
+  to.put(static_cast<uint8_t>(scene.colliders.size()));
+  for (const SphereCollider& sphere : scene.colliders) {
+    put_vector(sphere.center_m, to);
+    to.put(sphere.radius_m);
+  }
+  put_vector(scene.mean_wind_mps, to);
+  to.put(static_cast<uint8_t>(scene.waves.size()));
+  for (const GustWave& wave : scene.waves) {
+    put_vector(wave.amplitude_mps, to);
+    put_vector(wave.wave_vector_rad_per_m, to);
+    to.put(wave.phase_rad);
+  }
+}
+
+Result<StepScene> read_scene(ByteReader& bytes) {
+  Numbers from{bytes};
+  StepScene scene;
+  scene.step_s = from.take<double>(kMaxSubstepS * kMaxSubsteps);
+  scene.substeps = bytes.take<uint8_t>();
+  if (scene.substeps < 1 || scene.substeps > kMaxSubsteps)
+    return make_error(ErrorCode::LimitExceeded, "a step of {} substeps, not 1..{}", scene.substeps,
+                      kMaxSubsteps);
+  scene.gravity_mps2 = from.vector<double, glm::dvec3>(kMaxGravityMps2);
+  scene.groom_gravity_in_head_mps2 = from.vector<double, glm::dvec3>(kMaxGravityMps2);
+  scene.follicle_limit_rad = from.take<double>(kFreeFollicleRad);
+  scene.follicle_cosine = from.take<float>(1.0);
+  scene.follicle_sine = from.take<float>(1.0);
+  const auto collider_count = bytes.take<uint8_t>();
+  if (collider_count > kMaxSphereColliders)
+    return make_error(ErrorCode::LimitExceeded, "a step has {} colliders, most are {}", collider_count,
+                      kMaxSphereColliders);
+  for (size_t i = 0; i < collider_count; ++i) {
+    const auto center_m = from.vector<float, glm::vec3>(kMaxColliderM);
+    scene.colliders.push_back({center_m, from.take<float>(kMaxColliderM)});
+  }
+  scene.mean_wind_mps = from.vector<double, glm::dvec3>(kMaxWindMps);
+  const auto wave_count = bytes.take<uint8_t>();
+  if (wave_count > kMaxGustWaves)
+    return make_error(ErrorCode::LimitExceeded, "a step has {} waves of wind, most are {}", wave_count,
+                      kMaxGustWaves);
+  for (size_t i = 0; i < wave_count; ++i) {
+    GustWave wave;
+    wave.amplitude_mps = from.vector<float, glm::vec3>(kMaxWindMps);
+    wave.wave_vector_rad_per_m = from.vector<float, glm::vec3>(kMaxPhaseRad);
+    wave.phase_rad = from.take<float>(kMaxPhaseRad);
+    scene.waves.push_back(wave);
+  }
+  RETURN_IF_ERROR(from.status("the scene"));
+  return scene;
+}
+
+WindSteps wind_steps(const glm::dvec3& wind_mps) {
+  WindSteps steps;
+  for (int axis = 0; axis < 3; ++axis)
+    steps[static_cast<size_t>(axis)] =
+        static_cast<int32_t>(std::lrint(limited(wind_mps[axis], kMaxWindMps) / kWindStepMps));
+  return steps;
+}
+
+glm::dvec3 wind_of(const WindSteps& steps) {
+  return kWindStepMps * glm::dvec3(steps[0], steps[1], steps[2]);
+}
+
+void write_ticks(std::span<const StepTick> ticks, WindSteps& wind, std::vector<std::byte>& bytes) {
+  ByteWriter to(bytes);
+  to.put(static_cast<uint8_t>(ticks.size()));
+  for (const StepTick& tick : ticks) {
+    const Pose& last = ticks.back().world_from_head;
+    uint8_t flags = tick.has_waves ? kWaves : 0;
+    if (tick.carried_to) flags |= kCarried;
+    if (tick.carried_to && *tick.carried_to != tick.world_from_head) flags |= kCarriedElsewhere;
+    to.put(flags);
+    const WindSteps now = wind_steps(tick.wind_mps);
+    for (size_t axis = 0; axis < 3; ++axis) put_varint(folded(now[axis] - wind[axis]), bytes);
+    wind = now;
+    if (&tick != &ticks.back()) put_near(tick.world_from_head, last, to);
+    if ((flags & kCarriedElsewhere) != 0) put_near(*tick.carried_to, last, to);
+  }
+}
+
+Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, uint64_t frame_tick, const Pose& frame_pose,
+                                         WindSteps& wind) {
+  Numbers from{bytes};
+  const auto count = bytes.take<uint8_t>();
+  if (count > kMostTrailTicks)
+    return make_error(ErrorCode::LimitExceeded, "a frame of {} steps, most are {}", count, kMostTrailTicks);
+  std::vector<StepTick> ticks(count);
+  for (size_t i = 0; i < count; ++i) {
+    StepTick& tick = ticks[i];
+    tick.tick = frame_tick - (count - 1 - i);
+    const auto flags = bytes.take<uint8_t>();
+    if (flags > kTickFlags) return make_error(ErrorCode::BadInput, "a step has flags {}", flags);
+    tick.has_waves = (flags & kWaves) != 0;
+    for (int32_t& steps : wind)
+      steps = std::clamp(static_cast<int32_t>(static_cast<uint32_t>(steps) +
+                                              static_cast<uint32_t>(unfolded(take_varint(bytes)))),
+                         -kMostWindSteps * 2, kMostWindSteps * 2);
+    tick.wind_mps = wind_of(wind);
+    tick.world_from_head = i + 1 < count ? take_near(frame_pose, from) : frame_pose;
+    if ((flags & kCarriedElsewhere) != 0)
+      tick.carried_to = take_near(frame_pose, from);
+    else if ((flags & kCarried) != 0)
+      tick.carried_to = tick.world_from_head;
+  }
+  RETURN_IF_ERROR(from.status("a tick"));
+  return ticks;
+}
+
+}  // namespace strandcast::step

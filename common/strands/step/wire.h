@@ -1,0 +1,43 @@
+// The bytes of what a "step" frame says beside its integers: the model, the scene and the ticks. What is
+// written is rounded; both sides go on with what was read. Layout in proto/WIRE.md. Private to
+// common/strands.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/kernels/step_model.h"
+#include "common/strands/byte_io.h"
+
+namespace strandcast::step {
+
+/// Largest count among a kernel's constants: rounds, solves and the like. A seed may be anything.
+inline constexpr uint32_t kMostRounds = 256;
+/// Of a kernel's work for a vertex in a tick, substeps times rounds: what a peer may ask for.
+inline constexpr uint32_t kMostRoundsPerTick = 1024;
+
+/// The model for the first `strand_count` of its strands.
+void write_model(const StepModel& model, uint32_t strand_count, std::vector<std::byte>& bytes);
+/// From untrusted bytes, for strands of these counts: BadInput for a kernel that is not known, for numbers
+/// that are none, and for counts that no kernel may run with.
+Result<StepModel> read_model(ByteReader& bytes, uint32_t strand_count, uint32_t vertex_count);
+
+void write_scene(const StepScene& scene, std::vector<std::byte>& bytes);
+Result<StepScene> read_scene(ByteReader& bytes);
+
+/// Wind as it is on the wire.
+using WindSteps = std::array<int32_t, 3>;
+WindSteps wind_steps(const glm::dvec3& wind_mps);
+glm::dvec3 wind_of(const WindSteps& steps);
+
+/// Ticks up to a frame; wind counts from `wind`, which becomes that of the last one. `frame_pose` is the
+/// last tick's.
+void write_ticks(std::span<const StepTick> ticks, WindSteps& wind, std::vector<std::byte>& bytes);
+/// `frame_tick` is the last one's number.
+Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, uint64_t frame_tick, const Pose& frame_pose,
+                                         WindSteps& wind);
+
+}  // namespace strandcast::step
