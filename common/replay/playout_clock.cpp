@@ -10,8 +10,17 @@ namespace strandcast {
 namespace {
 
 constexpr double kLatenessQuantile = 0.95;
+/// A stream that has become slower shows in as many frames.
+constexpr size_t kRecentFrames = 8;
+constexpr double kNsPerS = 1e9;
 
 }  // namespace
+
+uint32_t frames_behind(double sim_frame_ns, double client_frame_ns, uint32_t now_behind) {
+  const double sim_hz = kNsPerS / sim_frame_ns;
+  const bool is_slow = now_behind > 1 ? sim_hz < kLinearAboveHz : sim_hz < kCubicBelowHz;
+  return is_slow && client_frame_ns <= kMostCubicDelayNs ? 2 : 1;
+}
 
 void PlayoutClock::add(int64_t receive_time_ns, int64_t sim_time_ns) {
   if (!samples_.empty()) {
@@ -53,10 +62,16 @@ void PlayoutClock::fit() {
     lateness_ns.push_back(std::max(0.0, dr - ds * client_per_sim));
   }
   const double late_ns = quantile(std::move(lateness_ns), kLatenessQuantile);
-  const double frame_ns = std::min(
-      static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0) * client_per_sim,
-      static_cast<double>(kPlayoutGapNs));
-  delay_ns_ = static_cast<int64_t>(frame_ns) + std::min(static_cast<int64_t>(late_ns), kMaxPlayoutDelayNs);
+  // Half the states may come from now on: a mean would take the whole window to know.
+  std::vector<double> recent_ns;
+  for (size_t i = samples_.size() - std::min(samples_.size() - 1, kRecentFrames); i < samples_.size(); ++i)
+    recent_ns.push_back(static_cast<double>(samples_[i].sim_time_ns - samples_[i - 1].sim_time_ns));
+  const double mean_ns = static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0);
+  const double sim_frame_ns = std::max(mean_ns, median(std::move(recent_ns)));
+  const double frame_ns = std::min(sim_frame_ns * client_per_sim, static_cast<double>(kPlayoutGapNs));
+  frames_behind_ = frames_behind(sim_frame_ns, frame_ns, frames_behind_);
+  delay_ns_ = static_cast<int64_t>(frames_behind_ * frame_ns) +
+              std::min(static_cast<int64_t>(late_ns), kMaxPlayoutDelayNs);
 }
 
 int64_t PlayoutClock::sim_time_at(int64_t client_time_ns) const {

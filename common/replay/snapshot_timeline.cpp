@@ -19,17 +19,6 @@ PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill) {
   return PosedStrands{snapshot.world_from_head, fill.positions(snapshot)};
 }
 
-PosedStrands blend(PosedStrands from, const PosedStrands& to, double blend) {
-  if (blend <= 0.0) return from;
-  // Without a rest shape a change to fewer strands leaves nothing to blend.
-  if (blend >= 1.0 || from.position_m.size() != to.position_m.size()) return to;
-  from.world_from_head = interpolate(from.world_from_head, to.world_from_head, blend);
-  const auto weight = static_cast<float>(blend);
-  for (size_t i = 0; i < to.position_m.size(); ++i)
-    from.position_m[i] += weight * (to.position_m[i] - from.position_m[i]);
-  return from;
-}
-
 void SnapshotTimeline::add(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns,
                            Continuity continuity) {
   // A keyframe on request repeats the state that is already here.
@@ -60,13 +49,39 @@ std::shared_ptr<const Snapshot> SnapshotTimeline::newest() const {
   return snapshots_.empty() ? nullptr : snapshots_.back();
 }
 
+void TimelinePlayer::set_fill(StrandFill fill) {
+  fill_ = std::move(fill);
+  knots_ = {};
+}
+
+/// Makes the strands of the states around the way to `later` that are not there from the way before.
+void TimelinePlayer::enter(const std::deque<std::shared_ptr<const Snapshot>>& snapshots, size_t later) {
+  if (knots_[1].snapshot == snapshots[later - 1] && knots_[2].snapshot == snapshots[later]) return;
+  chosen_ = choose_interpolation(snapshots, later);
+  std::array<Knot, 4> next;
+  const bool is_cubic = chosen_ == Interpolation::Cubic;
+  for (size_t i = is_cubic ? 0 : 1; i < (is_cubic ? next.size() : next.size() - 1); ++i) {
+    const auto& snapshot = snapshots[later - 2 + i];
+    const auto known = std::find_if(knots_.begin(), knots_.end(),
+                                    [&](const Knot& knot) { return knot.snapshot == snapshot; });
+    next[i] = known != knots_.end() ? std::move(*known) : Knot{snapshot, posed_strands_of(*snapshot, fill_)};
+    // Without a rest shape a change to fewer strands leaves no cubic.
+    if (next[i].strands.position_m.size() != next[is_cubic ? 0 : 1].strands.position_m.size())
+      chosen_ = Interpolation::Linear;
+  }
+  knots_ = std::move(next);
+}
+
 std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& timeline,
                                                        int64_t client_time_ns) {
   const auto& snapshots = timeline.snapshots();
+  interpolation_ = Interpolation::None;
   if (std::exchange(restarts_, timeline.restarts()) != timeline.restarts()) cursor_ = {};
   if (snapshots.empty()) return std::nullopt;
-  if (timeline.playout() == Playout::LowLatency || snapshots.size() < 2 || !timeline.clock().has_value())
+  if (timeline.playout() == Playout::LowLatency || snapshots.size() < 2 || !timeline.clock().has_value()) {
+    knots_ = {};
     return posed_strands_of(*snapshots.back(), fill_);
+  }
 
   // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
   const int64_t wanted_ns =
@@ -77,12 +92,17 @@ std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& t
   });
   if (later == snapshots.end()) return posed_strands_of(*snapshots.back(), fill_);
   if (later == snapshots.begin()) return posed_strands_of(**later, fill_);
-  const Snapshot& from = **std::prev(later);
-  const Snapshot& to = **later;
-  const auto span_ns = static_cast<double>(to.sim_time_ns - from.sim_time_ns);
+  enter(snapshots, static_cast<size_t>(later - snapshots.begin()));
+  interpolation_ = chosen_;
+  const int64_t from_ns = knots_[1].snapshot->sim_time_ns;
+  const int64_t to_ns = knots_[2].snapshot->sim_time_ns;
   // Both have all strands, also when the stream has changed to one with fewer in between.
-  return blend(posed_strands_of(from, fill_), posed_strands_of(to, fill_),
-               static_cast<double>(sim_time_ns - from.sim_time_ns) / span_ns);
+  if (chosen_ != Interpolation::Cubic)
+    return blend(knots_[1].strands, knots_[2].strands,
+                 static_cast<double>(sim_time_ns - from_ns) / static_cast<double>(to_ns - from_ns));
+  const KnotTimes times = {knots_[0].snapshot->sim_time_ns, from_ns, to_ns, knots_[3].snapshot->sim_time_ns};
+  return blend({&knots_[0].strands, &knots_[1].strands, &knots_[2].strands, &knots_[3].strands},
+               cubic_terms(times, sim_time_ns));
 }
 
 }  // namespace strandcast

@@ -3,12 +3,13 @@
 // copy. Pure logic.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
-#include <utility>
 
+#include "common/replay/interpolation.h"
 #include "common/replay/playout_clock.h"
 #include "common/replay/strand_fill.h"
 #include "common/strands/posed_strands.h"
@@ -26,7 +27,8 @@ enum class Continuity { SameStream, OtherStream };
 
 /// Smooth playout at 60 Hz is at most 100 ms behind, and as much again after a burst.
 inline constexpr size_t kKeptSnapshots = 16;
-/// Of huge states only as many are kept as fit, but the two that a picture lies between.
+/// Of huge states only as many are kept as fit, but the two that a picture lies between: the line is then
+/// what is drawn.
 inline constexpr uint64_t kMaxKeptSnapshotBytes = 256ull << 20;
 /// A keyframe of another stream may repeat a state this much older than the newest one.
 inline constexpr int64_t kStreamOverlapNs = 1'000'000'000;
@@ -55,23 +57,32 @@ class SnapshotTimeline {
   uint64_t restarts_ = 0;
 };
 
-/// Walks through timelines, each newer than the last, without jumping back. One thread.
+/// Walks through timelines, each newer than the last, without jumping back. What it chose between two states
+/// stays until the later one is reached, so that a change of it is never seen. One thread.
 class TimelinePlayer {
  public:
   /// For states without all strands, made from the asset's rest shape.
-  void set_fill(StrandFill fill) { fill_ = std::move(fill); }
+  void set_fill(StrandFill fill);
   /// What to draw at client time `client_time_ns`; nothing while the timeline is empty.
   std::optional<PosedStrands> strands_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
+  /// How the newest strands were made.
+  Interpolation interpolation() const { return interpolation_; }
 
  private:
+  /// A state with all its strands, made once for all pictures that need it.
+  struct Knot {
+    std::shared_ptr<const Snapshot> snapshot;
+    PosedStrands strands;
+  };
+  void enter(const std::deque<std::shared_ptr<const Snapshot>>& snapshots, size_t later);
+
   StrandFill fill_;
   PlayoutCursor cursor_;
   uint64_t restarts_ = 0;
+  Interpolation interpolation_ = Interpolation::None;
+  Interpolation chosen_ = Interpolation::None;  // between the inner two of knots_
+  std::array<Knot, 4> knots_;                   // a line has no outer ones
 };
-
-/// Strands between those of two states of equal sizes: blend 0 gives `from`, 1 gives `to`. Positions
-/// blend in head space, so a turning head carries the hair round instead of cutting through it.
-PosedStrands blend(PosedStrands from, const PosedStrands& to, double blend);
 
 /// The strands of one snapshot, as the server draws them when it has all.
 PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill);

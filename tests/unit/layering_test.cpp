@@ -42,7 +42,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       // The core: a viewer in a browser, a relay or a fuzzer links these and nothing else of ours.
       {"common/kernels", with({"common/simd", "shaders/shared", "shaders/lib"}, kMath)},
       {"common/strands", with({"common/simd"}, kKernels)},
-      {"common/replay", kStrands},
+      {"common/replay", with({"common/simd"}, kStrands)},
       {"common/pictures", kPictures},
       {"common/motion", kMath},
       {"common/groom", kStrands},

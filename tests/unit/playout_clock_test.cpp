@@ -21,6 +21,37 @@ TEST(PlayoutClock, StaysOneFrameBehindAnEvenStream) {
   EXPECT_NEAR(static_cast<double>(clock.sim_time_at(now_ns)), 98.0 * kStepNs + 4 * kMs, 1000.0);
 }
 
+TEST(PlayoutClock, StaysTwoFramesBehindASlowStreamForTheCubic) {
+  const auto behind = [](double hz, double realtime, uint32_t now) {
+    return frames_behind(1e9 / hz, 1e9 / (hz * realtime), now);
+  };
+  EXPECT_EQ(behind(60.0, 1.0, 1), 1u);
+  EXPECT_EQ(behind(50.5, 1.0, 2), 1u);
+  EXPECT_EQ(behind(47.0, 1.0, 1), 1u) << "in between it stays";
+  EXPECT_EQ(behind(47.0, 1.0, 2), 2u);
+  EXPECT_EQ(behind(44.5, 1.0, 1), 2u);
+  EXPECT_EQ(behind(30.0, 1.0, 1), 2u);
+  EXPECT_EQ(behind(20.0, 1.0, 1), 2u);
+  EXPECT_EQ(behind(15.0, 1.0, 2), 1u) << "67 ms more is too much";
+  EXPECT_EQ(behind(30.0, 0.5, 2), 1u) << "so it is in slow motion";
+  EXPECT_EQ(behind(60.0, 0.5, 1), 1u) << "states as near as at 60 Hz err little on lines";
+  PlayoutClock clock;
+  for (int64_t i = 0; i < 100; ++i) clock.add(kStartNs + 2 * i * kStepNs, 2 * i * kStepNs);
+  EXPECT_NEAR(static_cast<double>(clock.delay_ns()), 4.0 * kStepNs, 1e4);
+}
+
+TEST(PlayoutClock, AStreamThatBecomesSlowerShowsInAFewFrames) {
+  PlayoutClock clock;
+  int64_t tick = 0;
+  for (; tick < 100; ++tick) clock.add(kStartNs + tick * kStepNs, tick * kStepNs);
+  for (int i = 0; i < 5; ++i, tick += 2) clock.add(kStartNs + tick * kStepNs, tick * kStepNs);
+  EXPECT_GE(clock.delay_ns(), 2 * kStepNs);
+  // One frame that was lost is none of that.
+  PlayoutClock lossy;
+  for (tick = 0; tick < 100; tick += tick == 96 ? 2 : 1) lossy.add(kStartNs + tick * kStepNs, tick * kStepNs);
+  EXPECT_LT(lossy.delay_ns(), kStepNs + 2 * kMs);
+}
+
 TEST(PlayoutClock, FollowsASlowServer) {
   PlayoutClock clock;
   for (int64_t i = 0; i < 100; ++i)

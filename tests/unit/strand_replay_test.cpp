@@ -210,40 +210,6 @@ TEST(SnapshotTimeline, KeepsAsManyHugeStatesAsFitAndAtLeastTwo) {
   EXPECT_EQ(newest_count(kLimitBytes / 2 + 4), 2u);
 }
 
-// A head that moves by one unit a step is shown moving by as much at every moment, across states too.
-TEST(TimelinePlayer, EvenStatesAreShownInEqualIncrements) {
-  SnapshotTimeline timeline;
-  timeline.set_playout(Playout::Smooth);
-  TimelinePlayer player;
-  double last_head = 0.0, last_vertex = 0.0;
-  int increments = 0;
-  for (int64_t step = 0; step < 90; ++step) {
-    auto snapshot = std::make_shared<Snapshot>();
-    snapshot->sim_time_ns = step * kStepNs;
-    snapshot->world_from_head.position_m.x = static_cast<double>(step);
-    snapshot->strand_count = 1;
-    snapshot->vertex_count = 2;
-    snapshot->quantum_m = 1e-3f;
-    snapshot->lattice.assign(6, static_cast<int32_t>(1'000 * step));
-    timeline.add(snapshot, step * kStepNs, Continuity::SameStream);
-    constexpr int64_t kParts = 8;
-    for (int64_t part = 0; part < kParts; ++part) {
-      const auto strands = player.strands_at(timeline, step * kStepNs + part * kStepNs / kParts);
-      ASSERT_TRUE(strands);
-      const double head = strands->world_from_head.position_m.x;
-      const double vertex = strands->position_m[1].y;
-      if (step >= 60) {  // the clock has settled
-        EXPECT_NEAR(head - last_head, 1.0 / kParts, 1e-3) << "step " << step << ", part " << part;
-        EXPECT_NEAR(vertex - last_vertex, 1.0 / kParts, 1e-3) << "step " << step << ", part " << part;
-        ++increments;
-      }
-      last_head = head;
-      last_vertex = vertex;
-    }
-  }
-  EXPECT_EQ(increments, 240);
-}
-
 TEST(Blend, MeetsBothEndsExactlyAndIsLinearBetween) {
   HairMotion hair({.strand_count = kStrands, .vertex_count = kVertices});
   hair.step();
