@@ -252,6 +252,9 @@ Status StrandDrawer::draw(const Job& job, PosedStrands strands, size_t step) {
     newest_.renderer_bytes = renderer_->passes().live_bytes();
     newest_.asked_whole = drawn_->asked_whole;
     newest_.fair_ms = plan_.fair_ms(end_ns);
+    newest_.interpolation = player_.interpolation();
+    if (newest_.interpolation == Interpolation::Linear) ++newest_.linear_count;
+    if (newest_.interpolation == Interpolation::Cubic) ++newest_.cubic_count;
     ++newest_.count;
     newest_.draw_timer.add_ms(ms);
   }

@@ -37,6 +37,9 @@ struct DrawnState {
   RenderProfile profile;                           // likewise
   gl::PassReports passes;                          // of the renderer
   uint64_t renderer_bytes = 0;
+  Interpolation interpolation = Interpolation::None;  // what image shows between states
+  uint64_t linear_count = 0;                          // of pictures that were made so
+  uint64_t cubic_count = 0;
   uint64_t count = 0;        // of pictures
   uint64_t asked_whole = 0;  // the last ask_whole() that image answers
   StageTimer draw_timer;     // of the whole run

@@ -133,6 +133,7 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   if (!reason.empty()) add("because", reason);
   if (!is_frames) {
     add("shows", facts.playout == Playout::Smooth ? "smooth playout" : "the newest state");
+    if (facts.playout == Playout::Smooth) add("interpolation", to_string(facts.interpolation));
     add("drawn", fmt::format("{} ({:.0f} ms)", how_drawn(facts.draw_step), facts.draw_ms));
     if (!facts.drawn_by.empty()) add("by", facts.drawn_by);
     if (!facts.passes.empty()) add("passes", passes_text(facts.passes));

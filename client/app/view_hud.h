@@ -32,10 +32,11 @@ class Rate {
 struct ViewFacts {
   Address address;
   Playout playout = Playout::LowLatency;
-  std::string own_reason;     // why this machine needs frames
-  std::string message;        // the newest notice
-  bool has_own_look = false;  // not the scene's
-  bool is_starting = false;   // OpenGL
+  Interpolation interpolation = Interpolation::None;  // of the newest picture of strands
+  std::string own_reason;                             // why this machine needs frames
+  std::string message;                                // the newest notice
+  bool has_own_look = false;                          // not the scene's
+  bool is_starting = false;                           // OpenGL
   size_t draw_step = 0;
   double draw_ms = 0.0;    // median
   std::string drawn_by;    // empty: not known yet

@@ -115,8 +115,10 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_flag("--view-only", options.is_view_only,
                "Ask for a viewer's role: no steering of the server, and another look is seen here alone");
   app.add_option("--size", raw.size, "Picture or window size, WIDTHxHEIGHT")->capture_default_str();
-  app.add_option("--playout", raw.playout,
-                 "low-latency: the newest state; smooth: between states, a little behind")
+  app.add_option(
+         "--playout", raw.playout,
+         "low-latency: the newest state; smooth: between states, one frame behind, or two (and on cubics) "
+         "where 20 to 45 states come a second")
       ->check(CLI::IsMember({"low-latency", "smooth"}))
       ->capture_default_str();
   app.add_flag("--headless", options.is_headless, "No window: pictures, clip and report only");

@@ -84,6 +84,9 @@ ViewReport make_report(ViewerSession& session) {
   out.number("decode_ms_p99", decode.quantile_ms(kP99), 3);
   out.number("render_ms_median", 0.0, 3);
   out.count("rendered_pictures", 0);
+  out.word("interpolation", to_string(Interpolation::None));
+  out.count("linear_pictures", 0);
+  out.count("cubic_pictures", 0);
   out.number("motion_to_decoded_ms_median", motion.median_ms(), 3);
   out.number("motion_to_decoded_ms_p99", motion.quantile_ms(kP99), 3);
   out.count("motion_samples_seen", motion.count());
@@ -123,6 +126,17 @@ void set_render_times(ViewReport& report, const StageTimer& render_timer) {
   for (ReportEntry& entry : report) {
     if (entry.key == "render_ms_median") entry.text = fmt::format("{:.3f}", render_timer.median_ms());
     if (entry.key == "rendered_pictures") entry.text = std::to_string(render_timer.count());
+  }
+}
+
+void set_interpolation(ViewReport& report, uint64_t linear_count, uint64_t cubic_count) {
+  const Interpolation most = cubic_count > linear_count ? Interpolation::Cubic
+                             : linear_count > 0         ? Interpolation::Linear
+                                                        : Interpolation::None;
+  for (ReportEntry& entry : report) {
+    if (entry.key == "interpolation") entry.text = to_string(most);
+    if (entry.key == "linear_pictures") entry.text = std::to_string(linear_count);
+    if (entry.key == "cubic_pictures") entry.text = std::to_string(cubic_count);
   }
 }
 

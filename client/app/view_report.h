@@ -1,6 +1,7 @@
 // ViewReport: what a viewer measured, for people, for scripts and for tests. Pure text, any thread.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ ViewReport make_report(ViewerSession& session);
 void set_mode_reason(ViewReport& report, const std::string& reason);
 /// Fills in the render times of a report.
 void set_render_times(ViewReport& report, const StageTimer& render_timer);
+/// Fills in how many pictures were made in which way between states, and which way most were.
+void set_interpolation(ViewReport& report, uint64_t linear_count, uint64_t cubic_count);
 /// Adds how long a window took from waking up (a key, say) to the picture that answers.
 void add_answer_times(ViewReport& report, const StageTimer& answer_timer);
 

@@ -290,6 +290,7 @@ class WindowedView {
     ViewFacts facts;
     facts.address = options_.address;
     facts.playout = playout_;
+    facts.interpolation = drawn_.interpolation;
     facts.own_reason = own_reason_;
     if (time_ns - message_ns_ < kMessageNs) facts.message = message_;
     facts.has_own_look = look_.own_look().has_value();
@@ -337,7 +338,9 @@ class WindowedView {
       return make_error(ErrorCode::Unavailable, "left before the server had answered{}{}",
                         state_->trouble.empty() ? "" : ": ", state_->trouble);
     ViewReport report = *measured;
-    set_render_times(report, drawer_.look().draw_timer);
+    const DrawnState drawn = drawer_.look();
+    set_render_times(report, drawn.draw_timer);
+    set_interpolation(report, drawn.linear_count, drawn.cubic_count);
     add_answer_times(report, answer_timer_);
     if (!own_reason_.empty()) set_mode_reason(report, own_reason_);
     return report;

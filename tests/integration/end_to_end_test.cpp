@@ -607,9 +607,9 @@ bool has_virtual_display() {
 TEST_F(EndToEnd, TheWindowOpensDrawsAndLeaves) {
   if (!has_virtual_display())
     GTEST_SKIP() << "xvfb-run (package xvfb) is not installed: no display to open a window on";
-  const std::string nothing = "rendered_pictures=0\n";
+  const std::string nothing = "interpolation=none\n";
   const std::string report = window_report(server_->port(), "", "--playout smooth", nothing);
-  EXPECT_THAT(report, HasSubstr("rendered_pictures="));
+  EXPECT_THAT(report, HasSubstr("interpolation="));
   EXPECT_EQ(report.find(nothing), std::string::npos) << report;
 }
 

@@ -135,6 +135,31 @@ TEST(ViewHud, SaysWhatIsTriedInsteadOfBlack) {
   EXPECT_FALSE(writer.write(state, facts, kS).banner);
 }
 
+TEST(ViewHud, SaysWhatIsShownBetweenStates) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = true;
+  state.session_number = 1;
+  ViewFacts facts = facts_of("127.0.0.1");
+  facts.interpolation = Interpolation::Cubic;
+  const auto row = [](const std::string& value) {
+    return AllOf(Field(&HudRow::label, std::string("interpolation")), Field(&HudRow::value, value));
+  };
+  EXPECT_THAT(writer.write(state, facts, kS).rows, testing::Not(Contains(row("cubic"))))
+      << "the newest state is shown";
+  facts.playout = Playout::Smooth;
+  EXPECT_THAT(writer.write(state, facts, kS).rows, Contains(row("cubic")));
+  facts.interpolation = Interpolation::Linear;
+  EXPECT_THAT(writer.write(state, facts, kS).rows, Contains(row("linear")));
+  ViewReport report = {{"interpolation", "none", false}, {"linear_pictures", "0"}, {"cubic_pictures", "0"}};
+  set_interpolation(report, 0, 0);
+  EXPECT_THAT(to_lines(report), HasSubstr("interpolation=none\n"));
+  set_interpolation(report, 3, 2);
+  EXPECT_EQ(to_lines(report), "interpolation=linear\nlinear_pictures=3\ncubic_pictures=2\n");
+  set_interpolation(report, 3, 4);
+  EXPECT_THAT(to_lines(report), HasSubstr("interpolation=cubic\n"));
+}
+
 TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   HudWriter writer;
   ViewerState state;
