@@ -1,6 +1,6 @@
 // Interpolation: strands and head between states that are known: on the line between two, or on the cubic
-// through four where they are there and near enough in time. Exact at the states. Pure arithmetic; the same
-// bits on every machine.
+// through four where they are there and near enough in time. Exact at the states. Pure arithmetic; positions
+// have the same bits from every instruction set.
 //
 // Lagrange's cubic: between states h apart it errs by 3/128 h^4 |x''''| at most, the line by 1/8 h^2 |x''|.
 // Catmull-Rom's, which has no kink at the states, is as good in the middle and errs by h^3 elsewhere. On

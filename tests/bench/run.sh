@@ -21,7 +21,7 @@ out=$(realpath "$out")
 cd "$(dirname "$0")/../.."
 bash deploy/install_deps.sh
 cmake --preset release -DBUILD_TESTING=ON >/dev/null
-cmake --build --preset release --target sim_bench peers_bench codec_bench publish_bench frame_bench render_bench stage_bench strandcast-server strandcast-view strandcast-ctl \
+cmake --build --preset release --target sim_bench peers_bench codec_bench publish_bench replay_bench frame_bench render_bench stage_bench strandcast-server strandcast-view strandcast-ctl \
   >"$out/build.log" 2>&1 || { tail -30 "$out/build.log" >&2; exit 2; }
 bin=build/release/bin
 
@@ -33,6 +33,8 @@ echo "== publishing: $out/publish.csv"
 "$bin/publish_bench" | tee "$out/publish.csv"
 echo "== codecs: $out/codec.csv"
 "$bin/codec_bench" | tee "$out/codec.csv"
+echo "== between states: $out/replay.csv"
+"$bin/replay_bench" | tee "$out/replay.csv"
 
 echo "== pictures: $out/frame.csv"
 "$bin/frame_bench" | tee "$out/frame.csv"
