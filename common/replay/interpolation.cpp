@@ -37,15 +37,16 @@ glm::dvec3 position_between(const std::array<Pose, 4>& poses, const CubicTerms& 
 /// fourth derivative of its components points along them.
 glm::dquat rotation_between(const std::array<Pose, 4>& poses, const CubicTerms& terms) {
   std::array<glm::dquat, 4> turn;
+  const double scale[3] = {terms.before_scale, 1.0, terms.after_scale};
   double angle_rad[3];
   for (size_t i = 0; i < turn.size(); ++i) {
     turn[i] = poses[i].rotation;
     if (i == 0) continue;
     if (glm::dot(turn[i], turn[i - 1]) < 0.0) turn[i] = -turn[i];
-    angle_rad[i - 1] = angle_between_rad(turn[i - 1], turn[i]);
+    angle_rad[i - 1] = scale[i - 1] * angle_between_rad(turn[i - 1], turn[i]);
   }
   const bool is_far = *std::max_element(std::begin(angle_rad), std::end(angle_rad)) > kMostCubicTurnRad;
-  if (is_far || is_jump(angle_rad[0] * terms.before_scale, angle_rad[1], angle_rad[2] * terms.after_scale))
+  if (is_far || is_jump(angle_rad[0], angle_rad[1], angle_rad[2]))
     return glm::normalize(glm::slerp(poses[1].rotation, poses[2].rotation, terms.blend));
   return glm::normalize(on_cubic(turn[1], (turn[1] - turn[0]) * terms.before_scale, turn[2] - turn[1],
                                  (turn[3] - turn[2]) * terms.after_scale, terms));
@@ -70,9 +71,10 @@ Interpolation choose_interpolation(const std::deque<std::shared_ptr<const Snapsh
   if (later < 2 || later + 1 >= states.size()) return Interpolation::Linear;
   const auto step_ns = [&](size_t to) { return states[to]->sim_time_ns - states[to - 1]->sim_time_ns; };
   const int64_t inner_ns = step_ns(later);
-  for (const int64_t step : {step_ns(later - 1), inner_ns, step_ns(later + 1)}) {
-    if (step <= 0 || step > kLongestCubicStepNs) return Interpolation::Linear;
-    if (step > kMostUnevenSteps * inner_ns || inner_ns > kMostUnevenSteps * step)
+  if (inner_ns <= 0 || inner_ns > kLongestCubicStepNs) return Interpolation::Linear;
+  for (const int64_t outer_ns : {step_ns(later - 1), step_ns(later + 1)}) {
+    if (outer_ns <= 0 || outer_ns > kLongestCubicStepNs) return Interpolation::Linear;
+    if (outer_ns > kMostUnevenSteps * inner_ns || inner_ns > kMostUnevenSteps * outer_ns)
       return Interpolation::Linear;
   }
   return Interpolation::Cubic;

@@ -52,7 +52,8 @@ struct CubicTerms {
 };
 CubicTerms cubic_terms(const KnotTimes& sim_time_ns, int64_t time_ns);
 
-/// A head that turns further than this between two states, or jumps as kJumpSteps says, goes on the line.
+/// A head that turns faster than this in the time between the inner states, or jumps as kJumpSteps says, goes
+/// on the line; farther the components' cubic could lead past zero.
 inline constexpr double kMostCubicTurnRad = 1.0;
 Pose interpolate(const std::array<Pose, 4>& poses, const CubicTerms& terms);
 

@@ -69,7 +69,7 @@ void PlayoutClock::fit() {
   const double mean_ns = static_cast<double>(samples_.back().sim_time_ns - first.sim_time_ns) / (count - 1.0);
   const double sim_frame_ns = std::max(mean_ns, median(std::move(recent_ns)));
   const double frame_ns = std::min(sim_frame_ns * client_per_sim, static_cast<double>(kPlayoutGapNs));
-  frames_behind_ = frames_behind(sim_frame_ns, frame_ns, frames_behind_);
+  frames_behind_ = std::min(frames_behind(sim_frame_ns, frame_ns, frames_behind_), most_frames_behind_);
   delay_ns_ = static_cast<int64_t>(frames_behind_ * frame_ns) +
               std::min(static_cast<int64_t>(late_ns), kMaxPlayoutDelayNs);
 }

@@ -26,6 +26,8 @@ uint32_t frames_behind(double sim_frame_ns, double client_frame_ns, uint32_t now
 
 class PlayoutClock {
  public:
+  /// No more than so many frames behind, whatever frames_behind() says, from the next add() on.
+  void limit_frames_behind(uint32_t most) { most_frames_behind_ = most; }
   /// A frame of simulation time `sim_time_ns` was received at client time `receive_time_ns`.
   void add(int64_t receive_time_ns, int64_t sim_time_ns);
 
@@ -48,6 +50,7 @@ class PlayoutClock {
   double mean_receive_ns_ = 0.0;  // the fit passes through these, relative to the first sample
   double mean_sim_ns_ = 0.0;
   uint32_t frames_behind_ = 1;
+  uint32_t most_frames_behind_ = 2;
   int64_t delay_ns_ = 0;
 };
 

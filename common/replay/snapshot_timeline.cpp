@@ -7,9 +7,12 @@ namespace strandcast {
 
 namespace {
 
+uint64_t bytes_of(const Snapshot& snapshot) {
+  return snapshot.lattice.size() * sizeof(int32_t);
+}
 uint64_t bytes_of(const std::deque<std::shared_ptr<const Snapshot>>& snapshots) {
   uint64_t bytes = 0;
-  for (const auto& snapshot : snapshots) bytes += snapshot->lattice.size() * sizeof(int32_t);
+  for (const auto& snapshot : snapshots) bytes += bytes_of(*snapshot);
   return bytes;
 }
 
@@ -32,6 +35,8 @@ void SnapshotTimeline::add(std::shared_ptr<const Snapshot> snapshot, int64_t rec
     const int64_t behind_ns = snapshots_.back()->sim_time_ns - snapshot->sim_time_ns;
     if (behind_ns > 0 && behind_ns < kStreamOverlapNs) return;
   }
+  // Waiting for a fourth state is no use where there is no room for four.
+  clock_.limit_frames_behind(KnotTimes{}.size() * bytes_of(*snapshot) <= limit_bytes_ ? 2 : 1);
   clock_.add(receive_time_ns, snapshot->sim_time_ns);
   // A reset server starts at zero again: blending across it would sweep the hair through the head.
   const bool goes_back = !snapshots_.empty() && snapshot->sim_time_ns < snapshots_.back()->sim_time_ns;

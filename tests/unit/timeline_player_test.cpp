@@ -207,5 +207,48 @@ TEST(TimelinePlayer, AResetServerStartsOnTheLine) {
   EXPECT_EQ(play_on(kSettled, 2 * kSettled), Interpolation::Cubic) << "paused and resumed";
 }
 
+/// Of so many strands that all do the same.
+std::shared_ptr<const Snapshot> state_of(uint32_t strand_count, int64_t sim_time_ns) {
+  auto snapshot = std::make_shared<Snapshot>(*played_state(sim_time_ns));
+  const std::vector<int32_t> one = snapshot->lattice;
+  snapshot->strand_count = strand_count;
+  snapshot->lattice.clear();
+  for (const int32_t value : one) snapshot->lattice.insert(snapshot->lattice.end(), strand_count, value);
+  return snapshot;
+}
+
+TEST(TimelinePlayer, AChangeToFewerStrandsThatNothingFillsGoesOnTheLineOrJumps) {
+  SnapshotTimeline timeline;
+  timeline.set_playout(Playout::Smooth);
+  TimelinePlayer player;
+  const int64_t step_ns = 2 * kTickNs;
+  int cubic_after = 0;
+  for (int64_t i = 0; i < 2 * kSettled; ++i) {
+    timeline.add(state_of(i < kSettled ? 3 : 1, i * step_ns), i * step_ns, Continuity::SameStream);
+    const auto strands = player.strands_at(timeline, i * step_ns + step_ns / 2);
+    ASSERT_TRUE(strands);
+    const size_t shown = strands->position_m.size();
+    ASSERT_TRUE(shown == 3 || shown == 1) << i;
+    // Two frames behind, the way from one number to the other is shown two to three frames after it came.
+    EXPECT_EQ(shown, i < kSettled + 1 ? 3u : 1u) << i;
+    const bool is_cubic = player.interpolation() == Interpolation::Cubic;
+    EXPECT_TRUE(is_cubic || i <= 10 || (i >= kSettled && i < kSettled + 3)) << i;
+    if (i >= kSettled && i < kSettled + 3) cubic_after += is_cubic ? 1 : 0;
+    for (const glm::vec3& point : strands->position_m) EXPECT_EQ(point, strands->position_m[0]);
+  }
+  EXPECT_EQ(cubic_after, 0) << "states of different numbers are on no cubic";
+}
+
+TEST(TimelinePlayer, OfHugeStatesTheLineIsShown) {
+  SnapshotTimeline timeline(3 * 3 * sizeof(int32_t) - 1);  // of a state of 12 bytes two are kept
+  timeline.set_playout(Playout::Smooth);
+  TimelinePlayer player;
+  for (int64_t i = 0; i < kSettled; ++i) {
+    timeline.add(played_state(2 * i * kTickNs), 2 * i * kTickNs, Continuity::SameStream);
+    ASSERT_TRUE(player.strands_at(timeline, 2 * i * kTickNs + kMs));
+    EXPECT_TRUE(i < 10 || player.interpolation() == Interpolation::Linear) << i;
+  }
+}
+
 }  // namespace
 }  // namespace strandcast
