@@ -45,7 +45,7 @@ void clean(LookChange&) {}
 void clean(SceneText&) {}  // whoever takes it parses it
 void clean(Welcome& welcome) {
   for (std::string* text : {&welcome.server_version, &welcome.scene_name, &welcome.mode_reason,
-                            &welcome.codec, &welcome.sim_device})
+                            &welcome.codec, &welcome.codec_reason, &welcome.sim_device})
     *text = one_line(*text);
 }
 void clean(Notice& notice) {

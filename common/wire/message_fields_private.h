@@ -25,6 +25,7 @@ inline constexpr Range kRateDivisor{1, kMaxRateDivisor, "steps"};
 inline constexpr Range kStrandShare{1e-6, 1.0, ""};
 inline constexpr Range kReportedTime{0.0, kMaxReportedMs, "ms"};
 inline constexpr Range kReportedRate{0.0, kMaxReportedHz, "Hz"};
+inline constexpr Range kStepTime{0.0, kMaxStepNs, "ns"};
 inline constexpr Range kHeldBack{0.0, 1.0, ""};
 inline constexpr int kBehindNone = 1;  // number of the first enumerator where 0 stands for none on the wire
 
@@ -47,6 +48,8 @@ void visit(Visitor& v, Hello& m) {
   v.value("acknowledges", m.acknowledges);
   v.value("picture_codecs", m.picture_codecs);  // bits that this version does not know mean nothing
   v.value("gets_no_stream", m.gets_no_stream);
+  v.number("step_ns", m.step_ns, kStepTime);
+  v.exact_text("codec_wish", m.codec_wish, kMaxNameChars);
 }
 
 template <>
@@ -172,6 +175,7 @@ void visit(Visitor& v, Welcome& m) {
   v.choice("mode", m.mode, StreamMode::Frames);
   v.text("mode_reason", m.mode_reason, kMaxTextChars);
   v.exact_text("codec", m.codec, kMaxNameChars);
+  v.text("codec_reason", m.codec_reason, kMaxTextChars);
   v.number("strand_count", m.strand_count, scene_fields::kStrandCount);
   v.number("vertex_count", m.vertex_count, scene_fields::kVertexCount);
   v.number("bound_m", m.bound_m, scene_fields::kStreamBound);

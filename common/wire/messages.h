@@ -36,6 +36,7 @@ inline constexpr size_t kMaxListedNameChars = 32;
 inline constexpr size_t kMaxAddressChars = 64;
 inline constexpr double kMaxReportedMs = 60'000.0;  // ViewerReport
 inline constexpr double kMaxReportedHz = 1'000.0;
+inline constexpr double kMaxStepNs = 1e6;  // Hello
 
 enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
@@ -50,6 +51,10 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   bool acknowledges = false;                   // will send a FrameAck for every media message it can use
   PictureCodecs picture_codecs = 0;            // what it decodes besides whole JPEG pictures
   bool gets_no_stream = false;                 // neither strands nor frames: it came to say something
+  // What one vertex of one solver step takes on its machine, one thread, at most kMaxStepNs; 0 = it cannot
+  // predict: an older viewer, a browser, a build without kernels.
+  double step_ns = 0.0;
+  std::string codec_wish = {};  // strand codec that it insists on; empty = the server chooses
   bool operator==(const Hello&) const = default;
 };
 struct MotionSamples {  // from a Source
@@ -133,7 +138,8 @@ struct Welcome {
   std::string scene_name;
   StreamMode mode = StreamMode::Strands;  // what was chosen for `Auto`
   std::string mode_reason;
-  std::string codec;
+  std::string codec;              // of strands, as long as the connection lasts
+  std::string codec_reason = {};  // for a person: why this one
   uint32_t strand_count = 0;
   uint32_t vertex_count = 0;
   float bound_m = 0.0f;  // announced Euclidean error

@@ -18,7 +18,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
   motion.held_back = 0.75;
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
-  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true},
+  return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,
+                12.5, "delta"},
           motion,
           wind,
           camera,
@@ -41,6 +42,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   welcome.mode = StreamMode::Frames;
   welcome.mode_reason = "the viewer asked for frames";
   welcome.codec = "delta";
+  welcome.codec_reason = "delta was asked for";
   welcome.strand_count = 2000;
   welcome.vertex_count = 16;
   welcome.bound_m = 2e-5f;

@@ -43,6 +43,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxSceneTextBytes", with_commas(kMaxSceneTextBytes)},
       {"kMaxReportedMs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedMs)))},
       {"kMaxReportedHz", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedHz)))},
+      {"kMaxStepNs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxStepNs)))},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},

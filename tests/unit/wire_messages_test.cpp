@@ -196,6 +196,7 @@ TEST(WireMessages, WelcomeFieldsOutOfRangeAreNamed) {
       {"welcome.session_id", [](Welcome& w) { w.session_id.pop_back(); }},
       {"welcome.mode", [](Welcome& w) { w.mode = StreamMode::Auto; }},
       {"welcome.codec", [](Welcome& w) { w.codec = std::string(65, 'x'); }},
+      {"welcome.codec", [](Welcome& w) { w.codec = "del\nta"; }},
       {"welcome.strand_count", [](Welcome& w) { w.strand_count = 0; }},
       {"welcome.strand_count", [](Welcome& w) { w.strand_count = kMaxStrandCount + 1; }},
       {"welcome.vertex_count", [](Welcome& w) { w.vertex_count = 1; }},
@@ -313,6 +314,38 @@ TEST(WireMessages, ViewerReportNumbersMustBeFiniteAndInRange) {
       EXPECT_EQ(refused.error().place, name);
     }
   }
+}
+
+TEST(WireMessages, WhatAViewerSaysOfPredictingIsChecked) {
+  const auto say = [](double step_ns, const std::string& codec_wish) {
+    Hello hello;
+    hello.step_ns = step_ns;
+    hello.codec_wish = codec_wish;
+    return decode_client_message(encode(ClientMessage(hello)));
+  };
+  for (const double good : {0.0, 1e-3, 25.0, kMaxStepNs})
+    EXPECT_EQ(std::get<Hello>(say(good, "").value()).step_ns, good);
+  for (const double bad : {std::nan(""), double{INFINITY}, -double{INFINITY}, -1e-3, 1.001 * kMaxStepNs}) {
+    const auto refused = say(bad, "");
+    ASSERT_FALSE(refused) << bad;
+    EXPECT_EQ(refused.error().place, "hello.step_ns");
+  }
+  const std::string longest(kMaxNameChars, 'x');
+  EXPECT_EQ(std::get<Hello>(say(0.0, longest).value()).codec_wish, longest);
+  for (const std::string& bad : {longest + "x", std::string("tan\ngent"), std::string("\x7f")}) {
+    const auto refused = say(0.0, bad);
+    ASSERT_FALSE(refused) << bad;
+    EXPECT_EQ(refused.error().place, "hello.codec_wish");
+  }
+}
+
+// A client of before says nothing of it: it cannot predict, and insists on nothing.
+TEST(WireMessages, AHelloOfBeforeCannotPredict) {
+  const std::vector<std::byte> empty_hello = {std::byte{1}, std::byte{0x0a}, std::byte{0}};
+  const auto hello = decode_client_message(empty_hello);
+  ASSERT_TRUE(hello) << hello.error().to_string();
+  EXPECT_EQ(std::get<Hello>(*hello).step_ns, 0.0);
+  EXPECT_EQ(std::get<Hello>(*hello).codec_wish, "");
 }
 
 // Wider on the wire than in the struct: a number that does not fit is refused, not cut.

@@ -189,6 +189,20 @@ TEST(ControlBytes, UnknownEnumValuesAreNamed) {
       control_of({0x0a, 0x0b, 0x08, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x01})));
 }
 
+// The eight bytes of hello (field 1) { step_ns (field 10) }, the highest last.
+TEST(ControlBytes, NumbersOfPredictingThatAreNoneAreNamed) {
+  const auto hello_with = [](int high, int next) {
+    return control_of({0x0a, 0x09, 0x51, 0, 0, 0, 0, 0, 0, next, high});
+  };
+  EXPECT_EQ(std::get<Hello>(decode_client_message(hello_with(0x40, 0x29)).value()).step_ns, 12.5);
+  EXPECT_EQ(decode_client_message(hello_with(0x7f, 0xf8)).error().place, "hello.step_ns") << "no number";
+  EXPECT_EQ(decode_client_message(hello_with(0x7f, 0xf0)).error().place, "hello.step_ns") << "infinite";
+  EXPECT_EQ(decode_client_message(hello_with(0xc0, 0x29)).error().place, "hello.step_ns") << "negative";
+  // hello { codec_wish (field 11) = "a\nb" }
+  EXPECT_EQ(decode_client_message(control_of({0x0a, 0x05, 0x5a, 0x03, 'a', '\n', 'b'})).error().place,
+            "hello.codec_wish");
+}
+
 TEST(ControlBytes, DeepNestingIsRefused) {
   // Groups of an unknown field, opened only, or opened and closed again.
   for (const size_t depth : {size_t{8}, size_t{17}, size_t{10'000}}) {
