@@ -159,6 +159,11 @@ const std::vector<StrandCodecInfo>& strand_codecs() {
   return infos;
 }
 
+Result<StrandCodecInfo> strand_codec_info(const std::string& codec) {
+  ASSIGN_OR_RETURN(const Row* row, find_row(codec));
+  return row->info;
+}
+
 Result<float> lattice_step_m(const std::string& codec, float bound_m) {
   ASSIGN_OR_RETURN(const Row* row, find_row(codec));
   return row->lattice_step_m(bound_m);

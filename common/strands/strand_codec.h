@@ -63,9 +63,16 @@ struct StrandStreamLimits {
 struct StrandCodecInfo {
   std::string name;     // "delta", "raw", "tangent"
   std::string summary;  // one line
+  /// The decoder runs the simulation's own steps: only for viewers that can afford it, in builds with
+  /// kernels.
+  bool predicts = false;
+  std::string fallback = {};  // codec for viewers that cannot decode this one; empty = none is needed
+  double bytes_share = 1.0;   // of the fallback's bytes that it takes, as an estimate for people
 };
 
 const std::vector<StrandCodecInfo>& strand_codecs();
+/// NotFound names the known codecs.
+Result<StrandCodecInfo> strand_codec_info(const std::string& codec);
 /// Lattice step of the snapshots that a codec wants to stay within `bound_m` of the published positions: its
 /// own lattice for "delta" and "raw", which change nothing, a much finer one for "tangent", which rounds
 /// itself. `bound_m` is at least kMinBoundM. NotFound names the known codecs.

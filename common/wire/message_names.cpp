@@ -2,6 +2,10 @@
 
 namespace strandcast {
 
+std::string codec_text(const Welcome& welcome) {
+  return welcome.codec_reason.empty() ? welcome.codec : welcome.codec_reason;
+}
+
 const char* to_string(StreamMode mode) {
   switch (mode) {
     case StreamMode::Strands:

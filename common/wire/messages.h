@@ -246,6 +246,8 @@ std::vector<std::byte> encode(const ServerMessage& message);
 Result<ClientMessage> decode_client_message(std::span<const std::byte> bytes);
 Result<ServerMessage> decode_server_message(std::span<const std::byte> bytes);
 
+/// By what a viewer gets strands and why, for a person; older servers do not say why.
+std::string codec_text(const Welcome& welcome);
 const char* to_string(StreamMode mode);
 const char* to_string(Role role);
 const char* to_string(DrawingDevice device);

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "common/base/profile.h"
 #include "common/base/thread_name.h"
@@ -18,6 +19,7 @@
 #include "server/app/server_passes.h"
 #include "server/app/session_desk.h"
 #include "server/app/slow_motion.h"
+#include "server/app/viewer_codec.h"
 #include "server/encode/picture_passes.h"
 
 namespace strandcast {
@@ -61,6 +63,8 @@ class Server::State {
 
  private:
   Status choose_stream(const SceneAsset& asset);
+  Status choose_codecs();
+  void count_strands(ServerCounters& counters) const;
   Status connect(EncodedFramePtr asset_frame);
   void run_status();
   void watch_speed(const ServerCounters& now);
@@ -70,6 +74,7 @@ class Server::State {
   ServerConfig config_;
   bool is_drawn_by_processors_ = true;  // pictures, whatever simulates
   InputHub inputs_;
+  std::vector<StrandCodecInfo> codecs_;  // that strands are served by, the scene's first
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
   std::unique_ptr<StateSource> source_;
@@ -99,10 +104,12 @@ Status Server::State::start() {
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   RETURN_IF_ERROR(choose_stream(*asset));
+  RETURN_IF_ERROR(choose_codecs());
   ASSIGN_OR_RETURN(EncodedFramePtr asset_frame, encode_asset(*asset));
   const PainterConfig painter{
       {config_.renderer, config_.gl_device, config_.shader_folder}, asset, scene.look};
   ASSIGN_OR_RETURN(hub_, StreamHub::make({scene.stream,
+                                          codecs_.size() > 1 ? codecs_.back().name : std::string(),
                                           scene.step_rate_hz,
                                           make_scene_view(scene, scene_picture_size(scene), 0),
                                           asset,
@@ -136,12 +143,25 @@ Status Server::State::choose_stream(const SceneAsset& asset) {
   return {};
 }
 
+/// What strands are served by.
+Status Server::State::choose_codecs() {
+  const StreamDesc& stream = config_.scene.stream;
+  ASSIGN_OR_RETURN(StrandCodecInfo codec, strand_codec_info(stream.codec));
+  if (config_.fallback_codec) codec.fallback = *config_.fallback_codec;
+  ASSIGN_OR_RETURN(codecs_, served_codecs(codec, stream.bound_m));
+  if (codecs_.size() > 1)
+    log_info("app", "strands by {}, and by {} for viewers that cannot decode that", codecs_[0].name,
+             codecs_[1].name);
+  return {};
+}
+
 Status Server::State::connect(EncodedFramePtr asset_frame) {
-  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_,
+  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, codecs_,
                                                            std::move(asset_frame), is_drawn_by_processors_});
   desk_->set_metrics([this] { return metrics(); });
   NetConfig net = config_.net;
   net.strand_classes = hub_->strand_classes();
+  net.strand_codecs = codecs_.size();
   ASSIGN_OR_RETURN(net_, NetServer::listen(net, *desk_));
   desk_->connect(*net_);
   return {};
@@ -221,10 +241,29 @@ ServerCounters Server::State::counters() const {
   counters.viewers = desk_->viewer_count();
   counters.input = inputs_.counters();
   counters.sim = source_->stats();
-  counters.strand_classes = hub_->encode_counters();
-  if (!counters.strand_classes.empty()) counters.encode = counters.strand_classes[0];
+  count_strands(counters);
   counters.frames = hub_->frame_counters();
   return counters;
+}
+
+void Server::State::count_strands(ServerCounters& counters) const {
+  for (const StrandCodecInfo& codec : codecs_) counters.strand_viewers_of[codec.name] = 0;
+  counters.strand_streams = hub_->encode_counters();
+  for (const auto& [stream_id, of_stream] : counters.strand_streams) {
+    const StrandStream stream = strand_stream_of(stream_id);
+    const uint32_t readers = hub_->strand_readers(stream_id);
+    counters.strand_viewers_of[codecs_[stream.codec].name] += readers;
+    counters.strand_classes_in_use += readers > 0 ? 1 : 0;
+    if (stream.strand_class > 0) continue;
+    StrandEncodeCounters& first = counters.encode;
+    first.encodes += of_stream.encodes;
+    first.keyframes += of_stream.keyframes;
+    first.too_large += of_stream.too_large;
+    first.delta_bytes += of_stream.delta_bytes;
+    first.keyframe_bytes += of_stream.keyframe_bytes;
+    first.encode_median_ms = std::max(first.encode_median_ms, of_stream.encode_median_ms);
+    first.keyframe_median_ms = std::max(first.keyframe_median_ms, of_stream.keyframe_median_ms);
+  }
 }
 
 gl::PassReports Server::State::passes() const {
@@ -247,10 +286,7 @@ gl::PassReports Server::State::idle_picture_passes() const {
 }
 
 std::string Server::State::metrics() const {
-  ServerCounters now = counters();
-  for (uint16_t stream_id = 0; stream_id < hub_->strand_classes().size(); ++stream_id)
-    now.strand_classes_in_use += hub_->strand_readers(stream_id) > 0 ? 1 : 0;
-  return format_server_metrics(now, version()) + format_passes(passes(), gl::object_counts());
+  return format_server_metrics(counters(), version()) + format_passes(passes(), gl::object_counts());
 }
 
 Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}

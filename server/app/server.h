@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
@@ -40,13 +40,16 @@ struct ServerConfig {
   /// What feeds the stream; its states have the scene's codec, bound and rate.
   std::function<Result<std::unique_ptr<StateSource>>(const ServerConfig&, InputHub&)> make_source =
       simulation_source;
+  /// For viewers that cannot decode the scene's codec, instead of what that names itself.
+  std::optional<std::string> fallback_codec;
 };
 
 struct ServerCounters {
   SimStats sim;
   NetCounters net;
-  StrandEncodeCounters encode;                       // of the first class
-  std::vector<StrandEncodeCounters> strand_classes;  // all that were ever needed, by stream_id
+  StrandEncodeCounters encode;  // of the first class by all codecs, medians of the slowest
+  std::map<uint16_t, StrandEncodeCounters> strand_streams;  // all that were ever needed, by stream_id
+  std::map<std::string, uint32_t> strand_viewers_of;        // by codec
   FrameCounters frames;
   InputCounters input;
   uint32_t strand_viewers = 0;  // readers of strands; one whose mode changes counts in frame_viewers too

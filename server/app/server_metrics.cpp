@@ -41,10 +41,10 @@ constexpr Row kRows[] = {
     {"encode_all_classes_frames_total", "Strand frames encoded for all classes.",
      [](const ServerCounters& all) {
        uint64_t sum = 0;
-       for (const StrandEncodeCounters& one : all.strand_classes) sum += one.encodes;
+       for (const auto& [stream_id, one] : all.strand_streams) sum += one.encodes;
        return static_cast<double>(sum);
      }},
-    {"strand_classes_in_use", "Strand classes that somebody watches.",
+    {"strand_classes_in_use", "Strand classes that somebody watches, by each codec.",
      [](const ServerCounters& all) { return static_cast<double>(all.strand_classes_in_use); }},
     {"encode_keyframes_total", "Keyframes of the first class.",
      [](const ServerCounters& all) { return static_cast<double>(all.encode.keyframes); }},
@@ -83,6 +83,14 @@ constexpr Row kRows[] = {
     {"log_dropped_lines_total", "Lines of the log that nobody read in time.",
      [](const ServerCounters&) { return static_cast<double>(dropped_log_lines()); }}};
 
+std::string format_codecs(const std::map<std::string, uint32_t>& viewers_of) {
+  constexpr const char* kName = "strandcast_viewers_strands_of_codec";
+  std::string text = fmt::format("# HELP {0} Viewers that get strands, by codec.\n# TYPE {0} gauge\n", kName);
+  for (const auto& [codec, viewers] : viewers_of)
+    text += fmt::format("{}{{codec=\"{}\"}} {}\n", kName, codec, viewers);
+  return viewers_of.empty() ? std::string() : text;
+}
+
 }  // namespace
 
 std::string format_server_metrics(const ServerCounters& counters, const char* version) {
@@ -93,6 +101,7 @@ std::string format_server_metrics(const ServerCounters& counters, const char* ve
   for (const Row& row : kRows)
     text += format_metric(row.name, row.name.ends_with("_total") ? "counter" : "gauge", row.help,
                           row.value(counters));
+  text += format_codecs(counters.strand_viewers_of);
   return text + format_histogram("sim_step_ms", "Time of the solver for one step.", counters.sim.step_times);
 }
 

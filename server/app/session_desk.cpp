@@ -45,6 +45,8 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     if (const std::optional<Error> error = parts_.hub.picture_failure())
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
+  const ViewerCodec codec = choose_codec(hello);
+  visitor.subscription.strands.codec = codec.codec;
   const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
   viewers_.set_scene_camera(parts_.hub.look().camera);
   const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, visitor.subscription, hello);
@@ -53,14 +55,25 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     return place.error();
   }
   Admission admission;
-  admission.welcome = make_welcome(*place);
+  admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = parts_.asset;
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;
 }
 
-Welcome SessionDesk::make_welcome(const Viewers::Place& place) const {
+/// Nothing is known of its link yet.
+ViewerCodec SessionDesk::choose_codec(const Hello& hello) const {
+  ViewerCodecFacts facts;
+  facts.wish = hello.codec_wish;
+  facts.step_ns = hello.step_ns;
+  facts.vertices = parts_.source.asset()->rest_position_m.size();
+  facts.states_hz = parts_.scene.step_rate_hz;
+  facts.substeps = std::max<uint32_t>(parts_.source.stats().substeps, 1);
+  return choose_viewer_codec(parts_.codecs, facts);
+}
+
+Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {
   const SceneDesc& scene = parts_.scene;
   const std::shared_ptr<const SceneAsset> asset = parts_.source.asset();
   Welcome welcome;
@@ -68,7 +81,8 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place) const {
   welcome.server_version = version();
   welcome.scene_name = scene.name;
   welcome.mode_reason = place.reason;
-  welcome.codec = scene.stream.codec;
+  welcome.codec = parts_.codecs[codec.codec].name;
+  welcome.codec_reason = codec.reason;
   welcome.strand_count = asset->strand_count;
   welcome.vertex_count = asset->vertex_count;
   welcome.bound_m = parts_.hub.stream().bound_m;

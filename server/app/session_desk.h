@@ -7,9 +7,11 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/app/control_budget.h"
 #include "server/app/network_reader.h"
+#include "server/app/viewer_codec.h"
 #include "server/app/viewers.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
@@ -26,6 +28,7 @@ class SessionDesk : public NetHandler {
     StreamHub& hub;
     StateSource& source;
     InputHub& inputs;
+    std::vector<StrandCodecInfo> codecs;  // that strands are served by, as served_codecs()
     EncodedFramePtr asset;
     bool is_drawn_by_processors = true;  // pictures
   };
@@ -67,7 +70,8 @@ class SessionDesk : public NetHandler {
   std::string metrics() override { return metrics_ ? metrics_() : std::string(); }
 
  private:
-  Welcome make_welcome(const Viewers::Place& place) const;
+  ViewerCodec choose_codec(const Hello& hello) const;
+  Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
   StateSource::Reply reply_to(SessionId session);
   void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);

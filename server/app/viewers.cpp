@@ -47,7 +47,7 @@ PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, Pict
 /// What the viewer gets, and during a change what it is about to get as well.
 Demand Viewers::demand_of(const Subscription& wanted, const PictureView& view) {
   Demand demand;
-  if (wanted.gets(StreamMode::Strands)) demand.strand_class = wanted.strand_class;
+  if (wanted.gets(StreamMode::Strands)) demand.strand_stream = stream_id_of(wanted.strands);
   if (wanted.gets(StreamMode::Frames)) demand.picture = view;
   return demand;
 }
@@ -189,7 +189,7 @@ ModeChange Viewers::begin_change(Viewer& viewer, const ModeChoice& choice, int64
   if (choice.mode == viewer.subscription->mode()) return stay(viewer, choice.reason);
   Subscription wanted = *viewer.subscription;
   wanted.begin_change(choice.mode, time_ns);
-  if (choice.mode == StreamMode::Strands) wanted.strand_class = static_cast<uint16_t>(choice.strand_class);
+  if (choice.mode == StreamMode::Strands) wanted.strands.strand_class = choice.strand_class;
   if (const Status usable = change(viewer, wanted, viewer.view); !usable) {
     viewer.policy.note_failure(time_ns);
     if (viewer.wanted == StreamMode::Frames) viewer.wanted = viewer.subscription->mode();

@@ -45,7 +45,7 @@ const Waiting& least_worthy(const std::vector<Waiting>& waiting) {
 Context::Context(const NetConfig& net_config, NetHandler& net_handler)
     : config(net_config),
       handler(net_handler),
-      strands(net_config.strand_classes),
+      strands(net_config.strand_classes, net_config.strand_codecs),
       guard({net_config.limits.connections_per_s, net_config.limits.wrong_tokens,
              net_config.limits.wrong_token_window_ms * kNsPerMs,
              net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}),

@@ -1,6 +1,7 @@
 // How the network side of a server is set up: where it listens, who may come in, and its limits. Plain data.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -67,7 +68,8 @@ struct NetConfig {
   std::vector<AddressRange> trusted_proxies;
   ProxyProtocol proxy_protocol = ProxyProtocol::None;
   NetLimits limits;
-  std::vector<StrandClass> strand_classes = {StrandClass{}};  // at first; best first, index = stream_id
+  std::vector<StrandClass> strand_classes = {StrandClass{}};  // at first; best first
+  size_t strand_codecs = 1;                                   // that each of them is served by
 };
 
 }  // namespace strandcast

@@ -35,7 +35,7 @@ struct LinkState {
   double capacity_bytes_per_s = 0.0;
   double queue_delay_ms = 0.0;
   double round_trip_ms = 0.0;
-  std::vector<double> strand_bytes_per_s;  // what each strand class takes; empty = unknown
+  std::vector<double> strand_bytes_per_s;  // what each strand class takes by its codec; empty = unknown
 };
 
 /// What a viewer is told about its mode. When its subscription is changing, right before the first frame of
@@ -67,8 +67,8 @@ class NetHandler {
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   /// An admin wants the server to end.
   virtual void on_shut_down(SessionId) {}
-  /// The session waits for a keyframe of this strand class given to publish_strands(). Repeated until one
-  /// comes.
+  /// The session waits for a keyframe of this stream of strands given to publish_strands(). Repeated until
+  /// one comes.
   virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
   /// The session waits for a whole picture of its class: publish_picture() with the newest one, changed or
   /// not. Repeated until one comes.

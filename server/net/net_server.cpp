@@ -247,7 +247,8 @@ void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string
   CHECK(!classes.empty());
   net::asio::post(state_->context.io, [state = state_.get(), classes = std::move(classes),
                                        reason = std::move(reason), then = std::move(then)] {
-    state->context.strands = StrandCosts(classes);  // what was measured of the old ones is forgotten
+    // What was measured of the old ones is forgotten.
+    state->context.strands = StrandCosts(classes, state->context.config.strand_codecs);
     state->for_all([&](net::Session& session) { session.follow_strand_classes(reason); });
     then();
   });

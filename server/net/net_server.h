@@ -63,8 +63,8 @@ class NetServer {
   /// Reads the certificate and the key again; new connections get them. On an error the old ones stay.
   Status reload_tls();
 
-  /// Strand frames of one class (stream_id) in the order of their chain. A delta goes to sessions of the
-  /// class whose last frame it builds on, a keyframe to those that wait for one.
+  /// Strand frames of one stream (a class by a codec) in the order of their chain. A delta goes to sessions
+  /// of the stream whose last frame it builds on, a keyframe to those that wait for one.
   void publish_strands(EncodedFramePtr frame);
   /// The newest picture for the viewers of one class; replaces one not yet being sent. Each viewer gets what
   /// takes it there from the last one it was sent.

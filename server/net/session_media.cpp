@@ -36,7 +36,7 @@ void Session::start_again(int64_t time_ns) {
 }
 
 void Session::deliver_strands(const EncodedFramePtr& frame) {
-  if (state_ != State::Joined || frame->header.stream_id != subscription_.strand_class) return;
+  if (state_ != State::Joined || frame->header.stream_id != stream_id_of(subscription_.strands)) return;
   guarded([&] {
     const int64_t time_ns = now_ns();
     const SendQueue::Offer offer = queue_.offer_strands(frame);
@@ -90,7 +90,7 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   if (needs_picture)
     context_.handler.on_picture_request(id_, subscription_.pictures.picture_class);
   else
-    context_.handler.on_keyframe_request(id_, subscription_.strand_class);
+    context_.handler.on_keyframe_request(id_, stream_id_of(subscription_.strands));
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
@@ -133,21 +133,21 @@ void Session::adapt_pictures(int64_t time_ns) {
 void Session::adapt(int64_t time_ns) {
   if (subscription_.mode() == StreamMode::Frames) return adapt_pictures(time_ns);
   if (state_ != State::Joined || subscription_.mode() != StreamMode::Strands || !flow_.expects_acks()) return;
-  const std::vector<double> costs = context_.strands.bytes_per_s();
+  const std::vector<double> costs = context_.strands.bytes_per_s(subscription_.strands.codec);
   if (costs.empty()) return;
   const double cap = context_.config.limits.viewer_bytes_per_s;
-  const size_t chosen = flow_.choose_class(subscription_.strand_class, costs, cap, time_ns);
-  if (chosen == subscription_.strand_class) return;
-  const bool is_better = chosen < subscription_.strand_class;
+  const size_t present = subscription_.strands.strand_class;
+  const size_t chosen = flow_.choose_class(present, costs, cap, time_ns);
+  if (chosen == present) return;
   change_strand_class(chosen);
-  announce_quality(
-      fmt::format("{}: {}; {}", is_better ? "the link has room" : "the link or this viewer is too slow",
-                  to_string(context_.strands.classes()[subscription_.strand_class]), describe_link(time_ns)));
+  announce_quality(fmt::format("{}: {}; {}",
+                               chosen < present ? "the link has room" : "the link or this viewer is too slow",
+                               to_string(context_.strands.classes()[chosen]), describe_link(time_ns)));
   ask_for_keyframe(time_ns);
 }
 
 void Session::change_strand_class(size_t chosen) {
-  subscription_.strand_class = static_cast<uint16_t>(chosen);
+  subscription_.strands.strand_class = chosen;
   context_.count(&NetCounters::class_changes);
   queue_.restart_strands();
   context_.handler.on_strand_class(id_);
@@ -155,9 +155,9 @@ void Session::change_strand_class(size_t chosen) {
 
 void Session::announce_quality(const std::string& reason) {
   context_.note(fmt::format("session {}: {}", id_, reason));
-  const StrandClass& now = context_.strands.classes()[subscription_.strand_class];
-  queue_control(
-      StreamQuality{subscription_.strand_class, now.rate_divisor, now.strand_share, now.bound_m, reason});
+  const StrandClass& now = context_.strands.classes()[subscription_.strands.strand_class];
+  queue_control(StreamQuality{stream_id_of(subscription_.strands), now.rate_divisor, now.strand_share,
+                              now.bound_m, reason});
 }
 
 void Session::follow_strand_classes(const std::string& reason) {
@@ -166,9 +166,9 @@ void Session::follow_strand_classes(const std::string& reason) {
   if (state_ != State::Joined || !is_concerned || subscription_.is_empty()) return;
   guarded([&] {
     const size_t last = context_.strands.classes().size() - 1;
-    if (subscription_.strand_class > last) change_strand_class(last);
-    announce_quality(
-        fmt::format("{}: {}", reason, to_string(context_.strands.classes()[subscription_.strand_class])));
+    if (subscription_.strands.strand_class > last) change_strand_class(last);
+    announce_quality(fmt::format("{}: {}", reason,
+                                 to_string(context_.strands.classes()[subscription_.strands.strand_class])));
     ask_for_keyframe(now_ns());
   });
 }
@@ -183,7 +183,7 @@ void Session::report_link(int64_t time_ns) {
   link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   context_.queue_delays.add_ms(link.queue_delay_ms);
   link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
-  link.strand_bytes_per_s = context_.strands.bytes_per_s();
+  link.strand_bytes_per_s = context_.strands.bytes_per_s(subscription_.strands.codec);
   const LinkAnswer answer = context_.handler.on_link(id_, link, time_ns);
   is_mode_request_waiting_ = answer.is_request_waiting;
   if (answer.mode) answer_mode(*answer.mode);

@@ -88,9 +88,11 @@ void Session::join(const Hello& hello) {
   state_ = State::Joined;
   state_since_ns_ = now_ns();
   context_.update_session_counts();
-  context_.note(fmt::format("session {} from {} joined: {} '{}', {}", id_, peer_.address,
+  const bool gets_strands = subscription_.gets(StreamMode::Strands);
+  context_.note(fmt::format("session {} from {} joined: {} '{}', {}{}", id_, peer_.address,
                             to_string(hello.role), hello.name,
-                            subscription_.is_empty() ? "no stream" : to_string(subscription_.mode())));
+                            subscription_.is_empty() ? "no stream" : to_string(subscription_.mode()),
+                            gets_strands ? " by " + codec_text(admission->welcome) : std::string()));
   // Everything is set before anything is written, and strands start only behind the asset.
   if (!subscription_.is_empty()) begin_media(hello, admission->asset);
   queue_control(std::move(admission->welcome));

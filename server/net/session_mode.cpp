@@ -59,7 +59,7 @@ void Session::finish_mode_switch() {
   context_.handler.on_mode(id_);
   queue_control(change);
   if (subscription_.mode() == StreamMode::Frames || state_ != State::Joined) return;
-  announce_quality(to_string(context_.strands.classes()[subscription_.strand_class]));
+  announce_quality(to_string(context_.strands.classes()[subscription_.strands.strand_class]));
 }
 
 }  // namespace strandcast::net

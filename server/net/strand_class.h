@@ -3,9 +3,12 @@
 // any thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "common/strands/frame_header.h"
 
 namespace strandcast {
 
@@ -33,9 +36,27 @@ struct StrandStreamPlan {
   uint32_t strand_count = 1;
 };
 
-/// The classes of a stream, best first; the index is the stream_id. First there are fewer strands, then the
-/// rate is lowered, then the bound is coarser.
+/// The classes that strands are coded in, best first. First there are fewer strands, then the rate is
+/// lowered, then the bound is coarser.
 std::vector<StrandClass> make_strand_classes(const StrandStreamPlan& plan);
+
+/// Strands are served by the scene's codec, and maybe by a second one for viewers that cannot decode it. Each
+/// has all classes, in streams of its own: those of the second begin here.
+inline constexpr uint16_t kStreamsPerCodec = 256;
+inline constexpr size_t kMaxServedCodecs = 2;
+static_assert(kMaxServedCodecs * kStreamsPerCodec <= kPictureStreamBit);
+
+/// One class by one of the codecs that are served.
+struct StrandStream {
+  size_t codec = 0;         // 0 = the scene's
+  size_t strand_class = 0;  // below kStreamsPerCodec
+};
+constexpr uint16_t stream_id_of(const StrandStream& stream) {
+  return static_cast<uint16_t>(stream.codec * kStreamsPerCodec + stream.strand_class);
+}
+constexpr StrandStream strand_stream_of(uint16_t stream_id) {
+  return {stream_id / size_t{kStreamsPerCodec}, stream_id % size_t{kStreamsPerCodec}};
+}
 
 /// For a person: "1/4 of the strands, 30 Hz, 0.1 mm".
 std::string to_string(const StrandClass& row);

@@ -19,28 +19,31 @@ constexpr double kShortestPictureIntervalS = 1e-3;
 
 }  // namespace
 
-StrandCosts::StrandCosts(std::vector<StrandClass> classes)
-    : classes_(std::move(classes)), loads_(classes_.size()) {}
+StrandCosts::StrandCosts(std::vector<StrandClass> classes, size_t codec_count)
+    : classes_(std::move(classes)), loads_(codec_count, std::vector<Load>(classes_.size())) {}
 
 void StrandCosts::note_frame(const FrameHeader& header, size_t bytes, int64_t time_ns) {
-  if (header.opcode != Opcode::StrandDelta || header.stream_id >= loads_.size()) return;
-  Load& load = loads_[header.stream_id];
+  const StrandStream stream = strand_stream_of(header.stream_id);
+  const bool is_known = stream.codec < loads_.size() && stream.strand_class < classes_.size();
+  if (header.opcode != Opcode::StrandDelta || !is_known) return;
+  Load& load = loads_[stream.codec][stream.strand_class];
   const auto measured = static_cast<double>(bytes);
   const double weight = load.time_ns == 0 ? 1.0 : kStrandSmoothing;
   load.delta_bytes += weight * (measured - load.delta_bytes);
   load.time_ns = time_ns;
 }
 
-std::vector<double> StrandCosts::bytes_per_s() const {
-  const auto newest = std::max_element(loads_.begin(), loads_.end(),
+std::vector<double> StrandCosts::bytes_per_s(size_t codec) const {
+  const std::vector<Load>& loads = loads_[codec];
+  const auto newest = std::max_element(loads.begin(), loads.end(),
                                        [](const Load& a, const Load& b) { return a.time_ns < b.time_ns; });
-  if (newest == loads_.end() || newest->time_ns == 0) return {};
-  const StrandClass& reference = classes_[static_cast<size_t>(newest - loads_.begin())];
+  if (newest == loads.end() || newest->time_ns == 0) return {};
+  const StrandClass& reference = classes_[static_cast<size_t>(newest - loads.begin())];
   const double full = newest->delta_bytes * reference.frame_rate_hz / reference.relative_cost;
   std::vector<double> costs;
   for (size_t i = 0; i < classes_.size(); ++i) {
-    const bool is_fresh = loads_[i].time_ns > newest->time_ns - kStrandAgeNs && loads_[i].time_ns != 0;
-    costs.push_back(is_fresh ? loads_[i].delta_bytes * classes_[i].frame_rate_hz
+    const bool is_fresh = loads[i].time_ns > newest->time_ns - kStrandAgeNs && loads[i].time_ns != 0;
+    costs.push_back(is_fresh ? loads[i].delta_bytes * classes_[i].frame_rate_hz
                              : full * classes_[i].relative_cost);
   }
   return costs;

@@ -1,5 +1,5 @@
-// What each strand class and each picture class takes of a link, learned from the frames as they come. Plain
-// logic on given times; network thread.
+// What each strand class by each codec and each picture class takes of a link, learned from the frames as
+// they come. Plain logic on given times; network thread.
 #pragma once
 
 #include <cstddef>
@@ -16,14 +16,14 @@ using PictureClass = uint32_t;  // viewers of one class get the same rendered fr
 
 class StrandCosts {
  public:
-  explicit StrandCosts(std::vector<StrandClass> classes);
+  explicit StrandCosts(std::vector<StrandClass> classes, size_t codec_count = 1);
 
-  /// Best first; index = stream_id.
+  /// Best first.
   const std::vector<StrandClass>& classes() const { return classes_; }
   /// Keyframes and frames of no class are left out.
   void note_frame(const FrameHeader& header, size_t bytes, int64_t time_ns);
-  /// Of every class, as measured, or estimated from the one measured last; empty at first.
-  std::vector<double> bytes_per_s() const;
+  /// Of every class by this codec, as measured, or estimated from the one measured last; empty at first.
+  std::vector<double> bytes_per_s(size_t codec) const;
 
  private:
   struct Load {
@@ -31,7 +31,7 @@ class StrandCosts {
     int64_t time_ns = 0;       // of the newest delta; 0 = none yet
   };
   std::vector<StrandClass> classes_;
-  std::vector<Load> loads_;  // one per class
+  std::vector<std::vector<Load>> loads_;  // by codec and class
 };
 
 class PictureCosts {

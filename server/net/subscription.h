@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/wire/messages.h"
+#include "server/net/strand_class.h"
 #include "server/net/stream_costs.h"
 
 namespace strandcast {
@@ -22,7 +23,7 @@ struct PictureChoice {
 
 class Subscription {
  public:
-  uint16_t strand_class = 0;
+  StrandStream strands;  // its codec is chosen once, when the viewer joins
   PictureChoice pictures;
 
   /// Whether it gets anything: a source does not, nor who came to say something.

@@ -16,10 +16,11 @@ using ReaderId = uint64_t;  // never reused by one hub; 0 = nobody
 
 /// Nothing by default.
 struct Demand {
-  std::optional<uint16_t> strand_class;  // strand frames of this class
-  std::optional<PictureView> picture;    // frames rendered so
-  bool has_states = false;               // every published state, with its hash if it wants (state_hash)
-  bool has_inputs = false;               // motion and wind as they come in
+  std::optional<uint16_t>
+      strand_stream;                   // strand frames of this stream_id: a class by a codec (stream_id_of)
+  std::optional<PictureView> picture;  // frames rendered so
+  bool has_states = false;             // every published state, with its hash if it wants (state_hash)
+  bool has_inputs = false;             // motion and wind as they come in
 };
 
 /// Where readers say what they want.

@@ -36,23 +36,23 @@ Demand DemandBook::demand_of(ReaderId reader) const {
 
 uint32_t DemandBook::strand_readers(uint16_t stream_id) const {
   return static_cast<uint32_t>(std::count_if(readers_.begin(), readers_.end(), [&](const auto& entry) {
-    return entry.second.demand.strand_class == stream_id;
+    return entry.second.demand.strand_stream == stream_id;
   }));
 }
 
-std::set<uint16_t> DemandBook::strand_classes() const {
-  std::set<uint16_t> classes;
+std::set<uint16_t> DemandBook::strand_streams() const {
+  std::set<uint16_t> streams;
   for (const auto& [id, reader] : readers_) {
-    if (reader.demand.strand_class) classes.insert(*reader.demand.strand_class);
-    if (reader.demand.picture) classes.insert(0);
+    if (reader.demand.strand_stream) streams.insert(*reader.demand.strand_stream);
+    if (reader.demand.picture) streams.insert(picture_source_);
   }
-  return classes;
+  return streams;
 }
 
 SourceDemand DemandBook::total() const {
   SourceDemand total;
   for (const auto& [id, reader] : readers_) {
-    total.facts.strand_viewers += reader.demand.strand_class ? 1 : 0;
+    total.facts.strand_viewers += reader.demand.strand_stream ? 1 : 0;
     total.facts.frame_viewers += reader.demand.picture ? 1 : 0;
     total.has_state_readers |= reader.demand.has_states;
   }

@@ -26,8 +26,9 @@ struct SourceDemand {
 
 class DemandBook : public DemandDesk {
  public:
-  /// `scene_view`: as PictureViews.
-  DemandBook(PictureView scene_view, const PictureBudget& budget) : views_(std::move(scene_view), budget) {}
+  /// `scene_view`: as PictureViews; `picture_source`: the stream of strands that pictures are drawn from.
+  DemandBook(PictureView scene_view, const PictureBudget& budget, uint16_t picture_source = 0)
+      : picture_source_(picture_source), views_(std::move(scene_view), budget) {}
 
   ReaderId add(const ReaderTraits& traits);
   Result<PictureClass> set_demand(ReaderId reader, const Demand& demand) override;
@@ -43,9 +44,8 @@ class DemandBook : public DemandDesk {
   PictureClass picture_class_of(ReaderId reader) const { return views_.class_of(reader); }
   std::map<uint32_t, PictureView> picture_views() const { return views_.views(); }
   uint32_t strand_readers(uint16_t stream_id) const;
-  /// The classes that have to be encoded: those that readers want, and the first where pictures are drawn
-  /// from it.
-  std::set<uint16_t> strand_classes() const;
+  /// The streams that have to be encoded: those that readers want, and the one that pictures are drawn from.
+  std::set<uint16_t> strand_streams() const;
   /// Readers of strands and of pictures; one that wants both counts for both.
   SourceDemand total() const;
 
@@ -54,6 +54,7 @@ class DemandBook : public DemandDesk {
     ReaderTraits traits;
     Demand demand;
   };
+  const uint16_t picture_source_;
   std::map<ReaderId, Reader> readers_;
   PictureViews views_;
   ReaderId next_reader_ = 1;

@@ -15,13 +15,21 @@ bool is_alike(const SourceDemand& a, const SourceDemand& b) {
          a.has_state_readers == b.has_state_readers;
 }
 
+std::vector<std::string> codecs_of(const StreamHubConfig& config) {
+  if (config.fallback_codec.empty()) return {config.stream.codec};
+  return {config.stream.codec, config.fallback_codec};
+}
+
 }  // namespace
 
+/// Pictures are drawn from what every viewer could decode, all strands of it.
 StreamHub::StreamHub(StreamHubConfig config)
     : config_(std::move(config)),
+      codecs_(codecs_of(config_)),
+      picture_source_(stream_id_of({codecs_.size() - 1, 0})),
       stream_(config_.stream),
       look_(config_.look),
-      book_(config_.scene_view, kSoftwareBudget) {}
+      book_(config_.scene_view, kSoftwareBudget, picture_source_) {}
 
 Result<std::unique_ptr<StreamHub>> StreamHub::make(StreamHubConfig config) {
   std::unique_ptr<StreamHub> hub(new StreamHub(std::move(config)));
@@ -35,10 +43,10 @@ StreamHub::~StreamHub() {
 
 Status StreamHub::begin() {
   // A wrong codec is told here, and encoders can be made later without a way to fail.
-  RETURN_IF_ERROR(make_strand_encoder(stream_.codec));
+  for (const std::string& codec : codecs_) RETURN_IF_ERROR(make_strand_encoder(codec));
   const SceneAsset& asset = *config_.asset;
   ASSIGN_OR_RETURN(auto decoder,
-                   make_strand_decoder(stream_.codec, {asset.strand_count, asset.vertex_count}));
+                   make_strand_decoder(codecs_.back(), {asset.strand_count, asset.vertex_count}));
   decoder->set_rest_shape(asset.rest_position_m);
   classes_ = classes_of(stream_);
   FrameWorker::Hooks hooks;
@@ -46,10 +54,10 @@ Status StreamHub::begin() {
     give([&](const Entry& entry) { return entry.picture_class == picture_class; },
          [&](StreamReader& reader) { reader.on_picture(picture_class, picture); });
   };
-  hooks.request_keyframe = [this] { request_keyframe(0); };
+  hooks.request_keyframe = [this] { request_keyframe(picture_source_); };
   hooks.request_state = [this](int64_t not_before_ns) {
     const std::lock_guard lock(mutex_);
-    if (!encoders_.empty() && encoders_[0] != nullptr) encoders_[0]->request_state(not_before_ns);
+    if (StrandEncodeWorker* worker = find_encoder(picture_source_)) worker->request_state(not_before_ns);
   };
   hooks.on_refused = [this](PictureClass picture_class, const Error& error) {
     give([&](const Entry& entry) { return entry.picture_class == picture_class; },
@@ -92,8 +100,8 @@ Result<PictureClass> StreamHub::set_demand(ReaderId reader, const Demand& demand
   PictureClass picture_class = 0;
   {
     const std::lock_guard lock(mutex_);
-    if (demand.strand_class && *demand.strand_class >= classes_.size())
-      return make_error(ErrorCode::BadInput, "there is no strand class {}", *demand.strand_class);
+    if (demand.strand_stream && !is_stream(*demand.strand_stream))
+      return make_error(ErrorCode::BadInput, "there is no stream {} of strands", *demand.strand_stream);
     ASSIGN_OR_RETURN(picture_class, book_.set_demand(reader, demand));
     entries_[reader].demand = demand;
     entries_[reader].picture_class = picture_class;
@@ -136,13 +144,12 @@ void StreamHub::follow_demand() {
     const std::lock_guard lock(mutex_);
     if (has_stopped_) return;
     frames_->set_views(book_.picture_views());
-    const std::set<uint16_t> wanted = book_.strand_classes();
+    const std::set<uint16_t> wanted = book_.strand_streams();
     for (const uint16_t stream_id : wanted)
       encoder(stream_id).set_listeners(book_.strand_readers(stream_id) > 0 ? StrandListeners::All
                                                                            : StrandListeners::OnRequest);
-    for (uint16_t stream_id = 0; stream_id < encoders_.size(); ++stream_id)
-      if (encoders_[stream_id] != nullptr && !wanted.contains(stream_id))
-        encoders_[stream_id]->set_listeners(StrandListeners::None);
+    for (const auto& [stream_id, worker] : encoders_)
+      if (!wanted.contains(stream_id)) worker->set_listeners(StrandListeners::None);
   }
   // A camera that turns is no news for the source.
   if (const SourceDemand now = total(); !is_alike(now, told_)) {
@@ -151,28 +158,36 @@ void StreamHub::follow_demand() {
   }
 }
 
-/// The encoder of a class, made when it is needed first. mutex_ is held.
-StrandEncodeWorker& StreamHub::encoder(uint16_t stream_id) {
-  encoders_.resize(std::max(classes_.size(), encoders_.size()));
-  std::unique_ptr<StrandEncodeWorker>& worker = encoders_[stream_id];
-  if (worker != nullptr) return *worker;
-  auto made = make_strand_encoder(stream_.codec);
-  CHECK(made.ok());  // begin() has made one
-  (*made)->set_rest_shape(config_.asset->rest_position_m);
-  worker = std::make_unique<StrandEncodeWorker>(
-      slot_, std::move(*made), [this](const EncodedFramePtr& frame) { give_strands(frame); },
-      encode_config(stream_id));
-  return *worker;
+bool StreamHub::is_stream(uint16_t stream_id) const {
+  const StrandStream stream = strand_stream_of(stream_id);
+  return stream.codec < codecs_.size() && stream.strand_class < classes_.size();
 }
 
-/// Pictures are drawn from the first class.
+/// Null while nobody has needed it. mutex_ is held.
+StrandEncodeWorker* StreamHub::find_encoder(uint16_t stream_id) const {
+  const auto found = encoders_.find(stream_id);
+  return found != encoders_.end() ? found->second.get() : nullptr;
+}
+
+/// The encoder of a stream, made when it is needed first. mutex_ is held.
+StrandEncodeWorker& StreamHub::encoder(uint16_t stream_id) {
+  if (StrandEncodeWorker* present = find_encoder(stream_id)) return *present;
+  auto made = make_strand_encoder(codecs_[strand_stream_of(stream_id).codec]);
+  CHECK(made.ok());  // begin() has made one
+  (*made)->set_rest_shape(config_.asset->rest_position_m);
+  auto worker = std::make_unique<StrandEncodeWorker>(
+      slot_, std::move(*made), [this](const EncodedFramePtr& frame) { give_strands(frame); },
+      encode_config(stream_id));
+  return *(encoders_[stream_id] = std::move(worker));
+}
+
 void StreamHub::give_strands(const EncodedFramePtr& frame) {
   const uint16_t stream_id = frame->header.stream_id;
-  if (stream_id == 0) {
+  if (stream_id == picture_source_) {
     const std::lock_guard lock(mutex_);
     if (frames_ != nullptr && frames_->has_views()) frames_->offer(frame);
   }
-  give([&](const Entry& entry) { return entry.demand.strand_class == stream_id; },
+  give([&](const Entry& entry) { return entry.demand.strand_stream == stream_id; },
        [&](StreamReader& reader) { reader.on_strands(frame); });
 }
 
@@ -182,7 +197,7 @@ std::vector<StrandClass> StreamHub::classes_of(const StreamDesc& stream) const {
 }
 
 StrandEncodeConfig StreamHub::encode_config(uint16_t stream_id) const {
-  const StrandClass& row = classes_[stream_id];
+  const StrandClass& row = classes_[strand_stream_of(stream_id).strand_class];
   const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
   CHECK(quantum_m.ok());  // as above
   return {stream_id, row.rate_divisor, row.coarsening, row.strand_share, *quantum_m};
@@ -218,14 +233,13 @@ void StreamHub::begin_stream(const StreamDesc& stream, const std::vector<StrandC
   const std::lock_guard lock(mutex_);
   stream_ = stream;
   classes_ = classes;
-  for (uint16_t stream_id = 0; stream_id < std::min(encoders_.size(), classes_.size()); ++stream_id)
-    if (encoders_[stream_id] != nullptr) encoders_[stream_id]->change(encode_config(stream_id));
+  for (const auto& [stream_id, worker] : encoders_)
+    if (is_stream(stream_id)) worker->change(encode_config(stream_id));
 }
 
 void StreamHub::request_keyframe(uint16_t stream_id) {
   const std::lock_guard lock(mutex_);
-  if (stream_id < encoders_.size() && encoders_[stream_id] != nullptr)
-    encoders_[stream_id]->request_keyframe();
+  if (StrandEncodeWorker* worker = find_encoder(stream_id)) worker->request_keyframe();
 }
 
 void StreamHub::request_whole(PictureClass picture_class) {
@@ -283,21 +297,18 @@ std::vector<PictureMotion> StreamHub::take_picture_motions() {
   return frames_ != nullptr ? frames_->take_motions() : std::vector<PictureMotion>();
 }
 
-std::vector<StrandEncodeCounters> StreamHub::encode_counters() const {
+std::map<uint16_t, StrandEncodeCounters> StreamHub::encode_counters() const {
   const std::lock_guard lock(mutex_);
-  std::vector<StrandEncodeCounters> counters;
-  for (const auto& worker : encoders_)
-    counters.push_back(worker != nullptr ? worker->counters() : StrandEncodeCounters{});
+  std::map<uint16_t, StrandEncodeCounters> counters;
+  for (const auto& [stream_id, worker] : encoders_) counters[stream_id] = worker->counters();
   return counters;
 }
 
 gl::PassReports StreamHub::strand_passes() const {
   const std::lock_guard lock(mutex_);
   gl::PassReports passes;
-  for (const auto& worker : encoders_)
-    if (worker != nullptr) passes.push_back(worker->pass());
-  if (encoders_.empty() || encoders_[0] == nullptr)
-    passes.insert(passes.begin(), strand_encode_report(0, false, StageTimer()));
+  for (const auto& [stream_id, worker] : encoders_) passes.push_back(worker->pass());
+  if (find_encoder(0) == nullptr) passes.insert(passes.begin(), strand_encode_report(0, false, StageTimer()));
   return passes;
 }
 
@@ -314,7 +325,7 @@ std::optional<Error> StreamHub::picture_failure() const {
 void StreamHub::stop() {
   slot_.stop();
   // Each worker calls the hub: all are taken out of reach before their threads are joined.
-  std::vector<std::unique_ptr<StrandEncodeWorker>> encoders;
+  std::map<uint16_t, std::unique_ptr<StrandEncodeWorker>> encoders;
   std::unique_ptr<FrameWorker> frames;
   const std::lock_guard giving(giving_mutex_);
   const std::lock_guard lock(mutex_);

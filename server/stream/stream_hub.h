@@ -24,6 +24,7 @@ namespace strandcast {
 
 struct StreamHubConfig {
   StreamDesc stream;
+  std::string fallback_codec = {};  // for who cannot decode the stream's, on the same lattice; empty = none
   double step_rate_hz = 60.0;
   PictureView scene_view;  // always has room
   std::shared_ptr<const SceneAsset> asset;
@@ -33,7 +34,7 @@ struct StreamHubConfig {
 
 class StreamHub : public StateSink, public DemandDesk {
  public:
-  /// Unsupported for an unknown codec. Starts no thread but that of the frames, which sleeps.
+  /// NotFound for an unknown codec. Starts no thread but that of the frames, which sleeps.
   static Result<std::unique_ptr<StreamHub>> make(StreamHubConfig config);
   /// stop(), if it was not called.
   ~StreamHub() override;
@@ -52,7 +53,7 @@ class StreamHub : public StateSink, public DemandDesk {
   /// Told whenever the demands have changed, and at once.
   void set_source(std::function<void(const SourceDemand&)> on_demand);
 
-  /// A keyframe of this class for those who begin; comes with the next state. From a reader's functions too.
+  /// A keyframe of this stream for those who begin; comes with the next state. From a reader's functions too.
   void request_keyframe(uint16_t stream_id);
   /// The newest picture of a class again, whole. From a reader's functions too.
   void request_whole(PictureClass picture_class);
@@ -65,6 +66,9 @@ class StreamHub : public StateSink, public DemandDesk {
   void tell_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns);
 
   StreamDesc stream() const;
+  /// What strands are served by: the scene's codec, and the one for who cannot decode it. Of each there are
+  /// all classes, whose streams are called by stream_id_of(); no stream is encoded that nobody demands.
+  const std::vector<std::string>& strand_codecs() const { return codecs_; }
   /// The newest.
   LookChange look() const;
   std::vector<StrandClass> strand_classes() const;
@@ -74,8 +78,8 @@ class StreamHub : public StateSink, public DemandDesk {
   FrameCounters frame_counters() const;
   /// As FrameWorker::take_motions().
   std::vector<PictureMotion> take_picture_motions();
-  /// Of all classes that were ever needed, by stream_id.
-  std::vector<StrandEncodeCounters> encode_counters() const;
+  /// Of all streams that were ever needed, by stream_id.
+  std::map<uint16_t, StrandEncodeCounters> encode_counters() const;
   /// What the encoders run, and the frame thread; nothing of it while there is nothing to draw.
   gl::PassReports strand_passes() const;
   gl::PassReports picture_passes() const;
@@ -94,7 +98,9 @@ class StreamHub : public StateSink, public DemandDesk {
   explicit StreamHub(StreamHubConfig config);
   Status begin();
   void follow_demand();
+  bool is_stream(uint16_t stream_id) const;
   StrandEncodeWorker& encoder(uint16_t stream_id);
+  StrandEncodeWorker* find_encoder(uint16_t stream_id) const;
   StrandEncodeConfig encode_config(uint16_t stream_id) const;
   std::vector<StrandClass> classes_of(const StreamDesc& stream) const;
   void begin_stream(const StreamDesc& stream, const std::vector<StrandClass>& classes);
@@ -103,6 +109,8 @@ class StreamHub : public StateSink, public DemandDesk {
   void give(IsWanted is_wanted, Give give_one);
 
   const StreamHubConfig config_;
+  const std::vector<std::string> codecs_;
+  const uint16_t picture_source_;  // the stream that pictures are drawn from
   SnapshotSlot slot_;
 
   // Held through a change of the demands, so that the source hears of them in order.
@@ -118,7 +126,7 @@ class StreamHub : public StateSink, public DemandDesk {
   DemandBook book_;
   std::map<ReaderId, Entry> entries_;
   std::unique_ptr<FrameWorker> frames_;
-  std::vector<std::unique_ptr<StrandEncodeWorker>> encoders_;  // by stream_id; null until somebody needs it
+  std::map<uint16_t, std::unique_ptr<StrandEncodeWorker>> encoders_;  // by stream_id, once somebody needs it
   bool has_stopped_ = false;
 };
 

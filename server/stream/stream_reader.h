@@ -21,7 +21,7 @@ class StreamReader {
  public:
   virtual ~StreamReader() = default;
 
-  /// A frame of a class that it wants, in the order of the chain. A chain is entered with a keyframe
+  /// A frame of a stream that it wants, in the order of the chain. A chain is entered with a keyframe
   /// (StreamHub::request_keyframe). Once for all demands of this reader that ask for it.
   virtual void on_strands(const EncodedFramePtr& /*frame*/) {}
   virtual void on_picture(PictureClass, const PicturePtr&) {}

@@ -425,39 +425,69 @@ TEST_F(ServerNet, SlowReaderSkipsToKeyframesAndOthersGetEveryDelta) {
   EXPECT_EQ(server_->counters().frames_dropped, told_slow->dropped_frames);
 }
 
+// By either codec: each has all classes, in streams of its own.
 TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
-  // The asset shows that the link carries far more than the frames take.
-  app_.asset_bytes = 4'000'000;
-  app_.frame_bytes = 1'000;
+  for (const size_t codec : {0, 1}) {
+    // The asset shows that the link carries far more than the frames take.
+    app_.asset_bytes = 4'000'000;
+    app_.frame_bytes = 1'000;
+    app_.strand_codec = codec;
+    const uint16_t stream_id = stream_id_of({codec, 0});
+    NetConfig config;
+    StrandClass cheaper;
+    cheaper.strand_share = 0.25f;
+    cheaper.relative_cost = 0.25;
+    config.strand_classes = {StrandClass{}, cheaper};
+    config.strand_codecs = 2;
+    config.limits.viewer_bytes_per_s = 0.5 * 1'000 * StrandClass{}.frame_rate_hz;
+    start(config);
+    app_.publish_next(stream_id);
+    Hello viewer = hello();
+    viewer.acknowledges = true;
+    auto client = join(viewer);
+    std::optional<StreamQuality> quality;
+    EXPECT_TRUE(eventually([&] {
+      app_.publish_next(stream_id);
+      const test::Received received = client->read();
+      if (received.is_end) return true;
+      if (received.opcode() != Opcode::Control) {
+        const FrameHeader header = *unpack_frame_header(received.bytes);
+        client->send(FrameAck{header.sequence, 1, 0, header.stream_id});
+        return false;
+      }
+      const auto message = decode_server_message(received.bytes);
+      if (message && std::holds_alternative<StreamQuality>(*message))
+        quality = std::get<StreamQuality>(*message);
+      return quality.has_value();
+    }));
+    ASSERT_TRUE(quality.has_value());
+    EXPECT_EQ(quality->stream_id, stream_id_of({codec, 1}));
+    EXPECT_EQ(quality->strand_share, 0.25f);
+    server_->stop();
+  }
+}
+
+TEST_F(ServerNet, AViewerGetsFramesOfItsCodecOnly) {
   NetConfig config;
-  StrandClass cheaper;
-  cheaper.strand_share = 0.25f;
-  cheaper.relative_cost = 0.25;
-  config.strand_classes = {StrandClass{}, cheaper};
-  config.limits.viewer_bytes_per_s = 0.5 * 1'000 * StrandClass{}.frame_rate_hz;
+  config.strand_codecs = 2;
   start(config);
   app_.publish_next();
-  Hello viewer = hello();
-  viewer.acknowledges = true;
-  const auto client = join(viewer);
-  std::optional<StreamQuality> quality;
-  EXPECT_TRUE(eventually([&] {
-    app_.publish_next();
-    const test::Received received = client->read();
-    if (received.is_end) return true;
-    if (received.opcode() != Opcode::Control) {
-      const FrameHeader header = *unpack_frame_header(received.bytes);
-      client->send(FrameAck{header.sequence, 1, 0, header.stream_id});
-      return false;
+  const auto scenes = join();
+  app_.strand_codec = 1;
+  const auto other = join();
+  const uint16_t other_id = stream_id_of({1, 0});
+  // Each asks for a keyframe of its own stream; what it lacks of the chain it asks for again.
+  for (const auto& [client, stream_id] : {std::pair{scenes.get(), uint16_t{0}}, {other.get(), other_id}}) {
+    for (size_t count = 0; count < 3;) {
+      app_.publish_next(0);
+      app_.publish_next(other_id);
+      const test::Received received = client->read();
+      ASSERT_FALSE(received.is_end);
+      if (received.opcode() != Opcode::StrandKeyframe && received.opcode() != Opcode::StrandDelta) continue;
+      EXPECT_EQ(unpack_frame_header(received.bytes)->stream_id, stream_id);
+      ++count;
     }
-    const auto message = decode_server_message(received.bytes);
-    if (message && std::holds_alternative<StreamQuality>(*message))
-      quality = std::get<StreamQuality>(*message);
-    return quality.has_value();
-  }));
-  ASSERT_TRUE(quality.has_value());
-  EXPECT_EQ(quality->stream_id, 1u);
-  EXPECT_EQ(quality->strand_share, 0.25f);
+  }
 }
 
 TEST_F(ServerNet, StalledReaderIsDroppedAndCounted) {

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <thread>
 
 #include "common/strands/strand_codec.h"
+#include "server/app/viewers.h"
 #include "tests/support/frame_recorder.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/replay_source.h"
@@ -49,6 +51,7 @@ class StreamOfARecording : public test::ServerFixture {
     ServerConfig config;
     config.scene = test::bald_scene();
     config.scene.stream.codec = "delta";
+    config.fallback_codec = fallback_codec_;
     config.gl_device = "none at all";  // whoever asks for OpenGL fails
     const Result<float> quantum_m = lattice_step_m("delta", config.scene.stream.bound_m);
     ASSERT_TRUE(quantum_m.ok());
@@ -71,6 +74,15 @@ class StreamOfARecording : public test::ServerFixture {
   }
   uint64_t encodes() const { return server_->counters().encode.encodes; }
 
+  /// Frames of each stream that were encoded, by stream_id.
+  std::map<uint16_t, uint64_t> encodes_by_stream() const {
+    std::map<uint16_t, uint64_t> encodes;
+    for (const auto& [stream_id, of_stream] : server_->counters().strand_streams)
+      encodes[stream_id] = of_stream.encodes;
+    return encodes;
+  }
+
+  std::string fallback_codec_;  // empty = none
   std::vector<std::shared_ptr<const Snapshot>> states_;
   ReplaySource* source_ = nullptr;
   std::atomic<int> painters_{0};
@@ -81,7 +93,7 @@ TEST_F(StreamOfARecording, ARecorderGetsEveryStateAndPosesAsNoViewer) {
   FrameRecorder recorder;
   const ReaderId reader = server_->hub().add(recorder);
   Demand strands;
-  strands.strand_class = 0;
+  strands.strand_stream = 0;
   ASSERT_TRUE(server_->hub().set_demand(reader, strands).ok());
   EXPECT_TRUE(source_->is_watched());
   for (size_t count = 1; count <= kStates; ++count) {
@@ -111,6 +123,115 @@ TEST_F(StreamOfARecording, ARecorderGetsEveryStateAndPosesAsNoViewer) {
   EXPECT_EQ(encodes(), before) << "what nobody wants is not encoded";
   EXPECT_EQ(recorder.frames().size(), kStates);
   EXPECT_EQ(painters_, 0);
+}
+
+/// Two codecs that take the same states.
+class StreamByTwoCodecs : public StreamOfARecording {
+ protected:
+  StreamByTwoCodecs() { fallback_codec_ = "raw"; }
+  std::unique_ptr<ViewerSession> viewer_of(const std::string& wish) {
+    ClientConfig config = client_config();
+    config.hello.codec_wish = wish;
+    return open(config);
+  }
+  static constexpr uint16_t kSecond = stream_id_of({1, 0});
+};
+
+TEST_F(StreamByTwoCodecs, ViewersOfBothSeeTheSameStates) {
+  const auto scenes = viewer_of(""), other = viewer_of("raw"), lost = viewer_of("morse");
+  ASSERT_TRUE(scenes != nullptr && other != nullptr && lost != nullptr);
+  EXPECT_EQ(scenes->welcome().codec, "delta");
+  EXPECT_EQ(scenes->welcome().codec_reason, "delta: the scene's codec");
+  EXPECT_EQ(other->welcome().codec, "raw");
+  EXPECT_EQ(other->welcome().codec_reason, "raw: asked for");
+  EXPECT_EQ(lost->welcome().codec, "delta");
+  EXPECT_THAT(lost->welcome().codec_reason, HasSubstr("morse was asked for and is not served"));
+  std::map<const ViewerSession*, uint64_t> seen;
+  for (ViewerSession* viewer : {scenes.get(), other.get(), lost.get()})
+    viewer->set_snapshot_listener([&seen, viewer](const auto& state) { seen[viewer] = state_hash(*state); });
+  for (size_t i = 0; i < kStates; ++i) {
+    const uint64_t hash = state_hash(*states_[i]);
+    ASSERT_TRUE(pump_until({scenes.get(), other.get(), lost.get()}, [&] {
+      return seen[scenes.get()] == hash && seen[other.get()] == hash && seen[lost.get()] == hash;
+    })) << i;
+    if (i + 1 < kStates) source_->play_next();
+  }
+  const ServerCounters counters = server_->counters();
+  EXPECT_EQ(counters.strand_viewers, 3u);
+  EXPECT_EQ(counters.strand_viewers_of, (std::map<std::string, uint32_t>{{"delta", 2}, {"raw", 1}}));
+  EXPECT_EQ(counters.strand_classes_in_use, 2u);
+  for (const ViewerSession* viewer : {scenes.get(), other.get()})
+    EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u);
+}
+
+TEST_F(StreamByTwoCodecs, WhatNobodyGetsIsNotEncoded) {
+  auto other = viewer_of("raw");
+  ASSERT_NE(other, nullptr);
+  ASSERT_TRUE(pump_until({other.get()}, [&] { return other->has_picture(); }));
+  EXPECT_FALSE(encodes_by_stream().contains(0)) << "nobody gets delta";
+  const auto scenes = viewer_of("delta");
+  ASSERT_NE(scenes, nullptr);
+  ASSERT_TRUE(pump_until({scenes.get()}, [&] { return scenes->has_picture(); }));
+  other.reset();
+  ASSERT_TRUE(eventually([&] { return server_->hub().strand_readers(kSecond) == 0; }));
+  const uint64_t before = encodes_by_stream()[kSecond];
+  for (size_t count = scenes->decoded_frames() + 1, i = 0; i < 5; ++i, ++count) {
+    source_->play_next();
+    ASSERT_TRUE(pump_until({scenes.get()}, [&] { return scenes->decoded_frames() >= count; }));
+  }
+  EXPECT_EQ(encodes_by_stream()[kSecond], before);
+}
+
+TEST_F(StreamByTwoCodecs, ARecorderTakesEither) {
+  EXPECT_EQ(server_->hub().strand_codecs(), (std::vector<std::string>{"delta", "raw"}));
+  FrameRecorder recorders[2];
+  for (const size_t codec : {0, 1}) {
+    Demand strands;
+    strands.strand_stream = stream_id_of({codec, 0});
+    const ReaderId reader = server_->hub().add(recorders[codec]);
+    ASSERT_TRUE(server_->hub().set_demand(reader, strands).ok());
+    ASSERT_TRUE(eventually([&] { return !recorders[codec].frames().empty(); }));
+    const EncodedFramePtr first = recorders[codec].frames()[0];
+    EXPECT_EQ(first->header.stream_id, *strands.strand_stream);
+    auto decoder = make_strand_decoder(server_->hub().strand_codecs()[codec], {kStrands, kVertices});
+    ASSERT_TRUE(decoder.ok());
+    const auto decoded = (*decoder)->decode(first->message);
+    ASSERT_TRUE(decoded.ok()) << decoded.error().to_string();
+    EXPECT_EQ(state_hash(**decoded), state_hash(*states_[0]));
+    server_->hub().remove(reader);
+  }
+  const size_t class_count = server_->hub().strand_classes().size();
+  const ReaderId reader = server_->hub().add(recorders[0]);
+  for (const StrandStream nowhere : {StrandStream{0, class_count}, {1, class_count}, {2, 0}}) {
+    Demand wrong;
+    wrong.strand_stream = stream_id_of(nowhere);
+    EXPECT_EQ(server_->hub().set_demand(reader, wrong).error().code, ErrorCode::BadInput);
+  }
+}
+
+TEST_F(StreamByTwoCodecs, PicturesAreDrawnFromTheOneThatEverybodyDecodes) {
+  FrameRecorder recorder;
+  Demand pictures;
+  pictures.picture = make_scene_view(test::bald_scene(), {64, 48}, 0);
+  const ReaderId reader = server_->hub().add(recorder);
+  ASSERT_TRUE(server_->hub().set_demand(reader, pictures).ok());
+  const auto encodes = encodes_by_stream();
+  EXPECT_TRUE(encodes.contains(kSecond));
+  EXPECT_FALSE(encodes.contains(0));
+  server_->hub().remove(reader);
+}
+
+TEST_F(StreamByTwoCodecs, AChangeOfTheStreamReachesViewersOfBoth) {
+  const auto scenes = viewer_of("delta"), other = viewer_of("raw");
+  ASSERT_TRUE(scenes != nullptr && other != nullptr);
+  StreamDesc stream = server_->hub().stream();
+  stream.strand_rate_hz = 20.0;  // every third of 60 states a second
+  server_->hub().change_stream(stream);
+  EXPECT_TRUE(pump_until({scenes.get(), other.get()}, [&] {
+    return scenes->quality().rate_divisor == 3 && other->quality().rate_divisor == 3;
+  }));
+  EXPECT_EQ(scenes->quality().stream_id, 0);
+  EXPECT_EQ(other->quality().stream_id, kSecond);
 }
 
 TEST_F(StreamOfARecording, AViewerOnTheNetworkSeesTheRecording) {
@@ -223,7 +344,7 @@ TEST_F(StreamOfARecording, AReaderMayAskFromWithinWhatItIsGiven) {
   AskingRecorder recorder(server_->hub());
   const ReaderId reader = server_->hub().add(recorder);
   Demand strands;
-  strands.strand_class = 0;
+  strands.strand_stream = 0;
   ASSERT_TRUE(server_->hub().set_demand(reader, strands).ok());
   const auto keyframe_count = [&] {
     const auto frames = recorder.frames();
@@ -242,10 +363,10 @@ TEST_F(StreamOfARecording, ADemandThatCannotBeMetChangesNothing) {
   FrameRecorder recorder;
   const ReaderId reader = server_->hub().add(recorder);
   Demand demand;
-  demand.strand_class = 0;
+  demand.strand_stream = 0;
   ASSERT_TRUE(server_->hub().set_demand(reader, demand).ok());
   for (const auto& spoil : std::vector<std::function<void(Demand&)>>{
-           [](Demand& wrong) { wrong.strand_class = 999; },
+           [](Demand& wrong) { wrong.strand_stream = 999; },
            [](Demand& wrong) {
              wrong.picture = PictureView{{}, {1, 1}, 80, 1, PictureCodec::Jpeg};
            }}) {

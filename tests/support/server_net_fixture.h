@@ -22,9 +22,10 @@ inline uint16_t code(CloseCode close_code) {
 }
 
 inline EncodedFramePtr media(Opcode opcode, uint32_t sequence, uint32_t base_sequence,
-                             size_t payload_bytes = 64) {
+                             size_t payload_bytes = 64, uint16_t stream_id = 0) {
   FrameHeader header;
   header.opcode = opcode;
+  header.stream_id = stream_id;
   header.sequence = sequence;
   header.base_sequence = base_sequence;
   return make_encoded_frame(header, std::vector<std::byte>(payload_bytes, std::byte{0x5a}));
@@ -54,6 +55,7 @@ class FakeApp : public NetHandler {
     admission.welcome.scene_name = "fake";
     admission.welcome.codec = "delta";
     visitor.subscription.start_with(hello.mode);
+    visitor.subscription.strands.codec = strand_codec;
     admission.welcome.strand_count = 1;
     admission.welcome.vertex_count = 16;
     admission.welcome.bound_m = 1e-4f;
@@ -75,10 +77,11 @@ class FakeApp : public NetHandler {
     if (is_stepping) return {};
     return make_error(ErrorCode::Unavailable, "Stuck on purpose.");
   }
-  void on_keyframe_request(SessionId, uint16_t) override {
+  void on_keyframe_request(SessionId, uint16_t stream_id) override {
     const std::lock_guard lock(mutex_);
     ++keyframe_requests;
-    if (sequence_ > 0) server->publish_strands(media(Opcode::StrandKeyframe, sequence_, 0, frame_bytes));
+    if (sequence_ > 0)
+      server->publish_strands(media(Opcode::StrandKeyframe, sequence_, 0, frame_bytes, stream_id));
   }
   void on_left(SessionId session) override {
     const std::lock_guard lock(mutex_);
@@ -86,12 +89,12 @@ class FakeApp : public NetHandler {
     joined_.erase(session);
   }
 
-  void publish_next() {
+  void publish_next(uint16_t stream_id = 0) {
     const std::lock_guard lock(mutex_);
     ++sequence_;
-    server->publish_strands(sequence_ == 1
-                                ? media(Opcode::StrandKeyframe, 1, 0, frame_bytes)
-                                : media(Opcode::StrandDelta, sequence_, sequence_ - 1, frame_bytes));
+    server->publish_strands(
+        sequence_ == 1 ? media(Opcode::StrandKeyframe, 1, 0, frame_bytes, stream_id)
+                       : media(Opcode::StrandDelta, sequence_, sequence_ - 1, frame_bytes, stream_id));
   }
   uint32_t sequence() const {
     const std::lock_guard lock(mutex_);
@@ -105,6 +108,7 @@ class FakeApp : public NetHandler {
   NetServer* server = nullptr;
   size_t frame_bytes = 256;
   size_t asset_bytes = 1'000;
+  size_t strand_codec = 0;  // of who joins
   std::atomic<uint64_t> motion{0}, wind{0}, commands{0}, parameters{0}, cameras{0}, keyframe_requests{0},
       shut_downs{0};
   std::atomic<bool> left_twice{false}, is_stepping{true};

@@ -9,9 +9,9 @@ PictureView sized(uint32_t width) {
   return view;
 }
 
-Demand wants(std::optional<uint16_t> strand_class, std::optional<PictureView> picture = std::nullopt) {
+Demand wants(std::optional<uint16_t> strand_stream, std::optional<PictureView> picture = std::nullopt) {
   Demand demand;
-  demand.strand_class = strand_class;
+  demand.strand_stream = strand_stream;
   demand.picture = picture;
   return demand;
 }
@@ -20,22 +20,33 @@ TEST(DemandBook, WhatRunsIsTheUnionOfWhatIsWanted) {
   DemandBook book(sized(640), kHardwareBudget);
   const ReaderId a = book.add({}), b = book.add({}), c = book.add({});
   EXPECT_FALSE(book.total().is_watched());
-  EXPECT_TRUE(book.strand_classes().empty());
+  EXPECT_TRUE(book.strand_streams().empty());
   ASSERT_TRUE(book.set_demand(a, wants(3)).ok());
   ASSERT_TRUE(book.set_demand(b, wants(3)).ok());
-  EXPECT_EQ(book.strand_classes(), std::set<uint16_t>{3});
+  EXPECT_EQ(book.strand_streams(), std::set<uint16_t>{3});
   EXPECT_EQ(book.strand_readers(3), 2u);
   const auto pictures = book.set_demand(c, wants(std::nullopt, sized(100)));
   ASSERT_TRUE(pictures.ok());
   EXPECT_NE(*pictures, 0u);
-  EXPECT_EQ(book.strand_classes(), (std::set<uint16_t>{0, 3})) << "pictures are drawn from the first class";
+  EXPECT_EQ(book.strand_streams(), (std::set<uint16_t>{0, 3})) << "pictures are drawn from stream 0";
   EXPECT_EQ(book.strand_readers(0), 0u) << "which nobody reads";
   EXPECT_EQ(book.total().facts.strand_viewers, 2u);
   EXPECT_EQ(book.total().facts.frame_viewers, 1u);
   for (const ReaderId reader : {a, b, c}) book.remove(reader);
   EXPECT_FALSE(book.total().is_watched());
-  EXPECT_TRUE(book.strand_classes().empty());
+  EXPECT_TRUE(book.strand_streams().empty());
   EXPECT_TRUE(book.picture_views().empty());
+}
+
+TEST(DemandBook, PicturesAreDrawnFromTheStreamThatTheyAreSaidToBe) {
+  DemandBook book(sized(640), kHardwareBudget, kStreamsPerCodec);
+  const ReaderId strands = book.add({}), pictures = book.add({});
+  ASSERT_TRUE(book.set_demand(strands, wants(0)).ok());
+  ASSERT_TRUE(book.set_demand(pictures, wants(std::nullopt, sized(100))).ok());
+  EXPECT_EQ(book.strand_streams(), (std::set<uint16_t>{0, kStreamsPerCodec}));
+  EXPECT_EQ(book.strand_readers(kStreamsPerCodec), 0u) << "which nobody reads";
+  book.remove(strands);
+  EXPECT_EQ(book.strand_streams(), std::set<uint16_t>{kStreamsPerCodec});
 }
 
 TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
@@ -45,7 +56,7 @@ TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
   states.has_states = true;
   ASSERT_TRUE(book.set_demand(reader, states).ok());
   EXPECT_TRUE(book.total().is_watched());
-  EXPECT_TRUE(book.strand_classes().empty());
+  EXPECT_TRUE(book.strand_streams().empty());
   (void)book.add({});
   EXPECT_TRUE(book.total().is_watched()) << "whatever others want";
   Demand inputs;
@@ -60,7 +71,7 @@ TEST(DemandBook, ARefusedDemandLeavesTheOneBefore) {
   ASSERT_TRUE(book.set_demand(reader, wants(1, sized(100))).ok());
   const PictureClass picture_class = book.picture_class_of(reader);
   EXPECT_FALSE(book.set_demand(reader, wants(2, sized(1))).ok()) << "too narrow";
-  EXPECT_EQ(book.demand_of(reader).strand_class, 1);
+  EXPECT_EQ(book.demand_of(reader).strand_stream, 1);
   EXPECT_EQ(book.demand_of(reader).picture, sized(100));
   EXPECT_EQ(book.picture_class_of(reader), picture_class);
   EXPECT_EQ(book.set_demand(99, wants(1)).error().code, ErrorCode::NotFound);

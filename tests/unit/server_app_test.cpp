@@ -663,6 +663,16 @@ TEST(ServerMetrics, SayWhatSimulates) {
                               "device \\\\ {x, 2}\"} 1\n"));
 }
 
+TEST(ServerMetrics, SayWhichCodecViewersGet) {
+  ServerCounters counters;
+  EXPECT_THAT(format_server_metrics(counters, "1"), testing::Not(HasSubstr("of_codec")));
+  counters.strand_viewers_of = {{"delta", 2}, {"raw", 0}};
+  const std::string text = format_server_metrics(counters, "1");
+  EXPECT_THAT(test::metric_faults(text), testing::IsEmpty());
+  EXPECT_THAT(text, HasSubstr("\nstrandcast_viewers_strands_of_codec{codec=\"delta\"} 2\n"
+                              "strandcast_viewers_strands_of_codec{codec=\"raw\"} 0\n"));
+}
+
 // The reader above finds what it is there to find.
 TEST(ServerMetrics, FaultsAreFound) {
   const std::string good = "# HELP a_total A.\n# TYPE a_total counter\na_total 1\n";

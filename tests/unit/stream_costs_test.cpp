@@ -1,6 +1,8 @@
 // What classes of strands and pictures are said to cost, against frames of known size and time.
 #include "server/net/stream_costs.h"
 
+#include <set>
+
 namespace strandcast {
 namespace {
 
@@ -20,13 +22,13 @@ StrandCosts costs_of_built_in() {
 
 TEST(StrandCosts, UnmeasuredClassesFollowFromTheOneThatWas) {
   StrandCosts costs = costs_of_built_in();
-  EXPECT_TRUE(costs.bytes_per_s().empty()) << "nothing is known yet";
+  EXPECT_TRUE(costs.bytes_per_s(0).empty()) << "nothing is known yet";
   costs.note_frame(frame_of(1, Opcode::StrandKeyframe), 1'000'000, kSecondNs);
-  EXPECT_TRUE(costs.bytes_per_s().empty()) << "a keyframe says nothing about deltas";
+  EXPECT_TRUE(costs.bytes_per_s(0).empty()) << "a keyframe says nothing about deltas";
   costs.note_frame(frame_of(static_cast<uint16_t>(costs.classes().size())), 1'000'000, kSecondNs);
-  EXPECT_TRUE(costs.bytes_per_s().empty()) << "of no class";
+  EXPECT_TRUE(costs.bytes_per_s(0).empty()) << "of no class";
   costs.note_frame(frame_of(1), 5'000, kSecondNs);
-  const std::vector<double> found = costs.bytes_per_s();
+  const std::vector<double> found = costs.bytes_per_s(0);
   ASSERT_EQ(found.size(), costs.classes().size());
   const StrandClass& measured = costs.classes()[1];
   EXPECT_DOUBLE_EQ(found[1], 5'000 * measured.frame_rate_hz);
@@ -38,17 +40,46 @@ TEST(StrandCosts, WhatIsMeasuredCountsUntilItIsOld) {
   StrandCosts costs = costs_of_built_in();
   costs.note_frame(frame_of(0), 10'000, kSecondNs);
   costs.note_frame(frame_of(2), 1'000, kSecondNs + kStepNs);
-  EXPECT_DOUBLE_EQ(costs.bytes_per_s()[0], 10'000 * costs.classes()[0].frame_rate_hz);
+  EXPECT_DOUBLE_EQ(costs.bytes_per_s(0)[0], 10'000 * costs.classes()[0].frame_rate_hz);
   costs.note_frame(frame_of(2), 1'000, 10 * kSecondNs);
-  EXPECT_NEAR(costs.bytes_per_s()[0],
+  EXPECT_NEAR(costs.bytes_per_s(0)[0],
               1'000 * costs.classes()[2].frame_rate_hz / costs.classes()[2].relative_cost, 1e-6);
+}
+
+TEST(StrandCosts, WhatOneCodecTakesSaysNothingOfTheOther) {
+  const size_t class_count = costs_of_built_in().classes().size();
+  StrandCosts costs(costs_of_built_in().classes(), 2);
+  costs.note_frame(frame_of(stream_id_of({1, 2})), 1'000, kSecondNs);
+  EXPECT_TRUE(costs.bytes_per_s(0).empty());
+  EXPECT_DOUBLE_EQ(costs.bytes_per_s(1)[2], 1'000 * costs.classes()[2].frame_rate_hz);
+  costs.note_frame(frame_of(stream_id_of({0, 0})), 500, kSecondNs);
+  EXPECT_DOUBLE_EQ(costs.bytes_per_s(0)[0], 500 * costs.classes()[0].frame_rate_hz);
+  EXPECT_GT(costs.bytes_per_s(1)[0], costs.bytes_per_s(0)[0]) << "estimated from its own class 2";
+  const std::vector<double> before = costs.bytes_per_s(1);
+  for (const StrandStream nowhere : {StrandStream{1, class_count}, StrandStream{2, 0}})
+    costs.note_frame(frame_of(stream_id_of(nowhere)), 1'000'000, kSecondNs);
+  EXPECT_EQ(costs.bytes_per_s(1), before) << "of no class or codec";
+}
+
+TEST(StrandStreams, EveryClassOfEveryCodecHasAnIdOfItsOwn) {
+  std::set<uint16_t> ids;
+  for (size_t codec = 0; codec < kMaxServedCodecs; ++codec) {
+    for (size_t strand_class = 0; strand_class < kStreamsPerCodec; ++strand_class) {
+      const uint16_t id = stream_id_of({codec, strand_class});
+      EXPECT_TRUE(ids.insert(id).second) << id;
+      EXPECT_EQ(id & kPictureStreamBit, 0) << "that is a picture's";
+      EXPECT_EQ(strand_stream_of(id).codec, codec);
+      EXPECT_EQ(strand_stream_of(id).strand_class, strand_class);
+    }
+  }
+  EXPECT_EQ(stream_id_of({0, 0}), 0) << "as viewers of before know it";
 }
 
 TEST(StrandCosts, AChangeShowsWithinASecond) {
   StrandCosts costs = costs_of_built_in();
   costs.note_frame(frame_of(0), 10'000, kSecondNs);
   for (int i = 1; i <= 60; ++i) costs.note_frame(frame_of(0), 20'000, kSecondNs + i * kStepNs);
-  EXPECT_NEAR(costs.bytes_per_s()[0], 20'000 * 60.0, 0.05 * 20'000 * 60.0);
+  EXPECT_NEAR(costs.bytes_per_s(0)[0], 20'000 * 60.0, 0.05 * 20'000 * 60.0);
 }
 
 TEST(PictureCosts, AreBytesTimesRateWhileThePictureChanges) {

@@ -12,6 +12,7 @@
 #include "common/strands/tangent/symbols.h"
 #include "common/wire/close_code.h"
 #include "common/wire/messages.h"
+#include "server/net/strand_class.h"
 
 namespace strandcast {
 namespace {
@@ -44,6 +45,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxReportedMs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedMs)))},
       {"kMaxReportedHz", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedHz)))},
       {"kMaxStepNs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxStepNs)))},
+      {"kStreamsPerCodec", fmt::format("from {} (", kStreamsPerCodec)},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},
