@@ -137,6 +137,7 @@ class Examination {
     add(Finding::Ok, "role",
         fmt::format("{}{}", to_string(welcome.role),
                     options_.address.is_tls ? ", encrypted" : ", not encrypted"));
+    if (!welcome.codec_reason.empty()) add(Finding::Ok, "codec", welcome.codec_reason);
     const auto end = Clock::now() + kDiagnosisTimeout;
     const auto enough = Clock::now() + kDiagnosisWatch;
     Status pumped;

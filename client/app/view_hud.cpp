@@ -132,6 +132,7 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   const std::string& reason = facts.own_reason.empty() ? now.mode.reason : facts.own_reason;
   if (!reason.empty()) add("because", reason);
   if (!is_frames) {
+    add("strands by", codec_text(now.welcome));
     add("shows", facts.playout == Playout::Smooth ? "smooth playout" : "the newest state");
     if (facts.playout == Playout::Smooth) add("interpolation", to_string(facts.interpolation));
     add("drawn", fmt::format("{} ({:.0f} ms)", how_drawn(facts.draw_step), facts.draw_ms));

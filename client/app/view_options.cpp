@@ -7,8 +7,10 @@
 #include <map>
 #include <sstream>
 
+#include "client/app/step_speed.h"
 #include "common/base/file.h"
 #include "common/base/version.h"
+#include "common/strands/strand_codec.h"
 
 namespace strandcast {
 
@@ -75,10 +77,14 @@ ClientConfig client_config(const ViewOptions& options) {
   config.hello.frame_width = std::min(options.size.width, kMaxPictureWidth);
   config.hello.frame_height = std::min(options.size.height, kMaxPictureHeight);
   config.hello.picture_codecs = options.picture_codecs;
+  config.hello.step_ns = measured_step_ns();
+  config.hello.codec_wish = options.codec_wish;
   return config;
 }
 
 namespace {
+
+constexpr const char* kAnyCodec = "auto";
 
 /// Values that need more than CLI11's own conversion.
 struct RawOptions {
@@ -86,6 +92,7 @@ struct RawOptions {
   std::string diagnose;  // instead of connect; empty = no
   std::string mode = "auto";
   std::string pictures = "any";
+  std::string codec = kAnyCodec;
   std::string size = "960x540";
   std::string clip_size;  // empty = as size
   std::string token_file;
@@ -106,6 +113,10 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--pictures", raw.pictures,
                  "In frames mode: jpeg, tiles, vp8, h264 or any (the server chooses)")
       ->check(CLI::IsMember({"jpeg", "tiles", "vp8", "h264", "any"}))
+      ->capture_default_str();
+  app.add_option(
+         "--codec", raw.codec,
+         "Of strands: auto (the server chooses by what this machine can), or the name of one to insist on")
       ->capture_default_str();
   app.add_option("--token-file", raw.token_file,
                  "File with the token: the token alone, or lines 'role token'");
@@ -173,6 +184,10 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     return make_error(ErrorCode::Unsupported,
                       "this build cannot show --pictures {} (README.md says how to build it in)",
                       raw.pictures);
+  if (raw.codec != kAnyCodec) {
+    RETURN_IF_ERROR(strand_codec_info(raw.codec));
+    options.codec_wish = raw.codec;
+  }
   if (raw.playout == "smooth") options.playout = Playout::Smooth;
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,

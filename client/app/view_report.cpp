@@ -71,6 +71,7 @@ ViewReport make_report(ViewerSession& session) {
   out.count("look_changes", session.look_changes());
   const FrameQuality quality = session.frame_quality().value_or(FrameQuality{});
   out.word("codec", is_frames ? to_string(quality.codec) : welcome.codec);
+  out.word("codec_reason", is_frames ? quality.reason : welcome.codec_reason);
   out.count("strands", welcome.strand_count);
   out.count("vertices_per_strand", welcome.vertex_count);
   out.number("bound_mm", static_cast<double>(welcome.bound_m) * 1e3, 3);

@@ -31,6 +31,7 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
                                    [requester] { requester->request_keyframe(); });
   if (!replay) return at(config.address.to_string(), replay.error());
   session->replay_ = std::move(replay).value();
+  log_info("replay", "strands by {}", codec_text(welcome));
   session->opened_ns_ = now_ns();
   session->look_ = {welcome.look, welcome.camera};
   session->quality_.bound_m = session->welcome().bound_m;

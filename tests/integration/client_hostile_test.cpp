@@ -372,6 +372,7 @@ TEST(HostileServer, NothingOfItsWelcomeSteersATerminal) {
     Welcome welcome = make_welcome(20, 8);
     welcome.scene_name = "hair\u202egpj.exe";
     welcome.mode_reason = "because\u009b31m";
+    welcome.codec_reason = "so\u009b31m";
     peer.welcome(welcome);
     peer.read_to_end();
   });
@@ -380,6 +381,7 @@ TEST(HostileServer, NothingOfItsWelcomeSteersATerminal) {
   const std::string lines = to_lines(make_report(**session));
   EXPECT_THAT(lines, HasSubstr("scene=hair?gpj.exe"));
   EXPECT_THAT(lines, HasSubstr("mode_reason=because?31m"));
+  EXPECT_THAT(lines, HasSubstr("codec_reason=so?31m"));
 }
 
 TEST(HostileServer, NothingOfItsHealthSteersATerminal) {

@@ -26,6 +26,17 @@ TEST(ViewOptions, AskForNoMoreThanTheyNeed) {
   EXPECT_EQ(client_config(read({"--headless"})).hello.role, Role::Viewer);
 }
 
+TEST(ViewOptions, ACodecIsInsistedOnByItsName) {
+  EXPECT_EQ(client_config(read({})).hello.codec_wish, "");
+  EXPECT_EQ(client_config(read({"--codec", "auto"})).hello.codec_wish, "");
+  EXPECT_EQ(client_config(read({"--codec", "tangent"})).hello.codec_wish, "tangent");
+  const char* unknown[] = {"strandcast-view", "--codec", "morse"};
+  EXPECT_FALSE(read_view_command_line(3, unknown).options) << "what this build cannot decode is no use";
+  const ClientConfig config = client_config(read({}));
+  EXPECT_GE(config.hello.step_ns, 0.0);
+  EXPECT_LE(config.hello.step_ns, kMaxStepNs);
+}
+
 TEST(ViewOptions, EncryptWhenTheAddressOrAnOptionSaysSo) {
   EXPECT_FALSE(client_config(read({})).address.is_tls);
   EXPECT_FALSE(client_config(read({"--connect", "ws://localhost:1"})).address.is_tls);

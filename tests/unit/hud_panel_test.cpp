@@ -201,6 +201,24 @@ TEST(ViewHud, SaysWhatSimulates) {
   EXPECT_EQ(device(), "lanes (AVX2, 4 threads)");
 }
 
+TEST(ViewHud, SaysWhichCodecStrandsComeByAndWhy) {
+  HudWriter writer;
+  ViewerState state;
+  state.is_connected = true;
+  state.session_number = 1;
+  state.welcome.codec = "tangent";
+  const auto codec = [&] {
+    for (const HudRow& row : writer.write(state, facts_of("127.0.0.1"), kS).rows)
+      if (row.label == "strands by") return row.value;
+    return std::string("no row");
+  };
+  EXPECT_EQ(codec(), "tangent") << "an older server gives no reason";
+  state.welcome.codec_reason = "tangent: asked for";
+  EXPECT_EQ(codec(), "tangent: asked for");
+  state.mode.shown = StreamMode::Frames;
+  EXPECT_EQ(codec(), "no row");
+}
+
 TEST(ViewHud, SaysWhoseLookIsSeen) {
   HudWriter writer;
   ViewerState state;
