@@ -7,6 +7,7 @@
 #include <atomic>
 
 #include "common/base/profile.h"
+#include "common/strands/strand_codec.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
 #include "tests/tools/chaos_relay.h"
@@ -50,12 +51,14 @@ class ModeSwitching : public test::ServerFixture {
     config.scene.stream.frame_width = picture_.width;
     config.scene.stream.frame_height = picture_.height;
     config.net.limits.link_memory_ms = 4'000;
+    config.fallback_codec = fallback_codec_;
     config.make_painter = std::move(painter);
     return ServerFixture::start(std::move(config));
   }
   void join(StreamMode mode, uint16_t port = 0) {
     ClientConfig client = client_config(mode, Role::Viewer, port);
     client.hello.picture_codecs = picture_codecs_;
+    client.hello.codec_wish = fallback_codec_;
     viewer_ = open(client);
     ASSERT_NE(viewer_, nullptr);
     ASSERT_TRUE(pump_until([&] { return viewer_->has_picture(); }));
@@ -78,6 +81,7 @@ class ModeSwitching : public test::ServerFixture {
   // H.264 makes a first picture of 64 x 48 flat: what x264 says of itself takes all bits that it may have.
   RenderSize picture_{160, 120};
   PictureCodecs picture_codecs_ = decodable_picture_codecs();
+  std::string fallback_codec_;  // that viewers get; empty = none
   std::unique_ptr<ViewerSession> viewer_;
 };
 
@@ -102,6 +106,26 @@ TEST_F(ModeSwitching, APersonSwitchesThereAndBackWithoutABlankFrame) {
 }
 
 // Nobody looks at the link in this test but because of the request.
+TEST_F(ModeSwitching, TheSecondCodecStaysThroughModesAndBounds) {
+  SceneDesc scene = test::bald_scene();
+  scene.stream.codec = "delta";
+  scene.stream.has_codec = true;
+  fallback_codec_ = "raw";
+  if (!start(scene)) return;
+  ASSERT_NO_FATAL_FAILURE(join(StreamMode::Strands));
+  EXPECT_EQ(viewer_->welcome().codec, "raw");
+  viewer_->request_mode(StreamMode::Frames);
+  ASSERT_TRUE(pump_to(StreamMode::Frames));
+  viewer_->request_mode(StreamMode::Strands);
+  ASSERT_TRUE(pump_to(StreamMode::Strands));
+  ASSERT_EQ(run_command(ctl_target(), SetParameter{"stream.bound_m=0.0004"}), kDoneExit);
+  const float quantum_m = lattice_step_m("raw", 4e-4f).value();
+  EXPECT_TRUE(pump_until([&] { return viewer_->replay().newest()->quantum_m == quantum_m; }));
+  expect_no_gap();
+  EXPECT_EQ(viewer_->replay().stats().rejected_frames, 0u) << viewer_->replay().stats().last_error;
+  EXPECT_FALSE(server_->counters().strand_streams.contains(0)) << "neither viewer nor pictures took delta";
+}
+
 TEST_F(ModeSwitching, ARequestIsActedOnWithoutWaitingForALookAtTheLink) {
   ServerConfig config;
   config.scene = test::bald_scene();
