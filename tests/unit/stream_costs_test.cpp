@@ -75,6 +75,17 @@ TEST(StrandStreams, EveryClassOfEveryCodecHasAnIdOfItsOwn) {
   EXPECT_EQ(stream_id_of({0, 0}), 0) << "as viewers of before know it";
 }
 
+// The figure of SECURITY.md.
+TEST(StrandStreams, AreFew) {
+  size_t most = 0;
+  for (const double step_rate_hz : {10.0, 60.0, 240.0, 1'000.0})
+    for (const float bound_m : {2e-5f, 1e-4f, 5e-4f})
+      for (const uint32_t strands : {1u, 500u, 200'000u})
+        most = std::max(most, make_strand_classes({step_rate_hz, 0.0, bound_m, strands}).size());
+  EXPECT_EQ(most, 9u);
+  EXPECT_EQ(kMaxServedCodecs, 2u);
+}
+
 TEST(StrandCosts, AChangeShowsWithinASecond) {
   StrandCosts costs = costs_of_built_in();
   costs.note_frame(frame_of(0), 10'000, kSecondNs);
