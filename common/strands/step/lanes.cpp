@@ -1,13 +1,12 @@
 #include "common/strands/step/lanes.h"
 
+#include "common/strands/snapshot.h"
 #include "common/strands/tangent/row.h"
 
 namespace strandcast::step {
 namespace {
 
 using namespace simd::raw;
-using tangent::nearest_lanes;
-
 constexpr uint32_t kHalves = kBlockStrands / kLaneCount;
 
 STRANDCAST_LANES LaneVectors turned_by(const Turn& turn, const LaneVectors& v) {
@@ -27,6 +26,14 @@ STRANDCAST_LANES void add_vector(float* row, const LaneVectors& change, float sc
   }
 }
 
+/// Nearest whole numbers within the lattice; an end of it for NaN.
+STRANDCAST_LANES IntLanes on_lattice(const Lanes& value) {
+  constexpr auto kFarthest = static_cast<float>(kMaxLattice / 2);
+  const Lanes low = value > -kFarthest ? value : Lanes{} - kFarthest;
+  const Lanes within = low < kFarthest ? low : Lanes{} + kFarthest;
+  return to_integers(within + (within < 0.0f ? Lanes{} - 0.5f : Lanes{} + 0.5f));
+}
+
 STRANDCAST_LANES void expect_blocks_lanes(const ExpectWork& work) {
   const float per_step = 1.0f / work.quantum_m;
   for (uint32_t block = work.block_begin; block < work.block_end; ++block) {
@@ -38,7 +45,7 @@ STRANDCAST_LANES void expect_blocks_lanes(const ExpectWork& work) {
         const float* row = work.position_m.row(block, v, 0) + half * kLaneCount;
         const LaneVectors head = turned_by(work.head_from_world, load_vector(row));
         for (size_t axis = 0; axis < 3; ++axis) {
-          const IntLanes nearest = nearest_lanes(head.axis[axis] * per_step);
+          const IntLanes nearest = on_lattice(head.axis[axis] * per_step);
           store_lanes(is_there ? nearest : IntLanes{},
                       work.lattice[axis].data() + v * size_t{work.layout.stride} + place);
         }

@@ -15,6 +15,8 @@ constexpr double kNsPerS = 1e9;
 constexpr size_t kMostBytesPerStrand = 128;
 constexpr size_t kMostBytesPerVertex = 192;
 constexpr size_t kMostBytesBeside = 1 << 16;
+/// Frames with more are better off with fitted weights: of bits_apart().
+constexpr double kMostSparseBits = 1.0;
 /// Of vertices every so many are looked at.
 constexpr size_t kSampleRun = 8;
 constexpr size_t kSampleStep = 128;
@@ -35,10 +37,11 @@ void append_packed(ZstdCompressor& zstd, std::span<const std::byte> source, std:
   writer.put_bytes(packed);
 }
 
-/// About how many bits tell where vertices of a sample are, when they are expected there.
+/// About how many bits a vertex tell where those of a sample are, when they are expected there.
 double bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
                   const tangent::Planes<int32_t>& target) {
   double bits = 0.0;
+  size_t count = 0;
   for (uint32_t v = 1; v < layout.vertex_count; ++v)
     for (size_t run = 0; run < layout.no_neighbour(); run += kSampleStep)
       for (size_t place = run; place < std::min<size_t>(run + kSampleRun, layout.no_neighbour()); ++place) {
@@ -49,8 +52,9 @@ double bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>&
           squared += apart * apart;
         }
         bits += std::log2(1.0 + squared / (tangent::kStepsPerBound * tangent::kStepsPerBound));
+        ++count;
       }
-  return bits;
+  return count == 0 ? 0.0 : bits / static_cast<double>(count);
 }
 
 }  // namespace
@@ -135,13 +139,6 @@ std::span<const StepTick> EncoderSteps::ticks_since(const SnapshotInfo& snapshot
   return std::span(ticks).last(count);
 }
 
-/// Whether steps tell more than that nothing moved.
-bool EncoderSteps::pays(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
-                        const tangent::Planes<int32_t>& before,
-                        const tangent::Planes<int32_t>& target) const {
-  return bits_apart(layout, expected, target) <= bits_apart(layout, before, target);
-}
-
 uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout& layout,
                             tangent::History& history, const tangent::Planes<int32_t>& target) {
   bytes_.clear();
@@ -175,12 +172,14 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
       read_ticks(reader, snapshot.tick, snapshot.world_from_head, wind_read);
   CHECK(ticks.ok());
   step(*ticks, moment_of(snapshot), layout, history);
-  if (!pays(layout, expected_, history.lattice, target)) return flags;
+  // Where steps tell less than that nothing moved, motion does.
+  const double bits = bits_apart(layout, expected_, target);
+  if (bits > bits_apart(layout, history.lattice, target)) return flags;
   wind_ = wind_read;
   bytes_.insert(bytes_.end(), said.begin(), said.end());
   std::swap(history.lattice, expected_);
   is_stepping_ = true;
-  return flags | kStepFlag;
+  return flags | kStepFlag | (bits <= kMostSparseBits ? kSparseFlag : 0);
 }
 
 void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {

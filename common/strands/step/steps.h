@@ -21,10 +21,11 @@
 namespace strandcast::step {
 
 // Of a delta, beside that of anchors.
-inline constexpr uint8_t kStepFlag = 2;   // predicted by steps, whose ticks follow
-inline constexpr uint8_t kSceneFlag = 4;  // a scene follows
-inline constexpr uint8_t kModelFlag = 8;  // a model follows, from the next frame on; not with kStepFlag
-inline constexpr uint8_t kFlags = kStepFlag | kSceneFlag | kModelFlag;
+inline constexpr uint8_t kStepFlag = 2;     // predicted by steps, whose ticks follow
+inline constexpr uint8_t kSceneFlag = 4;    // a scene follows
+inline constexpr uint8_t kModelFlag = 8;    // a model follows, from the next frame on; not with kStepFlag
+inline constexpr uint8_t kSparseFlag = 16;  // with kStepFlag: without weights, in sparse_symbols.h's order
+inline constexpr uint8_t kFlags = kStepFlag | kSceneFlag | kModelFlag | kSparseFlag;
 
 /// A frame of which something is predicted.
 struct Moment {
@@ -81,8 +82,6 @@ class EncoderSteps : public Steps {
 
  private:
   std::span<const StepTick> ticks_since(const SnapshotInfo& snapshot) const;
-  bool pays(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
-            const tangent::Planes<int32_t>& before, const tangent::Planes<int32_t>& target) const;
   void take_scene(const StepScene& scene);
   bool take_model(const std::shared_ptr<const StepModel>& model, const tangent::Layout& layout);
 

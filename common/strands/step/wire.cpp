@@ -10,8 +10,8 @@
 namespace strandcast::step {
 namespace {
 
-constexpr double kWindStepMps = 1.0 / 512.0;
-constexpr int32_t kMostWindSteps = 1 << 22;
+constexpr double kWindStepMps = 1.0 / 16384.0;
+constexpr int32_t kMostWindSteps = 1 << 27;
 constexpr size_t kMostConstants = 24;
 constexpr size_t kMostNameBytes = 40;
 constexpr float kUnitStep = 1.0f / 32767.0f;  // of directions

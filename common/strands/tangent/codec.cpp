@@ -16,6 +16,7 @@
 #include "common/strands/step/steps.h"
 #include "common/strands/strand_payload.h"
 #include "common/strands/tangent/order.h"
+#include "common/strands/tangent/sparse_symbols.h"
 #include "common/strands/tangent/symbols.h"
 #include "common/strands/zstd_block.h"
 
@@ -45,16 +46,22 @@ struct Chain {
   History history;
   SymbolSizes sizes;
   Tables tables = make_first_tables();
+  // Of the "step" codec only.
+  SparseTables sparse_tables = make_first_sparse_tables();
+  BlockCounts blocks;
 
   void reset(const Layout& layout) {
     history.reset(layout);
     sizes.reset(layout);
+    blocks.assign(block_count_of(layout), 0);
     tables = make_first_tables();
+    sparse_tables = make_first_sparse_tables();
   }
   /// After an anchor: what a joiner knows, and no more. The tables stay.
   void forget_motion(const Layout& layout) {
     history.forget_motion();
     sizes.reset(layout);
+    blocks.assign(block_count_of(layout), 0);
   }
 };
 
@@ -158,7 +165,8 @@ class Encoder final : public StrandEncoder {
       frame_.head = {snapshot.world_from_head, {}};
     else
       frame_.head = chain_.history.head.followed_by(snapshot.world_from_head, snapshot.quantum_m);
-    fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
+    if ((flags_ & step::kSparseFlag) == 0)
+      fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
     writers_.resize(layout_.slice_count());
   }
 
@@ -170,6 +178,7 @@ class Encoder final : public StrandEncoder {
 
   EncodedFramePtr encode_delta(const Snapshot& snapshot) {
     begin(snapshot, Followers::Some);
+    if ((flags_ & step::kSparseFlag) != 0) return encode_sparse(snapshot);
     for (auto& escapes : frame_.codes.escapes) escapes.clear();
     std::vector<Tables> tables(layout_.slice_count(), chain_.tables);
     Slices slices(layout_.slice_count());
@@ -187,8 +196,32 @@ class Encoder final : public StrandEncoder {
     return make_delta(state_of(snapshot), slices);
   }
 
+  /// After begin(), for a frame that steps tell nearly all of.
+  EncodedFramePtr encode_sparse(const Snapshot& snapshot) {
+    for (auto& escapes : frame_.codes.escapes) escapes.clear();
+    for_each_part(encode_terms(layout_, workers_), layout_.slice_count(), [&](uint32_t slice) {
+      quantise_step(set_, {{layout_, chain_.history, slice, frame_}, target_});
+    });
+    next_blocks_.resize(chain_.blocks.size());
+    write_sparse({layout_, chain_.sizes, next_sizes_, chain_.blocks, next_blocks_, chain_.sparse_tables},
+                 frame_.codes, writers_[0]);
+    remember_step(chain_.history, frame_);
+    steps_->finish(snapshot, frame_, chain_.history);
+    std::swap(chain_.sizes, next_sizes_);
+    std::swap(chain_.blocks, next_blocks_);
+    Slices slices(1);
+    writers_[0].finish(slices[0]);
+    frame_.length_blend = 0;
+    return make_delta(state_of(snapshot), slices);
+  }
+
   JoinFrames encode_anchor(const Snapshot& snapshot, Followers followers) {
     begin(snapshot, followers);
+    if ((flags_ & step::kSparseFlag) != 0) {
+      // Who joins is told of the shape, which needs weights.
+      flags_ &= static_cast<uint8_t>(~step::kSparseFlag);
+      fit_motion(set_, layout_, chain_.history, target_, workers_, frame_);
+    }
     flags_ |= kAnchorFlag;
     frame_.shape_weights = fit_shape(layout_, snapshot.quantum_m, target_, workers_);
     for (auto& escapes : frame_.shape_codes.escapes) escapes.clear();
@@ -242,9 +275,11 @@ class Encoder final : public StrandEncoder {
     writer.put_bytes(std::as_bytes(std::span(&head, 1)));
     if (steps_) steps_->append_bytes(body);
     if ((flags_ & kAnchorFlag) != 0) writer.put_bytes(std::as_bytes(std::span(frame_.shape_weights)));
-    ValueWriter weights;
-    write_weights(motion_class_count(layout_), frame_.weights, weights);
-    weights.finish(body);
+    if ((flags_ & step::kSparseFlag) == 0) {
+      ValueWriter weights;
+      write_weights(motion_class_count(layout_), frame_.weights, weights);
+      weights.finish(body);
+    }
     for (const auto& slice : slices) writer.put_bytes(slice);
     FrameHeader header;
     header.opcode = Opcode::StrandDelta;
@@ -258,7 +293,10 @@ class Encoder final : public StrandEncoder {
   EncodedFramePtr make_keyframe(const State& state, const Slices& slices) {
     std::vector<std::byte> body(sizeof(uint32_t));
     body.reserve(2 * layout_.plane_size());
-    zstd_.append(std::as_bytes(std::span(chain_.tables)), kTableLevel, body);
+    std::vector<std::byte> tables(sizeof(Tables) + (steps_ ? sizeof(SparseTables) : 0));
+    std::memcpy(tables.data(), &chain_.tables, sizeof(Tables));
+    if (steps_) std::memcpy(tables.data() + sizeof(Tables), &chain_.sparse_tables, sizeof(SparseTables));
+    zstd_.append(tables, kTableLevel, body);
     const auto packed_bytes = static_cast<uint32_t>(body.size() - sizeof(uint32_t));
     std::memcpy(body.data(), &packed_bytes, sizeof packed_bytes);
     ByteWriter writer(body);
@@ -292,6 +330,7 @@ class Encoder final : public StrandEncoder {
   Frame frame_;
   SymbolSizes next_sizes_;
   SymbolSizes no_sizes_;
+  BlockCounts next_blocks_;
   // Kept for their memory.
   Planes<int32_t> target_;
   std::vector<ValueWriter> writers_;
@@ -352,9 +391,7 @@ class Decoder final : public StrandDecoder {
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
                         message.body.size());
-    if (auto filled = zstd_.fill(packed, std::as_writable_bytes(std::span(chain.tables))); !filled)
-      return at("symbol tables", filled.error());
-    RETURN_IF_ERROR(check_tables(chain.tables));
+    RETURN_IF_ERROR(read_tables(packed, chain));
     Tables tables = chain.tables;
     RETURN_IF_ERROR(read_slices(body.rest(), tables, no_sizes_, frame_.shape_codes, [&](uint32_t slice) {
       place_shape(set_, {layout_, chain.history, slice, frame_});
@@ -377,22 +414,61 @@ class Decoder final : public StrandDecoder {
     ASSIGN_OR_RETURN(const BodyHead head, read_head(body));
     const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
     if (steps_) RETURN_IF_ERROR(steps_->begin(head.flags, moment, layout_, body, chain_.history));
-    Tables tables = chain_.tables;
-    if (Status status = read_positions(head, body, message, snapshot, tables); !status) {
+    Learnt learnt{chain_.tables, chain_.sparse_tables};
+    const bool is_sparse = (head.flags & step::kSparseFlag) != 0;
+    const Status status = is_sparse ? read_sparse_positions(body, message, snapshot, learnt)
+                                    : read_positions(head, body, message, snapshot, learnt.tables);
+    if (!status) {
       if (steps_) steps_->abandon(chain_.history);
       return status;
     }
     // Only now, with everything checked, the state moves on.
-    remember(chain_.history, frame_);
+    (is_sparse ? remember_step : remember)(chain_.history, frame_);
     if (steps_) steps_->finish(moment, frame_, chain_.history);
     if ((head.flags & kAnchorFlag) != 0) {
       chain_.forget_motion(layout_);
       if (steps_) steps_->settle(chain_.history);
-    } else {
-      chain_.tables = tables;
-      std::swap(chain_.sizes, next_sizes_);
+      return {};
     }
+    chain_.tables = learnt.tables;
+    chain_.sparse_tables = learnt.sparse;
+    std::swap(chain_.sizes, next_sizes_);
+    if (is_sparse) std::swap(chain_.blocks, next_blocks_);
     return {};
+  }
+
+  /// Tables that a frame leaves behind.
+  struct Learnt {
+    Tables tables;
+    SparseTables sparse;
+  };
+
+  Status read_sparse_positions(ByteReader& body, const StrandMessage& message, Snapshot& snapshot,
+                               Learnt& learnt) {
+    ValueReader reader;
+    ASSIGN_OR_RETURN(const auto rest, reader.open(body.rest()));
+    if (!rest.empty())
+      return make_error(ErrorCode::BadInput, "{} bytes follow the integers of a strand payload", rest.size());
+    next_blocks_.resize(chain_.blocks.size());
+    read_sparse({layout_, chain_.sizes, next_sizes_, chain_.blocks, next_blocks_, learnt.sparse}, reader,
+                frame_.codes);
+    if (!reader.is_spent())
+      return make_error(ErrorCode::BadInput, "the integers do not end where their symbols end");
+    frame_.head = {snapshot.world_from_head, {}};
+    for_each_part(decode_terms(layout_, workers_), layout_.slice_count(), [&](uint32_t slice) {
+      place_step(set_, {layout_, chain_.history, slice, frame_});
+    });
+    return give(message, snapshot);
+  }
+
+  Status read_tables(std::span<const std::byte> packed, Chain& chain) {
+    std::vector<std::byte> tables(sizeof(Tables) + (steps_ ? sizeof(SparseTables) : 0));
+    if (auto filled = zstd_.fill(packed, tables); !filled) return at("symbol tables", filled.error());
+    std::memcpy(&chain.tables, tables.data(), sizeof(Tables));
+    if (steps_) std::memcpy(&chain.sparse_tables, tables.data() + sizeof(Tables), sizeof(SparseTables));
+    RETURN_IF_ERROR(check_tables(chain.tables));
+    RETURN_IF_ERROR(check_tables(chain.sparse_tables.block));
+    return check_tables(chain.sparse_tables.vertex);
   }
 
   Result<BodyHead> read_head(ByteReader& body) const {
@@ -402,6 +478,10 @@ class Decoder final : public StrandDecoder {
     const auto known = static_cast<uint8_t>(kAnchorFlag | (steps_ ? step::kFlags : 0));
     if ((head.flags & ~known) != 0)
       return make_error(ErrorCode::BadInput, "strand payload has flags {}, known is {}", head.flags, known);
+    const bool is_sparse = (head.flags & step::kSparseFlag) != 0;
+    if (is_sparse && ((head.flags & step::kStepFlag) == 0 || (head.flags & kAnchorFlag) != 0))
+      return make_error(ErrorCode::BadInput, "strand payload has flags {}, which do not go together",
+                        head.flags);
     if (head.length_blend > kMaxLengthBlend)
       return make_error(ErrorCode::BadInput,
                         "strand payload blends lengths by {}/16, at most {} are possible", head.length_blend,
@@ -480,7 +560,7 @@ class Decoder final : public StrandDecoder {
     return {};
   }
 
-  static Status check_tables(const Tables& tables) {
+  static Status check_tables(std::span<const SymbolTable> tables) {
     for (size_t i = 0; i < tables.size(); ++i) {
       bool is_rising = tables[i].start[0] == 0;
       for (uint32_t k = 0; k < kSymbolCount; ++k) is_rising &= tables[i].share(k) > 0;
@@ -505,6 +585,7 @@ class Decoder final : public StrandDecoder {
   Frame frame_;
   SymbolSizes next_sizes_;
   SymbolSizes no_sizes_;
+  BlockCounts next_blocks_;
   ZstdDecompressor zstd_;
   uint32_t sequence_ = 0;
 };

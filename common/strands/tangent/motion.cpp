@@ -57,6 +57,7 @@ Lattice escaped(const Escape& escape, const Lattice& from) {
 }
 
 void History::reset(const Layout& layout) {
+  has_motion = false;
   for (size_t axis = 0; axis < 3; ++axis) {
     lattice[axis].assign(layout.plane_size(), 0);
     for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
@@ -64,9 +65,18 @@ void History::reset(const Layout& layout) {
   }
 }
 
-void History::forget_motion() {
-  for (auto* planes : {&velocity, &velocity_before, &residual, &residual_before, &drift})
+namespace {
+
+void clear(std::initializer_list<Planes<float>*> all) {
+  for (auto* planes : all)
     for (auto& plane : *planes) std::fill(plane.begin(), plane.end(), 0.0f);
+}
+
+}  // namespace
+
+void History::forget_motion() {
+  clear({&velocity, &velocity_before, &residual, &residual_before, &drift});
+  has_motion = false;
   head = {head.pose, {}};
 }
 
@@ -116,6 +126,16 @@ void remember(History& history, Frame& frame) {
   std::swap(history.residual_before, history.residual);
   std::swap(history.residual, frame.residual);
   std::swap(history.drift, frame.drift);
+  history.has_motion = true;
+}
+
+void remember_step(History& history, Frame& frame) {
+  history.head = frame.head;
+  std::swap(history.lattice, frame.lattice);
+  std::swap(history.residual, frame.residual);
+  if (!history.has_motion) return;
+  clear({&history.velocity, &history.velocity_before, &history.residual_before, &history.drift});
+  history.has_motion = false;
 }
 
 }  // namespace strandcast::tangent

@@ -73,7 +73,8 @@ struct History {
   Planes<float> velocity_before;
   Planes<float> residual;  // decoded less predicted position
   Planes<float> residual_before;
-  Planes<float> drift;  // sum of all velocities, older ones fading: where strands swing back from
+  Planes<float> drift;      // sum of all velocities, older ones fading: where strands swing back from
+  bool has_motion = false;  // any of velocities, residual_before and drift is not 0
 
   void reset(const Layout& layout);
   /// Forgets all but where the strands are and the pose: what a keyframe tells a late joiner.
@@ -168,13 +169,18 @@ struct QuantiseWork {
 /// they decode to. Of an anchor it fills both kinds of integers.
 void quantise_slice(simd::InstructionSet set, const QuantiseWork& work);
 void quantise_anchor(simd::InstructionSet set, const QuantiseWork& work);
+/// The same after a step of the solver, whose positions the history holds, without weights (step_row.h).
+void quantise_step(simd::InstructionSet set, const QuantiseWork& work);
 /// Decoder: positions, velocities and residuals of a slice from its integers.
 void place_slice(simd::InstructionSet set, const SliceWork& work);
 void place_anchor(simd::InstructionSet set, const SliceWork& work);
+void place_step(simd::InstructionSet set, const SliceWork& work);
 /// Decoder: positions of a slice of an anchor from the integers for who has no history.
 void place_shape(simd::InstructionSet set, const SliceWork& work);
 
 /// The frame becomes history.
 void remember(History& history, Frame& frame);
+/// One of quantise_step() or place_step(): of the motion only what was corrected is known afterwards.
+void remember_step(History& history, Frame& frame);
 
 }  // namespace strandcast::tangent

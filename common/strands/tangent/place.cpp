@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "common/strands/tangent/shape_row.h"
+#include "common/strands/tangent/step_row.h"
 
 namespace strandcast::tangent {
 namespace {
@@ -49,6 +50,17 @@ STRANDCAST_LANES void place_slice_lanes(const SliceWork& of) {
   });
 }
 
+STRANDCAST_LANES void place_step_lanes(const SliceWork& of) {
+  EscapeWalk escapes(of.frame.codes.escapes[of.slice]);
+  for_each_step_block(
+      of, [&](const StepRow& row, size_t place, const Expected& expected) STRANDCAST_LANES_LAMBDA {
+        const size_t at = row.at(place);
+        IntLaneVectors position = expected.placed(load_codes(of.frame.codes, at));
+        escapes.place(at, position, [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
+        row.store(expected, place, position);
+      });
+}
+
 STRANDCAST_LANES void place_anchor_lanes(const SliceWork& of) {
   EscapeWalk escapes(of.frame.codes.escapes[of.slice]);
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
@@ -82,6 +94,7 @@ STRANDCAST_LANES void place_shape_lanes(const SliceWork& of) {
 
 STRANDCAST_KERNEL(place_slice, SliceWork);
 STRANDCAST_KERNEL(place_anchor, SliceWork);
+STRANDCAST_KERNEL(place_step, SliceWork);
 STRANDCAST_KERNEL(place_shape, SliceWork);
 
 }  // namespace strandcast::tangent

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "common/strands/tangent/shape_row.h"
+#include "common/strands/tangent/step_row.h"
 
 namespace strandcast::tangent {
 namespace {
@@ -166,6 +167,22 @@ STRANDCAST_LANES void quantise_slice_lanes(const QuantiseWork& work) {
   });
 }
 
+STRANDCAST_LANES void quantise_step_lanes(const QuantiseWork& work) {
+  const SliceWork& of = work.of;
+  for_each_step_block(
+      of, [&](const StepRow& row, size_t place, const Expected& expected) STRANDCAST_LANES_LAMBDA {
+        const size_t at = row.at(place);
+        const IntLaneVectors wanted = load_vectors(work.target, at);
+        const CodeLanes origin{};
+        Found found(expected, wanted, origin);
+        find_codes(found);
+        escape_others(found, at, of.frame.codes.escapes[of.slice],
+                      [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
+        store_codes(found.codes, of.frame.codes, at);
+        row.store(expected, place, found.position);
+      });
+}
+
 STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
   const SliceWork& of = work.of;
   for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
@@ -189,5 +206,6 @@ STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
 
 STRANDCAST_KERNEL(quantise_slice, QuantiseWork);
 STRANDCAST_KERNEL(quantise_anchor, QuantiseWork);
+STRANDCAST_KERNEL(quantise_step, QuantiseWork);
 
 }  // namespace strandcast::tangent
