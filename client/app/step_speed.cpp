@@ -1,16 +1,10 @@
 #include "client/app/step_speed.h"
 
+#include "common/kernels/step_speed.h"
+
 namespace strandcast {
-namespace {
-
-double measure_step_ns() {
-  return 0.0;
-}
-
-}  // namespace
-
 double measured_step_ns() {
-  static const double step_ns = measure_step_ns();
+  static const double step_ns = measure_kernel_step_ns();
   return step_ns;
 }
 

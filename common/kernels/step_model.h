@@ -29,6 +29,7 @@ struct StepKernel {
   std::vector<PlaneRole> fixed = {};
   bool carries_way = false;  // Displacement is the way of the last substep, and RodAxis turns with segments
   std::array<uint32_t, 2> scratch_rows{};  // without and with twist
+  double cost = 1.0;                       // of a step by default parameters, against that of dftl
 };
 /// Numbers are given once and stay.
 const std::vector<StepKernel>& step_kernels();

@@ -207,8 +207,10 @@ void visit_stream(Visitor& v, StreamDesc& stream) {
   // What is not the default was chosen by somebody.
   stream.has_codec = v.chooses("codec", stream.has_codec || stream.codec != StreamDesc().codec);
   if (stream.has_codec) v.text("codec", stream.codec, kMaxNameBytes);
-  v.require("codec", stream.codec == "delta" || stream.codec == "raw" || stream.codec == "tangent",
-            "is unknown (known: delta, raw, tangent)");
+  v.require(
+      "codec",
+      stream.codec == "delta" || stream.codec == "raw" || stream.codec == "step" || stream.codec == "tangent",
+      "is unknown (known: delta, raw, step, tangent)");
   v.number("bound_m", stream.bound_m, kStreamBound);
   v.number("frame_width", stream.frame_width, kFrameWidth);
   v.number("frame_height", stream.frame_height, kFrameHeight);

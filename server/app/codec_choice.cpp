@@ -16,7 +16,9 @@
 namespace strandcast {
 namespace {
 
-constexpr const char* kFewestBits = "tangent";
+constexpr const char* kFewestBits = "step";
+constexpr const char* kMeasured =
+    "tangent";  // what viewers get that cannot step, and the dearest of its frames
 constexpr const char* kCheapest = "delta";
 constexpr int kWarmUpStates = 4, kMeasuredStates = 5;
 
@@ -50,9 +52,9 @@ std::vector<glm::vec3> swung(const SceneAsset& asset, double time_s) {
 }
 
 Result<EncodeCost> measure(const SceneDesc& scene, const SceneAsset& asset) {
-  ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(kFewestBits));
+  ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(kMeasured));
   encoder->set_rest_shape(asset.rest_position_m);
-  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(kFewestBits, scene.stream.bound_m));
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(kMeasured, scene.stream.bound_m));
   EncodeCost cost{0.0, shared_workers().size(), states_per_second(scene)};
   std::vector<double> cpu_ms;
   for (int i = 0; i < kWarmUpStates + kMeasuredStates; ++i) {
@@ -88,11 +90,10 @@ CodecChoice choose_codec(const EncodeCost& cost) {
       "tangent takes {:.1f} ms of processor time a state here, {:.1f} ms are there ({} processors, {:g} "
       "states a second)",
       cost.cpu_ms, room_ms, cost.processors, cost.states_hz);
-  if (is_kept) return {kFewestBits, fmt::format("Codec tangent: {}.", measured)};
-  return {kCheapest,
-          fmt::format("Codec delta: {}. It needs two to three times the bits; --set stream.codec=tangent has "
-                      "the fewest, and --set stream.strand_rate_hz={:g} gives it time.",
-                      measured, std::round(0.5 * cost.states_hz))};
+  if (is_kept) return {kFewestBits, fmt::format("Codec step: {}.", measured)};
+  return {kCheapest, fmt::format("Codec delta: {}. It needs many times the bits; --set stream.codec=step has "
+                                 "the fewest, and --set stream.strand_rate_hz={:g} gives it time.",
+                                 measured, std::round(0.5 * cost.states_hz))};
 }
 
 Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset) {
@@ -100,10 +101,9 @@ Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset
   if (stream.has_codec || stream.codec != kFewestBits)
     return CodecChoice{stream.codec, fmt::format("Codec {}: the scene names it.", stream.codec)};
   const size_t vertices = asset.rest_position_m.size();
-  if (vertices <= kAlwaysTangentVertices || asset.vertex_count < 2)
+  if (vertices <= kAlwaysFewestBitsVertices || asset.vertex_count < 2)
     return CodecChoice{
-        kFewestBits,
-        fmt::format("Codec tangent: the fewest bits, and {} vertices are soon encoded.", vertices)};
+        kFewestBits, fmt::format("Codec step: the fewest bits, and {} vertices are soon encoded.", vertices)};
   ASSIGN_OR_RETURN(const EncodeCost cost, measure(scene, asset));
   return choose_codec(cost);
 }

@@ -1,4 +1,4 @@
-// Which strand codec a scene gets that names none: "tangent", which takes the fewest bits, unless this
+// Which strand codec a scene gets that names none: "step", which takes the fewest bits, unless this
 // machine cannot encode so many vertices as often as the scene steps, with room left for the simulation.
 #pragma once
 
@@ -12,7 +12,7 @@
 namespace strandcast {
 
 /// Any two processors encode so few in time: nothing is measured.
-inline constexpr size_t kAlwaysTangentVertices = 64'000;
+inline constexpr size_t kAlwaysFewestBitsVertices = 64'000;
 /// Of the processors' time between two states, what encoding may take.
 inline constexpr double kEncodeShare = 2.0 / 3.0;
 
@@ -33,7 +33,7 @@ struct EncodeCost {
 CodecChoice choose_codec(const EncodeCost& cost);
 
 /// For a scene and what it loaded: its own codec when it names one, else the choice by size or, above
-/// kAlwaysTangentVertices, by encoding some states of it, which takes about half a second.
+/// kAlwaysFewestBitsVertices, by encoding some states of it, which takes about half a second.
 Result<CodecChoice> choose_codec(const SceneDesc& scene, const SceneAsset& asset);
 
 }  // namespace strandcast

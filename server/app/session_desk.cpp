@@ -69,6 +69,7 @@ ViewerCodec SessionDesk::choose_codec(const Hello& hello) const {
   facts.step_ns = hello.step_ns;
   facts.vertices = parts_.source.asset()->rest_position_m.size();
   facts.states_hz = parts_.scene.step_rate_hz;
+  facts.solver_cost = parts_.source.stats().step_cost;
   facts.substeps = std::max<uint32_t>(parts_.source.stats().substeps, 1);
   return choose_viewer_codec(parts_.codecs, facts);
 }

@@ -12,6 +12,10 @@ void StepLog::add(const StepTick& tick) {
   ticks_.push_back(tick);
 }
 
+double StepLog::step_cost() const {
+  return model_ == nullptr ? 0.0 : find_step_kernel(model_->kernel.shader_path)->cost;
+}
+
 std::shared_ptr<const StepTrail> StepLog::trail() const {
   if (model_ == nullptr || scene_ == nullptr) return nullptr;
   return std::make_shared<StepTrail>(StepTrail{model_, scene_, ticks_});

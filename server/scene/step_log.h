@@ -15,6 +15,8 @@ class StepLog {
   /// The scene of the steps from now on.
   void set_scene(const StepScene& scene);
   void add(const StepTick& tick);
+  /// StepKernel::cost of the model; 0 without one.
+  double step_cost() const;
   /// As it is now; nullptr while there is no model.
   std::shared_ptr<const StepTrail> trail() const;
 

@@ -451,6 +451,7 @@ void SimLoop::update_stats() {
   stats.overstretched = publisher_->overstretch_count();
   stats.solver_builds = solver_builds_;
   stats.solver_bytes = solver_->memory_bytes();
+  stats.step_cost = step_log_.step_cost();
   stats.solver_name = config_.scene.solver.name;
   stats.substeps = config_.scene.substeps;
   stats.strand_rate_hz = config_.scene.stream.strand_rate_hz;

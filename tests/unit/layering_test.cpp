@@ -33,7 +33,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
   static const std::set<std::string> kGl = with({"common/gl", "shaders/shared", "common/log"}, kBase);
   static const std::set<std::string> kRender =
       with(with({"common/render", "common/simd", "shaders/lib"}, kGl), kStreams);
-  static const std::set<std::string> kAll = with(with(kRender, kWire), kReplay);
+  static const std::set<std::string> kAll = with(with(with(kRender, kWire), kReplay), kKernels);
   static const std::map<std::string, std::set<std::string>> kAllowed = {
       {"common/base", {}},
       {"common/simd", kBase},

@@ -584,17 +584,17 @@ TEST(SlowMotion, WaysOutSaveWhatTheySay) {
   EXPECT_LE(text.size(), kMaxTextChars);
 }
 
-TEST(CodecChoice, TangentUnlessItTakesTooMuchOfTheTime) {
+TEST(CodecChoice, StepUnlessTangentTakesTooMuchOfTheTime) {
   // Two processors have 33.3 ms between two states of 60 a second, two thirds of which are 22.2.
-  EXPECT_EQ(choose_codec(EncodeCost{22.2, 2, 60.0}).codec, "tangent");
+  EXPECT_EQ(choose_codec(EncodeCost{22.2, 2, 60.0}).codec, "step");
   const CodecChoice dear = choose_codec(EncodeCost{22.3, 2, 60.0});
   EXPECT_EQ(dear.codec, "delta");
   EXPECT_THAT(dear.reason,
               HasSubstr("22.3 ms of processor time a state here, 22.2 ms are there (2 processors"));
-  EXPECT_THAT(dear.reason, HasSubstr("--set stream.codec=tangent"));
+  EXPECT_THAT(dear.reason, HasSubstr("--set stream.codec=step"));
   EXPECT_THAT(dear.reason, HasSubstr("stream.strand_rate_hz=30"));
-  EXPECT_EQ(choose_codec(EncodeCost{44.4, 2, 30.0}).codec, "tangent") << "half as often, twice the time";
-  EXPECT_EQ(choose_codec(EncodeCost{44.4, 4, 60.0}).codec, "tangent");
+  EXPECT_EQ(choose_codec(EncodeCost{44.4, 2, 30.0}).codec, "step") << "half as often, twice the time";
+  EXPECT_EQ(choose_codec(EncodeCost{44.4, 4, 60.0}).codec, "step");
 }
 
 TEST(CodecChoice, WhatASceneNamesStays) {
@@ -603,9 +603,9 @@ TEST(CodecChoice, WhatASceneNamesStays) {
   asset.vertex_count = 2;
   asset.rest_position_m.resize(4);
   const auto chosen = [&](const SceneDesc& scene) { return choose_codec(scene, asset).value().codec; };
-  EXPECT_EQ(chosen(built_in_scene()), "tangent") << "few vertices are not measured";
-  EXPECT_EQ(chosen(parse_scene("", "empty", {}).value()), "tangent") << "scene files too";
-  for (const char* codec : {"delta", "raw", "tangent"}) {
+  EXPECT_EQ(chosen(built_in_scene()), "step") << "few vertices are not measured";
+  EXPECT_EQ(chosen(parse_scene("", "empty", {}).value()), "step") << "scene files too";
+  for (const char* codec : {"delta", "raw", "step", "tangent"}) {
     const auto named = built_in_scene_with({std::string("stream.codec=") + codec});
     EXPECT_TRUE(named->stream.has_codec);
     EXPECT_EQ(chosen(*named), codec);
@@ -622,7 +622,7 @@ TEST(CodecChoice, MeasuresLargeScenes) {
   ASSERT_TRUE(content.ok());
   const auto choice = choose_codec(scene, make_scene_asset(content->groom, {}));
   ASSERT_TRUE(choice.ok()) << choice.error().to_string();
-  EXPECT_THAT(choice->codec, testing::AnyOf("tangent", "delta"));
+  EXPECT_THAT(choice->codec, testing::AnyOf("step", "delta"));
   EXPECT_THAT(choice->reason, HasSubstr("ms of processor time a state here"));
 }
 

@@ -17,6 +17,8 @@ constexpr size_t kMostBytesPerVertex = 192;
 constexpr size_t kMostBytesBeside = 1 << 16;
 /// Frames with more are better off with fitted weights: of bits_apart().
 constexpr double kMostSparseBits = 1.0;
+/// Of the same, what steps may tell less than that nothing moved: strands at rest are told well by both.
+constexpr double kMostBitsWorse = 1.0;
 /// Of vertices every so many are looked at.
 constexpr size_t kSampleRun = 8;
 constexpr size_t kSampleStep = 128;
@@ -172,9 +174,9 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
       read_ticks(reader, snapshot.tick, snapshot.world_from_head, wind_read);
   CHECK(ticks.ok());
   step(*ticks, moment_of(snapshot), layout, history);
-  // Where steps tell less than that nothing moved, motion does.
+  // Where steps tell much less than that nothing moved, something else moves the strands.
   const double bits = bits_apart(layout, expected_, target);
-  if (bits > bits_apart(layout, history.lattice, target)) return flags;
+  if (bits > bits_apart(layout, history.lattice, target) + kMostBitsWorse) return flags;
   wind_ = wind_read;
   bytes_.insert(bytes_.end(), said.begin(), said.end());
   std::swap(history.lattice, expected_);
