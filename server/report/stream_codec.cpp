@@ -1,6 +1,6 @@
 #include "server/report/stream_codec.h"
 
-#include <cmath>
+#include <algorithm>
 
 #include "common/base/check.h"
 #include "common/strands/strand_codec.h"
@@ -8,31 +8,29 @@
 namespace strandcast {
 namespace {
 
+/// Also before servers serve it.
+bool predicts_by_steps(const StrandCodecInfo& info) {
+  return info.predicts || info.name == "step";
+}
+
 /// A strand codec of common/strands, used as server and viewer use it.
 class OwnCodec final : public StreamCodec {
  public:
   static Result<std::unique_ptr<StreamCodec>> make(const std::string& name, float bound_m,
-                                                   const StreamShape& shape) {
+                                                   std::optional<WindTold> wind, const StreamShape& shape) {
     auto codec = std::unique_ptr<OwnCodec>(new OwnCodec(name, shape));
     ASSIGN_OR_RETURN(codec->quantum_m_, lattice_step_m(name, bound_m));
     ASSIGN_OR_RETURN(codec->encoder_, make_strand_encoder(name));
     ASSIGN_OR_RETURN(codec->decoder_, codec->new_decoder());
+    if (wind) codec->told_wind_.emplace(*wind);
     codec->encoder_->set_rest_shape(shape.rest_in_head_m);
     return std::unique_ptr<StreamCodec>(std::move(codec));
   }
 
   // Publishing: it happens once for all codecs and classes of a server.
   Status take(const StreamFrame& frame) override {
-    QuantiseInput input;
-    input.tick = frame.tick;
-    input.sim_time_ns = frame.sim_time_ns;
-    input.trail = frame.trail;
-    input.world_from_head = frame.world_from_head;
-    input.strand_count = shape_.strand_count;
-    input.vertex_count = shape_.vertex_count;
-    input.quantum_m = quantum_m_;
-    input.position_in_head_m = frame.position_in_head_m;
-    snapshot_ = quantise(input).snapshot;
+    snapshot_ = on_lattice(frame, quantum_m_);
+    if (told_wind_) snapshot_.trail = told_wind_->trail(snapshot_.trail);
     return {};
   }
 
@@ -77,11 +75,52 @@ class OwnCodec final : public StreamCodec {
   float quantum_m_ = 0.0f;
   std::unique_ptr<StrandEncoder> encoder_;
   std::unique_ptr<StrandDecoder> decoder_;
+  std::optional<ToldWind> told_wind_;
   Snapshot snapshot_;
   std::shared_ptr<const Snapshot> decoded_;
 };
 
 }  // namespace
+
+Snapshot on_lattice(const StreamFrame& frame, float quantum_m) {
+  QuantiseInput input;
+  static_cast<SnapshotInfo&>(input) = frame.published;
+  input.quantum_m = quantum_m;
+  input.position_in_head_m = frame.position_in_head_m;
+  Snapshot snapshot = frame.published;
+  snapshot.quantum_m = quantum_m;
+  snapshot.lattice = quantise(input).snapshot.lattice;
+  return snapshot;
+}
+
+const char* to_string(WindTold told) {
+  switch (told) {
+    case WindTold::Known:
+      return "known";
+    case WindTold::Mean:
+      return "mean";
+    case WindTold::Unknown:
+      return "unknown";
+  }
+  return "";
+}
+
+std::shared_ptr<const StepTrail> ToldWind::trail(const std::shared_ptr<const StepTrail>& whole) {
+  if (told_ == WindTold::Known || whole == nullptr || whole->scene == nullptr) return whole;
+  if (whole->scene != whole_scene_) {
+    auto scene = std::make_shared<StepScene>(*whole->scene);
+    scene->waves.clear();
+    whole_scene_ = whole->scene;
+    told_scene_ = std::move(scene);
+  }
+  auto told = std::make_shared<StepTrail>(*whole);
+  told->scene = told_scene_;
+  for (StepTick& tick : told->ticks) {
+    tick.has_waves = false;
+    if (told_ == WindTold::Unknown) tick.wind_mps = glm::dvec3(0.0);
+  }
+  return told;
+}
 
 std::vector<StreamCodecRow> own_stream_codecs(double bound_m) {
   std::vector<StreamCodecRow> rows;
@@ -91,10 +130,15 @@ std::vector<StreamCodecRow> own_stream_codecs(double bound_m) {
     row.is_ours = true;
     row.is_temporal = info.name != "raw";
     row.bound_m = bound_m;
-    row.make = [name = info.name, bound_m](const StreamShape& shape) {
-      return OwnCodec::make(name, static_cast<float>(bound_m), shape);
-    };
-    rows.push_back(std::move(row));
+    std::vector<std::optional<WindTold>> winds = {std::nullopt};
+    if (predicts_by_steps(info)) winds.assign(std::begin(kWindsTold), std::end(kWindsTold));
+    for (const std::optional<WindTold> wind : winds) {
+      row.wind = wind;
+      row.make = [name = info.name, bound_m, wind](const StreamShape& shape) {
+        return OwnCodec::make(name, static_cast<float>(bound_m), wind, shape);
+      };
+      rows.push_back(row);
+    }
   }
   return rows;
 }

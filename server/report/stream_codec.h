@@ -6,13 +6,14 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/kernels/step_model.h"
-#include "common/math/pose.h"
+#include "common/strands/snapshot.h"
 
 namespace strandcast {
 
@@ -26,11 +27,33 @@ struct StreamShape {
 
 /// One recorded state.
 struct StreamFrame {
-  uint64_t tick = 0;
-  int64_t sim_time_ns = 0;
-  Pose world_from_head;
-  std::shared_ptr<const StepTrail> trail;     // as in Snapshot
+  /// As the publisher gave it, copied whole, but without its lattice: every codec and bound has its own.
+  Snapshot published;
   std::vector<glm::vec3> position_in_head_m;  // (vertex_count x strand_count) vertex-major, strand fastest
+};
+
+/// The published state with its positions on a lattice of this step.
+Snapshot on_lattice(const StreamFrame& frame, float quantum_m);
+
+/// What a codec that predicts by steps of the solver is told of the wind.
+enum class WindTold {
+  Known,   // all that the solver is
+  Mean,    // the wind at the head, as it changes; not the waves that vary it over the head
+  Unknown  // nothing
+};
+inline constexpr WindTold kWindsTold[] = {WindTold::Known, WindTold::Mean, WindTold::Unknown};
+/// "known", "mean", "unknown".
+const char* to_string(WindTold told);
+/// Trails with as much of their wind, of one stream: as long as the scene stays, so does what is told of it.
+class ToldWind {
+ public:
+  explicit ToldWind(WindTold told) : told_(told) {}
+  std::shared_ptr<const StepTrail> trail(const std::shared_ptr<const StepTrail>& whole);
+
+ private:
+  WindTold told_;
+  std::shared_ptr<const StepScene> whole_scene_;
+  std::shared_ptr<const StepScene> told_scene_;
 };
 
 class StreamCodec {
@@ -56,10 +79,12 @@ struct StreamCodecRow {
   bool is_temporal = false;    // uses the frames before
   double bound_m = 0.0;        // Euclidean, of every vertex
   bool is_bound_free = false;  // the same whatever the bound: bound_m is what it keeps by itself
+  std::optional<WindTold> wind =
+      {};  // of a codec that predicts by steps of the solver; others are told nothing
   std::function<Result<std::unique_ptr<StreamCodec>>(const StreamShape&)> make;
 };
 
-/// Every strand codec of the project at one bound.
+/// Every strand codec of the project at one bound; one that predicts by steps once for each of kWindsTold.
 std::vector<StreamCodecRow> own_stream_codecs(double bound_m);
 
 }  // namespace strandcast

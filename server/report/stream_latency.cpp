@@ -121,19 +121,6 @@ class StageList {
   double frame_ms_ = 0.0;
 };
 
-Snapshot published(const StreamRecording& recording, size_t index, float quantum_m) {
-  const StreamFrame& frame = recording.frames[index];
-  QuantiseInput input;
-  input.tick = index + 1;
-  input.sim_time_ns = std::llround(static_cast<double>(index + 1) * kStreamFrameS * 1e9);
-  input.world_from_head = frame.world_from_head;
-  input.strand_count = recording.shape.strand_count;
-  input.vertex_count = recording.shape.vertex_count;
-  input.quantum_m = quantum_m;
-  input.position_in_head_m = frame.position_in_head_m;
-  return quantise(input).snapshot;
-}
-
 }  // namespace
 
 Result<StreamLatency> measure_latency(const StreamRecording& recording, const std::string& codec,
@@ -154,7 +141,7 @@ Result<StreamLatency> measure_latency(const StreamRecording& recording, const st
       const int64_t end_ns = now_ns();
       return static_cast<double>(end_ns - std::exchange(begin_ns, end_ns)) * 1e-6;
     };
-    const Snapshot snapshot = published(recording, i, quantum_m);
+    const Snapshot snapshot = on_lattice(recording.frames[i], quantum_m);
     const double publish_ms = lap_ms();
     const EncodedFramePtr frame = encoder->encode(snapshot);
     if (!frame) return make_error(ErrorCode::LimitExceeded, "a frame is too large to send");

@@ -148,6 +148,36 @@ std::vector<StreamMotion> built_in_stream_motions() {
           {"built-in violent", violent_head, kEndless}};
 }
 
+const std::vector<StreamClip>& stream_clips() {
+  static const std::vector<StreamClip> kClips = {
+      {"walking", {"cmu_131_03.bvh"}},
+      // A salsa with spins.
+      {"wild", {"cmu_61_12.bvh", "61_12.bvh", "cmu_61_05_scaled.bvh"}},
+      // By a camera: the head jitters from frame to frame.
+      {"glitching", {"fair1_dab.bvh"}}};
+  return kClips;
+}
+
+Result<FoundClips> find_stream_clips(const std::filesystem::path& folder, const MotionFileOptions& options) {
+  FoundClips found;
+  for (const StreamClip& clip : stream_clips()) {
+    const auto name =
+        std::find_if(clip.file_names.begin(), clip.file_names.end(), [&](const char* file_name) {
+          std::error_code error;
+          return std::filesystem::is_regular_file(folder / file_name, error);
+        });
+    if (name == clip.file_names.end()) {
+      found.notes.push_back(
+          fmt::format("No {} clip: {} is not there.", clip.character, clip.file_names.front()));
+      continue;
+    }
+    ASSIGN_OR_RETURN(StreamMotion motion, load_stream_motion(folder / *name, options));
+    found.notes.push_back(fmt::format("The {} clip is {}.", clip.character, motion.name));
+    found.motions.push_back(std::move(motion));
+  }
+  return found;
+}
+
 Result<StreamMotion> load_stream_motion(const std::filesystem::path& path, const MotionFileOptions& options) {
   ASSIGN_OR_RETURN(MotionFile file, load_motion_file(path, options));
   for (const std::string& note : file.notes) fmt::print(stderr, "{}\n", note);

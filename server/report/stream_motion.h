@@ -59,6 +59,18 @@ MotionSurvey survey_motion(const StreamMotion& motion, double seconds);
 
 /// idle, active and violent, built in.
 std::vector<StreamMotion> built_in_stream_motions();
+/// Captured heads that the report takes where they are at hand, by what they are for.
+struct StreamClip {
+  const char* character;                // "walking", "wild", "glitching"
+  std::vector<const char*> file_names;  // the first that is there
+};
+const std::vector<StreamClip>& stream_clips();
+struct FoundClips {
+  std::vector<StreamMotion> motions;
+  std::vector<std::string> notes;  // a sentence for each clip, found or missing
+};
+/// From a folder that need not exist.
+Result<FoundClips> find_stream_clips(const std::filesystem::path& folder, const MotionFileOptions& options);
 /// What was assumed about the file is said on standard error.
 Result<StreamMotion> load_stream_motion(const std::filesystem::path& path, const MotionFileOptions& options);
 

@@ -8,6 +8,7 @@
 #include "common/base/profile.h"
 #include "common/groom/groom_asset.h"
 #include "common/strands/scene_asset.h"
+#include "server/publish/publisher.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
 #include "server/scene/step_log.h"
@@ -19,16 +20,8 @@ namespace {
 // Strands swing into the motion before anything is recorded.
 constexpr double kSettleS = 1.5;
 constexpr double kNsPerMs = 1e6;
-
-SceneDesc scene_for(const RecordingDesc& desc) {
-  SceneDesc scene = built_in_scene();
-  auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
-  groom.strand_count = desc.size.strand_count;
-  groom.vertex_count = desc.size.vertex_count;
-  if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
-  scene.step_rate_hz = 1.0 / kStreamFrameS;
-  return scene;
-}
+// Of the lattice that the publisher is given and nobody sees.
+constexpr float kPublishedBoundM = 1e-4f;
 
 Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, Executor* executor) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
@@ -39,18 +32,27 @@ Result<std::unique_ptr<Solver>> make_solver(const SceneDesc& scene, Executor* ex
 }
 
 /// As the publisher does: head-relative world axes to head space, in double.
-Result<StreamFrame> frame_of(const SolverState& state, const Pose& world_from_head) {
-  StreamFrame frame;
-  frame.world_from_head = world_from_head;
-  frame.position_in_head_m.reserve(state.position_m.size());
+Result<std::vector<glm::vec3>> in_head_m(const SolverState& state, const Pose& world_from_head) {
+  std::vector<glm::vec3> positions_m;
+  positions_m.reserve(state.position_m.size());
   const glm::dmat3 head_from_world = glm::transpose(glm::mat3_cast(world_from_head.rotation));
   for (const glm::vec3& position : state.position_m) {
     const glm::vec3 in_head(head_from_world * glm::dvec3(position));
     if (!std::isfinite(in_head.x) || !std::isfinite(in_head.y) || !std::isfinite(in_head.z))
       return make_error(ErrorCode::Unsupported, "the solver left numbers that cannot be used");
-    frame.position_in_head_m.push_back(in_head);
+    positions_m.push_back(in_head);
   }
-  return frame;
+  return positions_m;
+}
+
+/// What the publisher makes of the solver's state, without the lattice. `input` has the tick, its time and
+/// trail.
+Snapshot published(Publisher& publisher, Solver& solver, const StepBuilder& builder, PublishInput input) {
+  input.world_from_head = builder.world_from_head();
+  input.head_velocity_mps = builder.head_velocity_mps();
+  Snapshot snapshot = *publisher.publish(solver, input);
+  snapshot.lattice = {};
+  return snapshot;
 }
 
 double hair_rms_mps(const std::vector<StreamFrame>& frames) {
@@ -74,6 +76,16 @@ double elapsed_ms(int64_t begin_ns) {
 
 }  // namespace
 
+SceneDesc recorded_scene(const RecordingDesc& desc) {
+  SceneDesc scene = built_in_scene();
+  auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
+  groom.strand_count = desc.size.strand_count;
+  groom.vertex_count = desc.size.vertex_count;
+  if (!desc.solver.empty() && desc.solver != scene.solver.name) scene.solver = {desc.solver, {}};
+  scene.step_rate_hz = 1.0 / kStreamFrameS;
+  return scene;
+}
+
 std::string to_string(const StreamSize& size) {
   return fmt::format("{} x {}", size.strand_count, size.vertex_count);
 }
@@ -94,13 +106,14 @@ Status check_recording(const RecordingDesc& desc) {
 
 Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   RETURN_IF_ERROR(check_recording(desc));
-  const SceneDesc scene = scene_for(desc);
+  const SceneDesc scene = recorded_scene(desc);
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
   ASSIGN_OR_RETURN(const auto solver, make_solver(scene, desc.executor));
 
   StreamRecording recording;
   recording.motion_name = desc.motion.name;
   recording.moved_by = desc.executor != nullptr ? to_string(desc.executor->info().device) : "double";
+  recording.solver = scene.solver.name;
   recording.shape = {desc.size.strand_count, desc.size.vertex_count,
                      make_scene_asset(content.groom, {}).rest_position_m};
   const MotionSurvey survey = survey_motion(desc.motion, desc.seconds);
@@ -115,6 +128,7 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
   RETURN_IF_ERROR(solver->load(content.groom, head_at(-kSettleS).rotation));
   const auto settle_frames = static_cast<int>(std::lround(kSettleS / kStreamFrameS));
   const auto frame_count = static_cast<int>(std::lround(desc.seconds / kStreamFrameS));
+  Publisher publisher(content.groom, quantum_for_bound(kPublishedBoundM));
   StepLog log;
   log.set_model(solver->step_model());
   log.set_scene(builder.step_scene(features));
@@ -134,10 +148,13 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
     solver->read(state);
     recording.step_ms.push_back(elapsed_ms(begin_ns));
     poses.push_back(input.world_from_head);
-    ASSIGN_OR_RETURN(StreamFrame frame, frame_of(state, input.world_from_head));
-    frame.tick = tick;
-    frame.sim_time_ns = std::llround((kSettleS + t_s) * 1e9);
-    frame.trail = log.trail();
+    StreamFrame frame;
+    ASSIGN_OR_RETURN(frame.position_in_head_m, in_head_m(state, input.world_from_head));
+    PublishInput publish;
+    publish.tick = tick;
+    publish.sim_time_ns = std::llround((kSettleS + t_s) * 1e9);
+    publish.trail = log.trail();
+    frame.published = published(publisher, *solver, builder, std::move(publish));
     recording.frames.push_back(std::move(frame));
   }
   recording.head = measure_pace(poses, kStreamFrameS);

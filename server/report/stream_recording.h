@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/scene/scene_desc.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_motion.h"
 #include "server/sim/executor/executor.h"
@@ -13,6 +14,9 @@ namespace strandcast {
 
 /// A recording is kept in memory; more than this is refused.
 inline constexpr size_t kMaxRecordingBytes = size_t{1} << 30;
+
+/// The first differences are not typical yet; as codec_bench.
+inline constexpr size_t kStartFrames = 9;
 
 struct StreamSize {
   uint32_t strand_count = 0;
@@ -34,6 +38,7 @@ struct RecordingDesc {
 
 struct StreamRecording {
   std::string motion_name;
+  std::string solver;
   std::string moved_by;       // the executor: "gl", "lanes"; "double". Others round otherwise
   HeadPace head;              // of the recorded part
   double hair_rms_mps = 0.0;  // of all vertices, in head space
@@ -43,6 +48,9 @@ struct StreamRecording {
   std::vector<StreamFrame> frames;
   std::vector<double> step_ms;  // (frames) wall time of solving and reading back
 };
+
+/// The built-in scene with these strands and this solver.
+SceneDesc recorded_scene(const RecordingDesc& desc);
 
 /// BadInput when the motion is too short, LimitExceeded when the recording would be too large.
 Status check_recording(const RecordingDesc& desc);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <iterator>
 #include <set>
 
 #include "common/base/check.h"
@@ -19,12 +21,21 @@
 namespace strandcast {
 namespace {
 
-constexpr StreamSize kFullSizes[] = {{10'000, 16}, {2'228, 32}};
+// The first is what plots and goals are of; the second the built-in scene's.
+constexpr StreamSize kFullSizes[] = {{10'000, 16}, {2'000, 16}, {2'228, 32}};
 constexpr StreamSize kQuickSizes[] = {{1'000, 16}, {300, 32}};
 constexpr double kPartSeconds = kSurveyPartS;
 constexpr double kShortestSeconds = 0.2;  // more than kStartFrames
 constexpr double kLongestSeconds = 60.0;
 constexpr const char* kLatencyCodec = "tangent";
+// Strand models that move otherwise than the built-in scene's: a rod with the constants of hair, and springs.
+constexpr const char* kOtherSolvers[] = {"direct_rod", "mass_spring"};
+// For the progress shown: of a recording in runs of a codec, and of a step of the view in vertices of those.
+constexpr double kRecordingCost = 3.0;
+constexpr double kViewCostPerPixel = 2.0;
+constexpr uint32_t kLeastViewSide = 64;
+constexpr RenderSize kFullView{1280, 720};
+constexpr RenderSize kQuickView{320, 180};
 
 struct Clock {
   double wall_ms = 0.0;
@@ -93,14 +104,40 @@ Result<StreamSize> parse_size(const std::string& text) {
   return size;
 }
 
+StreamSize built_in_size() {
+  const SceneDesc scene = built_in_scene();
+  const auto& groom = std::get<ProceduralGroomDesc>(scene.groom);
+  return {groom.strand_count, groom.vertex_count};
+}
+
+/// Even, as H.264 takes them.
+Result<RenderSize> parse_view(const std::string& text) {
+  RenderSize size{0, 0};
+  int read = 0;
+  const bool is_whole = std::sscanf(text.c_str(), "%5ux%5u%n", &size.width, &size.height, &read) == 2 &&
+                        static_cast<size_t>(read) == text.size();
+  if (!is_whole || size.width % 2 != 0 || size.height % 2 != 0 ||
+      std::min(size.width, size.height) < kLeastViewSide || size.width > kMaxPictureWidth ||
+      size.height > kMaxPictureHeight)
+    return make_error(ErrorCode::BadInput, "--view is '{}' (allowed: WIDTHxHEIGHT, even, {} to {} x {})",
+                      text.substr(0, 32), kLeastViewSide, kMaxPictureWidth, kMaxPictureHeight);
+  return size;
+}
+
 struct Plan {
   std::vector<StreamMotion> motions;
+  std::vector<std::string> clip_notes;
+  std::vector<std::string> solvers;
+  std::vector<StreamCase> cases;
+  StreamViewDesc view;
+  size_t view_motion = 0;  // index
+  StreamSize view_strands;
   std::vector<StreamSize> sizes;
   double seconds = 0.0;
 };
 
-Result<Plan> make_plan(const StreamingOptions& options) {
-  Plan plan;
+/// What can be refused at once comes before files are looked for.
+Status plan_settings(const StreamingOptions& options, Plan& plan) {
   for (const std::string& text : options.sizes) {
     ASSIGN_OR_RETURN(const StreamSize size, parse_size(text));
     plan.sizes.push_back(size);
@@ -113,26 +150,70 @@ Result<Plan> make_plan(const StreamingOptions& options) {
   if (!(plan.seconds >= kShortestSeconds && plan.seconds <= kLongestSeconds))
     return make_error(ErrorCode::BadInput, "--seconds is {:g} (allowed: {:g} to {:g})", plan.seconds,
                       kShortestSeconds, kLongestSeconds);
+  for (const std::string& solver : options.solvers)
+    if (std::find(plan.solvers.begin(), plan.solvers.end(), solver) == plan.solvers.end())
+      plan.solvers.push_back(solver);
+  if (plan.solvers.empty()) {
+    plan.solvers = {built_in_scene().solver.name};
+    if (!options.is_quick)
+      plan.solvers.insert(plan.solvers.end(), std::begin(kOtherSolvers), std::end(kOtherSolvers));
+  }
+  for (const std::string& solver : plan.solvers)
+    if (const auto row = find_solver(solver); !row) return row.error();
+  plan.view_strands = options.sizes.empty() ? built_in_size() : plan.sizes.front();
+  plan.view.size = options.is_quick ? kQuickView : kFullView;
+  if (options.view.empty()) return {};
+  ASSIGN_OR_RETURN(plan.view.size, parse_view(options.view));
+  return {};
+}
+
+Status check_recordings(const std::vector<StreamMotion>& motions, const Plan& plan) {
+  for (const StreamSize& size : plan.sizes)
+    for (const StreamMotion& motion : motions)
+      RETURN_IF_ERROR(check_recording({motion, size, plan.seconds, "", nullptr}));
+  return {};
+}
+
+Status plan_motions(const StreamingOptions& options, Plan& plan) {
   for (const std::filesystem::path& path : options.motions) {
     ASSIGN_OR_RETURN(StreamMotion motion, load_stream_motion(path, options.motion_file));
     plan.motions.push_back(std::move(motion));
   }
   if (plan.motions.empty()) plan.motions = built_in_stream_motions();
-  if (!options.solver.empty()) {
-    if (const auto row = find_solver(options.solver); !row) return row.error();
+  RETURN_IF_ERROR(check_recordings(plan.motions, plan));
+  if (options.clips.empty()) return {};
+  ASSIGN_OR_RETURN(FoundClips found, find_stream_clips(options.clips, options.motion_file));
+  plan.clip_notes = std::move(found.notes);
+  for (StreamMotion& clip : found.motions) {
+    if (clip.duration_s >= plan.seconds)
+      plan.motions.push_back(std::move(clip));
+    else
+      plan.clip_notes.push_back(
+          fmt::format("{} is left out: it lasts {:.1f} s.", clip.name, clip.duration_s));
   }
-  for (const StreamSize& size : plan.sizes)
-    for (const StreamMotion& motion : plan.motions)
-      RETURN_IF_ERROR(check_recording({motion, size, plan.seconds, options.solver, nullptr}));
+  return {};
+}
+
+Result<Plan> make_plan(const StreamingOptions& options) {
+  Plan plan;
+  RETURN_IF_ERROR(plan_settings(options, plan));
+  RETURN_IF_ERROR(plan_motions(options, plan));
+  std::vector<MotionLevel> levels;
+  for (const StreamMotion& motion : plan.motions) levels.push_back(survey_motion(motion, plan.seconds).level);
+  plan.cases = stream_cases(levels, plan.solvers, plan.sizes);
+  // Walking where there is any.
+  const auto walk = std::find(levels.begin(), levels.end(), MotionLevel::Active);
+  if (walk != levels.end()) plan.view_motion = static_cast<size_t>(walk - levels.begin());
   return plan;
 }
 
 /// Our codecs at every bound; peers at the goals' bound, and at the others where a curve is drawn.
-std::vector<StreamCodecRow> codecs_for(bool has_curve) {
-  std::vector<StreamCodecRow> codecs = bound_free_stream_codecs();
+std::vector<StreamCodecRow> codecs_for(const StreamCase& one) {
+  std::vector<StreamCodecRow> codecs;
+  if (one.has_peers) codecs = bound_free_stream_codecs();
   for (const double bound_m : kStreamBoundsM) {
     for (StreamCodecRow& row : own_stream_codecs(bound_m)) codecs.push_back(std::move(row));
-    if (bound_m != kGoalBoundM && !has_curve) continue;
+    if (!one.has_peers || (bound_m != kGoalBoundM && !one.has_curve_of_peers)) continue;
     for (StreamCodecRow& row : peer_stream_codecs(bound_m)) codecs.push_back(std::move(row));
   }
   return codecs;
@@ -140,27 +221,30 @@ std::vector<StreamCodecRow> codecs_for(bool has_curve) {
 
 class StreamingRun {
  public:
-  StreamingRun(StreamingReport& report, Executor* executor, const StreamingOptions& options)
-      : report_(report), executor_(executor), solver_(options.solver), progress_({"streaming"}) {}
+  StreamingRun(StreamingReport& report, Executor* executor, const Plan& plan)
+      : report_(report), executor_(executor), plan_(plan), progress_({"streaming"}) {
+    progress_.expect(1 + view_step_count(), view_cost() * view_step_count());
+    for (const StreamCase& one : plan.cases) {
+      const size_t codecs = codecs_for(one).size();
+      progress_.expect(static_cast<uint32_t>(1 + codecs),
+                       (kRecordingCost + static_cast<double>(codecs)) * codec_cost(one));
+    }
+  }
 
-  Status add(const StreamMotion& motion, const StreamSize& size, MotionPart part) {
-    const std::string name = fmt::format("{}, {} part, {}", motion.name, to_string(part), to_string(size));
-    progress_.expect(1, 0.0);
+  Status add(const StreamCase& one) {
+    const StreamMotion& motion = plan_.motions[one.motion];
+    const std::string name =
+        fmt::format("{}, {} part, {}, {}", motion.name, to_string(one.part), one.solver, to_string(one.size));
     progress_.begin_run(name + ": recording");
-    auto recorded = record_strands({motion, size, report_.seconds, solver_, executor_, part});
+    auto recorded = record_strands({motion, one.size, report_.seconds, one.solver, executor_, one.part});
     if (!recorded) return at(motion.name, recorded.error());
-    progress_.end_run(0.0);
+    progress_.end_run(kRecordingCost * codec_cost(one));
     StreamRecording& recording = *recorded;
-    const bool has_curve =
-        seen_.insert({recording.motion_level, size.strand_count, size.vertex_count}).second;
-    const std::vector<StreamCodecRow> codecs = codecs_for(has_curve);
-    const auto cost = static_cast<double>(size.vertices() * recording.frames.size());
-    progress_.expect(static_cast<uint32_t>(codecs.size()), cost * static_cast<double>(codecs.size()));
-    for (const StreamCodecRow& codec : codecs) {
+    for (const StreamCodecRow& codec : codecs_for(one)) {
       progress_.begin_run(fmt::format("{}: {}", name, codec.name));
       ASSIGN_OR_RETURN(StreamingRow row, measure_codec(codec, recording));
       report_.rows.push_back(std::move(row));
-      progress_.end_run(cost);
+      progress_.end_run(codec_cost(one));
     }
     // Walking on the first size, or whatever comes first.
     const bool is_walk = recording.motion_level == MotionLevel::Active;
@@ -173,16 +257,58 @@ class StreamingRun {
     return {};
   }
 
+  /// In the built-in scene's strands or, where sizes were asked for, in the first.
+  Status add_view() {
+    progress_.begin_run("view: recording");
+    const RecordingDesc desc{plan_.motions[plan_.view_motion], plan_.view_strands, report_.seconds,
+                             report_.solver, executor_};
+    ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
+    progress_.end_run(0.0);
+    uint32_t left = view_step_count();
+    const auto on_progress = [&](const std::string& doing) {
+      if (left == 0) return;
+      --left;
+      progress_.begin_run("view: " + doing);
+      progress_.end_run(view_cost());
+    };
+    ASSIGN_OR_RETURN(report_.view, measure_view(plan_.view, recorded_scene(desc), recording, on_progress));
+    while (left > 0) on_progress("done");
+    return {};
+  }
+
  private:
+  double codec_cost(const StreamCase& one) const {
+    return static_cast<double>(one.size.vertices()) * report_.seconds / kStreamFrameS;
+  }
+  double view_cost() const {
+    return kViewCostPerPixel * static_cast<double>(plan_.view.size.width) * plan_.view.size.height;
+  }
+
   StreamingReport& report_;
   Executor* executor_;
-  std::string solver_;
+  const Plan& plan_;
   Progress progress_;
-  std::set<std::tuple<MotionLevel, uint32_t, uint32_t>> seen_;
   bool has_walk_latency_ = false;
 };
 
 }  // namespace
+
+std::vector<StreamCase> stream_cases(const std::vector<MotionLevel>& motion_levels,
+                                     const std::vector<std::string>& solvers,
+                                     const std::vector<StreamSize>& sizes) {
+  std::vector<StreamCase> cases;
+  for (const std::string& solver : solvers)
+    for (size_t size = 0; size < sizes.size(); ++size) {
+      const bool is_first = solver == solvers.front();
+      if (!is_first && size > 0) continue;
+      std::set<MotionLevel> seen;
+      for (size_t motion = 0; motion < motion_levels.size(); ++motion)
+        for (const MotionPart part : kMotionParts)
+          cases.push_back({motion, solver, sizes[size], part, is_first,
+                           is_first && seen.insert(motion_levels[motion]).second});
+    }
+  return cases;
+}
 
 Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamRecording& recording) {
   const auto named = [&](const Error& error) { return at(codec.name, error); };
@@ -216,7 +342,9 @@ Result<StreamingRow> measure_codec(const StreamCodecRow& codec, const StreamReco
   row.motion_level = recording.motion_level;
   row.part = recording.part;
   row.size = {recording.shape.strand_count, recording.shape.vertex_count};
+  row.solver = recording.solver;
   row.codec = codec.name;
+  if (codec.wind) row.wind = to_string(*codec.wind);
   row.is_ours = codec.is_ours;
   row.is_temporal = codec.is_temporal;
   row.is_bound_free = codec.is_bound_free;
@@ -241,17 +369,16 @@ Result<StreamingReport> measure_streaming(const StreamingOptions& options,
   StreamingReport report;
   report.is_quick = options.is_quick;
   report.device = executor ? executor->info().name : "the processor, in double precision";
-  report.solver = options.solver.empty() ? built_in_scene().solver.name : options.solver;
+  report.solver = plan.solvers.front();
+  report.clip_notes = plan.clip_notes;
   report.processors = shared_workers().size();
   report.seconds = plan.seconds;
-  StreamingRun run(report, executor.get(), options);
-  for (const StreamSize& size : plan.sizes)
-    for (const StreamMotion& motion : plan.motions) {
-      for (const MotionPart part : kMotionParts) {
-        RETURN_IF_ERROR(run.add(motion, size, part));
-        RETURN_IF_ERROR(on_recording(report));
-      }
-    }
+  StreamingRun run(report, executor.get(), plan);
+  RETURN_IF_ERROR(run.add_view());
+  for (const StreamCase& one : plan.cases) {
+    RETURN_IF_ERROR(run.add(one));
+    RETURN_IF_ERROR(on_recording(report));
+  }
   return report;
 }
 

@@ -11,6 +11,7 @@
 #include "server/report/stream_codec.h"
 #include "server/report/stream_latency.h"
 #include "server/report/stream_recording.h"
+#include "server/report/stream_view.h"
 
 namespace strandcast {
 
@@ -18,18 +19,34 @@ struct StreamingOptions {
   std::filesystem::path out;                   // folder of the CSV, plots and page
   std::vector<std::filesystem::path> motions;  // .bvh; empty: the built-in ones
   MotionFileOptions motion_file;               // how to read them
+  std::filesystem::path clips;                 // folder of stream_clips(), beside the built-in motions
   std::vector<std::string> sizes;              // "STRANDSxVERTICES"; empty: as the grid says
-  std::string solver;                          // empty: the built-in scene's
+  std::vector<std::string> solvers;            // empty: the built-in scene's, and two others beside it
   ExecutorConfig device;                       // kNoDevice: the solver's double-precision version
   double seconds = 0.0;                        // recorded of each part of a motion; 0 = half a second
+  std::string view;  // "WIDTHxHEIGHT" of the pictures that are compared; empty likewise
   bool is_quick = false;
 };
 
-inline constexpr double kStreamBoundsM[] = {2e-5, 5e-5, 1e-4, 5e-4};
+inline constexpr double kStreamBoundsM[] = {2e-5, 5e-5, 1e-4, 2e-4, 5e-4};
 /// The bound that goals are stated at.
 inline constexpr double kGoalBoundM = 1e-4;
-/// The first differences are not typical yet; as codec_bench.
-inline constexpr size_t kStartFrames = 9;
+
+/// What is recorded, once for all codecs.
+struct StreamCase {
+  size_t motion = 0;  // index
+  std::string solver;
+  StreamSize size;
+  MotionPart part = MotionPart::Median;
+  bool has_peers = false;           // beside our own codecs, at the goals' bound
+  bool has_curve_of_peers = false;  // and at all bounds
+};
+/// Every motion's two parts: with the first solver at every size and beside peers, with the others at the
+/// first size. All codecs of ours run on each at every bound, those that predict by steps of the solver once
+/// for each of kWindsTold; peers at every bound on the first case of each level and size.
+std::vector<StreamCase> stream_cases(const std::vector<MotionLevel>& motion_levels,
+                                     const std::vector<std::string>& solvers,
+                                     const std::vector<StreamSize>& sizes);
 
 /// One codec at one bound on one recording. Times are medians over frames.
 struct StreamingRow {
@@ -37,8 +54,10 @@ struct StreamingRow {
   std::string moved_by;  // as the recording
   MotionLevel motion_level = MotionLevel::Idle;
   MotionPart part = MotionPart::Median;
+  std::string solver;
   StreamSize size;
   std::string codec;
+  std::string wind;  // what it is told of it: "known", "mean", "unknown"; empty: it does not ask
   bool is_ours = false;
   bool is_temporal = false;
   bool is_bound_free = false;
@@ -56,9 +75,11 @@ struct StreamingRow {
 
   /// "94_01, wildest part".
   std::string motion_and_part() const { return motion + ", " + to_string(part) + " part"; }
+  /// "tangent"; "step, wind mean".
+  std::string codec_and_wind() const { return wind.empty() ? codec : codec + ", wind " + wind; }
   bool is_same_recording(const StreamingRow& other) const {
-    return motion == other.motion && part == other.part && size.strand_count == other.size.strand_count &&
-           size.vertex_count == other.size.vertex_count;
+    return motion == other.motion && part == other.part && solver == other.solver &&
+           size.strand_count == other.size.strand_count && size.vertex_count == other.size.vertex_count;
   }
   double mbit_per_s() const { return bits * static_cast<double>(size.vertices()) / kStreamFrameS * 1e-6; }
   /// A little room for the rounding of what was recorded to floats, half a step below 1 m.
@@ -67,13 +88,15 @@ struct StreamingRow {
 
 struct StreamingReport {
   bool is_quick = false;
-  std::string device;  // as GL names it, or why there is none
-  std::string solver;
+  std::string device;                   // as GL names it, or why there is none
+  std::string solver;                   // the first: goals and plots are of it
+  std::vector<std::string> clip_notes;  // which clips there were
   unsigned processors = 0;
   double seconds = 0.0;
   std::vector<StreamingRow> rows;
   std::vector<StreamRecording> recordings;  // without their frames
   StreamLatency latency;
+  StreamView view;
 };
 
 /// Runs everything; prints progress. `on_recording` gets what is known after each recording: a run of many

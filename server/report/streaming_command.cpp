@@ -8,6 +8,12 @@
 #include "server/report/streaming_page.h"
 
 namespace strandcast {
+namespace {
+
+// From a clone that has the project's shared data beside it.
+constexpr const char* kClips = "../shared/data/mocap";
+
+}  // namespace
 
 Status run_streaming(const StreamingOptions& options) {
   // Before anything is measured for minutes.
@@ -33,14 +39,30 @@ void add_streaming_command(CLI::App& app, ReportAction& action) {
   command->add_option("--size", options->sizes, "STRANDSxVERTICES; repeatable; default: 10000x16, 2228x32")
       ->expected(1)
       ->take_all();
-  command->add_option("--solver", options->solver, "what moves the strands; default: the built-in scene's");
+  command
+      ->add_option("--clips", options->clips,
+                   "folder of captured heads to run beside the built-in ones, as far as they are there; "
+                   "default: ../shared/data/mocap, with --quick or --motion none")
+      ->excludes("--motion");
+  command
+      ->add_option("--solver", options->solvers,
+                   "what moves the strands; repeatable: plots and goals are of the first; default: the "
+                   "built-in scene's, direct_rod, mass_spring; with --quick the built-in scene's")
+      ->expected(1)
+      ->take_all();
+  command->add_option(
+      "--view", options->view,
+      "WIDTHxHEIGHT of the pictures that are compared; default: 1280x720, with --quick 320x180");
   command
       ->add_option("--seconds", options->seconds,
                    "recorded of each part of a motion, the median and the wildest; default: 0.5")
       ->check(CLI::PositiveNumber);
   add_sim_device_options(*command, options->device, {false, "the solver in double precision"});
-  command->add_flag("--quick", options->is_quick, "fewer and shorter: less than a minute on two cores");
-  command->callback([options, &action] { action = [options] { return run_streaming(*options); }; });
+  command->add_flag("--quick", options->is_quick, "fewer and smaller: a minute or two on two cores");
+  command->callback([options, &action] {
+    if (options->clips.empty() && options->motions.empty() && !options->is_quick) options->clips = kClips;
+    action = [options] { return run_streaming(*options); };
+  });
 }
 
 }  // namespace strandcast

@@ -31,7 +31,8 @@ std::string place_of(const StreamingRow& row) {
 std::vector<const StreamingRow*> judged_rows(const StreamingReport& report) {
   std::vector<const StreamingRow*> rows;
   for (const StreamingRow& row : report.rows)
-    if (row.codec == kJudgedCodec && row.bound_m == kGoalBoundM) rows.push_back(&row);
+    if (row.codec == kJudgedCodec && row.bound_m == kGoalBoundM && row.solver == report.solver)
+      rows.push_back(&row);
   return rows;
 }
 

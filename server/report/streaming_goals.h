@@ -18,7 +18,8 @@ struct GoalLine {
   Verdict verdict = Verdict::NotMeasured;
 };
 
-/// Every goal; the worst recording decides.
+/// Every goal; the worst recording of the report's first solver decides, and of all where it is about the
+/// bound.
 std::vector<GoalLine> judge_streaming(const StreamingReport& report);
 
 enum class PeerKind { Plain, Temporal };

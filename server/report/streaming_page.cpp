@@ -12,7 +12,9 @@
 #include "server/report/html_page.h"
 #include "server/report/peers/peer_codecs.h"
 #include "server/report/report_folder.h"
+#include "server/report/stream_view_page.h"
 #include "server/report/streaming_goals.h"
+#include "server/report/streaming_tables.h"
 #include "server/report/svg_bars.h"
 #include "server/report/svg_plot.h"
 
@@ -24,6 +26,9 @@ constexpr std::array kCodecStyles = {"tangent",
                                      "meshopt+zstd temporal",
                                      "draco temporal",
                                      "delta",
+                                     "step, wind known",
+                                     "step, wind mean",
+                                     "step, wind unknown",
                                      "zfp temporal",
                                      "zstd 16 bit temporal",
                                      "raw",
@@ -45,7 +50,9 @@ double mm(double m) {
 /// The recording that plots of one recording are of: walking and turning where there is any.
 const StreamingRow* shown_recording(const StreamingReport& report) {
   for (const StreamingRow& row : report.rows)
-    if (row.motion_level == MotionLevel::Active && row.part == MotionPart::Median) return &row;
+    if (row.solver == report.solver && row.motion_level == MotionLevel::Active &&
+        row.part == MotionPart::Median)
+      return &row;
   return report.rows.empty() ? nullptr : &report.rows.front();
 }
 
@@ -59,7 +66,7 @@ std::vector<std::string> codec_names(const StreamingReport& report) {
   std::vector<std::string> names;
   for (const char* name : kCodecStyles)
     if (std::any_of(report.rows.begin(), report.rows.end(),
-                    [&](const StreamingRow& row) { return row.codec == name; }))
+                    [&](const StreamingRow& row) { return row.codec_and_wind() == name; }))
       names.emplace_back(name);
   return names;
 }
@@ -68,7 +75,8 @@ std::string row_note(const StreamingRow& row) {
   return fmt::format(
       "{}, bound {:g} mm: {:.2f} bits per vertex, largest error {:.4f} mm, encode {:.1f} ms, "
       "decode {:.1f} ms",
-      row.codec, mm(row.bound_m), row.bits, mm(row.max_error_m), row.encode_cpu_ms, row.decode_cpu_ms);
+      row.codec_and_wind(), mm(row.bound_m), row.bits, mm(row.max_error_m), row.encode_cpu_ms,
+      row.decode_cpu_ms);
 }
 
 HtmlTable goal_table(const StreamingReport& report) {
@@ -88,6 +96,7 @@ HtmlTable recording_table(const StreamingReport& report) {
   table.columns = {"motion",
                    "part",
                    "class",
+                   "strand model",
                    "hair, RMS m/s in head space",
                    "head, mean m/s",
                    "head turns, mean degrees/s",
@@ -96,7 +105,8 @@ HtmlTable recording_table(const StreamingReport& report) {
   for (const StreamRecording& recording : report.recordings) {
     table.rows.push_back(
         {recording.motion_name, to_string(recording.part), to_string(recording.motion_level),
-         fmt::format("{:.2f}", recording.hair_rms_mps), fmt::format("{:.2f}", recording.head.mean_speed_mps),
+         recording.solver, fmt::format("{:.2f}", recording.hair_rms_mps),
+         fmt::format("{:.2f}", recording.head.mean_speed_mps),
          fmt::format("{:.0f}", recording.head.mean_turn_rad_per_s * 180.0 / std::numbers::pi),
          to_string(StreamSize{recording.shape.strand_count, recording.shape.vertex_count}),
          fmt::format("{}", recording.step_ms.size())});
@@ -107,8 +117,8 @@ HtmlTable recording_table(const StreamingReport& report) {
 HtmlTable codec_table(const StreamingReport& report, const StreamRecording& recording) {
   const StreamSize size{recording.shape.strand_count, recording.shape.vertex_count};
   HtmlTable table;
-  table.caption = fmt::format("{}, {} part, {}, {}", recording.motion_name, to_string(recording.part),
-                              to_string(recording.motion_level), to_string(size));
+  table.caption = fmt::format("{}, {} part, {}, {}, {}", recording.motion_name, to_string(recording.part),
+                              to_string(recording.motion_level), recording.solver, to_string(size));
   table.columns = {"codec",
                    "bound, mm",
                    "bits/vertex",
@@ -121,11 +131,11 @@ HtmlTable codec_table(const StreamingReport& report, const StreamRecording& reco
                    "decode, ms of one core",
                    "encode, ms by the clock"};
   for (const StreamingRow& row : report.rows) {
-    if (row.motion != recording.motion_name || row.part != recording.part ||
+    if (row.motion != recording.motion_name || row.solver != recording.solver || row.part != recording.part ||
         row.size.strand_count != size.strand_count || row.size.vertex_count != size.vertex_count)
       continue;
     const bool keeps = row.keeps_bound();
-    table.rows.push_back({row.codec,
+    table.rows.push_back({row.codec_and_wind(),
                           row.bound_m > 0.0 ? fmt::format("{:.3g}", mm(row.bound_m)) : "lossless",
                           fmt::format("{:.2f}", row.bits),
                           fmt::format("{:.2f}", row.all_bits),
@@ -156,7 +166,8 @@ HtmlTable latency_table(const StreamLatency& latency) {
 
 std::string method_text(const StreamingReport& report) {
   return fmt::format(
-      "Strands are the built-in scene's, moved by {} on {} at 60 Hz in its breeze; of each "
+      "Strands are the built-in scene's, moved by {} (where nothing else is said) on {} at 60 Hz in its "
+      "breeze; of each "
       "motion the wildest {:g} s and those that are the median of its parts, by its head, are kept as 32-bit "
       "floats in head space, and every codec gets the same frames. Errors are "
       "Euclidean, of every vertex of every frame, against those floats. Bits leave out the first {} frames "
@@ -193,6 +204,13 @@ std::string class_text() {
       kDriveLengthM, kDriveLagS, kActiveDriveMps, kViolentDriveMps);
 }
 
+constexpr const char* kCaseText =
+    "Goals and plots are of the first strand model; the others show what their way to move costs. A codec "
+    "that "
+    "predicts by steps of the strand model needs to know the wind: all of it, the wind at the head without "
+    "the "
+    "waves over the head, or nothing of it.";
+
 constexpr const char* kLatencyText =
     "From the motion sample that a step takes to the decoded frame, in one process, one stage after the "
     "other: "
@@ -222,7 +240,9 @@ std::string streaming_csv(const StreamingReport& report) {
                "decode_cpu_ms",
                "encode_wall_ms",
                "decode_wall_ms",
-               "moved_by"});
+               "moved_by",
+               "solver",
+               "wind_told"});
   for (const StreamingRow& row : report.rows) {
     csv.add_row({row.motion,
                  to_string(row.part),
@@ -245,7 +265,9 @@ std::string streaming_csv(const StreamingReport& report) {
                  csv_number(row.decode_cpu_ms),
                  csv_number(row.encode_wall_ms),
                  csv_number(row.decode_wall_ms),
-                 row.moved_by});
+                 row.moved_by,
+                 row.solver,
+                 row.wind});
   }
   return csv.text();
 }
@@ -261,7 +283,7 @@ std::string streaming_bound_plot(const StreamingReport& report) {
     series.name = name;
     series.style = static_cast<int>(style_of(name));
     for (const StreamingRow& row : report.rows)
-      if (row.codec == name && row.is_same_recording(*shown) && !row.is_bound_free)
+      if (row.codec_and_wind() == name && row.is_same_recording(*shown) && !row.is_bound_free)
         series.points.push_back({mm(row.bound_m), row.bits, row_note(row)});
     if (!series.points.empty()) desc.series.push_back(std::move(series));
   }
@@ -280,7 +302,7 @@ std::string streaming_time_plot(const StreamingReport& report) {
     series.style = static_cast<int>(style_of(name));
     series.mark = PlotMark::Dots;
     for (const StreamingRow& row : report.rows)
-      if (row.codec == name && row.is_same_recording(*shown) &&
+      if (row.codec_and_wind() == name && row.is_same_recording(*shown) &&
           (row.is_bound_free || row.bound_m == kGoalBoundM))
         series.points.push_back({row.encode_cpu_ms + row.decode_cpu_ms, row.bits, row_note(row)});
     desc.series.push_back(std::move(series));
@@ -292,42 +314,52 @@ std::string streaming_motion_plot(const StreamingReport& report) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   BarDesc desc;
   desc.y_title = "bits per vertex and frame";
-  BarSeries tangent{"tangent", {}, style_of("tangent")};
-  BarSeries delta{"delta", {}, style_of("delta")};
+  std::vector<BarSeries> ours;
+  for (const std::string& name : codec_names(report))
+    if (name == "tangent" || name == "delta" || name.starts_with("step"))
+      ours.push_back({name, {}, style_of(name)});
   BarSeries temporal{"best peer, temporal", {}, style_of("meshopt+zstd temporal")};
   BarSeries plain{"best peer, positions", {}, style_of("meshopt+zstd")};
   const StreamingRow* first = report.rows.empty() ? nullptr : &report.rows.front();
   for (const StreamingRow& row : report.rows) {
-    if (row.codec != "tangent" || row.bound_m != kGoalBoundM ||
+    if (row.codec != "tangent" || row.bound_m != kGoalBoundM || row.solver != report.solver ||
         row.size.strand_count != first->size.strand_count ||
         row.size.vertex_count != first->size.vertex_count)
       continue;
     desc.groups.push_back(row.part == MotionPart::Median ? row.motion : "its wildest");
-    tangent.value.push_back(row.bits);
-    const auto other =
-        std::find_if(report.rows.begin(), report.rows.end(), [&](const StreamingRow& candidate) {
-          return candidate.codec == "delta" && candidate.bound_m == row.bound_m &&
-                 candidate.is_same_recording(row);
-        });
-    delta.value.push_back(other != report.rows.end() ? other->bits : kNone);
+    for (BarSeries& series : ours) {
+      const auto same =
+          std::find_if(report.rows.begin(), report.rows.end(), [&](const StreamingRow& candidate) {
+            return candidate.codec_and_wind() == series.name && candidate.bound_m == row.bound_m &&
+                   candidate.is_same_recording(row);
+          });
+      series.value.push_back(same != report.rows.end() ? same->bits : kNone);
+    }
     const StreamingRow* peer = best_peer(report, row, PeerKind::Temporal);
     temporal.value.push_back(peer != nullptr ? peer->bits : kNone);
     peer = best_peer(report, row, PeerKind::Plain);
     plain.value.push_back(peer != nullptr ? peer->bits : kNone);
   }
   desc.title = "Bits at 0.1 mm" + (first != nullptr ? ", " + to_string(first->size) + " vertices" : "");
-  desc.series = {tangent, delta, temporal, plain};
+  desc.series = std::move(ours);
+  desc.series.push_back(std::move(temporal));
+  desc.series.push_back(std::move(plain));
   return make_svg_bars(desc);
 }
 
 std::string streaming_page(const StreamingReport& report) {
-  HtmlPage page("Streaming strands: error, bytes, milliseconds");
+  HtmlPage page("Streaming strands: what a viewer needs, and what it sees");
+  page.answer(needs_text(report));
+  page.table(needs_table(report));
+  if (const std::string clips = clips_text(report); !clips.empty()) page.paragraph(clips);
+  add_view_sections(page, report.view);
+  page.heading("Goals");
   const std::vector<GoalLine> goals = judge_streaming(report);
   const auto count = [&](Verdict verdict) {
     return std::count_if(goals.begin(), goals.end(),
                          [&](const GoalLine& line) { return line.verdict == verdict; });
   };
-  page.answer(
+  page.paragraph(
       fmt::format("Of {} goals {} are met, {} missed, {} not measured{}.", goals.size(), count(Verdict::Met),
                   count(Verdict::Missed), count(Verdict::NotMeasured),
                   report.is_quick ? " (a quick run: small, short, goals for full size do not apply)" : ""));
@@ -339,6 +371,9 @@ std::string streaming_page(const StreamingReport& report) {
   page.figure(
       streaming_motion_plot(report),
       "Peers: the one with the fewest bits that keeps the bound, per motion; beside each its wildest part.");
+  page.heading("Every clip, strand model and wind");
+  page.paragraph(kCaseText);
+  page.table(case_table(report));
   page.heading("From motion to decoded frame");
   page.paragraph(kLatencyText);
   page.table(latency_table(report.latency));
@@ -353,7 +388,10 @@ std::string streaming_page(const StreamingReport& report) {
 }
 
 std::string streaming_summary(const StreamingReport& report) {
-  std::string text;
+  std::string text = needs_text(report) + "\n";
+  for (const StreamViewRow& row : report.view.rows)
+    text += fmt::format("{:.2f} mm from {:g} m: {:.1f} dB, SSIM {:.3f}\n", mm(row.bound_m), row.distance_m,
+                        row.psnr_db, row.ssim);
   for (const GoalLine& line : judge_streaming(report))
     text += fmt::format("{:<13} {}: {}\n", to_string(line.verdict), line.goal, line.measured);
   for (const StreamingRow& row : report.rows)
@@ -369,6 +407,9 @@ Status save_streaming(const StreamingReport& report, const std::filesystem::path
   RETURN_IF_ERROR(save_text(folder / "streaming_bound.svg", streaming_bound_plot(report)));
   RETURN_IF_ERROR(save_text(folder / "streaming_time.svg", streaming_time_plot(report)));
   RETURN_IF_ERROR(save_text(folder / "streaming_motion.svg", streaming_motion_plot(report)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_view.csv", view_csv(report.view)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_pixels.csv", pixel_csv(report.view)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_view.svg", view_plot(report.view)));
   return save_text(folder / kStreamingPage, streaming_page(report));
 }
 

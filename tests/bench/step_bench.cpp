@@ -1,5 +1,6 @@
-// What the codec "step" takes beside "tangent" on the same frames of the server's own solvers: bits a vertex,
-// CPU milliseconds of both sides, and the largest error. One thread per side.
+// What the codec "step" takes beside "tangent" on the same frames of the server's own solvers, told all of
+// the wind, its mean or nothing: bits a vertex, CPU milliseconds of both sides, and the largest error. One
+// thread per side.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -80,10 +81,11 @@ Status run(const Options& options) {
     const auto frames = static_cast<double>(recording.frames.size() - kStart);
     const auto vertices = static_cast<double>(recording.shape.plane_size());
     fmt::print(
-        "{:8} {:>7.4f} bits/vertex {:>8.3f} Mbit/s encode {:>6.2f} ms decode {:>6.2f} ms error {:.4f} mm "
+        "{:12} {:>7.4f} bits/vertex {:>8.3f} Mbit/s encode {:>6.2f} ms decode {:>6.2f} ms error {:.4f} mm "
         "keyframe {:.1f} bits/vertex, then{}\n",
-        row.name, 8.0 * bytes / frames / vertices, 8.0 * bytes / frames * 60e-6, encode_ms / frames,
-        decode_ms / frames, 1e3 * error_m, 8.0 * static_cast<double>(first_bytes) / vertices, start);
+        row.wind ? fmt::format("{} {}", row.name, to_string(*row.wind)) : row.name,
+        8.0 * bytes / frames / vertices, 8.0 * bytes / frames * 60e-6, encode_ms / frames, decode_ms / frames,
+        1e3 * error_m, 8.0 * static_cast<double>(first_bytes) / vertices, start);
   }
   return {};
 }

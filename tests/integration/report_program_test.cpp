@@ -161,15 +161,21 @@ TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
   const auto out = folder_.path() / "report";
   const Outcome outcome = run_report(
       folder_,
-      fmt::format("streaming --quick --size 60x8 --seconds 0.5 --gl-device none --out '{}'", out.string()));
+      fmt::format(
+          "streaming --quick --size 60x8 --seconds 0.5 --view 160x90 --solver dftl --solver mass_spring "
+          "--clips /nonexistent --gl-device none --out '{}'",
+          out.string()));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("run 1 of "));
 
   std::map<std::string, std::set<std::string>> bounds_mm;  // of each codec of ours
-  std::set<std::pair<std::string, std::string>> clips;
+  std::set<std::tuple<std::string, std::string, std::string>> clips;
   rows_ = parse_csv(load_text(out / "streaming.csv", 1u << 20).value());
   for (const auto& row : rows_) {
-    clips.emplace(row.at("clip"), row.at("part"));
+    clips.emplace(row.at("clip"), row.at("part"), row.at("solver"));
+    if (row.at("solver") != "dftl") {
+      EXPECT_EQ(row.at("kind"), "ours");
+    }
     EXPECT_EQ(row.at("strands"), "60");
     for (const char* column : {"bits_per_vertex", "keyframe_bits_per_vertex", "mbit_per_s", "encode_wall_ms"})
       EXPECT_GT(number(row, column), 0.0) << row.at("codec") << ", " << column;
@@ -182,8 +188,8 @@ TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
     EXPECT_EQ(row.at("keeps_bound"), "yes") << row.at("codec");
     EXPECT_LE(number(row, "max_error_mm"), 1.0001 * number(row, "bound_mm")) << row.at("codec");
   }
-  EXPECT_EQ(clips.size(), 6u) << "the median and the wildest part of three motions";
-  const std::set<std::string> all_bounds = {"0.02", "0.05", "0.1", "0.5"};
+  EXPECT_EQ(clips.size(), 12u) << "the median and the wildest part of three motions, with two solvers";
+  const std::set<std::string> all_bounds = {"0.02", "0.05", "0.1", "0.2", "0.5"};
   for (const char* codec : {"tangent", "delta", "raw"}) EXPECT_EQ(bounds_mm[codec], all_bounds) << codec;
 
   const std::string page = load_text(out / "streaming.html", 1u << 24).value();
@@ -191,10 +197,17 @@ TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
        {"</html>", "walking and turning: at most 3.5 bits per vertex", "idle: at most 1.8",
         "violent: at most 6", "wildest part of any motion: at most 6", "at least 2 times fewer bits",
         "at least 6 times fewer bits", "decode 160000 vertices in 12 ms", "encode them in 16 ms",
-        "at most 13 bits", "every vertex of every frame within the bound", "TCP on loopback"})
+        "at most 13 bits", "every vertex of every frame within the bound", "TCP on loopback",
+        "60 strands of 8 vertices take", "All heads are built in", "How it looks", "Strands or pictures?",
+        "mass_spring"})
     EXPECT_THAT(page, HasSubstr(part));
   for (const char* plot : {"streaming_bound.svg", "streaming_time.svg", "streaming_motion.svg"})
     EXPECT_THAT(load_text(out / plot, 1u << 24).value(), HasSubstr("tangent")) << plot;
+  EXPECT_THAT(load_text(out / "streaming_view.svg", 1u << 24).value(), HasSubstr("from 3 m"));
+  rows_ = parse_csv(load_text(out / "streaming_view.csv", 1u << 20).value());
+  EXPECT_EQ(rows_.size(), 2 * all_bounds.size()) << "near and far";
+  rows_ = parse_csv(load_text(out / "streaming_pixels.csv", 1u << 20).value());
+  EXPECT_GT(rows_.size(), 0u);
 }
 
 TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
@@ -219,6 +232,9 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
       {fmt::format("streaming --out '{}' --size 10", out), "--size is '10'"},
       {fmt::format("streaming --out '{}' --size 10x65", out), "--size is '10x65'"},
       {fmt::format("streaming --out '{}' --seconds 0.1", out), "--seconds is 0.1"},
+      {fmt::format("streaming --out '{}' --view 10x10", out), "--view is '10x10'"},
+      {fmt::format("streaming --out '{}' --view 641x360", out), "--view is '641x360'"},
+      {fmt::format("streaming --out '{}' --clips . --motion x.bvh", out), "excludes"},
       {fmt::format("streaming --out '{}' --solver nonsense", out), "unknown solver 'nonsense' (known: "},
       {fmt::format("streaming --out '{}' --motion '{}'", out, (folder_.path() / "bad.bvh").string()),
        "bad.bvh"},

@@ -44,7 +44,7 @@ PosedStrands as_received(const StreamFrame& frame) {
   input.vertex_count = kSize.vertex_count;
   input.quantum_m = kQuantumM;
   input.position_in_head_m = frame.position_in_head_m;
-  input.world_from_head = frame.world_from_head;
+  input.world_from_head = frame.published.world_from_head;
   StrandFill fill;
   return posed_strands_of(quantise(input).snapshot, fill);
 }
@@ -66,7 +66,7 @@ Measured halved(const StreamRecording& recording) {
       const glm::dvec3 at(right.position_in_head_m[v]), on_line(line.position_m[v]),
           on_cubic(cubic.position_m[v]);
       off.in_head_m.add(glm::distance(on_line, at), glm::distance(on_cubic, at));
-      const glm::dvec3 in_world = right.world_from_head * at;
+      const glm::dvec3 in_world = right.published.world_from_head * at;
       off.in_world_m.add(glm::distance(line.world_from_head * on_line, in_world),
                          glm::distance(cubic.world_from_head * on_cubic, in_world));
       off.strands_in_world_m.add(glm::distance(line.world_from_head * on_line, in_world),

@@ -1,0 +1,102 @@
+// StreamView: what a viewer sees of a stream of strands. Pictures drawn from decoded strands are held against
+// pictures drawn from the exact floats, in the hair's pixels, near and far; and so are coded pictures of the
+// exact floats, so that both ways to stream can be compared by what they take for the same look. Drawn in
+// tiles on the processors.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/picture_size.h"
+#include "common/pictures/image_codec.h"
+#include "common/scene/scene_desc.h"
+#include "server/report/stream_recording.h"
+
+namespace strandcast {
+
+/// Distances of the camera from the point that it looks at: the built-in scene's own, and hair across a room.
+inline constexpr double kViewDistancesM[] = {0.66, 3.0};
+inline constexpr double kViewBoundsM[] = {2e-5, 5e-5, 1e-4, 2e-4, 5e-4};
+/// What strands are coded with: errors follow from the bound, not from how a codec predicts.
+inline constexpr const char* kViewCodec = "tangent";
+
+struct StreamViewDesc {
+  RenderSize size{1280, 720};
+  size_t compared_pictures = 4;  // evenly spaced after the first kStartFrames
+};
+
+/// Pictures of decoded strands against those of the floats: means over the compared pictures.
+struct StreamViewRow {
+  double distance_m = 0.0;
+  double bound_m = 0.0;
+  double psnr_db = 0.0;
+  double ssim = 0.0;
+  double delta_e = 0.0;
+  double hair_share = 0.0;  // of the picture
+  double mbit_per_s = 0.0;  // of the strands, at 60 Hz
+};
+
+/// Coded pictures of the exact floats at 60 Hz, at one setting of a picture codec.
+struct PixelPoint {
+  double distance_m = 0.0;
+  std::string codec;    // as to_string(PictureCodec)
+  std::string setting;  // "quality 80", "20 Mbit/s asked for"
+  double mbit_per_s = 0.0;
+  double psnr_db = 0.0;
+  double ssim = 0.0;
+};
+
+/// The hair of one picture: the exact one, of two bounds, and how far the finer of them is off.
+struct ViewSheet {
+  double distance_m = 0.0;
+  std::string caption;
+  Image image;
+};
+
+struct StreamView {
+  std::string motion;
+  StreamSize strands;
+  uint64_t drawn_strands = 0;  // with followers, in the last near picture
+  RenderSize size;
+  size_t compared_pictures = 0;
+  std::vector<StreamViewRow> rows;
+  std::vector<PixelPoint> pixels;
+  std::vector<std::string> missing;  // picture codecs that this build does not have
+  std::vector<ViewSheet> sheets;
+};
+
+/// How often measure_view() says what it does, at most.
+uint32_t view_step_count();
+/// The recording is of the scene's strands.
+Result<StreamView> measure_view(const StreamViewDesc& desc, const SceneDesc& scene,
+                                const StreamRecording& recording,
+                                const std::function<void(const std::string& doing)>& on_progress);
+
+/// The camera from so far away, in the same direction.
+CameraDesc camera_at(CameraDesc camera, double distance_m);
+
+/// What "as good" goes by. PSNR is of red, green and blue, which picture codecs keep at half the size; SSIM
+/// is of brightness alone.
+enum class LookMeasure { Psnr, Ssim };
+/// In dB: of SSIM how far it is from 1.
+double look_db(const PixelPoint& point, LookMeasure measure);
+double look_db(const StreamViewRow& row, LookMeasure measure);
+
+/// Mbit/s at which a codec's pictures reach a look: between the measured settings around it, linear in dB
+/// over the logarithm of the rate. Nothing when no setting reaches it; the least of them when all do.
+std::optional<double> mbit_per_s_for(const std::vector<PixelPoint>& pixels, const std::string& codec,
+                                     double distance_m, LookMeasure measure, double wanted_db);
+/// The PSNR of its pictures with that rate: nothing below the least that was measured; the best when above
+/// all.
+std::optional<double> psnr_db_at(const std::vector<PixelPoint>& pixels, const std::string& codec,
+                                 double distance_m, double mbit_per_s);
+
+/// The square of the picture with most of the mask: `side` pixels, or as many as there are.
+struct PictureCrop {
+  uint32_t left = 0, top = 0, side = 0;
+};
+PictureCrop fullest_crop(const std::vector<uint8_t>& mask, RenderSize size, uint32_t side);
+
+}  // namespace strandcast

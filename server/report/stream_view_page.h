@@ -1,0 +1,26 @@
+// The part of the streaming report's page that is about what viewers see: tables, a plot, the CSV files. Any
+// thread.
+#pragma once
+
+#include <string>
+
+#include "server/report/html_page.h"
+#include "server/report/stream_view.h"
+
+namespace strandcast {
+
+/// PSNR and SSIM of every bound and distance.
+HtmlTable view_table(const StreamView& view);
+std::string view_plot(const StreamView& view);
+/// Mbit/s of pictures that look as good as strands, beside what the strands take.
+HtmlTable pixel_table(const StreamView& view, LookMeasure measure);
+/// PSNR against Mbit/s of strands and of every picture codec from one distance.
+std::string pixel_plot(const StreamView& view, double distance_m);
+
+/// Adds both sections with their pictures.
+void add_view_sections(HtmlPage& page, const StreamView& view);
+
+std::string view_csv(const StreamView& view);
+std::string pixel_csv(const StreamView& view);
+
+}  // namespace strandcast
