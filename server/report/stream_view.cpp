@@ -23,6 +23,7 @@ constexpr double kSheetBoundsM[] = {1e-4, 5e-4};
 
 /// A stream of strands at one bound.
 struct DecodedStrands {
+  std::string codec;
   double bound_m = 0.0;
   double mbit_per_s = 0.0;
   std::vector<std::vector<glm::vec3>> position_m;  // of the compared frames
@@ -38,14 +39,15 @@ std::vector<size_t> compared_frames(size_t frame_count, size_t wanted) {
   return frames;
 }
 
-Result<DecodedStrands> decode_at(double bound_m, const StreamRecording& recording,
+Result<DecodedStrands> decode_at(const std::string& name, double bound_m, const StreamRecording& recording,
                                  const std::vector<size_t>& compared) {
   const std::vector<StreamCodecRow> codecs = own_stream_codecs(bound_m);
   const auto row = std::find_if(codecs.begin(), codecs.end(),
-                                [](const StreamCodecRow& codec) { return codec.name == kViewCodec; });
+                                [&](const StreamCodecRow& codec) { return codec.name == name; });
   CHECK(row != codecs.end());
   ASSIGN_OR_RETURN(const std::unique_ptr<StreamCodec> codec, row->make(recording.shape));
   DecodedStrands decoded;
+  decoded.codec = name;
   decoded.bound_m = bound_m;
   const size_t count = recording.frames.size() - 1;
   double bytes = 0.0;
@@ -165,6 +167,7 @@ class ViewRun {
 
   Result<StreamViewRow> compare(const DecodedStrands& decoded) {
     StreamViewRow row;
+    row.codec = decoded.codec;
     row.distance_m = distance_m_;
     row.bound_m = decoded.bound_m;
     row.mbit_per_s = decoded.mbit_per_s;
@@ -181,7 +184,7 @@ class ViewRun {
       row.hair_share += share * error.masked_share;
       const bool is_shown = std::find(std::begin(kSheetBoundsM), std::end(kSheetBoundsM), decoded.bound_m) !=
                             std::end(kSheetBoundsM);
-      if (k == 0 && is_shown) shown_.push_back(std::move(seen.image));
+      if (k == 0 && is_shown && decoded.codec == kViewCodecs[0]) shown_.push_back(std::move(seen.image));
     }
     return row;
   }
@@ -248,7 +251,7 @@ PictureCrop fullest_crop(const std::vector<uint8_t>& mask, RenderSize size, uint
 
 uint32_t view_step_count() {
   return static_cast<uint32_t>(std::size(kViewDistancesM)) *
-         (1 + static_cast<uint32_t>(std::size(kViewBoundsM)) + pixel_step_count());
+         (1 + static_cast<uint32_t>(std::size(kViewCodecs) * std::size(kViewBoundsM)) + pixel_step_count());
 }
 
 Result<StreamView> measure_view(const StreamViewDesc& desc, const SceneDesc& scene,
@@ -262,10 +265,11 @@ Result<StreamView> measure_view(const StreamViewDesc& desc, const SceneDesc& sce
   view.compared_pictures = compared.size();
   view.missing = missing_picture_codecs();
   std::vector<DecodedStrands> streams;
-  for (const double bound_m : kViewBoundsM) {
-    ASSIGN_OR_RETURN(DecodedStrands decoded, decode_at(bound_m, recording, compared));
-    streams.push_back(std::move(decoded));
-  }
+  for (const char* codec : kViewCodecs)
+    for (const double bound_m : kViewBoundsM) {
+      ASSIGN_OR_RETURN(DecodedStrands decoded, decode_at(codec, bound_m, recording, compared));
+      streams.push_back(std::move(decoded));
+    }
   ASSIGN_OR_RETURN(const auto painter, ViewPainter::make(scene, desc.size));
   for (const double distance_m : kViewDistancesM) {
     ViewRun run(*painter, recording, compared, distance_m);
@@ -273,8 +277,8 @@ Result<StreamView> measure_view(const StreamViewDesc& desc, const SceneDesc& sce
     RETURN_IF_ERROR(run.draw_truth());
     if (view.drawn_strands == 0) view.drawn_strands = painter->drawn_strands();
     for (const DecodedStrands& decoded : streams) {
-      on_progress(
-          fmt::format("pictures of strands at {:g} mm from {:g} m", 1e3 * decoded.bound_m, distance_m));
+      on_progress(fmt::format("pictures of {} at {:g} mm from {:g} m", decoded.codec, 1e3 * decoded.bound_m,
+                              distance_m));
       ASSIGN_OR_RETURN(const StreamViewRow row, run.compare(decoded));
       view.rows.push_back(row);
     }

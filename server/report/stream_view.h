@@ -19,8 +19,8 @@ namespace strandcast {
 /// Distances of the camera from the point that it looks at: the built-in scene's own, and hair across a room.
 inline constexpr double kViewDistancesM[] = {0.66, 3.0};
 inline constexpr double kViewBoundsM[] = {2e-5, 5e-5, 1e-4, 2e-4, 5e-4};
-/// What strands are coded with: errors follow from the bound, not from how a codec predicts.
-inline constexpr const char* kViewCodec = "tangent";
+/// What strands are coded with; "step" is told all of the wind.
+inline constexpr const char* kViewCodecs[] = {"tangent", "step"};
 
 struct StreamViewDesc {
   RenderSize size{1280, 720};
@@ -29,6 +29,7 @@ struct StreamViewDesc {
 
 /// Pictures of decoded strands against those of the floats: means over the compared pictures.
 struct StreamViewRow {
+  std::string codec;  // of kViewCodecs
   double distance_m = 0.0;
   double bound_m = 0.0;
   double psnr_db = 0.0;

@@ -17,9 +17,10 @@ double mm(double m) {
   return 1e3 * m;
 }
 
-const StreamViewRow* row_of(const StreamView& view, double distance_m, double bound_m) {
+const StreamViewRow* row_of(const StreamView& view, const std::string& codec, double distance_m,
+                            double bound_m) {
   for (const StreamViewRow& row : view.rows)
-    if (row.distance_m == distance_m && row.bound_m == bound_m) return &row;
+    if (row.codec == codec && row.distance_m == distance_m && row.bound_m == bound_m) return &row;
   return nullptr;
 }
 
@@ -71,25 +72,26 @@ std::string look_with_same_rate(const StreamView& view, const StreamViewRow& str
 
 HtmlTable view_table(const StreamView& view) {
   HtmlTable table;
-  table.columns = {"bound, mm"};
+  table.columns = {"codec", "bound, mm"};
   for (const double distance_m : kViewDistancesM)
     for (const char* measure : {"PSNR, dB", "SSIM", "dE"})
       table.columns.push_back(fmt::format("{:g} m: {}", distance_m, measure));
   table.columns.emplace_back("strands, Mbit/s");
-  for (const double bound_m : kViewBoundsM) {
-    std::vector<HtmlCell> cells = {fmt::format("{:g}", mm(bound_m))};
-    double mbit_per_s = 0.0;
-    for (const double distance_m : kViewDistancesM) {
-      const StreamViewRow* row = row_of(view, distance_m, bound_m);
-      if (row == nullptr) break;
-      cells.emplace_back(fmt::format("{:.1f}", row->psnr_db));
-      cells.emplace_back(fmt::format("{:.3f}", row->ssim));
-      cells.emplace_back(fmt::format("{:.2f}", row->delta_e));
-      mbit_per_s = row->mbit_per_s;
+  for (const char* codec : kViewCodecs)
+    for (const double bound_m : kViewBoundsM) {
+      std::vector<HtmlCell> cells = {codec, fmt::format("{:g}", mm(bound_m))};
+      double mbit_per_s = 0.0;
+      for (const double distance_m : kViewDistancesM) {
+        const StreamViewRow* row = row_of(view, codec, distance_m, bound_m);
+        if (row == nullptr) break;
+        cells.emplace_back(fmt::format("{:.1f}", row->psnr_db));
+        cells.emplace_back(fmt::format("{:.3f}", row->ssim));
+        cells.emplace_back(fmt::format("{:.2f}", row->delta_e));
+        mbit_per_s = row->mbit_per_s;
+      }
+      cells.emplace_back(fmt::format("{:.2f}", mbit_per_s));
+      if (cells.size() == table.columns.size()) table.rows.push_back(std::move(cells));
     }
-    cells.emplace_back(fmt::format("{:.2f}", mbit_per_s));
-    if (cells.size() == table.columns.size()) table.rows.push_back(std::move(cells));
-  }
   return table;
 }
 
@@ -99,17 +101,17 @@ std::string view_plot(const StreamView& view) {
   desc.x.title = "largest error allowed for any vertex, mm";
   desc.y.title = "PSNR in the hair's pixels, dB";
   desc.y.scale = PlotScale::Linear;
-  for (const double distance_m : kViewDistancesM) {
-    PlotSeries series;
-    series.name = fmt::format("from {:g} m", distance_m);
-    for (const StreamViewRow& row : view.rows)
-      if (row.distance_m == distance_m)
-        series.points.push_back(
-            {mm(row.bound_m), row.psnr_db,
-             fmt::format("{:g} mm from {:g} m: {:.1f} dB, SSIM {:.3f}, {:.2f} Mbit/s", mm(row.bound_m),
-                         distance_m, row.psnr_db, row.ssim, row.mbit_per_s)});
-    if (!series.points.empty()) desc.series.push_back(std::move(series));
-  }
+  for (const char* codec : kViewCodecs)
+    for (const double distance_m : kViewDistancesM) {
+      PlotSeries series;
+      series.name = fmt::format("{} from {:g} m", codec, distance_m);
+      for (const StreamViewRow& row : view.rows)
+        if (row.codec == codec && row.distance_m == distance_m)
+          series.points.push_back({mm(row.bound_m), row.psnr_db,
+                                   fmt::format("{}: {:.1f} dB, SSIM {:.3f}, {:.2f} Mbit/s", series.name,
+                                               row.psnr_db, row.ssim, row.mbit_per_s)});
+      if (!series.points.empty()) desc.series.push_back(std::move(series));
+    }
   return make_svg_plot(desc);
 }
 
@@ -122,16 +124,17 @@ HtmlTable pixel_table(const StreamView& view, LookMeasure measure) {
   for (const std::string& codec : codecs) table.columns.push_back(codec + ", Mbit/s for it");
   if (measure == LookMeasure::Psnr) table.columns.emplace_back("pictures with the strands' Mbit/s");
   for (const double distance_m : kViewDistancesM)
-    for (const double bound_m : kViewBoundsM) {
-      const StreamViewRow* row = row_of(view, distance_m, bound_m);
-      if (row == nullptr) continue;
-      std::vector<HtmlCell> cells = {fmt::format("{:g} mm from {:g} m", mm(bound_m), distance_m),
-                                     look_words(row->psnr_db, row->ssim, measure),
-                                     fmt::format("{:.2f}", row->mbit_per_s)};
-      for (const std::string& codec : codecs) cells.push_back(need_of(view, codec, *row, measure));
-      if (measure == LookMeasure::Psnr) cells.emplace_back(look_with_same_rate(view, *row));
-      table.rows.push_back(std::move(cells));
-    }
+    for (const char* strand_codec : kViewCodecs)
+      for (const double bound_m : kViewBoundsM) {
+        const StreamViewRow* row = row_of(view, strand_codec, distance_m, bound_m);
+        if (row == nullptr) continue;
+        std::vector<HtmlCell> cells = {
+            fmt::format("{} at {:g} mm from {:g} m", strand_codec, mm(bound_m), distance_m),
+            look_words(row->psnr_db, row->ssim, measure), fmt::format("{:.2f}", row->mbit_per_s)};
+        for (const std::string& codec : codecs) cells.push_back(need_of(view, codec, *row, measure));
+        if (measure == LookMeasure::Psnr) cells.emplace_back(look_with_same_rate(view, *row));
+        table.rows.push_back(std::move(cells));
+      }
   return table;
 }
 
@@ -142,14 +145,16 @@ std::string pixel_plot(const StreamView& view, double distance_m) {
   desc.x.title = "Mbit/s";
   desc.y.title = "PSNR in the hair's pixels, dB";
   desc.y.scale = PlotScale::Linear;
-  PlotSeries strands;
-  strands.name = fmt::format("strands, {}", kViewCodec);
-  for (const StreamViewRow& row : view.rows)
-    if (row.distance_m == distance_m)
-      strands.points.push_back({row.mbit_per_s, row.psnr_db,
-                                fmt::format("strands at {:g} mm: {:.1f} dB, {:.2f} Mbit/s", mm(row.bound_m),
-                                            row.psnr_db, row.mbit_per_s)});
-  if (!strands.points.empty()) desc.series.push_back(std::move(strands));
+  for (const char* codec : kViewCodecs) {
+    PlotSeries strands;
+    strands.name = fmt::format("strands, {}", codec);
+    for (const StreamViewRow& row : view.rows)
+      if (row.codec == codec && row.distance_m == distance_m)
+        strands.points.push_back({row.mbit_per_s, row.psnr_db,
+                                  fmt::format("{} at {:g} mm: {:.1f} dB, {:.2f} Mbit/s", codec,
+                                              mm(row.bound_m), row.psnr_db, row.mbit_per_s)});
+    if (!strands.points.empty()) desc.series.push_back(std::move(strands));
+  }
   for (const std::string& codec : picture_codecs(view)) {
     PlotSeries series;
     series.name = "pictures, " + codec;
@@ -167,15 +172,16 @@ void add_view_sections(HtmlPage& page, const StreamView& view) {
   if (view.rows.empty()) return;
   page.heading("How it looks");
   page.paragraph(fmt::format(
-      "Pictures of {} x {} pixels drawn in tiles from decoded strands ({}), against pictures of the exact "
+      "Pictures of {} x {} pixels drawn in tiles from decoded strands (step is told all of the wind), "
+      "against pictures of the exact "
       "32-bit floats: {} of the median half second of {}, {} strands simulated and {} drawn. Only the hair "
       "counts: pixels of either picture that change when strands are drawn in other colours, so that skin in "
       "the hair's shadow does not. At 40 dB a difference is hard "
       "to "
       "find beside the exact picture. Strands finer than a pixel flicker by themselves: part of every "
       "difference is theirs, and OpenGL's quads, which draw looks that name a method, add to it.",
-      view.size.width, view.size.height, kViewCodec, view.compared_pictures, view.motion,
-      to_string(view.strands), view.drawn_strands));
+      view.size.width, view.size.height, view.compared_pictures, view.motion, to_string(view.strands),
+      view.drawn_strands));
   page.table(view_table(view));
   page.figure(view_plot(view), "Higher is better; 40 dB is hard to tell from exact.");
   for (const ViewSheet& sheet : view.sheets)
@@ -199,10 +205,10 @@ void add_view_sections(HtmlPage& page, const StreamView& view) {
 }
 
 std::string view_csv(const StreamView& view) {
-  CsvFile csv({"distance_m", "bound_mm", "psnr_db", "ssim", "delta_e", "hair_share", "mbit_per_s", "width",
-               "height"});
+  CsvFile csv({"codec", "distance_m", "bound_mm", "psnr_db", "ssim", "delta_e", "hair_share", "mbit_per_s",
+               "width", "height"});
   for (const StreamViewRow& row : view.rows)
-    csv.add_row({csv_number(row.distance_m), csv_number(mm(row.bound_m)), csv_number(row.psnr_db),
+    csv.add_row({row.codec, csv_number(row.distance_m), csv_number(mm(row.bound_m)), csv_number(row.psnr_db),
                  csv_number(row.ssim), csv_number(row.delta_e), csv_number(row.hair_share),
                  csv_number(row.mbit_per_s), fmt::format("{}", view.size.width),
                  fmt::format("{}", view.size.height)});

@@ -390,8 +390,8 @@ std::string streaming_page(const StreamingReport& report) {
 std::string streaming_summary(const StreamingReport& report) {
   std::string text = needs_text(report) + "\n";
   for (const StreamViewRow& row : report.view.rows)
-    text += fmt::format("{:.2f} mm from {:g} m: {:.1f} dB, SSIM {:.3f}\n", mm(row.bound_m), row.distance_m,
-                        row.psnr_db, row.ssim);
+    text += fmt::format("{} at {:.2f} mm from {:g} m: {:.1f} dB, SSIM {:.3f}\n", row.codec, mm(row.bound_m),
+                        row.distance_m, row.psnr_db, row.ssim);
   for (const GoalLine& line : judge_streaming(report))
     text += fmt::format("{:<13} {}: {}\n", to_string(line.verdict), line.goal, line.measured);
   for (const StreamingRow& row : report.rows)

@@ -45,7 +45,7 @@ TEST(PixelCurve, IsReadBetweenItsPoints) {
 
 TEST(PixelTable, SaysWhatIsMissingAndWhatIsNeverReached) {
   StreamView view;
-  view.rows = {{.distance_m = 3.0, .bound_m = 1e-4, .psnr_db = 35.0, .mbit_per_s = 2.0}};
+  view.rows = {{.codec = "tangent", .distance_m = 3.0, .bound_m = 1e-4, .psnr_db = 35.0, .mbit_per_s = 2.0}};
   view.pixels = {point(2.0, 30.0), point(8.0, 40.0), point(1.0, 20.0, "vp8")};
   view.missing = {"h264"};
   const HtmlTable table = pixel_table(view, LookMeasure::Psnr);
@@ -111,7 +111,7 @@ TEST(StreamView, FinerStrandsLookMoreLikeTheExactOnesAndTakeMore) {
   ASSERT_TRUE(view.ok()) << view.error().to_string();
   EXPECT_EQ(view->compared_pictures, 2u);
   EXPECT_LE(said, view_step_count());
-  ASSERT_EQ(view->rows.size(), std::size(kViewDistancesM) * std::size(kViewBoundsM));
+  ASSERT_EQ(view->rows.size(), std::size(kViewDistancesM) * std::size(kViewCodecs) * std::size(kViewBoundsM));
   for (size_t i = 0; i < view->rows.size(); ++i) {
     const StreamViewRow& row = view->rows[i];
     EXPECT_GT(row.hair_share, 0.0);
@@ -122,7 +122,7 @@ TEST(StreamView, FinerStrandsLookMoreLikeTheExactOnesAndTakeMore) {
     EXPECT_LT(finer.bound_m, row.bound_m);
     EXPECT_GT(finer.mbit_per_s, row.mbit_per_s);
   }
-  for (size_t d = 0; d < std::size(kViewDistancesM); ++d) {
+  for (size_t d = 0; d < std::size(kViewDistancesM) * std::size(kViewCodecs); ++d) {
     const StreamViewRow& finest = view->rows[d * std::size(kViewBoundsM)];
     const StreamViewRow& coarsest = view->rows[(d + 1) * std::size(kViewBoundsM) - 1];
     EXPECT_GT(finest.psnr_db, coarsest.psnr_db + 6.0) << "25 times as exact";
@@ -144,7 +144,7 @@ TEST(StreamView, FinerStrandsLookMoreLikeTheExactOnesAndTakeMore) {
   HtmlPage page("page");
   add_view_sections(page, *view);
   EXPECT_THAT(page.text(), HasSubstr("Strands or pictures?"));
-  EXPECT_THAT(view_plot(*view), HasSubstr("from 0.66 m"));
+  EXPECT_THAT(view_plot(*view), HasSubstr("tangent from 0.66 m"));
   const std::string csv = view_csv(*view);
   EXPECT_EQ(static_cast<size_t>(std::count(csv.begin(), csv.end(), '\n')), view->rows.size() + 1);
 }
