@@ -8,11 +8,6 @@
 namespace strandcast {
 namespace {
 
-/// Also before servers serve it.
-bool predicts_by_steps(const StrandCodecInfo& info) {
-  return info.predicts || info.name == "step";
-}
-
 /// A strand codec of common/strands, used as server and viewer use it.
 class OwnCodec final : public StreamCodec {
  public:
@@ -131,7 +126,7 @@ std::vector<StreamCodecRow> own_stream_codecs(double bound_m) {
     row.is_temporal = info.name != "raw";
     row.bound_m = bound_m;
     std::vector<std::optional<WindTold>> winds = {std::nullopt};
-    if (predicts_by_steps(info)) winds.assign(std::begin(kWindsTold), std::end(kWindsTold));
+    if (info.predicts) winds.assign(std::begin(kWindsTold), std::end(kWindsTold));
     for (const std::optional<WindTold> wind : winds) {
       row.wind = wind;
       row.make = [name = info.name, bound_m, wind](const StreamShape& shape) {

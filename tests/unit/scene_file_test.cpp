@@ -223,7 +223,7 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
   EXPECT_THAT(error_of("gravity_mps2 { y: nan }"), HasSubstr("gravity_mps2.y is nan"));
   EXPECT_THAT(error_of("gravity_mps2 { y: 1e999 }"), HasSubstr("gravity_mps2.y is inf"));
   EXPECT_THAT(error_of("look { root_color { g: 1.5 } }"), HasSubstr("look.root_color.g is 1.5"));
-  EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: delta, raw, tangent"));
+  EXPECT_THAT(error_of("stream { codec: 'h264' }"), HasSubstr("known: delta, raw, step, tangent"));
   EXPECT_EQ(
       error_of("look { methods { shading: 'phong' } }"),
       "s.textproto:1:18: look.methods.shading is unknown (known: main, sadeghi, kajiya_kay, karis, chiang, "
