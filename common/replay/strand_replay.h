@@ -1,5 +1,5 @@
 // StrandReplay: received strand frames -> what to draw now. Decodes, keeps the newest snapshots, blends
-// between them, asks for keyframes and measures. A viewer never simulates: between snapshots it only
+// between them, asks for keyframes and measures. A viewer never decides: between snapshots it only
 // interpolates. One thread; no network, no GL.
 #pragma once
 

@@ -218,7 +218,10 @@ TEST_F(ModeSwitching, AutoTakesFramesOnALinkTooSlowForStrandsAndComesBack) {
   constexpr uint32_t kStrands = 240;  // long ones: no class can leave out more than half of so few
   picture_ = {32, 24};                // that go through a link which is too slow for strands
   picture_codecs_ &= ~codec_bit(PictureCodec::H264);
-  if (!start(test::bald_scene(kStrands, 64))) return;
+  SceneDesc scene = test::bald_scene(kStrands, 64);
+  scene.stream.codec = "tangent";  // what steps tell of so few strands no link is too slow for
+  scene.stream.has_codec = true;
+  if (!start(scene)) return;
   chaos::RelayConfig relay;
   relay.to_port = server_->port();
   auto link = chaos::ChaosRelay::start(relay);

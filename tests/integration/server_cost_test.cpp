@@ -46,6 +46,8 @@ SceneDesc barest_scene() {
   scene.wind = {};
   scene.has_auto_collider = false;
   scene.follicle_limit_deg = 180.0;
+  scene.stream.codec = "tangent";  // a server that steps has a second codec, for who cannot
+  scene.stream.has_codec = true;
   return scene;
 }
 
