@@ -23,13 +23,13 @@ namespace strandcast {
 struct StepKernel {
   uint8_t number = 0;
   std::string shader_path;
+  double cost = 1.0;  // of a step with default parameters, against that of dftl
   bool has_twist_variant = false;
   /// Of the model's own planes those that change from step to step, and those that do not.
   std::vector<PlaneRole> moving = {};
   std::vector<PlaneRole> fixed = {};
   bool carries_way = false;  // Displacement is the way of the last substep, and RodAxis turns with segments
   std::array<uint32_t, 2> scratch_rows{};  // without and with twist
-  double cost = 1.0;                       // of a step by default parameters, against that of dftl
 };
 /// Numbers are given once and stay.
 const std::vector<StepKernel>& step_kernels();

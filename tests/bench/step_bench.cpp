@@ -78,14 +78,18 @@ Status run(const Options& options) {
       encode_ms += static_cast<double>(encoded_ns - begin_ns) * 1e-6;
       decode_ms += static_cast<double>(decoded_ns - encoded_ns) * 1e-6;
     }
+    const int64_t join_ns = cpu_ns();
+    ASSIGN_OR_RETURN(const size_t join_bytes, codec->join_bytes(recording.frames.back()));
+    const double join_ms = static_cast<double>(cpu_ns() - join_ns) * 1e-6;
     const auto frames = static_cast<double>(recording.frames.size() - kStart);
     const auto vertices = static_cast<double>(recording.shape.plane_size());
     fmt::print(
         "{:12} {:>7.4f} bits/vertex {:>8.3f} Mbit/s encode {:>6.2f} ms decode {:>6.2f} ms error {:.4f} mm "
-        "keyframe {:.1f} bits/vertex, then{}\n",
+        "keyframe {:.1f} bits/vertex, then{}; join {:.1f} bits/vertex {:.1f} ms\n",
         row.wind ? fmt::format("{} {}", row.name, to_string(*row.wind)) : row.name,
         8.0 * bytes / frames / vertices, 8.0 * bytes / frames * 60e-6, encode_ms / frames, decode_ms / frames,
-        1e3 * error_m, 8.0 * static_cast<double>(first_bytes) / vertices, start);
+        1e3 * error_m, 8.0 * static_cast<double>(first_bytes) / vertices, start,
+        8.0 * static_cast<double>(join_bytes) / vertices, join_ms);
   }
   return {};
 }

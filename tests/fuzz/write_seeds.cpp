@@ -140,6 +140,15 @@ void add_chains(const SeedFolder& seeds) {
       seeds.add("strand_" + codec.name, "patched_" + name, patched);
       seeds.add("strand_" + codec.name, "spliced_" + name, spliced);
     }
+    // What stands before the integers: of "step" a state, ticks, a scene or a model.
+    Bytes head_patches;
+    for (uint16_t at = 2; at < 40; at += 5)
+      head_patches = joined({head_patches, honest,
+                             chain_step(ChainStep::Patched, kKnowsHash | kFixLength,
+                                        packed(static_cast<uint16_t>(kBodyAt + at), uint8_t{64}))});
+    for (int settings = 1; codec.name == "step" && settings < 2 * kHairSizes; settings += 2)
+      seeds.add("strand_" + codec.name, fmt::format("head_{}", settings),
+                joined({packed(static_cast<uint8_t>(settings)), head_patches, honest}));
     const Bytes made_up = joined({packed(uint8_t{0}), chain_step(ChainStep::Whole, 0, frame->message), honest,
                                   chain_step(ChainStep::Body, kAsKeyframe | kKnowsHash, body),
                                   chain_step(ChainStep::Body, kKnowsHash, body),

@@ -1,5 +1,6 @@
 // What the predictor does with all vertices, a block of strands at a time: from its floats to the lattice,
 // and back from what was decoded. Private to common/strands/step; the same bits from every instruction set.
+// Places without a strand keep what they have.
 #pragma once
 
 #include <array>
@@ -44,5 +45,68 @@ struct CorrectWork {
   uint32_t block_end;
 };
 void correct_blocks(simd::InstructionSet set, const CorrectWork& work);
+
+/// Strands are where they were decoded.
+struct PlaceWork {
+  const tangent::Layout& layout;
+  const tangent::Planes<int32_t>& decoded;
+  Turn world_from_head;
+  float quantum_m;
+  StrandBlocks& position_m;
+  uint32_t block_begin;
+  uint32_t block_end;
+};
+void place_blocks(simd::InstructionSet set, const PlaceWork& work);
+
+/// Velocities since they were there, under another pose of the head; none for what jumped.
+struct StartWork {
+  const tangent::Layout& layout;
+  const tangent::Planes<int32_t>& before;
+  Turn world_from_head;          // then
+  std::array<float, 3> shift_m;  // of the head, back to then
+  float quantum_m;
+  float per_second;
+  const StrandBlocks& position_m;
+  StrandBlocks& velocity_mps;
+  uint32_t block_begin;
+  uint32_t block_end;
+};
+void start_blocks(simd::InstructionSet set, const StartWork& work);
+
+struct TurnWork {
+  Turn by;
+  StrandBlocks& vectors;
+  uint32_t block_begin;
+  uint32_t block_end;
+};
+void turn_blocks(simd::InstructionSet set, const TurnWork& work);
+
+/// Material axes without twist along strands as they lie.
+struct AxesWork {
+  const StrandBlocks& rod_edge;
+  const StrandBlocks& rod_strand;
+  Turn world_from_head;
+  uint32_t first;  // free vertex
+  const StrandBlocks& position_m;
+  StrandBlocks& axis;
+  uint32_t block_begin;
+  uint32_t block_end;
+};
+void axes_blocks(simd::InstructionSet set, const AxesWork& work);
+
+/// Vectors become whole numbers of steps beside what they are about.
+struct SettleWork {
+  StrandBlocks& vectors;
+  const StrandBlocks* about = nullptr;    // null: 0
+  const StrandBlocks* less = nullptr;     // half of which is taken off; null: 0
+  const StrandBlocks* seconds = nullptr;  // w of whose first row that is multiplied with; null: 1
+  float step = 1.0f;
+  float w_step = 0.0f;  // of w, from the second row on; 0: w becomes 0
+  uint32_t block_begin = 0;
+  uint32_t block_end = 0;
+};
+void settle_blocks(simd::InstructionSet set, const SettleWork& work);
+/// The most steps that any becomes.
+inline constexpr float kMostSteps = 524288.0f;
 
 }  // namespace strandcast::step

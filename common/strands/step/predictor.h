@@ -17,6 +17,7 @@
 #include "common/strands/byte_io.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
+#include "common/strands/value_coder.h"
 
 namespace strandcast::step {
 
@@ -27,6 +28,9 @@ struct PredictorGround {
   WorkerPool& workers;
   simd::InstructionSet set;
 };
+
+/// More are not predicted by steps: it takes up to 200 bytes of memory for each.
+inline constexpr size_t kMostStepVertices = 2'000'000;
 
 class Predictor {
  public:
@@ -62,29 +66,47 @@ class Predictor {
   void settle(const tangent::Planes<int32_t>& decoded, float quantum_m);
   /// After settle().
   void write_state(std::vector<std::byte>& bytes) const;
-  /// The other side of it, all but where strands are; BadInput for what is no state.
+  /// The other side of it, under this pose of the head; BadInput for what is no state. place() follows.
   Status read_state(ByteReader& bytes, const Pose& world_from_head);
-  /// Strands are where they were decoded.
-  void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
-  /// Bytes that write_state() may have at most.
-  size_t most_state_bytes() const;
+  /// Once it is known where the strands of read_state() were decoded.
+  void place(const tangent::Planes<int32_t>& decoded, float quantum_m);
 
   /// What may be put back after a frame that failed its checks.
   void save();
   void restore();
 
  private:
+  /// A plane of the state beside positions, as joiners are told of it.
+  struct StatePlane {
+    PlaneRole role;
+    float step;           // of x, y and z
+    float w_step = 0.0f;  // of w from the second vertex on, the first has the last substep; 0: there is none
+    bool is_way = false;  // told beside velocity times the last substep
+  };
+
   Predictor(StepModel model, const PredictorGround& ground);
   Status prepare();
   void fill_rest();
   void fill_fixed();
-  void find_axes();
+  void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
+  void find_axes(StrandBlocks& axes) const;
   void turn(const glm::dquat& by);
   void run(const StepInput& input);
   StrandBlocks* moving(PlaneRole role) const;
-  template <class Visit>
-  void for_state_planes(Visit visit) const;
+  std::vector<StatePlane> state_planes() const;
+  float share_history();
+  float way_velocity(size_t place, uint32_t v, uint32_t axis) const;
+  void write_slice(uint32_t slice, ValueWriter& writer) const;
+  void read_slice(uint32_t slice, float history_s, ValueReader& reader);
   uint32_t block_count() const;
+  template <class Work>
+  void for_blocks(const Work& work) const {
+    constexpr size_t kGrain = 32;
+    tangent::encode_terms(ground_.layout, ground_.workers)
+        .for_ranges(block_count(), kGrain, [&](size_t begin, size_t end) {
+          work(static_cast<uint32_t>(begin), static_cast<uint32_t>(end));
+        });
+  }
 
   /// What changes from frame to frame.
   struct State {
@@ -101,6 +123,9 @@ class Predictor {
   std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> fixed_;
   State state_;
   State saved_;
+  // By settle(), for write_state().
+  std::unique_ptr<StrandBlocks> found_axes_;
+  float history_s_ = 0.0f;  // last substep of strands that remember it
   std::optional<LaneProgram> program_;
   std::optional<LaneProgram> follicle_program_;
 };

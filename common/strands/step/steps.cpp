@@ -5,18 +5,14 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/hash.h"
 
 namespace strandcast::step {
 namespace {
 
-constexpr int kStateLevel = 3;
 constexpr double kNsPerS = 1e9;
-/// Of a strand or vertex in what is unpacked, for all a model and its state can have.
-constexpr size_t kMostBytesPerStrand = 128;
-constexpr size_t kMostBytesPerVertex = 192;
-constexpr size_t kMostBytesBeside = 1 << 16;
 /// Frames with more are better off with fitted weights: of bits_apart().
-constexpr double kMostSparseBits = 1.0;
+constexpr double kMostSparseBits = 0.5;
 /// Of the same, what steps may tell less than that nothing moved: strands at rest are told well by both.
 constexpr double kMostBitsWorse = 1.0;
 /// Of vertices every so many are looked at.
@@ -27,23 +23,24 @@ Moment moment_of(const SnapshotInfo& info) {
   return {info.tick, info.sim_time_ns, info.world_from_head};
 }
 
-size_t most_state_bytes(const tangent::Layout& layout) {
-  return kMostBytesBeside + kMostBytesPerStrand * layout.stride + kMostBytesPerVertex * layout.plane_size();
+/// Of what the bytes before the integers say: most of it moves no vertex far enough in this frame for the
+/// state hash to tell, and all of the next ones a little.
+uint16_t check_of(uint8_t flags, std::span<const std::byte> bytes) {
+  uint32_t hash = mix_u32(flags);
+  for (const std::byte byte : bytes) hash = mix_u32(hash ^ std::to_integer<uint32_t>(byte));
+  return static_cast<uint16_t>(hash);
 }
 
-void append_packed(ZstdCompressor& zstd, std::span<const std::byte> source, std::vector<std::byte>& to) {
-  std::vector<std::byte> packed;
-  zstd.append(source, kStateLevel, packed);
-  ByteWriter writer(to);
-  writer.put(static_cast<uint32_t>(packed.size()));
-  writer.put_bytes(packed);
-}
-
-/// About how many bits a vertex tell where those of a sample are, when they are expected there.
-double bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
-                  const tangent::Planes<int32_t>& target) {
+/// About how many bits tell where vertices of a sample are, when they are expected there.
+struct Sample {
   double bits = 0.0;
-  size_t count = 0;
+  double vertices = 0.0;
+
+  double mean() const { return vertices > 0.0 ? bits / vertices : 0.0; }
+};
+Sample bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>& expected,
+                  const tangent::Planes<int32_t>& target) {
+  Sample sample;
   for (uint32_t v = 1; v < layout.vertex_count; ++v)
     for (size_t run = 0; run < layout.no_neighbour(); run += kSampleStep)
       for (size_t place = run; place < std::min<size_t>(run + kSampleRun, layout.no_neighbour()); ++place) {
@@ -53,10 +50,18 @@ double bits_apart(const tangent::Layout& layout, const tangent::Planes<int32_t>&
           const double apart = static_cast<double>(target[axis][at]) - expected[axis][at];
           squared += apart * apart;
         }
-        bits += std::log2(1.0 + squared / (tangent::kStepsPerBound * tangent::kStepsPerBound));
-        ++count;
+        sample.vertices += 1.0;
+        sample.bits += std::log2(1.0 + squared / (tangent::kStepsPerBound * tangent::kStepsPerBound));
       }
-  return count == 0 ? 0.0 : bits / static_cast<double>(count);
+  return sample;
+}
+
+/// Whether strands can be where they were decoded: what moves without time passing was put somewhere.
+bool is_near(const tangent::Planes<int32_t>& decoded, const tangent::Planes<int32_t>& target) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    for (size_t i = 0; i < target[axis].size(); ++i)
+      if (std::abs(decoded[axis][i] - target[axis][i]) > tangent::kStepsPerBound) return false;
+  return true;
 }
 
 }  // namespace
@@ -70,9 +75,12 @@ void Steps::step(std::span<const StepTick> ticks, const Moment& now, const tange
 
 void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent::History& history) {
   const double seconds = static_cast<double>(now.sim_time_ns - last_.sim_time_ns) / kNsPerS;
-  if (is_stepping_) {
-    predictor_->correct({frame.lattice, history.lattice, seconds, history.quantum_m});
+  if (is_stepping_ || is_following_) {
+    predictor_->correct(
+        {is_stepping_ ? frame.lattice : expected_, history.lattice, seconds, history.quantum_m});
+    ++age_;
   } else {
+    age_ = seconds > 0.0 ? 1 : 0;
     if (next_predictor_) predictor_ = std::move(next_predictor_);
     if (predictor_) {
       predictor_->set_scene(scene_);
@@ -81,7 +89,7 @@ void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent
     }
   }
   next_predictor_.reset();
-  is_stepping_ = false;
+  is_stepping_ = is_following_ = false;
   last_ = now;
 }
 
@@ -103,12 +111,12 @@ bool EncoderSteps::take_model(const std::shared_ptr<const StepModel>& model, con
   has_model_ = false;
   next_predictor_.reset();
   model_bytes_.clear();
-  if (model == nullptr || model->vertex_count != layout.vertex_count ||
-      model->strand_count < layout.strand_count)
+  if (model == nullptr || rest_in_head_m_.size() != size_t{layout.strand_count} * layout.vertex_count ||
+      model->vertex_count != layout.vertex_count || model->strand_count < layout.strand_count)
     return false;
-  write_model(*model, layout.strand_count, model_bytes_);
+  write_model(*model, rest_in_head_m_, layout.strand_count, model_bytes_);
   ByteReader reader(model_bytes_);
-  Result<StepModel> read = read_model(reader, layout.strand_count, layout.vertex_count);
+  Result<StepModel> read = read_model(reader, rest_in_head_m_, layout.strand_count, layout.vertex_count);
   if (!read) return false;
   Result<std::unique_ptr<Predictor>> predictor = Predictor::make(std::move(*read), ground(layout));
   if (!predictor) return false;
@@ -127,6 +135,7 @@ void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& 
   is_stepping_ = false;
   last_ = moment_of(snapshot);
   bytes_.clear();
+  has_said_ = false;
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return;
   take_scene(*snapshot.trail->scene);
   told_scene_ = snapshot.trail->scene;
@@ -141,10 +150,31 @@ std::span<const StepTick> EncoderSteps::ticks_since(const SnapshotInfo& snapshot
   return std::span(ticks).last(count);
 }
 
+/// How steps serve the frame: they predict it, or go on beside what motion predicts, or are worth nothing.
+uint8_t EncoderSteps::judge(const tangent::Layout& layout, const tangent::History& history,
+                            const tangent::Planes<int32_t>& target) const {
+  constexpr uint32_t kFirstFrames = 1;     // strands without velocities rather start anew
+  constexpr double kMostBitsBeside = 8.0;  // of a vertex
+  const double by_steps = bits_apart(layout, expected_, target).mean();
+  const double by_nothing = bits_apart(layout, history.lattice, target).mean();
+  if (by_steps <= by_nothing + kMostBitsWorse)
+    return by_steps <= kMostSparseBits ? kStepFlag | kSparseFlag : kStepFlag;
+  return by_steps <= by_nothing + kMostBitsBeside && age_ >= kFirstFrames ? kFollowFlag : 0;
+}
+
 uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout& layout,
                             tangent::History& history, const tangent::Planes<int32_t>& target) {
   bytes_.clear();
-  is_stepping_ = false;
+  is_stepping_ = is_following_ = false;
+  const uint8_t flags = say(snapshot, layout, history, target);
+  check_ = check_of(flags & kTellingFlags, bytes_);
+  has_said_ = flags != 0;
+  return flags;
+}
+
+/// The flags; bytes_ are what they announce.
+uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& layout,
+                          tangent::History& history, const tangent::Planes<int32_t>& target) {
   if (snapshot.trail == nullptr || snapshot.trail->scene == nullptr) return 0;
   const StepTrail& trail = *snapshot.trail;
   uint8_t flags = 0;
@@ -156,7 +186,7 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
   }
   if (trail.model != told_model_) {
     if (take_model(trail.model, layout)) {
-      append_packed(zstd_, model_bytes_, bytes_);
+      ByteWriter(bytes_).put_bytes(model_bytes_);
       return flags | kModelFlag;
     }
     return flags;
@@ -165,6 +195,7 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
   const bool is_covered = snapshot.tick >= last_.tick && count <= trail.ticks.size() &&
                           (count == 0 || trail.ticks.back().tick == snapshot.tick);
   if (!predictor_ || !has_model_ || !is_covered) return flags;
+  if (vertex_rounds(predictor_->model(), scene_, count) > kMostVertexRounds) return flags;
   std::vector<std::byte> said;
   WindSteps wind = wind_;
   write_ticks(ticks_since(snapshot), wind, said);
@@ -174,18 +205,22 @@ uint8_t EncoderSteps::begin(const SnapshotInfo& snapshot, const tangent::Layout&
       read_ticks(reader, snapshot.tick, snapshot.world_from_head, wind_read);
   CHECK(ticks.ok());
   step(*ticks, moment_of(snapshot), layout, history);
-  // Where steps tell much less than that nothing moved, something else moves the strands.
-  const double bits = bits_apart(layout, expected_, target);
-  if (bits > bits_apart(layout, history.lattice, target) + kMostBitsWorse) return flags;
+  if (count == 0 && !is_near(history.lattice, target)) return flags;
+  const uint8_t how = judge(layout, history, target);
+  if (how == 0) return flags;
   wind_ = wind_read;
   bytes_.insert(bytes_.end(), said.begin(), said.end());
-  std::swap(history.lattice, expected_);
-  is_stepping_ = true;
-  return flags | kStepFlag | (bits <= kMostSparseBits ? kSparseFlag : 0);
+  is_stepping_ = (how & kStepFlag) != 0;
+  is_following_ = how == kFollowFlag;
+  if (is_stepping_) std::swap(history.lattice, expected_);
+  return flags | how;
 }
 
 void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {
-  ByteWriter(body).put_bytes(bytes_);
+  if (!has_said_) return;
+  ByteWriter writer(body);
+  writer.put(check_);
+  writer.put_bytes(bytes_);
 }
 
 void EncoderSteps::finish(const SnapshotInfo& snapshot, const tangent::Frame& frame,
@@ -199,55 +234,52 @@ void EncoderSteps::settle(const tangent::History& history) {
 }
 
 void EncoderSteps::append_state(std::vector<std::byte>& body) {
-  if (!predictor_ || !has_model_) {
-    ByteWriter(body).put(uint32_t{0});
-    return;
-  }
-  std::vector<std::byte> state;
-  write_scene(scene_, state);
-  ByteWriter(state).put_bytes(model_bytes_);
-  predictor_->write_state(state);
-  append_packed(zstd_, state, body);
+  const bool has_state = predictor_ && has_model_;
+  ByteWriter(body).put(static_cast<uint8_t>(has_state ? 1 : 0));
+  if (!has_state) return;
+  write_scene(scene_, body);
+  ByteWriter(body).put_bytes(model_bytes_);
+  predictor_->write_state(body);
 }
 
 void DecoderSteps::restart(std::span<const glm::vec3> rest_in_head_m) {
   rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
   predictor_.reset();
   next_predictor_.reset();
-  is_stepping_ = is_saved_ = false;
-}
-
-Result<std::vector<std::byte>> DecoderSteps::unpack(ByteReader& body, size_t most_bytes) {
-  const auto size = body.take<uint32_t>();
-  const auto packed = body.take_bytes(size);
-  if (!body.ok()) return make_error(ErrorCode::BadInput, "what a step needs is cut off");
-  ASSIGN_OR_RETURN(const size_t bytes, zstd_content_bytes(packed, most_bytes));
-  std::vector<std::byte> unpacked(bytes);
-  RETURN_IF_ERROR(zstd_.fill(packed, unpacked));
-  return unpacked;
+  is_stepping_ = is_following_ = is_saved_ = false;
 }
 
 Status DecoderSteps::begin(uint8_t flags, const Moment& now, const tangent::Layout& layout, ByteReader& body,
                            tangent::History& history) {
+  const auto announced = static_cast<uint16_t>((flags & kFlags) != 0 ? body.take<uint16_t>() : 0);
+  const std::span<const std::byte> all = body.rest();
   std::optional<StepScene> scene;
   std::unique_ptr<Predictor> next;
   if ((flags & kSceneFlag) != 0) {
     ASSIGN_OR_RETURN(scene, read_scene(body));
   }
   if ((flags & kModelFlag) != 0) {
-    ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, unpack(body, most_state_bytes(layout)));
-    ByteReader reader(bytes);
-    ASSIGN_OR_RETURN(StepModel model, read_model(reader, layout.strand_count, layout.vertex_count));
+    ASSIGN_OR_RETURN(StepModel model,
+                     read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));
     ASSIGN_OR_RETURN(next, Predictor::make(std::move(model), ground(layout)));
   }
   const bool is_step = (flags & kStepFlag) != 0;
+  const bool is_following = (flags & kFollowFlag) != 0;
   WindSteps wind = wind_;
   std::vector<StepTick> ticks;
-  if (is_step) {
-    if (!predictor_ || next)
+  if (is_step || is_following) {
+    if (!predictor_ || next || (is_step && is_following))
       return make_error(ErrorCode::BadInput, "a frame is predicted by steps of a solver that was not told");
     ASSIGN_OR_RETURN(ticks, read_ticks(body, now.tick, now.world_from_head, wind));
+    const uint64_t work = vertex_rounds(predictor_->model(), scene ? *scene : scene_, ticks.size());
+    if (work > kMostVertexRounds)
+      return make_error(ErrorCode::LimitExceeded, "steps of {} rounds of vertices in a frame, at most {}",
+                        work, kMostVertexRounds);
   }
+  const uint16_t check = check_of(flags & kTellingFlags, all.first(all.size() - body.rest().size()));
+  if ((flags & kTellingFlags) != 0 && check != announced)
+    return make_error(ErrorCode::BadInput,
+                      "what a frame says of steps has check {:04x}, announced was {:04x}", check, announced);
   // From here on nothing fails before the frame's own checks do.
   saved_scene_ = scene_;
   saved_wind_ = wind_;
@@ -258,15 +290,16 @@ Status DecoderSteps::begin(uint8_t flags, const Moment& now, const tangent::Layo
   next_predictor_ = std::move(next);
   wind_ = wind;
   is_stepping_ = is_step;
-  if (!is_step) return {};
+  is_following_ = is_following;
+  if (!is_step && !is_following) return {};
   step(ticks, now, layout, history);
-  std::swap(history.lattice, expected_);
+  if (is_step) std::swap(history.lattice, expected_);
   return {};
 }
 
 void DecoderSteps::abandon(tangent::History& history) {
   if (is_stepping_) std::swap(history.lattice, expected_);
-  is_stepping_ = false;
+  is_stepping_ = is_following_ = false;
   next_predictor_.reset();
   scene_ = saved_scene_;
   wind_ = saved_wind_;
@@ -286,20 +319,12 @@ void DecoderSteps::settle(const tangent::History& history) {
 Result<DecoderSteps::Joined> DecoderSteps::read_state(ByteReader& body, const Moment& now,
                                                       const tangent::Layout& layout) {
   Joined joined;
-  ByteReader peek = body;
-  if (peek.take<uint32_t>() == 0) {
-    body.take<uint32_t>();
-    return joined;
-  }
-  ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, unpack(body, most_state_bytes(layout)));
-  ByteReader reader(bytes);
-  ASSIGN_OR_RETURN(joined.scene, read_scene(reader));
-  ASSIGN_OR_RETURN(StepModel model, read_model(reader, layout.strand_count, layout.vertex_count));
+  if (body.take<uint8_t>() == 0) return joined;
+  ASSIGN_OR_RETURN(joined.scene, read_scene(body));
+  ASSIGN_OR_RETURN(StepModel model,
+                   read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));
   ASSIGN_OR_RETURN(joined.predictor, Predictor::make(std::move(model), ground(layout)));
-  RETURN_IF_ERROR(joined.predictor->read_state(reader, now.world_from_head));
-  if (!reader.rest().empty())
-    return make_error(ErrorCode::BadInput, "{} bytes follow the state that steps go on from",
-                      reader.rest().size());
+  RETURN_IF_ERROR(joined.predictor->read_state(body, now.world_from_head));
   return joined;
 }
 
@@ -309,10 +334,10 @@ void DecoderSteps::take_over(Joined joined, const Moment& now, const tangent::Hi
   scene_ = std::move(joined.scene);
   wind_ = {};
   last_ = now;
-  is_stepping_ = is_saved_ = false;
+  is_stepping_ = is_following_ = is_saved_ = false;
   if (!predictor_) return;
   predictor_->set_scene(scene_);
-  predictor_->put_positions(history.lattice, history.quantum_m);
+  predictor_->place(history.lattice, history.quantum_m);
 }
 
 }  // namespace strandcast::step

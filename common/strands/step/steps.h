@@ -16,7 +16,6 @@
 #include "common/strands/step/predictor.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
-#include "common/strands/zstd_block.h"
 
 namespace strandcast::step {
 
@@ -25,7 +24,10 @@ inline constexpr uint8_t kStepFlag = 2;     // predicted by steps, whose ticks f
 inline constexpr uint8_t kSceneFlag = 4;    // a scene follows
 inline constexpr uint8_t kModelFlag = 8;    // a model follows, from the next frame on; not with kStepFlag
 inline constexpr uint8_t kSparseFlag = 16;  // with kStepFlag: without weights, in sparse_symbols.h's order
-inline constexpr uint8_t kFlags = kStepFlag | kSceneFlag | kModelFlag | kSparseFlag;
+/// Predicted by motion; ticks follow, and steps are corrected by what is decoded. Not with kStepFlag.
+inline constexpr uint8_t kFollowFlag = 32;
+inline constexpr uint8_t kTellingFlags = kStepFlag | kSceneFlag | kModelFlag | kFollowFlag;  // bytes follow
+inline constexpr uint8_t kFlags = kTellingFlags | kSparseFlag;
 
 /// A frame of which something is predicted.
 struct Moment {
@@ -63,6 +65,8 @@ class Steps {
   Moment last_;
   tangent::Planes<int32_t> expected_;
   bool is_stepping_ = false;
+  bool is_following_ = false;  // steps were taken, and predict nothing
+  uint32_t age_ = 0;           // frames since strands started without velocities
 };
 
 class EncoderSteps : public Steps {
@@ -81,7 +85,11 @@ class EncoderSteps : public Steps {
   void append_state(std::vector<std::byte>& body);
 
  private:
+  uint8_t say(const SnapshotInfo& snapshot, const tangent::Layout& layout, tangent::History& history,
+              const tangent::Planes<int32_t>& target);
   std::span<const StepTick> ticks_since(const SnapshotInfo& snapshot) const;
+  uint8_t judge(const tangent::Layout& layout, const tangent::History& history,
+                const tangent::Planes<int32_t>& target) const;
   void take_scene(const StepScene& scene);
   bool take_model(const std::shared_ptr<const StepModel>& model, const tangent::Layout& layout);
 
@@ -89,8 +97,9 @@ class EncoderSteps : public Steps {
   bool has_model_ = false;  // that this build can step
   std::shared_ptr<const StepScene> told_scene_;
   std::vector<std::byte> model_bytes_;
-  std::vector<std::byte> bytes_;
-  ZstdCompressor zstd_;
+  std::vector<std::byte> bytes_;  // that the flags of the frame at work announce
+  uint16_t check_ = 0;
+  bool has_said_ = false;
 };
 
 class DecoderSteps : public Steps {
@@ -118,9 +127,6 @@ class DecoderSteps : public Steps {
   void take_over(Joined joined, const Moment& now, const tangent::History& history);
 
  private:
-  Result<std::vector<std::byte>> unpack(ByteReader& body, size_t most_bytes);
-
-  ZstdDecompressor zstd_;
   StepScene saved_scene_;
   WindSteps saved_wind_{};
   bool is_saved_ = false;

@@ -1,20 +1,26 @@
 #include "common/strands/step/wire.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
 
+#include "common/strands/step/numbers.h"
+#include "common/strands/step/rod_planes.h"
 #include "common/strands/strand_limits.h"
 #include "common/strands/strand_payload.h"
+#include "common/strands/wrapping.h"
 
 namespace strandcast::step {
 namespace {
 
 constexpr double kWindStepMps = 1.0 / 16384.0;
-constexpr int32_t kMostWindSteps = 1 << 27;
+constexpr auto kMostWindSteps = static_cast<int32_t>(kMaxWindMps / kWindStepMps);
 constexpr size_t kMostConstants = 24;
 constexpr size_t kMostNameBytes = 40;
-constexpr float kUnitStep = 1.0f / 32767.0f;  // of directions
+constexpr float kDirectionStep = 1.0f / 8192.0f;  // of what a rod is told beside its rest shape
+constexpr uint32_t kDroppedBits = 12;             // of a stiffness
+constexpr float kMostStiffness = 1e12f;
+constexpr double kLargest = 1e20;  // of parameters and constants
 constexpr uint8_t kWaves = 1;
 constexpr uint8_t kCarried = 2;
 constexpr uint8_t kCarriedElsewhere = 4;  // not to where the tick ends
@@ -33,13 +39,6 @@ uint32_t take_varint(ByteReader& bytes) {
   }
   return value;
 }
-uint32_t folded(int32_t value) {
-  return (static_cast<uint32_t>(value) << 1) ^ static_cast<uint32_t>(value >> 31);
-}
-int32_t unfolded(uint32_t value) {
-  return static_cast<int32_t>((value >> 1) ^ (0u - (value & 1u)));
-}
-
 /// Writes and reads vectors, and remembers whether all that was read were usable numbers.
 struct Numbers {
   ByteReader& bytes;
@@ -73,22 +72,90 @@ void put_vector(const Vector& vector, ByteWriter& to) {
   to.put(vector.z);
 }
 
-/// Directions in 16 bits an axis, all x first: bytes that are alike lie together.
-void put_plane(std::span<const glm::vec4> values, size_t row, size_t count, ByteWriter& to) {
-  for (int axis = 0; axis < 3; ++axis)
-    for (size_t begin = 0; begin < values.size(); begin += row)
-      for (size_t i = begin; i < begin + count; ++i)
-        to.put(static_cast<int16_t>(std::lrint(std::clamp(values[i][axis], -1.0f, 1.0f) / kUnitStep)));
-  for (size_t begin = 0; begin < values.size(); begin += row)
-    for (size_t i = begin; i < begin + count; ++i) to.put(values[i].w);
+/// What of a rod is told beside what follows from the rest shape, in the order of strands.
+template <class Code>
+void code_rods(StepModel& model, uint32_t strand_count, const RodPlanes& natural, Code code) {
+  const bool has_tail = model.pinned_tail_count > 0;
+  const auto code_vector = [&](glm::vec4& value, const glm::vec4& expected) {
+    for (int axis = 0; axis < 3; ++axis) code(value[axis], expected[axis], axis);
+  };
+  for (uint32_t s = 0; s < strand_count; ++s)
+    for (uint32_t row = 0; row < (has_tail ? kRodStrandRows : 2u); ++row)
+      code_vector(model.rod_strand[size_t{row} * model.strand_count + s],
+                  natural.strand[size_t{row} * strand_count + s]);
+  for (uint32_t s = 0; s < strand_count; ++s)
+    for (uint32_t v = model.pinned_root_count + 1; v < model.vertex_count; ++v)
+      code_vector(model.rod_edge[size_t{v} * model.strand_count + s],
+                  natural.edge[size_t{v} * strand_count + s]);
 }
-std::vector<glm::vec4> take_plane(size_t size, Numbers& from) {
-  constexpr double kLargest = 1e20;
-  std::vector<glm::vec4> values(size);
-  for (int axis = 0; axis < 3; ++axis)
-    for (glm::vec4& value : values) value[axis] = static_cast<float>(from.bytes.take<int16_t>()) * kUnitStep;
-  for (glm::vec4& value : values) value.w = from.take<float>(kLargest);
-  return values;
+
+/// First bits of a positive float.
+int32_t first_bits(float value) {
+  return static_cast<int32_t>(std::bit_cast<uint32_t>(std::max(value, 0.0f)) >> kDroppedBits);
+}
+float of_first_bits(int32_t bits) {
+  const float value = std::bit_cast<float>(static_cast<uint32_t>(bits) << kDroppedBits);
+  return value >= 0.0f && value < kMostStiffness ? value : 0.0f;
+}
+
+RodPlanes natural_rods_of(const StepModel& model, std::span<const glm::vec3> rest_in_head_m,
+                          uint32_t strand_count) {
+  const auto twist = model.kernel.variant.find("HAS_TWIST");
+  return natural_rods({rest_in_head_m, strand_count, model.vertex_count, model.pinned_root_count,
+                       model.pinned_tail_count, twist != model.kernel.variant.end() && twist->second != 0});
+}
+
+/// Directions of clamps and joints; then how stiff strands are.
+void write_rods(StepModel model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
+                std::vector<std::byte>& bytes) {
+  const RodPlanes natural = natural_rods_of(model, rest_in_head_m, strand_count);
+  ByteWriter to(bytes);
+  const size_t stride = model.strand_count;
+  const glm::vec4* const bend = model.rod_strand.data() + 2 * stride;
+  const glm::vec4* const twist = model.rod_strand.data() + 3 * stride;
+  to.put(strand_count > 0 && bend->w > 0.0f ? twist->w / bend->w : 0.0f);
+  ValueWriter writer;
+  std::array<NumberTables, 3> tables;
+  code_rods(model, strand_count, natural, [&](float& value, float expected, int axis) {
+    const float steps = (std::clamp(value, -1.0f, 1.0f) - expected) / kDirectionStep;
+    tables[static_cast<size_t>(axis)].put(static_cast<int32_t>(std::lrint(steps)), writer);
+  });
+  NumberTables stiffness;
+  int32_t before = 0;
+  for (uint32_t s = 0; s < strand_count; ++s) {
+    const int32_t bits = first_bits(bend[s].w);
+    stiffness.put(bits - before, writer);
+    before = bits;
+  }
+  writer.finish(bytes);
+}
+
+Status read_rods(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m, StepModel& model) {
+  RodPlanes natural = natural_rods_of(model, rest_in_head_m, model.strand_count);
+  model.rod_edge = natural.edge;
+  model.rod_strand = natural.strand;
+  const auto twist_over_bend = bytes.take<float>();
+  if (!bytes.ok() || !(twist_over_bend >= 0.0f && twist_over_bend < kMostStiffness))
+    return make_error(ErrorCode::BadInput, "the rods of a step are cut off or have no stiffness");
+  ValueReader reader;
+  ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
+  bytes.take_bytes(bytes.rest().size() - rest.size());
+  std::array<NumberTables, 3> tables;
+  code_rods(model, model.strand_count, natural, [&](float& value, float expected, int axis) {
+    const auto steps = static_cast<float>(tables[static_cast<size_t>(axis)].take(reader));
+    value = std::clamp(expected + kDirectionStep * steps, -1.0f, 1.0f);
+  });
+  NumberTables stiffness;
+  int32_t before = 0;
+  for (uint32_t s = 0; s < model.strand_count; ++s) {
+    before = wrapping_sum(before, stiffness.take(reader));
+    const float bend = of_first_bits(before);
+    model.rod_strand[size_t{2} * model.strand_count + s].w = bend;
+    model.rod_strand[size_t{3} * model.strand_count + s].w = bend * twist_over_bend;
+  }
+  if (!reader.is_spent())
+    return make_error(ErrorCode::BadInput, "the rods of a step do not end where they should");
+  return {};
 }
 
 // In their order on the wire.
@@ -112,7 +179,8 @@ Result<ModelConstants> read_constants(ByteReader& bytes) {
     const std::string name(reinterpret_cast<const char*>(text.data()), text.size());
     if (bytes.take<uint8_t>() == 0) {
       const auto value = bytes.take<double>();
-      if (!std::isfinite(value)) return make_error(ErrorCode::BadInput, "a step's constant is no number");
+      if (!(std::abs(value) <= kLargest))
+        return make_error(ErrorCode::BadInput, "a step's constant is no number");
       constants[name] = value;
       continue;
     }
@@ -142,7 +210,8 @@ Pose take_near(const Pose& near, Numbers& from) {
 
 }  // namespace
 
-void write_model(const StepModel& model, uint32_t strand_count, std::vector<std::byte>& bytes) {
+void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
+                 std::vector<std::byte>& bytes) {
   ByteWriter to(bytes);
   const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
   to.put(kernel->number);
@@ -158,13 +227,14 @@ void write_model(const StepModel& model, uint32_t strand_count, std::vector<std:
     to.put(static_cast<uint8_t>(value.index()));
     std::visit([&](auto number) { to.put(number); }, value);
   }
-  put_plane(model.rod_edge, model.strand_count, strand_count, to);
-  put_plane(model.rod_strand, model.strand_count, strand_count, to);
+  if (!kernel->fixed.empty()) write_rods(model, rest_in_head_m, strand_count, bytes);
 }
 
-Result<StepModel> read_model(ByteReader& bytes, uint32_t strand_count, uint32_t vertex_count) {
-  constexpr double kLargest = 1e20;
+Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m,
+                             uint32_t strand_count, uint32_t vertex_count) {
   Numbers from{bytes};
+  if (rest_in_head_m.size() != size_t{strand_count} * vertex_count)
+    return make_error(ErrorCode::Unsupported, "strands without a rest shape cannot be predicted by a step");
   StepModel model;
   const auto number = bytes.take<uint8_t>();
   const StepKernel* kernel = find_step_kernel(number);
@@ -184,13 +254,17 @@ Result<StepModel> read_model(ByteReader& bytes, uint32_t strand_count, uint32_t 
   model.kernel.variant = {{"HAS_PINNED_TAIL", model.pinned_tail_count > 0 ? 1 : 0}};
   if (kernel->has_twist_variant) model.kernel.variant["HAS_TWIST"] = has_twist ? 1 : 0;
   model.kernel.scratch_rows = kernel->scratch_rows[has_twist ? 1 : 0];
-  for (const PlaneRole role : kernel->fixed) {
-    const bool is_edge = role == PlaneRole::RodEdge;
-    const size_t rows = is_edge ? vertex_count : kRodStrandRows;
-    (is_edge ? model.rod_edge : model.rod_strand) = take_plane(rows * strand_count, from);
-  }
   RETURN_IF_ERROR(from.status("the model"));
+  if (!kernel->fixed.empty()) RETURN_IF_ERROR(read_rods(bytes, rest_in_head_m, model));
   return model;
+}
+
+uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t tick_count) {
+  uint64_t rounds = 1;
+  for (const auto& [name, value] : model.kernel.constants)
+    if (const auto* count = std::get_if<uint32_t>(&value); count != nullptr && *count <= kMostRounds)
+      rounds += *count;
+  return rounds * scene.substeps * tick_count * model.strand_count * model.vertex_count;
 }
 
 void write_scene(const StepScene& scene, std::vector<std::byte>& bytes) {
@@ -275,7 +349,7 @@ void write_ticks(std::span<const StepTick> ticks, WindSteps& wind, std::vector<s
     if (tick.carried_to && *tick.carried_to != tick.world_from_head) flags |= kCarriedElsewhere;
     to.put(flags);
     const WindSteps now = wind_steps(tick.wind_mps);
-    for (size_t axis = 0; axis < 3; ++axis) put_varint(folded(now[axis] - wind[axis]), bytes);
+    for (size_t axis = 0; axis < 3; ++axis) put_varint(fold_sign(now[axis] - wind[axis]), bytes);
     wind = now;
     if (&tick != &ticks.back()) put_near(tick.world_from_head, last, to);
     if ((flags & kCarriedElsewhere) != 0) put_near(*tick.carried_to, last, to);
@@ -296,9 +370,8 @@ Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, uint64_t frame_tick,
     if (flags > kTickFlags) return make_error(ErrorCode::BadInput, "a step has flags {}", flags);
     tick.has_waves = (flags & kWaves) != 0;
     for (int32_t& steps : wind)
-      steps = std::clamp(static_cast<int32_t>(static_cast<uint32_t>(steps) +
-                                              static_cast<uint32_t>(unfolded(take_varint(bytes)))),
-                         -kMostWindSteps * 2, kMostWindSteps * 2);
+      steps =
+          std::clamp(wrapping_sum(steps, unfold_sign(take_varint(bytes))), -kMostWindSteps, kMostWindSteps);
     tick.wind_mps = wind_of(wind);
     tick.world_from_head = i + 1 < count ? take_near(frame_pose, from) : frame_pose;
     if ((flags & kCarriedElsewhere) != 0)

@@ -16,14 +16,19 @@ namespace strandcast::step {
 
 /// Largest count among a kernel's constants: rounds, solves and the like. A seed may be anything.
 inline constexpr uint32_t kMostRounds = 256;
-/// Of a kernel's work for a vertex in a tick, substeps times rounds: what a peer may ask for.
-inline constexpr uint32_t kMostRoundsPerTick = 1024;
+/// What a peer may ask for in a frame: ticks times substeps times rounds times vertices. A processor takes
+/// about a second for as many; 100,000 x 16 with 10 rounds in 16 substeps are as many.
+inline constexpr uint64_t kMostVertexRounds = uint64_t{1} << 28;
+uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t tick_count);
 
-/// The model for the first `strand_count` of its strands.
-void write_model(const StepModel& model, uint32_t strand_count, std::vector<std::byte>& bytes);
+/// The model for the first `strand_count` of its strands, whose rest shape this is: (vertex_count x
+/// strand_count), strand fastest.
+void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
+                 std::vector<std::byte>& bytes);
 /// From untrusted bytes, for strands of these counts: BadInput for a kernel that is not known, for numbers
 /// that are none, and for counts that no kernel may run with.
-Result<StepModel> read_model(ByteReader& bytes, uint32_t strand_count, uint32_t vertex_count);
+Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_in_head_m,
+                             uint32_t strand_count, uint32_t vertex_count);
 
 void write_scene(const StepScene& scene, std::vector<std::byte>& bytes);
 Result<StepScene> read_scene(ByteReader& bytes);
