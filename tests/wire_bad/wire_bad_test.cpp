@@ -306,8 +306,10 @@ Bytes chain_input(int honest_count, ChainStep step, uint8_t flags, std::span<con
 }
 
 TEST(StrandBytes, DamageGivesAnErrorOrAValidSnapshot) {
-  const std::map<std::string, Entry> entries = {
-      {"raw", fuzz_strand_raw}, {"delta", fuzz_strand_delta}, {"tangent", fuzz_strand_tangent}};
+  const std::map<std::string, Entry> entries = {{"raw", fuzz_strand_raw},
+                                                {"delta", fuzz_strand_delta},
+                                                {"tangent", fuzz_strand_tangent},
+                                                {"step", fuzz_strand_step}};
   for (const StrandCodecInfo& codec : strand_codecs()) {
     ASSERT_EQ(entries.count(codec.name), 1u) << "no fuzz target for " << codec.name;
     const Entry entry = entries.at(codec.name);
