@@ -14,6 +14,7 @@
 #include "client/app/feed.h"
 #include "client/app/line_budget.h"
 #include "client/app/save_scene.h"
+#include "client/app/step_speed.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
@@ -287,8 +288,9 @@ int run_save(const CtlTarget& target, const std::filesystem::path& path) {
 }
 
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {
-  const auto config = config_for(target, Role::Viewer);
+  auto config = config_for(target, Role::Viewer);
   if (!config) return fail(config.error());
+  config->hello.step_ns = measured_step_ns();  // it decodes what viewers here get
   const auto check = check_stream(*config, frames, timeout_s);
   if (!check)
     return fail(check.error(), check.error().code == ErrorCode::Timeout ? kRefusedExit : kBadInputExit);

@@ -40,9 +40,9 @@ std::optional<uint64_t> TickHashes::find(const Key& key) const {
 }
 
 std::string StreamCheck::to_string() const {
-  std::string text =
-      fmt::format("{} frames decoded, {} ticks compared between two viewers, {} differ, {} frames rejected",
-                  decoded_frames, compared_ticks, differing_ticks, rejected_frames);
+  std::string text = fmt::format(
+      "{} frames decoded by {}, {} ticks compared between two viewers, {} differ, {} frames rejected",
+      decoded_frames, codec, compared_ticks, differing_ticks, rejected_frames);
   if (differing_ticks > 0) text += fmt::format(" (first at tick {})", first_differing_tick);
   if (compared_ticks == 0)
     text += " (the viewers got different streams: the link or this machine is too slow)";
@@ -76,6 +76,7 @@ Result<StreamCheck> check_stream(const ClientConfig& config, uint64_t frames, do
   }
 
   StreamCheck check;
+  check.codec = first.session->welcome().codec;
   check.decoded_frames = first.session->decoded_frames();
   check.rejected_frames =
       first.session->replay().stats().rejected_frames + second.session->replay().stats().rejected_frames;

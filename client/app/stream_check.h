@@ -39,6 +39,7 @@ class TickHashes {
 inline constexpr size_t kKeptTicksPerFrame = 4;
 
 struct StreamCheck {
+  std::string codec;             // of the first viewer's strands, at the end
   uint64_t decoded_frames = 0;   // by the first viewer
   uint64_t compared_ticks = 0;   // decoded by both, of the same stream
   uint64_t differing_ticks = 0;  // with different hashes

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "client/app/step_speed.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
 #include "client/net/http_get.h"
@@ -108,6 +109,8 @@ void print_measures(const LoadMeasures& measures, size_t viewers, double seconds
   print("newest_bound_mm", static_cast<double>(measures.newest_quality.bound_m) * 1e3);
   print("newest_quality_after_ms", static_cast<double>(measures.newest_quality_ms));
   print("joined", static_cast<double>(measures.joined));
+  for (const auto& [codec, count] : measures.joined_by_codec)
+    std::cout << fmt::format("joined_by_{}={}\n", one_line(codec, kMaxNameChars), count);
   print("ended_by_server", static_cast<double>(measures.ended));
   for (const auto& [code, count] : measures.close_codes)
     std::cout << fmt::format("close_{}={}\n", code, count);
@@ -141,7 +144,7 @@ Status run(CommandLine line) {
   const std::atomic<bool>& stop = catch_stop_signals();
   std::optional<Encryption> encryption;
   if (address.is_tls) encryption = Encryption{line.tls_authorities};
-  LoadViewers viewers({address.host, address.port, line.token, encryption});
+  LoadViewers viewers({address.host, address.port, line.token, encryption, measured_step_ns()});
   RETURN_IF_ERROR(join_all(viewers, line));
   for (const int64_t begin_ns = now_ns();
        !stop && static_cast<double>(now_ns() - begin_ns) * 1e-9 < line.warm_up_s;)

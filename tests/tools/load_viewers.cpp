@@ -158,6 +158,7 @@ class LoadViewers::State {
     hello.name = "load";
     hello.token = config_.token;
     hello.acknowledges = viewer.plan.acknowledges;
+    hello.step_ns = config_.step_ns;
     viewer.queue(hello);
   }
 
@@ -210,9 +211,10 @@ class LoadViewers::State {
   void take_control(Viewer& viewer, const std::vector<std::byte>& bytes) {
     const auto message = decode_server_message(bytes);
     if (!message) return;
-    if (std::holds_alternative<Welcome>(*message)) {
+    if (const auto* welcome = std::get_if<Welcome>(&*message)) {
       viewer.has_welcome = true;
       ++measures_.joined;
+      if (welcome->mode == StreamMode::Strands) ++measures_.joined_by_codec[welcome->codec];
     }
     if (const auto* quality = std::get_if<StreamQuality>(&*message)) {
       ++measures_.quality_changes;
@@ -260,6 +262,7 @@ void LoadViewers::reset_measures() {
   LoadMeasures fresh;
   fresh.newest_quality = state_->measures_.newest_quality;
   fresh.newest_quality_ms = state_->measures_.newest_quality_ms;
+  fresh.joined_by_codec = state_->measures_.joined_by_codec;
   state_->measures_ = std::move(fresh);
 }
 

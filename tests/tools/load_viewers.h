@@ -38,6 +38,7 @@ struct LoadConfig {
   uint16_t port = 0;
   std::string token;
   std::optional<Encryption> encryption = std::nullopt;
+  double step_ns = 0.0;  // as in Hello; 0 = as viewers that cannot predict
 };
 
 /// Totals since the start or the last reset_measures(); the vectors hold one value per frame, within
@@ -51,8 +52,9 @@ struct LoadMeasures {
   StreamQuality newest_quality;    // of any viewer; survives a reset, as the next one does
   float newest_quality_ms = 0.0f;  // from that viewer's first frame
   uint64_t joined = 0;
-  uint64_t ended = 0;                        // by the server or the network, not by leave()
-  std::map<uint16_t, uint64_t> close_codes;  // of those; 0 = broken off
+  std::map<std::string, uint64_t> joined_by_codec;  // of those who get strands; survives a reset
+  uint64_t ended = 0;                               // by the server or the network, not by leave()
+  std::map<uint16_t, uint64_t> close_codes;         // of those; 0 = broken off
   std::string last_goodbye;
   std::vector<float> interval_ms;  // between two frames of one viewer
   std::vector<float> latency_ms;   // from the server's send time; one machine, one clock
