@@ -1,5 +1,6 @@
 #include "client/app/viewer_session.h"
 
+#include <span>
 #include <utility>
 
 #include "common/log/log.h"
@@ -40,7 +41,8 @@ Result<std::unique_ptr<ViewerSession>> ViewerSession::open(const ClientConfig& c
   return session;
 }
 
-ViewerSession::ViewerSession(std::shared_ptr<ViewerClient> client) : client_(std::move(client)) {}
+ViewerSession::ViewerSession(std::shared_ptr<ViewerClient> client)
+    : client_(std::move(client)), welcome_(client_->welcome()) {}
 
 Status ViewerSession::pump(std::chrono::milliseconds timeout) {
   send_mode_request(*modes_, *client_);
@@ -67,7 +69,7 @@ Status ViewerSession::handle(ClientEvent& event) {
   } else if (auto* notice = std::get_if<Notice>(&event)) {
     notices_.add(std::move(*notice));
   } else if (auto* quality = std::get_if<StreamQuality>(&event)) {
-    take_quality(std::move(*quality));
+    return take_quality(std::move(*quality));
   } else if (auto* frame_quality = std::get_if<FrameQuality>(&event)) {
     take_quality(std::move(*frame_quality));
   } else if (auto* change = std::get_if<ModeChange>(&event)) {
@@ -110,12 +112,20 @@ void ViewerSession::follow(std::shared_ptr<ModeControl> modes) {
   modes_->begin_session(asked_mode_, welcome());
 }
 
-void ViewerSession::take_quality(StreamQuality quality) {
+Status ViewerSession::take_quality(StreamQuality quality) {
   quality_ = std::move(quality);
   ++quality_changes_;
-  if (!log_lines_.take(now_ns())) return;
+  if (!quality_.codec.empty() && quality_.codec != welcome_.codec) {
+    const auto rest =
+        asset_ ? std::span<const glm::vec3>(asset_->rest_position_m) : std::span<const glm::vec3>();
+    RETURN_IF_ERROR(replay_->follow_codec(quality_.codec, rest));
+    welcome_.codec = quality_.codec;
+    welcome_.codec_reason = quality_.reason;
+  }
+  if (!log_lines_.take(now_ns())) return {};
   log_info("replay", "{:.3g} % of the strands every {} steps within {:.3g} mm: {}",
            quality_.strand_share * 1e2, quality_.rate_divisor, quality_.bound_m * 1e3, quality_.reason);
+  return {};
 }
 
 void ViewerSession::take_quality(FrameQuality quality) {

@@ -48,7 +48,8 @@ class ViewerSession {
   /// and at least one frame. The error is why the connection ended; what was received stays readable.
   Status pump(std::chrono::milliseconds timeout);
 
-  const Welcome& welcome() const { return client_->welcome(); }
+  /// As the server said it, but for the codec of strands and its reason, which are those of now.
+  const Welcome& welcome() const { return welcome_; }
   ViewerClient& client() { return *client_; }
   /// For other threads that send.
   std::shared_ptr<ViewerClient> shared_client() const { return client_; }
@@ -116,7 +117,7 @@ class ViewerSession {
   Status handle(const MediaEvent& event);
   Status take_asset(const MediaEvent& event);
   void take_picture(const MediaEvent& event);
-  void take_quality(StreamQuality quality);
+  Status take_quality(StreamQuality quality);
   void take_quality(FrameQuality quality);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
@@ -124,6 +125,7 @@ class ViewerSession {
   void show(StreamMode mode);
 
   std::shared_ptr<ViewerClient> client_;
+  Welcome welcome_;
   std::unique_ptr<StrandReplay> replay_;
   std::shared_ptr<const SceneAsset> asset_;
   PictureDecoder pictures_;

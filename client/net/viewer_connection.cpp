@@ -48,6 +48,10 @@ void clean(Welcome& welcome) {
                             &welcome.codec, &welcome.codec_reason, &welcome.sim_device})
     *text = one_line(*text);
 }
+void clean(StreamQuality& quality) {
+  quality.reason = one_line(quality.reason);
+  quality.codec = one_line(quality.codec);
+}
 void clean(Notice& notice) {
   notice.text = one_line(notice.text);
 }

@@ -10,20 +10,40 @@ Result<std::unique_ptr<StrandReplay>> StrandReplay::make(const std::string& code
                                                          KeyframeRequester request_keyframe) {
   ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(codec, limits));
   return std::unique_ptr<StrandReplay>(
-      new StrandReplay(std::move(decoder), limits, std::move(request_keyframe)));
+      new StrandReplay({codec, std::move(decoder)}, limits, std::move(request_keyframe)));
 }
 
-StrandReplay::StrandReplay(std::unique_ptr<StrandDecoder> decoder, const StrandStreamLimits& limits,
+StrandReplay::StrandReplay(Decoding decoding, const StrandStreamLimits& limits,
                            KeyframeRequester request_keyframe)
-    : decoder_(std::move(decoder)),
+    : now_(std::move(decoding)),
       strand_count_(limits.strand_count),
       vertex_count_(limits.vertex_count),
       request_keyframe_(std::move(request_keyframe)) {}
 
 void StrandReplay::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
-  decoder_->set_rest_shape(rest_in_head_m);
+  now_.decoder->set_rest_shape(rest_in_head_m);
+  if (next_) next_->decoder->set_rest_shape(rest_in_head_m);
   const bool fits = rest_in_head_m.size() == size_t{strand_count_} * vertex_count_;
   player_.set_fill(fits ? StrandFill(rest_in_head_m, vertex_count_) : StrandFill());
+}
+
+Status StrandReplay::follow_codec(const std::string& codec, std::span<const glm::vec3> rest_in_head_m) {
+  if (codec == (next_ ? next_->codec : now_.codec)) return {};
+  if (codec == now_.codec) {
+    next_.reset();
+    return {};
+  }
+  ASSIGN_OR_RETURN(auto decoder, make_strand_decoder(codec, {strand_count_, vertex_count_}));
+  if (!rest_in_head_m.empty()) decoder->set_rest_shape(rest_in_head_m);
+  next_ = Decoding{codec, std::move(decoder)};
+  if (newest() == nullptr) begin_next();
+  return {};
+}
+
+void StrandReplay::begin_next() {
+  now_ = std::move(*next_);
+  next_.reset();
+  decode_timer_ = {};  // what the other codec took says nothing
 }
 
 std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte> message,
@@ -43,12 +63,15 @@ std::shared_ptr<const Snapshot> StrandReplay::receive(std::span<const std::byte>
   if (is_other_stream) last_sequence_ = 0;
   note_sequence(*header);
 
+  // Streams of two codecs have no number in common, so what is still on its way by the old one decodes.
+  const bool is_next = next_ && header->opcode == Opcode::StrandKeyframe && header->stream_id != stream_id_;
   const int64_t begin_ns = now_ns();
-  auto decoded = decoder_->decode(message);
+  auto decoded = (is_next ? *next_ : now_).decoder->decode(message);
   if (!decoded) {
     reject(decoded.error(), receive_time_ns);
     return nullptr;
   }
+  if (is_next) begin_next();
   std::shared_ptr<const Snapshot> snapshot = std::move(decoded).value();
   const int64_t decoded_ns = now_ns();
   decode_timer_.add_ms(static_cast<double>(decoded_ns - begin_ns) * 1e-6);

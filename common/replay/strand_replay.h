@@ -51,6 +51,11 @@ class StrandReplay {
   /// Other frames were sent instead for a while: the next keyframe continues nothing that could be missing.
   void forget_sequence() { last_sequence_ = 0; }
 
+  /// The server goes on by this codec: from the first keyframe of another stream on, or at once where
+  /// nothing was decoded yet. `rest_in_head_m` as for set_rest_shape(); empty before the asset came. NotFound
+  /// when this program cannot decode it; then nothing changes.
+  Status follow_codec(const std::string& codec, std::span<const glm::vec3> rest_in_head_m);
+
   /// The asset's rest shape; comes before the first strand frame.
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m);
 
@@ -78,13 +83,20 @@ class StrandReplay {
   double playout_delay_ms() const { return static_cast<double>(timeline_.clock().delay_ns()) * 1e-6; }
 
  private:
-  StrandReplay(std::unique_ptr<StrandDecoder> decoder, const StrandStreamLimits& limits,
-               KeyframeRequester request_keyframe);
+  /// A decoder and the name of its codec.
+  struct Decoding {
+    std::string codec;
+    std::unique_ptr<StrandDecoder> decoder;
+  };
+
+  StrandReplay(Decoding decoding, const StrandStreamLimits& limits, KeyframeRequester request_keyframe);
+  void begin_next();
   void reject(const Error& error, int64_t receive_time_ns);
   void note_sequence(const FrameHeader& header);
   Status check_stream(const FrameHeader& header) const;
 
-  std::unique_ptr<StrandDecoder> decoder_;
+  Decoding now_;
+  std::optional<Decoding> next_;  // announced, and not begun
   const uint32_t strand_count_;
   const uint32_t vertex_count_;
   KeyframeRequester request_keyframe_;

@@ -245,6 +245,7 @@ void visit(Visitor& v, StreamQuality& m) {
   v.number("strand_share", m.strand_share, kStrandShare);
   v.number("bound_m", m.bound_m, scene_fields::kStreamBound);
   v.text("reason", m.reason, kMaxTextChars);
+  v.exact_text("codec", m.codec, kMaxNameChars);
 }
 
 template <>

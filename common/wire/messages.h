@@ -183,6 +183,7 @@ struct StreamQuality {        // how strands are coded for this viewer from the 
   float strand_share = 1.0f;  // in (0, 1]
   float bound_m = 0.0f;       // Euclidean error
   std::string reason;         // for a person
+  std::string codec = {};     // of these frames; empty = as before
   bool operator==(const StreamQuality&) const = default;
 };
 struct ModeChange {                       // what the client gets from the next frame on, and why

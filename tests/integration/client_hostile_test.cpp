@@ -13,6 +13,7 @@
 #include "common/pictures/image_codec.h"
 #include "common/pictures/video_codec.h"
 #include "tests/support/client_config.h"
+#include "tests/support/eventually.h"
 #include "tests/support/fake_server.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sanitizers.h"
@@ -363,6 +364,25 @@ TEST(HostileServer, CheckComparesStatesOfTheSameStreamOnly) {
   EXPECT_EQ(check->compared_ticks, 0u);
   EXPECT_FALSE(check->is_good());
   EXPECT_THAT(check->to_string(), HasSubstr("different streams"));
+}
+
+// As after a Welcome that names one.
+TEST(HostileServer, ACodecThatNobodyKnowsEndsTheSession) {
+  const FakeServer server([&](FakePeer& peer) {
+    peer.welcome(make_welcome(20, 8));
+    peer.send(StreamQuality{256, 1, 1.0f, 1e-4f, "because", "so\u009b31m"});
+    peer.read_to_end();
+  });
+  auto session = ViewerSession::open(config_for(server.port()));
+  ASSERT_TRUE(session) << session.error().to_string();
+  Status pumped;
+  ASSERT_TRUE(eventually([&] {
+    if (pumped) pumped = (*session)->pump(std::chrono::milliseconds(5));
+    return !pumped;
+  }));
+  EXPECT_EQ(pumped.error().code, ErrorCode::NotFound);
+  EXPECT_THAT(pumped.error().to_string(), HasSubstr("'so?31m'"));
+  EXPECT_EQ((*session)->welcome().codec, "delta") << "as before";
 }
 
 // ---- text ----

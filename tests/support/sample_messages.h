@@ -75,7 +75,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
       status,
       Goodbye{"the server is shutting down"},
       Notice{true, "unknown field 'x'"},
-      StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link"},
+      StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link", "delta"},
       ModeChange{StreamMode::Frames, "the viewer draws 3 pictures per second", 640, 360},
       SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
                    {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}},

@@ -172,6 +172,46 @@ TEST_F(StrandReplayTest, AnotherStreamStartsWithItsKeyframeAndNeverStepsBack) {
   EXPECT_EQ(replay_->stats().gaps, 0u) << "streams count by themselves";
 }
 
+// What is still on its way by the old codec is shown, and nothing is refused in between.
+TEST_F(StrandReplayTest, AnotherCodecBeginsWithTheKeyframeOfItsStream) {
+  for (const char* codec : {"raw", "delta"}) {
+    const uint16_t stream_id = std::string(codec) == "raw" ? 256 : 0;
+    auto other = make_strand_encoder(codec);
+    ASSERT_TRUE(other);
+    for (int i = 0; i < 5; ++i)
+      ASSERT_TRUE(receive(with_send_time(*next(), replay_->stream_id(), 1), i * kStepNs));
+    ASSERT_TRUE(replay_->follow_codec(codec, hair_.rest_in_head()).ok());
+    ASSERT_TRUE(receive(with_send_time(*next(), replay_->stream_id(), 1), 5 * kStepNs));
+    EXPECT_EQ(state_hash(*replay_->newest()), state_hash(truth_));
+    for (int i = 6; i < 10; ++i) {
+      hair_.step();
+      truth_ = hair_.snapshot(kQuantumM);
+      ASSERT_TRUE(receive(with_send_time(*(*other)->encode(truth_), stream_id, 1), i * kStepNs))
+          << codec << ": " << replay_->stats().last_error;
+      EXPECT_EQ(state_hash(*replay_->newest()), state_hash(truth_));
+    }
+    EXPECT_EQ(replay_->decode_timer().count(), 4u) << "what the other codec took is forgotten";
+    encoder_ = std::move(*other);
+  }
+  EXPECT_EQ(replay_->stats().rejected_frames, 0u);
+  EXPECT_EQ(replay_->stats().gaps, 0u);
+}
+
+TEST_F(StrandReplayTest, ACodecIsFollowedAtOnceBeforeTheFirstStateAndTheLastWordCounts) {
+  auto other = make_strand_encoder("raw");
+  ASSERT_TRUE(other);
+  EXPECT_EQ(replay_->follow_codec("no such codec", {}).error().code, ErrorCode::NotFound);
+  ASSERT_TRUE(replay_->follow_codec("raw", {}).ok());
+  hair_.step();
+  ASSERT_TRUE(receive((*other)->encode(hair_.snapshot(kQuantumM)))) << "of stream 0, by the other codec";
+  ASSERT_TRUE(replay_->follow_codec("delta", {}).ok());
+  ASSERT_TRUE(replay_->follow_codec("raw", {}).ok());
+  hair_.step();
+  ASSERT_TRUE(receive(with_send_time(*(*other)->encode_for_join(hair_.snapshot(kQuantumM)).keyframe, 3, 1)))
+      << "the change was taken back";
+  EXPECT_EQ(replay_->stats().rejected_frames, 0u);
+}
+
 TEST_F(StrandReplayTest, MeasuresMotionLatencyOncePerSampleAndStateAge) {
   // The server's clock is one second ahead; the probe took no time.
   constexpr int64_t kAheadNs = 1'000'000'000;

@@ -275,6 +275,19 @@ TEST(WireMessages, StreamQualityIsCheckedFieldByField) {
   EXPECT_EQ(place_after([](StreamQuality& q) { q.strand_share = 0.0f; }), "quality.strand_share");
   EXPECT_EQ(place_after([](StreamQuality& q) { q.strand_share = 1.5f; }), "quality.strand_share");
   EXPECT_EQ(place_after([](StreamQuality& q) { q.bound_m = std::nanf(""); }), "quality.bound_m");
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.codec = std::string(kMaxNameChars + 1, 'x'); }),
+            "quality.codec");
+  EXPECT_EQ(place_after([](StreamQuality& q) { q.codec = "del\nta"; }), "quality.codec");
+}
+
+// A server of before says nothing of it: the codec stays.
+TEST(WireMessages, AStreamQualityOfBeforeNamesNoCodec) {
+  StreamQuality quality{3, 4, 0.5f, 5e-4f, "slow", "delta"};
+  const size_t bytes = encode(ServerMessage(quality)).size();
+  quality.codec.clear();
+  const auto before = encode(ServerMessage(quality));
+  EXPECT_EQ(before.size(), bytes - 2 - std::string("delta").size()) << "nothing is written for it";
+  EXPECT_EQ(std::get<StreamQuality>(decode_server_message(before).value()).codec, "");
 }
 
 TEST(WireMessages, TheLongestSessionListFitsIntoOneMessage) {
