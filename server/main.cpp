@@ -18,6 +18,7 @@
 #include "server/app/groom_check.h"
 #include "server/app/options.h"
 #include "server/app/server_passes.h"
+#include "server/app/viewer_codec.h"
 #include "server/net/token_file.h"
 
 namespace strandcast {
@@ -72,7 +73,11 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
   if (!notes) return fail(notes.error());
   const auto text = explain_scene(config.scene, asset, facts, *measured, *notes);
   if (!text) return fail(text.error());
-  fmt::print("{}{}\n", *text, choice->reason);
+  const auto codec = strand_codec_info(choice->codec);
+  if (!codec) return fail(codec.error());
+  const auto served = served_codecs(*codec, config.scene.stream.bound_m);
+  if (!served) return fail(served.error());
+  fmt::print("{}{}\n{}\n", *text, choice->reason, explain_viewer_codecs(*served));
   if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());
   return 0;
 }

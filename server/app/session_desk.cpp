@@ -45,7 +45,9 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     if (const std::optional<Error> error = parts_.hub.picture_failure())
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
-  const ViewerCodec codec = choose_codec(hello);
+  // Nothing is known of its link yet.
+  const ViewerCodecFacts facts = codec_facts(hello.codec_wish, hello.step_ns, parts_.source.stats());
+  const ViewerCodec codec = choose_viewer_codec(parts_.codecs, facts);
   visitor.subscription.strands.codec = codec.codec;
   const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
   viewers_.set_scene_camera(parts_.hub.look().camera);
@@ -54,6 +56,8 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     parts_.hub.remove(reader);
     return place.error();
   }
+  if (parts_.codecs.size() > 1 && !visitor.subscription.is_empty())
+    codec_watches_.insert_or_assign(visitor.session, ViewerCodecWatch(facts, codec.codec));
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = parts_.asset;
@@ -62,16 +66,35 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   return admission;
 }
 
-/// Nothing is known of its link yet.
-ViewerCodec SessionDesk::choose_codec(const Hello& hello) const {
+ViewerCodecFacts SessionDesk::codec_facts(const std::string& wish, double step_ns,
+                                          const SimStats& simulated) const {
   ViewerCodecFacts facts;
-  facts.wish = hello.codec_wish;
-  facts.step_ns = hello.step_ns;
+  facts.wish = wish;
+  facts.step_ns = step_ns;
   facts.vertices = parts_.source.asset()->rest_position_m.size();
   facts.states_hz = parts_.scene.step_rate_hz;
-  facts.solver_cost = parts_.source.stats().step_cost;
-  facts.substeps = std::max<uint32_t>(parts_.source.stats().substeps, 1);
-  return choose_viewer_codec(parts_.codecs, facts);
+  facts.solver = simulated.solver_name;
+  facts.solver_cost = simulated.step_cost;
+  facts.substeps = std::max<uint32_t>(simulated.substeps, 1);
+  return facts;
+}
+
+/// Looks whether this session can still afford its codec.
+std::optional<CodecAnswer> SessionDesk::consider_codec(SessionId session, const LinkState& link,
+                                                       int64_t time_ns) {
+  const auto found = codec_watches_.find(session);
+  if (found == codec_watches_.end()) return std::nullopt;
+  ViewerCodecWatch& watch = found->second;
+  const SimStats simulated = parts_.source.stats();
+  DecodeLoad load;
+  load.decode_ms = viewers_.report(session).decode_ms;
+  const std::vector<StrandClass> classes = parts_.hub.strand_classes();
+  if (link.mode == StreamMode::Strands && !simulated.is_paused && link.strand_class < classes.size())
+    load.states_hz = classes[link.strand_class].frame_rate_hz * std::min(simulated.realtime_factor, 1.0);
+  const ViewerCodecFacts facts = codec_facts(watch.facts().wish, watch.facts().step_ns, simulated);
+  const std::optional<ViewerCodec> chosen = watch.look(parts_.codecs, facts, load, time_ns);
+  if (!chosen) return std::nullopt;
+  return CodecAnswer{chosen->codec, parts_.codecs[chosen->codec].name, chosen->reason};
 }
 
 Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {
@@ -192,6 +215,7 @@ LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_
   LinkAnswer answer;
   if (auto change = viewers_.consider(session, gather_mode_facts(sources), time_ns))
     answer.mode = ModeAnswer{std::move(*change), parts_.asset};
+  answer.codec = consider_codec(session, link, time_ns);
   answer.is_request_waiting = viewers_.has_request(session);
   return answer;
 }
@@ -215,6 +239,7 @@ Status SessionDesk::readiness() {
 
 void SessionDesk::on_left(SessionId session) {
   control_budget_.remove(session);
+  codec_watches_.erase(session);
   parts_.inputs.remove_source(session);
   parts_.hub.remove(viewers_.remove(session));
 }

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <atomic>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -70,7 +72,8 @@ class SessionDesk : public NetHandler {
   std::string metrics() override { return metrics_ ? metrics_() : std::string(); }
 
  private:
-  ViewerCodec choose_codec(const Hello& hello) const;
+  ViewerCodecFacts codec_facts(const std::string& wish, double step_ns, const SimStats& simulated) const;
+  std::optional<CodecAnswer> consider_codec(SessionId session, const LinkState& link, int64_t time_ns);
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
   StateSource::Reply reply_to(SessionId session);
@@ -79,6 +82,7 @@ class SessionDesk : public NetHandler {
   const Parts parts_;
   const std::string session_id_;
   Viewers viewers_;
+  std::map<SessionId, ViewerCodecWatch> codec_watches_;  // of who may get another
   ControlBudget control_budget_;
   NetServer* net_ = nullptr;
   std::unique_ptr<NetworkReader> reader_;  // of all sessions

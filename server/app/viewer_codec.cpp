@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/check.h"
 #include "common/base/text.h"
@@ -12,6 +13,7 @@
 namespace strandcast {
 namespace {
 
+constexpr double kSPerMs = 1e-3;
 constexpr double kMsPerNs = 1e-6;
 constexpr double kBitsPerByte = 8.0;
 
@@ -20,7 +22,6 @@ double state_ms(const ViewerCodecFacts& facts) {
 }
 
 double core_share(const ViewerCodecFacts& facts) {
-  constexpr double kSPerMs = 1e-3;
   return state_ms(facts) * kSPerMs * facts.states_hz;
 }
 
@@ -87,6 +88,54 @@ ViewerCodec choose_viewer_codec(const std::vector<StrandCodecInfo>& served, cons
   ViewerCodec chosen = choose(served, facts);
   chosen.reason = fmt::format("{}: {}", served[chosen.codec].name, chosen.reason);
   return chosen;
+}
+
+std::string explain_viewer_codecs(const std::vector<StrandCodecInfo>& served) {
+  CHECK(!served.empty());
+  const std::string& first = served.front().name;
+  if (served.size() == 1) return fmt::format("Every viewer of strands gets {}.", first);
+  if (!served.front().predicts)
+    return fmt::format("Viewers of strands get {}, those who ask for it {}.", first, served[1].name);
+  return fmt::format(
+      "Viewers of strands get {} where predicting takes at most {:.0f} % of a core of theirs, else {}; "
+      "pictures are "
+      "drawn from {}.",
+      first, kPredictionShare * 1e2, served[1].name, served[1].name);
+}
+
+std::optional<ViewerCodec> ViewerCodecWatch::look(const std::vector<StrandCodecInfo>& served,
+                                                  const ViewerCodecFacts& facts, const DecodeLoad& load,
+                                                  int64_t time_ns) {
+  const bool is_other_model = facts.solver != facts_.solver || facts.substeps != facts_.substeps ||
+                              facts.solver_cost != facts_.solver_cost;
+  if (is_other_model) {
+    facts_ = facts;
+    slow_since_ns_.reset();
+    settled_ns_ = time_ns + kSettledDecodeNs;
+    ViewerCodec chosen = choose_viewer_codec(served, facts);
+    if (std::exchange(codec_, chosen.codec) == chosen.codec) return std::nullopt;
+    return chosen;
+  }
+  const StrandCodecInfo& present = served[codec_];
+  const size_t fallback = codec_ + 1;
+  if (!present.predicts || fallback >= served.size() || present.name == facts.wish) return std::nullopt;
+  if (!is_too_slow(load, time_ns)) return std::nullopt;
+  codec_ = fallback;
+  return ViewerCodec{
+      fallback,
+      fmt::format("{}: {} takes {:.1f} ms a state here, {:.0f} % of the time between two; {:.0f} % may be",
+                  served[fallback].name, present.name, load.decode_ms,
+                  load.decode_ms * kSPerMs * load.states_hz * 1e2, kSlowDecodeShare * 1e2)};
+}
+
+bool ViewerCodecWatch::is_too_slow(const DecodeLoad& load, int64_t time_ns) {
+  const bool is_slow = load.decode_ms * kSPerMs * load.states_hz > kSlowDecodeShare;
+  if (!is_slow || time_ns < settled_ns_) {
+    slow_since_ns_.reset();
+    return false;
+  }
+  if (!slow_since_ns_) slow_since_ns_ = time_ns;
+  return time_ns - *slow_since_ns_ >= kSlowDecodeNs;
 }
 
 }  // namespace strandcast

@@ -40,6 +40,7 @@ constexpr Row kTotals[] = {
     {"net_keyframe_requests_total", "Keyframes asked for.", &NetCounters::keyframe_requests},
     {"net_class_changes_total", "Changes of a viewer's strand class or picture step.",
      &NetCounters::class_changes},
+    {"net_codec_changes_total", "Changes of the codec of a viewer's strands.", &NetCounters::codec_changes},
     {"net_mode_changes_total", "Changes of a viewer between strands and frames.", &NetCounters::mode_changes},
     {"net_sent_bytes_total", "WebSocket payload written.", &NetCounters::bytes_sent}};
 

@@ -32,6 +32,7 @@ struct Admission {
 /// What one session's link does, for choosing between strands and frames; 0 = unknown.
 struct LinkState {
   StreamMode mode = StreamMode::Strands;  // of the frames it gets now
+  size_t strand_class = 0;                // of its strands, if it gets any
   double capacity_bytes_per_s = 0.0;
   double queue_delay_ms = 0.0;
   double round_trip_ms = 0.0;
@@ -45,9 +46,17 @@ struct ModeAnswer {
   EncodedFramePtr asset;  // for a change to strands
 };
 
+/// Another codec for the strands that a session gets, or will get.
+struct CodecAnswer {
+  size_t codec = 0;  // of those that are served
+  std::string name;
+  std::string reason;
+};
+
 /// What comes of a look at a link.
 struct LinkAnswer {
   std::optional<ModeAnswer> mode;
+  std::optional<CodecAnswer> codec;
   bool is_request_waiting = false;  // a ModeRequest has not had its turn: look again soon
 };
 

@@ -43,6 +43,7 @@ struct NetCounters {
   uint64_t chain_losses = 0;    // sessions that had to wait for a keyframe
   uint64_t keyframe_requests = 0;
   uint64_t class_changes = 0;  // of the strand class or picture step of a viewer
+  uint64_t codec_changes = 0;  // of the codec of a viewer's strands
   uint64_t mode_changes = 0;   // between strands and frames
   uint64_t bytes_sent = 0;     // WebSocket payload
 };

@@ -153,11 +153,24 @@ void Session::change_strand_class(size_t chosen) {
   context_.handler.on_strand_class(id_);
 }
 
+/// Strands go on by another codec, beginning with a keyframe.
+void Session::change_codec(const CodecAnswer& answer) {
+  if (state_ != State::Joined) return;
+  subscription_.strands.codec = answer.codec;
+  codec_ = answer.name;
+  context_.count(&NetCounters::codec_changes);
+  const bool has_strands = subscription_.gets(StreamMode::Strands);
+  if (has_strands) queue_.restart_strands();
+  context_.handler.on_strand_class(id_);
+  announce_quality(answer.reason);
+  if (has_strands) ask_for_keyframe(now_ns());
+}
+
 void Session::announce_quality(const std::string& reason) {
   context_.note(fmt::format("session {}: {}", id_, reason));
   const StrandClass& now = context_.strands.classes()[subscription_.strands.strand_class];
   queue_control(StreamQuality{stream_id_of(subscription_.strands), now.rate_divisor, now.strand_share,
-                              now.bound_m, reason});
+                              now.bound_m, reason, codec_});
 }
 
 void Session::follow_strand_classes(const std::string& reason) {
@@ -179,6 +192,7 @@ void Session::report_link(int64_t time_ns) {
   link_reported_ns_ = time_ns;
   LinkState link;
   link.mode = subscription_.mode();
+  link.strand_class = subscription_.strands.strand_class;
   link.capacity_bytes_per_s = flow_.capacity_bytes_per_s(time_ns);
   link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   context_.queue_delays.add_ms(link.queue_delay_ms);
@@ -186,6 +200,7 @@ void Session::report_link(int64_t time_ns) {
   link.strand_bytes_per_s = context_.strands.bytes_per_s(subscription_.strands.codec);
   const LinkAnswer answer = context_.handler.on_link(id_, link, time_ns);
   is_mode_request_waiting_ = answer.is_request_waiting;
+  if (answer.codec) change_codec(*answer.codec);
   if (answer.mode) answer_mode(*answer.mode);
 }
 

@@ -82,6 +82,7 @@ void Session::join(const Hello& hello) {
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   hello_.token.clear();
+  codec_ = admission->welcome.codec;
   admission->welcome.role = hello.role;
   admission->welcome.mode = subscription_.mode();
   has_joined_ = true;

@@ -72,6 +72,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_ack(const FrameAck& ack, int64_t time_ns);
   void adapt(int64_t time_ns);
   void change_strand_class(size_t chosen);
+  void change_codec(const CodecAnswer& answer);
   void announce_quality(const std::string& reason);
   void follow_picture_class(PictureClass before);
   void answer_mode(const ModeAnswer& answer);
@@ -95,6 +96,7 @@ class Session : public std::enable_shared_from_this<Session> {
   State state_ = State::Handshake;
   Hello hello_;
   Subscription subscription_;
+  std::string codec_;                        // name of that of its strands
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode
   bool is_mode_request_waiting_ = false;
   bool has_asset_ = false;  // sent, or next in line

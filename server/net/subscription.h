@@ -23,7 +23,7 @@ struct PictureChoice {
 
 class Subscription {
  public:
-  StrandStream strands;  // its codec is chosen once, when the viewer joins
+  StrandStream strands;
   PictureChoice pictures;
 
   /// Whether it gets anything: a source does not, nor who came to say something.

@@ -19,6 +19,8 @@
 #include "common/motion/motion_clip.h"
 #include "common/render/render_device.h"
 #include "common/scene/scene_file.h"
+#include "server/app/viewer_codec.h"
+#include "server/net/strand_class.h"
 #include "tests/support/look_variants.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/sample_look.h"
@@ -412,6 +414,41 @@ TEST_F(EndToEnd, AControllerPausesStepsAndIsToldWhatIsWrong) {
 }
 
 /// One viewer of strands that move, while somebody sets the stream.
+// The strands go on without a gap, by what the viewer can afford of what is simulated now.
+TEST_F(EndToEnd, AViewerThatCanNoLongerPredictGetsTheFallbackAndComesBack) {
+  start_feeding();
+  ASSERT_TRUE(eventually([&] { return server_->counters().sim.step_cost > 0.0; }));
+  const SimStats sim = server_->counters().sim;
+  ClientConfig config = client_config();
+  config.hello.step_ns =  // half of what it may take
+      0.5 * kPredictionShare * 1e9 / (kStrands * kVertices * 60.0 * sim.substeps * sim.step_cost);
+  const auto viewer = open(config);
+  ASSERT_TRUE(viewer);
+  States states;
+  record(*viewer, states);
+  const auto follows = [&](const std::string& codec, size_t number) {
+    return pump_until({viewer.get()}, [&] {
+      return viewer->welcome().codec == codec &&
+             strand_stream_of(viewer->replay().stream_id()).codec == number;
+    });
+  };
+  ASSERT_TRUE(follows("step", 0));
+  const uint32_t substeps[] = {sim.substeps * 4, sim.substeps};
+  for (const size_t turn : {0, 1}) {
+    const size_t count = states.size();
+    ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= count + 10; }));
+    ASSERT_EQ(run_command(ctl_target(), SetParameter{fmt::format("substeps={}", substeps[turn])}), kDoneExit);
+    ASSERT_TRUE(turn == 0 ? follows("tangent", 1) : follows("step", 0)) << turn;
+    EXPECT_THAT(viewer->welcome().codec_reason, HasSubstr(turn == 0 ? "100 % of a core" : "step: "));
+  }
+  const size_t count = states.size();
+  ASSERT_TRUE(pump_until({viewer.get()}, [&] { return states.size() >= count + 10; }));
+  expect_within_bound(states, observer_.published(), viewer->welcome().bound_m);
+  EXPECT_EQ(server_->counters().net.codec_changes, 2u);
+  EXPECT_EQ(viewer->blank_pictures(), 0u);
+  EXPECT_EQ(viewer->replay().stats().rejected_frames, 0u) << viewer->replay().stats().last_error;
+}
+
 class StreamSettings : public EndToEnd {
  protected:
   void SetUp() override {

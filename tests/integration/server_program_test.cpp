@@ -145,6 +145,8 @@ TEST_F(ServerProgram, PrintsSolversSceneAndPlan) {
   EXPECT_EQ(run({"--print-scene", "--scene", (folder_.path() / "printed.textproto").string()}), 0);
   EXPECT_EQ(run({"--explain", "--set", "wind.gust_intensity=0", "--log-level", "off"}), 0);
   EXPECT_THAT(out(), HasSubstr("scene/gusts        not requested"));
+  EXPECT_THAT(out(), HasSubstr("Viewers of strands get step where"));
+  EXPECT_THAT(out(), HasSubstr(", else tangent; "));
 }
 
 TEST_F(ServerProgram, ServesUntilTerminated) {

@@ -30,6 +30,7 @@ constexpr Told kTold[] = {{"open_sessions", &NetCounters::open_sessions},
                           {"chain_losses_total", &NetCounters::chain_losses},
                           {"keyframe_requests_total", &NetCounters::keyframe_requests},
                           {"class_changes_total", &NetCounters::class_changes},
+                          {"codec_changes_total", &NetCounters::codec_changes},
                           {"mode_changes_total", &NetCounters::mode_changes},
                           {"sent_bytes_total", &NetCounters::bytes_sent}};
 static_assert(sizeof(NetCounters) == std::size(kTold) * sizeof(uint64_t), "a new counter needs its row here");

@@ -117,6 +117,16 @@ TEST(ViewerCodec, WhereNobodyHasToPredictAllGetTheScenesCodec) {
   EXPECT_THAT(choose_viewer_codec(alone, facts).reason, StartsWith("oracle: no other codec is served; this"));
 }
 
+TEST(ViewerCodec, ExplainSaysWhoGetsWhich) {
+  EXPECT_EQ(
+      explain_viewer_codecs(predicting_and_plain()),
+      "Viewers of strands get oracle where predicting takes at most 50 % of a core of theirs, else plain; "
+      "pictures are drawn from plain.");
+  EXPECT_EQ(explain_viewer_codecs({{"plain", ""}}), "Every viewer of strands gets plain.");
+  EXPECT_EQ(explain_viewer_codecs({{"plain", ""}, {"plainer", ""}}),
+            "Viewers of strands get plain, those who ask for it plainer.");
+}
+
 // Whatever a client says, what it is told fits into a Welcome.
 TEST(ViewerCodec, ReasonsFitIntoAWelcome) {
   for (const std::string& wish : {std::string(kMaxNameChars, 'x'), std::string("a\nb\x1b[31m")}) {
@@ -129,6 +139,105 @@ TEST(ViewerCodec, ReasonsFitIntoAWelcome) {
       EXPECT_LE(reason.size(), kMaxTextChars);
       for (const char character : reason) EXPECT_GE(character, ' ') << reason;
     }
+  }
+}
+
+constexpr int64_t kS = 1'000'000'000;
+/// Of a state at 60 Hz.
+DecodeLoad load_of(double share) {
+  return {share * 1e3 / 60.0, 60.0};
+}
+
+/// What a viewer that is looked at four times a second is told, and when.
+std::optional<int64_t> told_after(ViewerCodecWatch& watch, const ViewerCodecFacts& facts,
+                                  const DecodeLoad& load, int64_t begin_ns) {
+  for (int64_t time_ns = begin_ns; time_ns <= begin_ns + 60 * kS; time_ns += kS / 4)
+    if (watch.look(predicting_and_plain(), facts, load, time_ns)) return time_ns - begin_ns;
+  return std::nullopt;
+}
+
+TEST(ViewerCodecWatch, WhoDecodesTooSlowlyForLongGetsTheFallback) {
+  ViewerCodecWatch quick(able_viewer(), kPredicting), slow(able_viewer(), kPredicting);
+  EXPECT_EQ(told_after(quick, able_viewer(), load_of(0.99 * kSlowDecodeShare), kS), std::nullopt);
+  EXPECT_EQ(told_after(slow, able_viewer(), load_of(1.01 * kSlowDecodeShare), kS), kSlowDecodeNs);
+  // As it decodes the other one in no time, it stays with that.
+  EXPECT_EQ(told_after(slow, able_viewer(), load_of(0.01), 100 * kS), std::nullopt);
+
+  ViewerCodecWatch told(able_viewer(), kPredicting);
+  EXPECT_EQ(told.look(predicting_and_plain(), able_viewer(), load_of(0.9), 0), std::nullopt);
+  const auto chosen = told.look(predicting_and_plain(), able_viewer(), load_of(0.9), kSlowDecodeNs);
+  ASSERT_TRUE(chosen);
+  EXPECT_EQ(chosen->codec, kFallback);
+  EXPECT_EQ(chosen->reason,
+            "plain: oracle takes 15.0 ms a state here, 90 % of the time between two; 60 % may be");
+}
+
+// A moment is not for long, a viewer of pictures decodes no strands, and rarer states leave more time.
+TEST(ViewerCodecWatch, OnlyTimeInARowCounts) {
+  ViewerCodecWatch watch(able_viewer(), kPredicting);
+  for (int i = 0; i < 20; ++i) {
+    const int64_t begin_ns = i * kSlowDecodeNs;
+    EXPECT_FALSE(watch.look(predicting_and_plain(), able_viewer(), load_of(2.0), begin_ns));
+    EXPECT_FALSE(
+        watch.look(predicting_and_plain(), able_viewer(), load_of(2.0), begin_ns + kSlowDecodeNs - 2));
+    const DecodeLoad none{load_of(2.0).decode_ms, i % 2 == 0 ? 0.0 : 15.0};
+    EXPECT_FALSE(watch.look(predicting_and_plain(), able_viewer(), none, begin_ns + kSlowDecodeNs - 1));
+  }
+}
+
+TEST(ViewerCodecWatch, OtherStepsAreChosenForAnew) {
+  ViewerCodecFacts facts = able_viewer();
+  facts.step_ns = 0.5 * kPredictionShare * 1e9 / (2'000 * 60.0);  // half of the share
+  const auto look = [&](ViewerCodecWatch& watch) {
+    return watch.look(predicting_and_plain(), facts, {}, kS);
+  };
+  ViewerCodecWatch watch(facts, kPredicting);
+  EXPECT_FALSE(look(watch));
+  facts.substeps = 4.0;
+  const auto dearer = look(watch);
+  ASSERT_TRUE(dearer);
+  EXPECT_EQ(dearer->codec, kFallback);
+  EXPECT_THAT(dearer->reason, HasSubstr("100 % of a core"));
+  EXPECT_FALSE(look(watch)) << "told once";
+  facts.solver_cost = 0.2;
+  const auto cheaper = look(watch);
+  ASSERT_TRUE(cheaper);
+  EXPECT_EQ(cheaper->codec, kPredicting);
+  // Who was too slow for one solver may try with another that costs the same.
+  EXPECT_TRUE(told_after(watch, facts, load_of(2.0), 100 * kS));
+  facts.solver = "another";
+  const auto again = look(watch);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->codec, kPredicting);
+}
+
+// Reports are of the last states, and those may be of what was simulated before.
+TEST(ViewerCodecWatch, ReportsOfOtherStepsDoNotCount) {
+  ViewerCodecFacts facts = able_viewer();
+  ViewerCodecWatch watch(facts, kPredicting);
+  facts.solver = "another";
+  EXPECT_FALSE(watch.look(predicting_and_plain(), facts, load_of(2.0), kS));
+  EXPECT_EQ(told_after(watch, facts, load_of(2.0), kS), kSettledDecodeNs + kSlowDecodeNs);
+}
+
+TEST(ViewerCodecWatch, WhoAskedForACodecKeepsIt) {
+  ViewerCodecFacts facts = able_viewer();
+  for (const auto& [wish, codec] : {std::pair{"oracle", kPredicting}, {"plain", kFallback}}) {
+    facts.wish = wish;
+    ViewerCodecWatch watch(facts, codec);
+    EXPECT_EQ(told_after(watch, facts, load_of(5.0), kS), std::nullopt) << wish;
+    facts.substeps *= 1e6;
+    EXPECT_EQ(told_after(watch, facts, load_of(5.0), 100 * kS), std::nullopt) << wish;
+  }
+}
+
+TEST(ViewerCodecWatch, WhereNothingElseIsServedNothingChanges) {
+  const std::vector<StrandCodecInfo> alone = {{"oracle", "", true, "", 0.1}};
+  ViewerCodecFacts facts = able_viewer();
+  ViewerCodecWatch watch(facts, 0);
+  for (int64_t time_ns = 0; time_ns < 60 * kS; time_ns += kS) {
+    if (time_ns == 30 * kS) facts.substeps = 1e6;
+    EXPECT_FALSE(watch.look(alone, facts, load_of(5.0), time_ns));
   }
 }
 
