@@ -112,7 +112,7 @@ Result<StreamRecording> record_strands(const RecordingDesc& desc) {
 
   StreamRecording recording;
   recording.motion_name = desc.motion.name;
-  recording.moved_by = desc.executor != nullptr ? to_string(desc.executor->info().device) : "double";
+  recording.moved_by = desc.executor != nullptr ? to_string(desc.executor->info().device) : kMovedByReference;
   recording.solver = scene.solver.name;
   recording.shape = {desc.size.strand_count, desc.size.vertex_count,
                      make_scene_asset(content.groom, {}).rest_position_m};

@@ -27,6 +27,9 @@ struct StreamSize {
 /// "10000 x 16".
 std::string to_string(const StreamSize& size);
 
+/// The double-precision solver, whose steps nobody is told.
+inline constexpr const char* kMovedByReference = "double";
+
 struct RecordingDesc {
   StreamMotion motion;
   StreamSize size;
@@ -39,7 +42,7 @@ struct RecordingDesc {
 struct StreamRecording {
   std::string motion_name;
   std::string solver;
-  std::string moved_by;       // the executor: "gl", "lanes"; "double". Others round otherwise
+  std::string moved_by;       // the executor: "gl", "lanes"; kMovedByReference. Others round otherwise
   HeadPace head;              // of the recorded part
   double hair_rms_mps = 0.0;  // of all vertices, in head space
   MotionLevel motion_level = MotionLevel::Idle;  // of the whole motion

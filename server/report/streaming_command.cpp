@@ -45,9 +45,10 @@ void add_streaming_command(CLI::App& app, ReportAction& action) {
                    "default: ../shared/data/mocap, with --quick or --motion none")
       ->excludes("--motion");
   command
-      ->add_option("--solver", options->solvers,
-                   "what moves the strands; repeatable: plots and goals are of the first; default: the "
-                   "built-in scene's, direct_rod, mass_spring; with --quick the built-in scene's")
+      ->add_option(
+          "--solver", options->solvers,
+          "what moves the strands; repeatable: plots and the goals of tangent are of the first; default: the "
+          "built-in scene's, direct_rod, mass_spring; with --quick the built-in scene's")
       ->expected(1)
       ->take_all();
   command->add_option(

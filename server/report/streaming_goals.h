@@ -1,4 +1,5 @@
-// What the tangent codec has to reach, and whether a streaming report shows that it does. Any thread.
+// What the codecs tangent and step have to reach, and whether a streaming report shows that it does. Any
+// thread.
 #pragma once
 
 #include <string>
@@ -18,8 +19,8 @@ struct GoalLine {
   Verdict verdict = Verdict::NotMeasured;
 };
 
-/// Every goal; the worst recording of the report's first solver decides, and of all where it is about the
-/// bound.
+/// Every goal; the worst recording that it is stated for decides: of the report's first solver those of
+/// tangent, of the solver that it names one of step, of all what is about the bound.
 std::vector<GoalLine> judge_streaming(const StreamingReport& report);
 
 enum class PeerKind { Plain, Temporal };

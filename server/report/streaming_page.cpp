@@ -81,7 +81,7 @@ std::string row_note(const StreamingRow& row) {
 
 HtmlTable goal_table(const StreamingReport& report) {
   HtmlTable table;
-  table.columns = {"goal, at 0.1 mm", "measured", "verdict"};
+  table.columns = {"goal, at 0.1 mm unless told otherwise", "measured", "verdict"};
   for (const GoalLine& line : judge_streaming(report)) {
     const HtmlMark mark = line.verdict == Verdict::Met      ? HtmlMark::Good
                           : line.verdict == Verdict::Missed ? HtmlMark::Bad
@@ -205,11 +205,9 @@ std::string class_text() {
 }
 
 constexpr const char* kCaseText =
-    "Goals and plots are of the first strand model; the others show what their way to move costs. A codec "
-    "that "
-    "predicts by steps of the strand model needs to know the wind: all of it, the wind at the head without "
-    "the "
-    "waves over the head, or nothing of it.";
+    "Plots and the goals of tangent are of the first strand model, those of step of the models that they "
+    "name. A codec that predicts by steps of the strand model needs to know the wind: all of it, the wind at "
+    "the head without the waves over the head, or nothing of it.";
 
 constexpr const char* kLatencyText =
     "From the motion sample that a step takes to the decoded frame, in one process, one stage after the "

@@ -352,6 +352,54 @@ StreamingRow row(const char* codec, MotionLevel motion_level, double bits) {
   return result;
 }
 
+/// A row of `step` and a peer that takes ten times as many bits.
+void add_step_row(StreamingReport& report, const char* solver, StreamingRow step) {
+  step.solver = solver;
+  step.is_ours = step.is_temporal = true;
+  step.decode_cpu_ms = 12.0;
+  StreamingRow peer = row("zfp temporal", step.motion_level, 10.0 * step.bits);
+  peer.motion = step.motion;
+  peer.part = step.part;
+  peer.solver = solver;
+  if (step.bound_m == kGoalBoundM && step.wind == "known") report.rows.push_back(peer);
+  report.rows.push_back(std::move(step));
+}
+
+StreamingRow step_row(const char* motion, MotionLevel level, MotionPart part, double bits) {
+  StreamingRow step = row("step", level, bits);
+  step.motion = motion;
+  step.part = part;
+  step.wind = "known";
+  return step;
+}
+
+/// Exactly what the goals of `step` ask for.
+void add_step_rows(StreamingReport& report) {
+  const StreamingRow walk = step_row("a walk", MotionLevel::Active, MotionPart::Median, 0.2);
+  add_step_row(report, "dftl", walk);
+  add_step_row(report, "dftl", step_row("a walk", MotionLevel::Active, MotionPart::Wildest, 0.7));
+  StreamingRow fine = step_row("a walk", MotionLevel::Active, MotionPart::Median, 0.3);
+  fine.bound_m = fine.max_error_m = kStreamBoundsM[0];
+  add_step_row(report, "dftl", fine);
+  StreamingRow windy = step_row("a walk", MotionLevel::Active, MotionPart::Median, 1.4);
+  windy.wind = "unknown";
+  add_step_row(report, "dftl", windy);
+  // A clip that glitches has no goal with `dftl`, and none beside peers.
+  StreamingRow glitch = step_row("fair1_dab", MotionLevel::Active, MotionPart::Median, 2.0);
+  add_step_row(report, "direct_rod", glitch);
+  report.rows[report.rows.size() - 2].bits = 4.0;
+  glitch.bits = 9.0;
+  add_step_row(report, "dftl", glitch);
+  report.rows[report.rows.size() - 2].bits = 18.0;
+  add_step_row(report, "direct_rod", step_row("a walk", MotionLevel::Active, MotionPart::Median, 0.25));
+  add_step_row(report, "direct_rod", step_row("a spin", MotionLevel::Violent, MotionPart::Median, 0.7));
+  windy.bits = 2.2;
+  add_step_row(report, "direct_rod", windy);
+  // Whoever stands is neither walking nor wild.
+  for (const MotionPart part : kMotionParts)
+    add_step_row(report, "direct_rod", step_row("standing", MotionLevel::Idle, part, 0.8));
+}
+
 /// Exactly what the goals ask for.
 StreamingReport just_met() {
   StreamingReport report;
@@ -370,8 +418,25 @@ StreamingReport just_met() {
     report.rows.push_back(row(codec, MotionLevel::Active, codec_bits));
     report.rows.back().part = MotionPart::Wildest;
   }
+  add_step_rows(report);
   return report;
 }
+
+bool is_known_walk(const StreamingRow& r) {
+  return r.motion == "a walk" && r.part == MotionPart::Median && r.wind == "known";
+}
+/// Those rows of `step` in just_met() that each of its goals is about.
+using StepPick = bool (*)(const StreamingRow&);
+constexpr StepPick kStepPicks[] = {
+    [](const StreamingRow& r) { return r.solver == "dftl" && is_known_walk(r) && r.bound_m == kGoalBoundM; },
+    [](const StreamingRow& r) { return r.solver == "dftl" && r.part == MotionPart::Wildest; },
+    [](const StreamingRow& r) { return r.solver == "dftl" && r.bound_m == kStreamBoundsM[0]; },
+    [](const StreamingRow& r) { return r.solver == "dftl" && r.wind == "unknown"; },
+    [](const StreamingRow& r) { return r.solver == "direct_rod" && is_known_walk(r); },
+    [](const StreamingRow& r) { return r.solver == "direct_rod" && r.motion_level == MotionLevel::Violent; },
+    [](const StreamingRow& r) { return r.solver == "direct_rod" && r.motion == "fair1_dab"; },
+    [](const StreamingRow& r) { return r.solver == "direct_rod" && r.wind == "unknown"; },
+};
 
 std::vector<Verdict> verdicts(const StreamingReport& report) {
   std::vector<Verdict> result;
@@ -383,8 +448,10 @@ TEST(StreamingGoals, AreMetWhenExactlyReached) {
   EXPECT_THAT(verdicts(just_met()), testing::Each(Verdict::Met));
 }
 
+/// Those of `step` come behind.
+constexpr size_t kTangentGoals = 10;
+
 TEST(StreamingGoals, EachIsMissedByALittleTooMuchOfItsOwn) {
-  const size_t count = judge_streaming(just_met()).size();
   const std::vector<void (*)(StreamingRow&)> spoils = {
       [](StreamingRow& r) { r.max_error_m = 1.01 * r.bound_m; },
       [](StreamingRow& r) {
@@ -407,8 +474,54 @@ TEST(StreamingGoals, EachIsMissedByALittleTooMuchOfItsOwn) {
     r.encode_wall_ms = r.encode_cpu_ms = 16.1;
     if (!r.is_ours) r.bits *= 0.99;
   }
-  for (size_t i = spoils.size(); i < count; ++i) EXPECT_EQ(verdicts(report)[i], Verdict::Missed) << i;
+  for (size_t i = spoils.size(); i < kTangentGoals; ++i) EXPECT_EQ(verdicts(report)[i], Verdict::Missed) << i;
   EXPECT_THAT(verdicts(StreamingReport{}), testing::Each(Verdict::NotMeasured));
+}
+
+constexpr size_t kStepRatioGoal = kTangentGoals + std::size(kStepPicks);
+constexpr size_t kStepDecodeGoal = kStepRatioGoal + 1;
+
+TEST(StreamingGoals, EachOfStepIsMissedByItsOwnRowsAlone) {
+  ASSERT_EQ(judge_streaming(just_met()).size(), kStepDecodeGoal + 1);
+  for (size_t goal = 0; goal < std::size(kStepPicks); ++goal) {
+    StreamingReport report = just_met();
+    for (StreamingRow& r : report.rows) {
+      if (r.codec == "step" && kStepPicks[goal](r)) r.bits *= 1.01;
+      if (!r.is_ours) r.bits *= 1.01;
+    }
+    std::vector<Verdict> expected(kStepDecodeGoal + 1, Verdict::Met);
+    expected[kTangentGoals + goal] = Verdict::Missed;
+    EXPECT_EQ(verdicts(report), expected) << judge_streaming(report)[kTangentGoals + goal].goal;
+  }
+}
+
+TEST(StreamingGoals, OfStepBesidePeersAndByTheClock) {
+  StreamingReport report = just_met();
+  for (StreamingRow& r : report.rows) {
+    if (!r.is_ours && r.motion == "a spin") r.bits *= 0.99;
+    if (r.codec == "step" && r.solver == "dftl" && r.wind == "known") r.decode_cpu_ms = 12.1;
+  }
+  const std::vector<GoalLine> lines = judge_streaming(report);
+  EXPECT_EQ(lines[kStepRatioGoal].verdict, Verdict::Missed);
+  EXPECT_THAT(lines[kStepRatioGoal].measured, HasSubstr("9.90 times at worst (a spin, median part"));
+  EXPECT_EQ(lines[kStepDecodeGoal].verdict, Verdict::Missed);
+  EXPECT_THAT(lines[kStepDecodeGoal].measured, HasSubstr("12.10 ms"));
+  for (size_t i = 0; i < kStepRatioGoal; ++i) EXPECT_EQ(lines[i].verdict, Verdict::Met) << lines[i].goal;
+}
+
+TEST(StreamingGoals, OfStepAreStatedForOneSizeAndForStepsThatWereTold) {
+  const auto spoil_and_judge = [](void (*spoil)(StreamingRow&)) {
+    StreamingReport report = just_met();
+    for (StreamingRow& r : report.rows)
+      if (r.codec == "step") spoil(r);
+    std::vector<Verdict> all = verdicts(report);
+    all.erase(all.begin(), all.begin() + kTangentGoals);
+    return all;
+  };
+  const auto is_not_measured = testing::Each(Verdict::NotMeasured);
+  EXPECT_THAT(spoil_and_judge([](StreamingRow& r) { r.size = {20'000, 8}; }), is_not_measured);
+  EXPECT_THAT(spoil_and_judge([](StreamingRow& r) { r.moved_by = kMovedByReference; }), is_not_measured);
+  EXPECT_THAT(spoil_and_judge([](StreamingRow& r) { r.moved_by = "lanes"; }), testing::Each(Verdict::Met));
 }
 
 TEST(StreamingGoals, APeerThatMissesTheBoundIsNoPeer) {
@@ -493,7 +606,7 @@ TEST(StreamingPage, SaysEveryGoalAndItsVerdict) {
   const StreamingReport report = just_met();
   const std::string page = streaming_page(report);
   for (const GoalLine& line : judge_streaming(report)) EXPECT_THAT(page, HasSubstr(line.goal));
-  EXPECT_THAT(page, HasSubstr("Of 10 goals 10 are met, 0 missed, 0 not measured."));
+  EXPECT_THAT(page, HasSubstr("Of 20 goals 20 are met, 0 missed, 0 not measured."));
   for (const char* loader : {"src=", "href=", "@import", "url(", "<script"})
     EXPECT_THAT(page, Not(HasSubstr(loader)));
   const std::string csv = streaming_csv(report);
