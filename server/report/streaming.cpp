@@ -32,7 +32,8 @@ constexpr const char* kLatencyCodec = "tangent";
 constexpr const char* kOtherSolvers[] = {"direct_rod", "mass_spring"};
 // For the progress shown: of a recording in runs of a codec, and of a step of the view in vertices of those.
 constexpr double kRecordingCost = 3.0;
-constexpr double kViewCostPerPixel = 2.0;
+constexpr double kViewCostPerPixel = 10.0;
+constexpr double kViewCodecShare = 1.0 / 6.0;  // of a run of a codec: few of the steps code strands
 constexpr uint32_t kLeastViewSide = 64;
 constexpr RenderSize kFullView{1280, 720};
 constexpr RenderSize kQuickView{320, 180};
@@ -223,11 +224,12 @@ class StreamingRun {
  public:
   StreamingRun(StreamingReport& report, Executor* executor, const Plan& plan)
       : report_(report), executor_(executor), plan_(plan), progress_({"streaming"}) {
-    progress_.expect(1 + view_step_count(), view_cost() * view_step_count());
+    progress_.expect(1 + view_step_count(),
+                     kRecordingCost * codec_cost(plan.view_strands) + view_cost() * view_step_count());
     for (const StreamCase& one : plan.cases) {
       const size_t codecs = codecs_for(one).size();
       progress_.expect(static_cast<uint32_t>(1 + codecs),
-                       (kRecordingCost + static_cast<double>(codecs)) * codec_cost(one));
+                       (kRecordingCost + static_cast<double>(codecs)) * codec_cost(one.size));
     }
   }
 
@@ -238,13 +240,13 @@ class StreamingRun {
     progress_.begin_run(name + ": recording");
     auto recorded = record_strands({motion, one.size, report_.seconds, one.solver, executor_, one.part});
     if (!recorded) return at(motion.name, recorded.error());
-    progress_.end_run(kRecordingCost * codec_cost(one));
+    progress_.end_run(kRecordingCost * codec_cost(one.size));
     StreamRecording& recording = *recorded;
     for (const StreamCodecRow& codec : codecs_for(one)) {
       progress_.begin_run(fmt::format("{}: {}", name, codec.name));
       ASSIGN_OR_RETURN(StreamingRow row, measure_codec(codec, recording));
       report_.rows.push_back(std::move(row));
-      progress_.end_run(codec_cost(one));
+      progress_.end_run(codec_cost(one.size));
     }
     // Walking on the first size, or whatever comes first.
     const bool is_walk = recording.motion_level == MotionLevel::Active;
@@ -263,7 +265,7 @@ class StreamingRun {
     const RecordingDesc desc{plan_.motions[plan_.view_motion], plan_.view_strands, report_.seconds,
                              report_.solver, executor_};
     ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
-    progress_.end_run(0.0);
+    progress_.end_run(kRecordingCost * codec_cost(plan_.view_strands));
     uint32_t left = view_step_count();
     const auto on_progress = [&](const std::string& doing) {
       if (left == 0) return;
@@ -277,11 +279,12 @@ class StreamingRun {
   }
 
  private:
-  double codec_cost(const StreamCase& one) const {
-    return static_cast<double>(one.size.vertices()) * report_.seconds / kStreamFrameS;
+  double codec_cost(const StreamSize& size) const {
+    return static_cast<double>(size.vertices()) * report_.seconds / kStreamFrameS;
   }
   double view_cost() const {
-    return kViewCostPerPixel * static_cast<double>(plan_.view.size.width) * plan_.view.size.height;
+    return kViewCostPerPixel * static_cast<double>(plan_.view.size.width) * plan_.view.size.height +
+           kViewCodecShare * codec_cost(plan_.view_strands);
   }
 
   StreamingReport& report_;

@@ -17,6 +17,11 @@ bool is_same(const StreamSize& a, const StreamSize& b) {
   return a.strand_count == b.strand_count && a.vertex_count == b.vertex_count;
 }
 
+/// A decimal more where one would leave a single digit.
+std::string mbit_text(const StreamingRow& row) {
+  return fmt::format("{:.{}f}", row.mbit_per_s(), row.mbit_per_s() < 1.0 ? 2 : 1);
+}
+
 /// What the table is of: the built-in scene's size and the largest, those that were measured.
 std::vector<StreamSize> needed_sizes(const StreamingReport& report) {
   std::vector<StreamSize> sizes;
@@ -113,7 +118,7 @@ std::vector<HtmlCell> needs_row(std::string name, const std::vector<NeedColumn>&
   std::vector<HtmlCell> cells = {std::move(name)};
   for (const NeedColumn& column : columns) {
     const StreamingRow* row = row_at(column);
-    cells.emplace_back(row != nullptr ? fmt::format("{:.1f}", row->mbit_per_s()) : "");
+    cells.emplace_back(row != nullptr ? mbit_text(*row) : "");
   }
   for (const NeedColumn& column : timed_columns(columns)) {
     const StreamingRow* row = row_at(column);
@@ -164,7 +169,7 @@ std::string needs_text(const StreamingReport& report) {
             row != nullptr && (best == nullptr || row->bits < best->bits))
           best = row;
       if (best != nullptr)
-        parts.push_back(fmt::format("{:.1f} Mbit/s {} ({})", best->mbit_per_s(), to_string(column.level),
+        parts.push_back(fmt::format("{} Mbit/s {} ({})", mbit_text(*best), to_string(column.level),
                                     best->codec_and_wind()));
     }
     if (!parts.empty())

@@ -62,4 +62,15 @@ inline constexpr double kClipBits = 4.6;
 inline constexpr double kTimesFewerThanTemporal = 2.0;
 inline constexpr double kTimesFewerThanPlain = 5.8;
 
+// ---- `step` at 0.1 mm when all of the wind is known, half a second each, dftl ----
+
+inline constexpr uint32_t kStepStrands = 2'000;
+/// Bits per vertex of the built-in head motions.
+inline constexpr double kStepIdleBits = 0.21;
+inline constexpr double kStepActiveBits = 0.21;
+inline constexpr double kStepViolentBits = 0.37;
+/// Of the median half second of the walk kStreamClip.
+inline constexpr double kStepClipBits = 0.36;
+inline constexpr double kStepTimesFewerThanTemporal = 26.0;
+
 }  // namespace strandcast::claims

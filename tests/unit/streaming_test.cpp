@@ -194,6 +194,8 @@ TEST(WindTold, MoreOfItTakesFewerBits) {
   EXPECT_LT(bits.at("step, wind known"), bits.at("step, wind mean"));
   EXPECT_LT(bits.at("step, wind mean"), bits.at("step, wind unknown"));
   EXPECT_LT(bits.at("step, wind known"), bits.at("tangent"));
+  EXPECT_GT(bits.at("step, wind unknown"), 2.0 * bits.at("step, wind known"))
+      << "what is not told costs more than all the rest";
   for (const auto& [codec, value] : bits) fmt::print("{}: {:.3f}\n", codec, value);
 }
 
@@ -333,6 +335,47 @@ TEST(StreamClaims, AWalkOfMotionCaptureBesidePeers) {
   // Of more times fewer bits the documents round down.
   expect_claimed(claims::kTimesFewerThanTemporal, times_fewer(PeerKind::Temporal), "temporal peers");
   expect_claimed(claims::kTimesFewerThanPlain, times_fewer(PeerKind::Plain), "plain peers");
+}
+
+/// `step`, told all of the wind, on the built-in scene's strands, and with peers every one that predicts.
+StreamingReport stepped(const StreamMotion& motion, bool has_peers) {
+  StreamingReport report;
+  const auto recording =
+      record_strands({motion, {claims::kStepStrands, claims::kStreamVertices}, kClaimedSeconds, "", lanes()});
+  EXPECT_TRUE(recording.ok()) << recording.error().to_string();
+  std::vector<StreamCodecRow> codecs = own_stream_codecs(kGoalBoundM);
+  std::erase_if(codecs, [](const StreamCodecRow& codec) {
+    return codec.name != "step" || codec.wind != WindTold::Known;
+  });
+  if (has_peers)
+    for (StreamCodecRow& peer : peer_stream_codecs(kGoalBoundM))
+      if (peer.is_temporal) codecs.push_back(std::move(peer));
+  for (const StreamCodecRow& codec : codecs) {
+    const auto measured = measure_codec(codec, *recording);
+    EXPECT_TRUE(measured.ok()) << measured.error().to_string();
+    report.rows.push_back(*measured);
+  }
+  return report;
+}
+
+TEST(StreamClaims, BitsOfStepWhenTheWindIsKnown) {
+  const std::vector<StreamMotion> motions = built_in_stream_motions();
+  const double claimed[] = {claims::kStepIdleBits, claims::kStepActiveBits, claims::kStepViolentBits};
+  for (size_t i = 0; i < motions.size(); ++i)
+    expect_claimed(stepped(motions[i], false).rows[0].bits, claimed[i], "step, " + motions[i].name);
+}
+
+TEST(StreamClaims, StepOnAWalkOfMotionCaptureBesidePeers) {
+  const std::filesystem::path clip =
+      std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap" / claims::kStreamClip;
+  REQUIRE_SHARED(clip);
+  const auto motion = load_stream_motion(clip, {});
+  ASSERT_TRUE(motion.ok()) << motion.error().to_string();
+  const StreamingReport report = stepped(*motion, true);
+  const StreamingRow& ours = report.rows[0];
+  expect_claimed(ours.bits, claims::kStepClipBits, "step, bits");
+  expect_claimed(claims::kStepTimesFewerThanTemporal,
+                 best_peer(report, ours, PeerKind::Temporal)->bits / ours.bits, "step, temporal peers");
 }
 
 StreamingRow row(const char* codec, MotionLevel motion_level, double bits) {
@@ -522,6 +565,15 @@ TEST(StreamingGoals, OfStepAreStatedForOneSizeAndForStepsThatWereTold) {
   EXPECT_THAT(spoil_and_judge([](StreamingRow& r) { r.size = {20'000, 8}; }), is_not_measured);
   EXPECT_THAT(spoil_and_judge([](StreamingRow& r) { r.moved_by = kMovedByReference; }), is_not_measured);
   EXPECT_THAT(spoil_and_judge([](StreamingRow& r) { r.moved_by = "lanes"; }), testing::Each(Verdict::Met));
+}
+
+TEST(StreamingSummary, CountsTheGoalsThatNothingWasMeasuredFor) {
+  StreamingReport report = just_met();
+  EXPECT_THAT(streaming_summary(report), Not(HasSubstr("did not run")));
+  std::erase_if(report.rows, [](const StreamingRow& r) { return r.codec == "step"; });
+  const std::string summary = streaming_summary(report);
+  EXPECT_THAT(summary, HasSubstr("10 goals are stated for sizes, strand models and clips that did not run."));
+  EXPECT_THAT(summary, Not(HasSubstr("step, dftl")));
 }
 
 TEST(StreamingGoals, APeerThatMissesTheBoundIsNoPeer) {
