@@ -207,7 +207,8 @@ std::string class_text() {
 constexpr const char* kCaseText =
     "Plots and the goals of tangent are of the first strand model, those of step of the models that they "
     "name. A codec that predicts by steps of the strand model needs to know the wind: all of it, the wind at "
-    "the head without the waves over the head, or nothing of it.";
+    "the head without the waves over the head, or nothing of it. It gets to know how strands move while it "
+    "runs: half a second is mostly that, and longer parts (--seconds 2) take fewer bits.";
 
 constexpr const char* kLatencyText =
     "From the motion sample that a step takes to the decoded frame, in one process, one stage after the "

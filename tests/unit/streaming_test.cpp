@@ -338,10 +338,10 @@ TEST(StreamClaims, AWalkOfMotionCaptureBesidePeers) {
 }
 
 /// `step`, told all of the wind, on the built-in scene's strands, and with peers every one that predicts.
-StreamingReport stepped(const StreamMotion& motion, bool has_peers) {
+StreamingReport stepped(const StreamMotion& motion, bool has_peers, double seconds = kClaimedSeconds) {
   StreamingReport report;
   const auto recording =
-      record_strands({motion, {claims::kStepStrands, claims::kStreamVertices}, kClaimedSeconds, "", lanes()});
+      record_strands({motion, {claims::kStepStrands, claims::kStreamVertices}, seconds, "", lanes()});
   EXPECT_TRUE(recording.ok()) << recording.error().to_string();
   std::vector<StreamCodecRow> codecs = own_stream_codecs(kGoalBoundM);
   std::erase_if(codecs, [](const StreamCodecRow& codec) {
@@ -363,6 +363,13 @@ TEST(StreamClaims, BitsOfStepWhenTheWindIsKnown) {
   const double claimed[] = {claims::kStepIdleBits, claims::kStepActiveBits, claims::kStepViolentBits};
   for (size_t i = 0; i < motions.size(); ++i)
     expect_claimed(stepped(motions[i], false).rows[0].bits, claimed[i], "step, " + motions[i].name);
+}
+
+// What the page and README.md say of half a second.
+TEST(StreamClaims, StepTakesFewerBitsOnceItKnowsHowStrandsMove) {
+  const StreamMotion walk = built_in_stream_motions()[1];
+  const double bits = stepped(walk, false).rows[0].bits;
+  EXPECT_LT(stepped(walk, false, 4.0 * kClaimedSeconds).rows[0].bits, bits / 2.0);
 }
 
 TEST(StreamClaims, StepOnAWalkOfMotionCaptureBesidePeers) {
