@@ -66,11 +66,11 @@ inline constexpr double kTimesFewerThanPlain = 5.8;
 
 inline constexpr uint32_t kStepStrands = 2'000;
 /// Bits per vertex of the built-in head motions.
-inline constexpr double kStepIdleBits = 0.21;
-inline constexpr double kStepActiveBits = 0.21;
-inline constexpr double kStepViolentBits = 0.37;
+inline constexpr double kStepIdleBits = 0.18;
+inline constexpr double kStepActiveBits = 0.17;
+inline constexpr double kStepViolentBits = 0.34;
 /// Of the median half second of the walk kStreamClip.
-inline constexpr double kStepClipBits = 0.36;
-inline constexpr double kStepTimesFewerThanTemporal = 26.0;
+inline constexpr double kStepClipBits = 0.27;
+inline constexpr double kStepTimesFewerThanTemporal = 35.0;
 
 }  // namespace strandcast::claims
