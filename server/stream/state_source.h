@@ -37,7 +37,7 @@ struct SimStats {
   uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
   uint64_t solver_builds = 0;
   uint64_t solver_bytes = 0;
-  double step_cost = 0.0;  // StepKernel::cost of the model; 0 = it has no kernel that others run
+  double step_cost = 0.0;       // StepKernel::cost of the model; 0 = it has no kernel that others run
   std::string sim_device;       // what simulates: "gl", "lanes"; empty = nothing does
   std::string sim_device_name;  // for people
   std::string solver_name;

@@ -62,7 +62,8 @@ void FloatStrands::rebase(const glm::dquat& world_from_head_rotation) {
 }
 
 void FloatStrands::substep(const StepInput& input) {
-  const StepBlock block = make_step_block(input, parameters_, layout_.counts(), HeadPath::at_rest(previous_rotation_));
+  const StepBlock block =
+      make_step_block(input, parameters_, layout_.counts(), HeadPath::at_rest(previous_rotation_));
   previous_rotation_ = limited_rotation(input.world_from_head_rotation);
   const glm::mat3 rotation = glm::mat3(glm::mat3_cast(previous_rotation_));
   const auto collider_count =

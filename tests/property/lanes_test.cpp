@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "common/base/worker_pool.h"
+#include "common/kernels/strand_blocks.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/solver_registry.h"
-#include "common/kernels/strand_blocks.h"
 #include "tests/support/sim_scene.h"
 
 namespace strandcast {
