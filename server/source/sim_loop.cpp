@@ -337,7 +337,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
-  step_log_.set_model(solver_->step_model());
+  // Reads planes back, for a codec whose viewers take steps too.
+  if (strand_codec_info(scene.stream.codec)->predicts) step_log_.set_model(solver_->step_model());
   stages_->plan_step(scene.substeps, explain(scene, facts_));
   stages_->set_solver_bytes(solver_->memory_bytes());
   ++solver_builds_;
