@@ -21,6 +21,12 @@ struct KernelDesc {
   bool is_per_vertex = false;  // a group takes whole strands, an invocation per vertex; else one per strand
   uint32_t scratch_rows = 0;   // per vertex, vec4 that the kernel keeps for itself during a dispatch
   auto operator<=>(const KernelDesc&) const = default;
+
+  /// As the variant says; 0 for an axis that is not named.
+  int variant_of(const std::string& axis) const {
+    const auto found = variant.find(axis);
+    return found == variant.end() ? 0 : found->second;
+  }
 };
 
 }  // namespace strandcast

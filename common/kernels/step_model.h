@@ -91,7 +91,8 @@ struct StepTrail {
 std::vector<StepInput> substeps_of(const StepScene& scene, const StepTick& tick, const Pose& from,
                                    double end_time_s);
 
-/// Phase of a wave at a time with the head there; |phase| <= pi.
+/// Phase of a wave at a time with the head there; |phase| <= pi. Waves stand still in air that moves with the
+/// mean wind; a phase counts from the head.
 float phase_of(const GustWave& wave, const glm::dvec3& mean_wind_mps, double time_s,
                const glm::dvec3& head_position_m);
 

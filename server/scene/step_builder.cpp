@@ -95,11 +95,7 @@ void StepBuilder::add_gusts() {
   const glm::dvec3 mean_mps = scene_.wind.mean_mps;
   for (size_t i = 0; i < step_.substeps.size(); ++i)
     for (GustWave wave : waves_) {
-      // The waves stand still in air that moves with the mean wind; x counts from the head.
-      const glm::dvec3 k = wave.wave_vector_rad_per_m;
-      const double phase_rad =
-          wave.phase_rad + glm::dot(k, mean_mps) * end_time_s_[i] - glm::dot(k, head_position_m_[i]);
-      wave.phase_rad = static_cast<float>(std::remainder(phase_rad, 2.0 * std::numbers::pi));
+      wave.phase_rad = phase_of(wave, mean_mps, end_time_s_[i], head_position_m_[i]);
       step_.substeps[i].gusts.push_back(wave);
     }
 }

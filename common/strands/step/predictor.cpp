@@ -82,8 +82,7 @@ Status Predictor::prepare() {
   KernelDesc follicle;
   follicle.shader_path = "sim/follicle_limit.comp";
   follicle.meets_air = false;
-  const auto twist = model_.kernel.variant.find("HAS_TWIST");
-  const bool has_twist = twist != model_.kernel.variant.end() && twist->second != 0;
+  const bool has_twist = model_.kernel.variant_of("HAS_TWIST") != 0;
   follicle.variant = {{"MEMORY", !kernel_.carries_way ? 0 : has_twist ? 2 : 1}};
   const LaneKernel* follicle_kernel = find_lane_kernel(follicle, set);
   if (kernel == nullptr || follicle_kernel == nullptr)

@@ -93,6 +93,11 @@ void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent
   last_ = now;
 }
 
+void Steps::settle(const tangent::History& history) {
+  wind_ = {};
+  if (predictor_) predictor_->settle(history.lattice, history.quantum_m);
+}
+
 void EncoderSteps::set_rest_shape(std::span<const glm::vec3> rest_in_head_m) {
   rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
 }
@@ -156,9 +161,9 @@ uint8_t EncoderSteps::judge(const tangent::Layout& layout, const tangent::Histor
   constexpr uint32_t kFirstFrames = 1;     // strands without velocities rather start anew
   constexpr double kMostBitsBeside = 8.0;  // of a vertex
   const double by_steps = bits_apart(layout, expected_, target).mean();
+  if (by_steps <= kMostSparseBits) return kStepFlag | kSparseFlag;
   const double by_nothing = bits_apart(layout, history.lattice, target).mean();
-  if (by_steps <= by_nothing + kMostBitsWorse)
-    return by_steps <= kMostSparseBits ? kStepFlag | kSparseFlag : kStepFlag;
+  if (by_steps <= by_nothing + kMostBitsWorse) return kStepFlag;
   return by_steps <= by_nothing + kMostBitsBeside && age_ >= kFirstFrames ? kFollowFlag : 0;
 }
 
@@ -226,11 +231,6 @@ void EncoderSteps::append_bytes(std::vector<std::byte>& body) const {
 void EncoderSteps::finish(const SnapshotInfo& snapshot, const tangent::Frame& frame,
                           const tangent::History& history) {
   follow(moment_of(snapshot), frame, history);
-}
-
-void EncoderSteps::settle(const tangent::History& history) {
-  wind_ = {};
-  if (predictor_) predictor_->settle(history.lattice, history.quantum_m);
 }
 
 void EncoderSteps::append_state(std::vector<std::byte>& body) {
@@ -309,11 +309,6 @@ void DecoderSteps::abandon(tangent::History& history) {
 
 void DecoderSteps::finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history) {
   follow(now, frame, history);
-}
-
-void DecoderSteps::settle(const tangent::History& history) {
-  wind_ = {};
-  if (predictor_) predictor_->settle(history.lattice, history.quantum_m);
 }
 
 Result<DecoderSteps::Joined> DecoderSteps::read_state(ByteReader& body, const Moment& now,

@@ -39,17 +39,15 @@ struct Moment {
 /// What both sides know.
 class Steps {
  public:
-  /// Positions were expected there while the frame that begins is coded, if it is one of steps.
-  bool is_stepping() const { return is_stepping_; }
-  /// Has strands to predict.
-  bool can_step() const { return predictor_ != nullptr; }
+  /// After an anchor: goes on with what joiners are told.
+  void settle(const tangent::History& history);
 
  protected:
   Steps(WorkerPool& workers, simd::InstructionSet set) : workers_(workers), set_(set) {}
   PredictorGround ground(const tangent::Layout& layout) const {
     return {layout, rest_in_head_m_, workers_, set_};
   }
-  /// The history holds where steps lead to instead of the last positions, which expected_ then holds.
+  /// Takes the steps; expected_ is where they lead.
   void step(std::span<const StepTick> ticks, const Moment& now, const tangent::Layout& layout,
             tangent::History& history);
   /// The frame is history: `frame.lattice` holds what `history.lattice` was before.
@@ -80,8 +78,7 @@ class EncoderSteps : public Steps {
                 const tangent::Planes<int32_t>& target);
   void append_bytes(std::vector<std::byte>& body) const;
   void finish(const SnapshotInfo& snapshot, const tangent::Frame& frame, const tangent::History& history);
-  /// After an anchor: goes on with what joiners are told, and appends that.
-  void settle(const tangent::History& history);
+  /// For a joiner, after settle().
   void append_state(std::vector<std::byte>& body);
 
  private:
@@ -114,8 +111,6 @@ class DecoderSteps : public Steps {
   /// The frame failed its checks: all is as before begin().
   void abandon(tangent::History& history);
   void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history);
-  /// Of an anchor that was decoded as a delta.
-  void settle(const tangent::History& history);
 
   /// What a keyframe says of steps, all but where strands are.
   struct Joined {

@@ -100,9 +100,9 @@ float of_first_bits(int32_t bits) {
 
 RodPlanes natural_rods_of(const StepModel& model, std::span<const glm::vec3> rest_in_head_m,
                           uint32_t strand_count) {
-  const auto twist = model.kernel.variant.find("HAS_TWIST");
+  const bool has_twist = model.kernel.variant_of("HAS_TWIST") != 0;
   return natural_rods({rest_in_head_m, strand_count, model.vertex_count, model.pinned_root_count,
-                       model.pinned_tail_count, twist != model.kernel.variant.end() && twist->second != 0});
+                       model.pinned_tail_count, has_twist});
 }
 
 /// Directions of clamps and joints; then how stiff strands are.
@@ -215,8 +215,7 @@ void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head
   ByteWriter to(bytes);
   const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
   to.put(kernel->number);
-  const auto twist = model.kernel.variant.find("HAS_TWIST");
-  to.put(static_cast<uint8_t>(twist != model.kernel.variant.end() && twist->second != 0 ? 1 : 0));
+  to.put(static_cast<uint8_t>(model.kernel.variant_of("HAS_TWIST")));
   to.put(static_cast<uint8_t>(model.pinned_root_count));
   to.put(static_cast<uint8_t>(model.pinned_tail_count));
   visit_parameters(model.parameters, [&](const double& value) { to.put(value); });

@@ -152,35 +152,30 @@ STRANDCAST_LANES void store_codes(const CodeLanes& codes, Codes& to, size_t at) 
   store_lanes(fold_lanes(codes.length), to.length.data() + at);
 }
 
-STRANDCAST_LANES void quantise_slice_lanes(const QuantiseWork& work) {
+/// A block of a row of either kind, from where it is expected.
+template <class Row>
+STRANDCAST_LANES void quantise_block(const QuantiseWork& work, const Row& row, size_t place,
+                                     const Expected& expected) {
   const SliceWork& of = work.of;
-  for_each_block(of, [&](const MotionRow& row, size_t place, const Expected& moved) STRANDCAST_LANES_LAMBDA {
-    const size_t at = row.at(place);
-    const IntLaneVectors wanted = load_vectors(work.target, at);
-    const CodeLanes origin{};
-    Found found(moved, wanted, origin);
-    find_codes(found);
-    escape_others(found, at, of.frame.codes.escapes[of.slice],
-                  [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
-    store_codes(found.codes, of.frame.codes, at);
-    row.store(moved, place, found.position);
-  });
+  const size_t at = row.at(place);
+  const IntLaneVectors wanted = load_vectors(work.target, at);
+  const CodeLanes origin{};
+  Found found(expected, wanted, origin);
+  find_codes(found);
+  escape_others(found, at, of.frame.codes.escapes[of.slice],
+                [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
+  store_codes(found.codes, of.frame.codes, at);
+  row.store(expected, place, found.position);
+}
+
+STRANDCAST_LANES void quantise_slice_lanes(const QuantiseWork& work) {
+  for_each_block(work.of, [&](const MotionRow& row, size_t place, const Expected& moved)
+                              STRANDCAST_LANES_LAMBDA { quantise_block(work, row, place, moved); });
 }
 
 STRANDCAST_LANES void quantise_step_lanes(const QuantiseWork& work) {
-  const SliceWork& of = work.of;
-  for_each_step_block(
-      of, [&](const StepRow& row, size_t place, const Expected& expected) STRANDCAST_LANES_LAMBDA {
-        const size_t at = row.at(place);
-        const IntLaneVectors wanted = load_vectors(work.target, at);
-        const CodeLanes origin{};
-        Found found(expected, wanted, origin);
-        find_codes(found);
-        escape_others(found, at, of.frame.codes.escapes[of.slice],
-                      [&]() STRANDCAST_LANES_LAMBDA { return row.last(place); });
-        store_codes(found.codes, of.frame.codes, at);
-        row.store(expected, place, found.position);
-      });
+  for_each_step_block(work.of, [&](const StepRow& row, size_t place, const Expected& expected)
+                                   STRANDCAST_LANES_LAMBDA { quantise_block(work, row, place, expected); });
 }
 
 STRANDCAST_LANES void quantise_anchor_lanes(const QuantiseWork& work) {
