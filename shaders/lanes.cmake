@@ -27,9 +27,11 @@ if(NOT block_begin EQUAL -1)
   string(APPEND text "${block}${after}")
 endif()
 
-# Planes, the scratch and the constants of a model.
+# Planes, tables, the scratch and the constants of a model.
 string(REGEX REPLACE "layout\\(binding = kUnit([A-Za-z]+)\\) uniform samplerBuffer ([a-z_]+);"
   "samplerBuffer \\2{plane(PlaneRole::\\1)};" text "${text}")
+string(REGEX REPLACE "layout\\(binding = kUnit([A-Za-z]+)\\) uniform lookup_table ([a-z_]+);"
+  "lookup_table \\2{table(TableRole::\\1)};" text "${text}")
 string(REGEX REPLACE "layout\\(std430, binding = kBindingRodScratch\\)[^{]*{([ \n]*)vec4 ([a-z]+)\\[\\];([ \n]*)} ([a-z_]+);"
   "struct {\\1Scratch \\2;\\3} \\4{{scratch_memory()}};" text "${text}")
 string(REGEX REPLACE "layout\\(std430, binding = kBinding([A-Za-z]+)\\)[^{]*{([ \n]*)vec4 ([a-z]+)\\[\\];([ \n]*)} ([a-z_]+);"

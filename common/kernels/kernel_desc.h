@@ -17,9 +17,10 @@ struct KernelDesc {
   std::string shader_path;             // below shaders/
   std::map<std::string, int> variant;  // besides COLLIDERS and HAS_TURBULENCE
   ModelConstants constants;
-  bool meets_air = true;       // false: it has no HAS_TURBULENCE
-  bool is_per_vertex = false;  // a group takes whole strands, an invocation per vertex; else one per strand
-  uint32_t scratch_rows = 0;   // per vertex, vec4 that the kernel keeps for itself during a dispatch
+  bool meets_air = true;        // false: it has no HAS_TURBULENCE
+  bool meets_colliders = true;  // false: it has no COLLIDERS
+  bool is_per_vertex = false;   // a group takes whole strands, an invocation per vertex; else one per strand
+  uint32_t scratch_rows = 0;    // per vertex, vec4 that the kernel keeps for itself during a dispatch
   auto operator<=>(const KernelDesc&) const = default;
 
   /// As the variant says; 0 for an axis that is not named.

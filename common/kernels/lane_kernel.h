@@ -15,6 +15,12 @@ struct LaneConstant {
   uint32_t count;
 };
 
+/// A table that a kernel looks things up in: count vec4, 16-byte aligned.
+struct LaneTable {
+  const float* values = nullptr;  // null = none
+  uint32_t count = 0;
+};
+
 /// What a run of a kernel works on: blocks [block_begin, block_end) of all planes.
 struct LaneRun {
   const void* step = nullptr;   // StepBlock with one strand in `shape`: a kernel sees one strand of a block
@@ -22,6 +28,7 @@ struct LaneRun {
   uint32_t gust_count = 0;      // the first ones of the step
   float* const* planes = nullptr;  // kPlaneRoleCount, in blocks (common/kernels/strand_blocks.h); null = none
   const size_t* block_floats = nullptr;  // of each plane
+  const LaneTable* tables = nullptr;     // kTableRoleCount
   const LaneConstant* constants = nullptr;
   uint32_t constant_count = 0;
   uint32_t block_begin = 0;

@@ -88,6 +88,74 @@ struct samplerBuffer {
 STRANDCAST_LANES vec4 texelFetch(const samplerBuffer& plane, int element) {
   return load_vec4(*plane.rows, static_cast<size_t>(element) * kRowFloats, kRowFloats / 4);
 }
+
+#if defined(__AVX512F__) && STRANDCAST_LANE_COUNT == 16
+using Gathering = __m512;
+#define GATHERING(name, ...) _mm512_##name##_ps(__VA_ARGS__)
+#elif defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8
+using Gathering = __m256;
+#define GATHERING(name, ...) _mm256_##name##_ps(__VA_ARGS__)
+#elif defined(__SSE2__) && STRANDCAST_LANE_COUNT == 4
+using Gathering = __m128;
+#define GATHERING(name, ...) _mm_##name##_ps(__VA_ARGS__)
+#endif
+/// x, y, z and w of an element of a table for each lane.
+struct Gathered {
+  simd::Float x, y, z, w;
+};
+/// Elements are loaded whole and turned into rows, four lanes at a time. An index beyond the end is that of
+/// the last element.
+STRANDCAST_LANES Gathered gather(const float* values, uint last, simd::Uint index) {
+  alignas(64) uint at[simd::kLanes];
+  const simd::UintBits limited = simd::min(index, simd::Uint(last)).v;
+  __builtin_memcpy(at, &limited, sizeof at);
+#if defined(GATHERING)
+  const auto element = [&](uint lane) STRANDCAST_LANES_LAMBDA {
+    const auto load = [&](uint from)
+                          STRANDCAST_LANES_LAMBDA { return _mm_load_ps(values + size_t{at[from]} * 4); };
+#if STRANDCAST_LANE_COUNT == 16
+    const __m512 low = _mm512_insertf32x4(_mm512_castps128_ps512(load(lane)), load(lane + 4), 1);
+    return _mm512_insertf32x4(_mm512_insertf32x4(low, load(lane + 8), 2), load(lane + 12), 3);
+#elif STRANDCAST_LANE_COUNT == 8
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(load(lane)), load(lane + 4), 1);
+#else
+    return load(lane);
+#endif
+  };
+  const Gathering a = element(0), b = element(1), c = element(2), d = element(3);
+  const Gathering xy_ab = GATHERING(unpacklo, a, b), zw_ab = GATHERING(unpackhi, a, b);
+  const Gathering xy_cd = GATHERING(unpacklo, c, d), zw_cd = GATHERING(unpackhi, c, d);
+  const auto row = [](Gathering value)
+                       STRANDCAST_LANES_LAMBDA { return simd::Float((simd::FloatBits)value); };
+  return {row(GATHERING(shuffle, xy_ab, xy_cd, 0x44)), row(GATHERING(shuffle, xy_ab, xy_cd, 0xee)),
+          row(GATHERING(shuffle, zw_ab, zw_cd, 0x44)), row(GATHERING(shuffle, zw_ab, zw_cd, 0xee))};
+#else
+  Gathered found;
+  for (uint lane = 0; lane < simd::kLanes; ++lane) {
+    const float* from = values + size_t{at[lane]} * 4;
+    found.x.v[lane] = from[0], found.y.v[lane] = from[1], found.z.v[lane] = from[2],
+    found.w.v[lane] = from[3];
+  }
+  return found;
+#endif
+}
+/// An array of vec4 that kernels look things up in.
+struct lookup_table {
+  const LaneTable& table;
+};
+STRANDCAST_LANES vec4 look_up(const lookup_table& from, Uint index) {
+  const uint last = from.table.count - 1;
+  vec4 value;
+#if KERNEL_PARTS == 2
+  const Gathered a = gather(from.table.values, last, index.a);
+  const Gathered b = gather(from.table.values, last, index.b);
+  value.x = {a.x, b.x}, value.y = {a.y, b.y}, value.z = {a.z, b.z}, value.w = {a.w, b.w};
+#else
+  const Gathered found = gather(from.table.values, last, index);
+  value.x = found.x, value.y = found.y, value.z = found.z, value.w = found.w;
+#endif
+  return value;
+}
 struct Sheet {
   struct Element {
     const Rows* rows;
@@ -183,6 +251,7 @@ class KernelBase {
     return found == nullptr ? 0u : found->count;
   }
   const Rows* plane(PlaneRole role) const { return &plane_[static_cast<uint>(role)]; }
+  const LaneTable& table(TableRole role) const { return run_.tables[static_cast<uint>(role)]; }
   float* scratch_memory() const { return run_.scratch; }
   uint collider_count() const { return run_.collider_count; }
   uint gust_count() const { return run_.gust_count; }

@@ -88,7 +88,8 @@ LaneProgram::LaneProgram(const LaneKernel& kernel, const KernelDesc& desc, const
   constants_.push_back({"u_strand_end", 0.0f, 1});
 }
 
-void LaneProgram::run(const StepBlock& step, size_t collider_count, const LanePlanes& planes) {
+void LaneProgram::run(const StepBlock& step, size_t collider_count, const LanePlanes& planes,
+                      const LaneTables& tables) {
   StepBlock one_strand = step;
   one_strand.shape.x = 1;
   std::array<float*, kPlaneRoleCount> data{};
@@ -105,6 +106,7 @@ void LaneProgram::run(const StepBlock& step, size_t collider_count, const LanePl
   if (work_.has_turbulence) run.gust_count = gust_count(step);
   run.planes = data.data();
   run.block_floats = block_floats.data();
+  run.tables = tables.data();
   run.constants = constants_.data();
   run.constant_count = static_cast<uint32_t>(constants_.size());
   const auto run_share = [&](size_t begin, size_t end, uint32_t worker) {

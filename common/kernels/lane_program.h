@@ -27,6 +27,9 @@ const LaneKernel* find_lane_kernel(const KernelDesc& desc, simd::InstructionSet 
 /// Blocks by role; nullptr = the kernel does not touch them.
 using LanePlanes = std::array<StrandBlocks*, kPlaneRoleCount>;
 
+/// Tables by role; none where the kernel looks nothing up.
+using LaneTables = std::array<LaneTable, kTableRoleCount>;
+
 /// What a program is for.
 struct LaneWork {
   uint32_t strand_count = 0;
@@ -41,7 +44,8 @@ class LaneProgram {
  public:
   LaneProgram(const LaneKernel& kernel, const KernelDesc& desc, const LaneWork& work);
   /// Once for all strands.
-  void run(const StepBlock& step, size_t collider_count, const LanePlanes& planes);
+  void run(const StepBlock& step, size_t collider_count, const LanePlanes& planes,
+           const LaneTables& tables = {});
   /// Of its own: scratch above all.
   uint64_t size_bytes() const { return memory_bytes_ * most_workers_; }
 

@@ -1,5 +1,5 @@
-// PlaneRole: the planes of strands by what kernels call them. Alone, for files that are compiled for one
-// instruction set (lane_kernel.h).
+// PlaneRole, TableRole: the planes of strands, and the tables that they look things up in, by what kernels
+// call them. Alone, for files that are compiled for one instruction set (lane_kernel.h).
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,13 @@ enum class PlaneRole : uint32_t {
   VelocityChange,
   RodEdge,
   RodStrand,
-  RodAxis
+  RodAxis,
+  PlaceBefore
 };
-inline constexpr size_t kPlaneRoleCount = 8;
+inline constexpr size_t kPlaneRoleCount = 9;
+
+/// What kernels call the tables.
+enum class TableRole : uint32_t { Field, Volume };
+inline constexpr size_t kTableRoleCount = 2;
 
 }  // namespace strandcast

@@ -22,9 +22,11 @@ struct Bool {
                   "select() or lane_bool");
   }
 };
+struct Float;
 struct Uint {
   OneUint a, b;
   Uint() = default;
+  STRANDCAST_LANES explicit Uint(Float value);
   STRANDCAST_LANES constexpr Uint(OneUint a_, OneUint b_) : a(a_), b(b_) {}
   template <std::same_as<uint32_t> Number>
   STRANDCAST_LANES constexpr Uint(Number value) : a(value), b(value) {}
@@ -40,6 +42,7 @@ struct Float {
       : a(value), b(value) {}
   STRANDCAST_LANES explicit Float(Uint value) : a(value.a), b(value.b) {}
 };
+STRANDCAST_LANES Uint::Uint(Float value) : a(value.a), b(value.b) {}
 
 #define STRANDCAST_OF_TWO(Result, op, Type)                    \
   STRANDCAST_LANES Result operator op(Type left, Type right) { \
@@ -106,6 +109,7 @@ STRANDCAST_OF_ONE(cos)
   }
 STRANDCAST_OF_BOTH(min, Float)
 STRANDCAST_OF_BOTH(max, Float)
+STRANDCAST_OF_BOTH(min, Uint)
 STRANDCAST_OF_BOTH(max, Uint)
 STRANDCAST_OF_BOTH(pow, Float)
 STRANDCAST_OF_BOTH(atan, Float)

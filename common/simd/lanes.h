@@ -225,6 +225,9 @@ STRANDCAST_LANES Float max(Float a, Float b) {
 STRANDCAST_LANES Uint max(Uint a, Uint b) {
   return (UintBits)_mm512_max_epu32((__m512i)a.v, (__m512i)b.v);
 }
+STRANDCAST_LANES Uint min(Uint a, Uint b) {
+  return (UintBits)_mm512_min_epu32((__m512i)a.v, (__m512i)b.v);
+}
 STRANDCAST_LANES Float sqrt(Float x) {
   return (FloatBits)_mm512_sqrt_ps((__m512)x.v);
 }
@@ -243,6 +246,9 @@ STRANDCAST_LANES Float max(Float a, Float b) {
 }
 STRANDCAST_LANES Uint max(Uint a, Uint b) {
   return a.v > b.v ? a.v : b.v;
+}
+STRANDCAST_LANES Uint min(Uint a, Uint b) {
+  return a.v < b.v ? a.v : b.v;
 }
 STRANDCAST_LANES Float sqrt(Float x) {
 #if defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8

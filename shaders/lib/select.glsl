@@ -13,4 +13,7 @@
 #define uniform_float float
 #define is_any(which) (which)
 #define lanes_that(value) (value)
+// An array of vec4, and its element at an index that may differ between strands.
+#define lookup_table samplerBuffer
+#define look_up(table, index) texelFetch(table, int(index))
 #endif

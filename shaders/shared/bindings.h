@@ -17,6 +17,7 @@ const uint kBindingDisplacement = 2u;
 const uint kBindingVelocityChange = 3u;
 const uint kBindingRodScratch = 4u;
 const uint kBindingRodAxis = 5u;
+const uint kBindingPlaceBefore = 6u;
 
 // Uniform block of the simulation.
 const uint kBindingStep = 0u;
@@ -30,6 +31,11 @@ const uint kUnitVelocityChange = 4u;
 const uint kUnitRodEdge = 5u;
 const uint kUnitRodStrand = 6u;
 const uint kUnitRodAxis = 7u;
+const uint kUnitPlaceBefore = 8u;
+
+// Of the tables in which it looks things up.
+const uint kUnitField = 9u;
+const uint kUnitVolume = 10u;
 
 // Storage blocks of the renderer.
 const uint kBindingKeyPosition = 0u;

@@ -1,7 +1,7 @@
 // Executor: what runs the strand kernels of shaders/sim and keeps the strands' state for them: OpenGL
 // (gl_executor.h), or the processors, a strand per lane of a vector register (lanes_executor.h). Solvers are
-// written against this and know neither. Planes and programs live no longer than their executor. From one
-// thread.
+// written against this and know neither. Planes, tables and programs live no longer than their executor. From
+// one thread.
 #pragma once
 
 #include <array>
@@ -44,6 +44,17 @@ class StrandPlane {
   virtual std::optional<StrandBlocksView> view() const { return {}; }
 };
 
+/// An array of vec4 that kernels look things up in, at an index that differs between strands.
+class LookupTable {
+ public:
+  virtual ~LookupTable() = default;
+  /// As many values as it has elements.
+  virtual void write(std::span<const glm::vec4> values) = 0;
+  /// Its own memory where host code may fill it without a copy, while no kernel runs; else nothing.
+  virtual std::span<glm::vec4> memory() { return {}; }
+  virtual uint64_t size_bytes() const = 0;
+};
+
 /// Turns xyz of every element, in double; w stays.
 void turn_plane(StrandPlane& plane, const glm::dquat& turn);
 
@@ -53,12 +64,22 @@ inline StrandPlane*& plane_of(BoundPlanes& planes, PlaneRole role) {
   return planes[static_cast<size_t>(role)];
 }
 
+/// By role; nullptr = the kernel looks nothing up in it.
+using BoundTables = std::array<LookupTable*, kTableRoleCount>;
+inline LookupTable*& table_of(BoundTables& tables, TableRole role) {
+  return tables[static_cast<size_t>(role)];
+}
+
 /// A kernel with its constants, ready to run.
 class KernelProgram {
  public:
   virtual ~KernelProgram() = default;
   /// Once for all strands. What it stores is there for the next run and for read().
-  virtual void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) = 0;
+  virtual void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes,
+                   const BoundTables& tables) = 0;
+  void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) {
+    run(step, collider_count, planes, {});
+  }
   /// Of its own, scratch above all.
   virtual uint64_t size_bytes() const = 0;
 };
@@ -83,6 +104,9 @@ class Executor {
   /// (rows x strand_count) values.
   virtual std::unique_ptr<StrandPlane> make_plane(const std::string& label, uint32_t strand_count,
                                                   std::span<const glm::vec4> values) = 0;
+  /// Zero at first. LimitExceeded when the device looks up fewer elements.
+  virtual Result<std::unique_ptr<LookupTable>> make_table(const std::string& label,
+                                                          uint32_t element_count) = 0;
   /// Compiles where it has to: not while a program of the same kernel, constants and features is there. Of
   /// `layout` only the counts matter. BadInput for a constant that the kernel does not declare, or when it
   /// does not compile; Unsupported for a kernel that this executor does not run, LimitExceeded for too many

@@ -38,7 +38,9 @@ constexpr std::array<PlaneBinding, kPlaneRoleCount> kPlaneBindings = {{
     {shader::kUnitRodEdge, {}},
     {shader::kUnitRodStrand, {}},
     {shader::kUnitRodAxis, shader::kBindingRodAxis},
+    {shader::kUnitPlaceBefore, shader::kBindingPlaceBefore},
 }};
+constexpr std::array<uint32_t, kTableRoleCount> kTableUnits = {shader::kUnitField, shader::kUnitVolume};
 
 /// A buffer of vec4 with a buffer texture over all of it: kernels write the one and fetch from the other,
 /// which on llvmpipe costs half of a storage-block load or less.
@@ -69,6 +71,19 @@ class GlPlane final : public StrandPlane {
   size_t count_;
 };
 
+class GlTable final : public LookupTable {
+ public:
+  GlTable(const std::string& label, uint32_t element_count)
+      : plane_(label, std::vector<glm::vec4>(element_count, glm::vec4(0.0f))) {}
+
+  void bind(uint32_t unit) const { plane_.bind({unit, {}}); }
+  void write(std::span<const glm::vec4> values) override { plane_.write(values); }
+  uint64_t size_bytes() const override { return plane_.size_bytes(); }
+
+ private:
+  GlPlane plane_;
+};
+
 /// One kernel compiled for the numbers of colliders that a scene may come to have, with its constants set.
 using Capacities = std::map<uint32_t, gl::Program>;
 
@@ -88,12 +103,12 @@ Status set_constants(const gl::Program& program, const ModelConstants& constants
 Result<Capacities> compile(const gl::ShaderLibrary& shaders, const SceneFeatures& features,
                            const KernelDesc& desc) {
   std::vector<uint32_t> capacities = {0};
-  if (features.has_colliders)
+  if (features.has_colliders && desc.meets_colliders)
     capacities.assign(std::begin(kColliderCapacities), std::end(kColliderCapacities));
   Capacities compiled;
   for (const uint32_t capacity : capacities) {
     gl::Variant variant = desc.variant;
-    variant["COLLIDERS"] = static_cast<int>(capacity);
+    if (desc.meets_colliders) variant["COLLIDERS"] = static_cast<int>(capacity);
     if (desc.meets_air) variant["HAS_TURBULENCE"] = features.has_turbulence ? 1 : 0;
     ASSIGN_OR_RETURN(gl::Program program, gl::Program::make(shaders, {desc.shader_path}, variant));
     RETURN_IF_ERROR(set_constants(program, desc.constants));
@@ -132,11 +147,15 @@ class GlKernel final : public KernelProgram {
     if (scratch_bytes > 0) scratch_ = gl::Buffer(shader_path + " scratch", scratch_bytes);
   }
 
-  void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) override {
+  using KernelProgram::run;
+  void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes,
+           const BoundTables& tables) override {
     step_.write(0, std::as_bytes(std::span(&step, 1)));
     step_.bind_uniform(shader::kBindingStep);
     for (size_t role = 0; role < planes.size(); ++role)
       if (planes[role] != nullptr) static_cast<const GlPlane*>(planes[role])->bind(kPlaneBindings[role]);
+    for (size_t role = 0; role < tables.size(); ++role)
+      if (tables[role] != nullptr) static_cast<const GlTable*>(tables[role])->bind(kTableUnits[role]);
     const gl::Program& program = fitting(*compiled_, collider_count);
     program.use();
     if (scratch_.size_bytes() == 0)
@@ -191,6 +210,13 @@ class GlExecutor final : public Executor {
                                           std::span<const glm::vec4> values) override {
     CHECK(strand_count > 0 && values.size() % strand_count == 0);
     return std::make_unique<GlPlane>(label, values);
+  }
+
+  Result<std::unique_ptr<LookupTable>> make_table(const std::string& label, uint32_t element_count) override {
+    CHECK(element_count > 0);
+    const gl::DeviceLimits& limits = context_->info().limits;
+    RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::BufferTexels, element_count, label));
+    return std::unique_ptr<LookupTable>(std::make_unique<GlTable>(label, element_count));
   }
 
   Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc, const SceneFeatures& features,

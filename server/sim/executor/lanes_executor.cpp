@@ -68,16 +68,43 @@ class LanePlane final : public StrandPlane {
   StrandBlocks blocks_;
 };
 
+class LaneLookupTable final : public LookupTable {
+ public:
+  explicit LaneLookupTable(uint32_t element_count)
+      : values_((element_count + 3) / 4), count_(element_count) {}
+
+  void write(std::span<const glm::vec4> values) override {
+    CHECK(values.size() == count_);
+    std::copy(values.begin(), values.end(), memory().begin());
+  }
+  std::span<glm::vec4> memory() override { return {values_.data()->value, count_}; }
+  uint64_t size_bytes() const override { return values_.size() * sizeof(Line); }
+  LaneTable table() { return {&values_.data()->value[0].x, count_}; }
+
+ private:
+  /// Of a cache: no element lies in two.
+  struct alignas(kBlockAlignment) Line {
+    glm::vec4 value[4] = {};
+  };
+  std::vector<Line> values_;
+  uint32_t count_;
+};
+
 class LaneKernelProgram final : public KernelProgram {
  public:
   LaneKernelProgram(const LaneKernel& kernel, const KernelDesc& desc, const LaneWork& work)
       : program_(kernel, desc, work) {}
 
-  void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes) override {
+  using KernelProgram::run;
+  void run(const StepBlock& step, size_t collider_count, const BoundPlanes& planes,
+           const BoundTables& tables) override {
     LanePlanes blocks{};
     for (size_t role = 0; role < kPlaneRoleCount; ++role)
       if (planes[role] != nullptr) blocks[role] = &static_cast<LanePlane*>(planes[role])->blocks();
-    program_.run(step, collider_count, blocks);
+    LaneTables looked_up{};
+    for (size_t role = 0; role < kTableRoleCount; ++role)
+      if (tables[role] != nullptr) looked_up[role] = static_cast<LaneLookupTable*>(tables[role])->table();
+    program_.run(step, collider_count, blocks, looked_up);
   }
   uint64_t size_bytes() const override { return program_.size_bytes(); }
 
@@ -116,6 +143,10 @@ class LanesExecutor final : public Executor {
   std::unique_ptr<StrandPlane> make_plane(const std::string&, uint32_t strand_count,
                                           std::span<const glm::vec4> values) override {
     return std::make_unique<LanePlane>(strand_count, values);
+  }
+  Result<std::unique_ptr<LookupTable>> make_table(const std::string&, uint32_t element_count) override {
+    CHECK(element_count > 0);
+    return std::unique_ptr<LookupTable>(std::make_unique<LaneLookupTable>(element_count));
   }
   Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc, const SceneFeatures& features,
                                                       const StrandLayout& layout) override {
