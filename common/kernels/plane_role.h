@@ -17,9 +17,10 @@ enum class PlaneRole : uint32_t {
   RodEdge,
   RodStrand,
   RodAxis,
-  PlaceBefore
+  PlaceBefore,
+  RestDensity
 };
-inline constexpr size_t kPlaneRoleCount = 9;
+inline constexpr size_t kPlaneRoleCount = 10;
 
 /// What kernels call the tables.
 enum class TableRole : uint32_t { Field, Volume };

@@ -42,6 +42,7 @@ struct StepInput {
   std::vector<GustWave> gusts;  // at most kMaxGustWaves; x is relative to the head joint
   /// Most that the first free segment leans from its groomed direction, turned with the head; pi = free.
   double follicle_limit_rad = kFreeFollicleRad;
+  bool begins_step = true;                // the first substep of a step: what is computed once a step is
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
 };
 

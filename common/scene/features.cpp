@@ -36,6 +36,14 @@ Fact decide_follicle_limit(const SceneDesc& scene, const RuntimeFacts&) {
   return {false, "follicle_limit_deg is 180: roots are free"};
 }
 
+Fact decide_volume(const SceneDesc& scene, const RuntimeFacts&) {
+  if (scene.volume.friction_per_s > 0.0) return {true, "volume.friction_per_s is above zero"};
+  if (scene.volume.repulsion_per_s2 > 0.0) return {true, "volume.repulsion_per_s2 is above zero"};
+  if (scene.volume.target_per_s2 > 0.0) return {true, "volume.target_per_s2 is above zero"};
+  if (scene.volume.wind_width_m > 0.0) return {true, "volume.wind_width_m is above zero"};
+  return {false, "volume has no friction, repulsion, target or wind_width: hair passes through hair"};
+}
+
 Fact decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
   if (facts.strand_viewers > 0) return {true, "a viewer receives strands"};
   return {false, "no viewer receives strands"};
@@ -79,6 +87,7 @@ constexpr std::array kFacts{
     FactRow{"has_turbulence", &SceneFeatures::has_turbulence, decide_turbulence},
     FactRow{"has_colliders", &SceneFeatures::has_colliders, decide_colliders},
     FactRow{"has_follicle_limit", &SceneFeatures::has_follicle_limit, decide_follicle_limit},
+    FactRow{"has_volume", &SceneFeatures::has_volume, decide_volume},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},
     FactRow{"has_frame_viewers", &SceneFeatures::has_frame_viewers, decide_frame_viewers},
 };

@@ -43,6 +43,13 @@ inline constexpr Range kStepRate{10.0, 1000.0, "Hz"};
 inline constexpr Range kSubsteps{1, 64, ""};
 inline constexpr Range kGravity{-1000.0, 1000.0, "m/s^2"};
 inline constexpr Range kFollicleLimit{1.0, 180.0, "degrees"};  // 180 = free
+inline constexpr Range kHairFriction{0.0, 1e4, "1/s"};
+inline constexpr Range kHairRepulsion{0.0, 1e6, "1/s^2"};
+inline constexpr Range kWindWidth{0.0, 1.0, "m"};
+inline constexpr Range kRestDensityScale{0.1, 100.0, ""};
+inline constexpr Range kVolumeResolution{8, 128, "cells"};
+inline constexpr Range kVolumeSmoothing{0, 3, "passes"};
+inline constexpr Range kVolumeInterval{1, 100, "steps"};
 inline constexpr Range kColliderCenter{-kMaxGroomExtentM, kMaxGroomExtentM, "m"};
 inline constexpr Range kColliderRadius{1e-4, 10.0, "m"};
 inline constexpr Range kWindSpeed{-100.0, 100.0, "m/s"};
@@ -256,6 +263,19 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
   v.group("camera", [&] { visit_camera(v, scene.camera); });
   v.group("stream", [&] { visit_stream(v, scene.stream); });
   v.number("follicle_limit_deg", scene.follicle_limit_deg, kFollicleLimit);
+  v.group("volume", [&] {
+    v.number("friction_per_s", scene.volume.friction_per_s, kHairFriction);
+    v.number("repulsion_per_s2", scene.volume.repulsion_per_s2, kHairRepulsion);
+    v.number("target_per_s2", scene.volume.target_per_s2, kHairRepulsion);
+    v.number("wind_width_m", scene.volume.wind_width_m, kWindWidth);
+    v.number("rest_density_scale", scene.volume.rest_density_scale, kRestDensityScale);
+    v.number("resolution", scene.volume.resolution, kVolumeResolution);
+    v.number("smoothing", scene.volume.smoothing, kVolumeSmoothing);
+    v.number("interval", scene.volume.interval, kVolumeInterval);
+    v.text("integration", scene.volume.integration, kMaxNameBytes);
+    v.require("integration", scene.volume.integration == "implicit" || scene.volume.integration == "explicit",
+              "is unknown (known: implicit, explicit)");
+  });
 }
 
 }  // namespace strandcast::scene_fields

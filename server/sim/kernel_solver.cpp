@@ -16,14 +16,21 @@ KernelSolver::KernelSolver(const SolverContext& context, const StrandParameters&
     : executor_(executor_of(context)),
       strands_(context.strands ? context.strands : std::make_shared<StrandState>(executor_)),
       parameters_(parameters),
-      features_(context.features) {}
+      features_(context.features),
+      volume_(context.volume) {}
 
 Status KernelSolver::prepare_all() {
   prepare();
   // The program before stays until then: what is compiled is not compiled again.
   ASSIGN_OR_RETURN(program_, executor_.make_program(kernel(), features_, layout()));
-  if (!features_.has_follicle_limit) return {};
-  ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(executor_, features_, layout(), carried()));
+  if (features_.has_follicle_limit) {
+    ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(executor_, features_, layout(), carried()));
+  }
+  if (features_.has_volume) {
+    ASSIGN_OR_RETURN(volume_forces_,
+                     VolumeForces::make(executor_, features_, layout(), volume_, carried().way));
+  }
+  has_gathered_ = false;
   return {};
 }
 
@@ -41,9 +48,20 @@ Status KernelSolver::follow() {
   return {};
 }
 
+void KernelSolver::gather(const StepInput& input) {
+  if (!volume_forces_ || has_gathered_) return;
+  volume_forces_->gather(input, *strands_, carried().way);
+  has_gathered_ = true;
+}
+
 void KernelSolver::substep(const StepInput& input) {
   adapt(input);
   const StepBlock block = make_step_block(input, parameters_, layout().counts(), strands_->head());
+  if (volume_forces_) {
+    if (input.begins_step) gather(input);
+    has_gathered_ = false;
+    volume_forces_->apply(block, *strands_, carried().way);
+  }
   BoundPlanes planes = strands_->planes();
   bind(planes);
   program_->run(block, input.colliders.size(), planes);
@@ -55,10 +73,12 @@ void KernelSolver::substep(const StepInput& input) {
 // A strand that is written as it was read goes on as if nothing had happened; another one starts anew.
 void KernelSolver::write(const SolverState& state) {
   forget(strands_->write(state));
+  if (volume_forces_) volume_forces_->forget();
 }
 
 void KernelSolver::rebase(const glm::dquat& world_from_head_rotation) {
   turn_memory(strands_->rebase(world_from_head_rotation));
+  if (volume_forces_) volume_forces_->forget();
 }
 
 std::shared_ptr<const StepModel> KernelSolver::step_model() {
@@ -81,6 +101,7 @@ uint64_t KernelSolver::memory_bytes() const {
   uint64_t bytes = strands_->memory_bytes() + model_bytes();
   if (program_) bytes += program_->size_bytes();
   if (follicle_limit_) bytes += follicle_limit_->size_bytes();
+  if (volume_forces_) bytes += volume_forces_->size_bytes();
   return bytes;
 }
 

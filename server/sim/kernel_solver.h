@@ -12,12 +12,14 @@
 #include "server/sim/follicle_limit.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
+#include "server/sim/volume/volume_forces.h"
 
 namespace strandcast {
 
 class KernelSolver : public Solver {
  public:
   Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) final;
+  void gather(const StepInput& input) final;
   void substep(const StepInput& input) final;
   void read(SolverState& state) final { strands_->read(state); }
   SolverBlocks read_blocks() final { return strands_->read_blocks(); }
@@ -68,6 +70,9 @@ class KernelSolver : public Solver {
   SceneFeatures features_;
   std::unique_ptr<KernelProgram> program_;
   std::optional<FollicleLimit> follicle_limit_;  // where the scene has one
+  VolumeDesc volume_;
+  std::unique_ptr<VolumeForces> volume_forces_;  // where hair acts on hair
+  bool has_gathered_ = false;                    // for the step that comes
 };
 
 }  // namespace strandcast

@@ -44,6 +44,9 @@ class Solver {
   virtual Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) = 0;
   /// Advances by input.h_s.
   virtual void substep(const StepInput& input) = 0;
+  /// Computes what the substeps of a step share, ahead of the first one, which else does it: for whoever
+  /// times it.
+  virtual void gather(const StepInput&) {}
   /// Copies the state out; resizes `state` on first use only.
   virtual void read(SolverState& state) = 0;
   /// As read(), in blocks of strands; without a copy where the solver keeps its strands so. Valid until the

@@ -38,6 +38,8 @@ struct SolverContext {
   /// Gravity that the steps will say the groom has its shape under, as far as it is known: what follows from
   /// it is then found by load() and not by the first step.
   glm::dvec3 groom_gravity_in_head_mps2 = {};
+  /// How strands act on each other, where the features say that they do.
+  VolumeDesc volume = {};
 };
 
 struct SolverRow {
@@ -62,6 +64,8 @@ struct SolverRow {
   /// False: there is no kernel. make then makes the double-precision solver as well, which runs on one
   /// thread of the processor, slowly, through the same interface.
   bool has_kernel = true;
+  /// False: forces between strands feed its motion for ever.
+  bool bears_volume = true;
   /// Does ahead what takes long of loading a groom under this gravity, so that load() finds it done, and
   /// gives what a person should know of the groom under this model, a sentence each. Any thread; ends early,
   /// with nothing, when told to stop. Empty = loading takes no time.

@@ -10,17 +10,12 @@
 namespace strandcast {
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",
-                                                   "substeps",
-                                                   "gravity_mps2",
-                                                   "follicle_limit_deg",
-                                                   "colliders",
-                                                   "has_auto_collider",
-                                                   "wind",
-                                                   "look",
-                                                   "camera",
-                                                   "stream.bound_m",
-                                                   "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",         "substeps",
+                                                   "gravity_mps2",   "follicle_limit_deg",
+                                                   "colliders",      "has_auto_collider",
+                                                   "volume",         "wind",
+                                                   "look",           "camera",
+                                                   "stream.bound_m", "stream.strand_rate_hz"};
   return kFields;
 }
 
@@ -28,6 +23,12 @@ Status check_solver(const SceneDesc& scene) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   const Result<SolverParameters> parameters = complete_parameters(*row, scene.solver.parameters);
   if (!parameters) return parameters.error();
+  if (analyse(scene, {}).has_volume && !(row->has_kernel && row->bears_volume))
+    return make_error(ErrorCode::BadInput,
+                      "solver {} takes no forces between strands ({}): set volume.friction_per_s and "
+                      "volume.repulsion_per_s2 to 0, or take another solver",
+                      row->name,
+                      row->has_kernel ? "they would feed its motion for ever" : "it has no kernel");
   return check_step(*row, *parameters, 1.0 / (scene.step_rate_hz * scene.substeps));
 }
 

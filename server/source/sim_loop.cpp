@@ -25,7 +25,8 @@ constexpr size_t kMaxToldChars = 200;      // of an assignment, in its answer
 /// Whether a solver built for one set of facts serves another: only what it compiles for counts.
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
   return a.has_wind == b.has_wind && a.has_turbulence == b.has_turbulence &&
-         a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit;
+         a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit &&
+         a.has_volume == b.has_volume;
 }
 
 double median_ms(const gl::PassReports& passes, std::string_view name) {
@@ -268,7 +269,8 @@ Notice SimLoop::change(const std::string& assignment) {
   if (!scene) return {true, scene.error().to_string()};
   const SceneFeatures features = analyse(*scene, facts_);
   const bool is_other_solver = scene->solver.name != config_.scene.solver.name ||
-                               scene->solver.parameters != config_.scene.solver.parameters;
+                               scene->solver.parameters != config_.scene.solver.parameters ||
+                               scene->volume != config_.scene.volume;
   if (is_other_solver || !needs_same_solver(features, solver_features_))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
@@ -326,7 +328,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   const auto strands = are_kept ? strands_ : std::make_shared<StrandState>(*executor_);
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
-  const SolverContext context = {executor_.get(), features, KernelForm::Auto, strands, groom_gravity};
+  const SolverContext context = {executor_.get(), features,      KernelForm::Auto,
+                                 strands,         groom_gravity, scene.volume};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;

@@ -27,9 +27,20 @@ class Stage final : public gl::Pass<StageTurn> {
   Work work_;
 };
 
-void run_substeps(StageTurn& turn) {
+void carry(StageTurn& turn) {
   const SceneStep& step = turn.builder.step();
-  if (step.carried_to_rotation) turn.solver.rebase(*step.carried_to_rotation);
+  if (step.carried_to_rotation && !turn.is_carried) turn.solver.rebase(*step.carried_to_rotation);
+  turn.is_carried = true;
+}
+
+void gather_volume(StageTurn& turn) {
+  carry(turn);
+  turn.solver.gather(turn.builder.step().substeps.front());
+}
+
+void run_substeps(StageTurn& turn) {
+  carry(turn);
+  const SceneStep& step = turn.builder.step();
   for (const StepInput& substep : step.substeps) {
     if (turn.is_stopping != nullptr && *turn.is_stopping) return;  // many of a slow solver take long
     turn.solver.substep(substep);
@@ -93,6 +104,12 @@ void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& r
       [](StageTurn& turn) { turn.builder.add_colliders(); });
   add("scene/follicle_limit", limits, fact(reasons, "has_follicle_limit"),
       [](StageTurn& turn) { turn.builder.add_follicle_limit(); });
+  const FeatureReason& has_volume = fact(reasons, "has_volume");
+  const gl::Resource* volume = resource("hair volume", 0);  // the solver's, counted with its state
+  if (has_volume.value) read_by_solver.push_back(volume);
+  step_->add(std::make_unique<Stage>(
+      gl::PassDeclaration{"sim/volume", {motion}, {volume}, has_volume.value, has_volume.reason},
+      gl::PassClock::Device, gather_volume));
   step_->add(
       std::make_unique<Stage>(gl::PassDeclaration{"sim/step", read_by_solver, {state_.get()}, true, {}},
                               gl::PassClock::Device, run_substeps));

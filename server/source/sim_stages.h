@@ -35,6 +35,7 @@ struct StageTurn : gl::PassTurn {
   InputFrame input;
   double end_time_s = 0.0;                         // of the step, simulated
   double input_rate = 1.0;                         // InputClock::rate()
+  bool is_carried = false;                         // strands went along with a jump of the head
   const std::atomic<bool>* is_stopping = nullptr;  // looked at between substeps; may be null
   // Publishing takes, besides how the head moved in the newest step,
   PublishInput publish;

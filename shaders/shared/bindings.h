@@ -32,6 +32,7 @@ const uint kUnitRodEdge = 5u;
 const uint kUnitRodStrand = 6u;
 const uint kUnitRodAxis = 7u;
 const uint kUnitPlaceBefore = 8u;
+const uint kUnitRestDensity = 11u;
 
 // Of the tables in which it looks things up.
 const uint kUnitField = 9u;

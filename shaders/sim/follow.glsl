@@ -1,13 +1,9 @@
 // Prediction and Follow-The-Leader placement of one vertex, with colliders and their friction. Document 003,
 // sections 2.1.4 and 4.2.3.
-#pragma variant HAS_TURBULENCE 0 1
 #pragma variant HAS_PINNED_TAIL 0 1
 #include "lib/hash.glsl"
 #include "sim/collider.glsl"
-
-#ifndef LANES
-#define GUST_COUNT kMaxGustWaves
-#endif
+#include "sim/gust.glsl"
 
 struct Vertex {
   vec3 target;     // groomed shape, turned with the head
@@ -35,18 +31,6 @@ void set_thickness(uint strand) {
 vec3 taken_back(vec3 correction, vec3 along) {
   const float thrust = max(dot(correction, along), 0.0) / max(dot(along, along), kTinySquared);
   return correction - (u_step.contact.z * thrust) * along;
-}
-
-// Wind beside the mean wind; waves that are not there have no amplitude.
-vec3 gust_velocity(vec3 point) {
-  vec3 gust = vec3(0.0);
-#if HAS_TURBULENCE
-  for (uint i = 0u; i < GUST_COUNT; ++i) {
-    const vec4 amplitude = u_step.gust_amplitude[i];
-    gust += amplitude.xyz * sin(dot(u_step.gust_wave[i].xyz, point) - amplitude.w);
-  }
-#endif
-  return gust;
 }
 
 // Groom and a state of a vertex, not yet predicted. A broken state starts again from the groomed shape.

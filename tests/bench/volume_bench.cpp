@@ -1,6 +1,6 @@
-// Prints what a hair volume takes, as CSV: processor time of all threads and time by the clock, beside a plain
-// splat of the same strands on one thread in the same run.
-// usage: volume_bench [--groom FILE] [--strands N] [--resolution N] [--smoothing N] [--rounds N]
+// Prints what a hair volume takes, as CSV: processor time of all threads and time by the clock, beside a
+// plain splat of the same strands on one thread in the same run. usage: volume_bench [--groom FILE]
+// [--strands N] [--resolution N] [--smoothing N] [--rounds N]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,9 +10,11 @@
 #include <ctime>
 #include <string>
 
+#include "common/base/check.h"
 #include "common/base/quantile.h"
 #include "server/scene/scene_content.h"
-#include "server/sim/volume/hair_volume.h"
+#include "server/sim/executor/lanes_executor.h"
+#include "server/sim/volume/volume_forces.h"
 
 namespace strandcast {
 namespace {
@@ -105,15 +107,35 @@ int run(const Options& options) {
     sorted.add([&] { volume->update(input, nodes); });
     plain.add([&] { splat_plainly(layout, volume->grid(), plain_nodes); });
   }
+  Times forces;
+  auto lanes = make_lanes_executor();
+  if (lanes) {
+    Executor& executor = **lanes;
+    StrandState strands(executor);
+    const glm::dquat upright(1.0, 0.0, 0.0, 0.0);
+    CHECK(strands.load(content->groom, upright).ok());
+    VolumeDesc desc;
+    desc.friction_per_s = 20.0;
+    desc.repulsion_per_s2 = 18000.0;
+    desc.resolution = options.resolution;
+    desc.smoothing = options.smoothing;
+    auto pass = VolumeForces::make(executor, {}, layout, desc, nullptr).value();
+    const StepInput step;
+    const StepBlock block = make_step_block(step, {.max_speed_mps = 100.0}, layout.counts(), strands.head());
+    pass->gather(step, strands, nullptr);
+    for (int i = 0; i < options.rounds; ++i) forces.add([&] { pass->apply(block, strands, nullptr); });
+  }
   size_t occupied = 0;
   for (const glm::vec4& node : plain_nodes) occupied += node.w > 0.0f ? 1 : 0;
-  fmt::print("# {} strands x {}, cell {:.1f} mm, grid {} x {} x {}, {:.0f} % of nodes in use, {} samples, {} kB\n",
-             layout.strand_count, layout.vertex_count, 1e3f * volume->cell_m(), volume->grid().nodes.x,
-             volume->grid().nodes.y, volume->grid().nodes.z,
-             100.0 * static_cast<double>(occupied) / static_cast<double>(plain_nodes.size()),
-             volume->sample_count(), volume->size_bytes() / 1000);
+  fmt::print(
+      "# {} strands x {}, cell {:.1f} mm, grid {} x {} x {}, {:.0f} % of nodes in use, {} samples, {} kB\n",
+      layout.strand_count, layout.vertex_count, 1e3f * volume->cell_m(), volume->grid().nodes.x,
+      volume->grid().nodes.y, volume->grid().nodes.z,
+      100.0 * static_cast<double>(occupied) / static_cast<double>(plain_nodes.size()), volume->sample_count(),
+      volume->size_bytes() / 1000);
   fmt::print("variant,cpu ms,wall ms\n");
   sorted.print("volume: density, velocity, smoothing");
+  if (lanes) forces.print("friction and repulsion on lanes");
   plain.print("plain splat without smoothing, one thread");
   return 0;
 }

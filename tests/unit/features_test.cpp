@@ -37,6 +37,16 @@ TEST(Features, EachFactFollowsItsOwnCause) {
   scene.follicle_limit_deg = 180.0;
   EXPECT_FALSE(analyse(scene, {}).has_follicle_limit);
 
+  EXPECT_FALSE(analyse(scene, {}).has_volume);
+  scene.volume.friction_per_s = 1.0;
+  EXPECT_TRUE(analyse(scene, {}).has_volume);
+  scene.volume = {.repulsion_per_s2 = 1.0};
+  EXPECT_TRUE(analyse(scene, {}).has_volume);
+  scene.volume = {.target_per_s2 = 1.0};
+  EXPECT_TRUE(analyse(scene, {}).has_volume);
+  scene.volume = {.wind_width_m = 1e-3};
+  EXPECT_TRUE(analyse(scene, {}).has_volume);
+
   EXPECT_TRUE(analyse(scene, {.strand_viewers = 1}).has_strand_viewers);
   EXPECT_FALSE(analyse(scene, {.strand_viewers = 1}).has_frame_viewers);
   EXPECT_TRUE(analyse(scene, {.frame_viewers = 2}).has_frame_viewers);
@@ -107,6 +117,8 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.wind.mean_mps.x = coin() ? 0.0f : 1.0f;
     scene.wind.gust_intensity = coin() ? 0.0f : 0.5f;
     scene.follicle_limit_deg = coin() ? 180.0 : 20.0;
+    scene.volume.friction_per_s = coin() ? 0.0 : 20.0;
+    scene.volume.repulsion_per_s2 = coin() ? 0.0 : 5.0;
     const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u};
     const SceneFeatures features = analyse(scene, facts);
     SceneFeatures explained;
@@ -114,6 +126,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
                                             {"has_turbulence", &explained.has_turbulence},
                                             {"has_colliders", &explained.has_colliders},
                                             {"has_follicle_limit", &explained.has_follicle_limit},
+                                            {"has_volume", &explained.has_volume},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
                                             {"has_frame_viewers", &explained.has_frame_viewers}};
     const auto reasons = explain(scene, facts);
@@ -133,6 +146,7 @@ TEST(Features, ReasonsDifferWithTheValue) {
   bare.follicle_limit_deg = 180.0;
   SceneDesc full;
   full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1};
+  full.volume.friction_per_s = 1.0;
   const auto off = explain(bare, {});
   const auto on = explain(full, {.strand_viewers = 1, .frame_viewers = 1});
   for (size_t i = 0; i < off.size(); ++i) {

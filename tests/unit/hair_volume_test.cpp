@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "server/sim/volume/hair_volume.h"
+#include "server/sim/volume/volume_extras.h"
 #include "tests/support/own_workers.h"
 #include "tests/support/volume_reference.h"
 
@@ -301,6 +301,107 @@ TEST(HairVolume, RefusesWhatHasNoVolume) {
   StrandLayout far = hair.layout;
   for (glm::vec4& vertex : far.rest) vertex.x += 80.0f;
   EXPECT_THAT(HairVolume::make(far, {}, {}).error().to_string(), HasSubstr("farther from the head joint"));
+}
+
+// E = 1/2 sum (D - T)^2 over the nodes, times a cell: what is looked up is its derivative by a vertex's
+// place, per length of hair. Against differences of E in double.
+TEST(VolumeExtras, TheSlopeOfTheExcessIsTheDerivativeOfTheEnergy) {
+  Hair hair = random_hair(150, 12, 0.006f, 12);
+  for (const uint32_t smoothing : {0u, 1u, 2u}) {
+    const VolumeOptions options{16, smoothing};
+    const Filled filled = fill(hair, options);
+    const VolumeGrid& grid = filled.volume.grid();
+    // The target is the same hair somewhere else, on a grid of its own.
+    Hair other = random_hair(150, 12, 0.006f, 12);
+    for (glm::vec3& point : other.position_m) point = 0.9f * point + glm::vec3(0.01f, -0.02f, 0.015f);
+    const Filled wanted = fill(other, options);
+    const TargetDensity target = make_target(wanted.volume.grid(), wanted.nodes);
+    VolumeExtras extras(options);
+    std::vector<glm::vec4> found(grid.size());
+    extras.update(grid, filled.nodes, &target, nullptr, found);
+    std::vector<glm::vec4> excess(grid.size());
+    for (size_t i = 0; i < excess.size(); ++i) {
+      excess[i] = glm::vec4(glm::vec3(0.0f), found[i].x);
+      ASSERT_EQ(found[i].y, 1.0f) << "no wind was asked for";
+    }
+    const auto target_at = [&](const glm::ivec3& lattice) {
+      const glm::ivec3 node = lattice - target.grid.first;
+      for (int axis = 0; axis < 3; ++axis)
+        if (node[axis] < 0 || node[axis] >= static_cast<int>(target.grid.nodes[axis])) return 0.0;
+      const glm::uvec3 at(node);
+      return static_cast<double>(target.density_mpm3[target.grid.index(at.x, at.y, at.z)]);
+    };
+    const auto cell_m = static_cast<double>(grid.cell_m);
+    const auto energy = [&](const std::vector<HairSample>& samples) {
+      const ReferenceVolume volume = make_reference_volume(grid, samples, smoothing);
+      double sum = 0.0;
+      for (uint32_t z = 0; z < grid.nodes.z; ++z)
+        for (uint32_t y = 0; y < grid.nodes.y; ++y)
+          for (uint32_t x = 0; x < grid.nodes.x; ++x) {
+            const double off =
+                volume.nodes[grid.index(x, y, z)].w - target_at(grid.first + glm::ivec3(x, y, z));
+            sum += 0.5 * off * off * cell_m * cell_m * cell_m;
+          }
+      return sum;
+    };
+    std::vector<HairSample> samples = hair.samples(1);
+    ASSERT_EQ(samples.size(), filled.volume.sample_count());
+    for (const size_t vertex : {17u, 400u, 901u, 1500u}) {
+      const VolumeSample here = sample_volume(grid, excess, samples[vertex].in_head_m);
+      const glm::dvec3 expected = samples[vertex].length_m * here.gradient_mpm4;
+      for (int axis = 0; axis < 3; ++axis) {
+        constexpr double kStepM = 1e-6;
+        const glm::dvec3 before = samples[vertex].in_head_m;
+        samples[vertex].in_head_m[axis] = before[axis] + kStepM;
+        const double above = energy(samples);
+        samples[vertex].in_head_m[axis] = before[axis] - kStepM;
+        const double below = energy(samples);
+        samples[vertex].in_head_m = before;
+        EXPECT_NEAR((above - below) / (2.0 * kStepM), expected[axis], 2e-3 * glm::length(expected))
+            << smoothing;
+      }
+    }
+  }
+}
+
+// A slab of hair of one density: what comes through is exp(-width x density x way), whatever the angle.
+TEST(VolumeExtras, TheWindThroughASlabFallsExponentially) {
+  VolumeGrid grid{0.01f, {-20, -20, -10}, {41, 41, 21}};
+  constexpr float kDensity = 5000.0f;
+  constexpr float kWidthM = 0.004f;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float tilt : {0.0f, 0.3f, -0.6f})
+      for (const float sign : {1.0f, -1.0f}) {
+        glm::uvec3 nodes(41u);
+        nodes[axis] = 21u;
+        grid.nodes = nodes;
+        std::vector<glm::vec4> values(grid.size(), glm::vec4(0.0f));
+        const auto visit = [&](const auto& work) {
+          for (uint32_t z = 0; z < nodes.z; ++z)
+            for (uint32_t y = 0; y < nodes.y; ++y)
+              for (uint32_t x = 0; x < nodes.x; ++x) work(glm::uvec3(x, y, z), grid.index(x, y, z));
+        };
+        visit([&](const glm::uvec3& node, size_t i) {
+          if (node[axis] >= 8 && node[axis] <= 12) values[i].w = kDensity;
+        });
+        glm::vec3 along(0.0f);
+        along[axis] = sign;
+        along[(axis + 1) % 3] = tilt;
+        WindShadow shadow{glm::normalize(along), kWidthM};
+        VolumeExtras extras({16, 1});
+        std::vector<glm::vec4> found(grid.size());
+        extras.update(grid, values, nullptr, &shadow, found);
+        // Five layers of nodes, half of whose cells are at either side of each.
+        const double way_m = 0.05 / std::cos(std::atan(static_cast<double>(tilt)));
+        const double through =
+            std::exp(-static_cast<double>(kWidthM) * static_cast<double>(kDensity) * way_m);
+        glm::uvec3 behind(20u);
+        behind[axis] = sign > 0.0f ? 15u : 5u;
+        glm::uvec3 before(20u);
+        before[axis] = sign > 0.0f ? 5u : 15u;
+        EXPECT_NEAR(found[grid.index(behind.x, behind.y, behind.z)].y, through, 1e-4) << axis << ' ' << tilt;
+        EXPECT_EQ(found[grid.index(before.x, before.y, before.z)].y, 1.0f);
+      }
 }
 
 }  // namespace

@@ -115,6 +115,15 @@ SceneDesc unusual_scene() {
               .frame_rate_hz = 7.5,
               .strand_rate_hz = 30.0};
   s.follicle_limit_deg = 33.5;
+  s.volume = {.friction_per_s = 12.5,
+              .repulsion_per_s2 = 3.5,
+              .target_per_s2 = 77.0,
+              .wind_width_m = 0.003,
+              .rest_density_scale = 1.4,
+              .resolution = 40,
+              .smoothing = 2,
+              .interval = 3,
+              .integration = "explicit"};
   return s;
 }
 

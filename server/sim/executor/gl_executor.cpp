@@ -39,6 +39,7 @@ constexpr std::array<PlaneBinding, kPlaneRoleCount> kPlaneBindings = {{
     {shader::kUnitRodStrand, {}},
     {shader::kUnitRodAxis, shader::kBindingRodAxis},
     {shader::kUnitPlaceBefore, shader::kBindingPlaceBefore},
+    {shader::kUnitRestDensity, {}},
 }};
 constexpr std::array<uint32_t, kTableRoleCount> kTableUnits = {shader::kUnitField, shader::kUnitVolume};
 

@@ -84,8 +84,8 @@ Result<HairVolume> HairVolume::make(const StrandLayout& layout, std::span<const 
   for (uint32_t strand = 0; strand < layout.strand_count; ++strand)
     for (uint32_t vertex = 0; vertex < layout.vertex_count; ++vertex) {
       const size_t row = size_t{strand / kBlockStrands} * layout.vertex_count + vertex;
-      const float length_m = (hairs.empty() ? 1.0f : hairs[strand]) *
-                             sample_length_m(layout, vertex, strand, volume.samples_);
+      const float length_m =
+          (hairs.empty() ? 1.0f : hairs[strand]) * sample_length_m(layout, vertex, strand, volume.samples_);
       volume.length_m_[row * kBlockStrands + strand % kBlockStrands] = length_m;
       volume.total_length_m_ += static_cast<double>(length_m);
     }
@@ -154,8 +154,7 @@ void HairVolume::update(const VolumeInput& input, std::span<glm::vec4> nodes) {
   // Whoever looks up where nothing is finds nothing.
   for_layers([&](uint32_t begin, uint32_t end) {
     for (size_t row = size_t{begin} * grid_.nodes.y; row < size_t{end} * grid_.nodes.y; ++row)
-      if (rows_[row] == 0)
-        std::fill_n(nodes.data() + row * grid_.nodes.x, grid_.nodes.x, glm::vec4(0.0f));
+      if (rows_[row] == 0) std::fill_n(nodes.data() + row * grid_.nodes.x, grid_.nodes.x, glm::vec4(0.0f));
   });
 }
 
@@ -319,8 +318,8 @@ void HairVolume::divide(const Field& field) {
 
 uint64_t HairVolume::size_bytes() const {
   uint64_t bytes = length_m_.size() * sizeof(float) + records_.size() * sizeof(VolumeRecord) +
-                   other_.size() * sizeof(glm::vec4) + layer_begin_.size() * sizeof(uint32_t) +
-                   rows_.size() + other_rows_.size();
+                   other_.size() * sizeof(glm::vec4) + layer_begin_.size() * sizeof(uint32_t) + rows_.size() +
+                   other_rows_.size();
   for (const Share& share : shares_) bytes += share.places.size() * sizeof(uint32_t);
   for (const Slab& slab : slabs_) bytes += slab.last_sums.size() * sizeof(glm::vec4) + slab.last_rows.size();
   for (const Scratch& scratch : scratch_)

@@ -25,8 +25,8 @@ inline constexpr uint32_t kMaxVolumeResolution = 128;
 inline constexpr uint32_t kMaxVolumeSmoothing = 3;
 
 struct VolumeOptions {
-  uint32_t resolution = 32;  // kMinVolumeResolution .. kMaxVolumeResolution
-  uint32_t smoothing = 1;    // passes of [1 2 1] / 4 along each axis, 0 .. kMaxVolumeSmoothing
+  uint32_t resolution = 32;       // kMinVolumeResolution .. kMaxVolumeResolution
+  uint32_t smoothing = 1;         // passes of [1 2 1] / 4 along each axis, 0 .. kMaxVolumeSmoothing
   WorkerPool* workers = nullptr;  // outlives the volume; nullptr: the process's
   simd::InstructionSet set = simd::widest_set();
 };
@@ -55,7 +55,8 @@ class HairVolume {
   const VolumeGrid& grid() const { return grid_; }
   size_t most_nodes() const { return most_nodes_; }
   float cell_m() const { return grid_.cell_m; }
-  /// Samples of the last update, and those of them that were not in the grid: beyond its limits, or no number.
+  /// Samples of the last update, and those of them that were not in the grid: beyond its limits, or no
+  /// number.
   uint64_t sample_count() const { return sample_count_; }
   uint64_t outside_count() const { return outside_count_; }
   /// Of all strands.

@@ -24,10 +24,10 @@ struct VolumeGrid {
 
 /// What a volume says of a place: length of hair per space, and how the hair there moves on the mean.
 struct VolumeSample {
-  glm::dvec3 velocity_mps{0.0};    // world axes, relative to the head joint
-  double density_mpm3 = 0.0;       // metres of hair in a cubic metre
-  glm::dvec3 gradient_mpm4{0.0};   // of the density, head space
-  bool is_inside = false;          // of the grid
+  glm::dvec3 velocity_mps{0.0};   // world axes, relative to the head joint
+  double density_mpm3 = 0.0;      // metres of hair in a cubic metre
+  glm::dvec3 gradient_mpm4{0.0};  // of the density, head space
+  bool is_inside = false;         // of the grid
 };
 
 }  // namespace strandcast

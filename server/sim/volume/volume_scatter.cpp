@@ -132,25 +132,25 @@ STRANDCAST_LANES void place_records_lanes(const VolumeScatterRange& range) {
   const Float share = 1.0f / static_cast<float>(work.samples);
   const vec3 first = {static_cast<float>(work.first.x), static_cast<float>(work.first.y),
                       static_cast<float>(work.first.z)};
-  for_each_sample(range, [&](const Sample& sample, const float* length,
-                             uint32_t used) STRANDCAST_LANES_LAMBDA {
-    const IntBits layer = layer_of(sample, simd::floor(sample.cells.z));
-    float at[7][kLanes];
-    simd::store_lanes(sample.cells.x - first.x, at[0]);
-    simd::store_lanes(sample.cells.y - first.y, at[1]);
-    simd::store_lanes(sample.cells.z - first.z, at[2]);
-    simd::store_lanes(simd::load_lanes(length) * share, at[3]);
-    simd::store_lanes(sample.velocity_mps.x, at[4]);
-    simd::store_lanes(sample.velocity_mps.y, at[5]);
-    simd::store_lanes(sample.velocity_mps.z, at[6]);
-    int32_t layers[kLanes];
-    std::memcpy(layers, &layer, sizeof layers);
-    for (uint32_t i = 0; i < used; ++i) {
-      if (layers[i] < 0) continue;
-      work.records[work.places[layers[i]]++] = {
-          {at[0][i], at[1][i], at[2][i]}, at[3][i], {at[4][i], at[5][i], at[6][i]}, 0.0f};
-    }
-  });
+  for_each_sample(range,
+                  [&](const Sample& sample, const float* length, uint32_t used) STRANDCAST_LANES_LAMBDA {
+                    const IntBits layer = layer_of(sample, simd::floor(sample.cells.z));
+                    float at[7][kLanes];
+                    simd::store_lanes(sample.cells.x - first.x, at[0]);
+                    simd::store_lanes(sample.cells.y - first.y, at[1]);
+                    simd::store_lanes(sample.cells.z - first.z, at[2]);
+                    simd::store_lanes(simd::load_lanes(length) * share, at[3]);
+                    simd::store_lanes(sample.velocity_mps.x, at[4]);
+                    simd::store_lanes(sample.velocity_mps.y, at[5]);
+                    simd::store_lanes(sample.velocity_mps.z, at[6]);
+                    int32_t layers[kLanes];
+                    std::memcpy(layers, &layer, sizeof layers);
+                    for (uint32_t i = 0; i < used; ++i) {
+                      if (layers[i] < 0) continue;
+                      work.records[work.places[layers[i]]++] = {
+                          {at[0][i], at[1][i], at[2][i]}, at[3][i], {at[4][i], at[5][i], at[6][i]}, 0.0f};
+                    }
+                  });
 }
 
 STRANDCAST_LANES void add_to(double* node, const Doubles& value, double weight) {
@@ -203,10 +203,9 @@ STRANDCAST_LANES void sum_slab_lanes(const VolumeSlab& slab) {
       const double length = record.length_m;
       const double far = along_x * length;
       const double near = length - far;
-      const Doubles value = {near * record.velocity_mps[0], near * record.velocity_mps[1],
-                             near * record.velocity_mps[2], near,
-                             far * record.velocity_mps[0],  far * record.velocity_mps[1],
-                             far * record.velocity_mps[2],  far};
+      const Doubles value = {
+          near * record.velocity_mps[0], near * record.velocity_mps[1], near * record.velocity_mps[2], near,
+          far * record.velocity_mps[0],  far * record.velocity_mps[1],  far * record.velocity_mps[2],  far};
       const size_t at = (static_cast<size_t>(y) * slab.nodes.x + static_cast<size_t>(x)) * 4;
       const size_t above = at + size_t{slab.nodes.x} * 4;
       add_to(front + at, value, (1.0 - along_y) * (1.0 - along_z));

@@ -35,9 +35,9 @@ struct VolumeBounds {
 };
 
 struct VolumeScatter {
-  StrandBlocksView position_m;    // head-relative world axes
-  StrandBlocksView velocity_mps;  // world; values = nullptr: nothing moves
-  float velocity_scale = 1.0f;    // velocities are this times what stands there
+  StrandBlocksView position_m;      // head-relative world axes
+  StrandBlocksView velocity_mps;    // world; values = nullptr: nothing moves
+  float velocity_scale = 1.0f;      // velocities are this times what stands there
   const float* length_m = nullptr;  // (blocks x vertex_count x 16) hair that a vertex stands for, or, with
                                     // several samples, the segment before it
   uint32_t samples = 1;             // of each segment; 1: vertices are the samples
@@ -67,12 +67,12 @@ void place_records(simd::InstructionSet set, const VolumeScatterRange& range);
 
 /// Layers that one thread sums, one behind the other.
 struct VolumeSlab {
-  const VolumeRecord* records = nullptr;      // of all layers
-  const uint32_t* layer_begin = nullptr;      // of each layer of cells, and the end of the last one
-  uint32_t begin = 0;                         // layers of cells
+  const VolumeRecord* records = nullptr;  // of all layers
+  const uint32_t* layer_begin = nullptr;  // of each layer of cells, and the end of the last one
+  uint32_t begin = 0;                     // layers of cells
   uint32_t end = 0;
   glm::uvec3 nodes{0u};
-  double* scratch = nullptr;  // 2 layers of nodes x 4, 64-byte aligned; zero before and after
+  double* scratch = nullptr;        // 2 layers of nodes x 4, 64-byte aligned; zero before and after
   uint8_t* scratch_rows = nullptr;  // 2 x nodes.y; zero before and after
   /// (nodes) velocity x length, length; rows that nothing is in are left as they are.
   glm::vec4* sums = nullptr;

@@ -1,7 +1,7 @@
 // The second half of a hair volume on processors: sums at nodes are smoothed by [1 2 1] / 4 along each axis,
 // divided, and the quotient smoothed alike, so that what interpolation takes out of the volume is what the
-// sums put in (momentum is kept). Rows of nodes that nothing is in are skipped. Any thread; the same bits from
-// every instruction set.
+// sums put in (momentum is kept). Rows of nodes that nothing is in are skipped. Any thread; the same bits
+// from every instruction set.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ enum class VolumeParts { All, Velocity };
 struct VolumeSmooth {
   glm::uvec3 nodes{0u};
   VolumeParts parts = VolumeParts::All;
-  const glm::vec4* from = nullptr;       // (nodes)
-  const uint8_t* from_rows = nullptr;    // (nodes.z x nodes.y)
+  const glm::vec4* from = nullptr;     // (nodes)
+  const uint8_t* from_rows = nullptr;  // (nodes.z x nodes.y)
   glm::vec4* to = nullptr;
   uint8_t* to_rows = nullptr;
   uint32_t begin = 0;  // layers of nodes

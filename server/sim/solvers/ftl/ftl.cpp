@@ -41,6 +41,7 @@ SolverRow ftl_row() {
   row.parameters.push_back(thickness_spread_info());
   // The segments are a chain of followers that no reaction holds back: what one does, the next does larger.
   row.comes_to_rest = false;
+  row.bears_volume = false;
   row.make = make_ftl;
   row.make_reference = [](const SolverParameters& parameters) {
     return std::make_unique<FtlReference>(parameters);

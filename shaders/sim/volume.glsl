@@ -1,0 +1,131 @@
+// The hair volume around a vertex (server/sim/volume/hair_volume.h): density of hair, its slope, and how the
+// hair there moves, trilinear between eight nodes in head space.
+#include "sim/step.glsl"
+
+// Where the grid begins, in cells, w = cells per metre; nodes along each axis; then the nodes, x fastest: mean
+// velocity relative to the head joint in world axes, m/s; w = density, m/m^3. With extras then as many of
+// these (server/sim/volume/volume_extras.h).
+layout(binding = kUnitVolume) uniform lookup_table u_volume;
+
+const uint kVolumeHeader = 2u;
+
+struct VolumeGrid {
+  vec3 first;
+  float per_cell;  // cells per metre
+  vec3 nodes;
+};
+
+struct VolumeHere {
+  vec3 velocity;
+  float density;
+  vec3 slope;  // of the density, per metre, head space
+};
+
+// Where a point lies between nodes.
+struct VolumePlace {
+  lane_uint front;  // element of the node before it along each axis
+  lane_uint back;   // the one a layer behind
+  lane_uint row;
+  vec3 share;
+  lane_bool is_inside;
+};
+
+// Trilinear between eight elements: the value, and how it changes along x, y and z per cell, of the component
+// that is asked for.
+struct VolumeValue {
+  vec4 x0;  // differences along x, front and back, and along y
+  vec4 x1;
+  vec4 y0;
+  vec4 y1;
+  vec4 z;
+  vec4 value;
+};
+
+VolumeGrid volume_grid() {
+  const vec4 first = look_up(u_volume, lane_uint(0u));
+  const vec4 nodes = look_up(u_volume, lane_uint(1u));
+  return VolumeGrid(first.xyz, first.w, nodes.xyz);
+}
+
+vec3 in_head(vec3 point) {
+  return vec3(dot(u_step.world_from_head[0].xyz, point), dot(u_step.world_from_head[1].xyz, point),
+              dot(u_step.world_from_head[2].xyz, point));
+}
+
+// `point` is head-relative in world axes. A place that is not inside is some other one.
+VolumePlace volume_place(VolumeGrid grid, vec3 point) {
+  const vec3 at = in_head(point) * grid.per_cell - grid.first;
+  const vec3 last = grid.nodes - 1.0;
+  VolumePlace place;
+  place.is_inside =
+      at.x >= 0.0 && at.y >= 0.0 && at.z >= 0.0 && at.x < last.x && at.y < last.y && at.z < last.z;
+  const vec3 held = select(place.is_inside, at, vec3(0.0));
+  const vec3 base = vec3(floor(held.x), floor(held.y), floor(held.z));
+  place.share = held - base;
+  // Whole numbers below 2^24: exact.
+  place.row = lane_uint(grid.nodes.x);
+  place.front =
+      lane_uint((base.z * grid.nodes.y + base.y) * grid.nodes.x + base.x) + lane_uint(kVolumeHeader);
+  place.back = place.front + lane_uint(grid.nodes.x * grid.nodes.y);
+  return place;
+}
+
+VolumeValue volume_value(VolumePlace place, lane_uint offset) {
+  const lane_uint front = place.front + offset;
+  const lane_uint back = place.back + offset;
+  const lane_uint front_row = front + place.row;
+  const lane_uint back_row = back + place.row;
+  const lane_uint one = lane_uint(1u);
+  const vec4 n00 = look_up(u_volume, front);
+  const vec4 n10 = look_up(u_volume, front_row);
+  const vec4 n01 = look_up(u_volume, back);
+  const vec4 n11 = look_up(u_volume, back_row);
+  const vec4 x00 = look_up(u_volume, front + one) - n00;
+  const vec4 x10 = look_up(u_volume, front_row + one) - n10;
+  const vec4 x01 = look_up(u_volume, back + one) - n01;
+  const vec4 x11 = look_up(u_volume, back_row + one) - n11;
+  const vec3 share = place.share;
+  const vec4 e00 = n00 + share.x * x00;
+  const vec4 e01 = n01 + share.x * x01;
+  VolumeValue found;
+  found.x0 = x00 + share.y * (x10 - x00);
+  found.x1 = x01 + share.y * (x11 - x01);
+  found.y0 = (n10 + share.x * x10) - e00;
+  found.y1 = (n11 + share.x * x11) - e01;
+  const vec4 f0 = e00 + share.y * found.y0;
+  found.z = (e01 + share.y * found.y1) - f0;
+  found.value = f0 + share.z * found.z;
+  return found;
+}
+
+// Beyond the grid there is no hair.
+VolumeHere volume_at(VolumeGrid grid, VolumePlace place) {
+  const VolumeValue found = volume_value(place, lane_uint(0u));
+  const vec3 slope =
+      vec3(found.x0.w + place.share.z * (found.x1.w - found.x0.w),
+           found.y0.w + place.share.z * (found.y1.w - found.y0.w), found.z.w);
+  VolumeHere here;
+  here.velocity = select(place.is_inside, found.value.xyz, vec3(0.0));
+  here.density = select(place.is_inside, found.value.w, 0.0);
+  here.slope = select(place.is_inside, grid.per_cell * slope, vec3(0.0));
+  return here;
+}
+
+#if HAS_EXTRAS
+struct VolumeExtra {
+  vec3 excess_slope;  // of the density beyond the target's, per metre, head space
+  float wind;         // share of it that comes through
+};
+
+VolumeExtra volume_extra(VolumeGrid grid, VolumePlace place) {
+  const lane_uint offset = lane_uint(grid.nodes.x * grid.nodes.y * grid.nodes.z);
+  const VolumeValue found = volume_value(place, offset);
+  const vec3 slope =
+      vec3(found.x0.x + place.share.z * (found.x1.x - found.x0.x),
+           found.y0.x + place.share.z * (found.y1.x - found.y0.x), found.z.x);
+  VolumeExtra extra;
+  extra.excess_slope = select(place.is_inside, grid.per_cell * slope, vec3(0.0));
+  extra.wind = select(place.is_inside, found.value.y, 1.0);
+  return extra;
+}
+#endif
