@@ -15,6 +15,7 @@
 #include "common/kernels/plane_role.h"
 #include "common/kernels/step_block.h"
 #include "common/kernels/step_input.h"
+#include "common/kernels/volume/volume_desc.h"
 #include "common/math/pose.h"
 
 namespace strandcast {
@@ -48,7 +49,14 @@ struct StepModel {
   // What the kernel reads besides, (rows x strand_count), strand fastest; empty where it has no such plane.
   std::vector<glm::vec4> rod_edge;    // (vertex_count x strand_count)
   std::vector<glm::vec4> rod_strand;  // (kRodStrandRows x strand_count)
+  /// How strands act on each other; whether it is made anew in every step is not told.
+  VolumeDesc volume;
 };
+/// A volume that is finer is not told of: strands are predicted without it.
+inline constexpr uint32_t kMostToldResolution = 64;
+inline bool tells_volume(const StepModel& model) {
+  return model.volume.acts() && model.volume.resolution <= kMostToldResolution;
+}
 inline constexpr uint32_t kRodStrandRows = 4;
 
 /// What all ticks have in common until the scene changes.

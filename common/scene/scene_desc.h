@@ -13,6 +13,7 @@
 
 #include "common/groom/groom.h"
 #include "common/groom/groom_file.h"
+#include "common/kernels/volume/volume_desc.h"
 #include "common/math/pose.h"
 #include "common/math/sphere_collider.h"
 #include "common/scene/render_methods.h"
@@ -62,24 +63,6 @@ struct WindDesc {
   uint32_t seed = 1;
 
   bool operator==(const WindDesc&) const = default;
-};
-
-/// How strands act on each other, over the volume that they fill. Without friction and repulsion there is
-/// none.
-struct VolumeDesc {
-  double friction_per_s = 0.0;  // rate at which hair takes on the mean velocity of the hair around it
-  /// How hard hair leaves where it is denser than in the groom: acceleration per cell where it is twice as
-  /// dense, and where the density falls to the groom's within a cell.
-  double repulsion_per_s2 = 0.0;
-  double target_per_s2 = 0.0;            // how hard hair goes to where its density is the groom's
-  double wind_width_m = 0.0;             // by which a simulated strand keeps the wind off what is behind it
-  double rest_density_scale = 1.0;       // times the groom's own density there, from which on it does
-  uint32_t resolution = 32;              // cells along the longest side of the groom's box
-  uint32_t smoothing = 1;                // of density and velocity: passes of [1 2 1] / 4
-  uint32_t interval = 1;                 // steps that a volume is good for
-  std::string integration = "implicit";  // of the repulsion: "implicit", or "explicit" as in the sources
-
-  bool operator==(const VolumeDesc&) const = default;
 };
 
 struct SolverDesc {

@@ -13,7 +13,13 @@ void StepLog::add(const StepTick& tick) {
 }
 
 double StepLog::step_cost() const {
-  return model_ == nullptr ? 0.0 : find_step_kernel(model_->kernel.shader_path)->cost;
+  if (model_ == nullptr) return 0.0;
+  const double cost = find_step_kernel(model_->kernel.shader_path)->cost;
+  if (!tells_volume(*model_)) return cost;
+  // The volume once a step, what it does to each vertex in each substep.
+  constexpr double kVolumeCost = 12.0;
+  constexpr double kForcesCost = 2.0;
+  return cost + kForcesCost + kVolumeCost / (scene_ == nullptr ? 1.0 : scene_->substeps);
 }
 
 std::shared_ptr<const StepTrail> StepLog::trail() const {

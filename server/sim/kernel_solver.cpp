@@ -86,6 +86,7 @@ std::shared_ptr<const StepModel> KernelSolver::step_model() {
   model->kernel = kernel();
   if (find_step_kernel(model->kernel.shader_path) == nullptr) return nullptr;
   model->parameters = parameters_;
+  if (features_.has_volume) model->volume = volume_;
   model->strand_count = layout().strand_count;
   model->vertex_count = layout().vertex_count;
   model->pinned_root_count = layout().pinned_root_count;

@@ -1,10 +1,10 @@
-// The hair volume around a vertex (server/sim/volume/hair_volume.h): density of hair, its slope, and how the
+// The hair volume around a vertex (common/kernels/volume/hair_volume.h): density of hair, its slope, and how the
 // hair there moves, trilinear between eight nodes in head space.
 #include "sim/step.glsl"
 
 // Where the grid begins, in cells, w = cells per metre; nodes along each axis; then the nodes, x fastest: mean
 // velocity relative to the head joint in world axes, m/s; w = density, m/m^3. With extras then as many of
-// these (server/sim/volume/volume_extras.h).
+// these (common/kernels/volume/volume_extras.h).
 layout(binding = kUnitVolume) uniform lookup_table u_volume;
 
 const uint kVolumeHeader = 2u;

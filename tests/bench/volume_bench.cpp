@@ -82,7 +82,8 @@ int run(const Options& options) {
     return 2;
   }
   const StrandLayout layout = make_strand_layout(content->groom).value();
-  auto volume = HairVolume::make(layout, {}, {options.resolution, options.smoothing});
+  auto volume = HairVolume::make({layout.strand_count, layout.vertex_count, layout.rest, {}},
+                                 {options.resolution, options.smoothing});
   if (!volume) {
     fmt::print(stderr, "{}\n", volume.error().to_string());
     return 2;

@@ -91,7 +91,17 @@ std::shared_ptr<const StepModel> model_of(const StreamCase& stream) {
   model->parameters.air_drag_per_s = 4.0;
   model->parameters.max_speed_mps = 20.0;
   model->parameters.collider_friction = 0.25;
-  if (stream.name != "rod") {
+  if (stream.name == "volume" || stream.name == "volume_extras") {
+    model->volume.friction_per_s = 16.0;
+    model->volume.repulsion_per_s2 = 4096.0;
+    model->volume.resolution = 8;
+  }
+  if (stream.name == "volume_extras") {
+    model->volume.target_per_s2 = 1024.0;
+    model->volume.wind_width_m = 0x1p-9;
+    model->volume.smoothing = 2;
+  }
+  if (stream.name != "rod" && stream.name != "volume_extras") {
     model->kernel.shader_path = "sim/dftl.comp";
     model->parameters.s_damping = 0.875;
     model->parameters.style_stiffness_per_s2 = 64.0;
@@ -192,6 +202,7 @@ std::vector<StreamCase> stream_cases() {
   cases.push_back({"no_rest", "tangent", 7, 5, 7, false});
   cases.push_back({"slices", "tangent", kSlicedStrands, kSlicedVertices, kSlicedStrands});
   for (const char* name : {"whole", "rod", "still"}) cases.push_back({name, "step", 7, 5, 7});
+  for (const char* name : {"volume", "volume_extras"}) cases.push_back({name, "step", 7, 5, 7});
   cases.push_back({"prefix", "step", 7, 5, 3});
   cases.push_back({"slices", "step", kSlicedStrands, kSlicedVertices, kSlicedStrands});
   return cases;

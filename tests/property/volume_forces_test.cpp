@@ -56,7 +56,9 @@ struct ShakenTuft {
   /// The same in double: a volume of its own, and the law of shaders/sim/volume_forces.comp.
   std::vector<glm::dvec3> expected(const VolumeDesc& desc) const {
     const StrandLayout& layout = strands.layout();
-    HairVolume volume = HairVolume::make(layout, {}, {desc.resolution, desc.smoothing}).value();
+    HairVolume volume = HairVolume::make({layout.strand_count, layout.vertex_count, layout.rest, {}},
+                                         {desc.resolution, desc.smoothing})
+                            .value();
     std::vector<glm::vec4> nodes(volume.most_nodes());
     StrandBlocks position(layout.strand_count, layout.vertex_count);
     StrandBlocks velocity(layout.strand_count, layout.vertex_count);

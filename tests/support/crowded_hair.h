@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "common/kernels/volume/hair_volume.h"
 #include "server/scene/scene_content.h"
 #include "server/scene/step_builder.h"
 #include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
-#include "server/sim/volume/hair_volume.h"
 
 namespace strandcast {
 
@@ -64,7 +64,9 @@ class CrowdedHair {
         content_{std::move(groom), {}, {}, {}, {}},
         builder_(scene, {}),
         layout_(make_strand_layout(content_.groom).value()),
-        volume_(HairVolume::make(layout_, {}, {scene.volume.resolution, 1}).value()),
+        volume_(HairVolume::make({layout_.strand_count, layout_.vertex_count, layout_.rest, {}},
+                                 {scene.volume.resolution, 1})
+                    .value()),
         nodes_(volume_.most_nodes()) {
     const SolverRow* row = find_solver(scene.solver.name).value();
     SolverContext context{&executor, analyse(scene, {})};

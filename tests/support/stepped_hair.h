@@ -148,6 +148,7 @@ class SteppedHair {
     const SolverParameters parameters = complete_parameters(*row, scene_.solver.parameters).value();
     SolverContext context{executor_.get(), features_};
     context.groom_gravity_in_head_mps2 = builder_.groom_gravity_in_head_mps2();
+    context.volume = scene_.volume;
     auto solver = row->make(parameters, context);
     EXPECT_TRUE(solver) << solver.error().to_string();
     return std::move(solver).value();

@@ -5,7 +5,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "server/sim/volume/volume_grid.h"
+#include "common/kernels/volume/volume_grid.h"
 
 namespace strandcast {
 

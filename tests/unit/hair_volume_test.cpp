@@ -7,7 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "server/sim/volume/volume_extras.h"
+#include "common/kernels/volume/volume_extras.h"
+#include "server/sim/strand_layout.h"
 #include "tests/support/own_workers.h"
 #include "tests/support/volume_reference.h"
 
@@ -102,12 +103,16 @@ Hair random_hair(uint32_t strand_count, uint32_t vertex_count, float step_m, uin
   return hair;
 }
 
+VolumeStrands strands_of(const StrandLayout& layout) {
+  return {layout.strand_count, layout.vertex_count, layout.rest, {}};
+}
+
 struct Filled {
   HairVolume volume;
   std::vector<glm::vec4> nodes;
 };
 Filled fill(Hair& hair, const VolumeOptions& options) {
-  Result<HairVolume> volume = HairVolume::make(hair.layout, {}, options);
+  Result<HairVolume> volume = HairVolume::make(strands_of(hair.layout), options);
   EXPECT_TRUE(volume) << volume.error().to_string();
   Filled filled{std::move(*volume), {}};
   filled.nodes.assign(filled.volume.most_nodes(), glm::vec4(7.0f));
@@ -199,10 +204,10 @@ TEST(HairVolume, IsWhatPlainLoopsInDoubleSay) {
 
 TEST(HairVolume, IsTheSameBitsFromEverySetAndNumberOfThreads) {
   Hair hair = random_hair(1003, 16, 0.006f, 5);
-  const Filled expected = fill(hair, {24, 1, own_workers(1), simd::InstructionSet::Plain});
+  const Filled expected = fill(hair, {24, 1, own_workers(1), Priority::Simulation, simd::InstructionSet::Plain});
   for (const simd::InstructionSet set : simd::instruction_sets())
     for (const uint32_t threads : {1u, 2u, 4u}) {
-      const Filled filled = fill(hair, {24, 1, own_workers(threads), set});
+      const Filled filled = fill(hair, {24, 1, own_workers(threads), Priority::Simulation, set});
       ASSERT_EQ(filled.volume.grid(), expected.volume.grid());
       EXPECT_EQ(std::memcmp(filled.nodes.data(), expected.nodes.data(), std::span(filled.nodes).size_bytes()),
                 0)
@@ -226,7 +231,7 @@ TEST(HairVolume, TakesEveryVertexInACellOfItsOwn) {
   Hair hair = random_hair(512, 16, 0.004f, 7);
   hair.world_from_head = {1.0, 0.0, 0.0, 0.0};
   hair.velocity_mps.assign(hair.velocity_mps.size(), hair.head_velocity_mps);
-  Result<HairVolume> volume = HairVolume::make(hair.layout, {}, {32, 0});
+  Result<HairVolume> volume = HairVolume::make(strands_of(hair.layout), {32, 0});
   ASSERT_TRUE(volume);
   const float cell_m = volume->cell_m();
   for (uint32_t i = 0; i < hair.position_m.size(); ++i) {
@@ -291,16 +296,17 @@ TEST(HairVolume, SlopeIsThatOfItsValues) {
 
 TEST(HairVolume, RefusesWhatHasNoVolume) {
   Hair hair = random_hair(10, 8, 0.006f, 11);
-  EXPECT_THAT(HairVolume::make(hair.layout, {}, {4, 1}).error().to_string(),
+  EXPECT_THAT(HairVolume::make(strands_of(hair.layout), {4, 1}).error().to_string(),
               HasSubstr("volume.resolution is 4 (allowed: 8 to 128)"));
-  EXPECT_THAT(HairVolume::make(hair.layout, {}, {32, 9}).error().to_string(),
+  EXPECT_THAT(HairVolume::make(strands_of(hair.layout), {32, 9}).error().to_string(),
               HasSubstr("volume.smoothing is 9 (allowed: 0 to 3)"));
   StrandLayout flat = hair.layout;
   for (glm::vec4& vertex : flat.rest) vertex = glm::vec4(0.1f, 0.1f, 0.1f, 0.0f);
-  EXPECT_THAT(HairVolume::make(flat, {}, {}).error().to_string(), HasSubstr("there is no hair"));
+  EXPECT_THAT(HairVolume::make(strands_of(flat), {}).error().to_string(), HasSubstr("there is no hair"));
   StrandLayout far = hair.layout;
   for (glm::vec4& vertex : far.rest) vertex.x += 80.0f;
-  EXPECT_THAT(HairVolume::make(far, {}, {}).error().to_string(), HasSubstr("farther from the head joint"));
+  EXPECT_THAT(HairVolume::make(strands_of(far), {}).error().to_string(),
+              HasSubstr("farther from the head joint"));
 }
 
 // E = 1/2 sum (D - T)^2 over the nodes, times a cell: what is looked up is its derivative by a vertex's

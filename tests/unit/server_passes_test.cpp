@@ -29,6 +29,7 @@ SceneDesc full_scene() {
   scene.groom = groom;
   scene.wind.mean_mps = {3.0f, 0.0f, 1.0f};
   scene.wind.gust_intensity = 0.3f;
+  scene.volume.friction_per_s = 20.0;
   scene.look.methods = {"marschner", "dual", "vertex"};  // each has tables
   return scene;
 }
@@ -36,6 +37,7 @@ SceneDesc full_scene() {
 SceneDesc bare_scene() {
   SceneDesc scene = full_scene();
   scene.wind = {};
+  scene.volume = {};
   scene.has_auto_collider = false;
   scene.follicle_limit_deg = 180.0;
   return scene;
@@ -160,6 +162,7 @@ TEST(SimStages, AStepRunInStagesIsTheStepThatTheFactsAskForBitForBit) {
     ASSERT_EQ(world.solver.steps.size(), expected.size());
     for (size_t i = 0; i < expected.size(); ++i) {
       const StepInput& ran = world.solver.steps[i];
+      EXPECT_EQ(ran.begins_step, i % scene.substeps == 0);
       EXPECT_EQ(ran.world_from_head_rotation, expected[i].world_from_head_rotation);
       EXPECT_EQ(ran.head_shift_m, expected[i].head_shift_m);
       EXPECT_EQ(ran.wind_mps, expected[i].wind_mps);
@@ -184,7 +187,7 @@ TEST(SimStages, WhatTheListSaysRanAndNothingElse) {
   for (const gl::PassReport& pass : world.stages.report()) {
     const bool has_run = pass.name == "scene/motion" || pass.name == "sim/step";
     EXPECT_EQ(pass.runs, has_run ? 2u : 0u) << pass.name;
-    const bool is_off = pass.name.starts_with("scene/") && !has_run;
+    const bool is_off = (pass.name.starts_with("scene/") || pass.name == "sim/volume") && !has_run;
     EXPECT_EQ(pass.fate == PassFate::NotRequested, is_off) << pass.name;
   }
   // A wind stream connects.

@@ -465,6 +465,47 @@ ErrorCode code_of(std::vector<std::byte> bytes, size_t at, Value value, Read rea
   return result ? ErrorCode::Internal : result.error().code;
 }
 
+// What hair does to hair is part of the step: the decoder makes the same volume of what it has decoded.
+TEST(StepCodec, ForcesBetweenStrandsArePredicted) {
+  for (const std::string& solver : kSolvers) {
+    SCOPED_TRACE(solver);
+    SceneDesc scene = stepped_scene(600, kVertices, solver);
+    scene.volume.friction_per_s = 20.0;
+    scene.volume.repulsion_per_s2 = 18000.0;
+    scene.volume.target_per_s2 = 500.0;
+    scene.volume.wind_width_m = 0.002;
+    scene.volume.resolution = 16;
+    SteppedHair hair(scene);
+    hair.settle(40);
+    const std::vector<SteppedState> states = recorded(hair, 40);
+    Stream stream(hair);
+    size_t told = 0;
+    for (const SteppedState& state : states) {
+      stream.pass(state);
+      if (!is_keyframe(*stream.frame)) told += stream.bytes();
+    }
+    EXPECT_EQ(stream.keyframes, 1);
+    // The same strands with a model that says nothing of it.
+    const auto silent = std::make_shared<StepModel>(*states.front().snapshot.trail->model);
+    silent->volume = {};
+    Stream other(hair);
+    size_t untold = 0;
+    for (SteppedState state : states) {
+      auto trail = std::make_shared<StepTrail>(*state.snapshot.trail);
+      trail->model = silent;
+      state.snapshot.trail = trail;
+      other.pass(state);
+      if (!is_keyframe(*other.frame)) untold += other.bytes();
+    }
+    EXPECT_LT(told, untold / 2) << told << " and " << untold << " bytes";
+    std::set<std::vector<std::vector<std::byte>>> all;
+    const std::vector<SteppedState> some(states.begin(), states.begin() + 6);
+    for (const simd::InstructionSet set : simd::instruction_sets())
+      for (const uint32_t threads : {1u, 3u}) all.insert(messages_of(hair, some, *own_workers(threads), set));
+    EXPECT_EQ(all.size(), 1u) << "sets and threads";
+  }
+}
+
 // Layout in proto/WIRE.md.
 TEST(StepWire, RefusesWhatNoStepCanBe) {
   const double kNoNumber = std::nan("");
@@ -489,6 +530,23 @@ TEST(StepWire, RefusesWhatNoStepCanBe) {
   std::vector<std::byte> rounds;
   step::write_model(many, hair.rest_in_head_m(), kStrands, rounds);
   EXPECT_EQ(code_of(rounds, 0, rounds[0], read_model), ErrorCode::LimitExceeded);
+
+  StepModel with_volume = *trail.model;
+  with_volume.volume.friction_per_s = 20.0;
+  std::vector<std::byte> volume;
+  step::write_model(with_volume, hair.rest_in_head_m(), kStrands, volume);
+  ByteReader good_volume(volume);
+  const auto with_volume_read = read_model(good_volume);
+  ASSERT_TRUE(with_volume_read);
+  EXPECT_EQ(with_volume_read->volume, with_volume.volume);
+  for (const uint8_t resolution : {7, 65})
+    EXPECT_EQ(code_of(volume, volume.size() - 3, resolution, read_model), ErrorCode::LimitExceeded);
+  EXPECT_EQ(code_of(volume, volume.size() - 2, uint8_t{4}, read_model), ErrorCode::LimitExceeded);
+  EXPECT_EQ(code_of(volume, volume.size() - 3 - 5 * sizeof(double), kNoNumber, read_model),
+            ErrorCode::BadInput);
+  EXPECT_EQ(code_of(volume, volume.size() - 3 - 5 * sizeof(double), -1.0, read_model), ErrorCode::BadInput);
+  volume.resize(volume.size() - 1);
+  EXPECT_EQ(code_of(volume, 0, volume[0], read_model), ErrorCode::BadInput);
 
   std::vector<std::byte> scene;
   step::write_scene(*trail.scene, scene);

@@ -105,7 +105,54 @@ Status Predictor::prepare() {
     if (role != PlaneRole::RodAxis || has_twist) at(state_.planes, role) = make(vertex_count);
   fill_rest();
   fill_fixed();
+  return tells_volume(model_) ? prepare_volume(set) : Status{};
+}
+
+/// Places without a strand have no hair.
+Status Predictor::prepare_volume(simd::InstructionSet set) {
+  const StrandBlocks& rest = *fixed_[static_cast<size_t>(PlaneRole::Rest)];
+  std::vector<glm::vec4> rest_in_head_m(size_t{places_} * model_.vertex_count);
+  std::vector<float> hairs(places_);
+  for (uint32_t place = 0; place < places_; ++place) {
+    hairs[place] = ground_.layout.strand_at[place] == kNoStrand ? 0.0f : 1.0f;
+    for (uint32_t v = 0; v < model_.vertex_count; ++v)
+      for (uint32_t axis = 0; axis < 4; ++axis)
+        rest_in_head_m[size_t{v} * places_ + place][static_cast<int>(axis)] =
+            rest.row(place / kBlockStrands, v, axis)[place % kBlockStrands];
+  }
+  const VolumeStrands strands{places_, model_.vertex_count, rest_in_head_m, hairs};
+  VolumeOptions options;
+  options.workers = &ground_.workers;
+  options.priority = Priority::Encoding;
+  options.set = ground_.set;
+  ASSIGN_OR_RETURN(volume_, VolumeLaw::make(strands, model_.volume, options));
+  const KernelDesc desc = volume_->kernel(kernel_.carries_way);
+  const LaneKernel* kernel = find_lane_kernel(desc, set);
+  if (kernel == nullptr)
+    return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
+                      desc.shader_path);
+  volume_program_.emplace(
+      *kernel, desc,
+      LaneWork{places_, model_.vertex_count, false, true, &ground_.workers, Priority::Encoding});
+  volume_table_.resize(volume_->most_elements());
+  const std::vector<glm::vec4>& density = volume_->rest_density();
+  auto blocks = std::make_unique<StrandBlocks>(places_, static_cast<uint32_t>(density.size() / places_));
+  pack_blocks(std::span<const glm::vec4>(density), *blocks);
+  fixed_[static_cast<size_t>(PlaneRole::RestDensity)] = std::move(blocks);
+  volume_->forget_rest_density();
   return {};
+}
+
+void Predictor::run_volume(const StepInput& input, const StepBlock& block, const LanePlanes& planes) {
+  if (input.begins_step) {
+    const auto view = [&](PlaneRole role) { return planes[static_cast<size_t>(role)]->view(); };
+    const PlaneRole motion = kernel_.carries_way ? PlaneRole::Displacement : PlaneRole::Velocity;
+    volume_->fill(block, {view(PlaneRole::Position), view(motion), kernel_.carries_way}, volume_table_);
+  }
+  LaneTables tables{};
+  tables[static_cast<size_t>(TableRole::Volume)] = {&volume_table_.data()->x,
+                                                    static_cast<uint32_t>(volume_table_.size())};
+  volume_program_->run(block, 0, planes, tables);
 }
 
 StrandBlocks* Predictor::moving(PlaneRole role) const {
@@ -231,6 +278,7 @@ void Predictor::run(const StepInput& input) {
   LanePlanes planes{};
   for (size_t role = 0; role < kPlaneRoleCount; ++role)
     planes[role] = fixed_[role] ? fixed_[role].get() : state_.planes[role].get();
+  if (volume_) run_volume(input, block, planes);
   program_->run(block, input.colliders.size(), planes);
   if (has_follicle_limit(input) && model_.pinned_tail_count == 0 &&
       model_.pinned_root_count < model_.vertex_count) {

@@ -14,6 +14,7 @@
 #include "common/kernels/head_path.h"
 #include "common/kernels/lane_program.h"
 #include "common/kernels/step_model.h"
+#include "common/kernels/volume/volume_law.h"
 #include "common/strands/byte_io.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
@@ -88,6 +89,8 @@ class Predictor {
   Status prepare();
   void fill_rest();
   void fill_fixed();
+  Status prepare_volume(simd::InstructionSet set);
+  void run_volume(const StepInput& input, const StepBlock& block, const LanePlanes& planes);
   void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
   void find_axes(StrandBlocks& axes) const;
   void turn(const glm::dquat& by);
@@ -128,6 +131,10 @@ class Predictor {
   float history_s_ = 0.0f;  // last substep of strands that remember it
   std::optional<LaneProgram> program_;
   std::optional<LaneProgram> follicle_program_;
+  // Where the model tells of a volume.
+  std::unique_ptr<VolumeLaw> volume_;
+  std::vector<glm::vec4> volume_table_;
+  std::optional<LaneProgram> volume_program_;
 };
 
 }  // namespace strandcast::step

@@ -21,6 +21,10 @@ constexpr float kDirectionStep = 1.0f / 8192.0f;  // of what a rod is told besid
 constexpr uint32_t kDroppedBits = 12;             // of a stiffness
 constexpr float kMostStiffness = 1e12f;
 constexpr double kLargest = 1e20;  // of parameters and constants
+constexpr uint8_t kVolume = 0x80;  // beside a kernel's number
+constexpr double kMostVolumeRate = 1e6;
+constexpr double kMostWindWidthM = 1.0;
+constexpr double kMostDensityScale = 100.0;
 constexpr uint8_t kWaves = 1;
 constexpr uint8_t kCarried = 2;
 constexpr uint8_t kCarriedElsewhere = 4;  // not to where the tick ends
@@ -208,13 +212,40 @@ Pose take_near(const Pose& near, Numbers& from) {
   return {near.position_m + glm::dvec3(moved), limited_rotation(glm::dquat(w, axis.x, axis.y, axis.z))};
 }
 
+void write_volume(const VolumeDesc& volume, ByteWriter& to) {
+  for (const double value : {volume.friction_per_s, volume.repulsion_per_s2, volume.target_per_s2,
+                             volume.wind_width_m, volume.rest_density_scale})
+    to.put(value);
+  to.put(static_cast<uint8_t>(volume.resolution));
+  to.put(static_cast<uint8_t>(volume.smoothing));
+  to.put(static_cast<uint8_t>(volume.is_implicit()));
+}
+Result<VolumeDesc> read_volume(ByteReader& bytes) {
+  Numbers from{bytes};
+  VolumeDesc volume;
+  for (double* value : {&volume.friction_per_s, &volume.repulsion_per_s2, &volume.target_per_s2})
+    from.are_usable &= (*value = from.take<double>(kMostVolumeRate)) >= 0.0;
+  from.are_usable &= (volume.wind_width_m = from.take<double>(kMostWindWidthM)) >= 0.0;
+  from.are_usable &= (volume.rest_density_scale = from.take<double>(kMostDensityScale)) > 0.0;
+  volume.resolution = bytes.take<uint8_t>();
+  volume.smoothing = bytes.take<uint8_t>();
+  volume.integration = bytes.take<uint8_t>() != 0 ? "implicit" : "explicit";
+  RETURN_IF_ERROR(from.status("the volume"));
+  if (volume.resolution < kMinVolumeResolution || volume.resolution > kMostToldResolution ||
+      volume.smoothing > kMaxVolumeSmoothing || !volume.acts())
+    return make_error(ErrorCode::LimitExceeded,
+                      "a step's volume has {} cells and {} smoothings, or does nothing", volume.resolution,
+                      volume.smoothing);
+  return volume;
+}
+
 }  // namespace
 
 void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
                  std::vector<std::byte>& bytes) {
   ByteWriter to(bytes);
   const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
-  to.put(kernel->number);
+  to.put(static_cast<uint8_t>(kernel->number | (tells_volume(model) ? kVolume : 0)));
   to.put(static_cast<uint8_t>(model.kernel.variant_of("HAS_TWIST")));
   to.put(static_cast<uint8_t>(model.pinned_root_count));
   to.put(static_cast<uint8_t>(model.pinned_tail_count));
@@ -226,6 +257,7 @@ void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head
     to.put(static_cast<uint8_t>(value.index()));
     std::visit([&](auto number) { to.put(number); }, value);
   }
+  if (tells_volume(model)) write_volume(model.volume, to);
   if (!kernel->fixed.empty()) write_rods(model, rest_in_head_m, strand_count, bytes);
 }
 
@@ -235,7 +267,8 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
   if (rest_in_head_m.size() != size_t{strand_count} * vertex_count)
     return make_error(ErrorCode::Unsupported, "strands without a rest shape cannot be predicted by a step");
   StepModel model;
-  const auto number = bytes.take<uint8_t>();
+  const auto first = bytes.take<uint8_t>();
+  const auto number = static_cast<uint8_t>(first & ~kVolume);
   const StepKernel* kernel = find_step_kernel(number);
   if (kernel == nullptr)
     return make_error(ErrorCode::Unsupported, "a step of kernel {}, which this build does not know", number);
@@ -254,16 +287,30 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
   if (kernel->has_twist_variant) model.kernel.variant["HAS_TWIST"] = has_twist ? 1 : 0;
   model.kernel.scratch_rows = kernel->scratch_rows[has_twist ? 1 : 0];
   RETURN_IF_ERROR(from.status("the model"));
+  if ((first & kVolume) != 0) {
+    ASSIGN_OR_RETURN(model.volume, read_volume(bytes));
+  }
   if (!kernel->fixed.empty()) RETURN_IF_ERROR(read_rods(bytes, rest_in_head_m, model));
   return model;
 }
+
+// What a volume takes, in rounds of a vertex.
+constexpr uint64_t kRoundsPerSample = 8;
+constexpr uint64_t kRoundsPerCell = 2;
 
 uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t tick_count) {
   uint64_t rounds = 1;
   for (const auto& [name, value] : model.kernel.constants)
     if (const auto* count = std::get_if<uint32_t>(&value); count != nullptr && *count <= kMostRounds)
       rounds += *count;
-  return rounds * scene.substeps * tick_count * model.strand_count * model.vertex_count;
+  const uint64_t vertices = uint64_t{model.strand_count} * model.vertex_count;
+  uint64_t of_volume = 0;
+  if (tells_volume(model)) {
+    const uint64_t cells =
+        uint64_t{model.volume.resolution} * model.volume.resolution * model.volume.resolution;
+    of_volume = kRoundsPerSample * vertices + kRoundsPerCell * cells + 2 * scene.substeps * vertices;
+  }
+  return tick_count * (rounds * scene.substeps * vertices + of_volume);
 }
 
 void write_scene(const StepScene& scene, std::vector<std::byte>& bytes) {

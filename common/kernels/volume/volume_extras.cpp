@@ -1,10 +1,10 @@
-#include "server/sim/volume/volume_extras.h"
+#include "common/kernels/volume/volume_extras.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
-#include "server/sim/volume/volume_smooth.h"
+#include "common/kernels/volume/volume_smooth.h"
 
 namespace strandcast {
 namespace {
@@ -12,8 +12,8 @@ namespace {
 constexpr size_t kLayerGrain = 4;
 
 template <class Work>
-void for_layers(WorkerPool& workers, const VolumeGrid& grid, const Work& work) {
-  workers.for_ranges(grid.nodes.z, kLayerGrain, [&](size_t begin, size_t end) {
+void for_layers(const WorkerPool::Terms& terms, const VolumeGrid& grid, const Work& work) {
+  terms.for_ranges(grid.nodes.z, kLayerGrain, [&](size_t begin, size_t end) {
     work(static_cast<uint32_t>(begin), static_cast<uint32_t>(end));
   });
 }
@@ -31,7 +31,7 @@ void VolumeExtras::update(const VolumeGrid& grid, std::span<const glm::vec4> nod
                           std::span<glm::vec4> extras) {
   CHECK(extras.size() >= grid.size() && nodes.size() >= grid.size());
   if (target != nullptr) find_excess(grid, nodes, *target, extras);
-  for_layers(*workers_, grid, [&](uint32_t begin, uint32_t end) {
+  for_layers(terms(), grid, [&](uint32_t begin, uint32_t end) {
     const size_t layer = grid.layer_size();
     for (size_t i = begin * layer; i < end * layer; ++i)
       extras[i] = glm::vec4(target != nullptr ? extras[i].x : 0.0f, 1.0f, 0.0f, 0.0f);
@@ -48,7 +48,7 @@ void VolumeExtras::find_excess(const VolumeGrid& grid, std::span<const glm::vec4
   CHECK(target.grid.cell_m == grid.cell_m);
   const glm::ivec3 shift = grid.first - target.grid.first;
   const glm::ivec3 target_nodes(target.grid.nodes);
-  for_layers(*workers_, grid, [&](uint32_t begin, uint32_t end) {
+  for_layers(terms(), grid, [&](uint32_t begin, uint32_t end) {
     for (uint32_t z = begin; z < end; ++z)
       for (uint32_t y = 0; y < grid.nodes.y; ++y) {
         const size_t row = grid.index(0, y, z);
@@ -68,7 +68,7 @@ void VolumeExtras::find_excess(const VolumeGrid& grid, std::span<const glm::vec4
       }
   });
   const auto pass = [&](auto kernel, const glm::vec4* from, glm::vec4* to) {
-    for_layers(*workers_, grid, [&](uint32_t begin, uint32_t end) {
+    for_layers(terms(), grid, [&](uint32_t begin, uint32_t end) {
       VolumeSmooth work;
       work.nodes = grid.nodes;
       work.from = from;
@@ -114,22 +114,33 @@ void VolumeExtras::sweep(const VolumeGrid& grid, std::span<const glm::vec4> node
   for (int step = 1; step < size[main]; ++step) {
     const int layer = is_forward ? step : size[main] - 1 - step;
     const int before = is_forward ? layer - 1 : layer + 1;
-    workers_->for_ranges(static_cast<size_t>(size[v]), kRowGrain, [&](size_t begin, size_t end) {
+    terms().for_ranges(static_cast<size_t>(size[v]), kRowGrain, [&](size_t begin, size_t end) {
       for (auto at_v = static_cast<int>(begin); at_v < static_cast<int>(end); ++at_v)
-        for (int at_u = 0; at_u < size[u]; ++at_u) {
-          float left = 0.0f;
-          float density = 0.0f;
-          for (int corner = 0; corner < 4; ++corner) {
-            const int from_u = at_u + floor_u + (corner & 1);
-            const int from_v = at_v + floor_v + (corner >> 1);
-            // Beside the grid is no hair.
-            const bool is_in = from_u >= 0 && from_v >= 0 && from_u < size[u] && from_v < size[v];
-            const int from = before * stride[main] + from_u * stride[u] + from_v * stride[v];
-            left += weight[corner] * (is_in ? extras[static_cast<size_t>(from)].y : 1.0f);
-            density += weight[corner] * (is_in ? nodes[static_cast<size_t>(from)].w : 0.0f);
+        for (int first_u = 0; first_u < size[u]; first_u += static_cast<int>(simd::kLanes)) {
+          float lefts[simd::kLanes] = {};
+          float depths[simd::kLanes] = {};
+          const int last_u = std::min(first_u + static_cast<int>(simd::kLanes), size[u]);
+          for (int at_u = first_u; at_u < last_u; ++at_u) {
+            float left = 0.0f;
+            float density = 0.0f;
+            for (int corner = 0; corner < 4; ++corner) {
+              const int from_u = at_u + floor_u + (corner & 1);
+              const int from_v = at_v + floor_v + (corner >> 1);
+              // Beside the grid is no hair.
+              const bool is_in = from_u >= 0 && from_v >= 0 && from_u < size[u] && from_v < size[v];
+              const int from = before * stride[main] + from_u * stride[u] + from_v * stride[v];
+              left += weight[corner] * (is_in ? extras[static_cast<size_t>(from)].y : 1.0f);
+              density += weight[corner] * (is_in ? nodes[static_cast<size_t>(from)].w : 0.0f);
+            }
+            const auto to = static_cast<size_t>(layer * stride[main] + at_u * stride[u] + at_v * stride[v]);
+            lefts[at_u - first_u] = left;
+            depths[at_u - first_u] = -0.5f * depth * (density + nodes[to].w);
           }
-          const auto to = static_cast<size_t>(layer * stride[main] + at_u * stride[u] + at_v * stride[v]);
-          extras[to].y = left * std::exp(-0.5f * depth * (density + nodes[to].w));
+          // The project's own function: a library's differs from machine to machine.
+          simd::store_lanes(simd::load_lanes(lefts) * simd::exp(simd::load_lanes(depths)), lefts);
+          for (int at_u = first_u; at_u < last_u; ++at_u)
+            extras[static_cast<size_t>(layer * stride[main] + at_u * stride[u] + at_v * stride[v])].y =
+                lefts[at_u - first_u];
         }
     });
   }

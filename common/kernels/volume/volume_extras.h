@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "server/sim/volume/hair_volume.h"
+#include "common/kernels/volume/hair_volume.h"
 
 namespace strandcast {
 
@@ -38,6 +38,7 @@ class VolumeExtras {
   uint64_t size_bytes() const { return other_.size() * sizeof(glm::vec4) + 2 * rows_.size(); }
 
  private:
+  WorkerPool::Terms terms() const { return workers_->at(options_.priority); }
   void find_excess(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const TargetDensity& target,
                    std::span<glm::vec4> extras);
   void sweep(const VolumeGrid& grid, std::span<const glm::vec4> nodes, const WindShadow& shadow,

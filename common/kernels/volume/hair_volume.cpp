@@ -1,11 +1,11 @@
-#include "server/sim/volume/hair_volume.h"
+#include "common/kernels/volume/hair_volume.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "common/base/check.h"
-#include "server/sim/volume/volume_smooth.h"
+#include "common/kernels/volume/volume_smooth.h"
 
 namespace strandcast {
 namespace {
@@ -24,11 +24,12 @@ int32_t floor_cell(float cells) {
 
 /// Hair that a sample's vertex stands for: half of the segments at either side of it, or, where segments are
 /// sampled, the segment before it.
-float sample_length_m(const StrandLayout& layout, uint32_t vertex, uint32_t strand, uint32_t samples) {
-  const float before = vertex == 0 ? 0.0f : layout.rest[layout.index(vertex, strand)].w;
+float sample_length_m(const VolumeStrands& strands, uint32_t vertex, uint32_t strand, uint32_t samples) {
+  const glm::vec4* const at = strands.rest_in_head_m.data() + size_t{vertex} * strands.strand_count + strand;
+  const float before = vertex == 0 ? 0.0f : at->w;
   if (samples > 1) return before;
-  const bool is_last = vertex + 1 == layout.vertex_count;
-  return 0.5f * (before + (is_last ? 0.0f : layout.rest[layout.index(vertex + 1, strand)].w));
+  const bool is_last = vertex + 1 == strands.vertex_count;
+  return 0.5f * (before + (is_last ? 0.0f : at[strands.strand_count].w));
 }
 
 Status check_options(const VolumeOptions& options) {
@@ -43,14 +44,14 @@ Status check_options(const VolumeOptions& options) {
 
 }  // namespace
 
-Result<HairVolume> HairVolume::make(const StrandLayout& layout, std::span<const float> hairs,
-                                    const VolumeOptions& options) {
+Result<HairVolume> HairVolume::make(const VolumeStrands& strands, const VolumeOptions& options) {
   RETURN_IF_ERROR(check_options(options));
-  CHECK(hairs.empty() || hairs.size() == layout.strand_count);
-  glm::vec3 low(layout.rest.front());
+  CHECK(strands.rest_in_head_m.size() == size_t{strands.strand_count} * strands.vertex_count);
+  CHECK(strands.hairs.empty() || strands.hairs.size() == strands.strand_count);
+  glm::vec3 low(strands.rest_in_head_m.front());
   glm::vec3 high = low;
   float longest_m = 0.0f;
-  for (const glm::vec4& vertex : layout.rest) {
+  for (const glm::vec4& vertex : strands.rest_in_head_m) {
     low = glm::min(low, glm::vec3(vertex));
     high = glm::max(high, glm::vec3(vertex));
     longest_m = std::max(longest_m, vertex.w);
@@ -79,19 +80,17 @@ Result<HairVolume> HairVolume::make(const StrandLayout& layout, std::span<const 
   volume.most_nodes_ = kRoom * side * side * side;
   volume.samples_ = std::clamp(static_cast<uint32_t>(std::ceil(longest_m / cell_m)), 1u, kMaxSegmentSamples);
 
-  const uint32_t blocks = block_count(layout.strand_count);
-  volume.length_m_.assign(size_t{blocks} * layout.vertex_count * kBlockStrands, 0.0f);
-  for (uint32_t strand = 0; strand < layout.strand_count; ++strand)
-    for (uint32_t vertex = 0; vertex < layout.vertex_count; ++vertex) {
-      const size_t row = size_t{strand / kBlockStrands} * layout.vertex_count + vertex;
-      const float length_m =
-          (hairs.empty() ? 1.0f : hairs[strand]) * sample_length_m(layout, vertex, strand, volume.samples_);
+  const uint32_t blocks = block_count(strands.strand_count);
+  volume.length_m_.assign(size_t{blocks} * strands.vertex_count * kBlockStrands, 0.0f);
+  for (uint32_t strand = 0; strand < strands.strand_count; ++strand)
+    for (uint32_t vertex = 0; vertex < strands.vertex_count; ++vertex) {
+      const size_t row = size_t{strand / kBlockStrands} * strands.vertex_count + vertex;
+      const float length_m = (strands.hairs.empty() ? 1.0f : strands.hairs[strand]) *
+                             sample_length_m(strands, vertex, strand, volume.samples_);
       volume.length_m_[row * kBlockStrands + strand % kBlockStrands] = length_m;
       volume.total_length_m_ += static_cast<double>(length_m);
+      if (length_m > 0.0f) volume.sample_count_ += volume.samples_;
     }
-  const size_t samples_of_strand =
-      volume.samples_ == 1 ? layout.vertex_count : (layout.vertex_count - 1) * size_t{volume.samples_};
-  volume.sample_count_ = samples_of_strand * layout.strand_count;
   volume.records_.resize(volume.sample_count_);
   volume.layer_begin_.resize(kMaxLayers + 1);
   volume.shares_.resize(std::min(kShares, blocks));
@@ -119,7 +118,7 @@ void HairVolume::update(const VolumeInput& input, std::span<glm::vec4> nodes) {
   scatter.head_velocity_mps = input.head_velocity_mps;
   scatter.ahead_s = input.ahead_s;
   const auto for_shares = [&](const auto& work) {
-    workers_->for_ranges(shares_.size(), 1, [&](size_t begin, size_t end) {
+    workers_->at(options_.priority).for_ranges(shares_.size(), 1, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         VolumeScatter share = scatter;
         share.counts = share.places = shares_[i].places.data();
@@ -234,7 +233,7 @@ void HairVolume::sum_layers(const Field& sums) {
       scratch.layers.resize(std::max(scratch.layers.size(), 2 * layer_size * 4));
       scratch.rows.resize(std::max(scratch.rows.size(), 2 * size_t{grid_.nodes.y}));
     }
-  const auto terms = workers_->at(Priority::Simulation, static_cast<uint32_t>(scratch_.size()));
+  const auto terms = workers_->at(options_.priority, static_cast<uint32_t>(scratch_.size()));
   terms.for_ranges(slabs_.size(), 1, [&](size_t first, size_t last, uint32_t worker) {
     for (size_t i = first; i < last; ++i) {
       Slab& slab = slabs_[i];
@@ -283,7 +282,7 @@ void HairVolume::add_last_layers(const Field& sums) {
 template <class Work>
 void HairVolume::for_layers(const Work& work) {
   constexpr size_t kGrain = 4;
-  workers_->for_ranges(grid_.nodes.z, kGrain, [&](size_t begin, size_t end) {
+  workers_->at(options_.priority).for_ranges(grid_.nodes.z, kGrain, [&](size_t begin, size_t end) {
     work(static_cast<uint32_t>(begin), static_cast<uint32_t>(end));
   });
 }

@@ -1,4 +1,4 @@
-#include "server/sim/volume/volume_scatter.h"
+#include "common/kernels/volume/volume_scatter.h"
 
 #include <cstring>
 
@@ -51,11 +51,11 @@ STRANDCAST_LANES vec3 between(const vec3& a, const vec3& b, float share) {
   return {simd::mix(a.x, b.x, share), simd::mix(a.y, b.y, share), simd::mix(a.z, b.z, share)};
 }
 
-/// The layer that a sample is in, from 0; -1 where it is too far away along some axis, or no number.
-STRANDCAST_LANES IntBits layer_of(const Sample& sample, const Float& below) {
+/// The layer that a sample is in, from 0; -1 where it is too far away along some axis, no number, or no hair.
+STRANDCAST_LANES IntBits layer_of(const Sample& sample, const Float& below, const Float& length) {
   const Float reach = kVolumeReachCells;
-  const Bool is_near = simd::abs(sample.cells.x) < reach && simd::abs(sample.cells.y) < reach &&
-                       simd::abs(sample.cells.z) < reach;
+  const Bool is_near = length > 0.0f && simd::abs(sample.cells.x) < reach &&
+                       simd::abs(sample.cells.y) < reach && simd::abs(sample.cells.z) < reach;
   const Float layer = simd::select(is_near, below + static_cast<float>(kMaxLayers / 2), Float(-1.0f));
   return simd::to_integers(layer);
 }
@@ -102,19 +102,20 @@ STRANDCAST_LANES void count_records_lanes(const VolumeScatterRange& range) {
   vec3 low = vec3(Float(kFar));
   vec3 high = vec3(Float(-kFar));
   const Float number = simd::lane_numbers();
-  for_each_sample(range, [&](const Sample& sample, const float*, uint32_t used) STRANDCAST_LANES_LAMBDA {
-    const Float below = simd::floor(sample.cells.z);
-    const IntBits layer = layer_of(sample, below);
-    const Bool is_there =
-        number < static_cast<float>(used) && simd::Float(__builtin_convertvector(layer, FloatBits)) >= 0.0f;
-    widen(sample.cells.x, is_there, low.x, high.x);
-    widen(sample.cells.y, is_there, low.y, high.y);
-    widen(sample.cells.z, is_there, low.z, high.z);
-    int32_t layers[kLanes];
-    std::memcpy(layers, &layer, sizeof layers);
-    for (uint32_t i = 0; i < used; ++i)
-      if (layers[i] >= 0) ++work.counts[layers[i]];
-  });
+  for_each_sample(range,
+                  [&](const Sample& sample, const float* length, uint32_t used) STRANDCAST_LANES_LAMBDA {
+                    const Float below = simd::floor(sample.cells.z);
+                    const IntBits layer = layer_of(sample, below, simd::load_lanes(length));
+                    const Bool is_there = number < static_cast<float>(used) &&
+                                          simd::Float(__builtin_convertvector(layer, FloatBits)) >= 0.0f;
+                    widen(sample.cells.x, is_there, low.x, high.x);
+                    widen(sample.cells.y, is_there, low.y, high.y);
+                    widen(sample.cells.z, is_there, low.z, high.z);
+                    int32_t layers[kLanes];
+                    std::memcpy(layers, &layer, sizeof layers);
+                    for (uint32_t i = 0; i < used; ++i)
+                      if (layers[i] >= 0) ++work.counts[layers[i]];
+                  });
   for (size_t axis = 0; axis < 3; ++axis) {
     float lows[kLanes];
     float highs[kLanes];
@@ -132,25 +133,25 @@ STRANDCAST_LANES void place_records_lanes(const VolumeScatterRange& range) {
   const Float share = 1.0f / static_cast<float>(work.samples);
   const vec3 first = {static_cast<float>(work.first.x), static_cast<float>(work.first.y),
                       static_cast<float>(work.first.z)};
-  for_each_sample(range,
-                  [&](const Sample& sample, const float* length, uint32_t used) STRANDCAST_LANES_LAMBDA {
-                    const IntBits layer = layer_of(sample, simd::floor(sample.cells.z));
-                    float at[7][kLanes];
-                    simd::store_lanes(sample.cells.x - first.x, at[0]);
-                    simd::store_lanes(sample.cells.y - first.y, at[1]);
-                    simd::store_lanes(sample.cells.z - first.z, at[2]);
-                    simd::store_lanes(simd::load_lanes(length) * share, at[3]);
-                    simd::store_lanes(sample.velocity_mps.x, at[4]);
-                    simd::store_lanes(sample.velocity_mps.y, at[5]);
-                    simd::store_lanes(sample.velocity_mps.z, at[6]);
-                    int32_t layers[kLanes];
-                    std::memcpy(layers, &layer, sizeof layers);
-                    for (uint32_t i = 0; i < used; ++i) {
-                      if (layers[i] < 0) continue;
-                      work.records[work.places[layers[i]]++] = {
-                          {at[0][i], at[1][i], at[2][i]}, at[3][i], {at[4][i], at[5][i], at[6][i]}, 0.0f};
-                    }
-                  });
+  for_each_sample(
+      range, [&](const Sample& sample, const float* length, uint32_t used) STRANDCAST_LANES_LAMBDA {
+        const IntBits layer = layer_of(sample, simd::floor(sample.cells.z), simd::load_lanes(length));
+        float at[7][kLanes];
+        simd::store_lanes(sample.cells.x - first.x, at[0]);
+        simd::store_lanes(sample.cells.y - first.y, at[1]);
+        simd::store_lanes(sample.cells.z - first.z, at[2]);
+        simd::store_lanes(simd::load_lanes(length) * share, at[3]);
+        simd::store_lanes(sample.velocity_mps.x, at[4]);
+        simd::store_lanes(sample.velocity_mps.y, at[5]);
+        simd::store_lanes(sample.velocity_mps.z, at[6]);
+        int32_t layers[kLanes];
+        std::memcpy(layers, &layer, sizeof layers);
+        for (uint32_t i = 0; i < used; ++i) {
+          if (layers[i] < 0) continue;
+          work.records[work.places[layers[i]]++] = {
+              {at[0][i], at[1][i], at[2][i]}, at[3][i], {at[4][i], at[5][i], at[6][i]}, 0.0f};
+        }
+      });
 }
 
 STRANDCAST_LANES void add_to(double* node, const Doubles& value, double weight) {

@@ -1,4 +1,4 @@
-#include "server/sim/volume/volume_smooth.h"
+#include "common/kernels/volume/volume_smooth.h"
 
 #include <cstring>
 

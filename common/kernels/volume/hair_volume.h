@@ -12,23 +12,29 @@
 #include "common/base/result.h"
 #include "common/base/worker_pool.h"
 #include "common/kernels/strand_blocks.h"
+#include "common/kernels/volume/volume_desc.h"
+#include "common/kernels/volume/volume_grid.h"
+#include "common/kernels/volume/volume_scatter.h"
 #include "common/simd/variants.h"
-#include "server/sim/strand_layout.h"
-#include "server/sim/volume/volume_grid.h"
-#include "server/sim/volume/volume_scatter.h"
 
 namespace strandcast {
-
-/// Cells along the longest side of the groom's box.
-inline constexpr uint32_t kMinVolumeResolution = 8;
-inline constexpr uint32_t kMaxVolumeResolution = 128;
-inline constexpr uint32_t kMaxVolumeSmoothing = 3;
 
 struct VolumeOptions {
   uint32_t resolution = 32;       // kMinVolumeResolution .. kMaxVolumeResolution
   uint32_t smoothing = 1;         // passes of [1 2 1] / 4 along each axis, 0 .. kMaxVolumeSmoothing
   WorkerPool* workers = nullptr;  // outlives the volume; nullptr: the process's
+  Priority priority = Priority::Simulation;
   simd::InstructionSet set = simd::widest_set();
+};
+
+/// What strands are made of.
+struct VolumeStrands {
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  /// (vertex_count x strand_count), strand fastest; w = length of the segment before a vertex
+  std::span<const glm::vec4> rest_in_head_m;
+  /// Of each strand, how many hairs it stands for, where that is not one; a strand of none is not there.
+  std::span<const float> hairs;
 };
 
 /// Where the strands are, and how they move.
@@ -43,10 +49,8 @@ struct VolumeInput {
 
 class HairVolume {
  public:
-  /// `hairs`: of each strand, how many it stands for; empty = one. BadInput for a groom without extent, and
-  /// for options out of range.
-  static Result<HairVolume> make(const StrandLayout& layout, std::span<const float> hairs,
-                                 const VolumeOptions& options);
+  /// BadInput for a groom without extent or too far away, and for options out of range.
+  static Result<HairVolume> make(const VolumeStrands& strands, const VolumeOptions& options);
 
   /// Fills `nodes` with mean velocity (world axes, relative to the head joint, m/s) and density (m/m^3), as
   /// many as grid() then says; the caller has room for most_nodes().
