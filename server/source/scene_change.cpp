@@ -6,6 +6,7 @@
 
 #include "common/scene/scene_file.h"
 #include "server/sim/solver_registry.h"
+#include "server/source/wet_hair.h"
 
 namespace strandcast {
 
@@ -21,7 +22,7 @@ const std::vector<std::string>& live_fields() {
 
 Status check_solver(const SceneDesc& scene) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
-  const Result<SolverParameters> parameters = complete_parameters(*row, scene.solver.parameters);
+  const Result<SolverParameters> parameters = moving_parameters(*row, scene);
   if (!parameters) return parameters.error();
   if (analyse(scene, {}).has_volume && !(row->has_kernel && row->bears_volume))
     return make_error(ErrorCode::BadInput,
@@ -36,7 +37,7 @@ Result<std::vector<std::string>> prepare_solver(const SceneDesc& scene, const Gr
                                                 const glm::dvec3& groom_gravity_in_head_mps2,
                                                 const std::stop_token& stop) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
-  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
+  ASSIGN_OR_RETURN(const SolverParameters parameters, moving_parameters(*row, scene));
   if (!row->prepare) return std::vector<std::string>{};
   return row->prepare(groom, parameters, groom_gravity_in_head_mps2, stop);
 }

@@ -12,6 +12,7 @@
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/source/scene_change.h"
+#include "server/source/wet_hair.h"
 
 namespace strandcast {
 namespace {
@@ -183,7 +184,7 @@ bool SimLoop::starts_to_prepare(const Job& job) {
   const auto* parameter = std::get_if<SetParameter>(&job.what);
   if (parameter == nullptr || job.is_prepared) return false;
   const Result<SceneDesc> scene = change_scene(config_.scene, parameter->assignment);
-  if (!scene || scene->solver == config_.scene.solver) return false;
+  if (!scene || !moves_otherwise(*scene, config_.scene)) return false;
   const Result<const SolverRow*> row = find_solver(scene->solver.name);
   if (!row || !(*row)->prepare) return false;
   {
@@ -268,9 +269,7 @@ Notice SimLoop::change(const std::string& assignment) {
   const Result<SceneDesc> scene = change_scene(config_.scene, assignment);
   if (!scene) return {true, scene.error().to_string()};
   const SceneFeatures features = analyse(*scene, facts_);
-  const bool is_other_solver = scene->solver.name != config_.scene.solver.name ||
-                               scene->solver.parameters != config_.scene.solver.parameters ||
-                               scene->volume != config_.scene.volume;
+  const bool is_other_solver = moves_otherwise(*scene, config_.scene);
   if (is_other_solver || !needs_same_solver(features, solver_features_))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
@@ -323,13 +322,14 @@ void SimLoop::follow_look() {
 /// Builds the scene's solver; strands keep their state.
 Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& features) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
-  ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
+  ASSIGN_OR_RETURN(const SolverParameters parameters, moving_parameters(*row, scene));
   const bool are_kept = solver_ != nullptr && solver_->strands() != nullptr;
   const auto strands = are_kept ? strands_ : std::make_shared<StrandState>(*executor_);
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
+  const double wetness = scene.look.shading.wetness;
   const SolverContext context = {executor_.get(), features,      KernelForm::Auto,
-                                 strands,         groom_gravity, scene.volume};
+                                 strands,         groom_gravity, wet_volume(scene.volume, wetness)};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;
