@@ -86,4 +86,32 @@ std::string to_sentence(const HeadMeasure& measure, size_t sphere_count) {
       measure.sphere_median_m * kMmPerM, measure.sphere_most_m * kMmPerM, measure.deepest_vertex_m * kMmPerM);
 }
 
+HairInside measure_inside(const DistanceField& field, const Groom& groom) {
+  HairInside inside;
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const size_t before = inside.vertex_count;
+    for (uint32_t i = groom.offset[strand]; i < groom.offset[strand + 1]; ++i) {
+      if (groom.pinned[i] != 0) continue;
+      const double distance_m = field.sample(groom.rest_position_m[i]).distance_m;
+      if (distance_m >= 0.0) continue;
+      ++inside.vertex_count;
+      inside.deepest_m = std::max(inside.deepest_m, -distance_m);
+    }
+    if (inside.vertex_count > before) ++inside.strand_count;
+  }
+  return inside;
+}
+
+std::string to_sentence(const HairInside& inside, const DistanceField& field) {
+  constexpr double kMmPerM = 1e3;
+  const glm::uvec3& nodes = field.node_count;
+  const std::string size =
+      fmt::format("the head collides as a distance field of {} x {} x {} nodes, {:.1f} mm apart", nodes.x,
+                  nodes.y, nodes.z, static_cast<double>(field.cell_m) * kMmPerM);
+  if (inside.vertex_count == 0) return size + "; no free vertex of the hair as loaded is inside of it";
+  return fmt::format(
+      "{}; {} free vertices of {} strands begin inside of it, at most {:.1f} mm deep, and stay there", size,
+      inside.vertex_count, inside.strand_count, inside.deepest_m * kMmPerM);
+}
+
 }  // namespace strandcast

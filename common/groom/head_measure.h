@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/groom/distance_field.h"
 #include "common/groom/groom.h"
 #include "common/groom/mesh.h"
 
@@ -24,5 +25,16 @@ HeadMeasure measure_head(const Mesh& head, const std::vector<FittedSphere>& sphe
 
 /// "half of the roots lie within 1.2 mm of the skin ..."
 std::string to_sentence(const HeadMeasure& measure, size_t sphere_count);
+
+/// What of a groom as loaded lies inside of a head that collides as a field: it stays there.
+struct HairInside {
+  size_t vertex_count = 0;  // free ones
+  size_t strand_count = 0;  // that have such
+  double deepest_m = 0.0;
+};
+HairInside measure_inside(const DistanceField& field, const Groom& groom);
+
+/// "the head collides as a distance field of 55 x 69 x 37 nodes, 7.2 mm apart; 12 free vertices ..."
+std::string to_sentence(const HairInside& inside, const DistanceField& field);
 
 }  // namespace strandcast

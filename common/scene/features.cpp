@@ -27,6 +27,8 @@ Fact decide_turbulence(const SceneDesc& scene, const RuntimeFacts& facts) {
 
 Fact decide_colliders(const SceneDesc& scene, const RuntimeFacts&) {
   if (!scene.colliders.empty()) return {true, "the scene lists colliders"};
+  if (scene.has_auto_collider && scene.head.collider == kFieldCollider)
+    return {false, "the scene lists no colliders, and head.collider is field"};
   if (scene.has_auto_collider) return {true, "has_auto_collider makes the head as it is drawn collide"};
   return {false, "the scene lists no colliders and has_auto_collider is false"};
 }
@@ -36,12 +38,23 @@ Fact decide_follicle_limit(const SceneDesc& scene, const RuntimeFacts&) {
   return {false, "follicle_limit_deg is 180: roots are free"};
 }
 
+Fact decide_bend_limit(const SceneDesc& scene, const RuntimeFacts&) {
+  if (scene.bend_limit.acts()) return {true, "bend_limit leaves less than 0 to 180 degrees"};
+  return {false, "bend_limit leaves 0 to 180 degrees: segments bend freely"};
+}
+
 Fact decide_volume(const SceneDesc& scene, const RuntimeFacts&) {
   if (scene.volume.friction_per_s > 0.0) return {true, "volume.friction_per_s is above zero"};
   if (scene.volume.repulsion_per_s2 > 0.0) return {true, "volume.repulsion_per_s2 is above zero"};
   if (scene.volume.target_per_s2 > 0.0) return {true, "volume.target_per_s2 is above zero"};
   if (scene.volume.wind_width_m > 0.0) return {true, "volume.wind_width_m is above zero"};
   return {false, "volume has no friction, repulsion, target or wind_width: hair passes through hair"};
+}
+
+Fact decide_distance_field(const SceneDesc& scene, const RuntimeFacts&) {
+  if (scene.head.collider != kFieldCollider) return {false, "head.collider is spheres"};
+  if (!scene.has_auto_collider) return {false, "has_auto_collider is false: the head does not collide"};
+  return {true, "head.collider is field"};
 }
 
 Fact decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
@@ -87,7 +100,9 @@ constexpr std::array kFacts{
     FactRow{"has_turbulence", &SceneFeatures::has_turbulence, decide_turbulence},
     FactRow{"has_colliders", &SceneFeatures::has_colliders, decide_colliders},
     FactRow{"has_follicle_limit", &SceneFeatures::has_follicle_limit, decide_follicle_limit},
+    FactRow{"has_bend_limit", &SceneFeatures::has_bend_limit, decide_bend_limit},
     FactRow{"has_volume", &SceneFeatures::has_volume, decide_volume},
+    FactRow{"has_distance_field", &SceneFeatures::has_distance_field, decide_distance_field},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},
     FactRow{"has_frame_viewers", &SceneFeatures::has_frame_viewers, decide_frame_viewers},
 };

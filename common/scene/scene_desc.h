@@ -65,6 +65,19 @@ struct WindDesc {
   bool operator==(const WindDesc&) const = default;
 };
 
+/// Angles from a segment to the next, from the root to the tip. How the groom bends is always allowed.
+struct BendLimitDesc {
+  double least_root_deg = 0.0;
+  double least_tip_deg = 0.0;
+  double most_root_deg = 180.0;
+  double most_tip_deg = 180.0;
+
+  bool acts() const {
+    return least_root_deg > 0.0 || least_tip_deg > 0.0 || most_root_deg < 180.0 || most_tip_deg < 180.0;
+  }
+  bool operator==(const BendLimitDesc&) const = default;
+};
+
 struct SolverDesc {
   std::string name = "dftl";
   std::map<std::string, double> parameters;  // by the names in the solver's table row; missing = its default
@@ -72,13 +85,19 @@ struct SolverDesc {
   bool operator==(const SolverDesc&) const = default;
 };
 
+/// Values of HeadDesc::collider.
+inline constexpr const char* kSphereCollider = "spheres";
+inline constexpr const char* kFieldCollider = "field";
+
 struct HeadDesc {
   std::filesystem::path mesh_path;  // OBJ in the groom's units and axes; empty = built-in head
   std::vector<std::filesystem::path> more_mesh_paths;  // further parts, at most kMaxMeshFiles - 1
   float radius_m = 0.095f;                             // of the built-in cranium; 0 = fitted to the roots
   bool is_visible = true;
-  glm::vec3 center_m{0.0f};  // of the built-in cranium, head space
-  bool has_center = false;   // false: at the head joint, or fitted to the roots of a groom file
+  glm::vec3 center_m{0.0f};                // of the built-in cranium, head space
+  bool has_center = false;                 // false: at the head joint, or fitted to the roots of a groom file
+  std::string collider = kSphereCollider;  // what of it strands meet, drawn or not
+  uint32_t field_resolution = 64;          // of kFieldCollider: cells along the longest side of the mesh
 
   bool operator==(const HeadDesc&) const = default;
 };
@@ -179,6 +198,7 @@ struct SceneDesc {
   std::vector<SphereCollider> colliders;
   bool has_auto_collider = true;  // the head as it is drawn, when `colliders` is empty
   VolumeDesc volume;
+  BendLimitDesc bend_limit;
   WindDesc wind;
   LookDesc look;
   CameraDesc camera;

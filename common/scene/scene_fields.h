@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/base/picture_size.h"
+#include "common/groom/distance_field.h"
 #include "common/groom/procedural.h"
 #include "common/scene/hair_color.h"
 #include "common/scene/scene_desc.h"
@@ -37,12 +38,14 @@ inline constexpr Range kUnit{0.0, 1e3, "m"};
 inline constexpr Range kYaw{-360.0, 360.0, "degrees"};
 inline constexpr Range kFileOrigin{-1e6, 1e6, "file units"};
 inline constexpr Range kHeadRadius{0.0, 1.0, "m"};
+inline constexpr Range kFieldResolution{kMinFieldResolution, kMaxFieldResolution, "cells"};
 inline constexpr Range kSolverParameter{-std::numeric_limits<double>::max(),
                                         std::numeric_limits<double>::max(), ""};
 inline constexpr Range kStepRate{10.0, 1000.0, "Hz"};
 inline constexpr Range kSubsteps{1, 64, ""};
 inline constexpr Range kGravity{-1000.0, 1000.0, "m/s^2"};
 inline constexpr Range kFollicleLimit{1.0, 180.0, "degrees"};  // 180 = free
+inline constexpr Range kBendAngle{0.0, 180.0, "degrees"};
 inline constexpr Range kHairFriction{0.0, 1e4, "1/s"};
 inline constexpr Range kHairRepulsion{0.0, 1e6, "1/s^2"};
 inline constexpr Range kWindWidth{0.0, 1.0, "m"};
@@ -240,6 +243,10 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.paths("more_mesh_paths", scene.head.more_mesh_paths, kMaxMeshFiles - 1);
     v.require("more_mesh_paths", scene.head.more_mesh_paths.empty() || !scene.head.mesh_path.empty(),
               "needs mesh_path, the first of them");
+    v.text("collider", scene.head.collider, kMaxNameBytes);
+    v.require("collider", scene.head.collider == kSphereCollider || scene.head.collider == kFieldCollider,
+              "is unknown (known: field, spheres)");
+    v.number("field_resolution", scene.head.field_resolution, kFieldResolution);
   });
   v.group("solver", [&] {
     v.text("name", scene.solver.name, kMaxNameBytes);
@@ -263,6 +270,15 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
   v.group("camera", [&] { visit_camera(v, scene.camera); });
   v.group("stream", [&] { visit_stream(v, scene.stream); });
   v.number("follicle_limit_deg", scene.follicle_limit_deg, kFollicleLimit);
+  v.group("bend_limit", [&] {
+    BendLimitDesc& limit = scene.bend_limit;
+    v.number("least_root_deg", limit.least_root_deg, kBendAngle);
+    v.number("least_tip_deg", limit.least_tip_deg, kBendAngle);
+    v.number("most_root_deg", limit.most_root_deg, kBendAngle);
+    v.number("most_tip_deg", limit.most_tip_deg, kBendAngle);
+    v.require("most_root_deg", limit.most_root_deg >= limit.least_root_deg, "is less than least_root_deg");
+    v.require("most_tip_deg", limit.most_tip_deg >= limit.least_tip_deg, "is less than least_tip_deg");
+  });
   v.group("volume", [&] {
     v.number("friction_per_s", scene.volume.friction_per_s, kHairFriction);
     v.number("repulsion_per_s2", scene.volume.repulsion_per_s2, kHairRepulsion);

@@ -118,7 +118,9 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   ASSIGN_OR_RETURN(const auto device,
                    RenderDevice::open({config.renderer, config.gl_device, config.shader_folder}));
   // Hair alone, hair on its head, hair on what collides.
-  const std::array<Mesh, 3> heads = {Mesh{}, content.head, balls_of(content.colliders)};
+  const bool is_field = content.head_field != nullptr && content.colliders.empty();
+  const std::array<Mesh, 3> heads = {Mesh{}, content.head,
+                                     is_field ? content.head : balls_of(content.colliders)};
   const Box box = box_of(content, content.head);
   Image sheet{kPictureSide * static_cast<uint32_t>(kDirections.size()),
               kPictureSide * static_cast<uint32_t>(heads.size()),
@@ -130,10 +132,10 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
   for (const std::string& note : content.notes) text += note + "\n";
   const std::filesystem::path picture = folder / "groom.png";
   RETURN_IF_ERROR(save_png(picture, sheet));
-  text += fmt::format(
-      "{}: from the front, from its left side and from above; hair alone, on the head, on the {} spheres "
-      "that collide\n",
-      picture.string(), content.colliders.size());
+  const std::string last = is_field ? "on the head once more, which collides itself"
+                                    : fmt::format("on the {} spheres that collide", content.colliders.size());
+  text += fmt::format("{}: from the front, from its left side and from above; hair alone, on the head, {}\n",
+                      picture.string(), last);
   RETURN_IF_ERROR(save_file(folder / "groom.txt", std::as_bytes(std::span(text))));
   return text;
 }

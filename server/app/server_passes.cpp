@@ -35,8 +35,14 @@ gl::PassReports join_passes(ThreadPasses threads, bool is_watched_as_pictures) {
 
 StageSizes stage_sizes(const SceneDesc& scene, const SceneAsset& asset) {
   const size_t colliders =
-      scene.colliders.empty() && scene.has_auto_collider ? kHeadSpheres : scene.colliders.size();
-  return {asset.strand_count, asset.vertex_count, scene.substeps, static_cast<uint32_t>(colliders)};
+      scene.colliders.empty() && scene.has_auto_collider && scene.head.collider == kSphereCollider
+          ? kHeadSpheres
+          : scene.colliders.size();
+  // About: the box of the mesh is not known before it is loaded.
+  const uint64_t nodes =
+      uint64_t{scene.head.field_resolution} * scene.head.field_resolution * scene.head.field_resolution;
+  return {asset.strand_count, asset.vertex_count, scene.substeps, static_cast<uint32_t>(colliders),
+          scene.head.collider == kFieldCollider ? nodes * sizeof(glm::vec4) : 0};
 }
 
 PictureView assumed_view(const SceneDesc& scene) {

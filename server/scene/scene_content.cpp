@@ -101,7 +101,7 @@ Result<Head> make_head_under(const SceneDesc& scene, const Groom& groom, const G
     if (fit == HeadFit::BustOnly) fitted.radius_m = desc.radius_m;
     head.mesh = HeadShape(groom, fitted, fit).mesh();
   }
-  head.spheres = fit_spheres(head.mesh, kHeadSpheres, groom);
+  if (desc.collider == kSphereCollider) head.spheres = fit_spheres(head.mesh, kHeadSpheres, groom);
   return head;
 }
 
@@ -128,8 +128,14 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
   const std::vector<FittedSphere> spheres = shrink_under(std::move(head.spheres), content.groom);
   for (const FittedSphere& sphere : spheres)
     content.head_colliders.push_back({sphere.center_m, sphere.radius_m});
-  if (std::holds_alternative<FileGroomDesc>(scene.groom))
+  if (std::holds_alternative<FileGroomDesc>(scene.groom) && scene.head.collider == kSphereCollider)
     content.notes.push_back(to_sentence(measure_head(head.mesh, spheres, content.groom), spheres.size()));
+  if (scene.head.collider == kFieldCollider) {
+    auto field = make_distance_field(head.mesh, scene.head.field_resolution);
+    if (!field) return at(scene.head.mesh_path.empty() ? "head.collider" : "head.mesh_path", field.error());
+    content.notes.push_back(to_sentence(measure_inside(*field, content.groom), *field));
+    content.head_field = std::make_shared<const DistanceField>(std::move(field).value());
+  }
   content.colliders = colliders_of(scene, content.head_colliders);
   if (scene.head.is_visible) content.head = std::move(head.mesh);
   return content;

@@ -1,10 +1,12 @@
 // SceneContent: what a SceneDesc refers to, loaded: groom, head mesh and colliders. Any thread, no GL.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/groom/distance_field.h"
 #include "common/groom/groom.h"
 #include "common/groom/mesh.h"
 #include "common/scene/scene_desc.h"
@@ -12,11 +14,13 @@
 namespace strandcast {
 
 struct SceneContent {
-  Groom groom;                                 // uniform, every prefix covers the head evenly
-  Mesh head;                                   // empty when not visible
-  std::vector<SphereCollider> head_colliders;  // head space: the head as spheres, visible or not
-  std::vector<SphereCollider> colliders;       // head space: the scene's own, or those of the head
-  std::vector<std::string> notes;              // a sentence for each thing that was guessed or fitted
+  Groom groom;  // uniform, every prefix covers the head evenly
+  Mesh head;    // empty when not visible
+  // Head space: the head as spheres, visible or not; empty where it collides as a field.
+  std::vector<SphereCollider> head_colliders;
+  std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one
+  std::vector<SphereCollider> colliders;            // head space: the scene's own, or those of the head
+  std::vector<std::string> notes;                   // a sentence for each thing that was guessed or fitted
 };
 
 /// Loads or grows the groom and the head. Errors name the file or the option.

@@ -17,7 +17,9 @@ KernelSolver::KernelSolver(const SolverContext& context, const StrandParameters&
       strands_(context.strands ? context.strands : std::make_shared<StrandState>(executor_)),
       parameters_(parameters),
       features_(context.features),
-      volume_(context.volume) {}
+      volume_(context.volume),
+      bend_limits_(context.bend_limit),
+      head_field_(context.head_field) {}
 
 Status KernelSolver::prepare_all() {
   prepare();
@@ -26,9 +28,16 @@ Status KernelSolver::prepare_all() {
   if (features_.has_follicle_limit) {
     ASSIGN_OR_RETURN(follicle_limit_, FollicleLimit::make(executor_, features_, layout(), carried()));
   }
+  if (features_.has_bend_limit && BendLimit::holds(layout())) {
+    ASSIGN_OR_RETURN(bend_limit_, BendLimit::make(executor_, features_, layout(), carried(), bend_limits_));
+  }
   if (features_.has_volume) {
     ASSIGN_OR_RETURN(volume_forces_,
                      VolumeForces::make(executor_, features_, layout(), volume_, carried().way));
+  }
+  if (features_.has_distance_field && head_field_ != nullptr && FieldCollider::holds(layout())) {
+    ASSIGN_OR_RETURN(field_collider_,
+                     FieldCollider::make(executor_, features_, *strands_, carried(), *head_field_));
   }
   has_gathered_ = false;
   return {};
@@ -65,8 +74,11 @@ void KernelSolver::substep(const StepInput& input) {
   BoundPlanes planes = strands_->planes();
   bind(planes);
   program_->run(block, input.colliders.size(), planes);
+  if (bend_limit_) bend_limit_->run(block, strands_->planes(), carried());
   if (follicle_limit_ && FollicleLimit::holds(input, layout()))
     follicle_limit_->run(block, input.colliders.size(), strands_->planes(), carried());
+  // Last: whatever turned them, strands end outside of the head.
+  if (field_collider_) field_collider_->run(block, strands_->planes(), carried());
   strands_->advance(input);
 }
 
@@ -102,7 +114,9 @@ uint64_t KernelSolver::memory_bytes() const {
   uint64_t bytes = strands_->memory_bytes() + model_bytes();
   if (program_) bytes += program_->size_bytes();
   if (follicle_limit_) bytes += follicle_limit_->size_bytes();
+  if (bend_limit_) bytes += bend_limit_->size_bytes();
   if (volume_forces_) bytes += volume_forces_->size_bytes();
+  if (field_collider_) bytes += field_collider_->size_bytes();
   return bytes;
 }
 

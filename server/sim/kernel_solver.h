@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "common/kernels/step_block.h"
+#include "server/sim/bend_limit.h"
+#include "server/sim/field_collider.h"
 #include "server/sim/follicle_limit.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
@@ -73,6 +75,10 @@ class KernelSolver : public Solver {
   VolumeDesc volume_;
   std::unique_ptr<VolumeForces> volume_forces_;  // where hair acts on hair
   bool has_gathered_ = false;                    // for the step that comes
+  BendLimitDesc bend_limits_;
+  std::optional<BendLimit> bend_limit_;  // where the scene has one
+  std::shared_ptr<const DistanceField> head_field_;
+  std::optional<FieldCollider> field_collider_;  // where the scene's head collides as a field
 };
 
 }  // namespace strandcast

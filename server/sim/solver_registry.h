@@ -14,6 +14,7 @@
 namespace strandcast {
 
 class Executor;
+struct DistanceField;
 
 struct SolverParameterInfo {
   std::string name;
@@ -40,6 +41,10 @@ struct SolverContext {
   glm::dvec3 groom_gravity_in_head_mps2 = {};
   /// How strands act on each other, where the features say that they do.
   VolumeDesc volume = {};
+  /// What strands are kept out of where features.has_distance_field says so; head space.
+  std::shared_ptr<const DistanceField> head_field = {};
+  /// How far segments bend, where features.has_bend_limit.
+  BendLimitDesc bend_limit = {};
 };
 
 struct SolverRow {

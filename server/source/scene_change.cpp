@@ -11,17 +11,28 @@
 namespace strandcast {
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",         "substeps",
-                                                   "gravity_mps2",   "follicle_limit_deg",
-                                                   "colliders",      "has_auto_collider",
-                                                   "volume",         "wind",
-                                                   "look",           "camera",
-                                                   "stream.bound_m", "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",
+                                                   "substeps",
+                                                   "gravity_mps2",
+                                                   "follicle_limit_deg",
+                                                   "colliders",
+                                                   "has_auto_collider",
+                                                   "bend_limit",
+                                                   "volume",
+                                                   "wind",
+                                                   "look",
+                                                   "camera",
+                                                   "stream.bound_m",
+                                                   "stream.strand_rate_hz"};
   return kFields;
 }
 
 Status check_solver(const SceneDesc& scene) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
+  if (!row->has_kernel && scene.head.collider == kFieldCollider && scene.has_auto_collider)
+    return make_error(ErrorCode::BadInput,
+                      "solver {} has no kernel and meets no distance field: head.collider \"{}\" is for it",
+                      row->name, kSphereCollider);
   const Result<SolverParameters> parameters = moving_parameters(*row, scene);
   if (!parameters) return parameters.error();
   if (analyse(scene, {}).has_volume && !(row->has_kernel && row->bears_volume))

@@ -27,7 +27,8 @@ constexpr size_t kMaxToldChars = 200;      // of an assignment, in its answer
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
   return a.has_wind == b.has_wind && a.has_turbulence == b.has_turbulence &&
          a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit &&
-         a.has_volume == b.has_volume;
+         a.has_bend_limit == b.has_bend_limit && a.has_volume == b.has_volume &&
+         a.has_distance_field == b.has_distance_field;
 }
 
 double median_ms(const gl::PassReports& passes, std::string_view name) {
@@ -98,7 +99,8 @@ Status SimLoop::begin() {
   look_ = wanted_look();
   const Groom& groom = config_.content->groom;
   const StageSizes sizes{groom.strand_count(), groom.uniform_vertex_count(), config_.scene.substeps,
-                         static_cast<uint32_t>(config_.content->colliders.size())};
+                         static_cast<uint32_t>(config_.content->colliders.size()),
+                         config_.content->head_field ? config_.content->head_field->size_bytes() : 0};
   stages_.emplace(sizes, explain(config_.scene, facts_));
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
   publish();
@@ -328,8 +330,14 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
   const double wetness = scene.look.shading.wetness;
-  const SolverContext context = {executor_.get(), features,      KernelForm::Auto,
-                                 strands,         groom_gravity, wet_volume(scene.volume, wetness)};
+  const SolverContext context = {executor_.get(),
+                                 features,
+                                 KernelForm::Auto,
+                                 strands,
+                                 groom_gravity,
+                                 wet_volume(scene.volume, wetness),
+                                 config_.content->head_field,
+                                 scene.bend_limit};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;

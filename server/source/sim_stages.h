@@ -49,6 +49,7 @@ struct StageSizes {
   uint32_t vertex_count = 0;
   uint32_t substeps = 1;
   uint32_t collider_count = 0;
+  uint64_t field_bytes = 0;  // of the head's distance field
 };
 
 class SimStages {

@@ -11,7 +11,8 @@ Result<SolverParameters> moving_parameters(const SolverRow& row, const SceneDesc
 }
 
 bool moves_otherwise(const SceneDesc& a, const SceneDesc& b) {
-  return a.solver != b.solver || a.volume != b.volume || a.look.shading.wetness != b.look.shading.wetness;
+  return a.solver != b.solver || a.volume != b.volume || a.bend_limit != b.bend_limit ||
+         a.look.shading.wetness != b.look.shading.wetness;
 }
 
 SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete, double wetness) {

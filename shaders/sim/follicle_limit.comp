@@ -5,30 +5,10 @@
 // substep. (Velocities that went along with the shift would make the strand weightless where the cone carries
 // it: rods then swing for ever.) Nothing gains speed. One invocation per strand; strands inside the cone are
 // read only.
-//
-// MEMORY: what else of a model goes along. 0 = nothing, 1 = the way of every vertex in the last substep, 2 =
-// that and the material axis of every segment.
-#pragma variant MEMORY 0 1 2
+#include "sim/carried.glsl"
 #include "sim/collider.glsl"
 
 layout(local_size_x = kStrandLocalSize) in;
-
-#if MEMORY >= 1
-layout(binding = kUnitDisplacement) uniform samplerBuffer u_way;  // world, m
-layout(std430, binding = kBindingDisplacement) writeonly restrict buffer WayBlock {
-  vec4 value[];
-} b_way;
-#endif
-#if MEMORY == 2
-layout(binding = kUnitRodAxis) uniform samplerBuffer u_axis;  // world
-layout(std430, binding = kBindingRodAxis) writeonly restrict buffer AxisBlock { vec4 value[]; } b_axis;
-#endif
-
-const float kFoldedBack = 1e-6;
-
-vec3 any_side(vec3 axis) {
-  return select(abs(axis.x) < 0.6, vec3(0.0, axis.z, -axis.y), vec3(-axis.z, 0.0, axis.x));
-}
 
 // Cosine and sine of the angle from `axis` towards `side` at which a segment may stand: the limit, or less
 // where a collider is in the way that the groomed direction itself is outside of. In the plane of both, a
@@ -70,29 +50,6 @@ vec3 outside(vec3 start, vec3 next) {
   }
 #endif
   return next;
-}
-
-#if MEMORY == 2
-void turn_axis(lane_bool is_held, uint at, vec3 from, vec3 to) {
-  const float squared = min(dot(from, from), dot(to, to));
-  const lane_bool is_turned = is_held && squared > kTinySquared;
-  if (!is_any(is_turned)) return;
-  from = normalize(from);
-  to = normalize(to);
-  const vec4 axis = texelFetch(u_axis, int(at));
-  const float sum = max(1.0 + dot(from, to), kFoldedBack);
-  vec3 turned = axis.xyz - (dot(axis.xyz, to) / sum) * (from + to);
-  turned -= to * dot(turned, to);
-  b_axis.value[at] = vec4(select(is_turned, normalize(turned), axis.xyz), axis.w);
-}
-#endif
-
-void move_vertex(uint at, vec4 position, vec3 way) {
-  b_position.position[at] = vec4(position.xyz + way, position.w);
-#if MEMORY >= 1
-  const vec4 before = texelFetch(u_way, int(at));
-  b_way.value[at] = vec4(before.xyz + way, before.w);
-#endif
 }
 
 // Takes from the velocity of a vertex what runs against its way, seen from the follicle's cone, which turns

@@ -53,6 +53,11 @@ vec3 turned_with_head(vec3 point) {
          u_step.world_from_head[2].xyz * point.z;
 }
 
+vec3 in_head(vec3 point) {
+  return vec3(dot(u_step.world_from_head[0].xyz, point), dot(u_step.world_from_head[1].xyz, point),
+              dot(u_step.world_from_head[2].xyz, point));
+}
+
 vec3 carried_by_head(vec3 point) {
   return u_step.carry[0].xyz * point.x + u_step.carry[1].xyz * point.y + u_step.carry[2].xyz * point.z;
 }

@@ -47,11 +47,6 @@ VolumeGrid volume_grid() {
   return VolumeGrid(first.xyz, first.w, nodes.xyz);
 }
 
-vec3 in_head(vec3 point) {
-  return vec3(dot(u_step.world_from_head[0].xyz, point), dot(u_step.world_from_head[1].xyz, point),
-              dot(u_step.world_from_head[2].xyz, point));
-}
-
 // `point` is head-relative in world axes. A place that is not inside is some other one.
 VolumePlace volume_place(VolumeGrid grid, vec3 point) {
   const vec3 at = in_head(point) * grid.per_cell - grid.first;

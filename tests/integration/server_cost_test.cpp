@@ -138,6 +138,16 @@ TEST_F(ServerCost, EachFactOfTheSceneCostsItsOwnVariants) {
   scene.follicle_limit_deg = SceneDesc().follicle_limit_deg;
   ASSERT_TRUE(start(on_gl(scene)));
   EXPECT_EQ(compiled() - before, bare + 1) << "held roots take one program more";
+  server_->stop();
+  server_.reset();
+  const uint64_t before_field = compiled();
+  scene = barest_scene();
+  scene.has_auto_collider = true;
+  scene.head.collider = kFieldCollider;
+  scene.head.field_resolution = 16;
+  ASSERT_TRUE(start(on_gl(scene)));
+  EXPECT_EQ(compiled() - before_field, bare + 1) << "a head that is a field takes one more, without spheres";
+  EXPECT_EQ(decisions(server_->passes()), decisions(planned(scene, {})));
 }
 
 TEST_F(ServerCost, WhatViewersNeedComesAndGoesWithThem) {

@@ -61,7 +61,7 @@ class CrowdedHair {
   /// A groom without a head.
   CrowdedHair(Executor& executor, const SceneDesc& scene, Groom groom)
       : scene_(scene),
-        content_{std::move(groom), {}, {}, {}, {}},
+        content_(content_of(std::move(groom))),
         builder_(scene, {}),
         layout_(make_strand_layout(content_.groom).value()),
         volume_(HairVolume::make({layout_.strand_count, layout_.vertex_count, layout_.rest, {}},
@@ -72,6 +72,7 @@ class CrowdedHair {
     SolverContext context{&executor, analyse(scene, {})};
     context.groom_gravity_in_head_mps2 = scene.gravity_mps2;
     context.volume = scene.volume;
+    context.bend_limit = scene.bend_limit;
     auto solver = row->make(complete_parameters(*row, scene.solver.parameters).value(), context);
     EXPECT_TRUE(solver) << solver.error().to_string();
     solver_ = std::move(solver).value();
@@ -134,6 +135,11 @@ class CrowdedHair {
   }
 
  private:
+  static SceneContent content_of(Groom groom) {
+    SceneContent content;
+    content.groom = std::move(groom);
+    return content;
+  }
   double time_s() const { return static_cast<double>(tick_) / scene_.step_rate_hz; }
   /// 3 g to and fro at 2 Hz while the head says no and nods.
   static Pose head_at(double t_s) {

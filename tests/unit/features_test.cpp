@@ -19,6 +19,16 @@ TEST(Features, EachFactFollowsItsOwnCause) {
   EXPECT_FALSE(analyse(scene, {}).has_colliders);
   scene.colliders.resize(1);
   EXPECT_TRUE(analyse(scene, {}).has_colliders);
+  scene.head.collider = kFieldCollider;
+  EXPECT_FALSE(analyse(scene, {}).has_distance_field) << "the head does not collide";
+  scene.has_auto_collider = true;
+  EXPECT_TRUE(analyse(scene, {}).has_distance_field);
+  EXPECT_TRUE(analyse(scene, {}).has_colliders) << "the scene's own, beside the head";
+  scene.colliders.clear();
+  EXPECT_FALSE(analyse(scene, {}).has_colliders) << "no spheres where the head is a field";
+  scene.head.collider = kSphereCollider;
+  EXPECT_FALSE(analyse(scene, {}).has_distance_field);
+  EXPECT_TRUE(analyse(scene, {}).has_colliders);
 
   scene.wind.gust_intensity = 1.0f;
   EXPECT_FALSE(analyse(scene, {}).has_wind) << "gusts are relative to the mean";
@@ -37,6 +47,9 @@ TEST(Features, EachFactFollowsItsOwnCause) {
   scene.follicle_limit_deg = 180.0;
   EXPECT_FALSE(analyse(scene, {}).has_follicle_limit);
 
+  EXPECT_FALSE(analyse(scene, {}).has_bend_limit);
+  scene.bend_limit.most_tip_deg = 90.0;
+  EXPECT_TRUE(analyse(scene, {}).has_bend_limit);
   EXPECT_FALSE(analyse(scene, {}).has_volume);
   scene.volume.friction_per_s = 1.0;
   EXPECT_TRUE(analyse(scene, {}).has_volume);
@@ -117,8 +130,10 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.wind.mean_mps.x = coin() ? 0.0f : 1.0f;
     scene.wind.gust_intensity = coin() ? 0.0f : 0.5f;
     scene.follicle_limit_deg = coin() ? 180.0 : 20.0;
+    scene.bend_limit.least_root_deg = coin() ? 0.0 : 5.0;
     scene.volume.friction_per_s = coin() ? 0.0 : 20.0;
     scene.volume.repulsion_per_s2 = coin() ? 0.0 : 5.0;
+    scene.head.collider = coin() ? kSphereCollider : kFieldCollider;
     const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u};
     const SceneFeatures features = analyse(scene, facts);
     SceneFeatures explained;
@@ -126,7 +141,9 @@ TEST(Features, ExplainAgreesWithAnalyse) {
                                             {"has_turbulence", &explained.has_turbulence},
                                             {"has_colliders", &explained.has_colliders},
                                             {"has_follicle_limit", &explained.has_follicle_limit},
+                                            {"has_bend_limit", &explained.has_bend_limit},
                                             {"has_volume", &explained.has_volume},
+                                            {"has_distance_field", &explained.has_distance_field},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
                                             {"has_frame_viewers", &explained.has_frame_viewers}};
     const auto reasons = explain(scene, facts);
@@ -147,6 +164,9 @@ TEST(Features, ReasonsDifferWithTheValue) {
   SceneDesc full;
   full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1};
   full.volume.friction_per_s = 1.0;
+  full.bend_limit.most_root_deg = 30.0;
+  full.head.collider = kFieldCollider;
+  full.colliders.resize(1);
   const auto off = explain(bare, {});
   const auto on = explain(full, {.strand_viewers = 1, .frame_viewers = 1});
   for (size_t i = 0; i < off.size(); ++i) {

@@ -77,6 +77,35 @@ TEST(SceneContent, OwnCollidersReplaceTheFittedOneAndNoneMeansNone) {
   EXPECT_TRUE(content->colliders.empty());
 }
 
+TEST(SceneContent, AHeadThatIsAFieldHasNoSpheresAndIsThatOfItsMesh) {
+  SceneDesc scene = built_in_scene();
+  EXPECT_EQ(load_scene_content(scene)->head_field, nullptr) << "nobody asked for one";
+  scene.head.collider = kFieldCollider;
+  scene.head.field_resolution = 32;
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok()) << content.error().to_string();
+  EXPECT_TRUE(content->colliders.empty());
+  ASSERT_NE(content->head_field, nullptr);
+  const DistanceField& field = *content->head_field;
+  for (size_t i = 0; i < content->head.position_m.size(); i += 37)
+    EXPECT_NEAR(field.sample(content->head.position_m[i]).distance_m, 0.0, 0.6 * field.cell_m);
+  const HairInside inside = measure_inside(field, content->groom);
+  ASSERT_EQ(content->notes.size(), 1u);
+  EXPECT_EQ(content->notes[0], to_sentence(inside, field));
+  EXPECT_LT(inside.deepest_m, 0.01) << "hair that grows on it";
+}
+
+TEST(SceneContent, AMeshThatNoFieldCanBeMadeOfIsNamed) {
+  const TemporaryFolder folder;
+  SceneDesc scene = built_in_scene();
+  scene.head.collider = kFieldCollider;
+  scene.head.mesh_path = folder.write("sheet.obj", "v -1 0 0\nv 1 0 0\nv 0 0 1\nv 0 0 2\nf 1 2 3\nf 1 3 4\n");
+  const auto content = load_scene_content(scene);
+  ASSERT_FALSE(content.ok());
+  EXPECT_EQ(content.error().code, ErrorCode::BadInput);
+  EXPECT_EQ(content.error().to_string().find("head.mesh_path: the mesh "), 0u) << content.error().to_string();
+}
+
 TEST(SceneContent, RealGroomGetsAHeadWhereItsRootsAre) {
   const std::filesystem::path path =
       std::filesystem::path(STRANDCAST_SHARED_DATA) / "grooms/Ratboy_mohawk.tfx";

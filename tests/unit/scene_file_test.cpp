@@ -44,7 +44,9 @@ SceneDesc unusual_scene() {
             .radius_m = 0.11f,
             .is_visible = false,
             .center_m = {0.1f, 0, -0.1f},
-            .has_center = true};
+            .has_center = true,
+            .collider = "field",
+            .field_resolution = 77};
   s.solver = {.name = "other", .parameters = {{"damping", 0.1}, {"k", 1e-300}, {"sag_free", 0.25}}};
   s.step_rate_hz = 59.94005994005994;
   s.substeps = 3;
@@ -115,6 +117,7 @@ SceneDesc unusual_scene() {
               .frame_rate_hz = 7.5,
               .strand_rate_hz = 30.0};
   s.follicle_limit_deg = 33.5;
+  s.bend_limit = {.least_root_deg = 1.5, .least_tip_deg = 2.5, .most_root_deg = 20.5, .most_tip_deg = 60.5};
   s.volume = {.friction_per_s = 12.5,
               .repulsion_per_s2 = 3.5,
               .target_per_s2 = 77.0,
@@ -316,6 +319,9 @@ TEST(SceneFile, OverrideErrorsNameTheAssignmentAndKnownFields) {
   for (const char* limit : {"0", "0.99", "180.5", "-20", "nan"})
     EXPECT_THAT(error_of("", {std::string("follicle_limit_deg=") + limit}), HasSubstr("1 .. 180 degrees"))
         << limit;
+  EXPECT_THAT(error_of("", {"head.collider=capsule"}),
+              HasSubstr("head.collider is unknown (known: field, spheres)"));
+  EXPECT_THAT(error_of("", {"head.field_resolution=15"}), HasSubstr("16 .. 128 cells"));
   EXPECT_THAT(error_of("", {"camera=3"}), HasSubstr("known: offset_m, target_m, fov_y_rad"));
   EXPECT_THAT(error_of("", {"camera={ fov_y_rad: 9 }"}),
               StartsWith("--set camera={ fov_y_rad: 9 }: camera.fov_y_rad"));

@@ -30,6 +30,10 @@ SceneDesc full_scene() {
   scene.wind.mean_mps = {3.0f, 0.0f, 1.0f};
   scene.wind.gust_intensity = 0.3f;
   scene.volume.friction_per_s = 20.0;
+  scene.bend_limit.most_tip_deg = 60.0;
+  scene.head.collider = kFieldCollider;
+  scene.head.field_resolution = 16;
+  scene.colliders = {{glm::vec3(0.0f, -0.3f, 0.0f), 0.1f}};
   scene.look.methods = {"marschner", "dual", "vertex"};  // each has tables
   return scene;
 }
@@ -38,6 +42,9 @@ SceneDesc bare_scene() {
   SceneDesc scene = full_scene();
   scene.wind = {};
   scene.volume = {};
+  scene.bend_limit = {};
+  scene.head.collider = kSphereCollider;
+  scene.colliders.clear();
   scene.has_auto_collider = false;
   scene.follicle_limit_deg = 180.0;
   return scene;

@@ -1,0 +1,99 @@
+#include "server/sim/reference_field.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace strandcast {
+namespace {
+
+constexpr double kTinyLengthM = 1e-10;
+/// So much nearer than in the groom is no contact yet.
+constexpr double kSlackM = 1e-6;
+constexpr double kLeastSlope = 0.5;
+/// Two rounds, and more where so much is left.
+constexpr int kMostRounds = 5;
+constexpr double kResidueM = 5e-5;
+/// An end that the middle's turn moved by more than twice this may have met something else.
+constexpr double kLookAgainM = 2e-4;
+
+/// The nearest part of the skin as a plane that a point is in front of.
+struct Contact {
+  glm::dvec3 normal{0.0};
+  double depth_m = 0.0;  // below the clearance; not positive = none
+};
+
+Contact contact_at(const DistanceField& field, const glm::dvec3& point_m, double clearance_m) {
+  const DistanceField::Sample sample = field.sample(point_m);
+  const double slope = glm::length(sample.gradient);
+  return {slope > 0.0 ? sample.gradient / slope : glm::dvec3(0.0),
+          (clearance_m - sample.distance_m) / std::max(slope, kLeastSlope)};
+}
+
+/// The segment of this length whose end stands so high over its start, leaning to where `towards` does.
+glm::dvec3 segment_at_height(const glm::dvec3& towards, const glm::dvec3& normal, double length_m,
+                             double height_m) {
+  const double angle = std::asin(std::clamp(height_m / length_m, -1.0, 1.0));
+  glm::dvec3 flat = towards - glm::dot(towards, normal) * normal;
+  if (glm::length(flat) <= 1e-6 * length_m)
+    flat = std::abs(normal.x) < 0.6 ? glm::dvec3(0.0, normal.z, -normal.y)
+                                    : glm::dvec3(-normal.z, 0.0, normal.x);
+  flat = glm::normalize(flat - glm::dot(flat, normal) * normal);
+  return length_m * (std::sin(angle) * normal + std::cos(angle) * flat);
+}
+
+glm::dvec3 after_friction(const glm::dvec3& before_m, const glm::dvec3& end_m, const Contact& contact,
+                          double friction) {
+  const glm::dvec3 slip = end_m - before_m;
+  const glm::dvec3 sliding = slip - glm::dot(slip, contact.normal) * contact.normal;
+  const double way_m = glm::length(sliding);
+  if (way_m <= friction * contact.depth_m) return end_m - sliding;
+  return end_m - friction * contact.depth_m / way_m * sliding;
+}
+
+}  // namespace
+
+double field_clearance_m(const DistanceField& field, const glm::dvec3& groomed_m) {
+  return std::min(kFieldClearanceM, field.sample(groomed_m).distance_m - kSlackM);
+}
+
+bool keep_out_of(const DistanceField& field, const ReferenceFieldStrand& strand) {
+  bool has_moved = false;
+  glm::dvec3 start_before = strand.position_m[strand.first - 1];
+  for (size_t i = strand.first; i < strand.position_m.size(); ++i) {
+    const glm::dvec3 start = strand.position_m[i - 1];
+    const glm::dvec3 place = strand.position_m[i];
+    const double length_m = glm::distance(place, start_before);
+    glm::dvec3 end = place;
+    if (start != start_before) {
+      const glm::dvec3 along = place - start;
+      end = start +
+            (glm::length(along) > kTinyLengthM ? length_m * glm::normalize(along) : place - start_before);
+    }
+    if (length_m > kTinyLengthM) {
+      const double clearance_m = field_clearance_m(field, strand.groomed_m[i]);
+      const double middle_clearance_m =
+          field_clearance_m(field, 0.5 * (strand.groomed_m[i - 1] + strand.groomed_m[i]));
+      for (int attempt = 0; attempt < 2; ++attempt) {
+        for (int round = 0; round < kMostRounds; ++round) {
+          const Contact contact = contact_at(field, end, clearance_m);
+          const double left_m = clearance_m - field.sample(end).distance_m;
+          if (!(left_m > (round < 2 ? 0.0 : kResidueM))) break;
+          const glm::dvec3 held = after_friction(strand.before_m[i], end, contact, strand.friction);
+          end = start + segment_at_height(held - start, contact.normal, length_m,
+                                          glm::dot(end - start, contact.normal) + contact.depth_m);
+        }
+        const Contact cut = contact_at(field, 0.5 * (start + end), middle_clearance_m);
+        if (!(cut.depth_m > 0.0)) break;
+        end = start + segment_at_height(end - start, cut.normal, length_m,
+                                        glm::dot(end - start, cut.normal) + 2.0 * cut.depth_m);
+        if (!(cut.depth_m > kLookAgainM)) break;
+      }
+    }
+    has_moved = has_moved || end != place;
+    start_before = place;
+    strand.position_m[i] = end;
+  }
+  return has_moved;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,167 @@
+// The head as a distance field (common/groom/distance_field.h) that strands collide with: after a substep of any
+// model, a segment whose end or middle is nearer to the skin than its clearance is turned about its start, at its
+// length, until it is not; two rounds or more for the end, then one for the middle, and both once more where that
+// one was large. The clearance is half a millimetre, or what the groom itself has there: strands of real grooms
+// begin inside, and nothing pops. Friction holds the end against sliding over the skin. What hangs on it follows
+// the leader to where the model put it. Seen from the head throughout, so the skin moves with it; what a vertex is
+// moved by counts as an impulse, once in its velocity. One invocation per strand; what touches nothing is not
+// written, not by a rounding either.
+#include "sim/carried.glsl"
+
+layout(local_size_x = kStrandLocalSize) in;
+
+layout(binding = kUnitField) uniform lookup_table u_field;           // distances, m; 2 x 2 nodes in x and y
+layout(binding = kUnitPlaceBefore) uniform samplerBuffer u_before;  // head space, m; after the substep before
+layout(std430, binding = kBindingPlaceBefore) writeonly restrict buffer PlaceBlock { vec4 value[]; } b_before;
+
+uniform float u_origin_x;  // of the grid; head space, m
+uniform float u_origin_y;
+uniform float u_origin_z;
+uniform float u_cells_per_m;
+uniform float u_last_x;  // cell along each axis
+uniform float u_last_y;
+uniform float u_last_z;
+uniform float u_row_nodes;
+uniform float u_slice_nodes;
+
+const float kClearance = 0.0005;
+// Below the groom's own clearance, so that roundings are no contact.
+const float kSlack = 1e-6;
+// Distances between nodes change by at most so much per way.
+const float kMostSlope = 1.3;
+const float kLeastSlopeSquared = 0.25;
+// Two rounds, and more where so much is left: at ears and noses, whose sides are near.
+const int kMostRounds = 5;
+const float kResidue = 5e-5;
+// An end that the middle's turn moved by more than twice this may have met something else.
+const float kLookAgain = 2e-4;
+
+// xyz = gradient, w = distance: trilinear between nodes.
+vec4 sample_field(vec3 point) {
+  const vec3 at = (point - vec3(u_origin_x, u_origin_y, u_origin_z)) * u_cells_per_m;
+  const vec3 cell = vec3(floor(clamp(at.x, 0.0, u_last_x)), floor(clamp(at.y, 0.0, u_last_y)),
+                         floor(clamp(at.z, 0.0, u_last_z)));
+  const vec3 f = vec3(clamp(at.x - cell.x, 0.0, 1.0), clamp(at.y - cell.y, 0.0, 1.0),
+                      clamp(at.z - cell.z, 0.0, 1.0));
+  const float index = cell.z * u_slice_nodes + (cell.y * u_row_nodes + cell.x);
+  const vec4 low = look_up(u_field, lane_uint(index));
+  const vec4 high = look_up(u_field, lane_uint(index + u_slice_nodes));
+  const vec4 rise = high - low;
+  const vec4 here = low + f.z * rise;
+  const float left = here.x + f.y * (here.z - here.x);
+  const float right = here.y + f.y * (here.w - here.y);
+  const float near = here.x + f.x * (here.y - here.x);
+  const float far = here.z + f.x * (here.w - here.z);
+  const float rise_near = rise.x + f.x * (rise.y - rise.x);
+  const float rise_far = rise.z + f.x * (rise.w - rise.z);
+  return vec4(u_cells_per_m * vec3(right - left, far - near, rise_near + f.y * (rise_far - rise_near)),
+              near + f.y * (far - near));
+}
+
+float clearance_at(vec3 groomed) { return min(kClearance, sample_field(groomed).w - kSlack); }
+
+// The end of a segment turned about its start, on its side, until it stands so high over the start along the normal:
+// straight up or down where it is too short for that.
+vec3 turned_to_height(vec3 start, vec3 towards, float segment, vec3 normal, float height) {
+  const float cosine = clamp(height / segment, -1.0, 1.0);
+  vec3 side = towards - normal * dot(towards, normal);
+  const vec3 other = select(abs(normal.x) < 0.6, vec3(0.0, normal.z, -normal.y), vec3(-normal.z, 0.0, normal.x));
+  side = select(dot(side, side) > 1e-12 * segment * segment, side, other);
+  side -= normal * dot(side, normal);  // once more: a short side is made of roundings along the normal
+  const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
+  return start + segment * (cosine * normal + sine * side);
+}
+
+vec3 normal_of(vec4 found) { return found.xyz * inversesqrt(max(dot(found.xyz, found.xyz), kTinySquared)); }
+
+// How far the place is below its clearance, along the normal.
+float depth_of(vec4 found, float clearance) {
+  return (clearance - found.w) * inversesqrt(max(dot(found.xyz, found.xyz), kLeastSlopeSquared));
+}
+
+vec3 held_by_skin(vec3 before, vec3 end, vec3 normal, float depth) {
+  const vec3 slip = end - before;
+  const vec3 sliding = slip - normal * dot(slip, normal);
+  return end - sliding * min(1.0, u_step.contact.x * depth * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
+}
+
+void main() {
+  const uint stride = u_step.shape.x;
+  const uint strand = gl_GlobalInvocationID.x;
+  if (strand >= stride) return;
+  uint at = (u_step.shape.z - 1u) * stride + strand;
+  vec3 placed_start = in_head(texelFetch(u_position, int(at)).xyz);  // by the model
+  vec3 start = placed_start;
+  float room = 0.0;  // that the start has to the skin, at least
+  for (uint i = u_step.shape.z; i < u_step.shape.y; ++i) {
+    at += stride;
+    const vec4 position = texelFetch(u_position, int(at));
+    const vec3 place = in_head(position.xyz);
+    const vec3 edge = place - placed_start;
+    const float segment = sqrt(dot(edge, edge));
+    const lane_bool has_length = segment * segment > kTinySquared;
+    vec3 end = place;
+    const lane_bool is_led = start != placed_start;
+    if (is_any(is_led)) {
+      const vec3 along = place - start;
+      const float squared = dot(along, along);
+      const vec3 direction = select(squared > kTinySquared, along * (segment * inversesqrt(squared)), edge);
+      end = select(is_led, start + direction, end);
+    }
+
+    room -= kMostSlope * segment;
+    const lane_bool is_near = room < kClearance && has_length;
+    lane_bool is_open = is_near;
+    for (int attempt = 0; attempt < 2 && is_any(is_open); ++attempt) {
+      vec4 found = sample_field(end);
+      room = select(is_open, found.w, room);
+      lane_bool is_deep = is_open && found.w < kClearance;
+      if (is_any(is_deep)) {
+        const lane_bool was_deep = is_deep;
+        const float clearance = clearance_at(texelFetch(u_rest, int(at)).xyz);
+        vec3 before = texelFetch(u_before, int(at)).xyz;
+        before = select(is_broken(before), end, before);
+        for (int round = 0; round < kMostRounds; ++round) {
+          if (round > 0) found = sample_field(end);
+          is_deep = is_deep && found.w < (round < 2 ? clearance : clearance - kResidue);
+          if (!is_any(is_deep)) break;
+          const vec3 normal = normal_of(found);
+          const float depth = depth_of(found, clearance);
+          const vec3 held = held_by_skin(before, end, normal, depth);
+          const float height = dot(normal, end - start) + depth;
+          end = select(is_deep, turned_to_height(start, held - start, segment, normal, height), end);
+        }
+        room = select(was_deep, min(room, 0.0), room);
+      }
+
+      is_open = is_open && room < 0.5 * kMostSlope * segment + kClearance;
+      if (!is_any(is_open)) break;
+      const vec4 below = sample_field(0.5 * (start + end));
+      is_open = is_open && below.w < kClearance;
+      if (!is_any(is_open)) break;
+      const float clearance =
+          clearance_at(0.5 * (texelFetch(u_rest, int(at - stride)).xyz + texelFetch(u_rest, int(at)).xyz));
+      is_open = is_open && below.w < clearance;
+      const vec3 normal = normal_of(below);
+      const float depth = depth_of(below, clearance);
+      const float height = dot(normal, end - start) + 2.0 * depth;
+      end = select(is_open, turned_to_height(start, end - start, segment, normal, height), end);
+      room = select(is_open, min(room, 0.0), room);
+      is_open = is_open && depth > kLookAgain;
+    }
+
+    const lane_bool is_moved = end != place;
+    if (is_any(is_moved)) {
+      const vec3 way = select(is_moved, turned_with_head(end - place), vec3(0.0));
+      move_vertex(at, position, way);
+      const vec4 velocity = texelFetch(u_velocity, int(at));
+      b_velocity.velocity[at] = vec4(velocity.xyz + way * u_step.push.w, velocity.w);
+#if MEMORY == 2
+      turn_axis(is_moved, at, turned_with_head(edge), turned_with_head(end - start));
+#endif
+    }
+    b_before.value[at] = vec4(end, 0.0);
+    placed_start = place;
+    start = end;
+  }
+}
