@@ -60,6 +60,17 @@ struct StrandStreamLimits {
   uint32_t vertex_count = 0;
 };
 
+/// How the bytes of deltas follow what a stream carries: an estimate for streams that nobody has measured.
+/// Of a frame a part is as large however few strands it has: its header, and what it tells of the steps since
+/// the last one. The rest, per second, goes with powers of the share of strands and of the rate.
+struct StrandByteModel {
+  double frame_bytes = 0.0;
+  double step_bytes = 0.0;    // for every step that a frame tells of
+  double share_power = 1.0;   // neighbours that are farther away say less
+  double rate_power = 1.0;    // rarer frames are harder to predict
+  double coarse_share = 1.0;  // of the rest at 0.5 mm instead of 0.1 mm
+};
+
 struct StrandCodecInfo {
   std::string name;     // "delta", "raw", "tangent"
   std::string summary;  // one line
@@ -68,6 +79,7 @@ struct StrandCodecInfo {
   bool predicts = false;
   std::string fallback = {};  // codec for viewers that cannot decode this one; empty = none is needed
   double bytes_share = 1.0;   // of the fallback's bytes that it takes, as an estimate for people
+  StrandByteModel bytes = {};
 };
 
 const std::vector<StrandCodecInfo>& strand_codecs();

@@ -161,7 +161,8 @@ Status Server::State::connect(EncodedFramePtr asset_frame) {
   desk_->set_metrics([this] { return metrics(); });
   NetConfig net = config_.net;
   net.strand_classes = hub_->strand_classes();
-  net.strand_codecs = codecs_.size();
+  net.strand_codecs.clear();
+  for (const StrandCodecInfo& codec : codecs_) net.strand_codecs.push_back(codec.bytes);
   ASSIGN_OR_RETURN(net_, NetServer::listen(net, *desk_));
   desk_->connect(*net_);
   return {};

@@ -68,8 +68,8 @@ struct NetConfig {
   std::vector<AddressRange> trusted_proxies;
   ProxyProtocol proxy_protocol = ProxyProtocol::None;
   NetLimits limits;
-  std::vector<StrandClass> strand_classes = {StrandClass{}};  // at first; best first
-  size_t strand_codecs = 1;                                   // that each of them is served by
+  std::vector<StrandClass> strand_classes = {StrandClass{}};         // at first; best first
+  std::vector<StrandByteModel> strand_codecs = {StrandByteModel{}};  // that each of them is served by
 };
 
 }  // namespace strandcast

@@ -10,14 +10,6 @@
 namespace strandcast {
 namespace {
 
-/// Bytes per second fall with this power of the rate: rarer frames are harder to predict. Measured with the
-/// adaptive codec on the built-in scene and on walking motion, divisors 2 to 6: 0.50 to 0.58.
-constexpr double kRatePower = 0.54;
-/// Measured likewise, from 0.1 mm to 0.5 mm: 0.60 to 0.67.
-constexpr double kCoarseCost = 0.63;
-/// And with this power of the share of strands: neighbours that are farther away say less. Measured on the
-/// built-in scene, shares 1/2 to 1/8: 1.00 to 0.92.
-constexpr double kSharePower = 0.95;
 /// A lattice that is coarser by less saves too little to be worth a keyframe.
 constexpr uint32_t kLeastCoarsening = 2;
 
@@ -33,6 +25,22 @@ uint32_t first_divisor(const StrandStreamPlan& plan) {
   constexpr double kRounding = 1e-9;
   const double steps = std::ceil(plan.step_rate_hz / plan.rate_hz - kRounding);
   return static_cast<uint32_t>(std::min<double>(steps, kMaxRateDivisor));
+}
+
+/// What of a frame's bytes hangs on neither strands nor bound.
+double fixed_bytes(const StrandByteModel& model, const StrandClass& row) {
+  return model.frame_bytes + model.step_bytes * row.rate_divisor;
+}
+
+/// The rest, bytes/s, up to a factor that all classes share.
+double relative_rest(const StrandByteModel& model, const StrandClass& row) {
+  return std::pow(row.frame_rate_hz, model.rate_power) *
+         std::pow(static_cast<double>(row.strand_share), model.share_power) *
+         (row.coarsening > 1 ? model.coarse_share : 1.0);
+}
+
+bool is_same(const StrandClass& a, const StrandClass& b) {
+  return a.strand_share == b.strand_share && a.rate_divisor == b.rate_divisor && a.coarsening == b.coarsening;
 }
 
 /// The smallest of 1, 1/2, 1/4, 1/8 that leaves enough strands, but not below `wanted`.
@@ -64,13 +72,21 @@ std::vector<StrandClass> make_strand_classes(const StrandStreamPlan& plan) {
     made.frame_rate_hz = plan.step_rate_hz / made.rate_divisor;
     made.coarsening = row.is_coarse ? coarsening : 1;
     made.bound_m = made.coarsening > 1 ? plan.bound_m * static_cast<float>(1 + coarsening) : plan.bound_m;
-    made.relative_cost = std::pow(row.rate_divisor, -kRatePower) * std::pow(made.strand_share, kSharePower) *
-                         (made.coarsening > 1 ? kCoarseCost : 1.0);
-    const bool is_new = classes.empty() || made.relative_cost < classes.back().relative_cost;
+    const bool is_new = classes.empty() || !is_same(made, classes.back());
     const bool is_fast_enough = row.rate_divisor == 1 || made.frame_rate_hz >= kLeastFrameRateHz;
     if (is_new && is_fast_enough && made.rate_divisor <= kMaxRateDivisor) classes.push_back(made);
   }
   return classes;
+}
+
+double expected_bytes_per_s(const StrandByteModel& model, const MeasuredClass& measured,
+                            const StrandClass& wanted) {
+  const double fixed = fixed_bytes(model, measured.row);
+  // Where even less came, what is fixed is less here, by as much.
+  const double fixed_scale = std::min(1.0, measured.delta_bytes / fixed);
+  const double rest_bytes_per_s = std::max(measured.delta_bytes - fixed, 0.0) * measured.row.frame_rate_hz;
+  return fixed_scale * fixed_bytes(model, wanted) * wanted.frame_rate_hz +
+         rest_bytes_per_s * relative_rest(model, wanted) / relative_rest(model, measured.row);
 }
 
 std::string to_string(const StrandClass& row) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/strands/frame_header.h"
+#include "common/strands/strand_codec.h"
 
 namespace strandcast {
 
@@ -18,7 +19,6 @@ struct StrandClass {
   uint32_t coarsening = 1;    // lattice steps per step of the published lattice
   float bound_m = 1e-4f;      // announced Euclidean error
   double frame_rate_hz = 60.0;
-  double relative_cost = 1.0;  // bytes per second against the first class; an estimate until it was measured
 };
 
 /// Cheaper classes keep at least this rate,
@@ -39,6 +39,15 @@ struct StrandStreamPlan {
 /// The classes that strands are coded in, best first. First there are fewer strands, then the rate is
 /// lowered, then the bound is coarser.
 std::vector<StrandClass> make_strand_classes(const StrandStreamPlan& plan);
+
+/// A class whose deltas have so many bytes.
+struct MeasuredClass {
+  const StrandClass& row;
+  double delta_bytes = 0.0;
+};
+/// What another class of the same strands takes then, bytes/s, by an estimate.
+double expected_bytes_per_s(const StrandByteModel& model, const MeasuredClass& measured,
+                            const StrandClass& wanted);
 
 /// Strands are served by the scene's codec, and maybe by a second one for viewers that cannot decode it. Each
 /// has all classes, in streams of its own: those of the second begin here.

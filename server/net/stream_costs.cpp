@@ -19,8 +19,10 @@ constexpr double kShortestPictureIntervalS = 1e-3;
 
 }  // namespace
 
-StrandCosts::StrandCosts(std::vector<StrandClass> classes, size_t codec_count)
-    : classes_(std::move(classes)), loads_(codec_count, std::vector<Load>(classes_.size())) {}
+StrandCosts::StrandCosts(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs)
+    : classes_(std::move(classes)),
+      codecs_(std::move(codecs)),
+      loads_(codecs_.size(), std::vector<Load>(classes_.size())) {}
 
 void StrandCosts::note_frame(const FrameHeader& header, size_t bytes, int64_t time_ns) {
   const StrandStream stream = strand_stream_of(header.stream_id);
@@ -38,13 +40,12 @@ std::vector<double> StrandCosts::bytes_per_s(size_t codec) const {
   const auto newest = std::max_element(loads.begin(), loads.end(),
                                        [](const Load& a, const Load& b) { return a.time_ns < b.time_ns; });
   if (newest == loads.end() || newest->time_ns == 0) return {};
-  const StrandClass& reference = classes_[static_cast<size_t>(newest - loads.begin())];
-  const double full = newest->delta_bytes * reference.frame_rate_hz / reference.relative_cost;
+  const MeasuredClass reference{classes_[static_cast<size_t>(newest - loads.begin())], newest->delta_bytes};
   std::vector<double> costs;
   for (size_t i = 0; i < classes_.size(); ++i) {
     const bool is_fresh = loads[i].time_ns > newest->time_ns - kStrandAgeNs && loads[i].time_ns != 0;
     costs.push_back(is_fresh ? loads[i].delta_bytes * classes_[i].frame_rate_hz
-                             : full * classes_[i].relative_cost);
+                             : expected_bytes_per_s(codecs_[codec], reference, classes_[i]));
   }
   return costs;
 }

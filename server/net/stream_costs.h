@@ -16,7 +16,8 @@ using PictureClass = uint32_t;  // viewers of one class get the same rendered fr
 
 class StrandCosts {
  public:
-  explicit StrandCosts(std::vector<StrandClass> classes, size_t codec_count = 1);
+  /// A model for each codec that they are served by.
+  StrandCosts(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs);
 
   /// Best first.
   const std::vector<StrandClass>& classes() const { return classes_; }
@@ -31,6 +32,7 @@ class StrandCosts {
     int64_t time_ns = 0;       // of the newest delta; 0 = none yet
   };
   std::vector<StrandClass> classes_;
+  std::vector<StrandByteModel> codecs_;
   std::vector<std::vector<Load>> loads_;  // by codec and class
 };
 

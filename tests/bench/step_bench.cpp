@@ -1,6 +1,6 @@
 // What the codec "step" takes beside "tangent" on the same frames of the server's own solvers, told all of
 // the wind, its mean or nothing: bits a vertex, CPU milliseconds of both sides, and the largest error. One
-// thread per side.
+// thread per side. --classes yes: what every class of strands takes against the first, by both codecs.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -10,6 +10,10 @@
 #include <string_view>
 
 #include "common/base/profile.h"
+#include "common/strands/strand_codec.h"
+#include "common/strands/strand_prefix.h"
+#include "server/encode/strand_encode_worker.h"
+#include "server/net/strand_class.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_recording.h"
 #include "server/sim/executor/lanes_executor.h"
@@ -24,7 +28,10 @@ struct Options {
   double seconds = 3.0;
   double bound_m = 1e-4;
   MotionPart part = MotionPart::Median;
+  bool has_classes = false;
 };
+
+constexpr size_t kStart = 9;
 
 int64_t cpu_ns() {
   timespec time{};
@@ -37,6 +44,68 @@ double largest_error_m(const std::vector<glm::vec3>& a, const std::vector<glm::v
   for (size_t i = 0; i < a.size(); ++i)
     largest = std::max(largest, static_cast<double>(glm::distance(glm::dvec3(a[i]), glm::dvec3(b[i]))));
   return largest;
+}
+
+struct ClassCost {
+  double bytes_per_s = 0.0;
+  double encode_ms = 0.0, decode_ms = 0.0;  // CPU, of a state
+};
+
+/// As the server encodes a class and its viewers decode it.
+Result<ClassCost> measure_class(const StreamRecording& recording, const std::string& codec, float quantum_m,
+                                const StrandClass& row) {
+  const StreamShape& shape = recording.shape;
+  ASSIGN_OR_RETURN(const auto encoder, make_strand_encoder(codec));
+  ASSIGN_OR_RETURN(const auto decoder, make_strand_decoder(codec, {shape.strand_count, shape.vertex_count}));
+  encoder->set_rest_shape(shape.rest_in_head_m);
+  decoder->set_rest_shape(shape.rest_in_head_m);
+  ClassCost cost;
+  double bytes = 0.0, states = 0.0;
+  for (size_t i = 0; i < recording.frames.size(); i += row.rate_divisor) {
+    Snapshot state = on_lattice(recording.frames[i], quantum_m);
+    if (row.strand_share < 1.0f) state = prefix_of(state, prefix_count(shape.strand_count, row.strand_share));
+    state = coarsen(state, row.coarsening);
+    const int64_t begin_ns = cpu_ns();
+    const EncodedFramePtr frame = encoder->encode(state);
+    const int64_t encoded_ns = cpu_ns();
+    if (frame == nullptr) return make_error(ErrorCode::LimitExceeded, "a frame is too large");
+    ASSIGN_OR_RETURN(const auto decoded, decoder->decode(frame->message));
+    if (i < kStart * row.rate_divisor) continue;
+    bytes += static_cast<double>(frame->message.size());
+    cost.encode_ms += static_cast<double>(encoded_ns - begin_ns) * 1e-6;
+    cost.decode_ms += static_cast<double>(cpu_ns() - encoded_ns) * 1e-6;
+    states += 1.0;
+  }
+  cost.bytes_per_s = bytes / states * row.frame_rate_hz;
+  cost.encode_ms /= states;
+  cost.decode_ms /= states;
+  return cost;
+}
+
+/// Bytes of the classes against the first one, beside what the server expects.
+Status compare_classes(const StreamRecording& recording, double bound_m) {
+  StrandStreamPlan plan;
+  plan.step_rate_hz = 1.0 / kStreamFrameS;
+  plan.bound_m = static_cast<float>(bound_m);
+  plan.strand_count = recording.shape.strand_count;
+  for (const char* codec : {"tangent", "step"}) {
+    ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(codec, plan.bound_m));
+    ASSIGN_OR_RETURN(const StrandCodecInfo info, strand_codec_info(codec));
+    const std::vector<StrandClass> classes = make_strand_classes(plan);
+    double first = 0.0;
+    for (const StrandClass& row : classes) {
+      ASSIGN_OR_RETURN(const ClassCost cost, measure_class(recording, codec, quantum_m, row));
+      if (first == 0.0) first = cost.bytes_per_s;
+      const double expected =
+          expected_bytes_per_s(info.bytes, {classes[0], first / classes[0].frame_rate_hz}, row);
+      fmt::print(
+          "{:8} {:36} {:>7.3f} Mbit/s {:>6.4f} of the first, expected {:>6.4f}; encode {:>5.2f} ms "
+          "decode {:>5.2f} ms\n",
+          codec, to_string(row), 8e-6 * cost.bytes_per_s, cost.bytes_per_s / first, expected / first,
+          cost.encode_ms, cost.decode_ms);
+    }
+  }
+  return {};
 }
 
 Status run(const Options& options) {
@@ -54,7 +123,7 @@ Status run(const Options& options) {
     ASSIGN_OR_RETURN(desc.motion, load_stream_motion(options.motion, {}));
   }
   ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
-  constexpr size_t kStart = 9;
+  if (options.has_classes) return compare_classes(recording, options.bound_m);
   for (const StreamCodecRow& row : own_stream_codecs(options.bound_m)) {
     if (row.name != "tangent" && row.name != "step") continue;
     ASSIGN_OR_RETURN(const auto codec, row.make(recording.shape));
@@ -107,6 +176,7 @@ int main(int argc, char** argv) {
     if (name == "--motion") options.motion = value;
     if (name == "--seconds") options.seconds = std::stod(value);
     if (name == "--bound-mm") options.bound_m = 1e-3 * std::stod(value);
+    if (name == "--classes") options.has_classes = value == "yes";
     if (name == "--part" && value == "wildest") options.part = MotionPart::Wildest;
     if (name == "--size" &&
         std::sscanf(value.c_str(), "%ux%u", &options.size.strand_count, &options.size.vertex_count) != 2)

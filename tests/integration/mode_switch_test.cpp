@@ -228,7 +228,8 @@ TEST_F(ModeSwitching, AutoTakesFramesOnALinkTooSlowForStrandsAndComesBack) {
   ASSERT_TRUE(link);
   ASSERT_NO_FATAL_FAILURE(join(StreamMode::Auto, (*link)->port()));
   // A link that is too slow for the cheapest class.
-  const StrandClass cheapest = make_strand_classes({60.0, 0.0, 1e-4f, kStrands}).back();
+  const std::vector<StrandClass> classes = make_strand_classes({60.0, 0.0, 1e-4f, kStrands});
+  const StrandClass cheapest = classes.back();
   const StrandEncodeCounters before = server_->counters().encode;
   const int64_t begin_ns = now_ns();
   ASSERT_TRUE(pump_until([&] { return viewer_->decoded_frames() >= 90; }));
@@ -240,7 +241,8 @@ TEST_F(ModeSwitching, AutoTakesFramesOnALinkTooSlowForStrandsAndComesBack) {
         "{:.1f} states a second: this machine is too slow to fill a link (sanitizers?)", rate_hz);
   const double full = static_cast<double>(after.delta_bytes - before.delta_bytes) / encodes * 60.0;
   chaos::LinkPlan slow;
-  slow.bytes_per_s = static_cast<uint64_t>(0.3 * cheapest.relative_cost * full);
+  slow.bytes_per_s = static_cast<uint64_t>(
+      0.3 * expected_bytes_per_s(strand_codec_info("tangent")->bytes, {classes[0], full / 60.0}, cheapest));
   (*link)->set_plan(chaos::Direction::Down, slow);
   // On so slow a link the server may try strands again before ten pictures are here, so it is not waited for
   // them.

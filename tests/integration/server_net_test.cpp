@@ -436,9 +436,8 @@ TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
     NetConfig config;
     StrandClass cheaper;
     cheaper.strand_share = 0.25f;
-    cheaper.relative_cost = 0.25;
     config.strand_classes = {StrandClass{}, cheaper};
-    config.strand_codecs = 2;
+    config.strand_codecs.resize(2);
     config.limits.viewer_bytes_per_s = 0.5 * 1'000 * StrandClass{}.frame_rate_hz;
     start(config);
     app_.publish_next(stream_id);
@@ -469,7 +468,7 @@ TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
 
 TEST_F(ServerNet, AViewerGetsFramesOfItsCodecOnly) {
   NetConfig config;
-  config.strand_codecs = 2;
+  config.strand_codecs.resize(2);
   start(config);
   app_.publish_next();
   const auto scenes = join();

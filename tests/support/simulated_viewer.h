@@ -32,6 +32,15 @@ inline StrandStreamPlan built_in_plan() {
   return {.step_rate_hz = 60.0, .bound_m = 1e-4f, .strand_count = 2'000};
 }
 
+/// Classes of such a codec: nothing in a frame is fixed.
+inline constexpr StrandByteModel kSimulatedBytes = {0.0, 0.0, 0.95, 0.54, 0.63};
+
+/// Bytes per second of a class against those of the first.
+inline double relative_cost(const StrandClass& row) {
+  const StrandClass first = make_strand_classes(built_in_plan()).front();
+  return expected_bytes_per_s(kSimulatedBytes, {first, 1.0 / first.frame_rate_hz}, row);
+}
+
 struct Link {
   double bytes_per_s = 1e9;
   int64_t round_trip_ns = 1 * kMs;
@@ -133,7 +142,7 @@ class Viewer {
   void note_cost(double full_bytes_per_s) {
     full_cost_ += (full_cost_ == 0.0 ? 1.0 : kCostSmoothing) * (full_bytes_per_s - full_cost_);
     costs_.clear();
-    for (const StrandClass& row : classes_) costs_.push_back(row.relative_cost * full_cost_);
+    for (const StrandClass& row : classes_) costs_.push_back(relative_cost(row) * full_cost_);
   }
 
   void tick() {
@@ -172,7 +181,7 @@ class Viewer {
     const StrandClass& row = classes_[present];
     const double coarse = (row.coarsening > 1 ? 0.7 : 1.0) * static_cast<double>(row.strand_share);
     const double full_bytes_per_s = content.bytes_per_s * content.activity(time_ns);
-    const double delta_bytes = full_bytes_per_s * row.relative_cost / row.frame_rate_hz;
+    const double delta_bytes = full_bytes_per_s * relative_cost(row) / row.frame_rate_hz;
     // A keyframe brings the state before, and the delta that everybody gets.
     const auto bytes = static_cast<size_t>(
         delta_bytes + (is_keyframe ? coarse * static_cast<double>(content.keyframe_bytes) : 0.0));

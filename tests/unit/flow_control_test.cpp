@@ -111,8 +111,8 @@ TEST(FlowControl, TriesThatFailAreRepeatedAtDoubledTimes) {
   viewer.run(5 * kS);
   const auto classes = make_strand_classes(built_in_plan());
   constexpr size_t kTooMuch = 1;
-  ASSERT_GT(classes[kTooMuch].relative_cost, 0.45);
-  ASSERT_LT(classes[kTooMuch + 1].relative_cost, 0.35);
+  ASSERT_GT(relative_cost(classes[kTooMuch]), 0.45);
+  ASSERT_LT(relative_cost(classes[kTooMuch + 1]), 0.35);
   viewer.link.bytes_per_s = 0.4 * kFullBytesPerS;
   viewer.run(30 * kS);
   viewer.tries.clear();
@@ -142,8 +142,8 @@ TEST(FlowControl, CapIsKept) {
   viewer.cap_bytes_per_s = 0.5 * kFullBytesPerS;
   viewer.run(60 * kS);
   const auto classes = make_strand_classes(built_in_plan());
-  EXPECT_LE(classes[viewer.present].relative_cost, 0.5);
-  EXPECT_GT(classes[viewer.present - 1].relative_cost, 0.5) << "no lower than the cap asks for";
+  EXPECT_LE(relative_cost(classes[viewer.present]), 0.5);
+  EXPECT_GT(relative_cost(classes[viewer.present - 1]), 0.5) << "no lower than the cap asks for";
 }
 
 TEST(FlowControl, WithoutAcknowledgementsNothingIsHeld) {
@@ -232,7 +232,11 @@ TEST(StrandClasses, GetCheaperAndKeepTheirBounds) {
       EXPECT_EQ(classes[0].rate_divisor, 1u);
       EXPECT_EQ(classes[0].bound_m, bound_m);
       for (size_t i = 1; i < classes.size(); ++i) {
-        EXPECT_LT(classes[i].relative_cost, classes[i - 1].relative_cost);
+        for (const StrandCodecInfo& codec : strand_codecs())
+          for (const double bytes : {50.0, 500.0, 50'000.0})
+            EXPECT_LT(expected_bytes_per_s(codec.bytes, {classes[0], bytes}, classes[i]),
+                      expected_bytes_per_s(codec.bytes, {classes[0], bytes}, classes[i - 1]) * (1.0 + 1e-9))
+                << codec.name;
         EXPECT_GE(classes[i].frame_rate_hz, kLeastFrameRateHz);
         EXPECT_LE(classes[i].bound_m, kCoarsestBoundM * 1.0001f);
         // The published lattice is within `bound`; a lattice k times coarser adds at most k times as much.

@@ -63,7 +63,7 @@ TEST(SlowLink, StrandsAreNoCoarserThanTheyMustBe) {
   for (const double mbit_per_s : {2.0, 5.0, 10.0}) {
     SCOPED_TRACE(mbit_per_s);
     size_t fitting = 0;
-    while (classes[fitting].relative_cost * turning_head().bytes_per_s > kUsableShare * mbit_per_s * 125e3)
+    while (relative_cost(classes[fitting]) * turning_head().bytes_per_s > kUsableShare * mbit_per_s * 125e3)
       ++fitting;
     AdaptedViewer viewer(mbit_per_s, 20, 1);
     const int64_t adapted_ns = viewer.time_ns;
