@@ -19,10 +19,21 @@ size_t affordable_class(size_t first, std::span<const double> costs, double allo
   return first;
 }
 
+/// Whether frames wait for decoding; where nothing is known of it, it may be that.
+bool is_viewer_busy(const ClassChoice::Question& question) {
+  const std::span<const double> shares = question.decode_shares;
+  return shares.empty() || shares[question.present] > kBusyDecodeShare;
+}
+
+/// What a cheaper class could shorten.
+int64_t curable_ns(const ClassChoice::Question& question, const ClassChoice::Delay& delay) {
+  return is_viewer_busy(question) ? delay.all_ns : delay.link_ns;
+}
+
 }  // namespace
 
-void ClassChoice::on_delay(int64_t delay_ns, int64_t time_ns) {
-  delays_.push_back({time_ns, static_cast<double>(delay_ns)});
+void ClassChoice::on_delay(const Delay& delay, int64_t time_ns) {
+  delays_.push_back({time_ns, delay});
   while (delays_.front().time_ns < time_ns - kDelayWindowNs) delays_.pop_front();
 }
 
@@ -32,22 +43,23 @@ void ClassChoice::on_chain_loss(int64_t time_ns) {
 }
 
 /// One loss is no trouble: quick hair takes more than the class usually does, for a moment.
-bool ClassChoice::is_troubled(int64_t time_ns) const {
+bool ClassChoice::is_troubled(const Question& question, int64_t time_ns) const {
   const auto recent_losses =
       static_cast<size_t>(std::count_if(losses_ns_.begin(), losses_ns_.end(), [&](int64_t lost_ns) {
         return lost_ns > std::max(quiet_since_ns_, time_ns - kLossWindowNs);
       }));
   if (recent_losses >= kTroublingLosses) return true;
   size_t high = 0, all = 0;
-  for (const TimedValue& sample : delays_) {
+  for (const TimedDelay& sample : delays_) {
     if (sample.time_ns <= quiet_since_ns_) continue;
     ++all;
-    high += sample.value > static_cast<double>(kHighDelayNs) ? 1 : 0;
+    high += curable_ns(question, sample.delay) > kHighDelayNs ? 1 : 0;
   }
   // A queue that drains is no trouble: a keyframe left it behind.
   return all >= kMinDelaySamples && high == all &&
          delays_.back().time_ns - delays_.front().time_ns >= kDelayWindowNs * 3 / 4 &&
-         delays_.back().value > kDrainingShare * delays_.front().value;
+         static_cast<double>(curable_ns(question, delays_.back().delay)) >
+             kDrainingShare * static_cast<double>(curable_ns(question, delays_.front().delay));
 }
 
 void ClassChoice::change(size_t from, size_t to, int64_t time_ns) {
@@ -81,10 +93,10 @@ void ClassChoice::note_demand(double cost, int64_t time_ns) {
 }
 
 /// Frames usually wait; that a client looks for them only now and then does not count.
-bool ClassChoice::has_standing_delay() const {
-  std::vector<double> delays;
-  for (const TimedValue& sample : delays_) delays.push_back(sample.value);
-  return !delays.empty() && median(std::move(delays)) > static_cast<double>(kLowDelayNs);
+bool ClassChoice::has_standing_delay(const Question& question) const {
+  std::vector<int64_t> delays_ns;
+  for (const TimedDelay& sample : delays_) delays_ns.push_back(curable_ns(question, sample.delay));
+  return !delays_ns.empty() && median(std::move(delays_ns)) > kLowDelayNs;
 }
 
 size_t ClassChoice::choose(const Question& question, int64_t time_ns) {
@@ -98,7 +110,7 @@ size_t ClassChoice::choose(const Question& question, int64_t time_ns) {
   if (!question.has_acks || (time_ns - quiet_since_ns_ < kSettleNs && !has_failed)) return question.present;
   const bool is_over_cap =
       question.cap_bytes_per_s > 0.0 && question.costs[question.present] > question.cap_bytes_per_s;
-  const bool must_lower = is_over_cap || has_failed || is_troubled(time_ns);
+  const bool must_lower = is_over_cap || has_failed || is_troubled(question, time_ns);
   return must_lower ? choose_lower(question, time_ns) : choose_better(question, time_ns);
 }
 
@@ -116,11 +128,13 @@ size_t ClassChoice::choose_better(const Question& question, int64_t time_ns) {
   const size_t present = question.present;
   const std::span<const double> costs = question.costs;
   const double allowed = question.allowed_bytes_per_s;
-  const bool has_delay = has_standing_delay();
+  const bool has_delay = has_standing_delay(question);
   // Back to where it went well the way is short; what failed is tried more and more rarely.
   const int64_t wait_ns = present == 0 || present - 1 > failed_class_ ? kFirstProbeNs : probe_ns_;
   if (has_delay) quiet_since_ns_ = std::max(quiet_since_ns_, time_ns - wait_ns / 2);
   if (present == 0 || has_delay || time_ns - quiet_since_ns_ < wait_ns) return present;
+  const std::span<const double> decode_shares = question.decode_shares;
+  if (!decode_shares.empty() && decode_shares[present - 1] > kBusyDecodeShare) return present;
   const double most = costs[present - 1] * demands_.front().value / costs[0];
   if (allowed > 0.0 && (costs[present - 1] > allowed || most > allowed / kUsableShare * kBurstShare))
     return present;

@@ -1,5 +1,6 @@
-// ClassChoice: which class of frames fits a viewer's link. Down at trouble, up one class after quiet time
-// that grows with every try that failed. Plain logic on given times, no I/O and no clock; network thread.
+// ClassChoice: which class of frames fits a viewer's link and its decoding. Down at trouble that a cheaper
+// class can cure, up one class after quiet time that grows with every try that failed. Plain logic on given
+// times, no I/O and no clock; network thread.
 #pragma once
 
 #include <cstddef>
@@ -22,6 +23,9 @@ inline constexpr int64_t kLossWindowNs = 2'000 * kNsPerMs;
 inline constexpr double kUsableShare = 0.85;
 inline constexpr double kBurstShare = 1.4;
 inline constexpr int64_t kDemandWindowNs = 15'000 * kNsPerMs;
+/// A viewer that decodes for so much of the time between two frames is what they wait for. One that does not
+/// and is late all the same lacks its processor: fewer strands would not help it.
+inline constexpr double kBusyDecodeShare = 0.8;
 /// Quiet time before a better class is tried; before one that failed it doubles with every try.
 inline constexpr int64_t kFirstProbeNs = 3'000 * kNsPerMs;
 inline constexpr int64_t kLongestProbeNs = 60'000 * kNsPerMs;
@@ -32,8 +36,12 @@ class ClassChoice {
  public:
   /// Other frames follow: what was seen of the ones before is no reason to change the class.
   void start_over(int64_t time_ns) { quiet_since_ns_ = time_ns; }
-  /// How long an acknowledged frame waited on its way.
-  void on_delay(int64_t delay_ns, int64_t time_ns);
+  /// How long an acknowledged frame waited, by the link alone and in all.
+  struct Delay {
+    int64_t link_ns = 0;
+    int64_t all_ns = 0;
+  };
+  void on_delay(const Delay& delay, int64_t time_ns);
   /// A frame found no place, so that a keyframe is needed.
   void on_chain_loss(int64_t time_ns);
 
@@ -45,6 +53,8 @@ class ClassChoice {
     double allowed_bytes_per_s = 0.0;
     double cap_bytes_per_s = 0.0;  // 0 = none
     bool has_acks = true;          // without them the class stays, but for the first one
+    /// Decoding of each class by this viewer, of the time between two frames; empty = unknown.
+    std::span<const double> decode_shares = {};
   };
   /// Remembers a change as made.
   size_t choose(const Question& question, int64_t time_ns);
@@ -56,11 +66,15 @@ class ClassChoice {
   size_t choose_better(const Question& question, int64_t time_ns);
   bool has_failed_try(int64_t time_ns) const;
   void note_demand(double cost, int64_t time_ns);
-  bool is_troubled(int64_t time_ns) const;
-  bool has_standing_delay() const;
+  bool is_troubled(const Question& question, int64_t time_ns) const;
+  bool has_standing_delay(const Question& question) const;
   void change(size_t from, size_t to, int64_t time_ns);
 
-  std::deque<TimedValue> delays_;   // queue delays of the last kDelayWindowNs
+  struct TimedDelay {
+    int64_t time_ns = 0;
+    Delay delay;
+  };
+  std::deque<TimedDelay> delays_;   // of the last kDelayWindowNs
   std::deque<TimedValue> demands_;  // decreasing maxima: what the next better class would have cost
   std::deque<int64_t> losses_ns_;
   int64_t quiet_since_ns_ = 0;  // the last trouble or change

@@ -2,13 +2,36 @@
 
 #include <algorithm>
 
-namespace strandcast {
+#include "common/base/quantile.h"
 
-void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns) {
-  const std::optional<AckedFrame> frame = gate_.take_acked(stream_id, sequence);
+namespace strandcast {
+namespace {
+
+/// Enough that a viewer which had to wait for its processor while it decoded does not seem slow.
+constexpr size_t kDecodes = 31;
+constexpr size_t kLeastDecodes = 5;
+constexpr double kSPerNs = 1e-9;
+
+}  // namespace
+
+void FlowControl::on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns, const ClientTimes& client) {
+  std::optional<AckedFrame> frame = gate_.take_acked(stream_id, sequence);
   if (!frame) return;
+  frame->client = client;
   queue_delay_ns_ = link_.on_acked(*frame, time_ns);
-  choice_.on_delay(queue_delay_ns_, time_ns);
+  choice_.on_delay({link_.link_delay_ns(), queue_delay_ns_}, time_ns);
+  // A keyframe takes longer, and comes once.
+  if (client.decode_ns <= 0 || frame->is_large) return;
+  decodes_ns_.push_back(client.decode_ns);
+  if (decodes_ns_.size() > kDecodes) decodes_ns_.pop_front();
+}
+
+/// A client of which nothing is heard may be away as well: whether its link is too slow shows when it is
+/// back.
+void FlowControl::on_chain_loss(int64_t time_ns) {
+  const int64_t due_ns = gate_.oldest_due_ns(time_ns);
+  const bool is_silent = due_ns != 0 && time_ns > due_ns + kHighDelayNs;
+  if (!is_silent) choice_.on_chain_loss(time_ns);
 }
 
 bool FlowControl::may_send(int64_t time_ns) const {
@@ -20,15 +43,37 @@ bool FlowControl::may_start(int64_t time_ns) const {
   return may_send(time_ns) && (!has_acks_ || gate_.has_short_queue(time_ns));
 }
 
-size_t FlowControl::choose_class(size_t present, std::span<const double> costs, double cap_bytes_per_s,
-                                 int64_t time_ns) {
-  if (costs.size() < 2 || (has_acks_ && link_.last_ack_ns() == 0)) return present;
+/// Of each class, by its share of the strands and its rate; empty = unknown.
+std::vector<double> FlowControl::decode_shares(const Classes& classes) const {
+  if (classes.strands.size() != classes.costs.size() || decodes_ns_.size() < kLeastDecodes) return {};
+  const auto decode_ns = static_cast<double>(median(std::vector(decodes_ns_.begin(), decodes_ns_.end())));
+  const double all_strands_s = decode_ns * kSPerNs / classes.strands[classes.present].strand_share;
+  std::vector<double> shares;
+  for (const StrandClass& row : classes.strands)
+    shares.push_back(all_strands_s * row.strand_share * row.frame_rate_hz);
+  return shares;
+}
+
+/// Of another class, until it was seen.
+void FlowControl::expect_decodes(const Classes& classes, size_t chosen) {
+  if (classes.strands.size() != classes.costs.size()) return decodes_ns_.clear();
+  const double factor = static_cast<double>(classes.strands[chosen].strand_share) /
+                        static_cast<double>(classes.strands[classes.present].strand_share);
+  for (int64_t& decode_ns : decodes_ns_)
+    decode_ns = static_cast<int64_t>(factor * static_cast<double>(decode_ns));
+}
+
+size_t FlowControl::choose_class(const Classes& classes, int64_t time_ns) {
+  const size_t present = classes.present;
+  if (classes.costs.size() < 2 || (has_acks_ && link_.last_ack_ns() == 0)) return present;
+  const double cap = classes.cap_bytes_per_s;
   const double capacity = link_.capacity_bytes_per_s(time_ns);
   const double usable = kUsableShare * capacity;
-  const double allowed = cap_bytes_per_s <= 0.0 ? usable
-                         : capacity > 0.0       ? std::min(usable, cap_bytes_per_s)
-                                                : cap_bytes_per_s;
-  return choice_.choose({present, costs, allowed, cap_bytes_per_s, has_acks_}, time_ns);
+  const double allowed = cap <= 0.0 ? usable : capacity > 0.0 ? std::min(usable, cap) : cap;
+  const std::vector<double> shares = decode_shares(classes);
+  const size_t chosen = choice_.choose({present, classes.costs, allowed, cap, has_acks_, shares}, time_ns);
+  if (chosen != present) expect_decodes(classes, chosen);
+  return chosen;
 }
 
 }  // namespace strandcast

@@ -5,12 +5,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <span>
+#include <vector>
 
 #include "common/strands/frame_header.h"
 #include "server/net/class_choice.h"
 #include "server/net/link_estimate.h"
 #include "server/net/send_gate.h"
+#include "server/net/strand_class.h"
 
 namespace strandcast {
 
@@ -36,22 +39,27 @@ class FlowControl {
   /// The link has taken a part of this frame.
   void on_written(const FrameHeader& header, int64_t time_ns) { gate_.on_written(header, time_ns); }
   /// Acknowledges this frame and all before it. Numbers that are not on their way are ignored.
-  void on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns);
+  void on_ack(uint16_t stream_id, uint32_t sequence, int64_t time_ns, const ClientTimes& client = {});
   /// A round trip of something small.
   void on_round_trip(int64_t round_trip_ns, int64_t time_ns) { link_.on_round_trip(round_trip_ns, time_ns); }
   /// The client could not use what is on its way: no acknowledgement will come.
   void forget_in_flight() { gate_.forget(); }
   /// A frame found no place, so that a keyframe is needed.
-  void on_chain_loss(int64_t time_ns) { choice_.on_chain_loss(time_ns); }
+  void on_chain_loss(int64_t time_ns);
 
   /// Whether the next media frame may go to the socket.
   bool may_send(int64_t time_ns) const;
   /// Whether a keyframe or whole picture may be asked for: it would be on its way at once.
   bool may_start(int64_t time_ns) const;
 
-  /// The class to be in, given the present one and what each costs, bytes/s, best first; at most
-  /// `cap_bytes_per_s`, 0 = no cap. Call often. Remembers a change as made.
-  size_t choose_class(size_t present, std::span<const double> costs, double cap_bytes_per_s, int64_t time_ns);
+  struct Classes {
+    size_t present = 0;
+    std::span<const double> costs;              // bytes/s of each, best first
+    double cap_bytes_per_s = 0.0;               // of any; 0 = none
+    std::span<const StrandClass> strands = {};  // where they are of strands
+  };
+  /// The class to be in. Call often. Remembers a change as made.
+  size_t choose_class(const Classes& classes, int64_t time_ns);
 
   /// How long data waits on its way, from the newest acknowledgement.
   int64_t queue_delay_ns() const { return queue_delay_ns_; }
@@ -63,11 +71,15 @@ class FlowControl {
   int64_t oldest_due_ns(int64_t time_ns) const { return gate_.oldest_due_ns(time_ns); }
 
  private:
+  std::vector<double> decode_shares(const Classes& classes) const;
+  void expect_decodes(const Classes& classes, size_t chosen);
+
   bool has_acks_ = false;
   LinkEstimate link_;
   SendGate gate_{link_};
   ClassChoice choice_;
   int64_t queue_delay_ns_ = 0;
+  std::deque<int64_t> decodes_ns_;  // of the newest deltas of the present class
 };
 
 }  // namespace strandcast

@@ -26,20 +26,30 @@ struct TimedValue {
   double value = 0.0;
 };
 
+/// What a client says of a frame, in its own time.
+struct ClientTimes {
+  int64_t received_ns = 0;  // by its own clock; 0 = unknown
+  int64_t decode_ns = 0;
+};
+
 /// A frame that the client has acknowledged.
 struct AckedFrame {
   size_t bytes = 0;
   int64_t sent_ns = 0;
   bool is_large = false;   // stands alone: asset or keyframe
   bool was_alone = false;  // nothing else was on its way
+  ClientTimes client = {};
 };
 
 class LinkEstimate {
  public:
   /// Instead of kCapacityAgeNs.
   void remember_capacity_for(int64_t duration_ns) { capacity_age_ns_ = duration_ns; }
-  /// Gives how long the frame waited on its way, ns.
+  /// Gives how long the frame waited on its way and at the client, ns.
   int64_t on_acked(const AckedFrame& frame, int64_t time_ns);
+  /// How long the newest frame had been due already when the client looked last without finding it: what it
+  /// waited less what the client was not there for. All of it from clients that do not say when they receive.
+  int64_t link_delay_ns() const { return link_delay_ns_; }
   /// A round trip of something small.
   void on_round_trip(int64_t round_trip_ns, int64_t time_ns);
 
@@ -54,16 +64,24 @@ class LinkEstimate {
 
  private:
   void note_round_trip(int64_t round_trip_ns, int64_t time_ns);
+  int64_t arrival_ns(const AckedFrame& frame, int64_t time_ns);
+  void note_look(int64_t arrived_ns);
+  int64_t shortest_way_ns() const;
   void note_capacity(const AckedFrame& frame, int64_t round_trip_ns, int64_t time_ns);
-  void note_busy_frame(const AckedFrame& frame, int64_t time_ns);
+  void note_busy_frame(const AckedFrame& frame, int64_t arrived_ns, int64_t time_ns);
   double busy_bytes_per_s(int64_t time_ns) const;
 
   int64_t capacity_age_ns_ = kCapacityAgeNs;
   int64_t last_ack_ns_ = 0;
-  // Acknowledgements come in bunches, as the client looks.
-  int64_t bunch_ns_ = 0;                // the first one of the newest bunch
-  int64_t before_bunch_ns_ = 0;         // the last one before it
+  // Frames come in bunches, as the client looks: by its clock where it tells that, else by when they are
+  // acknowledged.
+  bool has_client_clock_ = true;
+  int64_t arrived_ns_ = 0;       // the newest; 0 = none yet
+  int64_t bunch_ns_ = 0;         // the first one of the newest bunch
+  int64_t before_bunch_ns_ = 0;  // the last one before it
+  int64_t link_delay_ns_ = 0;
   std::deque<TimedValue> round_trips_;  // increasing minima of the last kBaseWindowNs
+  std::deque<TimedValue> ways_;         // likewise, from our clock to the client's
   std::deque<TimedValue> busy_rates_;   // bytes/s while the link was the limit, of spans of kBusySpanNs
   double busy_bytes_ = 0.0;             // of the span under way
   int64_t busy_ns_ = 0;

@@ -8,6 +8,11 @@
 #include "server/net/session_private.h"
 
 namespace strandcast::net {
+namespace {
+
+constexpr int64_t kNsPerUs = 1'000;
+
+}  // namespace
 
 void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
   queue_.set_asset(asset);
@@ -94,7 +99,8 @@ void Session::ask_for_keyframe(int64_t time_ns) {
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
-  flow_.on_ack(ack.stream_id, ack.sequence, time_ns);
+  flow_.on_ack(ack.stream_id, ack.sequence, time_ns,
+               {ack.receive_time_ns, int64_t{ack.decode_us} * kNsPerUs});
   adapt(time_ns);
   ask_for_keyframe(time_ns);
   pump();
@@ -119,7 +125,7 @@ void Session::adapt_pictures(int64_t time_ns) {
   std::vector<double> costs;
   for (const double cost : pictures.costs) costs.push_back(present * cost / pictures.costs[step]);
   const double cap = context_.config.limits.viewer_bytes_per_s;
-  const size_t chosen = flow_.choose_class(step, costs, cap, time_ns);
+  const size_t chosen = flow_.choose_class({step, costs, cap}, time_ns);
   if (chosen == step) return;
   const char* why = chosen < step ? "the link has room" : "the link or this viewer is too slow";
   if (!context_.handler.on_picture_step(id_, chosen, fmt::format("{}: {}", why, describe_link(time_ns))))
@@ -137,7 +143,7 @@ void Session::adapt(int64_t time_ns) {
   if (costs.empty()) return;
   const double cap = context_.config.limits.viewer_bytes_per_s;
   const size_t present = subscription_.strands.strand_class;
-  const size_t chosen = flow_.choose_class(present, costs, cap, time_ns);
+  const size_t chosen = flow_.choose_class({present, costs, cap, context_.strands.classes()}, time_ns);
   if (chosen == present) return;
   change_strand_class(chosen);
   announce_quality(fmt::format("{}: {}; {}",

@@ -48,7 +48,8 @@ class SessionGame {
         break;
       case Step::AckAnything: {
         const auto stream_id = input.take<uint16_t>();
-        flow_.on_ack(stream_id, input.take<uint32_t>(), time_ns_);
+        const auto sequence = input.take<uint32_t>();
+        flow_.on_ack(stream_id, sequence, time_ns_, {input.take<int64_t>(), input.take<uint32_t>()});
         break;
       }
       case Step::Ask:
@@ -86,7 +87,7 @@ class SessionGame {
   }
 
   void adapt() {
-    const size_t chosen = flow_.choose_class(class_, kClassCosts, 0.0, time_ns_);
+    const size_t chosen = flow_.choose_class({class_, kClassCosts}, time_ns_);
     CHECK(chosen < kClassCosts.size());
     if (chosen == class_) return;
     class_ = chosen;

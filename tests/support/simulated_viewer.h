@@ -49,6 +49,13 @@ struct Link {
   int64_t reader_ns = 1;  // the client looks this often for what has come
 };
 
+/// The machine at its end.
+struct Machine {
+  int64_t decode_ns = 0;                                                 // of a state with all strands
+  std::function<bool(int64_t)> is_away = [](int64_t) { return false; };  // others have the processor
+  bool tells_times = true;  // when it receives and how long it decodes
+};
+
 /// What the strands take, all of them at 60 Hz.
 struct Content {
   double bytes_per_s = kFullBytesPerS;
@@ -110,6 +117,7 @@ class Viewer {
 
   Link link;
   Content content;
+  Machine machine;
   FlowControl flow;
   SendQueue queue;
   int64_t time_ns = 1 * kS;
@@ -126,6 +134,10 @@ class Viewer {
   struct OnItsWay {
     EncodedFramePtr frame;
     int64_t ack_ns;
+  };
+  struct Received {
+    EncodedFramePtr frame;
+    int64_t received_ns, begun_ns, left_ns;  // of decoding; not begun: 0
   };
 
   static EncodedFramePtr frame(Opcode opcode, uint32_t sequence, uint16_t stream, size_t bytes) {
@@ -146,11 +158,12 @@ class Viewer {
   }
 
   void tick() {
-    const bool is_looking = time_ns >= looked_ns_ + link.reader_ns;
+    const bool is_looking = time_ns >= looked_ns_ + link.reader_ns && !machine.is_away(time_ns);
     if (is_looking) looked_ns_ = time_ns;
     while (is_looking && reads && !on_its_way_.empty() && on_its_way_.front().ack_ns <= time_ns &&
            !link.is_frozen(time_ns))
-      take_ack();
+      receive();
+    if (!machine.is_away(time_ns)) decode(kMs);
     if (time_ns >= next_step_ns_) {
       next_step_ns_ += kStepNs;
       ++step_;
@@ -197,7 +210,7 @@ class Viewer {
   }
 
   void adapt() {
-    const size_t chosen = flow.choose_class(present, costs_, cap_bytes_per_s, time_ns);
+    const size_t chosen = flow.choose_class({present, costs_, cap_bytes_per_s, classes_}, time_ns);
     if (chosen == present) return;
     if (chosen < present) tries[chosen].push_back(time_ns);
     present = chosen;
@@ -223,15 +236,42 @@ class Viewer {
     }
   }
 
-  void take_ack() {
-    const OnItsWay done = on_its_way_.front();
+  void receive() {
+    const double share = classes_[on_its_way_.front().frame->header.stream_id].strand_share;
+    received_.push_back({on_its_way_.front().frame, time_ns, 0,
+                         static_cast<int64_t>(share * static_cast<double>(machine.decode_ns))});
     on_its_way_.pop_front();
+  }
+
+  void decode(int64_t budget_ns) {
+    while (!received_.empty()) {
+      Received& first = received_.front();
+      if (first.begun_ns == 0) first.begun_ns = time_ns;
+      const int64_t spent_ns = std::min(budget_ns, first.left_ns);
+      budget_ns -= spent_ns;
+      first.left_ns -= spent_ns;
+      if (first.left_ns > 0) return;
+      acknowledge(first);
+      received_.pop_front();
+    }
+  }
+
+  void acknowledge(const Received& done) {
+    constexpr int64_t kClientAheadNs = 5'000 * kS, kLeastDecodeNs = kMs / 10;
     const FrameHeader& header = done.frame->header;
-    flow.on_ack(header.stream_id, header.sequence, time_ns);
+    ClientTimes client;
+    if (machine.tells_times)
+      client = {time_of_receipt_ns(done) + kClientAheadNs, std::max(time_ns - done.begun_ns, kLeastDecodeNs)};
+    flow.on_ack(header.stream_id, header.sequence, time_ns, client);
     if (header.opcode != Opcode::Asset)
       arrivals.push_back({made_ns_[done.frame.get()], time_ns - link.round_trip_ns / 2, header.stream_id,
                           header.opcode == Opcode::StrandKeyframe});
     adapt();
+  }
+
+  int64_t time_of_receipt_ns(const Received& done) {
+    told_ns_ = std::max(told_ns_ + 1, done.received_ns);
+    return told_ns_;
   }
 
   std::vector<StrandClass> classes_;
@@ -239,6 +279,8 @@ class Viewer {
   double full_cost_ = 0.0;
   int64_t looked_ns_ = 0;
   std::deque<OnItsWay> on_its_way_;
+  std::deque<Received> received_;
+  int64_t told_ns_ = 0;
   std::map<const EncodedFrame*, int64_t> made_ns_;
   int64_t pinged_ns_ = 0, pong_ns_ = 0, next_step_ns_ = 0, free_ns_ = 0, keyframe_asked_ns_ = -kS;
   uint64_t step_ = 0;

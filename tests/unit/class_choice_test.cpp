@@ -54,13 +54,47 @@ TEST(ClassChoice, AStandingQueueIsTroubleAndOneThatDrainsIsNot) {
     int64_t time_ns = kBeginNs;
     for (int i = 0; i <= 10; ++i) {
       time_ns = kBeginNs + i * 50 * kNsPerMs;
-      choice.on_delay(static_cast<int64_t>(delay_ms_at(i) * static_cast<double>(kNsPerMs)), time_ns);
+      const auto delay_ns = static_cast<int64_t>(delay_ms_at(i) * static_cast<double>(kNsPerMs));
+      choice.on_delay({delay_ns, delay_ns}, time_ns);
     }
     return choice.choose(at(0, 0.0), time_ns);
   };
   EXPECT_EQ(after_delays([](int) { return 300.0; }), 1u);
   EXPECT_EQ(after_delays([](int i) { return 300.0 - 15.0 * i; }), 0u);
   EXPECT_EQ(after_delays([](int i) { return i == 5 ? 90.0 : 300.0; }), 0u) << "it was not high throughout";
+}
+
+TEST(ClassChoice, WhatACheaperClassDoesNotCureIsNoTrouble) {
+  struct Case {
+    int64_t link_ms, all_ms;
+    double decode_share;
+    size_t expected;
+  };
+  for (const Case& one : {Case{0, 300, 0.33, 0}, Case{300, 300, 0.33, 1}, Case{0, 300, 1.2, 1}}) {
+    ClassChoice choice = settled();
+    const std::vector<double> shares = {one.decode_share, one.decode_share / 2, one.decode_share / 4,
+                                        one.decode_share / 8};
+    size_t chosen = 0;
+    for (int i = 0; i <= 10 && chosen == 0; ++i) {
+      const int64_t time_ns = kBeginNs + i * 50 * kNsPerMs;
+      choice.on_delay({one.link_ms * kNsPerMs, one.all_ms * kNsPerMs}, time_ns);
+      ClassChoice::Question question = at(0, 0.0);
+      question.decode_shares = shares;
+      chosen = choice.choose(question, time_ns);
+    }
+    EXPECT_EQ(chosen, one.expected) << one.link_ms << " ms on the link, decodes " << one.decode_share;
+  }
+}
+
+TEST(ClassChoice, WhatIsTooMuchToDecodeIsNotTried) {
+  for (const double better : {0.7, 0.9}) {
+    ClassChoice choice;
+    choice.start_over(kBeginNs);
+    const std::vector<double> shares = {2 * better, better, better / 2, better / 4};
+    ClassChoice::Question question = at(2, 0.0);
+    question.decode_shares = shares;
+    EXPECT_EQ(choice.choose(question, kBeginNs + kFirstProbeNs), better > kBusyDecodeShare ? 2u : 1u);
+  }
 }
 
 TEST(ClassChoice, AfterQuietTimeOneBetterIsTriedIfTheLinkAllows) {
@@ -104,7 +138,8 @@ TEST(ClassChoice, WhateverHappensItIsOneOfTheClassesAndAtMostOneBetter) {
     for (int i = 0; i < 500; ++i) {
       time_ns += static_cast<int64_t>(random() % 500) * kNsPerMs;
       if (random() % 8 == 0) choice.on_chain_loss(time_ns);
-      choice.on_delay(static_cast<int64_t>(random() % 300) * kNsPerMs, time_ns);
+      const auto all_ms = static_cast<int64_t>(random() % 300);
+      choice.on_delay({all_ms / 2 * kNsPerMs, all_ms * kNsPerMs}, time_ns);
       ClassChoice::Question question = at(present, random() % 3 == 0 ? 0.0 : 1e3 * (random() % 1'000));
       if (random() % 4 == 0) question.cap_bytes_per_s = 300e3;
       const size_t chosen = choice.choose(question, time_ns);

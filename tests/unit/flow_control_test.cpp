@@ -79,6 +79,69 @@ TEST(FlowControl, FreezesCostNoClass) {
   }
 }
 
+// Fewer strands would bring nothing: the link carries ten times what all take, and decoding takes a third of
+// the time, on a machine that does other things as well.
+TEST(FlowControl, AViewerThatLacksItsProcessorKeepsItsStrands) {
+  struct Absence {
+    int64_t period_ns, away_ns;
+  };
+  for (const double decode_share : {0.0, 0.33})
+    for (const Absence& absence :
+         {Absence{kS, 0}, Absence{100 * kMs, 30 * kMs}, Absence{400 * kMs, 200 * kMs}, Absence{kS, 300 * kMs},
+          Absence{2 * kS, 1'000 * kMs}, Absence{7 * kS, 3 * kS}})
+      for (const int64_t round_trip_ms : {1, 40}) {
+        SCOPED_TRACE(fmt::format("decodes {} of the time, away {} of {} ms, {} ms", decode_share,
+                                 absence.away_ns / kMs, absence.period_ns / kMs, round_trip_ms));
+        Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS,
+                       .round_trip_ns = round_trip_ms * kMs,
+                       .jitter_ns = 5 * kMs});
+        viewer.machine.decode_ns = static_cast<int64_t>(decode_share * kStepNs);
+        viewer.machine.is_away = [&](int64_t time_ns) {
+          // Present at first: the asset shows the link.
+          return (time_ns - kS) % absence.period_ns >= absence.period_ns - absence.away_ns;
+        };
+        viewer.run(40 * kS);
+        EXPECT_EQ(viewer.changes, 0u);
+      }
+}
+
+// Nor does a link that is too slow hide behind a viewer that is away now and then.
+TEST(FlowControl, ASlowLinkToAViewerThatIsAwayIsFollowed) {
+  for (const double mbit : {1.0, 3.0}) {
+    SCOPED_TRACE(mbit);
+    Viewer viewer({.bytes_per_s = mbit * 125e3, .round_trip_ns = 30 * kMs, .jitter_ns = 5 * kMs});
+    viewer.machine.is_away = [](int64_t time_ns) { return time_ns % kS < 100 * kMs; };
+    viewer.run(20 * kS);
+    EXPECT_LE(relative_cost(make_strand_classes(built_in_plan())[viewer.present]) * kFullBytesPerS,
+              mbit * 125e3);
+  }
+}
+
+TEST(FlowControl, AViewerThatDecodesForLongerThanAFrameGetsFewerStrands) {
+  for (const double decode_share : {1.2, 2.5, 5.0}) {
+    SCOPED_TRACE(decode_share);
+    Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS, .round_trip_ns = 20 * kMs, .jitter_ns = 5 * kMs});
+    viewer.machine.decode_ns = static_cast<int64_t>(decode_share * kStepNs);
+    viewer.run(15 * kS);
+    const size_t changes = viewer.changes;
+    const int64_t from_ns = viewer.time_ns;
+    viewer.run(60 * kS);
+    const std::vector<StrandClass> classes = make_strand_classes(built_in_plan());
+    EXPECT_LE(decode_share * classes[viewer.present].strand_share, kBusyDecodeShare);
+    EXPECT_GT(decode_share * classes[viewer.present - 1].strand_share, kBusyDecodeShare) << "no fewer";
+    EXPECT_EQ(viewer.changes, changes) << "what it cannot decode is not tried";
+    EXPECT_GE(share_of_full_rate(viewer, from_ns), 0.99);
+  }
+}
+
+// Who tells no times is believed to be slow, as before.
+TEST(FlowControl, OfAViewerThatTellsNoTimesEveryDelayCounts) {
+  Viewer viewer({.bytes_per_s = 10.0 * kFullBytesPerS, .round_trip_ns = 20 * kMs});
+  viewer.machine = {.decode_ns = 2 * kStepNs, .tells_times = false};
+  viewer.run(20 * kS);
+  EXPECT_GT(viewer.present, 0u);
+}
+
 TEST(FlowControl, LongerPathIsNoQueue) {
   Viewer viewer({.round_trip_ns = 20 * kMs});
   viewer.run(10 * kS);

@@ -1,6 +1,10 @@
 // Laws of what is learned about a link from single frames.
 #include "server/net/link_estimate.h"
 
+#include <limits>
+#include <utility>
+#include <vector>
+
 namespace strandcast {
 namespace {
 
@@ -80,6 +84,72 @@ TEST(LinkEstimate, APathThatBecameLongerIsBelievedOfAFrameThatMetNothing) {
   const AckedFrame alone{100, time_ns - 400 * kNsPerMs, false, true};
   EXPECT_EQ(link.on_acked(alone, time_ns), 0) << "a longer way is no queue";
   EXPECT_EQ(link.base_ns(), 400 * kNsPerMs);
+}
+
+/// As its client tells it: received at the end of the way there, by a clock of its own.
+AckedFrame told(const AckedFrame& frame, int64_t received_ns) {
+  AckedFrame with_times = frame;
+  with_times.client = {received_ns + 1'000 * kSecondNs, kNsPerMs};
+  return with_times;
+}
+
+TEST(LinkEstimate, WhatTheClientWasNotThereForIsNoDelayOfTheLink) {
+  LinkEstimate link;
+  int64_t time_ns = kSecondNs;
+  link.on_round_trip(20 * kNsPerMs, time_ns);
+  // A frame each 16 ms; the client looks every 320 ms and acknowledges what lies there, 1 ms each.
+  for (int look = 0; look < 20; ++look) {
+    time_ns += 320 * kNsPerMs;
+    for (int i = 0; i < 20; ++i) {
+      const int64_t sent_ns = time_ns - (20 - i) * 16 * kNsPerMs - 10 * kNsPerMs;
+      const int64_t delay_ns =
+          link.on_acked(told({400, sent_ns, false, false}, time_ns + i), time_ns + (10 + i) * kNsPerMs);
+      EXPECT_GE(delay_ns, (20 - i) * 15 * kNsPerMs) << "in all";
+      EXPECT_LE(link.link_delay_ns(), kLowDelayNs) << look << ", " << i;
+    }
+  }
+  EXPECT_EQ(link.capacity_bytes_per_s(time_ns), 0.0) << "the link was not the limit";
+}
+
+TEST(LinkEstimate, AQueueIsADelayOfTheLinkWhateverTheClientTells) {
+  LinkEstimate link;
+  int64_t time_ns = kSecondNs;
+  link.on_round_trip(20 * kNsPerMs, time_ns);
+  link.on_acked(told({100, time_ns - 20 * kNsPerMs, false, false}, time_ns - 10 * kNsPerMs), time_ns);
+  for (int i = 0; i < 40; ++i) {
+    time_ns += 50 * kNsPerMs;
+    link.on_acked(told(took(570, time_ns, 5'000), time_ns - 10 * kNsPerMs), time_ns);
+  }
+  EXPECT_GE(link.link_delay_ns(), 400 * kNsPerMs);
+  EXPECT_NEAR(link.capacity_bytes_per_s(time_ns), 100e3, 5e3);
+  // And when it has got fast again, nothing of that stays.
+  for (int i = 0; i < 600; ++i) {
+    time_ns += 66 * kNsPerMs;
+    AckedFrame alone = took(320, time_ns, 2'000);
+    alone.was_alone = true;
+    link.on_acked(told(alone, time_ns - 160 * kNsPerMs), time_ns);
+  }
+  EXPECT_LE(link.link_delay_ns(), kLowDelayNs);
+  EXPECT_EQ(link.capacity_bytes_per_s(time_ns), 0.0);
+}
+
+TEST(LinkEstimate, AClientWhoseTimesMakeNoSenseIsTakenByOurs) {
+  constexpr int64_t kLast = std::numeric_limits<int64_t>::max();
+  for (const auto& times : std::vector<std::pair<int64_t, int64_t>>{
+           {0, 0}, {1, 1}, {5, 4}, {-1, -2}, {kLast, kLast}, {kLast, -1}}) {
+    LinkEstimate told_link, link;
+    int64_t time_ns = kSecondNs;
+    for (LinkEstimate* one : {&told_link, &link}) one->on_round_trip(20 * kNsPerMs, time_ns);
+    for (int i = 0; i < 40; ++i) {
+      time_ns += 50 * kNsPerMs;
+      AckedFrame frame = took(570, time_ns, 5'000);
+      link.on_acked(frame, time_ns);
+      frame.client.received_ns = i % 2 == 0 ? times.first : times.second;
+      told_link.on_acked(frame, time_ns);
+    }
+    EXPECT_EQ(told_link.link_delay_ns(), link.link_delay_ns()) << times.first << ", " << times.second;
+    EXPECT_NEAR(told_link.capacity_bytes_per_s(time_ns), link.capacity_bytes_per_s(time_ns), 1.0);
+  }
 }
 
 }  // namespace

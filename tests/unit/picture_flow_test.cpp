@@ -143,7 +143,7 @@ class Viewer {
   void adapt() {
     std::vector<double> costs;
     for (size_t i = 0; i < ladder_.size(); ++i) costs.push_back(cost(i));
-    const size_t chosen = flow_.choose_class(step, costs, 0.0, time_ns);
+    const size_t chosen = flow_.choose_class({step, costs}, time_ns);
     if (chosen == step) return;
     step = chosen;
     ++changes;
