@@ -7,11 +7,9 @@
 #include <cstdlib>
 
 #include "common/base/check.h"
-#include "common/groom/groom_asset.h"
 #include "common/pictures/picture_error.h"
-#include "common/render/render_device.h"
 #include "server/report/stream_pixels.h"
-#include "server/scene/scene_content.h"
+#include "server/report/view_painter.h"
 
 namespace strandcast {
 namespace {
@@ -61,55 +59,6 @@ Result<DecodedStrands> decode_at(const std::string& name, double bound_m, const 
   }
   decoded.mbit_per_s = stream_mbit_per_s(bytes, count - kStartFrames);
   return decoded;
-}
-
-/// A picture and which of its pixels show hair.
-struct HairPicture {
-  Image image;
-  PictureMask hair;
-};
-
-class ViewPainter {
- public:
-  static Result<std::unique_ptr<ViewPainter>> make(const SceneDesc& scene, RenderSize size) {
-    auto painter = std::unique_ptr<ViewPainter>(new ViewPainter(scene, size));
-    ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
-    painter->asset_ = make_scene_asset(content.groom, content.head);
-    ASSIGN_OR_RETURN(painter->device_, RenderDevice::open({"tiles", "auto", {}}));
-    ASSIGN_OR_RETURN(painter->renderer_, painter->device_->make_renderer(RendererKind::Tiles, painter->asset_,
-                                                                         painter->scene_.look));
-    return painter;
-  }
-  Result<Image> image(const PosedStrands& strands, double distance_m,
-                      DebugView debug_view = DebugView::None) {
-    DrawTerms terms;
-    terms.debug_view = debug_view;
-    RETURN_IF_ERROR(renderer_->draw(strands, camera_at(scene_.camera, distance_m), size_, terms));
-    return renderer_->read_image();
-  }
-  /// Hair is what changes when strands have the colours of their directions. A picture of the bald head would
-  /// say the same of skin in the hair's shadow.
-  Result<HairPicture> hair(const PosedStrands& strands, double distance_m) {
-    ASSIGN_OR_RETURN(Image shown, image(strands, distance_m));
-    ASSIGN_OR_RETURN(const Image other, image(strands, distance_m, DebugView::Tangents));
-    PictureMask mask = mask_of(shown, other);
-    return HairPicture{std::move(shown), std::move(mask)};
-  }
-  uint64_t drawn_strands() const { return renderer_->profile().drawn_strands; }
-
- private:
-  ViewPainter(const SceneDesc& scene, RenderSize size) : scene_(scene), size_(size) {}
-
-  SceneDesc scene_;
-  RenderSize size_;
-  SceneAsset asset_;
-  std::unique_ptr<RenderDevice> device_;
-  std::unique_ptr<Renderer> renderer_;
-};
-
-PictureMask either(PictureMask a, const PictureMask& b) {
-  for (size_t i = 0; i < a.size(); ++i) a[i] |= b[i];
-  return a;
 }
 
 /// Crops side by side, each pixel `scale` times as large.
@@ -220,11 +169,6 @@ class ViewRun {
 };
 
 }  // namespace
-
-CameraDesc camera_at(CameraDesc camera, double distance_m) {
-  camera.offset_m *= static_cast<float>(distance_m) / glm::length(camera.offset_m);
-  return camera;
-}
 
 PictureCrop fullest_crop(const std::vector<uint8_t>& mask, RenderSize size, uint32_t side) {
   CHECK(mask.size() == size_t{size.width} * size.height);

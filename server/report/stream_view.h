@@ -75,9 +75,6 @@ Result<StreamView> measure_view(const StreamViewDesc& desc, const SceneDesc& sce
                                 const StreamRecording& recording,
                                 const std::function<void(const std::string& doing)>& on_progress);
 
-/// The camera from so far away, in the same direction.
-CameraDesc camera_at(CameraDesc camera, double distance_m);
-
 /// What "as good" goes by. PSNR is of red, green and blue, which picture codecs keep at half the size; SSIM
 /// is of brightness alone.
 enum class LookMeasure { Psnr, Ssim };

@@ -55,6 +55,10 @@ HtmlCell need_of(const StreamView& view, const std::string& codec, const StreamV
                      best->mbit_per_s);
 }
 
+std::string way_words(Interpolation way) {
+  return way == Interpolation::None ? "the state before" : to_string(way);
+}
+
 /// The best that any picture codec does with the strands' rate.
 std::string look_with_same_rate(const StreamView& view, const StreamViewRow& strands) {
   std::string best;
@@ -202,6 +206,40 @@ void add_view_sections(HtmlPage& page, const StreamView& view) {
   page.table(pixel_table(view, LookMeasure::Ssim));
   for (const double distance_m : kViewDistancesM)
     page.figure(pixel_plot(view, distance_m), "Upper left is better.");
+}
+
+HtmlTable playout_table(const std::vector<PlayoutRow>& rows) {
+  HtmlTable table;
+  table.columns = {"head", "shown between states", "off in the world, rms mm", "PSNR, dB", "SSIM", "dE"};
+  for (const PlayoutRow& row : rows)
+    table.rows.push_back({row.motion, way_words(row.interpolation),
+                          fmt::format("{:.3f}", mm(row.rms_error_m)), fmt::format("{:.1f}", row.psnr_db),
+                          fmt::format("{:.3f}", row.ssim), fmt::format("{:.2f}", row.delta_e)});
+  return table;
+}
+
+void add_playout_section(HtmlPage& page, const std::vector<PlayoutRow>& rows, const std::string& note) {
+  if (rows.empty()) return;
+  page.heading("Between states");
+  page.paragraph(fmt::format(
+      "Smooth playout of 30 states a second: pictures of moments halfway between two states, against the "
+      "picture of "
+      "the state that was there at 60 Hz, {} of each head's median half second, near, in the hair's pixels. "
+      "The line is "
+      "shown one frame late, the cubic two. States are the exact floats; the camera goes along with the head "
+      "that is shown. {}",
+      rows.front().compared_pictures, note));
+  page.table(playout_table(rows));
+}
+
+std::string playout_csv(const std::vector<PlayoutRow>& rows) {
+  CsvFile csv(
+      {"motion", "solver", "interpolation", "pictures", "rms_error_mm", "psnr_db", "ssim", "delta_e"});
+  for (const PlayoutRow& row : rows)
+    csv.add_row({row.motion, row.solver, to_string(row.interpolation),
+                 fmt::format("{}", row.compared_pictures), csv_number(mm(row.rms_error_m)),
+                 csv_number(row.psnr_db), csv_number(row.ssim), csv_number(row.delta_e)});
+  return csv.text();
 }
 
 std::string view_csv(const StreamView& view) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "server/report/html_page.h"
+#include "server/report/stream_playout.h"
 #include "server/report/stream_view.h"
 
 namespace strandcast {
@@ -19,6 +20,11 @@ std::string pixel_plot(const StreamView& view, double distance_m);
 
 /// Adds both sections with their pictures.
 void add_view_sections(HtmlPage& page, const StreamView& view);
+
+/// What is shown between states at 30 Hz; nothing without rows.
+HtmlTable playout_table(const std::vector<PlayoutRow>& rows);
+void add_playout_section(HtmlPage& page, const std::vector<PlayoutRow>& rows, const std::string& note);
+std::string playout_csv(const std::vector<PlayoutRow>& rows);
 
 std::string view_csv(const StreamView& view);
 std::string pixel_csv(const StreamView& view);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <optional>
 #include <set>
 
 #include "common/base/check.h"
@@ -37,6 +38,7 @@ constexpr double kViewCodecShare = 1.0 / 6.0;  // of a run of a codec: few of th
 constexpr uint32_t kLeastViewSide = 64;
 constexpr RenderSize kFullView{1280, 720};
 constexpr RenderSize kQuickView{320, 180};
+constexpr RenderSize kPlayoutView{640, 360};
 
 struct Clock {
   double wall_ms = 0.0;
@@ -132,6 +134,8 @@ struct Plan {
   std::vector<StreamCase> cases;
   StreamViewDesc view;
   size_t view_motion = 0;  // index
+  StreamPlayoutDesc playout;
+  std::optional<size_t> playout_clip;  // a captured head beside it
   StreamSize view_strands;
   std::vector<StreamSize> sizes;
   double seconds = 0.0;
@@ -195,6 +199,17 @@ Status plan_motions(const StreamingOptions& options, Plan& plan) {
   return {};
 }
 
+/// Walking where there is any; nothing when no other captured head than that of the view is there.
+std::optional<size_t> captured_clip(const Plan& plan, const std::vector<MotionLevel>& levels) {
+  std::optional<size_t> found;
+  for (size_t i = 0; i < plan.motions.size(); ++i) {
+    const bool is_captured = std::isfinite(plan.motions[i].duration_s);
+    if (!is_captured || i == plan.view_motion) continue;
+    if (!found || (levels[i] == MotionLevel::Active && levels[*found] != MotionLevel::Active)) found = i;
+  }
+  return found;
+}
+
 Result<Plan> make_plan(const StreamingOptions& options) {
   Plan plan;
   RETURN_IF_ERROR(plan_settings(options, plan));
@@ -205,6 +220,9 @@ Result<Plan> make_plan(const StreamingOptions& options) {
   // Walking where there is any.
   const auto walk = std::find(levels.begin(), levels.end(), MotionLevel::Active);
   if (walk != levels.end()) plan.view_motion = static_cast<size_t>(walk - levels.begin());
+  plan.playout_clip = captured_clip(plan, levels);
+  plan.playout.size = {std::min(plan.view.size.width, kPlayoutView.width),
+                       std::min(plan.view.size.height, kPlayoutView.height)};
   return plan;
 }
 
@@ -224,6 +242,8 @@ class StreamingRun {
  public:
   StreamingRun(StreamingReport& report, Executor* executor, const Plan& plan)
       : report_(report), executor_(executor), plan_(plan), progress_({"streaming"}) {
+    const uint32_t playouts = plan.playout_clip ? 2 : 1;
+    progress_.expect(playouts, playouts * playout_cost());
     progress_.expect(1 + view_step_count(),
                      kRecordingCost * codec_cost(plan.view_strands) + view_cost() * view_step_count());
     for (const StreamCase& one : plan.cases) {
@@ -275,10 +295,34 @@ class StreamingRun {
     };
     ASSIGN_OR_RETURN(report_.view, measure_view(plan_.view, recorded_scene(desc), recording, on_progress));
     while (left > 0) on_progress("done");
-    return {};
+    RETURN_IF_ERROR(add_playout(desc, recording));
+    return add_captured_playout(desc);
   }
 
  private:
+  Status add_playout(const RecordingDesc& desc, const StreamRecording& recording) {
+    progress_.begin_run("playout: " + desc.motion.name);
+    ASSIGN_OR_RETURN(const std::vector<PlayoutRow> rows,
+                     measure_playout(plan_.playout, recorded_scene(desc), recording));
+    report_.playout.insert(report_.playout.end(), rows.begin(), rows.end());
+    progress_.end_run(playout_cost());
+    return {};
+  }
+
+  Status add_captured_playout(RecordingDesc desc) {
+    if (!plan_.playout_clip) {
+      report_.playout_note =
+          "No captured head was there to show between states, too (--clips FOLDER brings some).";
+      return {};
+    }
+    desc.motion = plan_.motions[*plan_.playout_clip];
+    ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
+    return add_playout(desc, recording);
+  }
+
+  double playout_cost() const {
+    return kViewCostPerPixel * static_cast<double>(plan_.playout.size.width) * plan_.playout.size.height;
+  }
   double codec_cost(const StreamSize& size) const {
     return static_cast<double>(size.vertices()) * report_.seconds / kStreamFrameS;
   }

@@ -10,6 +10,7 @@
 
 #include "server/report/stream_codec.h"
 #include "server/report/stream_latency.h"
+#include "server/report/stream_playout.h"
 #include "server/report/stream_recording.h"
 #include "server/report/stream_view.h"
 
@@ -97,6 +98,8 @@ struct StreamingReport {
   std::vector<StreamRecording> recordings;  // without their frames
   StreamLatency latency;
   StreamView view;
+  std::vector<PlayoutRow> playout;
+  std::string playout_note;  // a head that it lacks
 };
 
 /// Runs everything; prints progress. `on_recording` gets what is known after each recording: a run of many

@@ -352,6 +352,7 @@ std::string streaming_page(const StreamingReport& report) {
   page.table(needs_table(report));
   if (const std::string clips = clips_text(report); !clips.empty()) page.paragraph(clips);
   add_view_sections(page, report.view);
+  add_playout_section(page, report.playout, report.playout_note);
   page.heading("Goals");
   const std::vector<GoalLine> goals = judge_streaming(report);
   const auto count = [&](Verdict verdict) {
@@ -391,6 +392,10 @@ std::string streaming_summary(const StreamingReport& report) {
   for (const StreamViewRow& row : report.view.rows)
     text += fmt::format("{} at {:.2f} mm from {:g} m: {:.1f} dB, SSIM {:.3f}\n", row.codec, mm(row.bound_m),
                         row.distance_m, row.psnr_db, row.ssim);
+  for (const PlayoutRow& row : report.playout)
+    text += fmt::format("between states at 30 Hz, {}, {}: {:.1f} dB, SSIM {:.3f}\n", row.motion,
+                        to_string(row.interpolation), row.psnr_db, row.ssim);
+  if (!report.playout_note.empty()) text += report.playout_note + "\n";
   size_t unmeasured = 0;
   for (const GoalLine& line : judge_streaming(report)) {
     if (line.verdict == Verdict::NotMeasured)
@@ -415,6 +420,7 @@ Status save_streaming(const StreamingReport& report, const std::filesystem::path
   RETURN_IF_ERROR(save_text(folder / "streaming_time.svg", streaming_time_plot(report)));
   RETURN_IF_ERROR(save_text(folder / "streaming_motion.svg", streaming_motion_plot(report)));
   RETURN_IF_ERROR(save_text(folder / "streaming_view.csv", view_csv(report.view)));
+  RETURN_IF_ERROR(save_text(folder / "streaming_playout.csv", playout_csv(report.playout)));
   RETURN_IF_ERROR(save_text(folder / "streaming_pixels.csv", pixel_csv(report.view)));
   RETURN_IF_ERROR(save_text(folder / "streaming_view.svg", view_plot(report.view)));
   return save_text(folder / kStreamingPage, streaming_page(report));

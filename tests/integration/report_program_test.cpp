@@ -206,6 +206,7 @@ TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
   EXPECT_THAT(load_text(out / "streaming_view.svg", 1u << 24).value(), HasSubstr("from 3 m"));
   rows_ = parse_csv(load_text(out / "streaming_view.csv", 1u << 20).value());
   EXPECT_EQ(rows_.size(), 2 * 2 * all_bounds.size()) << "near and far, two codecs";
+  EXPECT_THAT(load_text(out / "streaming_playout.csv", 1u << 20).value(), HasSubstr("cubic"));
   rows_ = parse_csv(load_text(out / "streaming_pixels.csv", 1u << 20).value());
   EXPECT_GT(rows_.size(), 0u);
 }

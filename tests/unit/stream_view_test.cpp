@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include "common/pictures/picture.h"
 #include "server/report/stream_pixels.h"
+#include "server/report/stream_playout.h"
 #include "server/report/stream_view_page.h"
+#include "server/report/view_painter.h"
 
 namespace strandcast {
 namespace {
@@ -147,6 +150,55 @@ TEST(StreamView, FinerStrandsLookMoreLikeTheExactOnesAndTakeMore) {
   EXPECT_THAT(view_plot(*view), HasSubstr("tangent from 0.66 m"));
   const std::string csv = view_csv(*view);
   EXPECT_EQ(static_cast<size_t>(std::count(csv.begin(), csv.end(), '\n')), view->rows.size() + 1);
+}
+
+// On the built-in walk, which is smooth, and on a captured one, whose head trembles.
+TEST(StreamPlayout, LooksNearerToTheStateOnTheCubicThanOnTheLineAndThanTheStateBefore) {
+  std::vector<StreamMotion> motions = {built_in_stream_motions()[1]};
+  const std::filesystem::path clip = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap/cmu_131_03.bvh";
+  if (std::filesystem::exists(clip)) motions.push_back(load_stream_motion(clip, {}).value());
+  for (const StreamMotion& motion : motions) {
+    SCOPED_TRACE(motion.name);
+    const RecordingDesc desc{motion, {200, 16}, 0.25, "", nullptr};
+    const auto recording = record_strands(desc);
+    ASSERT_TRUE(recording.ok()) << recording.error().to_string();
+    const auto rows = measure_playout({{160, 90}, 3}, recorded_scene(desc), *recording);
+    ASSERT_TRUE(rows.ok()) << rows.error().to_string();
+    ASSERT_EQ(rows->size(), 3u);
+    const PlayoutRow& held = (*rows)[0];
+    const PlayoutRow& line = (*rows)[1];
+    const PlayoutRow& cubic = (*rows)[2];
+    EXPECT_EQ(held.interpolation, Interpolation::None);
+    EXPECT_EQ(line.interpolation, Interpolation::Linear);
+    EXPECT_EQ(cubic.interpolation, Interpolation::Cubic);
+    EXPECT_LT(line.rms_error_m, held.rms_error_m);
+    EXPECT_LT(cubic.rms_error_m, line.rms_error_m);
+    EXPECT_GT(line.psnr_db, held.psnr_db);
+    EXPECT_GE(cubic.psnr_db, line.psnr_db);
+    EXPECT_GE(cubic.ssim, line.ssim);
+    EXPECT_EQ(playout_table(*rows).rows.size(), rows->size());
+    EXPECT_THAT(playout_csv(*rows), HasSubstr("cubic"));
+  }
+  if (motions.size() == 1) GTEST_SKIP() << "the captured walk needs ../shared/data: there is no " << clip;
+}
+
+TEST(StreamPlayout, AStateThatWasThereIsShownAsItWas) {
+  const RecordingDesc desc{built_in_stream_motions()[1], {60, 8}, 0.25, "", nullptr};
+  auto recording = record_strands(desc);
+  ASSERT_TRUE(recording.ok()) << recording.error().to_string();
+  // Nothing moves: every way shows the state.
+  for (StreamFrame& frame : recording->frames) {
+    frame.position_in_head_m = recording->frames[0].position_in_head_m;
+    frame.published.world_from_head = recording->frames[0].published.world_from_head;
+  }
+  const auto rows = measure_playout({{160, 90}, 1}, recorded_scene(desc), *recording);
+  ASSERT_TRUE(rows.ok()) << rows.error().to_string();
+  for (const PlayoutRow& row : *rows) {
+    EXPECT_LT(row.rms_error_m, 1e-7);
+    EXPECT_GT(row.psnr_db, 60.0);
+  }
+  recording->frames.resize(6);
+  EXPECT_FALSE(measure_playout({{160, 90}, 1}, recorded_scene(desc), *recording).ok()) << "no cubic fits";
 }
 
 }  // namespace

@@ -1,0 +1,39 @@
+// StreamPlayout: what a viewer shows between states. Every second state of a recording is taken away, as a
+// stream of 30 states a second does, and what a viewer draws in its place is held against the picture of the
+// state itself. States are the exact floats: what codecs add is StreamView's. Drawn in tiles on the
+// processors.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/picture_size.h"
+#include "common/replay/interpolation.h"
+#include "common/scene/scene_desc.h"
+#include "server/report/stream_recording.h"
+
+namespace strandcast {
+
+struct StreamPlayoutDesc {
+  RenderSize size{640, 360};
+  size_t compared_pictures = 4;  // evenly spaced
+  double distance_m = 0.66;
+};
+
+/// One way to show moments between states of one recording: means over the compared pictures.
+struct PlayoutRow {
+  std::string motion;
+  std::string solver;
+  Interpolation interpolation = Interpolation::None;  // None: the state before is shown
+  size_t compared_pictures = 0;
+  double rms_error_m = 0.0;  // of vertices, in the world
+  double psnr_db = 0.0;      // in the hair's pixels
+  double ssim = 0.0;
+  double delta_e = 0.0;
+};
+
+/// A row for each Interpolation. BadInput for a recording of fewer than seven frames.
+Result<std::vector<PlayoutRow>> measure_playout(const StreamPlayoutDesc& desc, const SceneDesc& scene,
+                                                const StreamRecording& recording);
+
+}  // namespace strandcast
