@@ -59,8 +59,9 @@ std::vector<std::string> methods_of(const WorkReport& report) {
   return methods;
 }
 
-/// A plot of points with each method's front joined by a line.
-std::string front_plot(const WorkReport& report, const std::vector<WorkPoint>& points, PlotDesc desc) {
+/// A plot of points with each method's front joined by a line, and of other fronts beside them.
+std::string front_plot(const WorkReport& report, const std::vector<WorkPoint>& points, PlotDesc desc,
+                       const std::vector<PlotSeries>& beside = {}) {
   std::vector<PlotSeries> fronts;
   for (const std::string& method : methods_of(report)) {
     std::vector<WorkPoint> own;
@@ -79,6 +80,7 @@ std::string front_plot(const WorkReport& report, const std::vector<WorkPoint>& p
     fronts.push_back(std::move(front));
   }
   desc.series.insert(desc.series.end(), fronts.begin(), fronts.end());
+  desc.series.insert(desc.series.end(), beside.begin(), beside.end());
   desc.x.title = kFrameTimeTitle;
   return make_svg_plot(desc);
 }
@@ -91,6 +93,21 @@ std::vector<WorkPoint> points_of(const WorkReport& report, const std::string& te
       points.push_back({record.setting.row->name, record.us, record.result.error, to_string(record.setting)});
   }
   return points;
+}
+
+/// The front of all models on each other executor, so that one plot shows what the executor is worth.
+std::vector<PlotSeries> other_fronts(const WorkReport& report, MotionHair hair, const std::string& device) {
+  std::vector<PlotSeries> fronts;
+  auto style = static_cast<int>(methods_of(report).size());
+  for (const std::string& other : front_devices(report)) {
+    if (other == device) continue;
+    PlotSeries front{"best" + on_device(other), {}, PlotMark::LineAndDots, style++};
+    const std::vector<WorkPoint> points = motion_points(report, hair, other);
+    for (const size_t i : pareto_front(points))
+      if (points[i].error < kWorstPlotted) front.points.push_back(plotted(points[i]));
+    if (!front.points.empty()) fronts.push_back(std::move(front));
+  }
+  return fronts;
 }
 
 /// Whether any model beats the champion on this hair, in a sentence.
@@ -401,7 +418,8 @@ std::string motion_plot(const WorkReport& report, MotionHair hair, const std::st
                            to_string(hair), report.motion_name);
   desc.y.title = "RMS position error over the length";
   desc.guides = {{"1 %", kChampionErrorLimit}};
-  return front_plot(report, motion_points(report, hair, device), std::move(desc));
+  return front_plot(report, motion_points(report, hair, device), std::move(desc),
+                    other_fronts(report, hair, device));
 }
 
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title) {
@@ -424,7 +442,8 @@ std::string work_precision_page(const WorkReport& report) {
       add_picks(page, report, hair, device);
       page.figure(
           motion_plot(report, hair, device),
-          "Lines join the runs of a model that no other run of it beats; faint marks are all other runs. "
+          "Lines join the runs of a model that no other run of it beats; faint marks are all other runs; "
+          "\"best on\" another executor joins those that no run of any model beats there. "
           "Rest the mouse on a mark for its setting.");
     }
     add_devices(page, report, hair);

@@ -34,7 +34,8 @@ std::string work_precision_summary(const WorkReport& report);
 std::string work_precision_csv(const WorkReport& report);
 std::string work_precision_page(const WorkReport& report);
 
-/// Error against time on the motion set: all runs faint, each model's front as a line.
+/// Error against time on the motion set: all runs faint, each model's front as a line, and the front of all
+/// models on every other executor.
 std::string motion_plot(const WorkReport& report, MotionHair hair, const std::string& device = "");
 /// Error against time of one analytic test, on the first executor.
 std::string analytic_plot(const WorkReport& report, const std::string& test, const std::string& title);

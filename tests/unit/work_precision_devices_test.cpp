@@ -92,6 +92,10 @@ TEST(WorkPrecisionDevices, ThePageShowsBothFrontsAndWhatLanesSave) {
                     HasSubstr("lanes take 0.21 times what gl takes, in the median of 2 models")));
   const std::string plot = devices_plot(report, MotionHair::Straight);
   EXPECT_THAT(plot, AllOf(HasSubstr(">gl</text>"), HasSubstr(">lanes</text>")));
+  const std::string on_lanes = motion_plot(report, MotionHair::Straight, "lanes");
+  EXPECT_THAT(on_lanes, AllOf(HasSubstr("on lanes"), HasSubstr(">dftl</text>"),
+                              HasSubstr(">best on gl</text>"), Not(HasSubstr(">best on lanes</text>"))));
+  EXPECT_THAT(motion_plot(report, MotionHair::Straight, "gl"), HasSubstr(">best on lanes</text>"));
   const std::string page = work_precision_page(report);
   EXPECT_THAT(page, AllOf(HasSubstr("gl, lanes beside each other"), HasSubstr(plot),
                           HasSubstr("a machine&#39;s gl and on a machine&#39;s lanes"),
