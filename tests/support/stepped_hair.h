@@ -53,7 +53,7 @@ class SteppedHair {
 
   explicit SteppedHair(const SceneDesc& scene) : SteppedHair(scene, loaded(scene)) {}
   SteppedHair(const SceneDesc& scene, Groom groom)
-      : SteppedHair(scene, SceneContent{std::move(groom), {}, {}, scene.colliders, {}}) {}
+      : SteppedHair(scene, content_of(scene, std::move(groom))) {}
 
   /// (vertex_count x strand_count), strand fastest
   const std::vector<glm::vec3>& rest_in_head_m() const { return rest_in_head_m_; }
@@ -119,6 +119,12 @@ class SteppedHair {
   void tell_model() { log_.set_model(solver_->step_model()); }
 
  private:
+  static SceneContent content_of(const SceneDesc& scene, Groom groom) {
+    SceneContent content;
+    content.groom = std::move(groom);
+    content.colliders = scene.colliders;
+    return content;
+  }
   SteppedHair(const SceneDesc& scene, SceneContent content)
       : scene_(scene),
         content_(std::move(content)),
@@ -149,6 +155,7 @@ class SteppedHair {
     SolverContext context{executor_.get(), features_};
     context.groom_gravity_in_head_mps2 = builder_.groom_gravity_in_head_mps2();
     context.volume = scene_.volume;
+    context.bend_limit = scene_.bend_limit;
     auto solver = row->make(parameters, context);
     EXPECT_TRUE(solver) << solver.error().to_string();
     return std::move(solver).value();
