@@ -18,9 +18,9 @@ struct SceneContent {
   Mesh head;    // empty when not visible
   // Head space: the head as spheres, visible or not; empty where it collides as a field.
   std::vector<SphereCollider> head_colliders;
-  std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one
   std::vector<SphereCollider> colliders;            // head space: the scene's own, or those of the head
   std::vector<std::string> notes;                   // a sentence for each thing that was guessed or fitted
+  std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one
 };
 
 /// Loads or grows the groom and the head. Errors name the file or the option.

@@ -156,6 +156,7 @@ class SteppedHair {
     context.groom_gravity_in_head_mps2 = builder_.groom_gravity_in_head_mps2();
     context.volume = scene_.volume;
     context.bend_limit = scene_.bend_limit;
+    context.head_field = content_.head_field;
     auto solver = row->make(parameters, context);
     EXPECT_TRUE(solver) << solver.error().to_string();
     return std::move(solver).value();

@@ -367,6 +367,28 @@ TEST(StepCodec, GoesOnThroughWhatHappensToAScene) {
 }
 
 // States of a paused simulation come again and again.
+TEST(StepCodec, AHeadThatItDoesNotKnowCostsBitsAndNothingElse) {
+  for (const char* solver : {"dftl", "direct_rod"}) {
+    SCOPED_TRACE(solver);
+    SceneDesc scene = stepped_scene(300, 16, solver);
+    scene.head.collider = kFieldCollider;
+    SteppedHair hair(scene);
+    hair.settle(30);
+    Stream stream(hair), other(hair, "tangent");
+    size_t bytes = 0, tangent_bytes = 0;
+    for (int frame = 0; frame < 60; ++frame) {
+      const SteppedState state = hair.step();
+      stream.pass(state);
+      other.pass(state);
+      if (frame < 10) continue;
+      bytes += stream.bytes();
+      tangent_bytes += other.bytes();
+    }
+    EXPECT_EQ(stream.keyframes, 1);
+    EXPECT_LT(bytes, tangent_bytes) << "still worth it";
+  }
+}
+
 TEST(StepCodec, APauseForgetsNothing) {
   for (const std::string& solver : kSolvers) {
     SCOPED_TRACE(solver);
