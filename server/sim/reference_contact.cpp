@@ -85,8 +85,10 @@ glm::dvec3 turned_onto_sphere(const ReferenceSegment& segment, const glm::dvec3&
 glm::dvec3 pushed_out(const StepInput& input, const glm::dquat& carry, double friction,
                       ReferenceSegment segment) {
   for (int round = 0; round < push_rounds(input); ++round) {
-    const ReferenceSphere sphere = deepest_sphere(input, segment.end_m);
-    if (sphere.radius_m <= 0.0) break;
+    ReferenceSphere sphere = deepest_sphere(input, segment.end_m);
+    if (segment.groomed_m)
+      sphere.radius_m = std::min(sphere.radius_m, glm::distance(*segment.groomed_m, sphere.center_m));
+    if (glm::distance(segment.end_m, sphere.center_m) >= sphere.radius_m) break;
     segment.end_m = held_by_friction(segment.old_m, segment.end_m, carry, friction, sphere);
     segment.end_m = turned_onto_sphere(segment, sphere.center_m, sphere.radius_m);
   }

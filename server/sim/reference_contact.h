@@ -4,6 +4,7 @@
 
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <optional>
 
 #include "server/sim/solver.h"
 
@@ -35,6 +36,7 @@ struct ReferenceSegment {
   glm::dvec3 start_m{0.0};
   glm::dvec3 end_m{0.0};
   double length_m = 0.0;
+  std::optional<glm::dvec3> groomed_m = {};  // where the end may stay, inside of a sphere or not
 };
 
 /// The end turned about the start until it is outside all spheres (two rounds, out of the deepest first) and

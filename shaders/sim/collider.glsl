@@ -30,6 +30,13 @@ vec3 turned_onto_sphere(vec3 start, vec3 direction, float segment, vec3 center, 
 }
 
 #if COLLIDERS >= 1
+// A sphere as a strand meets it that begins at a place inside of it: no larger than leaves that place.
+vec4 around_groomed(vec4 sphere, vec3 groomed) {
+  const vec3 outward = groomed - sphere.xyz;
+  const float squared = dot(outward, outward);
+  return vec4(sphere.xyz, select(squared < sphere.w * sphere.w, sqrt(squared), sphere.w));
+}
+
 // The sphere that a point is deepest inside of, by r^2 - d^2; its radius is 0 when the point is in none.
 vec4 deepest_collider(vec3 point) {
   vec4 deepest = vec4(0.0);

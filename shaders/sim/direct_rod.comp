@@ -277,6 +277,7 @@ void finish(Rod rod) {
 #if HAS_PINNED_TAIL || COLLIDERS > 0
     Vertex vertex;
     vertex.target = segment * along;
+    vertex.groomed = target_at(at);
     vertex.segment = segment;
     vertex.old = node.stored;
     vertex.arc = 0.0;

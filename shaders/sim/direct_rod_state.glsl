@@ -1,4 +1,7 @@
 // State and geometry of the strands of direct_rod. Every quantity is per mass per length.
+// A vertex that is groomed inside of a collider may stay there: a rod that is pushed out of its shape in every step,
+// behind the back of its solve, is driven by that and whirls for good.
+#define BEGINS_INSIDE 1
 #include "sim/follow.glsl"
 
 // Planes of one vertex per strand: position, velocity, displacement and velocity change as in step.glsl, with

@@ -12,6 +12,9 @@ struct Vertex {
   float arc;       // 0 at the root, 1 at the tip
   vec3 predicted;  // where forces alone would take it
   vec3 velocity;   // before the substep, relative to the head joint's during it
+#ifdef BEGINS_INSIDE
+  vec3 groomed;    // `target` is something else
+#endif
   float inertia;   // how hard it holds to the prediction: 1 + what drag and pull add in an implicit step
 };
 
@@ -116,8 +119,17 @@ vec3 placed(vec3 start, vec3 start_target, Vertex vertex, vec3 anchor, float rea
 
 #if COLLIDERS >= 1
   for (int round = 0; round < PUSH_ROUNDS; ++round) {
+#ifdef BEGINS_INSIDE
+    vec4 deepest = deepest_collider(end);
+    lane_bool is_inside = deepest.w > 0.0;
+    if (!is_any(is_inside)) break;
+    deepest = around_groomed(deepest, vertex.groomed);
+    const vec3 outward = end - deepest.xyz;
+    is_inside = is_inside && dot(outward, outward) < deepest.w * deepest.w;
+#else
     const vec4 deepest = deepest_collider(end);
     const lane_bool is_inside = deepest.w > 0.0;
+#endif
     if (!is_any(is_inside)) break;
     const float per_segment = 1.0 / max(vertex.segment, kTinySquared);
     const vec3 held = (held_by_friction(vertex.old, end, deepest) - start) * per_segment;
