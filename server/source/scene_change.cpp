@@ -9,6 +9,13 @@
 #include "server/source/wet_hair.h"
 
 namespace strandcast {
+namespace {
+
+bool bears_volume(const SolverRow& row) {
+  return row.has_kernel && row.bears_volume;
+}
+
+}  // namespace
 
 const std::vector<std::string>& live_fields() {
   static const std::vector<std::string> kFields = {"solver",
@@ -35,7 +42,10 @@ Status check_solver(const SceneDesc& scene) {
                       row->name, kSphereCollider);
   const Result<SolverParameters> parameters = moving_parameters(*row, scene);
   if (!parameters) return parameters.error();
-  if (analyse(scene, {}).has_volume && !(row->has_kernel && row->bears_volume))
+  if (scene.bend_limit.acts() && !row->has_kernel)
+    return make_error(ErrorCode::BadInput,
+                      "solver {} has no kernel and takes no bend_limit: leave it at 0 and 180", row->name);
+  if (scene.volume.acts() && !bears_volume(*row))
     return make_error(ErrorCode::BadInput,
                       "solver {} takes no forces between strands ({}): set volume.friction_per_s and "
                       "volume.repulsion_per_s2 to 0, or take another solver",
@@ -53,9 +63,12 @@ Result<std::vector<std::string>> prepare_solver(const SceneDesc& scene, const Gr
   return row->prepare(groom, parameters, groom_gravity_in_head_mps2, stop);
 }
 
-void fit_parameters(SolverDesc& solver) {
+void fit_to_solver(SceneDesc& scene) {
+  SolverDesc& solver = scene.solver;
   const auto row = find_solver(solver.name);
   if (!row) return;
+  if (!bears_volume(**row)) scene.volume = {};
+  if (!(*row)->has_kernel) scene.bend_limit = {};
   std::erase_if(solver.parameters, [&](const auto& given) {
     return std::none_of(
         (*row)->parameters.begin(), (*row)->parameters.end(), [&](const SolverParameterInfo& info) {
@@ -65,23 +78,27 @@ void fit_parameters(SolverDesc& solver) {
   });
 }
 
-std::string left_out_note(const SolverDesc& before, const SolverDesc& after) {
+std::string left_out_note(const SceneDesc& before, const SceneDesc& after) {
   std::vector<std::string> names;
-  for (const auto& [name, value] : before.parameters)
-    if (!after.parameters.contains(name)) names.push_back(fmt::format("{} {:g}", name, value));
-  if (names.empty()) return {};
-  return fmt::format("solver {} does not take {}: left out", after.name, fmt::join(names, ", "));
+  for (const auto& [name, value] : before.solver.parameters)
+    if (!after.solver.parameters.contains(name)) names.push_back(fmt::format("{} {:g}", name, value));
+  if (before.volume.acts() && !after.volume.acts()) names.emplace_back("forces between strands (volume)");
+  if (before.bend_limit.acts() && !after.bend_limit.acts()) names.emplace_back("bend_limit");
+  if (names.empty() || before.solver.name == after.solver.name) return {};
+  return fmt::format("solver {} does not take {}: left out", after.solver.name, fmt::join(names, ", "));
 }
 
 Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_solver,
                                 const std::vector<std::string>& overrides) {
   SceneDesc fitted = scene;
   if (scene.solver.name == scene_solver.name) return fitted;
-  fit_parameters(fitted.solver);
+  fit_to_solver(fitted);
   // What was asked for beside the solver is kept, so that a wrong name or value is told.
   constexpr std::string_view kGroup = "solver.parameters.";
   for (const std::string& assignment : overrides) {
     const std::string path = assignment.substr(0, assignment.find('='));
+    if (path.starts_with("volume")) fitted.volume = scene.volume;
+    if (path.starts_with("bend_limit")) fitted.bend_limit = scene.bend_limit;
     if (!path.starts_with(kGroup)) continue;
     const auto given = scene.solver.parameters.find(path.substr(kGroup.size()));
     if (given != scene.solver.parameters.end()) fitted.solver.parameters.insert(*given);
@@ -100,7 +117,7 @@ Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assign
     return make_error(ErrorCode::BadInput, "'{}' cannot change while running (known: {})", path,
                       fmt::join(fields, ", "));
   ASSIGN_OR_RETURN(SceneDesc changed, with_overrides(scene, {assignment}));
-  if (changed.solver.name != scene.solver.name) fit_parameters(changed.solver);
+  if (changed.solver.name != scene.solver.name) fit_to_solver(changed);
   RETURN_IF_ERROR(check_solver(changed));
   return changed;
 }

@@ -19,11 +19,12 @@ const std::vector<std::string>& live_fields();
 /// that a newly chosen solver does not take are left out. Errors name what is known.
 Result<SceneDesc> change_scene(const SceneDesc& scene, const std::string& assignment);
 
-/// Takes out the parameters that the solver of this name does not have, or not with this value.
-void fit_parameters(SolverDesc& solver);
+/// Takes out the parameters that the scene's solver does not have, or not with this value, and what else of
+/// the scene it does not take: forces between strands, limits of bending.
+void fit_to_solver(SceneDesc& scene);
 
-/// What fit_parameters took out between the two, as a sentence; empty when nothing.
-std::string left_out_note(const SolverDesc& before, const SolverDesc& after);
+/// What fit_to_solver took out between the two, as a sentence; empty when nothing.
+std::string left_out_note(const SceneDesc& before, const SceneDesc& after);
 
 /// A scene whose overrides named another solver than its file did, without the parameters of the file's that
 /// the new one does not take. Parameters that the overrides themselves name stay and are checked.

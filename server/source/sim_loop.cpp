@@ -277,7 +277,7 @@ Notice SimLoop::change(const std::string& assignment) {
       return {true, status.error().to_string()};
   if (scene->substeps != config_.scene.substeps) stages_->plan_step(scene->substeps, explain(*scene, facts_));
   const std::string what = excerpt(assignment, kMaxToldChars);
-  const std::string left_out = left_out_note(config_.scene.solver, scene->solver);
+  const std::string left_out = left_out_note(config_.scene, *scene);
   config_.scene = *scene;
   {
     const std::lock_guard lock(mutex_);

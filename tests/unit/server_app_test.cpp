@@ -107,9 +107,29 @@ TEST(SceneChange, SaysWhatANewSolverDoesNotTake) {
   const auto changed = change_scene(scene, "solver.name=dftl");
   ASSERT_TRUE(changed.ok()) << changed.error().to_string();
   EXPECT_EQ(changed->solver.parameters, (std::map<std::string, double>{{"sag_free", 0.5}}));
-  EXPECT_EQ(left_out_note(scene.solver, changed->solver),
-            "solver dftl does not take iterations 20: left out");
-  EXPECT_EQ(left_out_note(scene.solver, scene.solver), "");
+  EXPECT_EQ(left_out_note(scene, *changed), "solver dftl does not take iterations 20: left out");
+  EXPECT_EQ(left_out_note(scene, scene), "");
+}
+
+// A model that cannot bear what a scene asks for besides goes on without, and that is said; who asks for both
+// is refused.
+TEST(SceneChange, LeavesOutWhatANewSolverCannotBear) {
+  SceneDesc scene = built_in_scene();
+  scene.volume.friction_per_s = 20.0;
+  scene.bend_limit.most_tip_deg = 60.0;
+  const auto follow = change_scene(scene, "solver.name=ftl");
+  ASSERT_TRUE(follow.ok()) << follow.error().to_string();
+  EXPECT_FALSE(follow->volume.acts());
+  EXPECT_TRUE(follow->bend_limit.acts());
+  EXPECT_THAT(left_out_note(scene, *follow), HasSubstr("solver ftl does not take"));
+  EXPECT_THAT(left_out_note(scene, *follow), HasSubstr("forces between strands (volume): left out"));
+  EXPECT_THAT(change_scene(*follow, "volume.friction_per_s=20").error().to_string(),
+              HasSubstr("solver ftl takes no forces between strands"));
+  const auto reference = change_scene(scene, "solver.name=super_helix");
+  ASSERT_TRUE(reference.ok()) << reference.error().to_string();
+  EXPECT_FALSE(reference->volume.acts() || reference->bend_limit.acts());
+  EXPECT_THAT(change_scene(*reference, "bend_limit.most_tip_deg=60").error().to_string(),
+              HasSubstr("solver super_helix has no kernel and takes no bend_limit"));
 }
 
 TEST(SceneChange, StepsOutsideTheStableRangeAreRefusedWhateverChangesThem) {
