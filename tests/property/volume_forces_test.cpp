@@ -270,6 +270,31 @@ std::vector<std::string> rows_that_rest() {
 INSTANTIATE_TEST_SUITE_P(Rows, HangingHair, testing::ValuesIn(rows_that_rest()),
                          [](const auto& name) { return name.param; });
 
+// A style that its model keeps stays kept: the groom's own density is what hair may have.
+TEST(VolumeForces, AStyleThatIsKeptStaysSo) {
+  for (const char* solver : {"dftl", "direct_rod"}) {
+    SceneDesc scene = built_in_scene();
+    auto& desc = std::get<ProceduralGroomDesc>(scene.groom);
+    desc.strand_count = on_grid(400, 2000);
+    scene.wind = {};
+    scene.has_auto_collider = false;
+    scene.solver = {solver, {{"sag_free", 1.0}}};
+    const Groom groom = load_scene_content(scene).value().groom;
+    const auto off_m = [&](const VolumeDesc& volume) {
+      scene.volume = volume;
+      auto executor = std::move(make_lanes_executor()).value();
+      CrowdedHair hair(*executor, scene, groom);
+      hair.hold(20.0);
+      return hair.shape_rms_m();
+    };
+    VolumeDesc volume = some_volume();
+    volume.resolution = 32;
+    const double without_m = off_m({});
+    const double with_m = off_m(volume);
+    EXPECT_LT(with_m, 2e-3) << solver << ": " << without_m << " m without";
+  }
+}
+
 // Hair that lies elsewhere than its groom did goes back to where the groom was, as a volume.
 TEST(VolumeForces, ATargetKeepsAStyleAsAVolume) {
   SceneDesc scene = hanging_scene(*find_solver("direct_rod").value());

@@ -126,6 +126,15 @@ class CrowdedHair {
       findings.highest_m = std::max(findings.highest_m, static_cast<double>(point.y));
     return findings;
   }
+  /// Root mean square of how far vertices are from where the groom has them.
+  double shape_rms_m() const {
+    double squared = 0.0;
+    for (size_t i = 0; i < position_m_.size(); ++i) {
+      const glm::dvec3 off = glm::dvec3(position_m_[i]) - glm::dvec3(layout_.rest[i]);
+      squared += glm::dot(off, off);
+    }
+    return std::sqrt(squared / static_cast<double>(position_m_.size()));
+  }
   /// Of all vertices from where the groom has them, head space.
   glm::dvec3 mean_shift_m() const {
     glm::dvec3 sum(0.0);
