@@ -256,8 +256,7 @@ Result<ServerConfig> load_config(const ServerOptions& options) {
   std::erase_if(others, [](const std::string& assignment) { return assignment.starts_with("solver"); });
   ASSIGN_OR_RETURN(const SceneDesc own, load(others));
   ASSIGN_OR_RETURN(config.scene, choose_solver(scene, own.solver, options.overrides));
-  if (const std::string note = left_out_note(scene, config.scene); !note.empty())
-    log_warn("app", "{}", note);
+  if (const std::string note = left_out_note(scene, config.scene); !note.empty()) log_warn("app", "{}", note);
   return config;
 }
 

@@ -204,7 +204,8 @@ TEST(HairVolume, IsWhatPlainLoopsInDoubleSay) {
 
 TEST(HairVolume, IsTheSameBitsFromEverySetAndNumberOfThreads) {
   Hair hair = random_hair(1003, 16, 0.006f, 5);
-  const Filled expected = fill(hair, {24, 1, own_workers(1), Priority::Simulation, simd::InstructionSet::Plain});
+  const Filled expected =
+      fill(hair, {24, 1, own_workers(1), Priority::Simulation, simd::InstructionSet::Plain});
   for (const simd::InstructionSet set : simd::instruction_sets())
     for (const uint32_t threads : {1u, 2u, 4u}) {
       const Filled filled = fill(hair, {24, 1, own_workers(threads), Priority::Simulation, set});

@@ -37,25 +37,33 @@ STRANDCAST_LANES Quad with_density_of(const Quad& value, const Quad& center, Vol
   return Quad{value[0], value[1], value[2], center[3]};
 }
 
+/// The row at `at` of `count` along an axis, which is `index` of all, and those beside it; whether the
+/// smoothed one has anything is noted.
+STRANDCAST_LANES RowOfThree rows_around(const VolumeSmooth& work, size_t index, uint32_t at, uint32_t count,
+                                        size_t stride) {
+  RowOfThree rows{{nullptr, nullptr, nullptr}, false};
+  for (uint32_t i = 0; i < 3; ++i) {
+    if (at + i == 0 || at + i > count) continue;
+    const size_t beside = index + i * stride - stride;
+    if (work.from_rows[beside] == 0) continue;
+    rows.row[i] = work.from + beside * work.nodes.x;
+    rows.is_any = true;
+  }
+  work.to_rows[index] = rows.is_any ? 1 : 0;
+  return rows;
+}
+
 STRANDCAST_LANES void smooth_in_layers_lanes(const VolumeSmooth& work) {
   const uint32_t nodes_x = work.nodes.x;
   for (uint32_t z = work.begin; z < work.end; ++z)
     for (uint32_t y = 0; y < work.nodes.y; ++y) {
-      const size_t row_index = size_t{z} * work.nodes.y + y;
-      RowOfThree rows{{nullptr, nullptr, nullptr}, false};
-      for (uint32_t i = 0; i < 3; ++i) {
-        if (y + i == 0 || y + i > work.nodes.y) continue;
-        const size_t index = row_index + i - 1;
-        if (work.from_rows[index] == 0) continue;
-        rows.row[i] = work.from + index * nodes_x;
-        rows.is_any = true;
-      }
-      work.to_rows[row_index] = rows.is_any ? 1 : 0;
+      const size_t index = size_t{z} * work.nodes.y + y;
+      const RowOfThree rows = rows_around(work, index, y, work.nodes.y, 1);
       if (!rows.is_any) continue;
-      glm::vec4* const to = work.to + row_index * nodes_x;
       const auto column = [&](uint32_t x) STRANDCAST_LANES_LAMBDA {
         return smoothed(at(rows.row[0], x), at(rows.row[1], x), at(rows.row[2], x));
       };
+      glm::vec4* const to = work.to + index * nodes_x;
       Quad before{};
       Quad now = column(0);
       for (uint32_t x = 0; x < nodes_x; ++x) {
@@ -71,18 +79,10 @@ STRANDCAST_LANES void smooth_across_layers_lanes(const VolumeSmooth& work) {
   const uint32_t nodes_x = work.nodes.x;
   for (uint32_t z = work.begin; z < work.end; ++z)
     for (uint32_t y = 0; y < work.nodes.y; ++y) {
-      const size_t row_index = size_t{z} * work.nodes.y + y;
-      RowOfThree rows{{nullptr, nullptr, nullptr}, false};
-      for (uint32_t i = 0; i < 3; ++i) {
-        if (z + i == 0 || z + i > work.nodes.z) continue;
-        const size_t index = row_index + size_t{i} * work.nodes.y - work.nodes.y;
-        if (work.from_rows[index] == 0) continue;
-        rows.row[i] = work.from + index * nodes_x;
-        rows.is_any = true;
-      }
-      work.to_rows[row_index] = rows.is_any ? 1 : 0;
+      const size_t index = size_t{z} * work.nodes.y + y;
+      const RowOfThree rows = rows_around(work, index, z, work.nodes.z, work.nodes.y);
       if (!rows.is_any) continue;
-      glm::vec4* const to = work.to + row_index * nodes_x;
+      glm::vec4* const to = work.to + index * nodes_x;
       for (uint32_t x = 0; x < nodes_x; ++x) {
         const Quad center = at(rows.row[1], x);
         const Quad value = smoothed(at(rows.row[0], x), center, at(rows.row[2], x));
