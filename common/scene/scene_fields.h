@@ -3,6 +3,8 @@
 // scene.proto; a name that scene.proto lacks is a broken invariant found by the first test.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
 #include <limits>
 
 #include "common/base/picture_size.h"
@@ -291,6 +293,11 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.text("integration", scene.volume.integration, kMaxNameBytes);
     v.require("integration", scene.volume.integration == "implicit" || scene.volume.integration == "explicit",
               "is unknown (known: implicit, explicit)");
+    v.text("scatter", scene.volume.scatter, kMaxNameBytes);
+    v.require("scatter",
+              std::find(std::begin(kVolumeScatters), std::end(kVolumeScatters), scene.volume.scatter) !=
+                  std::end(kVolumeScatters),
+              "is unknown (known: auto, host, sort, atomics)");
   });
 }
 

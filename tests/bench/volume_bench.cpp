@@ -1,5 +1,6 @@
 // Prints what a hair volume takes, as CSV: processor time of all threads and time by the clock, beside a
-// plain splat of the same strands on one thread in the same run. usage: volume_bench [--groom FILE]
+// plain splat of the same strands on one thread and what OpenGL takes for each way to scatter, in turns in
+// the same run; the last column compares processor times of these. usage: volume_bench [--groom FILE]
 // [--strands N] [--resolution N] [--smoothing N] [--rounds N]
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 #include "common/base/check.h"
 #include "common/base/quantile.h"
 #include "server/scene/scene_content.h"
+#include "server/sim/executor/gl_executor.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/volume/volume_forces.h"
 
@@ -46,7 +48,63 @@ struct Times {
     wall.push_back(clock_ms() - begin_ms);
     cpu.push_back(cpu_ms() - cpu_begin_ms);
   }
-  void print(const char* name) { fmt::print("{},{:.2f},{:.2f}\n", name, median(cpu), median(wall)); }
+  void print(const std::string& name, const std::string& ratio = "") {
+    fmt::print("{},{:.2f},{:.2f},{}\n", name, median(cpu), median(wall), ratio);
+  }
+};
+
+/// Volumes that OpenGL makes, in turns.
+class GlScatters {
+ public:
+  GlScatters(const StrandLayout& layout, const HairVolume& host, uint32_t smoothing) {
+    auto executor = make_gl_executor("auto");
+    if (!executor) return;
+    executor_ = std::move(executor).value();
+    step_.world_from_head = {glm::vec4(1, 0, 0, 0), glm::vec4(0, 1, 0, 0), glm::vec4(0, 0, 1, 0)};
+    step_.head_velocity.w = 1.0f / 60.0f;
+    step_.shape = {layout.strand_count, layout.vertex_count, 1u, layout.vertex_count};
+    position_ = executor_->make_plane("position", layout.strand_count, layout.rest);
+    velocity_ = executor_->make_plane("velocity", layout.strand_count,
+                                      std::vector<glm::vec4>(layout.size(), glm::vec4(0.0f)));
+    table_ = executor_->make_table("volume", static_cast<uint32_t>(2 + host.most_nodes())).value();
+    for (const char* name : {"sort", "atomics"}) {
+      DeviceVolumeDesc desc;
+      desc.scatter = name;
+      desc.volume = &host;
+      desc.strand_count = layout.strand_count;
+      desc.vertex_count = layout.vertex_count;
+      desc.smoothing = smoothing;
+      auto volume = executor_->make_volume(desc);
+      if (!volume) fmt::print(stderr, "{}\n", volume.error().to_string());
+      if (volume) volumes_.push_back({name, std::move(volume).value(), {}});
+    }
+  }
+  void round(bool is_timed) {
+    if (!executor_ || !executor_->make_current().ok()) return;
+    for (Row& row : volumes_) {
+      Times unused;
+      (is_timed ? row.times : unused).add([&] {
+        timed_ms(*executor_, [&] { row.volume->update(step_, *position_, *velocity_, *table_); });
+      });
+    }
+  }
+  void print(uint32_t smoothing) {
+    for (Row& row : volumes_)
+      row.times.print(fmt::format("OpenGL {}, {} smoothings", row.name, smoothing),
+                      fmt::format("{:.2f}", median(row.times.cpu) / median(volumes_.back().times.cpu)));
+  }
+
+ private:
+  struct Row {
+    std::string name;
+    std::unique_ptr<DeviceVolume> volume;
+    Times times;
+  };
+  std::unique_ptr<Executor> executor_;
+  StepBlock step_{};
+  std::unique_ptr<StrandPlane> position_, velocity_;
+  std::unique_ptr<LookupTable> table_;
+  std::vector<Row> volumes_;
 };
 
 /// Eight nodes a vertex, one after the other.
@@ -99,7 +157,11 @@ int run(const Options& options) {
   Times sorted;
   Times plain;
   std::vector<glm::vec4> plain_nodes;
+  GlScatters without_smoothing(layout, *volume, 0);
+  GlScatters with_smoothing(layout, *volume, options.smoothing);
   for (int i = 0; i <= options.rounds; ++i) {
+    without_smoothing.round(i > 0);
+    with_smoothing.round(i > 0);
     if (i == 0) {  // the first one allocates
       volume->update(input, nodes);
       plain_nodes.resize(volume->grid().size());
@@ -134,10 +196,12 @@ int run(const Options& options) {
       volume->grid().nodes.y, volume->grid().nodes.z,
       100.0 * static_cast<double>(occupied) / static_cast<double>(plain_nodes.size()), volume->sample_count(),
       volume->size_bytes() / 1000);
-  fmt::print("variant,cpu ms,wall ms\n");
+  fmt::print("variant,cpu ms,wall ms,cpu of atomics\n");
   sorted.print("volume: density, velocity, smoothing");
   if (lanes) forces.print("friction and repulsion on lanes");
   plain.print("plain splat without smoothing, one thread");
+  without_smoothing.print(0);
+  with_smoothing.print(options.smoothing);
   return 0;
 }
 

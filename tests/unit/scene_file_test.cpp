@@ -126,7 +126,8 @@ SceneDesc unusual_scene() {
               .resolution = 40,
               .smoothing = 2,
               .interval = 3,
-              .integration = "explicit"};
+              .integration = "explicit",
+              .scatter = "atomics"};
   return s;
 }
 
@@ -244,6 +245,8 @@ TEST(SceneFile, RangeErrorsNamePlacePathValueAndRange) {
               HasSubstr("scattering is unknown (known: main, volume, none, isosurface, dual)"));
   EXPECT_THAT(error_of("look { methods { evaluation: 'pixel' } }"),
               HasSubstr("evaluation is unknown (known: main, vertex, fragment)"));
+  EXPECT_THAT(error_of("volume { scatter: 'hash' }"),
+              HasSubstr("volume.scatter is unknown (known: auto, host, sort, atomics)"));
   EXPECT_THAT(error_of("camera { offset_m { x: 0 y: 0 z: 0 } }"),
               HasSubstr("camera.offset_m is almost zero"));
   EXPECT_THAT(error_of("groom { file { } }"), HasSubstr("--set groom.file.path=FILE"));

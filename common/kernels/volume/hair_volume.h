@@ -63,6 +63,14 @@ class HairVolume {
   /// number.
   uint64_t sample_count() const { return sample_count_; }
   uint64_t outside_count() const { return outside_count_; }
+  /// Box of the groom at rest, lattice points.
+  const glm::ivec3& home_low() const { return home_low_; }
+  const glm::ivec3& home_high() const { return home_high_; }
+  /// Samples of each segment; 1: vertices are the samples.
+  uint32_t segment_samples() const { return samples_; }
+  /// (blocks x vertex_count x 16) hair that a vertex stands for, m, or with several samples the segment
+  /// before it.
+  std::span<const float> sample_lengths_m() const { return length_m_; }
   /// Of all strands.
   double length_m() const { return total_length_m_; }
   uint64_t size_bytes() const;

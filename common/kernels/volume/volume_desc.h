@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace strandcast {
 
@@ -10,6 +11,9 @@ namespace strandcast {
 inline constexpr uint32_t kMinVolumeResolution = 8;
 inline constexpr uint32_t kMaxVolumeResolution = 128;
 inline constexpr uint32_t kMaxVolumeSmoothing = 3;
+
+/// How strands get into it. "auto": "sort" on an OpenGL device that can, else "host".
+inline constexpr std::string_view kVolumeScatters[] = {"auto", "host", "sort", "atomics"};
 
 struct VolumeDesc {
   double friction_per_s = 0.0;  // rate at which hair takes on the mean velocity of the hair around it
@@ -23,6 +27,7 @@ struct VolumeDesc {
   uint32_t smoothing = 1;                // of density and velocity: passes of [1 2 1] / 4
   uint32_t interval = 1;                 // steps that a volume is good for
   std::string integration = "implicit";  // of the repulsion: "implicit", or "explicit" as in the sources
+  std::string scatter = "auto";          // how strands get into it, one of kVolumeScatters
 
   /// Whether any of it does something.
   bool acts() const {

@@ -8,6 +8,13 @@
 #include "server/sim/executor/lanes_executor.h"
 
 namespace strandcast {
+
+Result<std::unique_ptr<DeviceVolume>> Executor::make_volume(const DeviceVolumeDesc& desc) {
+  return make_error(ErrorCode::Unsupported,
+                    "volume.scatter: {} needs OpenGL, this simulation runs on {} (known there: auto, host)",
+                    desc.scatter, info().name);
+}
+
 void turn_plane(StrandPlane& plane, const glm::dquat& turn) {
   std::vector<glm::vec4> values;
   plane.read(values);

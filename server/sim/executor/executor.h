@@ -21,6 +21,7 @@
 #include "common/kernels/plane_role.h"
 #include "common/kernels/step_block.h"
 #include "common/kernels/strand_blocks.h"
+#include "common/kernels/volume/hair_volume.h"
 #include "common/scene/features.h"
 #include "server/sim/strand_layout.h"
 
@@ -84,6 +85,37 @@ class KernelProgram {
   virtual uint64_t size_bytes() const = 0;
 };
 
+/// What is wanted of a volume that the executor's device makes of planes (common/kernels/volume).
+struct DeviceVolumeDesc {
+  std::string scatter;       // how strands are added up: one of kVolumeScatters but "auto" and "host"
+  const HairVolume* volume;  // of the same strands on the host; read by make_volume() only
+  uint32_t strand_count = 0;
+  uint32_t vertex_count = 0;
+  uint32_t smoothing = 1;
+  bool has_way = false;  // motion is the plane of every vertex's way in the last substep
+  bool is_ahead = true;  // of the strands as they will be after the substep
+};
+
+/// What a device found of strands.
+struct DeviceVolumeFacts {
+  VolumeGrid grid;
+  uint64_t outside_count = 0;  // samples beyond the grid's limits, or no number
+};
+
+/// A hair volume made where the strands are, without waiting for anything: grid and sums as HairVolume's but
+/// for roundings, the same bits every time.
+class DeviceVolume {
+ public:
+  virtual ~DeviceVolume() = default;
+  /// Fills `table` as shaders/sim/volume.glsl reads it. `motion`: velocities, or ways.
+  virtual void update(const StepBlock& step, const StrandPlane& position, const StrandPlane& motion,
+                      LookupTable& table) = 0;
+  /// Of the last update, and the nodes that it left in its table; waits for it.
+  virtual DeviceVolumeFacts read_facts() const = 0;
+  virtual void read_nodes(const LookupTable& table, std::vector<glm::vec4>& nodes) const = 0;
+  virtual uint64_t size_bytes() const = 0;
+};
+
 enum class SimDevice { Gl, Lanes };
 const char* to_string(SimDevice device);
 
@@ -114,6 +146,9 @@ class Executor {
   virtual Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc,
                                                               const SceneFeatures& features,
                                                               const StrandLayout& layout) = 0;
+  /// Unsupported where the device makes none, or not so; LimitExceeded when it would be too large for it.
+  /// Tables that it fills have room for the host's volume.
+  virtual Result<std::unique_ptr<DeviceVolume>> make_volume(const DeviceVolumeDesc& desc);
   /// For timing what runs on a device of its own; nullptr: a clock of the calling thread does.
   virtual gl::GpuTimer* timer() { return nullptr; }
 };

@@ -11,6 +11,8 @@
 #include "common/gl/egl_context.h"
 #include "common/gl/program.h"
 #include "common/gl/timer.h"
+#include "server/sim/executor/gl_plane.h"
+#include "server/sim/executor/gl_volume.h"
 #include "shaders/shared/bindings.h"
 #include "shaders/shared/limits.h"
 
@@ -23,67 +25,6 @@ constexpr uint32_t kColliderCapacities[] = {1, 4, kMaxSphereColliders};
 // finds on the way back what still fits its caches; hardware wants all strands at once.
 constexpr size_t kCachedScratchBytes = size_t{2} << 20;
 constexpr size_t kMaxScratchBytes = size_t{64} << 20;
-
-/// Where kernels find a plane, by role. Not all are stored to.
-struct PlaneBinding {
-  uint32_t unit;
-  std::optional<uint32_t> storage;
-};
-constexpr std::array<PlaneBinding, kPlaneRoleCount> kPlaneBindings = {{
-    {shader::kUnitRest, {}},
-    {shader::kUnitPosition, shader::kBindingPosition},
-    {shader::kUnitVelocity, shader::kBindingVelocity},
-    {shader::kUnitDisplacement, shader::kBindingDisplacement},
-    {shader::kUnitVelocityChange, shader::kBindingVelocityChange},
-    {shader::kUnitRodEdge, {}},
-    {shader::kUnitRodStrand, {}},
-    {shader::kUnitRodAxis, shader::kBindingRodAxis},
-    {shader::kUnitPlaceBefore, shader::kBindingPlaceBefore},
-    {shader::kUnitRestDensity, {}},
-}};
-constexpr std::array<uint32_t, kTableRoleCount> kTableUnits = {shader::kUnitField, shader::kUnitVolume};
-
-/// A buffer of vec4 with a buffer texture over all of it: kernels write the one and fetch from the other,
-/// which on llvmpipe costs half of a storage-block load or less.
-class GlPlane final : public StrandPlane {
- public:
-  GlPlane(const std::string& label, std::span<const glm::vec4> values)
-      : buffer_(label, std::as_bytes(values)),
-        view_(gl::Texture::view_of(label, GL_RGBA32F, buffer_)),
-        count_(values.size()) {}
-
-  void bind(const PlaneBinding& binding) const {
-    if (binding.storage) buffer_.bind_storage(*binding.storage);
-    view_.bind(binding.unit);
-  }
-  void write(std::span<const glm::vec4> values) override {
-    CHECK(values.size() == count_);
-    buffer_.write(0, std::as_bytes(values));
-  }
-  void read(std::vector<glm::vec4>& values) const override {
-    values.resize(count_);
-    buffer_.read(0, std::as_writable_bytes(std::span(values)));
-  }
-  uint64_t size_bytes() const override { return buffer_.size_bytes(); }
-
- private:
-  gl::Buffer buffer_;
-  gl::Texture view_;
-  size_t count_;
-};
-
-class GlTable final : public LookupTable {
- public:
-  GlTable(const std::string& label, uint32_t element_count)
-      : plane_(label, std::vector<glm::vec4>(element_count, glm::vec4(0.0f))) {}
-
-  void bind(uint32_t unit) const { plane_.bind({unit, {}}); }
-  void write(std::span<const glm::vec4> values) override { plane_.write(values); }
-  uint64_t size_bytes() const override { return plane_.size_bytes(); }
-
- private:
-  GlPlane plane_;
-};
 
 /// One kernel compiled for the numbers of colliders that a scene may come to have, with its constants set.
 using Capacities = std::map<uint32_t, gl::Program>;
@@ -218,6 +159,10 @@ class GlExecutor final : public Executor {
     const gl::DeviceLimits& limits = context_->info().limits;
     RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::BufferTexels, element_count, label));
     return std::unique_ptr<LookupTable>(std::make_unique<GlTable>(label, element_count));
+  }
+
+  Result<std::unique_ptr<DeviceVolume>> make_volume(const DeviceVolumeDesc& desc) override {
+    return make_gl_volume(shaders_, context_->info().limits, desc);
   }
 
   Result<std::unique_ptr<KernelProgram>> make_program(const KernelDesc& desc, const SceneFeatures& features,

@@ -21,16 +21,46 @@ Result<std::unique_ptr<VolumeForces>> VolumeForces::make(Executor& executor, con
   std::unique_ptr<VolumeForces> forces(new VolumeForces);
   const VolumeStrands strands{layout.strand_count, layout.vertex_count, layout.rest, {}};
   ASSIGN_OR_RETURN(forces->law_, VolumeLaw::make(strands, desc, {}));
+  RETURN_IF_ERROR(forces->choose_scatter(executor, layout, desc, way != nullptr));
   forces->interval_ = desc.interval;
   const size_t elements = forces->law_->most_elements();
   ASSIGN_OR_RETURN(forces->table_, executor.make_table("hair volume", static_cast<uint32_t>(elements)));
-  if (forces->table_->memory().empty()) forces->elements_.resize(elements);
+  if (forces->table_->memory().empty() && !forces->device_volume_) forces->elements_.resize(elements);
   forces->rest_density_ =
       executor.make_plane("rest density", layout.strand_count, forces->law_->rest_density());
   forces->law_->forget_rest_density();
   ASSIGN_OR_RETURN(forces->program_,
                    executor.make_program(forces->law_->kernel(way != nullptr), features, layout));
   return forces;
+}
+
+/// What the scene names, or the device's where it has one.
+Status VolumeForces::choose_scatter(Executor& executor, const StrandLayout& layout, const VolumeDesc& desc,
+                                    bool has_way) {
+  const bool is_free = desc.scatter == "auto";
+  if (desc.scatter == "host" || (is_free && desc.has_extras())) return {};
+  if (desc.has_extras())
+    return make_error(ErrorCode::Unsupported,
+                      "volume.scatter: {} does not know volume.target_per_s2 and volume.wind_width_m (known "
+                      "with them: auto, host)",
+                      desc.scatter);
+  DeviceVolumeDesc wanted;
+  wanted.scatter = is_free ? "sort" : desc.scatter;
+  wanted.volume = &law_->volume();
+  wanted.strand_count = layout.strand_count;
+  wanted.vertex_count = layout.vertex_count;
+  wanted.smoothing = desc.smoothing;
+  wanted.has_way = has_way;
+  wanted.is_ahead = desc.is_implicit();
+  Result<std::unique_ptr<DeviceVolume>> made = executor.make_volume(wanted);
+  if (made) {
+    device_volume_ = std::move(made).value();
+    scatter_ = wanted.scatter;
+    return {};
+  }
+  const ErrorCode code = made.error().code;
+  const bool host_can = code == ErrorCode::Unsupported || code == ErrorCode::LimitExceeded;
+  return is_free && host_can ? Status{} : Status(made.error());
 }
 
 void VolumeForces::gather(const StepInput& input, StrandState& strands, const StrandPlane* way) {
@@ -43,6 +73,10 @@ void VolumeForces::gather(const StepInput& input, StrandState& strands, const St
   BoundPlanes planes = strands.planes();
   const StrandPlane& motion = way != nullptr ? *way : *plane_of(planes, PlaneRole::Velocity);
   const StepBlock step = make_step_block(input, {}, layout.counts(), strands.head());
+  if (device_volume_) {
+    device_volume_->update(step, *plane_of(planes, PlaneRole::Position), motion, *table_);
+    return;
+  }
   const VolumeState state{
       blocks_of(*plane_of(planes, PlaneRole::Position), layout, position_blocks_, staging_),
       blocks_of(motion, layout, velocity_blocks_, staging_), way != nullptr};
@@ -62,7 +96,7 @@ void VolumeForces::apply(const StepBlock& step, StrandState& strands, StrandPlan
 
 uint64_t VolumeForces::size_bytes() const {
   return law_->size_bytes() + table_->size_bytes() + rest_density_->size_bytes() + program_->size_bytes() +
-         elements_.size() * sizeof(glm::vec4);
+         elements_.size() * sizeof(glm::vec4) + (device_volume_ ? device_volume_->size_bytes() : 0);
 }
 
 }  // namespace strandcast

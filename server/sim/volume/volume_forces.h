@@ -5,6 +5,7 @@
 
 #include <glm/glm.hpp>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "common/kernels/volume/volume_law.h"
@@ -16,8 +17,8 @@ namespace strandcast {
 
 class VolumeForces {
  public:
-  /// As VolumeLaw::make() and Executor::make_program(). `way`: the model's plane of how every vertex moved in
-  /// the last substep, where its stored velocities are not that; may be null.
+  /// As VolumeLaw::make(), Executor::make_volume() and Executor::make_program(). `way`: the model's plane of
+  /// how every vertex moved in the last substep, where its stored velocities are not that; may be null.
   static Result<std::unique_ptr<VolumeForces>> make(Executor& executor, const SceneFeatures& features,
                                                     const StrandLayout& layout, const VolumeDesc& volume,
                                                     const StrandPlane* way);
@@ -29,13 +30,18 @@ class VolumeForces {
   /// Strands were put somewhere else: the volume is too old.
   void forget() { next_in_ = 0; }
 
-  const HairVolume& volume() const { return law_->volume(); }
+  /// What the volume is made by: a name of kVolumeScatters but "auto".
+  const std::string& scatter() const { return scatter_; }
   uint64_t size_bytes() const;
 
  private:
   VolumeForces() = default;
 
+  Status choose_scatter(Executor& executor, const StrandLayout& layout, const VolumeDesc& desc, bool has_way);
+
   std::unique_ptr<VolumeLaw> law_;
+  std::string scatter_ = "host";
+  std::unique_ptr<DeviceVolume> device_volume_;  // nullptr: the host makes it
   uint32_t interval_ = 1;
   uint32_t next_in_ = 0;  // steps until the volume is too old
   std::unique_ptr<LookupTable> table_;
