@@ -4,9 +4,10 @@ add_library(strandcast_flags INTERFACE)
 target_include_directories(strandcast_flags INTERFACE ${CMAKE_SOURCE_DIR})
 # -ffp-contract=off: encoder and decoder, and CPU and llvmpipe, must round alike.
 target_compile_options(strandcast_flags INTERFACE
-  -Wall -Wextra -Wshadow -Wnon-virtual-dtor -ffp-contract=off -fno-math-errno -fstack-protector-strong
+  -Wall -Wextra -Wshadow -Wnon-virtual-dtor -ffp-contract=off -fno-math-errno
+  $<$<NOT:$<BOOL:${EMSCRIPTEN}>>:-fstack-protector-strong>
   $<$<BOOL:${STRANDCAST_WARNINGS_AS_ERRORS}>:-Werror>)
-if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT STRANDCAST_SANITIZE)
+if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT STRANDCAST_SANITIZE AND NOT EMSCRIPTEN)
   target_compile_definitions(strandcast_flags INTERFACE _FORTIFY_SOURCE=2)
   # Checked by tests/tools/check_hardening.sh.
   target_link_options(strandcast_flags INTERFACE -pie -Wl,-z,relro,-z,now,-z,noexecstack)

@@ -39,6 +39,20 @@ string(REGEX REPLACE "layout\\(std430, binding = kBinding([A-Za-z]+)\\)[^{]*{([ 
 string(REGEX REPLACE "\nuniform float ([a-z0-9_]+);" "\nconst number \\1 = constant(\"\\1\");" text "${text}")
 string(REGEX REPLACE "\nuniform uint ([a-z0-9_]+);" "\nconst uint \\1 = count(\"\\1\");" text "${text}")
 
+# Constructors of structs: not every compiler knows C++20's aggregates in parentheses.
+file(GLOB all_files ${ROOT}/sim/*.glsl ${ROOT}/sim/*.comp)
+foreach(other IN LISTS all_files)
+  file(STRINGS ${other} heads REGEX "^struct [A-Za-z]+ {")
+  foreach(head IN LISTS heads)
+    string(REGEX REPLACE "^struct ([A-Za-z]+) {.*" "\\1" name "${head}")
+    list(APPEND names ${name})
+  endforeach()
+endforeach()
+list(REMOVE_DUPLICATES names)
+foreach(name IN LISTS names)
+  string(REGEX REPLACE "([^A-Za-z0-9_])${name}\\(" "\\1CONSTRUCTED(${name})(" text "${text}")
+endforeach()
+
 # The language.
 string(REGEX REPLACE "\nconst (u?int) (k[A-Za-z]+)" "\nstatic constexpr \\1 \\2" text "${text}")
 string(REGEX REPLACE "\nconst float (k[A-Za-z]+)" "\nstatic constexpr number \\1" text "${text}")

@@ -14,6 +14,8 @@
 #include <new>
 #if defined(__SSE2__)
 #include <immintrin.h>
+#elif !defined(__aarch64__)
+#define STRANDCAST_LANES_FLUSH 1  // no mode of the processor does it
 #endif
 
 #include "common/kernels/lane_kernel.h"
@@ -26,7 +28,9 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #pragma GCC diagnostic ignored "-Wunused-variable"
 #pragma GCC diagnostic ignored "-Wunused-but-set-variable"
+#if !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
 #pragma GCC diagnostic ignored "-Wshadow"
 
 namespace strandcast {
@@ -263,6 +267,16 @@ class KernelBase {
   } gl_GlobalInvocationID{0};
 };
 
+#if defined(__cpp_aggregate_paren_init)
+#define CONSTRUCTED(Struct) Struct
+#else
+template <class Struct, class... Values>
+STRANDCAST_LANES Struct constructed(const Values&... values) {
+  return Struct{values...};
+}
+#define CONSTRUCTED(Struct) constructed<Struct>
+#endif
+
 #define LANE_STEP(Block, name) const Block name = *static_cast<const Block*>(run_.step);
 #define COLLIDERS 16
 #define COLLIDER_COUNT collider_count()
@@ -302,16 +316,25 @@ class Kernel : public KernelBase {
 
 // Numbers too small for full precision count as 0, as on OpenGL devices: single processors take a hundred
 // times as long for them. (Set back by hand: a destructor would bring tables along that other files share.)
+// ARM alone looks at results before they are rounded: of those less than half a rounding step below the least
+// number it makes 0, which is once in 2^24 of products as small as that.
 void run_kernel(const LaneRun& run) {
 #if defined(__SSE2__)
   constexpr uint kFlushed = 0x8040;  // results and operands
   const uint before = _mm_getcsr();
   _mm_setcsr(before | kFlushed);
+#elif defined(__aarch64__)
+  constexpr uint64_t kFlushed = 1u << 24;  // FZ: results and operands
+  uint64_t before;
+  __asm__ volatile("mrs %0, fpcr" : "=r"(before));
+  __asm__ volatile("msr fpcr, %0" : : "r"(before | kFlushed) : "memory");
 #endif
   Kernel* kernel = new (run.memory) Kernel(run);
   kernel->run_blocks();
 #if defined(__SSE2__)
   _mm_setcsr(before);
+#elif defined(__aarch64__)
+  __asm__ volatile("msr fpcr, %0" : : "r"(before) : "memory");
 #endif
 }
 

@@ -23,8 +23,21 @@
 #include <immintrin.h>
 #endif
 #endif
+#if defined(__wasm_simd128__)
+#include <wasm_simd128.h>
+#endif
+// Kernels count numbers too small for full precision as 0. Where the processor has no mode for that
+// (WebAssembly), they define this as 1 and every operation here does it.
+#ifndef STRANDCAST_LANES_FLUSH
+#define STRANDCAST_LANES_FLUSH 0
+#endif
 
-#if STRANDCAST_LANE_COUNT == 16
+#if STRANDCAST_LANES_FLUSH
+#define STRANDCAST_LANE_NAMESPACE flushed_lanes4
+#if STRANDCAST_LANE_COUNT != 4
+#error "only four lanes flush by themselves"
+#endif
+#elif STRANDCAST_LANE_COUNT == 16
 #define STRANDCAST_LANE_NAMESPACE lanes16
 #elif STRANDCAST_LANE_COUNT == 8
 #define STRANDCAST_LANE_NAMESPACE lanes8
@@ -62,6 +75,52 @@ struct Bool {
   }
 };
 
+/// Towards zero; the least integer for what does not fit and for NaN, as x86 has it.
+STRANDCAST_LANES IntBits to_int_bits(FloatBits x) {
+  IntBits whole = __builtin_convertvector(x, IntBits);
+#if !defined(__x86_64__)  // others give the nearest that fits, and 0 for NaN
+  const IntBits fits = x < 2147483648.0f;
+  const UintBits least = UintBits{} + 0x80000000u;
+  whole = (whole & fits) | ((IntBits)least & ~fits);
+#endif
+  return whole;
+}
+
+#if STRANDCAST_LANES_FLUSH
+STRANDCAST_LANES FloatBits zero_where(IntBits is_tiny, FloatBits x) {  // of the same sign
+  return (FloatBits)((UintBits)x & ~((UintBits)is_tiny >> 1));
+}
+STRANDCAST_LANES FloatBits sizes(FloatBits x) {
+  return (FloatBits)((UintBits)x & 0x7fffffffu);
+}
+/// Of a number that is exact: sums too small for full precision are.
+STRANDCAST_LANES FloatBits flushed(FloatBits x) {
+  return zero_where(((UintBits)x & 0x7f800000u) == 0, x);
+}
+// x86 asks whether the result would be too small if exponents had no end, rounded to full precision.
+STRANDCAST_LANES FloatBits flushed_product(FloatBits a, FloatBits b) {
+  constexpr float kTwo24 = 16777216.0f;
+  constexpr int32_t kLeastTimesTwo24 = 0x0c800000;
+  const IntBits bits = (IntBits)(a * kTwo24 * b) & 0x7fffffff;
+  return zero_where(bits < kLeastTimesTwo24, a * b);
+}
+// No quotient lies so little below the least number that rounding takes it there.
+STRANDCAST_LANES FloatBits flushed_quotient(FloatBits a, FloatBits b) {
+  constexpr float kTwo63 = 9.223372037e18f;
+  return zero_where(sizes(a) * kTwo63 < sizes(b) * (1.0f / kTwo63), a / b);
+}
+#else
+STRANDCAST_LANES constexpr FloatBits flushed(FloatBits x) {
+  return x;
+}
+STRANDCAST_LANES constexpr FloatBits flushed_product(FloatBits a, FloatBits b) {
+  return a * b;
+}
+STRANDCAST_LANES constexpr FloatBits flushed_quotient(FloatBits a, FloatBits b) {
+  return a / b;
+}
+#endif
+
 struct Float;
 
 struct Uint {
@@ -78,28 +137,28 @@ struct Float {
   FloatBits v;
   Float() = default;
   STRANDCAST_LANES constexpr Float(FloatBits bits) : v(bits) {}
-  STRANDCAST_LANES constexpr Float(float value) : v(FloatBits{} + value) {}
-  STRANDCAST_LANES constexpr Float(double value) : v(FloatBits{} + static_cast<float>(value)) {}
+  STRANDCAST_LANES constexpr Float(float value) : v(flushed(FloatBits{} + value)) {}
+  STRANDCAST_LANES constexpr Float(double value) : v(flushed(FloatBits{} + static_cast<float>(value))) {}
   STRANDCAST_LANES constexpr Float(int value) : v(FloatBits{} + static_cast<float>(value)) {}
   STRANDCAST_LANES constexpr Float(uint32_t value) : v(FloatBits{} + static_cast<float>(value)) {}
   /// Of values below 2^31.
   STRANDCAST_LANES explicit Float(Uint value) : v(__builtin_convertvector((IntBits)value.v, FloatBits)) {}
 };
 
-STRANDCAST_LANES Uint::Uint(Float value) : v((UintBits) __builtin_convertvector(value.v, IntBits)) {}
+STRANDCAST_LANES Uint::Uint(Float value) : v((UintBits)to_int_bits(value.v)) {}
 
 // ---- operators
 STRANDCAST_LANES constexpr Float operator+(Float a, Float b) {
-  return a.v + b.v;
+  return flushed(a.v + b.v);
 }
 STRANDCAST_LANES constexpr Float operator-(Float a, Float b) {
-  return a.v - b.v;
+  return flushed(a.v - b.v);
 }
 STRANDCAST_LANES constexpr Float operator*(Float a, Float b) {
-  return a.v * b.v;
+  return flushed_product(a.v, b.v);
 }
 STRANDCAST_LANES constexpr Float operator/(Float a, Float b) {
-  return a.v / b.v;
+  return flushed_quotient(a.v, b.v);
 }
 STRANDCAST_LANES constexpr Float operator-(Float a) {
   return -a.v;
@@ -267,6 +326,13 @@ STRANDCAST_LANES Uint min(Uint a, Uint b) {
 STRANDCAST_LANES Float sqrt(Float x) {
 #if defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8
   return (FloatBits)_mm256_sqrt_ps((__m256)x.v);
+#elif defined(__wasm_simd128__)
+  v128_t parts[sizeof(FloatBits) / sizeof(v128_t)];
+  std::memcpy(parts, &x.v, sizeof parts);
+  for (v128_t& part : parts) part = wasm_f32x4_sqrt(part);
+  FloatBits root;
+  std::memcpy(&root, parts, sizeof root);
+  return root;
 #else
   FloatBits root;
   for (uint32_t lane = 0; lane < kLanes; ++lane) root[lane] = __builtin_sqrtf(x.v[lane]);
@@ -288,7 +354,7 @@ STRANDCAST_LANES Float inversesqrt(Float x) {
 }
 /// Of values within +-2^31.
 STRANDCAST_LANES Float floor(Float x) {
-  const FloatBits cut = __builtin_convertvector(__builtin_convertvector(x.v, IntBits), FloatBits);
+  const FloatBits cut = __builtin_convertvector(to_int_bits(x.v), FloatBits);
   return cut > x.v ? cut - 1.0f : cut;
 }
 STRANDCAST_LANES Float fract(Float x) {
@@ -307,7 +373,7 @@ STRANDCAST_LANES Float exp(Float x) {
   const Float p =
       1.0f + f * (1.0f + f * (0.5f + f * (1.66666667e-1f +
                                           f * (4.16666667e-2f + f * (8.33333333e-3f + f * 1.38888889e-3f)))));
-  const IntBits power = (__builtin_convertvector(n.v, IntBits) + 127) << 23;
+  const IntBits power = (to_int_bits(n.v) + 127) << 23;
   return p * Float((FloatBits)power);
 }
 /// Of positive numbers; absolute error below 1e-6.
@@ -337,7 +403,7 @@ STRANDCAST_LANES Float sine_of_quarters(Float x, int shift) {
   const Float z = r * r;
   const Float s = r + r * z * (-1.66666546e-1f + z * (8.33216087e-3f - z * 1.95152959e-4f));
   const Float c = 1.0f - 0.5f * z + z * z * (4.16666457e-2f + z * (-1.38873163e-3f + z * 2.44331571e-5f));
-  const IntBits n = __builtin_convertvector(quarters.v, IntBits) + shift;
+  const IntBits n = to_int_bits(quarters.v) + shift;
   const FloatBits value = (n & 1) != 0 ? c.v : s.v;
   return (FloatBits)((IntBits)value ^ ((n & 2) << 30));
 }
@@ -376,6 +442,12 @@ STRANDCAST_LANES bool is_any(Bool which) {
   return which.v != 0;
 #elif defined(__AVX2__) && STRANDCAST_LANE_COUNT == 8
   return _mm256_movemask_ps((__m256)which.v) != 0;
+#elif defined(__wasm_simd128__)
+  v128_t parts[sizeof(IntBits) / sizeof(v128_t)];
+  std::memcpy(parts, &which.v, sizeof parts);
+  v128_t all = parts[0];
+  for (size_t i = 1; i < sizeof parts / sizeof(v128_t); ++i) all = wasm_v128_or(all, parts[i]);
+  return wasm_v128_any_true(all);
 #else
   uint64_t parts[sizeof(IntBits) / sizeof(uint64_t)];
   std::memcpy(parts, &which.v, sizeof parts);
@@ -387,7 +459,7 @@ STRANDCAST_LANES bool is_any(Bool which) {
 STRANDCAST_LANES Float load_lanes(const float* from) {
   FloatBits v;
   std::memcpy(&v, from, sizeof v);
-  return v;
+  return flushed(v);
 }
 STRANDCAST_LANES void store_lanes(Float x, float* to) {
   std::memcpy(to, &x.v, sizeof x.v);
@@ -400,7 +472,7 @@ STRANDCAST_LANES Float lane_numbers() {
 #endif
 /// Towards zero, of values within +-2^31.
 STRANDCAST_LANES IntBits to_integers(Float x) {
-  return __builtin_convertvector(x.v, IntBits);
+  return to_int_bits(x.v);
 }
 
 #include "common/simd/lane_vectors_private.h"

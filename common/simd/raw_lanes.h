@@ -69,9 +69,9 @@ STRANDCAST_LANES Lanes sizes_of(const Lanes& value) {
 STRANDCAST_LANES Lanes to_floats(const IntLanes& value) {
   return __builtin_convertvector(value, Lanes);
 }
-/// Towards zero; any number where the value is not one that fits.
+/// Towards zero; the least integer for what does not fit and for NaN.
 STRANDCAST_LANES IntLanes to_integers(const Lanes& value) {
-  return __builtin_convertvector(value, IntLanes);
+  return to_int_bits(value);
 }
 
 /// Sums and differences that wrap around.

@@ -17,6 +17,8 @@ namespace {
 
 using SnapshotPtr = std::shared_ptr<const Snapshot>;
 
+StrandChainWatcher* chain_watcher = nullptr;
+
 constexpr float kBoundM = 1e-4f;
 constexpr size_t kFrames = 8;
 constexpr size_t kJoinFrame = 3;  // late joiners get a keyframe of this state
@@ -167,12 +169,13 @@ class Game {
     CHECK(decoder.ok());
     decoder_ = std::move(decoder).value();
     decoder_->set_rest_shape(chain_.rest_in_head_m);
+    if (chain_watcher != nullptr) chain_watcher->made(codec, chain_.limits, chain_.rest_in_head_m);
   }
 
   void honest() {
     const EncodedFramePtr& frame = is_following_ ? chain_.frame[next_] : chain_.joiner;
     if (!is_following_) next_ = kJoinFrame;
-    const auto decoded = decoder_->decode(frame->message);
+    const auto decoded = decode(frame->message);
     CHECK(decoded.ok());
     CHECK((*decoded)->lattice == chain_.decoded[next_]->lattice);
     CHECK(state_hash(**decoded) == state_hash(*chain_.decoded[next_]));
@@ -187,10 +190,10 @@ class Game {
       const auto length = static_cast<uint32_t>(message.size() - kFrameHeaderBytes);
       std::memcpy(message.data() + kPayloadLengthAt, &length, sizeof(length));
     }
-    auto decoded = decoder_->decode(message);
+    auto decoded = decode(message);
     for (int i = 0; i < 2 && !decoded && (flags & kKnowsHash) != 0; ++i) {
       if (!correct_hash(decoded.error(), message)) break;
-      decoded = decoder_->decode(message);
+      decoded = decode(message);
     }
     if (!decoded) return;
     check_valid(**decoded, chain_.limits);
@@ -199,6 +202,12 @@ class Game {
   }
 
  private:
+  Result<SnapshotPtr> decode(std::span<const std::byte> message) {
+    auto decoded = decoder_->decode(message);
+    if (chain_watcher != nullptr) chain_watcher->decoded(message, decoded);
+    return decoded;
+  }
+
   std::vector<std::byte> make_message(ChainStep step, uint8_t flags, std::span<const std::byte> piece) const {
     const std::vector<std::byte>& good = chain_.frame[next_]->message;
     if (step == ChainStep::Whole) return {piece.begin(), piece.end()};
@@ -257,6 +266,10 @@ class Game {
 };
 
 }  // namespace
+
+void watch_strand_chains(StrandChainWatcher* watcher) {
+  chain_watcher = watcher;
+}
 
 int fuzz_strand_chain(const std::string& codec, const uint8_t* data, size_t size) {
   FuzzInput input(data, size);

@@ -4,7 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
+
+#include "common/strands/strand_codec.h"
 
 namespace strandcast {
 
@@ -30,5 +34,17 @@ inline constexpr uint8_t kKnowsHash = 4;   // a refused state hash is corrected,
 /// What decodes must be a valid snapshot, an honest frame must decode to exactly what it should, and after an
 /// error the chain must go on as if nothing had come. Returns 0.
 int fuzz_strand_chain(const std::string& codec, const uint8_t* data, size_t size);
+
+/// Sees what games do with their decoders.
+class StrandChainWatcher {
+ public:
+  virtual ~StrandChainWatcher() = default;
+  virtual void made(const std::string& codec, const StrandStreamLimits& limits,
+                    std::span<const glm::vec3> rest_in_head_m) = 0;
+  virtual void decoded(std::span<const std::byte> message,
+                       const Result<std::shared_ptr<const Snapshot>>& result) = 0;
+};
+/// Of all games from now on; nullptr = nobody watches. From one thread.
+void watch_strand_chains(StrandChainWatcher* watcher);
 
 }  // namespace strandcast

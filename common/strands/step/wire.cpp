@@ -1,7 +1,6 @@
 #include "common/strands/step/wire.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "common/strands/step/numbers.h"
@@ -95,10 +94,10 @@ void code_rods(StepModel& model, uint32_t strand_count, const RodPlanes& natural
 
 /// First bits of a positive float.
 int32_t first_bits(float value) {
-  return static_cast<int32_t>(std::bit_cast<uint32_t>(std::max(value, 0.0f)) >> kDroppedBits);
+  return static_cast<int32_t>(glm::floatBitsToUint(std::max(value, 0.0f)) >> kDroppedBits);
 }
 float of_first_bits(int32_t bits) {
-  const float value = std::bit_cast<float>(static_cast<uint32_t>(bits) << kDroppedBits);
+  const float value = glm::uintBitsToFloat(static_cast<uint32_t>(bits) << kDroppedBits);
   return value >= 0.0f && value < kMostStiffness ? value : 0.0f;
 }
 

@@ -1,0 +1,124 @@
+#include "client/web/strand_core.h"
+
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/worker_pool.h"
+#include "common/strands/scene_asset.h"
+#include "common/strands/strand_codec.h"
+
+#define STRAND_CORE_EXPORT extern "C" __attribute__((visibility("default"), used))
+
+using namespace strandcast;
+
+struct StrandCoreDecoder {
+  StrandStreamLimits limits;
+  WorkerPool workers{1};
+  std::unique_ptr<StrandDecoder> decoder;
+  std::shared_ptr<const Snapshot> newest;
+  StrandCoreState state{};
+  std::vector<glm::vec3> position_m;  // of `newest`, once they are asked for
+};
+
+namespace {
+
+std::string& last_error() {
+  static std::string text;
+  return text;
+}
+ErrorCode last_error_code = ErrorCode::Internal;
+
+void remember(const Error& error) {
+  last_error() = error.to_string();
+  last_error_code = error.code;
+}
+
+StrandCoreState state_of(const Snapshot& snapshot) {
+  const glm::dvec3& position_m = snapshot.world_from_head.position_m;
+  const glm::dquat& rotation = snapshot.world_from_head.rotation;
+  return {snapshot.tick,
+          snapshot.sim_time_ns,
+          snapshot.motion_time_ns,
+          {position_m.x, position_m.y, position_m.z},
+          {rotation.w, rotation.x, rotation.y, rotation.z},
+          snapshot.strand_count,
+          snapshot.vertex_count,
+          static_cast<uint32_t>(3 * snapshot.plane_size()),
+          snapshot.quantum_m};
+}
+
+Status set_asset(StrandCoreDecoder& core, std::span<const std::byte> payload) {
+  ASSIGN_OR_RETURN(const SceneAsset asset, decode_scene_asset(payload));
+  if (asset.strand_count != core.limits.strand_count || asset.vertex_count != core.limits.vertex_count)
+    return make_error(ErrorCode::BadInput, "the asset has {} strands of {} vertices, {} of {} were announced",
+                      asset.strand_count, asset.vertex_count, core.limits.strand_count,
+                      core.limits.vertex_count);
+  core.decoder->set_rest_shape(asset.rest_position_m);
+  return {};
+}
+
+}  // namespace
+
+STRAND_CORE_EXPORT void* strand_core_allocate(size_t size_bytes) {
+  return std::malloc(size_bytes);
+}
+STRAND_CORE_EXPORT void strand_core_free(void* memory) {
+  std::free(memory);
+}
+
+STRAND_CORE_EXPORT StrandCoreDecoder* strand_core_make(const char* codec, size_t codec_bytes,
+                                                       uint32_t strand_count, uint32_t vertex_count) {
+  auto core = std::make_unique<StrandCoreDecoder>();
+  core->limits = {strand_count, vertex_count};
+  auto decoder = make_strand_decoder(std::string(codec, codec_bytes), core->limits, core->workers);
+  if (!decoder) {
+    remember(decoder.error());
+    return nullptr;
+  }
+  core->decoder = std::move(decoder).value();
+  return core.release();
+}
+STRAND_CORE_EXPORT void strand_core_delete(StrandCoreDecoder* decoder) {
+  delete decoder;
+}
+
+STRAND_CORE_EXPORT int strand_core_set_asset(StrandCoreDecoder* decoder, const std::byte* payload,
+                                             size_t size_bytes) {
+  const Status status = set_asset(*decoder, {payload, size_bytes});
+  if (!status) remember(status.error());
+  return status.ok() ? 1 : 0;
+}
+
+STRAND_CORE_EXPORT int strand_core_decode(StrandCoreDecoder* decoder, const std::byte* message,
+                                          size_t size_bytes) {
+  auto decoded = decoder->decoder->decode({message, size_bytes});
+  if (!decoded) {
+    remember(decoded.error());
+    return 0;
+  }
+  decoder->newest = std::move(decoded).value();
+  decoder->state = state_of(*decoder->newest);
+  decoder->position_m.clear();
+  return 1;
+}
+
+STRAND_CORE_EXPORT const StrandCoreState* strand_core_state(const StrandCoreDecoder* decoder) {
+  return decoder->newest == nullptr ? nullptr : &decoder->state;
+}
+STRAND_CORE_EXPORT const float* strand_core_positions(StrandCoreDecoder* decoder) {
+  if (decoder->newest == nullptr) return nullptr;
+  if (decoder->position_m.empty()) decoder->position_m = positions_in_head(*decoder->newest);
+  return &decoder->position_m.front().x;
+}
+STRAND_CORE_EXPORT uint64_t strand_core_hash(const StrandCoreDecoder* decoder) {
+  return decoder->newest == nullptr ? 0 : state_hash(*decoder->newest);
+}
+
+STRAND_CORE_EXPORT const char* strand_core_error() {
+  return last_error().c_str();
+}
+STRAND_CORE_EXPORT const char* strand_core_error_kind() {
+  return to_string(last_error_code);
+}

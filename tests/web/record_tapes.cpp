@@ -1,0 +1,183 @@
+// Writes tapes (tests/web/tape.h) of what this build's decoders make of strand messages:
+//   record_tapes kept FILE                 every kept stream of tests/conformance
+//   record_tapes hostile FILE              the fuzzers' inputs for strand decoders and assets
+//   record_tapes stream FILE SOLVER CODEC STRANDSxVERTICES FRAMES    the server's own solver on the built-in walk
+#include <ctime>
+#include <map>
+
+#include "common/strands/byte_io.h"
+#include "common/strands/scene_asset.h"
+#include "server/report/stream_codec.h"
+#include "server/report/stream_recording.h"
+#include "server/sim/executor/lanes_executor.h"
+#include "tests/conformance/stored_stream.h"
+#include "tests/fuzz/strand_chain.h"
+#include "tests/web/tape.h"
+
+namespace strandcast {
+namespace {
+
+const std::filesystem::path kTests = std::filesystem::path(STRANDCAST_SOURCE_DIR) / "tests";
+
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// CPU time of one thread that decodes.
+double cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+class Player {
+ public:
+  Player(Tape& tape, const std::string& codec, const StrandStreamLimits& limits,
+         std::span<const glm::vec3> rest_in_head_m)
+      : tape_(tape), decoder_(std::move(make_strand_decoder(codec, limits, workers_)).value()) {
+    decoder_->set_rest_shape(rest_in_head_m);
+    tape_.add_decoder(codec, limits, rest_in_head_m);
+  }
+  bool play(std::span<const std::byte> message) {
+    const double begin_ms = cpu_ms();
+    const auto decoded = decoder_->decode(message);
+    tape_.add_message(message, decoded, cpu_ms() - begin_ms);
+    return decoded.ok();
+  }
+
+ private:
+  Tape& tape_;
+  WorkerPool workers_{1};
+  std::unique_ptr<StrandDecoder> decoder_;
+};
+
+/// As its first viewer sees a kept stream, and whoever joins.
+Status record_kept(Tape& tape) {
+  for (const auto& path : files_of(kTests / "conformance/vectors")) {
+    if (!path.filename().string().starts_with("strands_")) continue;
+    ASSIGN_OR_RETURN(const auto stored, conformance::load_stream(path));
+    const StrandStreamLimits limits{stored.stream.strand_count, stored.stream.vertex_count};
+    tape.add_name(path.filename().string());
+    // Those who joined before `begin` are behind the same frames.
+    std::vector<size_t> begins = {0};
+    for (size_t i = 0; i < stored.steps.size(); ++i)
+      if (!stored.steps[i].keyframe.empty()) begins.push_back(i);
+    for (size_t viewer = 0; viewer < begins.size(); ++viewer) {
+      Player player(tape, stored.stream.codec, limits, stored.rest_in_head_m);
+      for (size_t i = begins[viewer]; i < stored.steps.size(); ++i) {
+        const bool joins = viewer > 0 && i == begins[viewer];
+        player.play(joins ? stored.steps[i].keyframe : stored.steps[i].frame);
+      }
+    }
+  }
+  return {};
+}
+
+/// Writes down what the fuzzers' games give to decoders.
+class Watcher final : public StrandChainWatcher {
+ public:
+  explicit Watcher(Tape& tape) : tape_(tape) {}
+  void made(const std::string& codec, const StrandStreamLimits& limits,
+            std::span<const glm::vec3> rest_in_head_m) override {
+    tape_.add_decoder(codec, limits, rest_in_head_m);
+  }
+  void decoded(std::span<const std::byte> message,
+               const Result<std::shared_ptr<const Snapshot>>& result) override {
+    tape_.add_message(message, result, 0.0);
+  }
+
+ private:
+  Tape& tape_;
+};
+
+Status record_hostile(Tape& tape) {
+  Watcher watcher(tape);
+  watch_strand_chains(&watcher);
+  for (const StrandCodecInfo& codec : strand_codecs()) {
+    tape.add_name("inputs of strand_" + codec.name);
+    for (const auto& path : files_of(kTests / "fuzz/corpus" / ("strand_" + codec.name))) {
+      ASSIGN_OR_RETURN(const auto bytes, load_file(path, 1 << 20));
+      fuzz_strand_chain(codec.name, reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size());
+    }
+  }
+  watch_strand_chains(nullptr);
+  tape.add_name("inputs of scene_asset");
+  for (const auto& path : files_of(kTests / "fuzz/corpus/scene_asset")) {
+    ASSIGN_OR_RETURN(const auto bytes, load_file(path, 1 << 20));
+    // Whole, damaged in every place, and cut off there.
+    std::vector<std::vector<std::byte>> payloads = {bytes};
+    for (size_t i = 0; i < bytes.size(); i += 1 + bytes.size() / 64) {
+      payloads.push_back(bytes);
+      payloads.back()[i] ^= std::byte{0x10};
+      payloads.emplace_back(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    for (const auto& payload : payloads) {
+      const auto asset = decode_scene_asset(payload);
+      const StrandStreamLimits any{4, 4};
+      tape.add_decoder("raw", asset ? StrandStreamLimits{asset->strand_count, asset->vertex_count} : any, {});
+      tape.add_asset(payload, asset ? Status() : Status(asset.error()));
+    }
+  }
+  return {};
+}
+
+struct StreamWish {
+  std::string solver;
+  std::string codec;
+  StreamSize size;
+  int frames = 0;
+};
+
+Status record_stream(const StreamWish& wish, Tape& tape) {
+  constexpr float kBoundM = 1e-4f;
+  ASSIGN_OR_RETURN(const auto executor, make_lanes_executor());
+  RecordingDesc desc;
+  desc.size = wish.size;
+  desc.solver = wish.solver;
+  desc.seconds = wish.frames / 60.0;
+  desc.executor = executor.get();
+  for (const StreamMotion& motion : built_in_stream_motions())
+    if (motion.name == "built-in walk") desc.motion = motion;
+  ASSIGN_OR_RETURN(const StreamRecording recording, record_strands(desc));
+  ASSIGN_OR_RETURN(const auto encoder, make_strand_encoder(wish.codec));
+  ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(wish.codec, kBoundM));
+  encoder->set_rest_shape(recording.shape.rest_in_head_m);
+  tape.add_name(fmt::format("{} {} {}", wish.solver, wish.codec, to_string(wish.size)));
+  Player player(tape, wish.codec, {wish.size.strand_count, wish.size.vertex_count},
+                recording.shape.rest_in_head_m);
+  for (const StreamFrame& frame : recording.frames) {
+    const EncodedFramePtr encoded = encoder->encode(on_lattice(frame, quantum_m));
+    if (encoded == nullptr || !player.play(encoded->message))
+      return make_error(ErrorCode::Internal, "a frame of {} cannot be sent", wish.codec);
+  }
+  return {};
+}
+
+Status record(const std::vector<std::string>& arguments) {
+  Tape tape;
+  if (arguments.size() == 2 && arguments[0] == "kept") {
+    RETURN_IF_ERROR(record_kept(tape));
+  } else if (arguments.size() == 2 && arguments[0] == "hostile") {
+    RETURN_IF_ERROR(record_hostile(tape));
+  } else if (arguments.size() == 6 && arguments[0] == "stream") {
+    StreamWish wish{arguments[2], arguments[3], {}, std::atoi(arguments[5].c_str())};
+    if (std::sscanf(arguments[4].c_str(), "%ux%u", &wish.size.strand_count, &wish.size.vertex_count) != 2)
+      return make_error(ErrorCode::BadInput, "\"{}\" is no size", arguments[4]);
+    RETURN_IF_ERROR(record_stream(wish, tape));
+  } else {
+    return make_error(ErrorCode::BadInput, "usage: record_tapes kept|hostile|stream FILE ...");
+  }
+  return tape.save(arguments[1]);
+}
+
+}  // namespace
+}  // namespace strandcast
+
+int main(int argc, char** argv) {
+  const strandcast::Status status = strandcast::record({argv + 1, argv + argc});
+  if (!status) fmt::print(stderr, "{}\n", status.error().to_string());
+  return status ? 0 : 2;
+}
