@@ -1,5 +1,5 @@
-// Bindings and numbers on which the kernels that make a hair volume (volume/*.comp) and their host agree. Included by both: only
-// "const uint" lines here, with names that no other header uses.
+// Bindings and numbers on which the kernels that make a hair volume (volume/*.comp) and their host agree. Included
+// by both: only "const uint" lines here, with names that no other header uses.
 #ifndef STRANDCAST_SHADERS_SHARED_HAIR_VOLUME_H
 #define STRANDCAST_SHADERS_SHARED_HAIR_VOLUME_H
 
@@ -18,6 +18,8 @@ const uint kBindingVolumeCells = 4u;
 const uint kBindingVolumeLists = 5u;
 const uint kBindingVolumeNodes = 6u;
 const uint kBindingVolumeMasks = 7u;
+const uint kBindingVolumePlaces = 2u;   // of vertices
+const uint kBindingVolumeMotions = 3u;
 
 // Uniform block beside the step's.
 const uint kBindingVolumeFactsRead = 1u;
@@ -31,6 +33,8 @@ const uint kUnitVolumeSum = 11u;
 const uint kUnitVolumeMask = 12u;
 const uint kUnitVolumeSegment = 13u;
 const uint kUnitVolumeNode = 14u;
+const uint kUnitVolumePlace = 15u;
+const uint kUnitVolumeMotion = 9u;
 
 // Elements of a table in front of the nodes (sim/volume.glsl).
 const uint kVolumeHeader = 2u;
@@ -40,6 +44,9 @@ const uint kVolumeCellBias = 4096u;
 // Nodes of a grid along x, at most: a row's segments of eight nodes have a bit each of two words.
 const uint kVolumeMostAcross = 512u;
 const uint kVolumeSegment = 8u;
+// Bits of a sample's number on its segment (kMaxSegmentSamples), below the vertex; a rank that is none.
+const uint kVolumePartBits = 3u;
+const uint kVolumeOutside = 0xffffffffu;
 const uint kVolumeLocalSize = 64u;
 // Groups of an indirect dispatch along x, at most.
 const uint kVolumeGroupsAcross = 32768u;

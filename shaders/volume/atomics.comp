@@ -1,5 +1,7 @@
-// Samples straight into the nodes around them, by 32 integer atomic additions each. An invocation per sample.
+// Samples straight into the nodes around them, by 32 integer atomic additions each. A row of invocations for each row of
+// samples, an invocation for each strand.
 #include "volume/corners.glsl"
+#include "volume/grid.glsl"
 #include "volume/samples.glsl"
 
 layout(local_size_x = kVolumeLocalSize) in;
@@ -16,16 +18,17 @@ void add_to_node(uint node, ivec4 sum) {
 
 void main() {
   const uint strand = gl_GlobalInvocationID.x;
-  if (strand >= u_step.shape.x) return;
-  const HairSample found = hair_sample(strand, gl_GlobalInvocationID.y);
+  if (strand >= u_strand_count) return;
+  const SampleIndex which = sample_index(strand, gl_GlobalInvocationID.y);
+  const vec4 place = sample_place(which);
   const uvec3 nodes = volume_nodes();
-  const ivec3 cell = cell_of(found);
-  if (!found.is_there || !is_in_grid(cell, nodes)) return;
+  const ivec3 cell = cell_of(place.xyz);
+  if (!is_sample(place.xyz, place.w) || !is_in_grid(cell, nodes)) return;
   // No node has more samples around it.
   const vec4 scale = fixed_scale(min(8u * fact(kFactMostCount), fact(kFactPlaced)), u_length_exponent);
-  const vec4 value = scale * (found.weight * vec4(found.velocity, 1.0));
+  const vec4 value = scale * (place.w * vec4(sample_velocity(which), 1.0));
   ivec4 s0 = ivec4(0), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
-  ADD_TO_CORNERS(found.cells - floor(found.cells), value)
+  ADD_TO_CORNERS(place.xyz - floor(place.xyz), value)
   const uint at = index_of(cell, nodes);
   const uint layer = nodes.x * nodes.y;
   add_to_node(at, s0);

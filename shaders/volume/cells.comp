@@ -1,13 +1,14 @@
-// Sums of the records of each cell in use for the eight nodes around it. An invocation per cell; of a cell with a crowd a
+// Sums of the samples of each cell in use for the eight nodes around it. An invocation per cell; of a cell with a crowd a
 // group of them.
 #pragma variant HAS_CROWD 0 1
 #include "volume/corners.glsl"
 #include "volume/facts.glsl"
+#include "volume/samples.glsl"
 
 layout(local_size_x = kVolumeLocalSize) in;
 // (cells in use + 1) x 8 corners, the first of them zero.
 layout(std430, binding = kBindingVolumeNodes) writeonly restrict buffer SumBlock { vec4 sum[]; } b_sums;
-layout(binding = kUnitVolumeRecord) uniform samplerBuffer u_record;
+layout(binding = kUnitVolumeRecord) uniform usamplerBuffer u_record;
 layout(binding = kUnitVolumeList) uniform usamplerBuffer u_list;
 
 uniform int u_length_exponent;
@@ -42,10 +43,10 @@ void main() {
   const vec4 scale = fixed_scale(entry.y, u_length_exponent);
   ivec4 s0 = ivec4(0), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
   for (uint i = first; i < entry.y; i += stride) {
-    const int at = 2 * int(entry.x + i);
-    const vec4 place = texelFetch(u_record, at);
-    const vec4 value = scale * vec4(texelFetch(u_record, at + 1).xyz, place.w);
-    ADD_TO_CORNERS(place.xyz, value)
+    const SampleIndex which = unpacked_index(texelFetch(u_record, int(entry.x + i)).x);
+    const vec4 place = sample_place(which);
+    const vec4 value = scale * (place.w * vec4(sample_velocity(which), 1.0));
+    ADD_TO_CORNERS(place.xyz - floor(place.xyz), value)
   }
   const vec4 back = 1.0 / scale;
   const uint to = (number + 1u) * 8u;

@@ -1,19 +1,16 @@
-// Samples sorted by cells: where in its cell each lies with its length, and its momentum. An invocation per sample.
+// Samples sorted by cells: which they are. A row of invocations for each row of samples, an invocation for each strand.
 #include "volume/samples.glsl"
 
 layout(local_size_x = kVolumeLocalSize) in;
-layout(std430, binding = kBindingVolumeRecords) writeonly restrict buffer RecordBlock { vec4 record[]; } b_records;
+layout(std430, binding = kBindingVolumeRecords) writeonly restrict buffer RecordBlock { uint record[]; } b_records;
 layout(binding = kUnitVolumeRank) uniform usamplerBuffer u_rank;
 layout(binding = kUnitVolumeCell) uniform usamplerBuffer u_cell;
 
 void main() {
   const uint strand = gl_GlobalInvocationID.x;
   const uint row = gl_GlobalInvocationID.y;
-  if (strand >= u_step.shape.x) return;
-  const uint rank = texelFetch(u_rank, int(row * u_step.shape.x + strand)).x;
-  if (rank == 0xffffffffu) return;
-  const HairSample found = hair_sample(strand, row);
-  const uint at = texelFetch(u_cell, int(index_of(cell_of(found), volume_nodes()))).x + rank;
-  b_records.record[2u * at] = vec4(found.cells - floor(found.cells), found.weight);
-  b_records.record[2u * at + 1u] = vec4(found.weight * found.velocity, 0.0);
+  if (strand >= u_strand_count) return;
+  const uvec2 rank = texelFetch(u_rank, int(row * u_strand_count + strand)).xy;
+  if (rank.y == kVolumeOutside) return;
+  b_records.record[texelFetch(u_cell, int(rank.x)).x + rank.y] = packed_index(sample_index(strand, row));
 }

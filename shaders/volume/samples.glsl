@@ -1,73 +1,52 @@
-// The samples of a hair volume: vertices, or places on segments that are longer than a cell, where they will be at the
-// end of the substep. A row of invocations for each row of samples, an invocation for each strand.
-#pragma variant HAS_WAY 0 1
+// The samples of a hair volume: vertices, or places on segments that are longer than a cell.
 #pragma variant HAS_SPLIT 0 1
-#include "sim/step.glsl"
-#include "volume/facts.glsl"
+#include "volume/sample.glsl"
 
-// (vertex_count x strand_count) hair that a vertex stands for, or with split segments the part of the segment before it
-// that each of its samples does; 0: not there.
-layout(binding = kUnitVolumeLength) uniform samplerBuffer u_length;
-#if HAS_WAY
-layout(binding = kUnitDisplacement) uniform samplerBuffer u_displacement;  // in the last substep, m
-#endif
+// As volume/bounds.comp left them.
+layout(binding = kUnitVolumePlace) uniform samplerBuffer u_place;
+layout(binding = kUnitVolumeMotion) uniform samplerBuffer u_motion;
 
-uniform float u_per_cell;     // cells per metre
-uniform float u_ahead;        // 1: where strands are at the end of the substep; 0: at its beginning
+uniform uint u_strand_count;
 uniform uint u_sample_count;  // of a segment that is split
-uniform uint u_row_count;     // of samples
 
-// `cells` in the lattice. Kernels must agree on the cell to the bit: nothing of it may be fused.
-struct HairSample {
-  vec3 cells;
-  vec3 velocity;  // world, relative to the head joint
-  float weight;   // length of hair, m
-  bool is_there;
+// The vertex, or with split segments the one behind the sample, and which of the segment's samples it is.
+struct SampleIndex {
+  uint vertex;  // element
+  uint part;
 };
 
-void find_vertex(uint at, out vec3 cells, out vec3 velocity) {
-#if HAS_WAY
-  const vec3 moved = texelFetch(u_displacement, int(at)).xyz * u_step.push.w;
-#else
-  const vec3 moved = texelFetch(u_velocity, int(at)).xyz;
-#endif
-  precise vec3 relative = moved - u_step.head_velocity.xyz;
-  precise vec3 point = texelFetch(u_position, int(at)).xyz + (u_ahead * u_step.head_velocity.w) * relative;
-  precise vec3 turned;
-  for (int axis = 0; axis < 3; ++axis) {
-    const vec3 row = u_step.world_from_head[axis].xyz;
-    turned[axis] = ((row.z * point.z + row.y * point.y) + row.x * point.x) * u_per_cell;
-  }
-  cells = turned;
-  velocity = relative;
-}
-
-HairSample hair_sample(uint strand, uint row) {
-  HairSample found;
+SampleIndex sample_index(uint strand, uint row) {
 #if HAS_SPLIT
-  const uint at = (row / u_sample_count + 1u) * u_step.shape.x + strand;
-  vec3 before, now, velocity_before, velocity_now;
-  find_vertex(at - u_step.shape.x, before, velocity_before);
-  find_vertex(at, now, velocity_now);
-  const float share = (float(row % u_sample_count) + 0.5) / float(u_sample_count);
-  precise vec3 cells = before + (now - before) * share;
-  found.cells = cells;
-  found.velocity = velocity_before + (velocity_now - velocity_before) * share;
+  return SampleIndex((row / u_sample_count + 1u) * u_strand_count + strand, row % u_sample_count);
 #else
-  const uint at = row * u_step.shape.x + strand;
-  find_vertex(at, found.cells, found.velocity);
+  return SampleIndex(row * u_strand_count + strand, 0u);
 #endif
-  found.weight = texelFetch(u_length, int(at)).x;
-  found.is_there = found.weight > 0.0 && !is_broken(found.cells) && !is_broken(found.velocity) &&
-                   all(lessThan(abs(found.cells), vec3(float(kVolumeReach))));
-  return found;
 }
 
-// The cell, from the grid's first.
-ivec3 cell_of(HairSample found) { return ivec3(floor(found.cells)) - volume_first(); }
-bool is_in_grid(ivec3 cell, uvec3 nodes) {
-  return all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, ivec3(nodes) - 1));
+// In a word.
+uint packed_index(SampleIndex which) { return which.vertex << kVolumePartBits | which.part; }
+SampleIndex unpacked_index(uint word) {
+  return SampleIndex(word >> kVolumePartBits, word & ((1u << kVolumePartBits) - 1u));
 }
-uint index_of(ivec3 cell, uvec3 nodes) {
-  return (uint(cell.z) * nodes.y + uint(cell.y)) * nodes.x + uint(cell.x);
+
+// In cells of the lattice; w = length of hair, m.
+vec4 sample_place(SampleIndex which) {
+  const vec4 place = texelFetch(u_place, int(which.vertex));
+#if HAS_SPLIT
+  const vec3 before = texelFetch(u_place, int(which.vertex - u_strand_count)).xyz;
+  return vec4(between(before, place.xyz, sample_share(which.part, u_sample_count)), place.w);
+#else
+  return place;
+#endif
+}
+
+// World, relative to the head joint.
+vec3 sample_velocity(SampleIndex which) {
+  const vec3 velocity = texelFetch(u_motion, int(which.vertex)).xyz;
+#if HAS_SPLIT
+  const vec3 before = texelFetch(u_motion, int(which.vertex - u_strand_count)).xyz;
+  return between(before, velocity, sample_share(which.part, u_sample_count));
+#else
+  return velocity;
+#endif
 }

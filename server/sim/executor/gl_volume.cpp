@@ -12,6 +12,7 @@
 namespace strandcast {
 namespace {
 
+static_assert(1u << shader::kVolumePartBits == kMaxSegmentSamples);
 static_assert(shader::kVolumeReach == static_cast<uint32_t>(kVolumeReachCells));
 
 // Groups that look for bounds, and turns of a loop that one of their invocations may take.
@@ -47,8 +48,11 @@ class GlVolume final : public DeviceVolume {
 
   Status check(const gl::DeviceLimits& limits) const {
     const size_t nodes = desc_.volume->most_nodes();
-    const size_t vectors = std::max({nodes + shader::kVolumeHeader, 2 * samples(), kCorners * (cells() + 1)});
+    const size_t vectors = std::max({nodes + shader::kVolumeHeader, samples(), kCorners * (cells() + 1)});
     const char* const user = "volume.scatter";
+    if (size_t{desc_.strand_count} * desc_.vertex_count > ~0u >> shader::kVolumePartBits)
+      return make_error(ErrorCode::LimitExceeded, "volume.scatter: {} strands x {} vertices are too many",
+                        desc_.strand_count, desc_.vertex_count);
     RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::BufferTexels, vectors, user));
     RETURN_IF_ERROR(gl::check_device_limit(limits, gl::DeviceLimit::GroupCount,
                                            std::max(groups_of(desc_.strand_count), rows()), user));
@@ -107,11 +111,13 @@ class GlVolume final : public DeviceVolume {
       gather_;
   gl::Program smooth_xy_, smooth_z_, divide_z_, smooth_velocity_xy_, smooth_velocity_z_;
   FetchedBuffer lengths_;  // (vertex_count x strand_count) float
+  FetchedBuffer places_;   // (vertex_count x strand_count) vec4
+  FetchedBuffer motions_;  // (vertex_count x strand_count) vec4
   gl::Buffer step_{"step", sizeof(StepBlock)};
   gl::Buffer facts_;       // kFactCount words
   gl::Buffer counts_;      // (most_nodes) uint, zero between updates
-  FetchedBuffer ranks_;    // (rows x strand_count) uint
-  FetchedBuffer records_;  // (samples x 2) vec4; by atomics: (most_nodes) ivec4, zero between updates
+  FetchedBuffer ranks_;    // (rows x strand_count) uvec2
+  FetchedBuffer records_;  // (samples) uint; by atomics: (most_nodes) ivec4, zero between updates
   FetchedBuffer cell_;     // (most_nodes) uvec2
   FetchedBuffer lists_;    // (cells, then crowds) uvec4
   FetchedBuffer sums_;     // (cells + 1) x 8 vec4
@@ -126,26 +132,24 @@ Status GlVolume::compile(const gl::ShaderLibrary& shaders) {
   most_nodes_ = volume.most_nodes();
   row_count_ = rows();
   sample_count_ = volume.sample_count();
-  const uint64_t strands_each = kMostTurns / row_count_;
+  const uint64_t strands_each = kMostTurns / desc_.vertex_count;
   bounds_groups_ = std::min(groups_of(desc_.strand_count),
                             std::max(kBoundsGroups, groups_of(desc_.strand_count / strands_each + 1)));
   const uint32_t reach = 2 * desc_.smoothing;
   const auto crowds_begin = static_cast<uint32_t>(cells());
-  gl::Variant of_samples = {{"HAS_WAY", desc_.has_way ? 1 : 0},
-                            {"HAS_SPLIT", volume.segment_samples() > 1 ? 1 : 0}};
+  const int is_split = volume.segment_samples() > 1 ? 1 : 0;
+  constexpr const char* kBounds = "bounds";
   const auto make = [&](gl::Program& program, const char* name, const gl::Variant& variant) -> Status {
     ASSIGN_OR_RETURN(program, gl::Program::make(shaders, {std::string("volume/") + name + ".comp"}, variant));
     return {};
   };
   const auto make_of_samples = [&](gl::Program& program, const char* name,
                                    const gl::Variant& variant = {}) -> Status {
-    gl::Variant all = of_samples;
-    all.insert(variant.begin(), variant.end());
+    gl::Variant all = variant;
+    all["HAS_SPLIT"] = is_split;
     RETURN_IF_ERROR(make(program, name, all));
-    program.set("u_per_cell", 1.0f / cell_m_);
-    program.set("u_ahead", desc_.is_ahead ? 1.0f : 0.0f);
     program.set("u_sample_count", volume.segment_samples());
-    program.set("u_row_count", row_count_);
+    if (name != kBounds) program.set("u_strand_count", desc_.strand_count);
     return {};
   };
   const auto make_of_nodes = [&](gl::Program& program, const char* name,
@@ -161,7 +165,9 @@ Status GlVolume::compile(const gl::ShaderLibrary& shaders) {
     if (length_m > 0.0f) length_exponent_ = std::max(length_exponent_, exponent);
   }
   RETURN_IF_ERROR(make_of_nodes(clear_, "clear", {}));
-  RETURN_IF_ERROR(make_of_samples(bounds_, "bounds"));
+  RETURN_IF_ERROR(make_of_samples(bounds_, kBounds, {{"HAS_WAY", desc_.has_way ? 1 : 0}}));
+  bounds_.set("u_per_cell", 1.0f / cell_m_);
+  bounds_.set("u_ahead", desc_.is_ahead ? 1.0f : 0.0f);
   RETURN_IF_ERROR(make(fit_, "fit", {}));
   fit_.set("u_per_cell", 1.0f / cell_m_);
   fit_.set("u_home_low", glm::vec3(volume.home_low()));
@@ -179,8 +185,8 @@ Status GlVolume::compile(const gl::ShaderLibrary& shaders) {
                                 {{"FROM_CELLS", sorts_ ? 1 : 0}, {"DIVIDES", desc_.smoothing == 0 ? 1 : 0}}));
   if (sorts_) {
     RETURN_IF_ERROR(make_of_samples(place_, "place"));
-    RETURN_IF_ERROR(make(cells_, "cells", {{"HAS_CROWD", 0}}));
-    RETURN_IF_ERROR(make(crowds_, "cells", {{"HAS_CROWD", 1}}));
+    RETURN_IF_ERROR(make_of_samples(cells_, "cells", {{"HAS_CROWD", 0}}));
+    RETURN_IF_ERROR(make_of_samples(crowds_, "cells", {{"HAS_CROWD", 1}}));
     for (const gl::Program* program : {&cells_, &crowds_}) {
       program->set("u_length_exponent", length_exponent_);
       program->set("u_crowds_begin", crowds_begin);
@@ -211,6 +217,8 @@ void GlVolume::allocate() {
     }
   lengths_ = {"volume lengths", GL_R32F, lengths.size() * sizeof(float)};
   lengths_.buffer.write(lengths);
+  places_ = {"volume places", GL_RGBA32F, lengths.size() * sizeof(glm::vec4)};
+  motions_ = {"volume motions", GL_RGBA32F, lengths.size() * sizeof(glm::vec4)};
   std::vector<uint32_t> facts(shader::kFactCount, 0);
   std::fill_n(facts.begin() + shader::kFactLow, 3, ~0u);
   facts_ = gl::Buffer::of("volume facts", facts);
@@ -220,8 +228,8 @@ void GlVolume::allocate() {
               (most_nodes_ / shader::kVolumeSegment + most_nodes_ / kLeastRow + 1) * sizeof(glm::uvec4)};
   other_ = {"volume smoothing", GL_RGBA32F, (most_nodes_ + shader::kVolumeHeader) * sizeof(glm::vec4)};
   if (sorts_) {
-    ranks_ = {"volume ranks", GL_R32UI, samples() * sizeof(uint32_t)};
-    records_ = {"volume records", GL_RGBA32F, 2 * samples() * sizeof(glm::vec4)};
+    ranks_ = {"volume ranks", GL_RG32UI, samples() * sizeof(glm::uvec2)};
+    records_ = {"volume records", GL_R32UI, samples() * sizeof(uint32_t)};
     cell_ = {"volume cells", GL_RG32UI, most_nodes_ * sizeof(glm::uvec2)};
     lists_ = {"volume lists", GL_RGBA32UI,
               (cells() + samples() / shader::kVolumeCrowd + 1) * sizeof(glm::uvec4)};
@@ -250,7 +258,11 @@ void GlVolume::update(const StepBlock& step, const StrandPlane& position, const 
   other_.buffer.bind_storage(shader::kBindingVolumeRecords);
   run_counted(clear_, shader::kFactSegmentGroups);
 
+  places_.buffer.bind_storage(shader::kBindingVolumePlaces);
+  motions_.buffer.bind_storage(shader::kBindingVolumeMotions);
   run(bounds_, bounds_groups_);
+  places_.view.bind(shader::kUnitVolumePlace);
+  motions_.view.bind(shader::kUnitVolumeMotion);
   run(fit_, 1);
   counts_.bind_storage(shader::kBindingVolumeCounts);
   if (sorts_) ranks_.buffer.bind_storage(shader::kBindingVolumeRanks);
@@ -328,8 +340,8 @@ void GlVolume::read_nodes(const LookupTable& table, std::vector<glm::vec4>& node
 
 uint64_t GlVolume::size_bytes() const {
   uint64_t bytes = facts_.size_bytes() + counts_.size_bytes() + step_.size_bytes();
-  for (const FetchedBuffer* fetched :
-       {&lengths_, &ranks_, &records_, &cell_, &lists_, &sums_, &masks_, &segment_, &other_})
+  for (const FetchedBuffer* fetched : {&lengths_, &places_, &motions_, &ranks_, &records_, &cell_, &lists_,
+                                       &sums_, &masks_, &segment_, &other_})
     bytes += fetched->buffer.size_bytes();
   return bytes;
 }
