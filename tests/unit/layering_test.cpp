@@ -68,6 +68,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
        with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode"}, kAll)},
       {"server", with({"server/app", "server/net"}, kAll)},
       {"client/net", with({"common/net", "common/replay"}, kWire)},
+      {"client/web", kStrands},
       {"client/window", kAll},
       {"client/app", with({"client/net", "client/window"}, kAll)},
       {"client", with({"client/app"}, kAll)},
