@@ -64,7 +64,7 @@ const uint kFactCells = 9u;             // with samples
 const uint kFactCrowds = 10u;           // with more than kVolumeCrowd
 const uint kFactSegments = 11u;         // of nodes that something comes to
 const uint kFactNodes = 12u;            // along each axis
-const uint kFactMomentumExponent = 15u; // momenta are below 2^(this - bias)
+const uint kFactMomentum = 15u;         // bits of the largest component of momentum, kept
 const uint kFactFirst = 16u;            // lattice point of node 0 + bias
 // Groups of the indirect dispatches.
 const uint kFactRowGroups = 20u;

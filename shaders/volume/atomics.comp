@@ -7,7 +7,7 @@
 layout(local_size_x = kVolumeLocalSize) in;
 layout(std430, binding = kBindingVolumeNodes) restrict buffer FixedBlock { int part[]; } b_fixed;
 
-uniform int u_length_exponent;
+uniform float u_most_length;  // of a sample, m
 
 void add_to_node(uint node, ivec4 sum) {
   atomicAdd(b_fixed.part[4u * node], sum.x);
@@ -25,10 +25,10 @@ void main() {
   const ivec3 cell = cell_of(place.xyz);
   if (!is_sample(place.xyz, place.w) || !is_in_grid(cell, nodes)) return;
   // No node has more samples around it.
-  const vec4 scale = fixed_scale(min(8u * fact(kFactMostCount), fact(kFactPlaced)), u_length_exponent);
+  const vec4 scale = fixed_scale(min(8u * fact(kFactMostCount), fact(kFactPlaced)), u_most_length);
   const vec4 value = scale * (place.w * vec4(sample_velocity(which), 1.0));
   ivec4 s0 = ivec4(0), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
-  ADD_TO_CORNERS(place.xyz - floor(place.xyz), value)
+  ADD_TO_CORNERS(place.xyz - floor(place.xyz), value, sample_dither(which))
   const uint at = index_of(cell, nodes);
   const uint layer = nodes.x * nodes.y;
   add_to_node(at, s0);

@@ -11,7 +11,7 @@ layout(std430, binding = kBindingVolumeNodes) writeonly restrict buffer SumBlock
 layout(binding = kUnitVolumeRecord) uniform usamplerBuffer u_record;
 layout(binding = kUnitVolumeList) uniform usamplerBuffer u_list;
 
-uniform int u_length_exponent;
+uniform float u_most_length;  // of a sample, m
 uniform uint u_crowds_begin;  // in the lists
 
 #if HAS_CROWD
@@ -40,13 +40,13 @@ void main() {
   const uint first = 0u;
   const uint stride = 1u;
 #endif
-  const vec4 scale = fixed_scale(entry.y, u_length_exponent);
+  const vec4 scale = fixed_scale(entry.y, u_most_length);
   ivec4 s0 = ivec4(0), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
   for (uint i = first; i < entry.y; i += stride) {
     const SampleIndex which = unpacked_index(texelFetch(u_record, int(entry.x + i)).x);
     const vec4 place = sample_place(which);
     const vec4 value = scale * (place.w * vec4(sample_velocity(which), 1.0));
-    ADD_TO_CORNERS(place.xyz - floor(place.xyz), value)
+    ADD_TO_CORNERS(place.xyz - floor(place.xyz), value, sample_dither(which))
   }
   const vec4 back = 1.0 / scale;
   const uint to = (number + 1u) * 8u;

@@ -17,13 +17,9 @@ uint volume_invocation() {
   return (gl_WorkGroupID.y * kVolumeGroupsAcross + gl_WorkGroupID.x) * kVolumeLocalSize + gl_LocalInvocationID.x;
 }
 
-float power_of_two(int exponent) { return uintBitsToFloat(uint(clamp(exponent, -126, 127) + 127) << 23); }
-// The least n with count <= 2^n.
-int bits_of(uint count) { return count > 1u ? findMSB(count - 1u) + 1 : 0; }
-// By which (momentum, length) become integers, so many of which sum to less than 2^31 however they come: a power of
-// two, which takes nothing away. Lengths are below 2^length_exponent.
-vec4 fixed_scale(uint count, int length_exponent) {
-  const int bits = 30 - bits_of(count);
-  const int momentum_exponent = int(fact(kFactMomentumExponent)) - int(kVolumeCellBias);
-  return vec4(vec3(power_of_two(bits - momentum_exponent)), power_of_two(bits - length_exponent));
+// By which (momentum, length) become integers, so many of which stay below 2^31 however they come and are rounded.
+vec4 fixed_scale(uint count, float most_length) {
+  const float room = 0.999999 * (2147483648.0 - 2.0 * float(count)) / float(max(count, 1u));
+  const vec4 most = vec4(vec3(uintBitsToFloat(fact(kFactMomentum))), most_length);
+  return room / max(most, vec4(1e-20));
 }

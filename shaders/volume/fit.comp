@@ -53,7 +53,7 @@ void main() {
     b_facts.fact[kFactLow + axis] = 0xffffffffu;
     b_facts.fact[kFactHigh + axis] = 0u;
   }
-  b_facts.fact[kFactMomentumExponent] = (b_facts.fact[kFactMostMomentum] >> 23) + kVolumeCellBias - 126u;
+  b_facts.fact[kFactMomentum] = b_facts.fact[kFactMostMomentum];
   for (uint word = kFactMostMomentum; word <= kFactSegments; ++word) b_facts.fact[word] = 0u;
   const uint groups = (nodes.y * nodes.z + kVolumeLocalSize - 1u) / kVolumeLocalSize;
   b_facts.fact[kFactRowGroups] = min(groups, kVolumeGroupsAcross);

@@ -9,7 +9,7 @@ layout(binding = kUnitVolumeSum) uniform samplerBuffer u_sum;
 #else
 layout(std430, binding = kBindingVolumeRecords) restrict buffer FixedBlock { ivec4 node[]; } b_fixed;
 
-uniform int u_length_exponent;
+uniform float u_most_length;  // of a sample, m
 #endif
 
 #if FROM_CELLS
@@ -33,7 +33,7 @@ void main() {
   sum += held_for(at - layer, 4) + held_for(at - layer - 1, 5);
   sum += held_for(at - layer - row, 6) + held_for(at - layer - row - 1, 7);
 #else
-  const vec4 scale = fixed_scale(min(8u * fact(kFactMostCount), fact(kFactPlaced)), u_length_exponent);
+  const vec4 scale = fixed_scale(min(8u * fact(kFactMostCount), fact(kFactPlaced)), u_most_length);
   const vec4 sum = vec4(b_fixed.node[node.index]) / scale;
   b_fixed.node[node.index] = ivec4(0);
 #endif

@@ -1,5 +1,6 @@
 // The samples of a hair volume: vertices, or places on segments that are longer than a cell.
 #pragma variant HAS_SPLIT 0 1
+#include "lib/hash.glsl"
 #include "volume/sample.glsl"
 
 // As volume/bounds.comp left them.
@@ -28,6 +29,8 @@ uint packed_index(SampleIndex which) { return which.vertex << kVolumePartBits | 
 SampleIndex unpacked_index(uint word) {
   return SampleIndex(word >> kVolumePartBits, word & ((1u << kVolumePartBits) - 1u));
 }
+
+float sample_dither(SampleIndex which) { return float(mix_u32(packed_index(which)) >> 8) * (1.0 / 16777216.0); }
 
 // In cells of the lattice; w = length of hair, m.
 vec4 sample_place(SampleIndex which) {

@@ -290,6 +290,28 @@ TEST_P(GlVolumes, HoldAllHairInOneCell) {
   EXPECT_EQ(std::memcmp(again.nodes.data(), filled.nodes.data(), filled.nodes.size() * sizeof(glm::vec4)), 0);
 }
 
+// The most that can come to a node: equal lengths just below a power of two, and all hair of a mind.
+TEST_P(GlVolumes, HoldAllHairOnOneNode) {
+  constexpr float kBelowPowerOfTwo = 0.0078f;
+  const glm::vec3 moving(0.999f, -0.999f, 0.5f);
+  Hair hair = random_hair(4400, 0.006f, 13);
+  for (size_t i = hair.layout.strand_count; i < hair.layout.size(); ++i)
+    hair.layout.rest[i].w = kBelowPowerOfTwo;
+  Maker maker = make(hair, {20, 0});
+  ASSERT_EQ(maker.host.segment_samples(), 1u);
+  const glm::dvec3 node = glm::dvec3(maker.host.cell_m()) * glm::dvec3(3.0, 2.0, -4.0);
+  for (size_t i = 0; i < hair.layout.size(); ++i) {
+    hair.velocity_mps[i] = glm::vec4(hair.head_velocity_mps + moving, 0.0f);
+    const glm::dvec3 at = hair.world_from_head * node - glm::dvec3(hair.h_s * moving);
+    hair.position_m[i] = glm::vec4(glm::vec3(at), 0.0f);
+  }
+  const Filled filled = fill(maker, hair);
+  EXPECT_EQ(filled.facts.outside_count, 0u);
+  EXPECT_NEAR(length_in(filled) / maker.host.length_m(), 1.0, 1e-6);
+  const VolumeSample found = sample_volume(filled.facts.grid, filled.nodes, node);
+  EXPECT_LT(glm::distance(found.velocity_mps, glm::dvec3(moving)), 1e-5);
+}
+
 // As many cells in use as there can be.
 TEST_P(GlVolumes, HoldEachVertexInACellOfItsOwn) {
   Hair hair = random_hair(1000, 0.006f, 6);

@@ -3,7 +3,6 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/check.h"
 #include "server/sim/executor/gl_plane.h"
@@ -105,7 +104,6 @@ class GlVolume final : public DeviceVolume {
   uint32_t row_count_ = 0;     // of samples
   uint64_t sample_count_ = 0;  // that are hair
   uint32_t bounds_groups_ = 0;
-  int32_t length_exponent_ = 0;  // of a sample, at most
 
   gl::Program clear_, bounds_, fit_, rank_, rows_, segments_, groups_, place_, cells_, crowds_, atomics_,
       gather_;
@@ -158,12 +156,9 @@ Status GlVolume::compile(const gl::ShaderLibrary& shaders) {
     program.set("u_per_cell_m3", 1.0f / (cell_m_ * cell_m_ * cell_m_));
     return {};
   };
-  length_exponent_ = -100;
-  for (const float length_m : volume.sample_lengths_m()) {
-    int exponent = 0;
-    std::frexp(length_m / static_cast<float>(volume.segment_samples()), &exponent);
-    if (length_m > 0.0f) length_exponent_ = std::max(length_exponent_, exponent);
-  }
+  const std::span<const float> lengths_m = volume.sample_lengths_m();
+  const float most_length_m =
+      *std::max_element(lengths_m.begin(), lengths_m.end()) / static_cast<float>(volume.segment_samples());
   RETURN_IF_ERROR(make_of_nodes(clear_, "clear", {}));
   RETURN_IF_ERROR(make_of_samples(bounds_, kBounds, {{"HAS_WAY", desc_.has_way ? 1 : 0}}));
   bounds_.set("u_per_cell", 1.0f / cell_m_);
@@ -188,13 +183,13 @@ Status GlVolume::compile(const gl::ShaderLibrary& shaders) {
     RETURN_IF_ERROR(make_of_samples(cells_, "cells", {{"HAS_CROWD", 0}}));
     RETURN_IF_ERROR(make_of_samples(crowds_, "cells", {{"HAS_CROWD", 1}}));
     for (const gl::Program* program : {&cells_, &crowds_}) {
-      program->set("u_length_exponent", length_exponent_);
+      program->set("u_most_length", most_length_m);
       program->set("u_crowds_begin", crowds_begin);
     }
   } else {
     RETURN_IF_ERROR(make_of_samples(atomics_, "atomics"));
-    atomics_.set("u_length_exponent", length_exponent_);
-    gather_.set("u_length_exponent", length_exponent_);
+    atomics_.set("u_most_length", most_length_m);
+    gather_.set("u_most_length", most_length_m);
   }
   if (desc_.smoothing == 0) return {};
   RETURN_IF_ERROR(make_of_nodes(smooth_xy_, "smooth", {}));
