@@ -1,5 +1,5 @@
-// Samples straight into the nodes around them, by 32 integer atomic additions each. A row of invocations for each row of
-// samples, an invocation for each strand.
+// Samples straight into the nodes around them, by 32 integer atomic additions each. A row of invocations for each
+// row of samples, an invocation for each strand.
 #include "volume/corners.glsl"
 #include "volume/grid.glsl"
 #include "volume/samples.glsl"

@@ -1,5 +1,5 @@
-// Where vertices are at the end of the substep, in cells, and which cells of the lattice hair is in, from and to along
-// each axis, with the largest momentum of a sample. Each invocation looks at several strands.
+// Where vertices are at the end of the substep, in cells, and which cells of the lattice hair is in, from and to
+// along each axis, with the largest momentum of a sample. Each invocation looks at several strands.
 #pragma variant HAS_WAY 0 1
 #pragma variant HAS_SPLIT 0 1
 #include "sim/step.glsl"

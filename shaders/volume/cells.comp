@@ -1,5 +1,5 @@
-// Sums of the samples of each cell in use for the eight nodes around it. An invocation per cell; of a cell with a crowd a
-// group of them.
+// Sums of the samples of each cell in use for the eight nodes around it. An invocation per cell; of a cell with a
+// crowd a group of them.
 #pragma variant HAS_CROWD 0 1
 #include "volume/corners.glsl"
 #include "volume/facts.glsl"

@@ -1,8 +1,7 @@
-// What a sample adds to the eight nodes around it, as integers: sums of them are the same in any order. They
-// are in s0 to s7, (momentum, length), x the fastest.
-// `dither`, 0 to 1 and of the sample alone: rounded alike, equal samples of a crowd would all be off the same way;
-// corners take different parts of it.
-// `share`: where in its cell it lies; `value`: its momentum and length.
+// What a sample adds to the eight nodes around it, as integers: sums of them are the same in any order. They are
+// in s0 to s7, (momentum, length), x the fastest. `dither`, 0 to 1 and of the sample alone: rounded alike, equal
+// samples of a crowd would all be off the same way; corners take different parts of it. `share`: where in its cell
+// it lies; `value`: its momentum and length.
 #define ADD_TO_CORNERS(share, value, dither)                                  \
   {                                                                           \
     const vec4 dither0 = fract(dither + vec4(0.0, 0.125, 0.25, 0.375));       \

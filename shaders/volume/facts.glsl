@@ -1,4 +1,5 @@
-// The facts of a hair volume under way, as the kernels that make it read them: the grid and how much of it is in use.
+// The facts of a hair volume under way, as the kernels that make it read them: the grid and how much of it is in
+// use.
 #include "shared/bindings.h"
 #include "shared/hair_volume.h"
 

@@ -1,6 +1,6 @@
-// The grid around the hair that was found, with a margin that smoothing fills and one for strands that move on while the
-// volume stays; cut down to the groom's own box, side by side, where it would be too large (HairVolume::fit_grid). One
-// invocation.
+// The grid around the hair that was found, with a margin that smoothing fills and one for strands that move on
+// while the volume stays; cut down to the groom's own box, side by side, where it would be too large
+// (HairVolume::fit_grid). One invocation.
 #include "shared/bindings.h"
 #include "shared/hair_volume.h"
 

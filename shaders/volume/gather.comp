@@ -1,5 +1,5 @@
-// Sums at nodes: of what the cells around each hold for it, or of integers that were added there. An invocation per node
-// of a segment.
+// Sums at nodes: of what the cells around each hold for it, or of integers that were added there. An invocation
+// per node of a segment.
 #pragma variant FROM_CELLS 0 1
 #include "volume/nodes.glsl"
 

@@ -1,5 +1,5 @@
-// What kernels over the segments of nodes share: eight invocations each, which node each has, and how sums become mean
-// velocity and density.
+// What kernels over the segments of nodes share: eight invocations each, which node each has, and how sums become
+// mean velocity and density.
 #pragma variant DIVIDES 0 1
 #include "volume/facts.glsl"
 

@@ -1,4 +1,5 @@
-// Samples sorted by cells: which they are. A row of invocations for each row of samples, an invocation for each strand.
+// Samples sorted by cells: which they are. A row of invocations for each row of samples, an invocation for each
+// strand.
 #include "volume/samples.glsl"
 
 layout(local_size_x = kVolumeLocalSize) in;

@@ -1,5 +1,5 @@
-// In which cell each sample is, and which of its samples. A row of invocations for each row of samples, an invocation for
-// each strand.
+// In which cell each sample is, and which of its samples. A row of invocations for each row of samples, an
+// invocation for each strand.
 #pragma variant KEEPS_RANKS 0 1
 #include "volume/grid.glsl"
 #include "volume/samples.glsl"

@@ -1,5 +1,5 @@
-// Counts of cells to where the records of each begin, to lists of the cells in use, and to what segments of eight nodes
-// their hair comes to once it is smoothed. Leaves the counts at zero. An invocation per row of cells.
+// Counts of cells to where the records of each begin, to lists of the cells in use, and to what segments of eight
+// nodes their hair comes to once it is smoothed. Leaves the counts at zero. An invocation per row of cells.
 #pragma variant SORTS 0 1
 #include "volume/facts.glsl"
 

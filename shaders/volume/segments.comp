@@ -1,4 +1,5 @@
-// The segments of eight nodes that hair comes to, of which all passes over nodes are. An invocation per row of nodes.
+// The segments of eight nodes that hair comes to, of which all passes over nodes are. An invocation per row of
+// nodes.
 #include "volume/facts.glsl"
 
 layout(local_size_x = kVolumeLocalSize) in;

@@ -1,5 +1,5 @@
-// [1 2 1] / 4 along x and y, or along z, of sums or of mean velocities. Beyond the grid is nothing. An invocation per node
-// of a segment.
+// [1 2 1] / 4 along x and y, or along z, of sums or of mean velocities. Beyond the grid is nothing. An invocation
+// per node of a segment.
 #pragma variant ALONG_Z 0 1
 #pragma variant OF_VELOCITY 0 1
 #include "volume/nodes.glsl"
