@@ -26,8 +26,11 @@
 #if defined(__wasm_simd128__)
 #include <wasm_simd128.h>
 #endif
-// Kernels count numbers too small for full precision as 0. Where the processor has no mode for that
-// (WebAssembly), they define this as 1 and every operation here does it.
+// Kernels count numbers too small for full precision (below 2^-126) as 0. Where the processor has no mode for
+// that (WebAssembly), they define this as 1, and lanes do it wherever such a number could come to matter: what
+// is loaded, stored, compared, divided or divided by, and what a root is taken of. Sums and products leave it:
+// to do it there as well takes five to seven times as long, and beside a number that is not as small itself
+// (above 2^-102) what is left vanishes in rounding.
 #ifndef STRANDCAST_LANES_FLUSH
 #define STRANDCAST_LANES_FLUSH 0
 #endif
@@ -52,6 +55,7 @@ namespace strandcast::simd {
 inline namespace STRANDCAST_LANE_NAMESPACE {
 
 inline constexpr uint32_t kLanes = STRANDCAST_LANE_COUNT;
+inline constexpr float kLeastFloat = 1.17549435e-38f;  // of full precision, 2^-126
 
 #define STRANDCAST_LANES inline __attribute__((always_inline))
 #define STRANDCAST_LANES_LAMBDA __attribute__((always_inline))  // behind a lambda's parameters
@@ -86,40 +90,16 @@ STRANDCAST_LANES IntBits to_int_bits(FloatBits x) {
   return whole;
 }
 
-#if STRANDCAST_LANES_FLUSH
-STRANDCAST_LANES FloatBits zero_where(IntBits is_tiny, FloatBits x) {  // of the same sign
-  return (FloatBits)((UintBits)x & ~((UintBits)is_tiny >> 1));
-}
-STRANDCAST_LANES FloatBits sizes(FloatBits x) {
-  return (FloatBits)((UintBits)x & 0x7fffffffu);
-}
-/// Of a number that is exact: sums too small for full precision are.
+/// 0 of the same sign in place of what is too small for full precision, where lanes do that by themselves.
 STRANDCAST_LANES FloatBits flushed(FloatBits x) {
-  return zero_where(((UintBits)x & 0x7f800000u) == 0, x);
-}
-// x86 asks whether the result would be too small if exponents had no end, rounded to full precision.
-STRANDCAST_LANES FloatBits flushed_product(FloatBits a, FloatBits b) {
-  constexpr float kTwo24 = 16777216.0f;
-  constexpr int32_t kLeastTimesTwo24 = 0x0c800000;
-  const IntBits bits = (IntBits)(a * kTwo24 * b) & 0x7fffffff;
-  return zero_where(bits < kLeastTimesTwo24, a * b);
-}
-// No quotient lies so little below the least number that rounding takes it there.
-STRANDCAST_LANES FloatBits flushed_quotient(FloatBits a, FloatBits b) {
-  constexpr float kTwo63 = 9.223372037e18f;
-  return zero_where(sizes(a) * kTwo63 < sizes(b) * (1.0f / kTwo63), a / b);
-}
+#if STRANDCAST_LANES_FLUSH
+  const v128_t bits = (v128_t)x;
+  const v128_t is_tiny = wasm_f32x4_lt(wasm_f32x4_abs(bits), wasm_f32x4_splat(kLeastFloat));
+  return (FloatBits)wasm_v128_andnot(bits, wasm_u32x4_shr(is_tiny, 1));
 #else
-STRANDCAST_LANES constexpr FloatBits flushed(FloatBits x) {
   return x;
-}
-STRANDCAST_LANES constexpr FloatBits flushed_product(FloatBits a, FloatBits b) {
-  return a * b;
-}
-STRANDCAST_LANES constexpr FloatBits flushed_quotient(FloatBits a, FloatBits b) {
-  return a / b;
-}
 #endif
+}
 
 struct Float;
 
@@ -137,8 +117,8 @@ struct Float {
   FloatBits v;
   Float() = default;
   STRANDCAST_LANES constexpr Float(FloatBits bits) : v(bits) {}
-  STRANDCAST_LANES constexpr Float(float value) : v(flushed(FloatBits{} + value)) {}
-  STRANDCAST_LANES constexpr Float(double value) : v(flushed(FloatBits{} + static_cast<float>(value))) {}
+  STRANDCAST_LANES constexpr Float(float value) : v(FloatBits{} + value) {}
+  STRANDCAST_LANES constexpr Float(double value) : v(FloatBits{} + static_cast<float>(value)) {}
   STRANDCAST_LANES constexpr Float(int value) : v(FloatBits{} + static_cast<float>(value)) {}
   STRANDCAST_LANES constexpr Float(uint32_t value) : v(FloatBits{} + static_cast<float>(value)) {}
   /// Of values below 2^31.
@@ -149,16 +129,16 @@ STRANDCAST_LANES Uint::Uint(Float value) : v((UintBits)to_int_bits(value.v)) {}
 
 // ---- operators
 STRANDCAST_LANES constexpr Float operator+(Float a, Float b) {
-  return flushed(a.v + b.v);
+  return a.v + b.v;
 }
 STRANDCAST_LANES constexpr Float operator-(Float a, Float b) {
-  return flushed(a.v - b.v);
+  return a.v - b.v;
 }
 STRANDCAST_LANES constexpr Float operator*(Float a, Float b) {
-  return flushed_product(a.v, b.v);
+  return a.v * b.v;
 }
-STRANDCAST_LANES constexpr Float operator/(Float a, Float b) {
-  return flushed_quotient(a.v, b.v);
+STRANDCAST_LANES Float operator/(Float a, Float b) {
+  return flushed(a.v) / flushed(b.v);
 }
 STRANDCAST_LANES constexpr Float operator-(Float a) {
   return -a.v;
@@ -205,22 +185,22 @@ STRANDCAST_LANES Bool lanes_that(bool value) {
 }
 #else
 STRANDCAST_LANES Bool operator<(Float a, Float b) {
-  return {a.v < b.v};
+  return {flushed(a.v) < flushed(b.v)};
 }
 STRANDCAST_LANES Bool operator>(Float a, Float b) {
-  return {a.v > b.v};
+  return {flushed(a.v) > flushed(b.v)};
 }
 STRANDCAST_LANES Bool operator<=(Float a, Float b) {
-  return {a.v <= b.v};
+  return {flushed(a.v) <= flushed(b.v)};
 }
 STRANDCAST_LANES Bool operator>=(Float a, Float b) {
-  return {a.v >= b.v};
+  return {flushed(a.v) >= flushed(b.v)};
 }
 STRANDCAST_LANES Bool operator==(Float a, Float b) {
-  return {a.v == b.v};
+  return {flushed(a.v) == flushed(b.v)};
 }
 STRANDCAST_LANES Bool operator!=(Float a, Float b) {
-  return {a.v != b.v};
+  return {flushed(a.v) != flushed(b.v)};
 }
 STRANDCAST_LANES Bool operator>=(Uint a, Uint b) {
   return {a.v >= b.v};
@@ -328,7 +308,8 @@ STRANDCAST_LANES Float sqrt(Float x) {
   return (FloatBits)_mm256_sqrt_ps((__m256)x.v);
 #elif defined(__wasm_simd128__)
   v128_t parts[sizeof(FloatBits) / sizeof(v128_t)];
-  std::memcpy(parts, &x.v, sizeof parts);
+  const FloatBits of = flushed(x.v);
+  std::memcpy(parts, &of, sizeof parts);
   for (v128_t& part : parts) part = wasm_f32x4_sqrt(part);
   FloatBits root;
   std::memcpy(&root, parts, sizeof root);
@@ -462,7 +443,8 @@ STRANDCAST_LANES Float load_lanes(const float* from) {
   return flushed(v);
 }
 STRANDCAST_LANES void store_lanes(Float x, float* to) {
-  std::memcpy(to, &x.v, sizeof x.v);
+  const FloatBits v = flushed(x.v);
+  std::memcpy(to, &v, sizeof v);
 }
 #if STRANDCAST_LANE_COUNT == 8
 /// 0, 1, 2 ...

@@ -64,6 +64,12 @@ function* records(file) {
   }
 }
 
+/** Processor time of this process: worth something on a busy machine too. */
+function cpuMs() {
+  const { user, system } = process.cpuUsage();
+  return (user + system) / 1000;
+}
+
 function median(values) {
   const sorted = [...values].sort((a, b) => a - b);
   return sorted[Math.floor(sorted.length / 2)] ?? 0;
@@ -120,10 +126,10 @@ for (const tape of tapes) {
     } else {
       const call = record.kind === 'A' ? core.of.strand_core_set_asset : core.of.strand_core_decode;
       const ok = core.lend(record.bytes, (at, size) => {
-        const begin = performance.now();
+        const begin = cpuMs();
         const status = call(core.decoder, at, size);
         if (record.kind === 'M' && ++sinceMade > WARM_UP && record.ok) {
-          result.ownMs.push(performance.now() - begin);
+          result.ownMs.push(cpuMs() - begin);
           result.nativeMs.push(record.nativeMs);
         }
         return status === 1;
