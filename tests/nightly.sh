@@ -5,7 +5,7 @@
 #   bash tests/nightly.sh --seconds 5 fuzz     the short form: only the fuzzers, 5 s each
 # Parts: fuzz, grids (property and comparing tests), dev (address and undefined behaviour, all tests), tsan (threads, all
 # tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
-# kernels compile for NEON). A part that fails
+# kernels compile for NEON), wasm (does the strand core in WebAssembly decode what this one does, bit for bit). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -17,11 +17,11 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | grids | dev | tsan | lto | arm) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto | arm | wasm) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, wasm)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm wasm)
 
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools spirv-tools
 log="$(mktemp)"
@@ -42,6 +42,11 @@ run_part() {
     tsan) build tsan && bash tests/run_preset.sh tsan build/tsan "$jobs" -LE 'property|compare' ;;
     lto) build lto && echo "all files agree" ;;
     arm) bash tests/tools/compile_for_arm.sh ;;
+    wasm)
+      bash deploy/install_deps.sh emscripten nodejs dpkg-dev
+      build ci -DSTRANDCAST_WEB=ON && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
+        cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
+      ;;
   esac
 }
 

@@ -81,6 +81,13 @@ FILENAME ~ /\.txt$/ {
   last_begun[entry] = ""
   in_entry = 1
 }
+# What a program of no GoogleTest says before it ends with its status for a skip.
+in_entry && /^\t\t<skipped / { skip_said[entry] = "skipped" }
+in_entry && /skipped: / {
+  text = $0
+  sub(/.*skipped: /, "", text)
+  skip_said[entry] = plain(text)
+}
 in_entry && /^\[ RUN      \] / { last_begun[entry] = plain(substr($0, 14)) }
 in_entry && /^(<system-out>)?\[       OK \] / { last_begun[entry] = "" }
 /^\t<\/testcase>/ { in_entry = 0 }
@@ -101,6 +108,9 @@ END {
       if (status[entry] == "run") {
         ++passed
         all[++all_count] = entry
+      } else if (status[entry] == "notrun" && entry in skip_said) {
+        ++skipped
+        skips = add(skips, entry ": " skip_said[entry])
       } else if (status[entry] == "disabled") {
         ++skipped
         skips = add(skips, entry ": disabled")

@@ -27,10 +27,10 @@
 #include <wasm_simd128.h>
 #endif
 // Kernels count numbers too small for full precision (below 2^-126) as 0. Where the processor has no mode for
-// that (WebAssembly), they define this as 1, and lanes do it wherever such a number could come to matter: what
-// is loaded, stored, compared, divided or divided by, and what a root is taken of. Sums and products leave it:
-// to do it there as well takes five to seven times as long, and beside a number that is not as small itself
-// (above 2^-102) what is left vanishes in rounding.
+// that (WebAssembly), they define this as 1, and lanes do it wherever such a number could come to matter:
+// what is loaded, stored, compared, divided or divided by, and what a root is taken of. Sums and products
+// leave it: to do it there as well takes five to seven times as long, and beside a number that is not as
+// small itself (above 2^-102) what is left vanishes in rounding.
 #ifndef STRANDCAST_LANES_FLUSH
 #define STRANDCAST_LANES_FLUSH 0
 #endif

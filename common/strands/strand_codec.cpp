@@ -188,7 +188,8 @@ Result<float> lattice_step_m(const std::string& codec, float bound_m) {
 
 Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec, WorkerPool& workers) {
   ASSIGN_OR_RETURN(const Row* row, find_row(codec));
-  return std::unique_ptr<StrandEncoder>(std::make_unique<PrefixEncoder>(make_encoder_of(row->info.name, workers)));
+  return std::unique_ptr<StrandEncoder>(
+      std::make_unique<PrefixEncoder>(make_encoder_of(row->info.name, workers)));
 }
 
 Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& codec,

@@ -6,6 +6,8 @@
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 #include <algorithm>
@@ -65,6 +67,12 @@ STRANDCAST_LANES uint32_t find_symbol(const SymbolTable& table, int32_t place) {
   const __m128i low = _mm_cmpgt_epi16(_mm_load_si128(start), wanted);
   const __m128i high = _mm_cmpgt_epi16(_mm_load_si128(start + 1), wanted);
   const auto beyond = static_cast<uint32_t>(_mm_movemask_epi8(_mm_packs_epi16(low, high)));
+  return static_cast<uint32_t>(std::countr_zero(beyond | 1u << kSymbolCount)) - 1u;
+#elif defined(__wasm_simd128__)
+  const v128_t wanted = wasm_i16x8_splat(static_cast<int16_t>(place));
+  const v128_t low = wasm_i16x8_gt(wasm_v128_load(table.start.data()), wanted);
+  const v128_t high = wasm_i16x8_gt(wasm_v128_load(table.start.data() + kSymbolCount / 2), wanted);
+  const auto beyond = static_cast<uint32_t>(wasm_i8x16_bitmask(wasm_i8x16_narrow_i16x8(low, high)));
   return static_cast<uint32_t>(std::countr_zero(beyond | 1u << kSymbolCount)) - 1u;
 #else
   uint32_t symbol = 0;

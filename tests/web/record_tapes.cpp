@@ -1,17 +1,22 @@
 // Writes tapes (tests/web/tape.h) of what this build's decoders make of strand messages:
 //   record_tapes kept FILE                 every kept stream of tests/conformance
 //   record_tapes hostile FILE              the fuzzers' inputs for strand decoders and assets
-//   record_tapes stream FILE SOLVER CODEC STRANDSxVERTICES FRAMES    the server's own solver on the built-in walk
+//   record_tapes tiny FILE                 every kernel on strands whose lengths, forces and speeds go down
+//   to 2^-156 record_tapes stream FILE SOLVER CODEC STRANDSxVERTICES FRAMES    the server's own solver on the
+//   built-in walk
+#include <array>
+#include <cmath>
 #include <ctime>
-#include <map>
 
-#include "common/strands/byte_io.h"
+#include "common/kernels/step_model.h"
 #include "common/strands/scene_asset.h"
+#include "common/strands/step/rod_planes.h"
 #include "server/report/stream_codec.h"
 #include "server/report/stream_recording.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "tests/conformance/stored_stream.h"
 #include "tests/fuzz/strand_chain.h"
+#include "tests/support/hair_motion.h"
 #include "tests/web/tape.h"
 
 namespace strandcast {
@@ -124,6 +129,79 @@ Status record_hostile(Tape& tape) {
   return {};
 }
 
+constexpr HairMotionDesc kTinyHair = {40, 8, MotionKind::Still, 0.3f, 0.0f};
+
+std::shared_ptr<const StepModel> tiny_model(const StepKernel& kernel,
+                                            std::span<const glm::vec3> rest_in_head_m) {
+  auto model = std::make_shared<StepModel>();
+  model->strand_count = kTinyHair.strand_count;
+  model->vertex_count = kTinyHair.vertex_count;
+  model->pinned_root_count = 2;
+  model->parameters.air_drag_per_s = 5.0;
+  model->parameters.max_speed_mps = 30.0;
+  model->parameters.s_damping = 0.9;
+  model->kernel.shader_path = kernel.shader_path;
+  model->kernel.variant = {{"HAS_PINNED_TAIL", 0}};
+  if (kernel.fixed.empty()) return model;
+  model->kernel.variant["HAS_TWIST"] = 1;
+  model->kernel.constants = {{"u_solves", 1u}, {"u_order", 2u}, {"u_bending_damping", 2e-3}};
+  step::RodPlanes rods =
+      step::natural_rods({rest_in_head_m, kTinyHair.strand_count, kTinyHair.vertex_count, 2, 0, true});
+  for (uint32_t s = 0; s < kTinyHair.strand_count; ++s)
+    for (const uint32_t row : {2u, 3u}) rods.strand[row * kTinyHair.strand_count + s].w = 1e-3f;
+  model->rod_edge = std::move(rods.edge);
+  model->rod_strand = std::move(rods.strand);
+  return model;
+}
+
+constexpr double kTinyForce = 0x1p-120;
+std::shared_ptr<const StepScene> tiny_scene(double force) {
+  auto scene = std::make_shared<StepScene>();
+  scene->gravity_mps2 = {0.0, -9.81 * force, 0.0};
+  scene->colliders = {{glm::vec3(0.0f, 0.0f, 1.0f), 0.05f}};
+  scene->follicle_limit_rad = 0.5;
+  scene->follicle_cosine = 0.87758f;
+  scene->follicle_sine = 0.47943f;
+  return scene;
+}
+
+/// Strand s is 2^(4 s) times as short as hair, and in the later half of the frames all forces are tiny.
+Status record_tiny(Tape& tape) {
+  constexpr uint64_t kFrames = 60;
+  constexpr int64_t kStepNs = 16'666'667;
+  std::vector<glm::vec3> rest_in_head_m = HairMotion(kTinyHair).rest_in_head();
+  for (size_t i = 0; i < rest_in_head_m.size(); ++i)
+    rest_in_head_m[i] *= std::ldexp(1.0f, -4 * static_cast<int>(i % kTinyHair.strand_count));
+  for (const StepKernel& kernel : step_kernels()) {
+    tape.add_name("tiny " + kernel.shader_path);
+    ASSIGN_OR_RETURN(const auto encoder, make_strand_encoder("step"));
+    ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m("step", 1e-4f));
+    encoder->set_rest_shape(rest_in_head_m);
+    Player player(tape, "step", {kTinyHair.strand_count, kTinyHair.vertex_count}, rest_in_head_m);
+    const auto model = tiny_model(kernel, rest_in_head_m);
+    const std::array scenes = {tiny_scene(1.0), tiny_scene(kTinyForce)};
+    std::vector<StepTick> ticks;
+    for (uint64_t frame = 1; frame <= kFrames; ++frame) {
+      const double force = frame < kFrames / 2 ? 1.0 : kTinyForce;
+      const auto& scene = frame < kFrames / 2 ? scenes[0] : scenes[1];
+      ticks.push_back({frame, {}, {}, glm::dvec3(0.6, 0.1, 0.2) * force, false});
+      if (ticks.size() > kMostTrailTicks) ticks.erase(ticks.begin());
+      QuantiseInput state;
+      state.tick = frame;
+      state.sim_time_ns = static_cast<int64_t>(frame) * kStepNs;
+      state.strand_count = kTinyHair.strand_count;
+      state.vertex_count = kTinyHair.vertex_count;
+      state.quantum_m = quantum_m;
+      state.position_in_head_m = rest_in_head_m;
+      Snapshot snapshot = quantise(state).snapshot;
+      snapshot.trail = std::make_shared<StepTrail>(StepTrail{model, scene, ticks});
+      if (!player.play(encoder->encode(snapshot)->message))
+        return make_error(ErrorCode::Internal, "a frame of {} cannot be sent", kernel.shader_path);
+    }
+  }
+  return {};
+}
+
 struct StreamWish {
   std::string solver;
   std::string codec;
@@ -162,13 +240,15 @@ Status record(const std::vector<std::string>& arguments) {
     RETURN_IF_ERROR(record_kept(tape));
   } else if (arguments.size() == 2 && arguments[0] == "hostile") {
     RETURN_IF_ERROR(record_hostile(tape));
+  } else if (arguments.size() == 2 && arguments[0] == "tiny") {
+    RETURN_IF_ERROR(record_tiny(tape));
   } else if (arguments.size() == 6 && arguments[0] == "stream") {
     StreamWish wish{arguments[2], arguments[3], {}, std::atoi(arguments[5].c_str())};
     if (std::sscanf(arguments[4].c_str(), "%ux%u", &wish.size.strand_count, &wish.size.vertex_count) != 2)
       return make_error(ErrorCode::BadInput, "\"{}\" is no size", arguments[4]);
     RETURN_IF_ERROR(record_stream(wish, tape));
   } else {
-    return make_error(ErrorCode::BadInput, "usage: record_tapes kept|hostile|stream FILE ...");
+    return make_error(ErrorCode::BadInput, "usage: record_tapes kept|hostile|tiny|stream FILE ...");
   }
   return tape.save(arguments[1]);
 }
