@@ -43,6 +43,11 @@ Fact decide_bend_limit(const SceneDesc& scene, const RuntimeFacts&) {
   return {false, "bend_limit leaves 0 to 180 degrees: segments bend freely"};
 }
 
+Fact decide_oriented_drag(const SceneDesc& scene, const RuntimeFacts&) {
+  if (scene.wind.along_share < 1.0f) return {true, "wind.along_share is below 1"};
+  return {false, "wind.along_share is 1: air drags hair alike in all directions"};
+}
+
 Fact decide_volume(const SceneDesc& scene, const RuntimeFacts&) {
   if (scene.volume.friction_per_s > 0.0) return {true, "volume.friction_per_s is above zero"};
   if (scene.volume.repulsion_per_s2 > 0.0) return {true, "volume.repulsion_per_s2 is above zero"};
@@ -101,6 +106,7 @@ constexpr std::array kFacts{
     FactRow{"has_colliders", &SceneFeatures::has_colliders, decide_colliders},
     FactRow{"has_follicle_limit", &SceneFeatures::has_follicle_limit, decide_follicle_limit},
     FactRow{"has_bend_limit", &SceneFeatures::has_bend_limit, decide_bend_limit},
+    FactRow{"has_oriented_drag", &SceneFeatures::has_oriented_drag, decide_oriented_drag},
     FactRow{"has_volume", &SceneFeatures::has_volume, decide_volume},
     FactRow{"has_distance_field", &SceneFeatures::has_distance_field, decide_distance_field},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},

@@ -23,6 +23,7 @@ struct SceneFeatures {
   bool has_colliders = false;
   bool has_follicle_limit = false;  // roots lean only so far
   bool has_bend_limit = false;      // segments bend only so far
+  bool has_oriented_drag = false;   // air drags hair less along its length than across
   bool has_volume = false;          // hair acts on hair
   bool has_distance_field = false;  // the head collides as one, not as spheres
   bool has_strand_viewers = false;

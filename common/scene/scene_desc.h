@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <glm/glm.hpp>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -61,6 +62,7 @@ struct WindDesc {
   float gust_intensity = 0.0f;  // standard deviation over mean speed, 0 = steady
   float gust_length_m = 9.0f;   // integral length of the turbulence
   uint32_t seed = 1;
+  float along_share = 1.0f;  // of the drag across a hair, what there is along it: 0.5 = a thin cylinder
 
   bool operator==(const WindDesc&) const = default;
 };
@@ -186,9 +188,11 @@ struct StreamDesc {
   bool operator==(const StreamDesc&) const = default;
 };
 
+using GroomDesc = std::variant<ProceduralGroomDesc, FileGroomDesc>;
+
 struct SceneDesc {
   std::string name = "default";
-  std::variant<ProceduralGroomDesc, FileGroomDesc> groom;
+  GroomDesc groom;
   HeadDesc head;
   SolverDesc solver;
   double step_rate_hz = 60.0;  // 10 .. 1000
@@ -198,6 +202,8 @@ struct SceneDesc {
   std::vector<SphereCollider> colliders;
   bool has_auto_collider = true;  // the head as it is drawn, when `colliders` is empty
   VolumeDesc volume;
+  std::optional<GroomDesc>
+      target_groom;  // to which volume.target_per_s2 drives the hair's volume; none: its own
   BendLimitDesc bend_limit;
   WindDesc wind;
   LookDesc look;

@@ -86,7 +86,7 @@ inline constexpr Range kFrameRate{0.1, 240.0, "Hz"};
 inline constexpr Range kStrandRate{0.0, 1000.0, "Hz"};  // 0 = every step
 
 template <class Visitor>
-void visit_groom(Visitor& v, std::variant<ProceduralGroomDesc, FileGroomDesc>& groom) {
+void visit_groom(Visitor& v, GroomDesc& groom) {
   if (!v.chooses("file", std::holds_alternative<FileGroomDesc>(groom))) {
     auto* procedural = std::get_if<ProceduralGroomDesc>(&groom);
     if (!procedural) procedural = &groom.emplace<ProceduralGroomDesc>();
@@ -267,6 +267,7 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
     v.number("gust_intensity", scene.wind.gust_intensity, kGustIntensity);
     v.number("gust_length_m", scene.wind.gust_length_m, kGustLength);
     v.number("seed", scene.wind.seed, kSeed);
+    v.number("along_share", scene.wind.along_share, kFraction);
   });
   v.group("look", [&] { visit_look(v, scene.look); });
   v.group("camera", [&] { visit_camera(v, scene.camera); });
@@ -299,6 +300,9 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
                   std::end(kVolumeScatters),
               "is unknown (known: auto, host, sort, atomics)");
   });
+  if (!v.chooses("target_groom", scene.target_groom.has_value())) return scene.target_groom.reset();
+  if (!scene.target_groom) scene.target_groom.emplace();
+  v.group("target_groom", [&] { visit_groom(v, *scene.target_groom); });
 }
 
 }  // namespace strandcast::scene_fields

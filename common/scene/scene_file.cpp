@@ -377,6 +377,12 @@ void resolve(std::string& path, const std::filesystem::path& folder) {
   if (!path.empty()) path = (folder / path).lexically_normal().generic_string();
 }
 
+void resolve(v1::Groom& groom, const std::filesystem::path& folder) {
+  if (!groom.has_file()) return;
+  if (groom.file().has_path()) resolve(*groom.mutable_file()->mutable_path(), folder);
+  for (std::string& path : *groom.mutable_file()->mutable_more_paths()) resolve(path, folder);
+}
+
 Result<SceneDesc> parse(const std::string& text, const std::string& place,
                         const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
   if (text.size() > kMaxSceneFileBytes)
@@ -391,11 +397,8 @@ Result<SceneDesc> parse(const std::string& text, const std::string& place,
   parser.SetRecursionLimit(kMaxNesting);
   if (!parser.ParseFromString(text, &message)) return errors.error(place);
   // Before the overrides: a path typed on the command line starts at the current folder, as everywhere else.
-  if (message.groom().has_file() && message.groom().file().has_path())
-    resolve(*message.mutable_groom()->mutable_file()->mutable_path(), folder);
-  if (message.groom().has_file())
-    for (std::string& path : *message.mutable_groom()->mutable_file()->mutable_more_paths())
-      resolve(path, folder);
+  if (message.has_groom()) resolve(*message.mutable_groom(), folder);
+  if (message.has_target_groom()) resolve(*message.mutable_target_groom(), folder);
   if (message.head().has_mesh_path()) resolve(*message.mutable_head()->mutable_mesh_path(), folder);
   if (message.has_head())
     for (std::string& path : *message.mutable_head()->mutable_more_mesh_paths()) resolve(path, folder);
@@ -438,10 +441,14 @@ SceneDesc with_absolute_paths(SceneDesc scene) {
   };
   complete(scene.head.mesh_path);
   for (std::filesystem::path& path : scene.head.more_mesh_paths) complete(path);
-  if (auto* file = std::get_if<FileGroomDesc>(&scene.groom)) {
+  const auto complete_groom = [&](GroomDesc& groom) {
+    auto* const file = std::get_if<FileGroomDesc>(&groom);
+    if (file == nullptr) return;
     complete(file->path);
     for (std::filesystem::path& path : file->more_paths) complete(path);
-  }
+  };
+  complete_groom(scene.groom);
+  if (scene.target_groom) complete_groom(*scene.target_groom);
   return scene;
 }
 

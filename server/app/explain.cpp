@@ -55,7 +55,11 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
   ASSIGN_OR_RETURN(auto solver, row->make(parameters, {.executor = &bench.executor,
                                                        .features = features,
                                                        .groom_gravity_in_head_mps2 = scene.gravity_mps2,
-                                                       .head_field = content.head_field}));
+                                                       .volume = scene.volume,
+                                                       .head_field = content.head_field,
+                                                       .bend_limit = scene.bend_limit,
+                                                       .volume_target = content.volume_target,
+                                                       .drag_along_share = scene.wind.along_share}));
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
   encoder->set_rest_shape(bench.asset.rest_position_m);

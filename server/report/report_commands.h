@@ -38,5 +38,6 @@ void add_rendering_command(CLI::App& app, ReportAction& action);
 void add_scalp_command(CLI::App& app, ReportAction& action);
 void add_stability_command(CLI::App& app, ReportAction& action);
 void add_streaming_command(CLI::App& app, ReportAction& action);
+void add_volume_command(CLI::App& app, ReportAction& action);
 
 }  // namespace strandcast

@@ -1,5 +1,6 @@
 #include "server/scene/scene_content.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -16,6 +17,8 @@ namespace {
 /// Cranium when neither the scene nor a groom gives one: an adult head.
 constexpr float kDefaultHeadRadiusM = 0.095f;
 constexpr uint32_t kScalpVertices = 2'000;
+/// Of the box of a target's hair, what it has to share with the box of the scene's.
+constexpr double kLeastTargetShare = 0.1;
 glm::vec3 head_center(const HeadDesc& head) {
   return head.has_center ? head.center_m : glm::vec3(0.0f);
 }
@@ -42,8 +45,7 @@ Result<PlacedGroom> load_hair_of(const FileGroomDesc& file) {
   return hair;
 }
 
-Result<Groom> grow_hair_of(const SceneDesc& scene) {
-  const auto& procedural = std::get<ProceduralGroomDesc>(scene.groom);
+Result<Groom> grow_hair_of(const SceneDesc& scene, const ProceduralGroomDesc& procedural) {
   const float radius_m = scene.head.radius_m > 0.0f ? scene.head.radius_m : kDefaultHeadRadiusM;
   ProceduralGroomOptions options;
   options.strand_count = procedural.strand_count;
@@ -57,6 +59,38 @@ Result<Groom> grow_hair_of(const SceneDesc& scene) {
   options.has_bust = scene.head.is_visible || (scene.colliders.empty() && scene.has_auto_collider);
   // Grown strands come in prefix order already.
   return grow_groom(make_scalp_cap(head_center(scene.head), radius_m, kScalpVertices), options);
+}
+
+/// Corners of the box around a groom.
+std::pair<glm::dvec3, glm::dvec3> box_of(const Groom& groom) {
+  std::pair<glm::dvec3, glm::dvec3> box(groom.rest_position_m.front(), groom.rest_position_m.front());
+  for (const glm::vec3& point : groom.rest_position_m)
+    box = {glm::min(box.first, glm::dvec3(point)), glm::max(box.second, glm::dvec3(point))};
+  return box;
+}
+
+/// Other hair on the same head, to whose volume the scene's is driven.
+Result<Groom> load_target_of(const SceneDesc& scene, const Groom& groom) {
+  const GroomDesc& desc = *scene.target_groom;
+  Groom target;
+  if (const auto* file = std::get_if<FileGroomDesc>(&desc)) {
+    ASSIGN_OR_RETURN(PlacedGroom hair, load_hair_of(*file));
+    target = std::move(hair.groom);
+  } else {
+    ASSIGN_OR_RETURN(target, grow_hair_of(scene, std::get<ProceduralGroomDesc>(desc)));
+  }
+  const auto own = box_of(groom), other = box_of(target);
+  const glm::dvec3 shared =
+      glm::max(glm::min(own.second, other.second) - glm::max(own.first, other.first), glm::dvec3(0.0));
+  const glm::dvec3 size = other.second - other.first;
+  const double share = shared.x * shared.y * shared.z / std::max(size.x * size.y * size.z, 1e-12);
+  if (share < kLeastTargetShare)
+    return make_error(
+        ErrorCode::BadInput,
+        "the target's hair lies elsewhere than the scene's: {:.0f} % of its box is shared, at least {:.0f} "
+        "% have to be; is it of another head, or in another unit?",
+        100.0 * share, 100.0 * kLeastTargetShare);
+  return target;
 }
 
 /// Meshes of the groom's file: the same unit, axes and origin. Several are joined.
@@ -122,7 +156,12 @@ Result<SceneContent> load_scene_content(const SceneDesc& scene) {
     content.notes = std::move(hair.notes);
     placement = hair.placement;
   } else {
-    ASSIGN_OR_RETURN(content.groom, grow_hair_of(scene));
+    ASSIGN_OR_RETURN(content.groom, grow_hair_of(scene, std::get<ProceduralGroomDesc>(scene.groom)));
+  }
+  if (scene.target_groom) {
+    auto target = load_target_of(scene, content.groom);
+    if (!target) return at("target_groom", target.error());
+    content.volume_target = std::make_shared<const Groom>(std::move(target).value());
   }
   ASSIGN_OR_RETURN(Head head, make_head_under(scene, content.groom, placement));
   const std::vector<FittedSphere> spheres = shrink_under(std::move(head.spheres), content.groom);

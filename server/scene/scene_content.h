@@ -20,6 +20,7 @@ struct SceneContent {
   std::vector<SphereCollider> head_colliders;
   std::vector<SphereCollider> colliders;            // head space: the scene's own, or those of the head
   std::vector<std::string> notes;                   // a sentence for each thing that was guessed or fitted
+  std::shared_ptr<const Groom> volume_target;       // head space; where the scene names one
   std::shared_ptr<const DistanceField> head_field;  // head space; where the scene asks for one
 };
 

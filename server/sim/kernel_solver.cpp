@@ -18,6 +18,8 @@ KernelSolver::KernelSolver(const SolverContext& context, const StrandParameters&
       parameters_(parameters),
       features_(context.features),
       volume_(context.volume),
+      volume_target_(context.volume.target_per_s2 > 0.0 ? context.volume_target : nullptr),
+      drag_along_share_(context.drag_along_share),
       bend_limits_(context.bend_limit),
       head_field_(context.head_field) {}
 
@@ -32,8 +34,12 @@ Status KernelSolver::prepare_all() {
     ASSIGN_OR_RETURN(bend_limit_, BendLimit::make(executor_, features_, layout(), carried(), bend_limits_));
   }
   if (features_.has_volume) {
-    ASSIGN_OR_RETURN(volume_forces_,
-                     VolumeForces::make(executor_, features_, layout(), volume_, carried().way));
+    ASSIGN_OR_RETURN(volume_forces_, VolumeForces::make(executor_, features_, layout(), volume_,
+                                                        carried().way, volume_target_.get()));
+  }
+  if (features_.has_oriented_drag) {
+    ASSIGN_OR_RETURN(oriented_drag_,
+                     OrientedDrag::make(executor_, features_, layout(), carried().way, drag_along_share_));
   }
   if (features_.has_distance_field && head_field_ != nullptr && FieldCollider::holds(layout())) {
     ASSIGN_OR_RETURN(field_collider_,
@@ -71,6 +77,7 @@ void KernelSolver::substep(const StepInput& input) {
     has_gathered_ = false;
     volume_forces_->apply(block, *strands_, carried().way);
   }
+  if (oriented_drag_) oriented_drag_->run(block, strands_->planes(), carried().way);
   BoundPlanes planes = strands_->planes();
   bind(planes);
   program_->run(block, input.colliders.size(), planes);
@@ -98,7 +105,8 @@ std::shared_ptr<const StepModel> KernelSolver::step_model() {
   model->kernel = kernel();
   if (find_step_kernel(model->kernel.shader_path) == nullptr) return nullptr;
   model->parameters = parameters_;
-  if (features_.has_volume) model->volume = volume_;
+  // A target that nobody else knows is not told: strands are then predicted without their volume.
+  if (features_.has_volume && volume_target_ == nullptr) model->volume = volume_;
   model->strand_count = layout().strand_count;
   model->vertex_count = layout().vertex_count;
   model->pinned_root_count = layout().pinned_root_count;
@@ -114,6 +122,7 @@ uint64_t KernelSolver::memory_bytes() const {
   uint64_t bytes = strands_->memory_bytes() + model_bytes();
   if (program_) bytes += program_->size_bytes();
   if (follicle_limit_) bytes += follicle_limit_->size_bytes();
+  if (oriented_drag_) bytes += oriented_drag_->size_bytes();
   if (bend_limit_) bytes += bend_limit_->size_bytes();
   if (volume_forces_) bytes += volume_forces_->size_bytes();
   if (field_collider_) bytes += field_collider_->size_bytes();

@@ -12,6 +12,7 @@
 #include "server/sim/bend_limit.h"
 #include "server/sim/field_collider.h"
 #include "server/sim/follicle_limit.h"
+#include "server/sim/oriented_drag.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
 #include "server/sim/volume/volume_forces.h"
@@ -73,8 +74,11 @@ class KernelSolver : public Solver {
   std::unique_ptr<KernelProgram> program_;
   std::optional<FollicleLimit> follicle_limit_;  // where the scene has one
   VolumeDesc volume_;
+  std::shared_ptr<const Groom> volume_target_;
   std::unique_ptr<VolumeForces> volume_forces_;  // where hair acts on hair
   bool has_gathered_ = false;                    // for the step that comes
+  double drag_along_share_;
+  std::optional<OrientedDrag> oriented_drag_;  // where the scene's air has one
   BendLimitDesc bend_limits_;
   std::optional<BendLimit> bend_limit_;  // where the scene has one
   std::shared_ptr<const DistanceField> head_field_;

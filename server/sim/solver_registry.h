@@ -45,6 +45,10 @@ struct SolverContext {
   std::shared_ptr<const DistanceField> head_field = {};
   /// How far segments bend, where features.has_bend_limit.
   BendLimitDesc bend_limit = {};
+  /// Hair whose volume is the target, where there is one; head space. nullptr: the strands' own groom.
+  std::shared_ptr<const Groom> volume_target = {};
+  /// Of the drag across a hair, what there is along it, where features.has_oriented_drag.
+  double drag_along_share = 1.0;
 };
 
 struct SolverRow {

@@ -45,6 +45,10 @@ Status check_solver(const SceneDesc& scene) {
   if (scene.bend_limit.acts() && !row->has_kernel)
     return make_error(ErrorCode::BadInput,
                       "solver {} has no kernel and takes no bend_limit: leave it at 0 and 180", row->name);
+  if (scene.wind.along_share < 1.0f && !row->has_kernel)
+    return make_error(ErrorCode::BadInput,
+                      "solver {} has no kernel and knows no drag by direction: leave wind.along_share at 1",
+                      row->name);
   if (scene.volume.acts() && !bears_volume(*row))
     return make_error(ErrorCode::BadInput,
                       "solver {} takes no forces between strands ({}): set volume.friction_per_s and "
@@ -69,6 +73,7 @@ void fit_to_solver(SceneDesc& scene) {
   if (!row) return;
   if (!bears_volume(**row)) scene.volume = {};
   if (!(*row)->has_kernel) scene.bend_limit = {};
+  if (!(*row)->has_kernel) scene.wind.along_share = WindDesc().along_share;
   std::erase_if(solver.parameters, [&](const auto& given) {
     return std::none_of(
         (*row)->parameters.begin(), (*row)->parameters.end(), [&](const SolverParameterInfo& info) {
@@ -84,6 +89,7 @@ std::string left_out_note(const SceneDesc& before, const SceneDesc& after) {
     if (!after.solver.parameters.contains(name)) names.push_back(fmt::format("{} {:g}", name, value));
   if (before.volume.acts() && !after.volume.acts()) names.emplace_back("forces between strands (volume)");
   if (before.bend_limit.acts() && !after.bend_limit.acts()) names.emplace_back("bend_limit");
+  if (before.wind.along_share != after.wind.along_share) names.emplace_back("wind.along_share");
   if (names.empty() || before.solver.name == after.solver.name) return {};
   return fmt::format("solver {} does not take {}: left out", after.solver.name, fmt::join(names, ", "));
 }
@@ -98,6 +104,7 @@ Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_
   for (const std::string& assignment : overrides) {
     const std::string path = assignment.substr(0, assignment.find('='));
     if (path.starts_with("volume")) fitted.volume = scene.volume;
+    if (path == "wind.along_share") fitted.wind.along_share = scene.wind.along_share;
     if (path.starts_with("bend_limit")) fitted.bend_limit = scene.bend_limit;
     if (!path.starts_with(kGroup)) continue;
     const auto given = scene.solver.parameters.find(path.substr(kGroup.size()));

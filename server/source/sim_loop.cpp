@@ -27,8 +27,8 @@ constexpr size_t kMaxToldChars = 200;      // of an assignment, in its answer
 bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
   return a.has_wind == b.has_wind && a.has_turbulence == b.has_turbulence &&
          a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit &&
-         a.has_bend_limit == b.has_bend_limit && a.has_volume == b.has_volume &&
-         a.has_distance_field == b.has_distance_field;
+         a.has_bend_limit == b.has_bend_limit && a.has_oriented_drag == b.has_oriented_drag &&
+         a.has_volume == b.has_volume && a.has_distance_field == b.has_distance_field;
 }
 
 double median_ms(const gl::PassReports& passes, std::string_view name) {
@@ -337,7 +337,9 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
                                  groom_gravity,
                                  wet_volume(scene.volume, wetness),
                                  config_.content->head_field,
-                                 scene.bend_limit};
+                                 scene.bend_limit,
+                                 config_.content->volume_target,
+                                 scene.wind.along_share};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;

@@ -12,7 +12,7 @@ Result<SolverParameters> moving_parameters(const SolverRow& row, const SceneDesc
 
 bool moves_otherwise(const SceneDesc& a, const SceneDesc& b) {
   return a.solver != b.solver || a.volume != b.volume || a.bend_limit != b.bend_limit ||
-         a.look.shading.wetness != b.look.shading.wetness;
+         a.wind.along_share != b.wind.along_share || a.look.shading.wetness != b.look.shading.wetness;
 }
 
 SolverParameters wet_parameters(const SolverRow& row, SolverParameters complete, double wetness) {

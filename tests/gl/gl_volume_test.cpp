@@ -10,8 +10,8 @@
 #include "server/sim/executor/gl_executor.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/strand_layout.h"
+#include "server/sim/volume/reference_volume.h"
 #include "server/sim/volume/volume_forces.h"
-#include "tests/support/volume_reference.h"
 
 namespace strandcast {
 namespace {

@@ -211,6 +211,57 @@ TEST_F(ReportProgram, ASmallStreamingReportKeepsItsBounds) {
   EXPECT_GT(rows_.size(), 0u);
 }
 
+// Few hairs and short runs: a volume asked of all hairs as the truth is has no error, guides have one, every
+// way to scatter but hashing is a sum of the same samples, and hair keeps more of its volume with it than
+// without.
+TEST_F(ReportProgram, ASmallVolumeReportKeepsTheLaws) {
+  const auto out = folder_.path() / "report";
+  const Outcome outcome = run_report(
+      folder_, fmt::format("volume --quick --set groom.procedural.strand_count=600 --guides 150 --out '{}'",
+                           out.string()));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr("150 guides know the density of 600 hairs best with "));
+
+  rows_ = parse_csv(load_text(out / "volume_error.csv", 1u << 20).value());
+  std::map<std::string, double> error;  // of the truth's cells and smoothing
+  for (const auto& row : rows_) {
+    EXPECT_GT(number(row, "cpu_ms"), 0.0);
+    const bool is_like_truth =
+        row.at("resolution") == "64" && row.at("smoothing") == "1" && row.at("interval") == "1";
+    if (is_like_truth)
+      error[row.at("hairs")] = number(row, "density");
+    else
+      EXPECT_GT(number(row, "density"), 0.01) << row.at("resolution") << ' ' << row.at("smoothing");
+  }
+  EXPECT_EQ(error.at("all hairs"), 0.0);
+  EXPECT_GT(error.at("guides"), 0.05);
+
+  rows_ = parse_csv(load_text(out / "volume_scatter.csv", 1u << 20).value());
+  std::set<std::string> names;
+  for (const auto& row : rows_) {
+    const std::string name = row.at("scatter");
+    names.insert(name);
+    EXPECT_TRUE(row.at("in_use") == "0" || row.at("repeatable") == "1") << name;
+    if (name == "hashing") {
+      EXPECT_GT(number(row, "density"), 0.01) << "what lies across a plane is missed";
+    } else {
+      // Places have the roundings of floats that count cells from the head joint: 64 of them, to 2^-24 each.
+      EXPECT_LT(number(row, "density"), 1e-5) << name;
+      EXPECT_LT(number(row, "momentum"), 1e-4) << name;
+      EXPECT_EQ(number(row, "lost_share"), 0.0) << name;
+    }
+  }
+  EXPECT_THAT(names,
+              testing::UnorderedElementsAre("host", "sort", "atomics", "raster", "counting", "hashing"));
+
+  rows_ = parse_csv(load_text(out / "volume_outcome.csv", 1u << 20).value());
+  std::map<std::string, double> share;
+  for (const auto& row : rows_) share[row.at("volume")] = number(row, "volume_share");
+  EXPECT_GT(share.at("as shipped"), share.at("no volume") + 0.05);
+  const std::string page = load_text(out / "volume.html", 1u << 24).value();
+  EXPECT_THAT(page, AllOf(HasSubstr("</html>"), HasSubstr("Breaking (002, 4.2)")));
+}
+
 TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
   const std::string out = (folder_.path() / "report").string();
   folder_.write("file", "");
@@ -239,6 +290,8 @@ TEST_F(ReportProgram, RefusesBadInputInOneSentence) {
       {fmt::format("streaming --out '{}' --solver nonsense", out), "unknown solver 'nonsense' (known: "},
       {fmt::format("streaming --out '{}' --motion '{}'", out, (folder_.path() / "bad.bvh").string()),
        "bad.bvh"},
+      {fmt::format("volume --out '{}' --set groom.procedural.strand_count=10 --guides 11", out),
+       "11 guides of 10 hairs"},
       {fmt::format("streaming --out '{}' --size 200000x64 --gl-device none", out), "MiB"},
   };
   for (const auto& [arguments, part] : bad) {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <random>
 
+#include "server/report/crowded_hair.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/strand_state.h"
-#include "tests/support/crowded_hair.h"
 #include "tests/support/sim_devices.h"
 
 namespace strandcast {
@@ -37,7 +37,7 @@ class BendLimitOn : public testing::TestWithParam<SimDevice> {
  protected:
   /// A tuft bent in all directions; the first vertices of some strands stay as groomed.
   void bend(float amount) {
-    groom = tuft(61, 16, 0.2f, 3);
+    groom = make_tuft(61, 16, 0.2f, 3);
     strands.emplace(executor());
     ASSERT_TRUE(strands->load(groom, rotation));
     strands->read(state);
@@ -148,7 +148,7 @@ TEST_P(BendLimitOn, DirectionsBeyondATurnStay) {
 }
 
 TEST_P(BendLimitOn, TheGroomsOwnBendsAreAllowed) {
-  groom = tuft(20, 12, 0.2f, 8);
+  groom = make_tuft(20, 12, 0.2f, 8);
   for (size_t i = 0; i < groom.rest_position_m.size(); ++i)
     if (i % 12 > 5) groom.rest_position_m[i].x += 0.02f * static_cast<float>(i % 12 - 5);
   strands.emplace(executor());
@@ -168,7 +168,7 @@ TEST(BendLimit, HairStandsAndRests) {
   auto executor = std::move(make_lanes_executor()).value();
   for (const char* solver : {"dftl", "direct_rod", "xpbd"}) {
     SCOPED_TRACE(solver);
-    Groom groom = tuft(60, 12, 0.2f, 9);
+    Groom groom = make_tuft(60, 12, 0.2f, 9);
     for (glm::vec3& point : groom.rest_position_m) point = {point.y, point.z, point.x};  // out to the side
     for (uint32_t s = 0; s < groom.strand_count(); ++s) groom.pinned[groom.offset[s] + 1] = 1;
     SceneDesc scene;
@@ -179,7 +179,7 @@ TEST(BendLimit, HairStandsAndRests) {
       if (info.name == "style_stiffness_per_s2" || info.name == "sag_free")
         scene.solver.parameters[info.name] = 0.0;
     const auto height_m = [&] {
-      CrowdedHair hair(*executor, scene, groom);
+      CrowdedHair hair = CrowdedHair::make(*executor, scene, groom, scene.volume.resolution).value();
       hair.shake(4.0);
       hair.hold(12.0);
       const RestFindings found = hair.look(2.0);

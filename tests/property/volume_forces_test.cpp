@@ -3,13 +3,18 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <limits>
+#include <map>
+#include <numbers>
 #include <random>
+#include <tuple>
+#include <utility>
 
+#include "server/report/crowded_hair.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/volume/volume_forces.h"
 #include "server/source/scene_change.h"
-#include "tests/support/crowded_hair.h"
 #include "tests/support/sim_devices.h"
 #include "tests/support/test_grid.h"
 
@@ -23,7 +28,7 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// A tuft whose vertices are somewhere else than in the groom, and move.
 struct ShakenTuft {
   explicit ShakenTuft(Executor& executor) : strands(executor) {
-    groom = tuft(203, 16, 0.2f, 5);
+    groom = make_tuft(203, 16, 0.2f, 5);
     EXPECT_TRUE(strands.load(groom, rotation));
     std::mt19937 random(6);
     std::normal_distribution<float> normal;
@@ -237,7 +242,8 @@ SceneDesc hanging_scene(const SolverRow& row) {
 RestFindings after_shaking(const SceneDesc& scene) {
   const bool is_whole = test_grid() == TestGrid::Whole;
   auto executor = std::move(make_lanes_executor()).value();
-  CrowdedHair hair(*executor, scene, tuft(is_whole ? 400 : 200, is_whole ? 32 : 16, 0.2f, 1));
+  const Groom groom = make_tuft(is_whole ? 400 : 200, is_whole ? 32 : 16, 0.2f, 1);
+  CrowdedHair hair = CrowdedHair::make(*executor, scene, groom, scene.volume.resolution).value();
   hair.shake(20.0);
   hair.hold(35.0);
   return hair.look(5.0);
@@ -288,7 +294,7 @@ TEST(VolumeForces, AStyleThatIsKeptStaysSo) {
     const auto off_m = [&](const VolumeDesc& volume) {
       scene.volume = volume;
       auto executor = std::move(make_lanes_executor()).value();
-      CrowdedHair hair(*executor, scene, groom);
+      CrowdedHair hair = CrowdedHair::make(*executor, scene, groom, scene.volume.resolution).value();
       hair.hold(20.0);
       return hair.shape_rms_m();
     };
@@ -316,6 +322,156 @@ TEST(VolumeForces, ATargetKeepsAStyleAsAVolume) {
   EXPECT_LT(with.speed_rms_mps, 5e-4);
 }
 
+/// Half of the sum of squares by which a tuft's density differs from that of other hair on the same lattice,
+/// over what it is without the tuft (003, section 6.2), before and after some seconds.
+std::pair<double, double> energies(const SceneDesc& scene, const Groom& groom, const Groom& target,
+                                   double seconds) {
+  SceneContent content;
+  content.groom = groom;
+  content.volume_target = std::make_shared<const Groom>(target);
+  auto executor = std::move(make_lanes_executor()).value();
+  HairRun run = HairRun::make(*executor, scene, content).value();
+  const StrandLayout goal_layout = make_strand_layout(target).value();
+  HairVolume volume =
+      HairVolume::make({run.layout().strand_count, run.layout().vertex_count, run.layout().rest, {}},
+                       {scene.volume.resolution, scene.volume.smoothing})
+          .value();
+  VolumeOptions options{scene.volume.resolution, scene.volume.smoothing};
+  options.cell_m = volume.cell_m();
+  HairVolume goal =
+      HairVolume::make({goal_layout.strand_count, goal_layout.vertex_count, goal_layout.rest, {}}, options)
+          .value();
+  const auto densities = [](HairVolume& of, uint32_t strands, uint32_t vertices, const auto& position,
+                            double scale) {
+    StrandBlocks blocks(strands, vertices);
+    pack_blocks(std::span(position), blocks);
+    VolumeInput input;
+    input.position_m = blocks.view();
+    std::vector<glm::vec4> nodes(of.most_nodes());
+    of.update(input, nodes);
+    std::map<std::tuple<int, int, int>, double> density;  // by lattice point
+    const VolumeGrid& grid = of.grid();
+    for (uint32_t z = 0; z < grid.nodes.z; ++z)
+      for (uint32_t y = 0; y < grid.nodes.y; ++y)
+        for (uint32_t x = 0; x < grid.nodes.x; ++x) {
+          const glm::ivec3 at = grid.first + glm::ivec3(glm::uvec3(x, y, z));
+          density[{at.x, at.y, at.z}] = scale * static_cast<double>(nodes[grid.index(x, y, z)].w);
+        }
+    return density;
+  };
+  const auto wanted = densities(goal, goal_layout.strand_count, goal_layout.vertex_count, goal_layout.rest,
+                                volume.length_m() / goal.length_m());
+  const auto energy = [&] {
+    auto found = densities(volume, run.layout().strand_count, run.layout().vertex_count,
+                           run.position_in_head_m(), 1.0);
+    double off = 0.0, whole = 0.0;
+    for (const auto& [at, density] : wanted) {
+      found[at] -= density;
+      whole += density * density;
+    }
+    for (const auto& [at, density] : found) off += density * density;
+    return off / whole;
+  };
+  const double before = energy();
+  for (int i = 0; i < std::lround(seconds * scene.step_rate_hz); ++i) run.step(shaken_head(0.0));
+  return {before, energy()};
+}
+
+// Hair goes to where other hair is, as a volume: the energy of 003 falls, and without the push it does not.
+TEST(VolumeForces, ATargetOfAnotherGroomIsApproached) {
+  SceneDesc scene = hanging_scene(*find_solver("direct_rod").value());
+  scene.volume = {};
+  scene.volume.resolution = some_volume().resolution;
+  scene.volume.friction_per_s = 20.0;
+  const Groom groom = make_tuft(200, 16, 0.2f, 1);
+  Groom target = groom;  // blown aside, further and further down
+  for (glm::vec3& point : target.rest_position_m) point.x += 0.25f * (0.1f - point.y);
+  const auto [before, unpushed] = energies(scene, groom, target, 4.0);
+  scene.volume.target_per_s2 = 18000.0;
+  const auto [same, pushed] = energies(scene, groom, target, 4.0);
+  EXPECT_EQ(before, same);
+  EXPECT_GT(unpushed, 0.8 * before);
+  EXPECT_LT(pushed, 0.6 * before) << before;
+  // Twice as many strands are no other target: what there is of hair is scaled.
+  Groom doubled = target;
+  const auto vertices = static_cast<uint32_t>(target.rest_position_m.size());
+  for (uint32_t strand = 0; strand < target.strand_count(); ++strand)
+    doubled.offset.push_back(vertices + target.offset[strand + 1]);
+  doubled.rest_position_m.insert(doubled.rest_position_m.end(), target.rest_position_m.begin(),
+                                 target.rest_position_m.end());
+  doubled.pinned.insert(doubled.pinned.end(), target.pinned.begin(), target.pinned.end());
+  EXPECT_NEAR(energies(scene, groom, doubled, 4.0).second, pushed, 1e-2 * before);
+}
+
+/// Root mean square of how far vertices are from the middle of a turn around them: the radius of curls.
+double curl_radius_m(const StrandLayout& layout, const std::vector<glm::vec3>& position_m,
+                     uint32_t turn_vertices) {
+  double squared = 0.0;
+  size_t counted = 0;
+  for (uint32_t strand = 0; strand < layout.strand_count; ++strand)
+    for (uint32_t first = 0; first + turn_vertices <= layout.vertex_count; ++first) {
+      glm::dvec3 middle(0.0);
+      for (uint32_t i = 0; i < turn_vertices; ++i)
+        middle += glm::dvec3(position_m[layout.index(first + i, strand)]);
+      middle /= turn_vertices;
+      const uint32_t vertex = first + turn_vertices / 2;
+      if (vertex >= layout.vertex_count) continue;
+      // Across the way of the turn: along it a vertex is where it is on any straight hair too.
+      const glm::dvec3 way =
+          glm::normalize(glm::dvec3(position_m[layout.index(first + turn_vertices - 1, strand)]) -
+                         glm::dvec3(position_m[layout.index(first, strand)]));
+      const glm::dvec3 off = glm::dvec3(position_m[layout.index(vertex, strand)]) - middle;
+      const glm::dvec3 across = off - glm::dot(off, way) * way;
+      squared += glm::dot(across, across);
+      ++counted;
+    }
+  return std::sqrt(squared / static_cast<double>(counted));
+}
+
+// Real curls, by the rod's own curvature and twist: hair that acts on hair keeps them and the room that they
+// take.
+TEST(VolumeForces, CurlsKeepTheirTurnsAndTheirRoom) {
+  constexpr float kRadiusM = 0.005f;
+  constexpr uint32_t kTurnVertices = 8;
+  constexpr float kTurnRad = 2.0f * std::numbers::pi_v<float> / kTurnVertices;
+  Groom groom = make_tuft(200, 32, 0.2f, 1);
+  std::mt19937 random(2);
+  for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
+    const float phase = std::uniform_real_distribution<float>(0.0f, 6.28f)(random);
+    for (uint32_t i = groom.offset[strand] + 1; i < groom.offset[strand + 1]; ++i) {
+      const float angle = phase + kTurnRad * static_cast<float>(i - groom.offset[strand]);
+      groom.rest_position_m[i] += kRadiusM * glm::vec3(std::cos(angle), 0.0f, std::sin(angle));
+    }
+  }
+  SceneDesc scene = hanging_scene(*find_solver("direct_rod").value());
+  const auto after = [&](const VolumeDesc& volume) {
+    scene.volume = volume;
+    auto executor = std::move(make_lanes_executor()).value();
+    CrowdedHair hair = CrowdedHair::make(*executor, scene, groom, some_volume().resolution).value();
+    hair.shake(5.0);
+    hair.hold(15.0);
+    const RestFindings found = hair.look(2.0);
+    return std::pair(found,
+                     curl_radius_m(hair.run().layout(), hair.run().position_in_head_m(), kTurnVertices));
+  };
+  const double groomed_m = curl_radius_m(
+      make_strand_layout(groom).value(),
+      [&] {
+        const StrandLayout layout = make_strand_layout(groom).value();
+        return std::vector<glm::vec3>(layout.rest.begin(), layout.rest.end());
+      }(),
+      kTurnVertices);
+  EXPECT_NEAR(groomed_m, static_cast<double>(kRadiusM), 5e-4);
+  const auto [alone, alone_m] = after({});
+  const auto [together, together_m] = after(some_volume());
+  SCOPED_TRACE(to_text(alone));
+  SCOPED_TRACE(to_text(together));
+  EXPECT_GT(together_m, 0.95 * alone_m) << "of " << groomed_m;
+  EXPECT_GT(together.volume_share, 0.93);
+  EXPECT_LT(together.crowded_share, 0.01);
+  EXPECT_LT(together.speed_rms_mps, 5e-4);
+}
+
 // Wind through hair: what is behind other hair is blown less far.
 TEST(VolumeForces, HairKeepsTheWindOffHair) {
   SceneDesc scene = hanging_scene(*find_solver("direct_rod").value());
@@ -323,7 +479,8 @@ TEST(VolumeForces, HairKeepsTheWindOffHair) {
   scene.volume.repulsion_per_s2 = 0.0;
   const auto blown_m = [&] {
     auto executor = std::move(make_lanes_executor()).value();
-    CrowdedHair hair(*executor, scene, tuft(400, 16, 0.2f, 1));
+    CrowdedHair hair =
+        CrowdedHair::make(*executor, scene, make_tuft(400, 16, 0.2f, 1), scene.volume.resolution).value();
     hair.hold(10.0);
     return hair.mean_shift_m();
   };

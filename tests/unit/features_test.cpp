@@ -131,6 +131,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.wind.gust_intensity = coin() ? 0.0f : 0.5f;
     scene.follicle_limit_deg = coin() ? 180.0 : 20.0;
     scene.bend_limit.least_root_deg = coin() ? 0.0 : 5.0;
+    scene.wind.along_share = coin() ? 1.0f : 0.5f;
     scene.volume.friction_per_s = coin() ? 0.0 : 20.0;
     scene.volume.repulsion_per_s2 = coin() ? 0.0 : 5.0;
     scene.head.collider = coin() ? kSphereCollider : kFieldCollider;
@@ -142,6 +143,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
                                             {"has_colliders", &explained.has_colliders},
                                             {"has_follicle_limit", &explained.has_follicle_limit},
                                             {"has_bend_limit", &explained.has_bend_limit},
+                                            {"has_oriented_drag", &explained.has_oriented_drag},
                                             {"has_volume", &explained.has_volume},
                                             {"has_distance_field", &explained.has_distance_field},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
@@ -162,7 +164,7 @@ TEST(Features, ReasonsDifferWithTheValue) {
   bare.has_auto_collider = false;
   bare.follicle_limit_deg = 180.0;
   SceneDesc full;
-  full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1};
+  full.wind = {.mean_mps = {1, 0, 0}, .gust_intensity = 1, .along_share = 0.5f};
   full.volume.friction_per_s = 1.0;
   full.bend_limit.most_root_deg = 30.0;
   full.head.collider = kFieldCollider;

@@ -9,8 +9,8 @@
 
 #include "common/kernels/volume/volume_extras.h"
 #include "server/sim/strand_layout.h"
+#include "server/sim/volume/reference_volume.h"
 #include "tests/support/own_workers.h"
-#include "tests/support/volume_reference.h"
 
 namespace strandcast {
 namespace {

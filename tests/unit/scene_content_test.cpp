@@ -1,7 +1,7 @@
 // Loading what a scene names: grown and real grooms, the collider under them, and clear errors.
 #include "server/scene/scene_content.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
@@ -104,6 +104,37 @@ TEST(SceneContent, AMeshThatNoFieldCanBeMadeOfIsNamed) {
   ASSERT_FALSE(content.ok());
   EXPECT_EQ(content.error().code, ErrorCode::BadInput);
   EXPECT_EQ(content.error().to_string().find("head.mesh_path: the mesh "), 0u) << content.error().to_string();
+}
+
+TEST(SceneContent, OtherHairIsATargetWhereItIsOnTheSameHead) {
+  SceneDesc scene = built_in_scene();
+  EXPECT_EQ(load_scene_content(scene)->volume_target, nullptr) << "nobody asked for one";
+  scene.target_groom = ProceduralGroomDesc{.strand_count = 100, .vertex_count = 8, .length_m = 0.15f};
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok()) << content.error().to_string();
+  ASSERT_NE(content->volume_target, nullptr);
+  EXPECT_EQ(content->volume_target->strand_count(), 100u);
+
+  // A strand of a metre beside a head of ten centimetres.
+  const TemporaryFolder folder;
+  FileGroomDesc far;
+  testing::ByteFile hair;
+  for (const char letter : std::string("HAIR")) hair.add(letter);
+  hair.add(1u).add(2u).add(2u).add(1u).zeros(128 - 20);  // a strand, two points, which is all there is
+  for (const float number : {5.0f, 0.0f, 0.0f, 5.0f, -1.0f, 0.0f}) hair.add(number);
+  far.path = folder.write("far.hair", hair.text());
+  far.unit_m = 1.0f;
+  far.has_origin = far.has_up_axis = far.has_yaw = true;
+  scene.target_groom = far;
+  const auto elsewhere = load_scene_content(scene);
+  ASSERT_FALSE(elsewhere.ok());
+  EXPECT_EQ(elsewhere.error().code, ErrorCode::BadInput);
+  EXPECT_THAT(elsewhere.error().to_string(),
+              ::testing::StartsWith(
+                  "target_groom: the target's hair lies elsewhere than the scene's: 0 % of its box"));
+  far.path = folder.path() / "none.tfx";
+  scene.target_groom = far;
+  EXPECT_THAT(load_scene_content(scene).error().to_string(), ::testing::StartsWith("target_groom, "));
 }
 
 TEST(SceneContent, RealGroomGetsAHeadWhereItsRootsAre) {

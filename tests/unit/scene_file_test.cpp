@@ -128,6 +128,8 @@ SceneDesc unusual_scene() {
               .interval = 3,
               .integration = "explicit",
               .scatter = "atomics"};
+  s.wind.along_share = 0.25f;
+  s.target_groom = ProceduralGroomDesc{.strand_count = 23, .vertex_count = 5, .length_m = 0.12f};
   return s;
 }
 

@@ -117,6 +117,7 @@ TEST(SceneChange, LeavesOutWhatANewSolverCannotBear) {
   SceneDesc scene = built_in_scene();
   scene.volume.friction_per_s = 20.0;
   scene.bend_limit.most_tip_deg = 60.0;
+  scene.wind.along_share = 0.5f;
   const auto follow = change_scene(scene, "solver.name=ftl");
   ASSERT_TRUE(follow.ok()) << follow.error().to_string();
   EXPECT_FALSE(follow->volume.acts());
@@ -128,6 +129,10 @@ TEST(SceneChange, LeavesOutWhatANewSolverCannotBear) {
   const auto reference = change_scene(scene, "solver.name=super_helix");
   ASSERT_TRUE(reference.ok()) << reference.error().to_string();
   EXPECT_FALSE(reference->volume.acts() || reference->bend_limit.acts());
+  EXPECT_EQ(reference->wind.along_share, 1.0f);
+  EXPECT_THAT(left_out_note(scene, *reference), HasSubstr("wind.along_share"));
+  EXPECT_THAT(change_scene(*reference, "wind.along_share=0.5").error().to_string(),
+              HasSubstr("solver super_helix has no kernel and knows no drag by direction"));
   EXPECT_THAT(change_scene(*reference, "bend_limit.most_tip_deg=60").error().to_string(),
               HasSubstr("solver super_helix has no kernel and takes no bend_limit"));
 }

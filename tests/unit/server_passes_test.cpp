@@ -29,6 +29,7 @@ SceneDesc full_scene() {
   scene.groom = groom;
   scene.wind.mean_mps = {3.0f, 0.0f, 1.0f};
   scene.wind.gust_intensity = 0.3f;
+  scene.wind.along_share = 0.5f;
   scene.volume.friction_per_s = 20.0;
   scene.bend_limit.most_tip_deg = 60.0;
   scene.head.collider = kFieldCollider;

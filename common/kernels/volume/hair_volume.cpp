@@ -62,7 +62,14 @@ Result<HairVolume> HairVolume::make(const VolumeStrands& strands, const VolumeOp
     return make_error(ErrorCode::BadInput,
                       "volume: the groom's box is {:.3g} m wide: there is no hair to put in a volume",
                       longest_side_m);
-  const float cell_m = longest_side_m / static_cast<float>(options.resolution);
+  const float cell_m =
+      options.cell_m > 0.0f ? options.cell_m : longest_side_m / static_cast<float>(options.resolution);
+  const float cells_across =
+      options.cell_m > 0.0f ? std::ceil(longest_side_m / cell_m) : static_cast<float>(options.resolution);
+  if (cells_across > static_cast<float>(kMaxVolumeResolution))
+    return make_error(ErrorCode::BadInput,
+                      "volume: the hair is {:.3g} m wide, more than {} cells of {:.3g} m", longest_side_m,
+                      kMaxVolumeResolution, cell_m);
   const glm::vec3 farthest = glm::max(glm::abs(low), glm::abs(high));
   if (std::max({farthest.x, farthest.y, farthest.z}) > kVolumeReachCells * cell_m)
     return make_error(ErrorCode::BadInput,
@@ -76,7 +83,7 @@ Result<HairVolume> HairVolume::make(const VolumeStrands& strands, const VolumeOp
     volume.home_low_[axis] = floor_cell(low[axis] / cell_m);
     volume.home_high_[axis] = floor_cell(high[axis] / cell_m) + 1;
   }
-  const size_t side = options.resolution + 2 * (2 * options.smoothing + 1) + 2;
+  const size_t side = static_cast<size_t>(cells_across) + 2 * (2 * options.smoothing + 1) + 2;
   volume.most_nodes_ = kRoom * side * side * side;
   volume.samples_ = std::clamp(static_cast<uint32_t>(std::ceil(longest_m / cell_m)), 1u, kMaxSegmentSamples);
 

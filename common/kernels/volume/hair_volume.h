@@ -25,6 +25,7 @@ struct VolumeOptions {
   WorkerPool* workers = nullptr;  // outlives the volume; nullptr: the process's
   Priority priority = Priority::Simulation;
   simd::InstructionSet set = simd::widest_set();
+  float cell_m = 0.0f;  // 0: from the groom's box and the resolution
 };
 
 /// What strands are made of.

@@ -14,7 +14,8 @@ constexpr double kGive = 2.0;
 }  // namespace
 
 Result<std::unique_ptr<VolumeLaw>> VolumeLaw::make(const VolumeStrands& strands, const VolumeDesc& desc,
-                                                   const VolumeOptions& options) {
+                                                   const VolumeOptions& options,
+                                                   const VolumeStrands* target) {
   VolumeOptions of_volume = options;
   of_volume.resolution = desc.resolution;
   of_volume.smoothing = desc.smoothing;
@@ -22,7 +23,24 @@ Result<std::unique_ptr<VolumeLaw>> VolumeLaw::make(const VolumeStrands& strands,
   std::unique_ptr<VolumeLaw> law(new VolumeLaw(desc, std::move(volume)));
   if (desc.has_extras()) law->extras_ = std::make_unique<VolumeExtras>(of_volume);
   law->find_rest_density(strands);
+  if (target != nullptr && desc.target_per_s2 > 0.0) RETURN_IF_ERROR(law->take_target(*target, of_volume));
   return law;
+}
+
+/// On the strands' own lattice.
+Status VolumeLaw::take_target(const VolumeStrands& hair, VolumeOptions options) {
+  options.cell_m = volume_.cell_m();
+  ASSIGN_OR_RETURN(HairVolume volume, HairVolume::make(hair, options));
+  StrandBlocks rest(hair.strand_count, hair.vertex_count);
+  pack_blocks(hair.rest_in_head_m, rest);
+  VolumeInput input;
+  input.position_m = rest.view();
+  std::vector<glm::vec4> nodes(volume.most_nodes());
+  volume.update(input, nodes);
+  target_ = make_target(volume.grid(), nodes);
+  const auto scale = static_cast<float>(volume_.length_m() / volume.length_m());
+  for (float& density : target_.density_mpm3) density *= scale;
+  return {};
 }
 
 KernelDesc VolumeLaw::kernel(bool has_way) const {

@@ -25,9 +25,11 @@ struct VolumeState {
 
 class VolumeLaw {
  public:
-  /// As HairVolume::make().
+  /// As HairVolume::make(). `target`: hair in head space whose volume is the target, as much of it as there
+  /// is of the strands; nullptr = the strands at rest.
   static Result<std::unique_ptr<VolumeLaw>> make(const VolumeStrands& strands, const VolumeDesc& desc,
-                                                 const VolumeOptions& options);
+                                                 const VolumeOptions& options,
+                                                 const VolumeStrands* target = nullptr);
 
   /// Elements that a table needs.
   size_t most_elements() const { return kHeader + (extras_ ? 2 : 1) * volume_.most_nodes(); }
@@ -51,11 +53,12 @@ class VolumeLaw {
 
   VolumeLaw(const VolumeDesc& desc, HairVolume volume) : desc_(desc), volume_(std::move(volume)) {}
   void find_rest_density(const VolumeStrands& strands);
+  Status take_target(const VolumeStrands& hair, VolumeOptions options);
 
   VolumeDesc desc_;
   HairVolume volume_;
   std::unique_ptr<VolumeExtras> extras_;  // where a target or a wind's shadow is wanted
-  TargetDensity target_;                  // of the groom
+  TargetDensity target_;                  // where one is wanted
   double mean_density_mpm3_ = 1.0;        // over the groom's vertices
   std::vector<glm::vec4> rest_density_;
 };

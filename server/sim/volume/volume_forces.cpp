@@ -17,10 +17,16 @@ StrandBlocksView blocks_of(const StrandPlane& plane, const StrandLayout& layout,
 
 Result<std::unique_ptr<VolumeForces>> VolumeForces::make(Executor& executor, const SceneFeatures& features,
                                                          const StrandLayout& layout, const VolumeDesc& desc,
-                                                         const StrandPlane* way) {
+                                                         const StrandPlane* way, const Groom* target) {
   std::unique_ptr<VolumeForces> forces(new VolumeForces);
   const VolumeStrands strands{layout.strand_count, layout.vertex_count, layout.rest, {}};
-  ASSIGN_OR_RETURN(forces->law_, VolumeLaw::make(strands, desc, {}));
+  if (target == nullptr) {
+    ASSIGN_OR_RETURN(forces->law_, VolumeLaw::make(strands, desc, {}));
+  } else {
+    ASSIGN_OR_RETURN(const StrandLayout goal, make_strand_layout(*target));
+    const VolumeStrands hair{goal.strand_count, goal.vertex_count, goal.rest, {}};
+    ASSIGN_OR_RETURN(forces->law_, VolumeLaw::make(strands, desc, {}, &hair));
+  }
   RETURN_IF_ERROR(forces->choose_scatter(executor, layout, desc, way != nullptr));
   forces->interval_ = desc.interval;
   const size_t elements = forces->law_->most_elements();

@@ -19,9 +19,10 @@ class VolumeForces {
  public:
   /// As VolumeLaw::make(), Executor::make_volume() and Executor::make_program(). `way`: the model's plane of
   /// how every vertex moved in the last substep, where its stored velocities are not that; may be null.
+  /// `target`: hair in head space whose volume is the target; nullptr = the strands' own groom.
   static Result<std::unique_ptr<VolumeForces>> make(Executor& executor, const SceneFeatures& features,
                                                     const StrandLayout& layout, const VolumeDesc& volume,
-                                                    const StrandPlane* way);
+                                                    const StrandPlane* way, const Groom* target = nullptr);
 
   /// The volume of the strands as they will be after this substep; the ones until the next call go by it.
   void gather(const StepInput& input, StrandState& strands, const StrandPlane* way);

@@ -1,0 +1,97 @@
+// The measurements of strandcast-report volume: how well a volume is known of the hair that there is, against
+// the time that it takes; the ways to get strands into it; and how hair lies after a shake for every way to
+// use it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/scene/scene_desc.h"
+#include "server/sim/executor/executor.h"
+
+namespace strandcast {
+
+/// Who is asked about the hair, out of all that there is.
+enum class VolumeHairs { Guides, All };
+/// "guides", "all hairs".
+const char* to_string(VolumeHairs hairs);
+
+/// What the hair is really like: of all hairs, with cells and smoothing as here.
+inline constexpr uint32_t kTrueResolution = 64;
+inline constexpr uint32_t kTrueSmoothing = 1;
+
+struct VolumeStudyDesc {
+  SceneDesc scene;           // all hairs that there are
+  uint32_t guide_count = 0;  // those of them that are simulated where only guides are; at most all
+  double seconds = 2.0;      // of the shake
+  uint32_t moments = 4;      // of that, at which volumes are compared
+  uint32_t rounds = 5;       // of each timing
+  std::vector<uint32_t> resolutions = {16, 24, 32, 48, 64, 96, 128};
+  std::vector<uint32_t> smoothings = {0, 1, 2};
+  std::vector<uint32_t> intervals = {1, 2, 4};
+  double shake_s = 20.0;  // of a tuft, which then is held for
+  double hold_s = 35.0;   // and looked at for
+  double look_s = 5.0;
+  uint32_t tuft_strands = 200;
+};
+
+/// One way to ask for a volume.
+struct VolumeError {
+  uint32_t resolution = 0;
+  uint32_t smoothing = 0;
+  uint32_t interval = 1;  // steps that it is good for: errors are of the oldest, time is the mean
+  VolumeHairs hairs = VolumeHairs::Guides;
+  float cell_m = 0.0f;
+  // Root mean squares at all vertices of the guides, over those of the truth.
+  double density = 0.0;
+  double gradient = 0.0;
+  double velocity = 0.0;
+  double cpu_ms = 0.0;  // of a step, median
+};
+
+/// One way to get strands into a volume.
+struct ScatterResult {
+  std::string name;
+  std::string what;        // it is, in words
+  bool is_in_use = false;  // the simulation may do it so
+  // Root mean squares over all nodes, against a sum in double.
+  double density = 0.0;
+  double momentum = 0.0;
+  bool is_repeatable = true;  // the same bits each time, asked several times
+  double lost_share = 0.0;    // of samples
+  double cpu_ms = 0.0;
+};
+
+/// One way to use it, on a tuft: shaken, held, looked at.
+struct VolumeOutcome {
+  std::string name;
+  VolumeDesc volume;
+  double speed_rms_mps = 0.0;
+  double nyquist_m = 0.0;
+  double volume_share = 0.0;
+  double crowded_share = 0.0;
+  double step_cpu_ms = 0.0;
+};
+
+struct VolumeStudy {
+  uint32_t hair_count = 0;
+  uint32_t guide_count = 0;
+  uint32_t vertex_count = 0;
+  size_t scatter_samples = 0;
+  uint32_t scatter_resolution = 0;
+  std::string scatter_device;  // empty: no OpenGL, and only the host's way was tried
+  std::vector<VolumeError> errors;
+  std::vector<ScatterResult> scatters;
+  std::vector<VolumeOutcome> outcomes;
+};
+
+/// Says what it is at, once per part.
+using VolumeProgress = std::function<void(const std::string&)>;
+
+/// BadInput for a scene that is none, or for more guides than hairs.
+Result<VolumeStudy> run_volume_study(const VolumeStudyDesc& desc, Executor& executor,
+                                     const std::string& gl_device, const VolumeProgress& progress);
+
+}  // namespace strandcast
