@@ -217,6 +217,7 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
     return seconds > 0.0 && static_cast<double>(now_ns() - begin_ns) * 1e-9 >= seconds;
   };
   bool was_slow = false;
+  std::string told_detail;
   while (!stop && std::cout && !is_over()) {
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
@@ -224,6 +225,9 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
         const bool is_slow = !status->slow_motion.empty();
         if (is_slow && !std::exchange(was_slow, is_slow)) print(status->slow_motion);
         was_slow = is_slow;
+        if (status->detail != told_detail)
+          print("level of detail: " + (status->detail.empty() ? "full" : status->detail));
+        told_detail = status->detail;
       }
       if (const auto* notice = std::get_if<Notice>(&event)) print(notice->text);
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return fail(closed->error, kRefusedExit);

@@ -155,6 +155,7 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   add("server step",
       fmt::format("{:.2f} ms, x{:.2f} real time", now.status.sim_ms, now.status.realtime_factor));
   if (!now.welcome.sim_device.empty()) add("simulated by", now.welcome.sim_device);
+  if (!now.status.detail.empty()) add("simulates", now.status.detail);
   add("encoded in", fmt::format("{:.2f} ms", now.status.encode_ms));
   const double since_ms = static_cast<double>(time_ns - now.made_ns) * kNsToMs;
   if (now.state_age_ms > 0.0) add("state age", fmt::format("{:.0f} ms", now.state_age_ms + since_ms));

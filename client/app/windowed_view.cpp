@@ -12,6 +12,7 @@
 #include "client/window/orbit_camera.h"
 #include "client/window/window.h"
 #include "common/log/log.h"
+#include "common/render/hair_size.h"
 #include "common/scene/scene_file.h"
 
 namespace strandcast {
@@ -23,6 +24,9 @@ constexpr int64_t kNsPerMs = 1'000'000;
 constexpr int64_t kMessageNs = 4000 * kNsPerMs;  // how long a notice stays on the panel
 constexpr int64_t kCameraSendNs = 33 * kNsPerMs;
 constexpr int64_t kReportNs = 1000 * kNsPerMs;
+constexpr int64_t kGrownReportNs = 100 * kNsPerMs;  // when the hair is larger by so much:
+constexpr double kGrownHair = 1.1;
+constexpr double kLeastHairPx = 0.1;                  // 0 says nothing
 constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
 constexpr int64_t kPanelNs = 250 * kNsPerMs;          // how often its numbers change
 constexpr int64_t kSceneWaitNs = 5000 * kNsPerMs;
@@ -215,8 +219,13 @@ class WindowedView {
   /// Tells the server about once a second what this machine makes of the stream.
   void report() {
     const int64_t time_ns = now_ns();
-    if (time_ns - reported_ns_ < kReportNs || !state_->is_connected) return;
+    if (!state_->is_connected) return;
+    // What gets larger is told sooner, for more of it may have to be simulated.
+    const double hair_px_now = hair_px();
+    const bool has_grown = hair_px_now > kGrownHair * reported_hair_px_;
+    if (time_ns - reported_ns_ < (has_grown ? kGrownReportNs : kReportNs)) return;
     reported_ns_ = time_ns;
+    reported_hair_px_ = hair_px_now;
     ViewerReport now;
     now.decode_ms = std::min(state_->strand_decode_ms, kMaxReportedMs);
     now.draw_ms = std::min(drawn_.fair_ms, kMaxReportedMs);
@@ -225,8 +234,19 @@ class WindowedView {
     now.device = !can_draw()                          ? DrawingDevice::None
                  : drawn_.device->value().is_software ? DrawingDevice::Software
                                                       : DrawingDevice::Hardware;
+    now.hair_px = hair_px_now;
     // One that is lost is followed by the next.
     (void)viewer_->send(now);
+  }
+
+  /// How high the hair is in the window; where it is not in it, as little as can be told.
+  double hair_px() {
+    if (state_->asset == nullptr) return 0.0;
+    if (measured_ != state_->asset) hair_ = hair_extent(*state_->asset);
+    measured_ = state_->asset;
+    const RenderSize size = window_->framebuffer_size();
+    return std::clamp(hair_height_px(hair_, orbit_.camera(), {size.width, size.height}), kLeastHairPx,
+                      kMaxReportedPx);
   }
 
   bool send(const ClientMessage& message) {
@@ -361,6 +381,9 @@ class WindowedView {
   bool is_camera_sent_ = false;
   int64_t camera_sent_ns_ = 0;
   int64_t reported_ns_ = 0;
+  double reported_hair_px_ = 0.0;
+  std::shared_ptr<const SceneAsset> measured_;  // what hair_ is of
+  HairExtent hair_;
   int64_t presented_ns_ = 0;
   bool is_due_ = true;                  // a picture
   std::shared_ptr<const Image> image_;  // that is shown

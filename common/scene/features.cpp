@@ -2,12 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 namespace strandcast {
 namespace {
 
 constexpr double kFreeFollicleDeg = 180.0;
+
+/// Whether what is simulated lacks what this level leaves out. Where nothing is, the rest stays as it is.
+bool leaves_out(const RuntimeFacts& facts, DetailLevel level) {
+  return facts.detail >= level && facts.detail != DetailLevel::FollowHead;
+}
 
 // Facts carry their cause, so that analyse() and explain() cannot disagree.
 Fact decide_wind(const SceneDesc& scene, const RuntimeFacts& facts) {
@@ -48,7 +54,8 @@ Fact decide_oriented_drag(const SceneDesc& scene, const RuntimeFacts&) {
   return {false, "wind.along_share is 1: air drags hair alike in all directions"};
 }
 
-Fact decide_volume(const SceneDesc& scene, const RuntimeFacts&) {
+Fact decide_volume(const SceneDesc& scene, const RuntimeFacts& facts) {
+  if (scene.volume.acts() && leaves_out(facts, DetailLevel::NoHairHair)) return {false, facts.detail_reason};
   if (scene.volume.friction_per_s > 0.0) return {true, "volume.friction_per_s is above zero"};
   if (scene.volume.repulsion_per_s2 > 0.0) return {true, "volume.repulsion_per_s2 is above zero"};
   if (scene.volume.target_per_s2 > 0.0) return {true, "volume.target_per_s2 is above zero"};
@@ -60,6 +67,23 @@ Fact decide_distance_field(const SceneDesc& scene, const RuntimeFacts&) {
   if (scene.head.collider != kFieldCollider) return {false, "head.collider is spheres"};
   if (!scene.has_auto_collider) return {false, "has_auto_collider is false: the head does not collide"};
   return {true, "head.collider is field"};
+}
+
+Fact decide_followed_strands(const SceneDesc& scene, const RuntimeFacts& facts) {
+  if (simulated_share(scene, facts) >= 1.0) return {false, "every strand is simulated"};
+  const bool is_far = leaves_out(facts, DetailLevel::FewerStrands);
+  return {true, is_far ? facts.detail_reason : "detail.simulated_share is below 1"};
+}
+
+Fact decide_half_rate(const SceneDesc& scene, const RuntimeFacts& facts) {
+  if (!leaves_out(facts, DetailLevel::HalfRate)) return {false, "every step is simulated"};
+  if (scene.step_rate_hz < kLeastHalvedRateHz) return {false, "step_rate_hz is too low to be halved"};
+  return {true, facts.detail_reason};
+}
+
+Fact decide_carried(const SceneDesc&, const RuntimeFacts& facts) {
+  if (facts.detail < DetailLevel::FollowHead) return {false, "hair is simulated"};
+  return {true, facts.detail_reason};
 }
 
 Fact decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
@@ -109,23 +133,45 @@ constexpr std::array kFacts{
     FactRow{"has_oriented_drag", &SceneFeatures::has_oriented_drag, decide_oriented_drag},
     FactRow{"has_volume", &SceneFeatures::has_volume, decide_volume},
     FactRow{"has_distance_field", &SceneFeatures::has_distance_field, decide_distance_field},
+    FactRow{"has_followed_strands", &SceneFeatures::has_followed_strands, decide_followed_strands},
+    FactRow{"has_half_rate", &SceneFeatures::has_half_rate, decide_half_rate},
+    FactRow{"is_carried", &SceneFeatures::is_carried, decide_carried},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},
     FactRow{"has_frame_viewers", &SceneFeatures::has_frame_viewers, decide_frame_viewers},
 };
 static_assert(sizeof(SceneFeatures) == kFacts.size(), "every fact has a row");
 
+Fact decide(const FactRow& row, const SceneDesc& scene, const RuntimeFacts& facts) {
+  Fact fact = row.decide(scene, facts);
+  if (!fact.value && std::find(facts.forced.begin(), facts.forced.end(), row.name) != facts.forced.end())
+    fact = {true, fmt::format("forced, though {}", fact.reason)};
+  return fact;
+}
+
 }  // namespace
 
 SceneFeatures analyse(const SceneDesc& scene, const RuntimeFacts& facts) {
   SceneFeatures features;
-  for (const FactRow& row : kFacts) features.*row.member = row.decide(scene, facts).value;
+  for (const FactRow& row : kFacts) features.*row.member = decide(row, scene, facts).value;
   return features;
+}
+
+const char* to_string(DetailLevel level) {
+  constexpr std::array kNames{"full", "no hair-hair", "fewer strands", "half rate", "follow the head"};
+  static_assert(kNames.size() == kDetailLevels);
+  return kNames[static_cast<size_t>(level)];
+}
+
+double simulated_share(const SceneDesc& scene, const RuntimeFacts& facts) {
+  const DetailDesc& detail = scene.detail;
+  if (!leaves_out(facts, DetailLevel::FewerStrands)) return detail.simulated_share;
+  return std::min(detail.simulated_share, detail.far_share);
 }
 
 std::vector<FeatureReason> explain(const SceneDesc& scene, const RuntimeFacts& facts) {
   std::vector<FeatureReason> reasons;
   for (const FactRow& row : kFacts) {
-    const Fact decision = row.decide(scene, facts);
+    const Fact decision = decide(row, scene, facts);
     reasons.push_back({row.name, decision.value, decision.reason});
   }
   return reasons;

@@ -80,6 +80,26 @@ struct BendLimitDesc {
   bool operator==(const BendLimitDesc&) const = default;
 };
 
+/// Values of DetailDesc::mode and ::idle.
+inline constexpr const char* kDetailOff = "off";
+inline constexpr const char* kDetailAuto = "auto";
+inline constexpr const char* kIdleFollow = "follow";
+inline constexpr const char* kIdleFull = "full";
+
+/// How much is simulated, by who looks and how large the hair is on their screens.
+struct DetailDesc {
+  std::string mode = kDetailOff;   // kDetailOff: whoever reads gets all of it; kDetailAuto: by size
+  double full_at_px = 240.0;       // height of the hair on a screen from which on all of it is simulated
+  double hysteresis = 0.25;        // a smaller level only this share below its size, 0 .. 0.9
+  double settle_s = 2.0;           // and only after so long
+  double simulated_share = 1.0;    // of strands, at the most: the first; the others follow them
+  double far_share = 0.25;         // likewise from DetailLevel::FewerStrands on
+  std::string idle = kIdleFollow;  // nobody reads: kIdleFollow, hair goes with the head; or kIdleFull
+  double idle_after_s = 10.0;      // for so long
+
+  bool operator==(const DetailDesc&) const = default;
+};
+
 struct SolverDesc {
   std::string name = "dftl";
   std::map<std::string, double> parameters;  // by the names in the solver's table row; missing = its default
@@ -205,6 +225,7 @@ struct SceneDesc {
   std::optional<GroomDesc>
       target_groom;  // to which volume.target_per_s2 drives the hair's volume; none: its own
   BendLimitDesc bend_limit;
+  DetailDesc detail;
   WindDesc wind;
   LookDesc look;
   CameraDesc camera;

@@ -55,6 +55,10 @@ inline constexpr Range kRestDensityScale{0.1, 100.0, ""};
 inline constexpr Range kVolumeResolution{8, 128, "cells"};
 inline constexpr Range kVolumeSmoothing{0, 3, "passes"};
 inline constexpr Range kVolumeInterval{1, 100, "steps"};
+inline constexpr Range kFullAtPx{1.0, 10'000.0, "pixels"};
+inline constexpr Range kHysteresis{0.0, 0.9, ""};
+inline constexpr Range kWaitingTime{0.0, 3600.0, "s"};
+inline constexpr Range kSimulatedShare{0.001, 1.0, ""};
 inline constexpr Range kColliderCenter{-kMaxGroomExtentM, kMaxGroomExtentM, "m"};
 inline constexpr Range kColliderRadius{1e-4, 10.0, "m"};
 inline constexpr Range kWindSpeed{-100.0, 100.0, "m/s"};
@@ -300,9 +304,25 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
                   std::end(kVolumeScatters),
               "is unknown (known: auto, host, sort, atomics)");
   });
-  if (!v.chooses("target_groom", scene.target_groom.has_value())) return scene.target_groom.reset();
-  if (!scene.target_groom) scene.target_groom.emplace();
-  v.group("target_groom", [&] { visit_groom(v, *scene.target_groom); });
+  v.group("detail", [&] {
+    DetailDesc& detail = scene.detail;
+    v.text("mode", detail.mode, kMaxNameBytes);
+    v.require("mode", detail.mode == kDetailOff || detail.mode == kDetailAuto,
+              "is unknown (known: auto, off)");
+    v.number("full_at_px", detail.full_at_px, kFullAtPx);
+    v.number("hysteresis", detail.hysteresis, kHysteresis);
+    v.number("settle_s", detail.settle_s, kWaitingTime);
+    v.number("simulated_share", detail.simulated_share, kSimulatedShare);
+    v.number("far_share", detail.far_share, kSimulatedShare);
+    v.text("idle", detail.idle, kMaxNameBytes);
+    v.require("idle", detail.idle == kIdleFollow || detail.idle == kIdleFull,
+              "is unknown (known: follow, full)");
+    v.number("idle_after_s", detail.idle_after_s, kWaitingTime);
+  });
+  const bool has_target = v.chooses("target_groom", scene.target_groom.has_value());
+  if (!has_target) scene.target_groom.reset();
+  if (has_target && !scene.target_groom) scene.target_groom.emplace();
+  if (has_target) v.group("target_groom", [&] { visit_groom(v, *scene.target_groom); });
 }
 
 }  // namespace strandcast::scene_fields

@@ -25,6 +25,7 @@ inline constexpr Range kRateDivisor{1, kMaxRateDivisor, "steps"};
 inline constexpr Range kStrandShare{1e-6, 1.0, ""};
 inline constexpr Range kReportedTime{0.0, kMaxReportedMs, "ms"};
 inline constexpr Range kReportedRate{0.0, kMaxReportedHz, "Hz"};
+inline constexpr Range kReportedSize{0.0, kMaxReportedPx, "pixels"};
 inline constexpr Range kStepTime{0.0, kMaxStepNs, "ns"};
 inline constexpr Range kHeldBack{0.0, 1.0, ""};
 inline constexpr int kBehindNone = 1;  // number of the first enumerator where 0 stands for none on the wire
@@ -141,6 +142,7 @@ void visit(Visitor& v, ViewerReport& m) {
   v.number("picture_decode_ms", m.picture_decode_ms, kReportedTime);
   v.number("shown_hz", m.shown_hz, kReportedRate);
   v.choice("device", m.device, DrawingDevice::Hardware);
+  v.number("hair_px", m.hair_px, kReportedSize);
 }
 
 template <>
@@ -219,6 +221,7 @@ void visit(Visitor& v, ServerStatus& m) {
     v.value("sim_time_ns", motion.sim_time_ns);
     v.value("motion_time_ns", motion.motion_time_ns);
   });
+  v.text("detail", m.detail, kMaxTextChars);
 }
 
 template <>

@@ -35,6 +35,7 @@ inline constexpr uint32_t kMaxListedSessions = 256;
 inline constexpr size_t kMaxListedNameChars = 32;
 inline constexpr size_t kMaxAddressChars = 64;
 inline constexpr double kMaxReportedMs = 60'000.0;  // ViewerReport
+inline constexpr double kMaxReportedPx = 100'000.0;
 inline constexpr double kMaxReportedHz = 1'000.0;
 inline constexpr double kMaxStepNs = 1e6;  // Hello
 
@@ -118,6 +119,7 @@ struct ViewerReport {      // about once a second: what this machine makes of wh
   double picture_decode_ms = 0.0;  // median per picture of the server's
   double shown_hz = 0.0;           // different pictures shown per second
   DrawingDevice device = DrawingDevice::Unknown;
+  double hair_px = 0.0;  // of strands: how high the hair is on the screen
   bool operator==(const ViewerReport&) const = default;
 };
 struct ModeRequest {  // answered by a ModeChange
@@ -175,6 +177,7 @@ struct ServerStatus {  // about twice a second to every viewer
   std::string slow_motion = {};        // for a person: how slow, and the cheapest ways out; empty = real time
   // Who gets pictures: of those drawn since the last status, at most kMaxPictureMotions, oldest first.
   std::vector<PictureMotion> picture_motions = {};
+  std::string detail = {};  // for a person: how much is simulated, and why not all; empty = all of it
   bool operator==(const ServerStatus&) const = default;
 };
 struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on

@@ -12,6 +12,7 @@
 #include "server/encode/picture_passes.h"
 #include "server/encode/strand_encode_worker.h"
 #include "server/sim/executor/executor.h"
+#include "server/sim/followed_solver.h"
 #include "server/sim/solver_registry.h"
 #include "server/source/scene_change.h"
 #include "server/source/sim_stages.h"
@@ -52,14 +53,17 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
   const SceneFeatures features = analyse(scene, bench.facts);
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, complete_parameters(*row, scene.solver.parameters));
-  ASSIGN_OR_RETURN(auto solver, row->make(parameters, {.executor = &bench.executor,
-                                                       .features = features,
-                                                       .groom_gravity_in_head_mps2 = scene.gravity_mps2,
-                                                       .volume = scene.volume,
-                                                       .head_field = content.head_field,
-                                                       .bend_limit = scene.bend_limit,
-                                                       .volume_target = content.volume_target,
-                                                       .drag_along_share = scene.wind.along_share}));
+  ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver,
+                   row->make(parameters, {.executor = &bench.executor,
+                                          .features = features,
+                                          .groom_gravity_in_head_mps2 = scene.gravity_mps2,
+                                          .volume = scene.volume,
+                                          .head_field = content.head_field,
+                                          .bend_limit = scene.bend_limit,
+                                          .volume_target = content.volume_target,
+                                          .drag_along_share = scene.wind.along_share}));
+  if (features.has_followed_strands && can_follow(content.groom))
+    solver = std::make_unique<FollowedSolver>(std::move(solver), simulated_share(scene, bench.facts));
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
   encoder->set_rest_shape(bench.asset.rest_position_m);

@@ -206,6 +206,8 @@ void Server::State::run_status() {
     status.quarantined_strands = now.sim.quarantined;
     status.overstretched_strands = now.sim.overstretched;
     status.slow_motion = slow_motion_;
+    if (now.sim.detail != DetailLevel::Full)
+      status.detail = fmt::format("{}: {}", to_string(now.sim.detail), now.sim.detail_reason);
     status.picture_motions = hub_->take_picture_motions();
     net_->broadcast(status);
     lock.lock();

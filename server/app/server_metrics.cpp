@@ -20,6 +20,15 @@ constexpr Row kRows[] = {
      [](const ServerCounters& all) { return all.sim.step_median_ms; }},
     {"sim_realtime_factor", "Simulated time per real time.",
      [](const ServerCounters& all) { return all.sim.realtime_factor; }},
+    {"sim_detail_level",
+     "How much is left out of the simulation: 0 nothing, 1 hair that acts on hair, 2 most strands, 3 every "
+     "other "
+     "step, 4 all steps.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.detail); }},
+    {"sim_detail_changes_total", "Changes of that level.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.detail_changes); }},
+    {"sim_simulated_strands", "Strands that take steps; the others follow them, or the head.",
+     [](const ServerCounters& all) { return static_cast<double>(all.sim.simulated_strands); }},
     {"sim_slow_motion", "1 while simulated time falls behind real time.",
      [](const ServerCounters& all) { return all.is_slow ? 1.0 : 0.0; }},
     {"sim_slow_motions_total", "Times that slow motion began.",
@@ -98,6 +107,10 @@ std::string format_server_metrics(const ServerCounters& counters, const char* ve
   if (!counters.sim.sim_device.empty())
     text += format_info("sim_device_info", "Always 1; the labels say what simulates.",
                         {{"device", counters.sim.sim_device}, {"name", counters.sim.sim_device_name}});
+  if (!counters.sim.sim_device.empty())
+    text += format_info("sim_detail_info",
+                        "Always 1; the labels say how much is simulated, and why not all of it.",
+                        {{"level", to_string(counters.sim.detail)}, {"reason", counters.sim.detail_reason}});
   for (const Row& row : kRows)
     text += format_metric(row.name, row.name.ends_with("_total") ? "counter" : "gauge", row.help,
                           row.value(counters));

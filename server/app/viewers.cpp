@@ -45,8 +45,9 @@ PictureView make_scene_view(const SceneDesc& scene, const RenderSize& size, Pict
 }
 
 /// What the viewer gets, and during a change what it is about to get as well.
-Demand Viewers::demand_of(const Subscription& wanted, const PictureView& view) {
+Demand Viewers::demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view) {
   Demand demand;
+  demand.hair_px = viewer.report.hair_px;
   if (wanted.gets(StreamMode::Strands)) demand.strand_stream = stream_id_of(wanted.strands);
   if (wanted.gets(StreamMode::Frames)) demand.picture = view;
   return demand;
@@ -54,7 +55,8 @@ Demand Viewers::demand_of(const Subscription& wanted, const PictureView& view) {
 
 /// On an error the viewer stays as it was.
 Status Viewers::change(Viewer& viewer, Subscription wanted, const PictureView& view) {
-  ASSIGN_OR_RETURN(wanted.pictures.picture_class, desk_.set_demand(viewer.reader, demand_of(wanted, view)));
+  ASSIGN_OR_RETURN(wanted.pictures.picture_class,
+                   desk_.set_demand(viewer.reader, demand_of(viewer, wanted, view)));
   *viewer.subscription = std::move(wanted);
   viewer.view = view;
   return {};
@@ -130,7 +132,9 @@ Status Viewers::set_camera(SessionId session, const CameraDesc& camera) {
 
 void Viewers::set_report(SessionId session, const ViewerReport& report) {
   const auto found = viewers_.find(session);
-  if (found != viewers_.end()) found->second.report = report;
+  if (found == viewers_.end()) return;
+  const double before_px = std::exchange(found->second.report, report).hair_px;
+  if (before_px != report.hair_px) change_surely(found->second, *found->second.subscription);
 }
 
 ViewerReport Viewers::report(SessionId session) const {

@@ -99,7 +99,7 @@ class Viewers {
 
     bool gets(StreamMode kind) const { return subscription->gets(kind); }
   };
-  static Demand demand_of(const Subscription& wanted, const PictureView& view);
+  static Demand demand_of(const Viewer& viewer, const Subscription& wanted, const PictureView& view);
   Status change(Viewer& viewer, Subscription wanted, const PictureView& view);
   void change_surely(Viewer& viewer, const Subscription& wanted);
   ModeChoice choose(Viewer& viewer, const ModeFacts& facts, int64_t time_ns);

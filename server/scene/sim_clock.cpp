@@ -37,6 +37,17 @@ std::optional<int64_t> SimClock::take_step(int64_t time_ns) {
   return step_time_ns;
 }
 
+uint64_t SimClock::skip(int64_t time_ns) {
+  if (is_paused_) return 0;
+  uint64_t count = 0;
+  for (; due_ns() <= time_ns; ++next_step_, ++count) {
+    // A wait longer than the window was slept through.
+    if (due_ns() > time_ns - kFactorWindowNs) taken_ns_.push_back(due_ns());
+  }
+  while (!taken_ns_.empty() && taken_ns_.front() < time_ns - kFactorWindowNs) taken_ns_.pop_front();
+  return count;
+}
+
 std::optional<int64_t> SimClock::next_due_ns() const {
   if (is_paused_) return std::nullopt;
   return due_ns();

@@ -19,6 +19,9 @@ class SimClock {
   /// Takes the next step if it is due by `time_ns`: the server time that its end stands for. While paused
   /// only steps asked for by step_once().
   std::optional<int64_t> take_step(int64_t time_ns);
+  /// Leaves out all steps that are due by `time_ns`, which nobody needs: they are taken as far as the pace
+  /// goes. Gives how many; none while paused.
+  uint64_t skip(int64_t time_ns);
   /// When take_step() will have one; nullopt while paused.
   std::optional<int64_t> next_due_ns() const;
 

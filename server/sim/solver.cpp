@@ -22,4 +22,23 @@ SolverBlocks Solver::read_blocks() {
           packed(read_state_.velocity_mps, strand_count(), velocity_mps_in_blocks_)};
 }
 
+HeadMotion head_motion(const Pose& from, const Pose& to, double passed_s) {
+  HeadMotion motion;
+  motion.velocity_mps = (to.position_m - from.position_m) / passed_s;
+  glm::dquat turn = to.rotation * glm::inverse(from.rotation);
+  if (turn.w < 0.0) turn = -turn;
+  const double angle_rad = glm::angle(turn);
+  if (angle_rad > 0.0) motion.spin_radps = glm::axis(turn) * (angle_rad / passed_s);
+  return motion;
+}
+
+void move_with_head(Solver& solver, const HeadMotion& motion) {
+  SolverState state;
+  solver.read(state);
+  for (size_t i = 0; i < state.velocity_mps.size(); ++i)
+    state.velocity_mps[i] =
+        glm::vec3(motion.velocity_mps + glm::cross(motion.spin_radps, glm::dvec3(state.position_m[i])));
+  solver.write(state);
+}
+
 }  // namespace strandcast

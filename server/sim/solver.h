@@ -16,6 +16,7 @@
 #include "common/kernels/step_input.h"
 #include "common/kernels/step_model.h"
 #include "common/kernels/strand_blocks.h"
+#include "common/math/pose.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
 
@@ -47,6 +48,9 @@ class Solver {
   /// Computes what the substeps of a step share, ahead of the first one, which else does it: for whoever
   /// times it.
   virtual void gather(const StepInput&) {}
+  /// Computes the strands that follow others, ahead of the next read_blocks(), which else does it: for
+  /// whoever times it.
+  virtual void follow_guides() {}
   /// Copies the state out; resizes `state` on first use only.
   virtual void read(SolverState& state) = 0;
   /// As read(), in blocks of strands; without a copy where the solver keeps its strands so. Valid until the
@@ -78,6 +82,16 @@ class Solver {
   StrandBlocks position_m_in_blocks_;
   StrandBlocks velocity_mps_in_blocks_;
 };
+
+/// How a head moves: of its joint, and about it; world.
+struct HeadMotion {
+  glm::dvec3 velocity_mps{0.0};
+  glm::dvec3 spin_radps{0.0};
+};
+/// Between two poses, so long after each other.
+HeadMotion head_motion(const Pose& from, const Pose& to, double passed_s);
+/// All strands move as the head does from here on, as one that has been carried by it: nothing pulls at them.
+void move_with_head(Solver& solver, const HeadMotion& motion);
 
 /// `to` goes on where `from` is, with the same strands: at once when both work on the same strands, else by
 /// way of a copy. On an error `from` is as it was.

@@ -11,6 +11,7 @@
 #include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
+#include "server/sim/followed_solver.h"
 #include "server/source/scene_change.h"
 #include "server/source/wet_hair.h"
 
@@ -28,7 +29,22 @@ bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
   return a.has_wind == b.has_wind && a.has_turbulence == b.has_turbulence &&
          a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit &&
          a.has_bend_limit == b.has_bend_limit && a.has_oriented_drag == b.has_oriented_drag &&
-         a.has_volume == b.has_volume && a.has_distance_field == b.has_distance_field;
+         a.has_volume == b.has_volume && a.has_distance_field == b.has_distance_field &&
+         a.has_followed_strands == b.has_followed_strands && a.has_half_rate == b.has_half_rate;
+}
+
+/// What takes long of simulating fewer strands, ahead of when they are fewer.
+Status prepare_guides(const SceneDesc& scene, const Groom& groom, const glm::dvec3& groom_gravity) {
+  if (!can_follow(groom)) return {};
+  const DetailDesc& detail = scene.detail;
+  for (const DetailLevel level : {DetailLevel::Full, DetailLevel::FewerStrands}) {
+    const double share = simulated_share(scene, {.detail = level});
+    if (share >= 1.0 || (level != DetailLevel::Full && detail.mode != kDetailAuto)) continue;
+    const Groom guides = first_strands(groom, guide_count(groom.strand_count(), share));
+    const auto notes = prepare_solver(scene, guides, groom_gravity);
+    if (!notes) return notes.error();
+  }
+  return {};
 }
 
 double median_ms(const gl::PassReports& passes, std::string_view name) {
@@ -92,6 +108,7 @@ Status SimLoop::begin() {
   ASSIGN_OR_RETURN(executor_, open_executor(config_.device));
   log_info("sim", "simulating on {}", executor_->info().name);
   builder_.emplace(config_.scene, config_.content->colliders);
+  detail_.change(config_.scene.detail);
   const StreamDesc& stream = config_.scene.stream;
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(stream.codec, stream.bound_m));
   publisher_.emplace(config_.content->groom, quantum_m);
@@ -121,6 +138,11 @@ void SimLoop::loop() {
     for (const Job& job : jobs) carry_out_in_turn(job);
     follow_stream_settings();
     follow_look();
+    follow_detail();
+    if (is_asleep()) {
+      sleep_through();
+      continue;
+    }
     const auto time_ns = clock_->take_step(now_ns());
     if (time_ns) step(*time_ns);
     const bool is_old = now_ns() - stats_ns_ >= kStatsNs;
@@ -140,6 +162,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
            std::any_of(jobs_.begin(), jobs_.end(), is_demand);
   };
   std::optional<int64_t> wake_ns = clock_->next_due_ns();
+  if (is_asleep()) wake_ns = now_ns() + kAsleepNs;
   const auto wake_by = [&](int64_t time_ns) { wake_ns = std::min(wake_ns.value_or(time_ns), time_ns); };
   if (has_other_stream()) wake_by(stream_changed_ns_ + kStreamChangeNs);
   if (has_other_look()) wake_by(look_changed_ns_ + kLookChangeNs);
@@ -272,7 +295,7 @@ Notice SimLoop::change(const std::string& assignment) {
   if (!scene) return {true, scene.error().to_string()};
   const SceneFeatures features = analyse(*scene, facts_);
   const bool is_other_solver = moves_otherwise(*scene, config_.scene);
-  if (is_other_solver || !needs_same_solver(features, solver_features_))
+  if (is_other_solver || needs_other_solver(*scene, features))
     if (const Status status = rebuild_solver(*scene, features); !status)
       return {true, status.error().to_string()};
   if (scene->substeps != config_.scene.substeps) stages_->plan_step(scene->substeps, explain(*scene, facts_));
@@ -283,7 +306,8 @@ Notice SimLoop::change(const std::string& assignment) {
     const std::lock_guard lock(mutex_);
     scene_ = *scene;
   }
-  builder_->change(*scene, colliders_of(*scene, config_.content->head_colliders));
+  builder_->change(stepped_scene(*scene, features), colliders_of(*scene, config_.content->head_colliders));
+  detail_.change(scene->detail);
   follow_stream_settings();
   follow_look();
   if (has_other_look())
@@ -325,10 +349,13 @@ void SimLoop::follow_look() {
 Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& features) {
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, moving_parameters(*row, scene));
-  const bool are_kept = solver_ != nullptr && solver_->strands() != nullptr;
+  catch_up();
+  const bool are_followed = features.has_followed_strands && can_follow(config_.content->groom);
+  const bool are_kept = !are_followed && solver_ != nullptr && solver_->strands() != nullptr;
   const auto strands = are_kept ? strands_ : std::make_shared<StrandState>(*executor_);
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
   ASSIGN_OR_RETURN(const auto notes, prepare_solver(scene, config_.content->groom, groom_gravity));
+  RETURN_IF_ERROR(prepare_guides(scene, config_.content->groom, groom_gravity));
   const double wetness = scene.look.shading.wetness;
   const SolverContext context = {executor_.get(),
                                  features,
@@ -341,6 +368,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
                                  config_.content->volume_target,
                                  scene.wind.along_share};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
+  const double share = simulated_share(scene, facts_);
+  if (are_followed) solver = std::make_unique<FollowedSolver>(std::move(solver), share);
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
@@ -350,9 +379,14 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
-  // Reads planes back, for a codec whose viewers take steps too.
-  if (strand_codec_info(scene.stream.codec)->predicts) step_log_.set_model(solver_->step_model());
-  stages_->plan_step(scene.substeps, explain(scene, facts_));
+  solver_share_ = share;
+  const uint32_t strand_count = config_.content->groom.strand_count();
+  simulated_strands_ = are_followed ? guide_count(strand_count, share) : strand_count;
+  // Reads planes back, for a codec whose viewers take steps too. What takes no whole steps is not told.
+  const bool is_whole = !features.has_half_rate;
+  if (strand_codec_info(scene.stream.codec)->predicts)
+    step_log_.set_model(is_whole ? solver_->step_model() : nullptr);
+  stages_->plan_step(stepped_scene(scene, features).substeps, explain(scene, facts_));
   stages_->set_solver_bytes(solver_->memory_bytes());
   ++solver_builds_;
   // The same model, built for other facts, says nothing new.
@@ -369,9 +403,13 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
 void SimLoop::apply_demand(const SourceDemand& demand) {
   const bool was_watched = is_watched();
   has_state_readers_ = demand.has_state_readers;
+  hair_px_ = demand.hair_px;
   RuntimeFacts facts = demand.facts;
   facts.has_wind_stream = facts_.has_wind_stream;
+  facts.detail = facts_.detail;
+  facts.detail_reason = facts_.detail_reason;
   apply_facts(facts);
+  follow_detail();
   // The first viewer sees the present state at once, also while paused.
   if (!was_watched && is_watched() && published_tick_ != tick_) publish();
 }
@@ -379,21 +417,127 @@ void SimLoop::apply_demand(const SourceDemand& demand) {
 void SimLoop::apply_facts(const RuntimeFacts& facts) {
   facts_ = facts;
   const SceneFeatures features = analyse(config_.scene, facts_);
-  if (needs_same_solver(features, solver_features_)) return;
+  solver_features_.is_carried = features.is_carried;
+  // What is not used is not made anew.
+  if (features.is_carried || !needs_other_solver(config_.scene, features)) return;
   if (const Status status = rebuild_solver(config_.scene, features); !status)
     log_error("sim", "the solver in use stays: {}", status.error().to_string());
 }
 
-void SimLoop::step(int64_t time_ns) {
+bool SimLoop::needs_other_solver(const SceneDesc& scene, const SceneFeatures& features) const {
+  return !needs_same_solver(features, solver_features_) || simulated_share(scene, facts_) != solver_share_;
+}
+
+/// The scene as its steps are: at half the rate they are twice as long, and where the model cannot bear that
+/// each is taken in twice as many parts.
+SceneDesc SimLoop::stepped_scene(const SceneDesc& scene, const SceneFeatures& features) {
+  SceneDesc stepped = scene;
+  if (!features.has_half_rate || features.is_carried) return stepped;
+  stepped.step_rate_hz *= 0.5;
+  if (!check_solver(stepped)) stepped.substeps *= 2;
+  return stepped;
+}
+
+/// How much is simulated follows who reads, between two steps. A pause costs nothing and changes nothing, and
+/// whoever observes sees all of it.
+void SimLoop::follow_detail() {
+  const bool is_observed = static_cast<bool>(config_.on_publish) || clock_->is_paused();
+  ReaderSight sight{is_watched(), hair_px_};
+  if (is_observed) sight = {.has_readers = true};
+  const int64_t time_ns = now_ns();
+  if (detail_.update(sight, time_ns)) set_detail(time_ns);
+}
+
+void SimLoop::set_detail(int64_t time_ns) {
+  RuntimeFacts facts = facts_;
+  facts.detail = detail_.level();
+  facts.detail_reason = detail_.reason();
+  const double rate_before_hz = stepped_scene(config_.scene, solver_features_).step_rate_hz;
+  const bool wakes = solver_features_.is_carried && facts.detail != DetailLevel::FollowHead;
+  if (wakes) find_head(time_ns);
+  apply_facts(facts);
+  if (wakes) wake();
+  ++detail_changes_;
+  carried_.reset();
+  const SceneDesc stepped = stepped_scene(config_.scene, solver_features_);
+  builder_->change(stepped, colliders_of(config_.scene, config_.content->head_colliders));
+  if (wakes || stepped.step_rate_hz != rate_before_hz) input_clock_.emplace(1.0 / stepped.step_rate_hz);
+  stages_->plan_step(stepped.substeps, explain(config_.scene, facts_));
+  log_info("sim", "step {}: level of detail: {}{}{}", tick_, to_string(facts.detail),
+           facts.detail_reason.empty() ? "" : ": ", facts.detail_reason);
+}
+
+/// Nobody reads: time and inputs go on, and nothing else.
+void SimLoop::sleep_through() {
+  const int64_t time_ns = now_ns();
+  const uint64_t passed = clock_->skip(time_ns);
+  if (passed == 0) return;
+  tick_ += passed;
+  input_ = hub_.sample(time_ns);
+  update_stats();
+}
+
+/// The solver's strands, which have stood still, go along to where the head is now.
+void SimLoop::catch_up() {
+  if (!std::exchange(is_behind_, false)) return;
+  solver_->rebase(builder_->world_from_head().rotation);
+}
+
+/// While the loop slept nobody looked where the head was, and how it moves.
+void SimLoop::find_head(int64_t time_ns) {
+  is_behind_ = true;
+  const double step_ns = kNsPerS / config_.scene.step_rate_hz;
+  if (static_cast<double>(time_ns - head_seen_ns_) < 2.0 * step_ns) return;
+  tick_ += clock_->skip(time_ns);
+  head_path_.clear();
+  for (int before = kHeadPathSteps; before >= 0; --before) {
+    input_ = hub_.sample(time_ns - static_cast<int64_t>(before * step_ns));
+    head_path_.push_back(input_.world_from_head);
+  }
+  builder_->begin(input_, 0.0);
+}
+
+/// Strands go on from where they went along with the head, as fast as it.
+void SimLoop::wake() {
+  catch_up();
+  const bool has_path = head_path_.size() > 1 && input_.has_motion && !input_.has_teleported;
+  const double passed_s = static_cast<double>(head_path_.size() - 1) / config_.scene.step_rate_hz;
+  move_with_head(*solver_,
+                 has_path ? head_motion(head_path_.front(), head_path_.back(), passed_s) : HeadMotion{});
+}
+
+void SimLoop::take_input(int64_t time_ns) {
   // A pause is not caught up.
   if (clock_->is_paused()) input_clock_->restart();
   input_ = hub_.sample(input_clock_->next(time_ns));
-  if (input_.has_wind_stream != facts_.has_wind_stream) {
-    RuntimeFacts facts = facts_;
-    facts.has_wind_stream = input_.has_wind_stream;
-    apply_facts(facts);
+  if (input_.has_wind_stream == facts_.has_wind_stream) return;
+  RuntimeFacts facts = facts_;
+  facts.has_wind_stream = input_.has_wind_stream;
+  apply_facts(facts);
+}
+
+/// Somebody looks from afar: the state goes with the head.
+void SimLoop::carry_step() {
+  if (input_.has_teleported) head_path_.clear();
+  head_path_.push_back(input_.world_from_head);
+  if (head_path_.size() > kHeadPathSteps + 1) head_path_.pop_front();
+  builder_->begin(input_, static_cast<double>(tick_) / config_.scene.step_rate_hz, input_clock_->rate());
+  is_behind_ = true;
+  last_step_ns_ = head_seen_ns_ = now_ns();
+  if (carried_ == nullptr) return publish();
+  publish_carried();
+}
+
+void SimLoop::step(int64_t time_ns) {
+  const bool is_left_out = solver_features_.has_half_rate && !solver_features_.is_carried &&
+                           !clock_->is_paused() && tick_ % 2 == 0;
+  if (is_left_out) {
+    ++tick_;
+    return;
   }
+  take_input(time_ns);
   ++tick_;
+  if (solver_features_.is_carried) return carry_step();
   const double end_time_s = static_cast<double>(tick_) / config_.scene.step_rate_hz;
   StageTurn turn(*builder_, *solver_, *publisher_);
   turn.input = input_;
@@ -408,17 +552,40 @@ void SimLoop::step(int64_t time_ns) {
   if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
 
-void SimLoop::publish() {
-  StageTurn turn(*builder_, *solver_, *publisher_);
-  PublishInput& input = turn.publish;
+PublishInput SimLoop::publish_input() const {
+  PublishInput input;
   input.tick = tick_;
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
   input.motion_time_ns = input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
+  return input;
+}
+
+/// What was published last, elsewhere: seen from the head it is the same.
+void SimLoop::publish_carried() {
+  auto snapshot = std::make_shared<Snapshot>(*carried_);
+  const PublishInput input = publish_input();
+  snapshot->tick = input.tick;
+  snapshot->sim_time_ns = input.sim_time_ns;
+  snapshot->motion_time_ns = input.motion_time_ns;
+  snapshot->world_from_head = input.world_from_head;
+  snapshot->trail = nullptr;
+  if (config_.on_publish) config_.on_publish(snapshot);
+  sink_.put(std::move(snapshot));
+  published_tick_ = tick_;
+  ++published_count_;
+}
+
+void SimLoop::publish() {
+  catch_up();
+  StageTurn turn(*builder_, *solver_, *publisher_);
+  PublishInput& input = turn.publish;
+  input = publish_input();
   step_log_.set_scene(builder_->step_scene(solver_features_));
-  input.trail = step_log_.trail();
+  if (!solver_features_.is_carried) input.trail = step_log_.trail();
   CHECK(stages_->publish(turn).ok());  // likewise
   std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
+  if (solver_features_.is_carried) carried_ = snapshot;
   if (config_.on_publish) config_.on_publish(snapshot);
   sink_.put(std::move(snapshot));
   published_tick_ = tick_;
@@ -463,6 +630,10 @@ void SimLoop::update_stats() {
   stats.published = published_count_;
   stats.quarantined = publisher_->quarantine_count();
   stats.overstretched = publisher_->overstretch_count();
+  stats.detail = facts_.detail;
+  stats.detail_reason = facts_.detail_reason;
+  stats.simulated_strands = solver_features_.is_carried ? 0 : simulated_strands_;
+  stats.detail_changes = detail_changes_;
   stats.solver_builds = solver_builds_;
   stats.solver_bytes = solver_->memory_bytes();
   stats.step_cost = step_log_.step_cost();

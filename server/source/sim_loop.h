@@ -31,6 +31,7 @@
 #include "server/sim/executor/executor.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
+#include "server/source/sim_detail.h"
 #include "server/source/sim_stages.h"
 #include "server/stream/state_source.h"
 
@@ -55,6 +56,11 @@ inline constexpr double kJobShare = 0.25;
 inline constexpr int64_t kStreamChangeNs = 500'000'000;
 /// Readers hear of another look at most this often, of the newest.
 inline constexpr int64_t kLookChangeNs = 100'000'000;
+/// While nobody reads and hair goes with the head, the loop wakes only this often, for what it tells of
+/// itself.
+inline constexpr int64_t kAsleepNs = 500'000'000;
+/// Hair that wakes has the speed of the head over so many steps: samples come in jerks.
+inline constexpr int kHeadPathSteps = 4;
 
 class SimLoop {
  public:
@@ -109,9 +115,22 @@ class SimLoop {
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_demand(const SourceDemand& demand);
   void apply_facts(const RuntimeFacts& facts);
-  bool is_watched() const { return SourceDemand{facts_, has_state_readers_}.is_watched(); }
+  bool is_watched() const { return SourceDemand{facts_, has_state_readers_, hair_px_}.is_watched(); }
+  void follow_detail();
+  void set_detail(int64_t time_ns);
+  bool needs_other_solver(const SceneDesc& scene, const SceneFeatures& features) const;
+  static SceneDesc stepped_scene(const SceneDesc& scene, const SceneFeatures& features);
+  bool is_asleep() const { return solver_features_.is_carried && !is_watched() && !clock_->is_paused(); }
+  void sleep_through();
+  void take_input(int64_t time_ns);
+  void carry_step();
+  void catch_up();
+  void find_head(int64_t time_ns);
+  void wake();
   void step(int64_t time_ns);
   void publish();
+  void publish_carried();
+  PublishInput publish_input() const;
   void report_quarantine();
   void update_stats();
 
@@ -124,6 +143,13 @@ class SimLoop {
   std::shared_ptr<StrandState> strands_;  // of solvers with a kernel, one after the other; else null
   std::unique_ptr<Solver> solver_;
   SceneFeatures solver_features_;  // what the solver was built for
+  double solver_share_ = 1.0;      // of strands that it simulates
+  SimDetail detail_{DetailDesc()};
+  uint64_t detail_changes_ = 0;
+  uint32_t simulated_strands_ = 0;
+  bool is_behind_ = false;      // the head has turned since, and the solver's strands have not gone along
+  std::deque<Pose> head_path_;  // of the head that carries hair, a step apart, to the builder's
+  std::shared_ptr<const Snapshot> carried_;  // the state that goes with the head, where nothing is simulated
   std::optional<StepBuilder> builder_;
   StepLog step_log_;  // for a codec that predicts by steps
   std::optional<Publisher> publisher_;
@@ -132,6 +158,7 @@ class SimLoop {
   std::optional<SimStages> stages_;
   RuntimeFacts facts_;
   bool has_state_readers_ = false;
+  double hair_px_ = 0.0;
   Histogram step_times_;
   InputFrame input_;
   uint64_t next_quarantine_report_ = 1;   // at so many broken strands since start
@@ -145,6 +172,7 @@ class SimLoop {
   int64_t stream_changed_ns_ = 0;  // 0 = never
   LookChange look_;                // as readers know it
   int64_t look_changed_ns_ = 0;    // 0 = never
+  int64_t head_seen_ns_ = 0;       // when hair that is carried went along with it last
   int64_t jobs_rest_ns_ = 0;       // no command is carried out before
   std::atomic<int64_t> last_step_ns_{0};
 

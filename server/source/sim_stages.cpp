@@ -62,21 +62,39 @@ SimStages::SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& 
                                           kStateBytes * sizes.strand_count * sizes.vertex_count)),
       host_state_("state on the host", 2 * kVec3Bytes * sizes.strand_count * sizes.vertex_count),
       snapshot_("snapshot", kVec3Bytes * sizes.strand_count * sizes.vertex_count) {
+  plan_step(sizes.substeps, reasons);
+}
+
+/// Times go on where nothing has changed.
+void SimStages::plan_publish(const FeatureReason& has_followed_strands) {
+  const FeatureReason planned = std::exchange(publish_planned_for_, has_followed_strands);
+  if (publish_ != nullptr && planned.value == has_followed_strands.value &&
+      planned.reason == has_followed_strands.reason)
+    return;
+  publish_ = std::make_unique<gl::PassList<StageTurn>>();
   const auto add = [this](gl::PassDeclaration declaration, Stage::Work work) {
-    publish_.add(std::make_unique<Stage>(std::move(declaration), gl::PassClock::Host, work));
+    publish_->add(std::make_unique<Stage>(std::move(declaration), gl::PassClock::Host, work));
   };
-  add({"publish/read", {state_.get()}, {&host_state_}, true, {}},
+  gl::Resources read = {state_.get()};
+  if (has_followed_strands.value) read.push_back(&followed_);
+  add({"publish/follow",
+       {state_.get()},
+       {&followed_},
+       has_followed_strands.value,
+       has_followed_strands.reason},
+      [](StageTurn& turn) { turn.solver.follow_guides(); });
+  add({"publish/read", read, {&host_state_}, true, {}},
       [](StageTurn& turn) { turn.publisher.read(turn.solver); });
   add({"publish/quantise", {&host_state_}, {&snapshot_}, true, {}}, [](StageTurn& turn) {
     turn.publish.head_velocity_mps = turn.builder.head_velocity_mps();
     turn.snapshot = turn.publisher.quantise(turn.publish);
   });
-  CHECK(publish_.plan({state_.get()}, {&snapshot_}).ok());
-  plan_step(sizes.substeps, reasons);
+  CHECK(publish_->plan({state_.get()}, {&snapshot_}).ok());
 }
 
 void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& reasons) {
   sizes_.substeps = substeps;
+  plan_publish(fact(reasons, "has_followed_strands"));
   step_ = std::make_unique<gl::PassList<StageTurn>>();
   const auto resource = [this](const char* name, uint64_t size_bytes) {
     return &step_->keep(std::make_unique<gl::Resource>(name, size_bytes));
@@ -118,16 +136,17 @@ void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& r
   step_->add(std::make_unique<Stage>(
       gl::PassDeclaration{"sim/volume", {motion}, {volume}, has_volume.value, has_volume.reason},
       gl::PassClock::Device, gather_volume));
-  step_->add(
-      std::make_unique<Stage>(gl::PassDeclaration{"sim/step", read_by_solver, {state_.get()}, true, {}},
-                              gl::PassClock::Device, run_substeps));
+  const FeatureReason& carried = fact(reasons, "is_carried");
+  step_->add(std::make_unique<Stage>(
+      gl::PassDeclaration{"sim/step", read_by_solver, {state_.get()}, !carried.value, carried.reason},
+      gl::PassClock::Device, run_substeps));
   CHECK(step_->plan({&input_}, {state_.get()}).ok());
 }
 
 gl::PassReports SimStages::report() const {
   gl::PassReports reports = step_->report();
-  for (gl::PassReport& report : publish_.report()) {
-    if (!is_watched_)
+  for (gl::PassReport& report : publish_->report()) {
+    if (!is_watched_ && report.fate == gl::PassFate::Kept)
       report.reason =
           fmt::format("every {} steps, to find broken strands: nobody watches", kIdlePublishSteps);
     reports.push_back(std::move(report));

@@ -66,13 +66,14 @@ class SimStages {
   /// Ends early when it is told to stop; then nothing may be published. Without a device its work is timed on
   /// this thread.
   Status step(StageTurn& turn, gl::GpuTimer* device) { return step_->run(turn, device); }
-  Status publish(StageTurn& turn) { return publish_.run(turn, nullptr); }
+  Status publish(StageTurn& turn) { return publish_->run(turn, nullptr); }
 
   /// What the solver took of the last step.
   double last_step_ms() const { return step_->last_ms("sim/step"); }
   gl::PassReports report() const;
 
  private:
+  void plan_publish(const FeatureReason& has_followed_strands);
   struct KnownLater final : gl::Resource {
     KnownLater(std::string name, uint64_t bytes_at_most) : Resource(std::move(name)), bytes(bytes_at_most) {}
     uint64_t size_bytes() const override { return bytes; }
@@ -82,10 +83,12 @@ class SimStages {
   StageSizes sizes_;
   gl::Resource input_{"input"};  // from outside
   std::unique_ptr<KnownLater> state_;
+  gl::Resource followed_{"followed strands"};  // the solver's, counted with its state
   gl::Resource host_state_;
   gl::Resource snapshot_;
   std::unique_ptr<gl::PassList<StageTurn>> step_;
-  gl::PassList<StageTurn> publish_;
+  std::unique_ptr<gl::PassList<StageTurn>> publish_;
+  FeatureReason publish_planned_for_;  // has_followed_strands
   bool is_watched_ = false;
 };
 

@@ -1,6 +1,7 @@
 #include "server/stream/demand_book.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace strandcast {
 
@@ -49,12 +50,25 @@ std::set<uint16_t> DemandBook::strand_streams() const {
   return streams;
 }
 
+/// On the largest of a reader's screens.
+double DemandBook::hair_px(const Demand& demand) const {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  if (demand.has_states) return kUnknown;
+  double px = 0.0;
+  if (demand.strand_stream) px = demand.hair_px > 0.0 ? demand.hair_px : kUnknown;
+  if (!demand.picture) return px;
+  const RenderSize& size = demand.picture->size;
+  return std::max(
+      px, hair_ ? hair_height_px(*hair_, demand.picture->camera, {size.width, size.height}) : kUnknown);
+}
+
 SourceDemand DemandBook::total() const {
   SourceDemand total;
   for (const auto& [id, reader] : readers_) {
     total.facts.strand_viewers += reader.demand.strand_stream ? 1 : 0;
     total.facts.frame_viewers += reader.demand.picture ? 1 : 0;
     total.has_state_readers |= reader.demand.has_states;
+    total.hair_px = std::max(total.hair_px, hair_px(reader.demand));
   }
   return total;
 }

@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 
+#include "common/render/hair_size.h"
 #include "common/scene/features.h"
 #include "server/stream/demand.h"
 
@@ -20,6 +22,9 @@ struct ReaderTraits {
 struct SourceDemand {
   RuntimeFacts facts;
   bool has_state_readers = false;
+  /// Height of the hair on the largest screen; infinity: a reader did not say, or takes states down. 0: it is
+  /// in no picture, or nobody reads.
+  double hair_px = 0.0;
 
   bool is_watched() const { return has_state_readers || facts.strand_viewers + facts.frame_viewers > 0; }
 };
@@ -35,6 +40,8 @@ class DemandBook : public DemandDesk {
   PictureBudget picture_budget() const override { return views_.budget(); }
   /// Before the first demand for pictures.
   void set_picture_budget(const PictureBudget& budget) { views_.set_budget(budget); }
+  /// What hair takes of a picture; without it nobody knows.
+  void set_hair(const HairExtent& extent) { hair_ = extent; }
   void set_scene_camera(const CameraDesc& camera) { views_.set_reserved_camera(camera); }
   /// Ignored for unknown readers.
   void remove(ReaderId reader);
@@ -54,9 +61,12 @@ class DemandBook : public DemandDesk {
     ReaderTraits traits;
     Demand demand;
   };
+  double hair_px(const Demand& demand) const;
+
   const uint16_t picture_source_;
   std::map<ReaderId, Reader> readers_;
   PictureViews views_;
+  std::optional<HairExtent> hair_;
   ReaderId next_reader_ = 1;
 };
 

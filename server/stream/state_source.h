@@ -33,8 +33,12 @@ struct SimStats {
   uint64_t rejected_samples = 0;
   uint64_t dropped_steps = 0;
   uint64_t published = 0;
-  uint64_t quarantined = 0;    // strands put back to rest because they had no usable numbers
-  uint64_t overstretched = 0;  // strands put back to rest because they had stretched too far
+  uint64_t quarantined = 0;                // strands put back to rest because they had no usable numbers
+  uint64_t overstretched = 0;              // strands put back to rest because they had stretched too far
+  DetailLevel detail = DetailLevel::Full;  // how much is simulated
+  std::string detail_reason;               // of a level that is not Full
+  uint32_t simulated_strands = 0;          // the others follow them; 0 = none: all go with the head
+  uint64_t detail_changes = 0;
   uint64_t solver_builds = 0;
   uint64_t solver_bytes = 0;
   double step_cost = 0.0;       // StepKernel::cost of the model; 0 = it has no kernel that others run

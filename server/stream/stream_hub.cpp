@@ -1,6 +1,7 @@
 #include "server/stream/stream_hub.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -10,9 +11,16 @@
 namespace strandcast {
 namespace {
 
+/// Sizes that differ by less than this share are one.
+constexpr double kSameSize = 0.02;
+
+bool is_same_size(double a, double b) {
+  return a == b || std::abs(a - b) < kSameSize * std::min(a, b);
+}
+
 bool is_alike(const SourceDemand& a, const SourceDemand& b) {
-  return a.facts.strand_viewers == b.facts.strand_viewers && a.facts.frame_viewers == b.facts.frame_viewers &&
-         a.has_state_readers == b.has_state_readers;
+  return is_same_size(a.hair_px, b.hair_px) && a.facts.strand_viewers == b.facts.strand_viewers &&
+         a.facts.frame_viewers == b.facts.frame_viewers && a.has_state_readers == b.has_state_readers;
 }
 
 std::vector<std::string> codecs_of(const StreamHubConfig& config) {
@@ -29,7 +37,9 @@ StreamHub::StreamHub(StreamHubConfig config)
       picture_source_(stream_id_of({codecs_.size() - 1, 0})),
       stream_(config_.stream),
       look_(config_.look),
-      book_(config_.scene_view, kSoftwareBudget, picture_source_) {}
+      book_(config_.scene_view, kSoftwareBudget, picture_source_) {
+  if (config_.asset != nullptr) book_.set_hair(hair_extent(*config_.asset));
+}
 
 Result<std::unique_ptr<StreamHub>> StreamHub::make(StreamHubConfig config) {
   std::unique_ptr<StreamHub> hub(new StreamHub(std::move(config)));
@@ -151,7 +161,7 @@ void StreamHub::follow_demand() {
     for (const auto& [stream_id, worker] : encoders_)
       if (!wanted.contains(stream_id)) worker->set_listeners(StrandListeners::None);
   }
-  // A camera that turns is no news for the source.
+  // A camera that turns is no news for the source, unless hair gets larger or smaller by it.
   if (const SourceDemand now = total(); !is_alike(now, told_)) {
     told_ = now;
     if (on_demand_) on_demand_(now);

@@ -232,7 +232,8 @@ TEST(DeviceLimits, FilesThatShareMemoryAreKnown) {
   // vec3 arrays have a stride of 16 bytes at most.
   constexpr uint64_t kVectors = 128 + 128 + 2 * 128, kFloats = 128;
   constexpr uint64_t kSteps = 128, kInvocations = 16;
-  const std::map<std::string, uint64_t> known{{"cells.comp", 32 * 4},
+  const std::map<std::string, uint64_t> known{{"bins_begin.comp", 128 * 4},
+                                              {"cells.comp", 32 * 4},
                                               {"dftl_parallel.comp", kVectors * 16 + kFloats * 4},
                                               {"running_sum.comp", 128 * 4},
                                               {"tile_offsets.comp", 128 * 4},

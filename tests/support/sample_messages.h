@@ -28,7 +28,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
           Ping{INT64_MIN},
           ControlCommand{Command::Reset},
           SetParameter{"solver.name=dftl"},
-          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software},
+          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5},
           ModeRequest{StreamMode::Auto},
           AdminCommand{AdminAction::Kick, 1ull << 40},
           SceneRequest{}};
@@ -69,6 +69,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.queue_delay_ms = 31.5;
   status.picture_motions = {{2'000'000'000, -5}, {INT64_MAX, INT64_MIN}};
   status.slow_motion = "half of real time; substeps=1 takes a third of the work away";
+  status.detail = "half rate: the hair is 50 pixels high on the largest screen: all from 240 on";
   return {
       welcome,
       Pong{1, -2, INT64_MAX},

@@ -1,5 +1,7 @@
 #include "server/stream/demand_book.h"
 
+#include <cmath>
+
 namespace strandcast {
 namespace {
 
@@ -63,6 +65,34 @@ TEST(DemandBook, StatesAloneAreReasonEnoughToPublishAndForNothingElse) {
   inputs.has_inputs = true;
   ASSERT_TRUE(book.set_demand(reader, inputs).ok());
   EXPECT_FALSE(book.total().is_watched()) << "inputs come whoever watches";
+}
+
+// What is simulated follows the largest screen; who says nothing may look closely.
+TEST(DemandBook, HairIsAsLargeAsOnTheLargestScreen) {
+  DemandBook book(sized(640), kHardwareBudget);
+  EXPECT_EQ(book.total().hair_px, 0.0) << "nobody";
+  const ReaderId strands = book.add({}), pictures = book.add({}), recorder = book.add({});
+  Demand told = wants(0);
+  told.hair_px = 55.0;
+  ASSERT_TRUE(book.set_demand(strands, told).ok());
+  EXPECT_EQ(book.total().hair_px, 55.0);
+  ASSERT_TRUE(book.set_demand(pictures, wants(std::nullopt, sized(640))).ok());
+  EXPECT_TRUE(std::isinf(book.total().hair_px)) << "nobody knows the hair";
+  book.set_hair({glm::vec3(0.0f), 0.2f, 0.3f});
+  const double near_px = book.total().hair_px;
+  EXPECT_TRUE(near_px > 0.0 && !std::isinf(near_px));
+  PictureView far = sized(640);
+  far.camera.offset_m *= 100.0f;
+  ASSERT_TRUE(book.set_demand(pictures, wants(std::nullopt, far)).ok());
+  EXPECT_EQ(book.total().hair_px, 55.0) << "the other one's screen";
+  Demand states;
+  states.has_states = true;
+  states.hair_px = 1.0;
+  ASSERT_TRUE(book.set_demand(recorder, states).ok());
+  EXPECT_TRUE(std::isinf(book.total().hair_px)) << "what is recorded may be looked at closely later";
+  book.remove(recorder);
+  ASSERT_TRUE(book.set_demand(strands, wants(0)).ok());
+  EXPECT_TRUE(std::isinf(book.total().hair_px)) << "an older viewer";
 }
 
 TEST(DemandBook, ARefusedDemandLeavesTheOneBefore) {

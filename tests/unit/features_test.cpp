@@ -1,6 +1,7 @@
 #include "common/scene/features.h"
 
 #include <random>
+#include <utility>
 
 namespace strandcast {
 namespace {
@@ -135,7 +136,9 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.volume.friction_per_s = coin() ? 0.0 : 20.0;
     scene.volume.repulsion_per_s2 = coin() ? 0.0 : 5.0;
     scene.head.collider = coin() ? kSphereCollider : kFieldCollider;
-    const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u};
+    scene.detail.simulated_share = coin() ? 1.0 : 0.5;
+    const auto level = static_cast<DetailLevel>(random() % kDetailLevels);
+    const RuntimeFacts facts{coin(), coin() ? 0u : 1u, coin() ? 0u : 2u, level, "it is far away"};
     const SceneFeatures features = analyse(scene, facts);
     SceneFeatures explained;
     const std::map<std::string, bool*> fact{{"has_wind", &explained.has_wind},
@@ -146,6 +149,9 @@ TEST(Features, ExplainAgreesWithAnalyse) {
                                             {"has_oriented_drag", &explained.has_oriented_drag},
                                             {"has_volume", &explained.has_volume},
                                             {"has_distance_field", &explained.has_distance_field},
+                                            {"has_followed_strands", &explained.has_followed_strands},
+                                            {"has_half_rate", &explained.has_half_rate},
+                                            {"is_carried", &explained.is_carried},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
                                             {"has_frame_viewers", &explained.has_frame_viewers}};
     const auto reasons = explain(scene, facts);
@@ -169,13 +175,56 @@ TEST(Features, ReasonsDifferWithTheValue) {
   full.bend_limit.most_root_deg = 30.0;
   full.head.collider = kFieldCollider;
   full.colliders.resize(1);
+  full.detail.simulated_share = 0.5;
   const auto off = explain(bare, {});
-  const auto on = explain(full, {.strand_viewers = 1, .frame_viewers = 1});
+  const auto on = explain(full, {.strand_viewers = 1,
+                                 .frame_viewers = 1,
+                                 .detail = DetailLevel::FollowHead,
+                                 .detail_reason = "nobody reads",
+                                 .forced = {"has_half_rate"}});
   for (size_t i = 0; i < off.size(); ++i) {
     EXPECT_FALSE(off[i].value) << off[i].name;
     EXPECT_TRUE(on[i].value) << on[i].name;
     EXPECT_NE(off[i].reason, on[i].reason) << on[i].name;
   }
+}
+
+TEST(Features, EachLevelOfDetailLeavesOutWhatTheOneBeforeDoes) {
+  SceneDesc scene;
+  scene.volume.friction_per_s = 1.0;
+  const auto at = [&](DetailLevel level) {
+    return analyse(scene, {.detail = level, .detail_reason = "it is far away"});
+  };
+  const SceneFeatures full = at(DetailLevel::Full), alone = at(DetailLevel::NoHairHair);
+  EXPECT_TRUE(full.has_volume);
+  EXPECT_FALSE(alone.has_volume || alone.has_followed_strands);
+  const SceneFeatures fewer = at(DetailLevel::FewerStrands), half = at(DetailLevel::HalfRate);
+  EXPECT_TRUE(fewer.has_followed_strands && !fewer.has_volume && !fewer.has_half_rate);
+  EXPECT_TRUE(half.has_followed_strands && !half.has_volume && half.has_half_rate && !half.is_carried);
+  // What takes no step is not made anew either.
+  SceneFeatures carried = at(DetailLevel::FollowHead);
+  EXPECT_TRUE(std::exchange(carried.is_carried, false));
+  EXPECT_EQ(carried, full);
+
+  EXPECT_EQ(simulated_share(scene, {}), 1.0);
+  EXPECT_EQ(simulated_share(scene, {.detail = DetailLevel::HalfRate}), scene.detail.far_share);
+  scene.detail.simulated_share = 0.1;
+  EXPECT_EQ(simulated_share(scene, {.detail = DetailLevel::HalfRate}), 0.1) << "no more than close by";
+  scene.step_rate_hz = 0.9 * kLeastHalvedRateHz;
+  EXPECT_FALSE(at(DetailLevel::HalfRate).has_half_rate) << "too rare to be shown smoothly";
+}
+
+// For measurements: nothing but the named fact changes, and it says so.
+TEST(Features, AForcedFactHoldsAndSaysThatItIsForced) {
+  SceneDesc bare;
+  bare.has_auto_collider = false;
+  bare.follicle_limit_deg = 180.0;
+  const RuntimeFacts facts{.forced = {"has_bend_limit"}};
+  SceneFeatures features = analyse(bare, facts);
+  EXPECT_TRUE(std::exchange(features.has_bend_limit, false));
+  EXPECT_EQ(features, analyse(bare, {}));
+  for (const FeatureReason& reason : explain(bare, facts))
+    EXPECT_EQ(reason.reason.starts_with("forced"), reason.name == "has_bend_limit") << reason.name;
 }
 
 }  // namespace

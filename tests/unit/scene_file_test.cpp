@@ -130,6 +130,14 @@ SceneDesc unusual_scene() {
               .scatter = "atomics"};
   s.wind.along_share = 0.25f;
   s.target_groom = ProceduralGroomDesc{.strand_count = 23, .vertex_count = 5, .length_m = 0.12f};
+  s.detail = {.mode = "auto",
+              .full_at_px = 301.5,
+              .hysteresis = 0.4,
+              .settle_s = 1.25,
+              .simulated_share = 0.5,
+              .far_share = 0.125,
+              .idle = "full",
+              .idle_after_s = 33.0};
   return s;
 }
 

@@ -32,6 +32,7 @@ SceneDesc full_scene() {
   scene.wind.along_share = 0.5f;
   scene.volume.friction_per_s = 20.0;
   scene.bend_limit.most_tip_deg = 60.0;
+  scene.detail.simulated_share = 0.5;
   scene.head.collider = kFieldCollider;
   scene.head.field_resolution = 16;
   scene.colliders = {{glm::vec3(0.0f, -0.3f, 0.0f), 0.1f}};
@@ -44,6 +45,7 @@ SceneDesc bare_scene() {
   scene.wind = {};
   scene.volume = {};
   scene.bend_limit = {};
+  scene.detail = {};
   scene.head.collider = kSphereCollider;
   scene.colliders.clear();
   scene.has_auto_collider = false;
@@ -83,7 +85,8 @@ TEST(ServerPlan, RunsOnlyWhatTheSceneAndItsViewersNeed) {
   ASSERT_TRUE(unwatched) << unwatched.error().to_string();
   EXPECT_THAT(kept(*unwatched), ElementsAre("scene/motion", "sim/step", "publish/read", "publish/quantise"));
   for (const gl::PassReport& pass : *unwatched)
-    EXPECT_EQ(pass.reason.find("nobody watches") != std::string::npos, pass.name.starts_with("publish/"))
+    EXPECT_EQ(pass.reason.find("nobody watches") != std::string::npos,
+              pass.fate == PassFate::Kept && pass.name.starts_with("publish/"))
         << pass.name;
   EXPECT_GT(saved_bytes(*unwatched), 0u);
   EXPECT_LT(kept_bytes(*unwatched), kept_bytes(*watched));
@@ -195,7 +198,9 @@ TEST(SimStages, WhatTheListSaysRanAndNothingElse) {
   for (const gl::PassReport& pass : world.stages.report()) {
     const bool has_run = pass.name == "scene/motion" || pass.name == "sim/step";
     EXPECT_EQ(pass.runs, has_run ? 2u : 0u) << pass.name;
-    const bool is_off = (pass.name.starts_with("scene/") || pass.name == "sim/volume") && !has_run;
+    const bool is_off =
+        (pass.name.starts_with("scene/") || pass.name == "sim/volume" || pass.name == "publish/follow") &&
+        !has_run;
     EXPECT_EQ(pass.fate == PassFate::NotRequested, is_off) << pass.name;
   }
   // A wind stream connects.

@@ -89,5 +89,20 @@ TEST(SimClock, PauseStepAndResumeAreExact) {
   EXPECT_EQ(clock.dropped_steps(), 0u);
 }
 
+// Nobody needs the steps: time passes in them as ever, and nothing is late afterwards.
+TEST(SimClock, SkippedStepsPassAndAreNeitherLateNorDropped) {
+  SimClock clock(0.01, kStart);
+  EXPECT_EQ(clock.skip(kStart + 5 * kMsNs), 0u);
+  EXPECT_EQ(clock.skip(kStart + kSecondNs / 2), 50u);
+  EXPECT_EQ(clock.skip(kStart + kSecondNs / 2), 0u);
+  EXPECT_EQ(clock.skip(kStart + 20 * kSecondNs), 1'950u);
+  EXPECT_NEAR(clock.realtime_factor(kStart + 20 * kSecondNs), 1.0, 0.02) << "no slow motion";
+  EXPECT_EQ(clock.dropped_steps(), 0u);
+  EXPECT_EQ(clock.take_step(kStart + 20 * kSecondNs), std::nullopt);
+  EXPECT_EQ(clock.take_step(kStart + 20 * kSecondNs + 10 * kMsNs), kStart + 20 * kSecondNs + 10 * kMsNs);
+  clock.pause();
+  EXPECT_EQ(clock.skip(kStart + 30 * kSecondNs), 0u);
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -109,7 +109,7 @@ TEST(WireMessages, EveryEnumeratorComesBack) {
     EXPECT_EQ(round_trip(AdminCommand{action, 1ull << 63}), (AdminCommand{action, 1ull << 63}));
   for (const DrawingDevice device :
        {DrawingDevice::Unknown, DrawingDevice::None, DrawingDevice::Software, DrawingDevice::Hardware})
-    EXPECT_EQ(round_trip(ViewerReport{0.0, 0.0, 0.0, 0.0, device}).device, device);
+    EXPECT_EQ(round_trip(ViewerReport{0.0, 0.0, 0.0, 0.0, device, 0.0}).device, device);
   for (const StreamMode mode : {StreamMode::Strands, StreamMode::Frames, StreamMode::Auto})
     EXPECT_EQ(round_trip(ModeRequest{mode}).mode, mode);
   for (const PictureCodec codec : kPictureCodecs)
@@ -315,6 +315,7 @@ TEST(WireMessages, ViewerReportNumbersMustBeFiniteAndInRange) {
       {"viewer_report.decode_ms", &ViewerReport::decode_ms, kMaxReportedMs},
       {"viewer_report.draw_ms", &ViewerReport::draw_ms, kMaxReportedMs},
       {"viewer_report.picture_decode_ms", &ViewerReport::picture_decode_ms, kMaxReportedMs},
+      {"viewer_report.hair_px", &ViewerReport::hair_px, kMaxReportedPx},
       {"viewer_report.shown_hz", &ViewerReport::shown_hz, kMaxReportedHz}};
   for (const auto& [name, field, limit] : fields) {
     ViewerReport report;

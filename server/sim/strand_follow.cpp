@@ -1,0 +1,170 @@
+#include "server/sim/strand_follow.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/base/worker_pool.h"
+#include "common/math/point_tree.h"
+
+namespace strandcast {
+namespace {
+
+/// Strands by their roots that are looked at for the nearest in shape.
+constexpr uint32_t kCandidates = 10;
+/// Nearer than this two strands are one, m.
+constexpr float kSameStrandM = 1e-3f;
+/// How much a difference in shape counts beside one of the roots, both as distances.
+constexpr float kShapeWeight = 1.0f;
+constexpr float kShortestM = 1e-9f;
+/// Vertices that a worker takes at a time.
+constexpr uint32_t kVerticesPerRange = 8'192;
+
+glm::vec3 direction_of(const glm::vec3& v) {
+  const float length = glm::length(v);
+  return length > kShortestM ? v / length : glm::vec3(0.0f);
+}
+
+/// `v` turned as `from` is turned to `to` on the shortest way; both are unit vectors, or without a direction.
+/// Keeps its length.
+glm::vec3 turned(const glm::vec3& v, const glm::vec3& from, const glm::vec3& to) {
+  constexpr float kOpposite = 1e-4f;
+  const float cosine = glm::dot(from, to);
+  if (1.0f + cosine < kOpposite) return v - 2.0f * glm::dot(from, v) * from;
+  const glm::vec3 axis = glm::cross(from, to);
+  return cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1.0f + cosine));
+}
+
+}  // namespace
+
+bool can_follow(const Groom& groom) {
+  for (uint32_t s = 0; s < groom.strand_count(); ++s)
+    if (groom.pinned[groom.offset[s + 1] - 1] != 0) return false;
+  return groom.strand_count() > 0;
+}
+
+uint32_t guide_count(uint32_t strand_count, double share) {
+  const auto count = static_cast<uint32_t>(std::ceil(share * strand_count));
+  return std::clamp(count, 1u, std::max(1u, strand_count));
+}
+
+StrandFollow::StrandFollow(const Groom& groom, uint32_t guide_count)
+    : strand_count_(groom.strand_count()),
+      vertex_count_(groom.uniform_vertex_count()),
+      guide_count_(std::min(guide_count, strand_count_)) {
+  CHECK(guide_count_ > 0 && vertex_count_ > 0);
+  while (pinned_count_ < vertex_count_ && groom.pinned[pinned_count_] != 0) ++pinned_count_;
+  std::vector<glm::vec3> rest(size_t{strand_count_} * vertex_count_);
+  for (uint32_t s = 0; s < strand_count_; ++s)
+    for (uint32_t v = 0; v < vertex_count_; ++v)
+      rest[size_t{v} * strand_count_ + s] = groom.rest_position_m[groom.offset[s] + v];
+  choose_guides(rest);
+  const uint32_t follower_count = strand_count_ - guide_count_;
+  pinned_in_head_m_.resize(size_t{pinned_count_} * follower_count);
+  own_segment_m_.resize(size_t{vertex_count_} * follower_count);
+  guides_direction_.resize(own_segment_m_.size());
+  for (uint32_t v = 0; v < vertex_count_; ++v) {
+    const glm::vec3* here = rest.data() + size_t{v} * strand_count_;
+    for (uint32_t f = 0; f < follower_count; ++f) {
+      const size_t i = size_t{v} * follower_count + f;
+      if (v < pinned_count_) pinned_in_head_m_[i] = here[guide_count_ + f];
+      if (v == 0) continue;
+      const glm::vec3* before = here - strand_count_;
+      own_segment_m_[i] = here[guide_count_ + f] - before[guide_count_ + f];
+      glm::vec3 mean(0.0f);
+      for (size_t g = 0; g < kMaxGuidesOfStrand; ++g) {
+        const uint32_t guide = guides_[f].strand[g];
+        mean += guides_[f].weight[g] * (here[guide] - before[guide]);
+      }
+      guides_direction_[i] = direction_of(mean);
+    }
+  }
+}
+
+void StrandFollow::choose_guides(const std::vector<glm::vec3>& rest) {
+  const PointTree tree(std::span<const glm::vec3>(rest).first(guide_count_));
+  guides_.resize(strand_count_ - guide_count_);
+  for (uint32_t f = 0; f < guides_.size(); ++f) {
+    const uint32_t strand = guide_count_ + f;
+    std::vector<PointTree::Neighbour> near = tree.nearest(rest[strand], kCandidates);
+    for (PointTree::Neighbour& guide : near) {
+      float shape = 0.0f;  // mean square of how far apart the two are with their roots in one place
+      for (size_t v = 1; v < vertex_count_; ++v) {
+        const glm::vec3* here = rest.data() + v * strand_count_;
+        const glm::vec3 apart = (here[strand] - rest[strand]) - (here[guide.index] - rest[guide.index]);
+        shape += glm::dot(apart, apart) / static_cast<float>(vertex_count_ - 1);
+      }
+      guide.distance_squared += kShapeWeight * shape;
+    }
+    std::sort(near.begin(), near.end());
+    Guides& guides = guides_[f];
+    float sum = 0.0f;
+    for (size_t g = 0; g < std::min<size_t>(kMaxGuidesOfStrand, near.size()); ++g) {
+      guides.strand[g] = near[g].index;
+      guides.weight[g] = 1.0f / (near[g].distance_squared + kSameStrandM * kSameStrandM);
+      sum += guides.weight[g];
+    }
+    for (float& weight : guides.weight) weight /= sum;
+  }
+}
+
+void StrandFollow::follow(std::span<const glm::vec3> guides_in_head_m,
+                          std::span<glm::vec3> all_in_head_m) const {
+  CHECK(guides_in_head_m.size() == size_t{guide_count_} * vertex_count_ &&
+        all_in_head_m.size() == size_t{strand_count_} * vertex_count_);
+  for (size_t v = 0; v < vertex_count_; ++v)
+    std::copy_n(guides_in_head_m.data() + v * guide_count_, guide_count_,
+                all_in_head_m.data() + v * strand_count_);
+  const size_t grain = std::max(1u, kVerticesPerRange / vertex_count_);
+  shared_workers().at(Priority::Simulation).for_ranges(guides_.size(), grain, [&](size_t begin, size_t end) {
+    follow_some(guides_in_head_m.data(), all_in_head_m.data(), begin, end);
+  });
+}
+
+void StrandFollow::follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all_in_head_m, size_t begin,
+                               size_t end) const {
+  const size_t follower_count = guides_.size();
+  for (size_t v = 0; v < vertex_count_; ++v) {
+    glm::vec3* out = all_in_head_m + v * strand_count_ + guide_count_;
+    if (v < pinned_count_) {
+      const glm::vec3* pinned = pinned_in_head_m_.data() + v * follower_count;
+      std::copy(pinned + begin, pinned + end, out + begin);
+      continue;
+    }
+    const glm::vec3* of_guides = guides_in_head_m + v * guide_count_;
+    const glm::vec3* before = of_guides - guide_count_;
+    const glm::vec3* own = own_segment_m_.data() + v * follower_count;
+    const glm::vec3* at_rest = guides_direction_.data() + v * follower_count;
+    for (size_t f = begin; f < end; ++f) {
+      glm::vec3 mean(0.0f);
+      for (size_t g = 0; g < kMaxGuidesOfStrand; ++g) {
+        const uint32_t guide = guides_[f].strand[g];
+        mean += guides_[f].weight[g] * (of_guides[guide] - before[guide]);
+      }
+      out[f] = (out - strand_count_)[f] + turned(own[f], at_rest[f], direction_of(mean));
+    }
+  }
+}
+
+void StrandFollow::blend(std::span<const glm::vec3> of_guides, std::span<glm::vec3> of_all) const {
+  CHECK(of_guides.size() == size_t{guide_count_} * vertex_count_ &&
+        of_all.size() == size_t{strand_count_} * vertex_count_);
+  for (size_t v = 0; v < vertex_count_; ++v) {
+    const glm::vec3* from = of_guides.data() + v * guide_count_;
+    glm::vec3* to = of_all.data() + v * strand_count_;
+    std::copy_n(from, guide_count_, to);
+    for (size_t f = 0; f < guides_.size(); ++f) {
+      glm::vec3 mean(0.0f);
+      for (size_t g = 0; g < kMaxGuidesOfStrand; ++g)
+        mean += guides_[f].weight[g] * from[guides_[f].strand[g]];
+      to[guide_count_ + f] = mean;
+    }
+  }
+}
+
+uint64_t StrandFollow::size_bytes() const {
+  return guides_.size() * sizeof(Guides) +
+         (pinned_in_head_m_.size() + own_segment_m_.size() + guides_direction_.size()) * sizeof(glm::vec3);
+}
+
+}  // namespace strandcast
