@@ -75,6 +75,30 @@ class ReportProgram : public testing::Test {
   std::vector<std::map<std::string, std::string>> rows_;
 };
 
+// A scene that needs nothing: all that a step can be without is named, and none of it is missed.
+TEST_F(ReportProgram, PruningOfTheBarestScene) {
+  const auto out = folder_.path() / "pruning";
+  const std::string scenes = (std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy" / "scenes").string();
+  const Outcome done =
+      run_report(folder_, fmt::format("pruning --scenes '{}' --scene minimal --steps 10 --no-pictures "
+                                      "--sim-device lanes --out '{}'",
+                                      scenes, out.string()));
+  ASSERT_EQ(done.exit_code, 0) << done.output;
+  EXPECT_THAT(done.output, HasSubstr("scene/bend_limit"));
+  rows_ = parse_csv(load_text(out / "pruning.csv", 1u << 20).value());
+  std::set<std::string> passes;
+  for (const auto& row : rows_) {
+    passes.insert(row.at("pass"));
+    EXPECT_TRUE(row.at("same_hair") == "yes" || !row.at("note").empty()) << row.at("pass");
+  }
+  for (const char* pass : {"scene/wind", "scene/gusts", "scene/colliders", "scene/follicle_limit",
+                           "scene/bend_limit", "scene/distance_field", "sim/volume"})
+    EXPECT_TRUE(passes.contains(pass)) << pass;
+  EXPECT_TRUE(std::filesystem::exists(out / "pruning.html"));
+  EXPECT_EQ(run_report(folder_, fmt::format("pruning --scene nowhere --out '{}'", out.string())).exit_code,
+            2);
+}
+
 // One model, one size, half a second of motion: what the numbers must be by the laws of rods and chains.
 TEST_F(ReportProgram, ASmallWorkPrecisionKeepsTheLaws) {
   const auto out = folder_.path() / "report";

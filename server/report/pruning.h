@@ -1,0 +1,86 @@
+// What is left out of a scene because nobody wants anything of it, and what that saves: every fact that does
+// not hold is forced (RuntimeFacts::forced), and the scene runs both ways in turns under the same head
+// motion. Hair must be where it was, bit for bit. And what it costs, in millimetres and bytes, to let most
+// strands follow others. From the executor's thread.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/gl/pass_list.h"
+#include "common/pictures/picture_error.h"
+#include "common/scene/features.h"
+#include "server/report/stream_motion.h"
+#include "server/scene/scene_content.h"
+#include "server/sim/executor/executor.h"
+
+namespace strandcast {
+
+/// An OpenGL compiler may round a kernel with another part otherwise; beyond this hair is elsewhere.
+inline constexpr double kRoundingMm = 0.01;
+
+struct PruningDesc {
+  SceneDesc scene;
+  StreamMotion motion;
+  int steps = 180;
+  bool has_pictures = true;  // compared at the end; what pictures take is measured too
+};
+
+/// A pass that the simulation of a scene is without.
+struct PrunedPass {
+  std::string pass;
+  std::string reason;          // why it is left out
+  double without_ms = 0.0;     // median of a whole step
+  double with_ms = 0.0;        // likewise, with the pass forced
+  uint64_t without_bytes = 0;  // all that solver and step keep
+  uint64_t with_bytes = 0;
+  bool is_same_hair = false;  // state hashes of all steps
+  double largest_mm = 0.0;    // distance of a vertex between the two, of all steps
+  bool has_pictures = false;
+  bool is_same_picture = false;  // bytes of the last one
+  std::string note;              // why it could not be forced; then nothing else is told
+};
+
+/// A pass that runs for readers only, with what it takes where there are some.
+struct ReaderPass {
+  std::string pass;
+  double ms = 0.0;
+  uint64_t bytes = 0;
+};
+
+struct PruningRun {
+  std::string scene;
+  std::vector<PrunedPass> passes;
+  std::vector<ReaderPass> reader_passes;  // left out while nobody reads
+  bool is_same_unread = false;            // hair after all steps, whether or not states were published
+};
+
+/// What a share of the strands simulated is worth against all of them.
+struct FollowedRun {
+  std::string scene;
+  double share = 1.0;
+  bool has_volume = false;
+  uint32_t simulated = 0;
+  double all_step_ms = 0.0;  // medians
+  double step_ms = 0.0;
+  double follow_ms = 0.0;  // of a published state
+  uint64_t all_bytes = 0;  // of the solver
+  uint64_t bytes = 0;
+  double all_mbit_per_s = 0.0;  // deltas of the scene's codec at 60 states a second
+  double mbit_per_s = 0.0;
+  double rms_mm = 0.0;  // of the vertices that follow, from where they are with all strands simulated
+  double p95_mm = 0.0;
+};
+
+Result<PruningRun> run_pruning(const PruningDesc& desc, Executor& executor);
+/// The scene as it is, or without forces between strands.
+Result<FollowedRun> run_followed(const PruningDesc& desc, double share, bool has_volume, Executor& executor);
+
+std::string pruning_text(const std::vector<PruningRun>& runs, const std::vector<FollowedRun>& followed);
+std::string pruning_csv(const std::vector<PruningRun>& runs);
+std::string followed_csv(const std::vector<FollowedRun>& followed);
+std::string pruning_page(const std::vector<PruningRun>& runs, const std::vector<FollowedRun>& followed);
+/// A sentence for each pass that changes what is seen; empty when none does.
+std::vector<std::string> pruning_breaks(const std::vector<PruningRun>& runs);
+
+}  // namespace strandcast
