@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <fmt/ranges.h>
+
 #include <cmath>
 #include <functional>
 #include <iostream>
@@ -83,12 +85,20 @@ Status add_motion(const FeedOptions& options, FeedPlan& plan, double& length_s) 
     plan.motion = built_in_motion;
     return {};
   }
-  ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, options.motion_file));
+  MotionFileOptions file = options.motion_file;
+  file.has_body = true;
+  ASSIGN_OR_RETURN(MotionFile loaded, load_motion_file(options.motion, file));
   for (const std::string& note : loaded.notes) std::cerr << note << '\n';
   auto clip = std::make_shared<const MotionClip>(std::move(loaded.clip));
   length_s = clip->duration_s();
   plan.motion = [clip, is_looped = options.is_looped](double t_s) {
     return clip->sample(wrapped(t_s, clip->duration_s(), is_looped));
+  };
+  if (clip->joint_name.empty()) return {};
+  std::cerr << fmt::format("{}: joints of the body: {}\n", options.motion, fmt::join(clip->joint_name, ", "));
+  plan.joint_names = clip->joint_name;
+  plan.joints = [clip, is_looped = options.is_looped](double t_s) {
+    return clip->sample_joints(wrapped(t_s, clip->duration_s(), is_looped));
   };
   return {};
 }

@@ -39,6 +39,8 @@ void declare_feed(CLI::App& app, CommandLine& line) {
   app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file (default: guessed from the rest pose)")
       ->check(CLI::IsMember({"y", "z"}));
   app.add_option("--joint", feed.motion_file.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_option("--body-joint", feed.motion_file.body_joints,
+                 "Joints of the BVH file to send besides neck, chest, shoulders and elbows, by their names");
   app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
                "Take steps out of the BVH file that are faster than any head moves");
   app.add_flag("--loop", feed.is_looped, "Start over at the end of the files");

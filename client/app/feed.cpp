@@ -66,7 +66,12 @@ class Feeder {
  private:
   void send_sample(int64_t sample_ns) {
     if (plan_.motion) {
-      const MotionSamples message{{{sample_ns, plan_.motion(progress_.motion_s)}}, 1.0 - progress_.pace};
+      MotionSamples message{{{sample_ns, plan_.motion(progress_.motion_s)}}, 1.0 - progress_.pace};
+      if (plan_.joints) {
+        message.joint_names = plan_.joint_names;
+        const std::vector<glm::dvec3> places = plan_.joints(progress_.motion_s);
+        message.samples.front().joint_m.assign(places.begin(), places.end());
+      }
       count(client_.send(message), progress_.motion_samples);
     }
     if (plan_.wind) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -86,13 +87,16 @@ std::string to_sentence(const HeadMeasure& measure, size_t sphere_count) {
       measure.sphere_median_m * kMmPerM, measure.sphere_most_m * kMmPerM, measure.deepest_vertex_m * kMmPerM);
 }
 
-HairInside measure_inside(const DistanceField& field, const Groom& groom) {
+namespace {
+
+template <class Distance>
+HairInside inside_where(const Groom& groom, Distance distance_m_at) {
   HairInside inside;
   for (uint32_t strand = 0; strand < groom.strand_count(); ++strand) {
     const size_t before = inside.vertex_count;
     for (uint32_t i = groom.offset[strand]; i < groom.offset[strand + 1]; ++i) {
       if (groom.pinned[i] != 0) continue;
-      const double distance_m = field.sample(groom.rest_position_m[i]).distance_m;
+      const double distance_m = distance_m_at(groom.rest_position_m[i]);
       if (distance_m >= 0.0) continue;
       ++inside.vertex_count;
       inside.deepest_m = std::max(inside.deepest_m, -distance_m);
@@ -100,6 +104,45 @@ HairInside measure_inside(const DistanceField& field, const Groom& groom) {
     if (inside.vertex_count > before) ++inside.strand_count;
   }
   return inside;
+}
+
+/// By the foot of the point on the axis: as far as it leans, a cone is a little nearer.
+double distance_about(const BodyCapsule& capsule, const glm::dvec3& point_m) {
+  const glm::dvec3 axis = capsule.to_m - capsule.from_m;
+  const double squared = glm::dot(axis, axis);
+  const double share =
+      squared > 0.0 ? std::clamp(glm::dot(point_m - capsule.from_m, axis) / squared, 0.0, 1.0) : 0.0;
+  return glm::distance(point_m, capsule.from_m + share * axis) -
+         glm::mix(capsule.from_radius_m, capsule.to_radius_m, share);
+}
+
+}  // namespace
+
+HairInside measure_inside(const DistanceField& field, const Groom& groom) {
+  return inside_where(groom, [&](const glm::vec3& point) { return field.sample(point).distance_m; });
+}
+
+HairInside measure_inside(const BodyInput& body, const Groom& groom) {
+  return inside_where(groom, [&](const glm::dvec3& point_m) {
+    double nearest_m = std::numeric_limits<double>::max();
+    for (const BodyCapsule& capsule : body.capsules)
+      nearest_m = std::min(nearest_m, distance_about(capsule, point_m));
+    for (const BodyPlane& plane : body.planes)
+      nearest_m = std::min(nearest_m, glm::dot(plane.normal, point_m - plane.point_m));
+    return nearest_m;
+  });
+}
+
+std::string to_sentence(const HairInside& inside, size_t capsule_count) {
+  constexpr double kMmPerM = 1e3;
+  if (inside.vertex_count == 0)
+    return fmt::format("the body has {} capsules; no free vertex of the hair as loaded is inside of it",
+                       capsule_count);
+  return fmt::format(
+      "the body has {} capsules; {} free vertices of {} strands as loaded are inside of it, at most {:.1f} "
+      "mm deep, "
+      "and stay until they get out",
+      capsule_count, inside.vertex_count, inside.strand_count, inside.deepest_m * kMmPerM);
 }
 
 std::string to_sentence(const HairInside& inside, const DistanceField& field) {

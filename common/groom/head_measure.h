@@ -7,6 +7,7 @@
 #include "common/groom/distance_field.h"
 #include "common/groom/groom.h"
 #include "common/groom/mesh.h"
+#include "common/kernels/body_input.h"
 
 namespace strandcast {
 
@@ -33,6 +34,10 @@ struct HairInside {
   double deepest_m = 0.0;
 };
 HairInside measure_inside(const DistanceField& field, const Groom& groom);
+/// Likewise of a body, at the end of the substep.
+HairInside measure_inside(const BodyInput& body, const Groom& groom);
+/// "the body has 6 capsules; no free vertex of the hair as loaded lies inside of them"
+std::string to_sentence(const HairInside& inside, size_t capsule_count);
 
 /// "the head collides as a distance field of 55 x 69 x 37 nodes, 7.2 mm apart; 12 free vertices ..."
 std::string to_sentence(const HairInside& inside, const DistanceField& field);

@@ -23,7 +23,7 @@ enum class PlaneRole : uint32_t {
 inline constexpr size_t kPlaneRoleCount = 10;
 
 /// What kernels call the tables.
-enum class TableRole : uint32_t { Field, Volume };
-inline constexpr size_t kTableRoleCount = 2;
+enum class TableRole : uint32_t { Field, Volume, Body };
+inline constexpr size_t kTableRoleCount = 3;
 
 }  // namespace strandcast

@@ -12,6 +12,7 @@
 #include <numbers>
 #include <vector>
 
+#include "common/kernels/body_input.h"
 #include "common/math/sphere_collider.h"
 
 namespace strandcast {
@@ -44,6 +45,7 @@ struct StepInput {
   double follicle_limit_rad = kFreeFollicleRad;
   bool begins_step = true;                // the first substep of a step: what is computed once a step is
   std::vector<SphereCollider> colliders;  // centres in head-relative world axes, at the end of the substep
+  BodyInput body;                         // head space
 };
 
 /// Whether roots are held in this substep; no number, and no angle, is no limit.

@@ -8,6 +8,7 @@
 #include "common/base/check.h"
 #include "common/base/file.h"
 #include "common/base/quantile.h"
+#include "common/motion/bvh_body.h"
 #include "common/motion/text_cursor.h"
 
 namespace strandcast {
@@ -175,16 +176,20 @@ bool is_head_name(std::string_view name) {
   return equals_ignoring_case(name, "head");
 }
 
+std::string known_joints(const Skeleton& skeleton) {
+  std::string known;
+  for (const Joint& joint : skeleton.joints)
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", shown(joint.name));
+  return known;
+}
+
 Result<uint32_t> find_head(const Skeleton& skeleton, const std::string& wanted) {
   for (uint32_t i = 0; i < skeleton.joints.size(); ++i) {
     const std::string& name = skeleton.joints[i].name;
     if (wanted.empty() ? is_head_name(name) : name == wanted) return i;
   }
-  std::string known;
-  for (const Joint& joint : skeleton.joints)
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", shown(joint.name));
   return make_error(ErrorCode::NotFound, "no joint named {} (--joint NAME takes another, known: {})",
-                    wanted.empty() ? "Head or head" : shown(wanted), known);
+                    wanted.empty() ? "Head or head" : shown(wanted), known_joints(skeleton));
 }
 
 /// Joints from the root down to the head.
@@ -356,6 +361,45 @@ void to_world(std::vector<Pose>& poses, double unit_m, bool is_z_up, bool recent
   for (Pose& pose : poses) pose.position_m -= start;
 }
 
+/// Likewise: seen from the head, whose rest pose is upright.
+void to_head_space(std::vector<glm::dvec3>& places, double unit_m, bool is_z_up) {
+  const glm::dquat upright = is_z_up ? glm::angleAxis(glm::radians(-90.0), kAxis[0]) : glm::dquat(1, 0, 0, 0);
+  for (glm::dvec3& place : places) place = upright * (place * unit_m);
+}
+
+void erase_first_frame(MotionClip& clip) {
+  clip.world_from_head.erase(clip.world_from_head.begin());
+  clip.joint_m.erase(clip.joint_m.begin(),
+                     clip.joint_m.begin() +
+                         static_cast<std::ptrdiff_t>(std::min(clip.joint_m.size(), clip.joint_name.size())));
+}
+
+/// Paths to the joints of the body that are known, and their names; NotFound for one that was asked for.
+Result<std::vector<std::vector<const Joint*>>> find_body(const Skeleton& skeleton, const BvhOptions& options,
+                                                         std::vector<std::string>& names) {
+  std::vector<std::string> in_file;
+  for (const Joint& joint : skeleton.joints) in_file.push_back(joint.name);
+  std::vector<std::vector<const Joint*>> paths;
+  const auto add = [&](const std::string& name, size_t joint) {
+    names.push_back(name);
+    paths.push_back(path_to(skeleton, static_cast<uint32_t>(joint)));
+  };
+  if (options.has_body)
+    for (const auto& [name, joint] : usual_body(in_file)) add(name, joint);
+  for (const std::string& wanted : options.body_joints) {
+    const auto found = std::find(in_file.begin(), in_file.end(), wanted);
+    if (found == in_file.end())
+      return make_error(ErrorCode::NotFound, "no joint named {} (--body-joint, known: {})", shown(wanted),
+                        known_joints(skeleton));
+    if (std::find(names.begin(), names.end(), wanted) == names.end())
+      add(wanted, static_cast<size_t>(found - in_file.begin()));
+  }
+  if (names.size() > kMaxBodyJoints)
+    return make_error(ErrorCode::LimitExceeded, "{} joints of the body, the limit is {}", names.size(),
+                      kMaxBodyJoints);
+  return paths;
+}
+
 }  // namespace
 
 Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, const BvhOptions& options) {
@@ -372,6 +416,12 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
 
   static_cast<void>(cursor.rest_of_line());
   MotionClip clip;
+  std::vector<std::vector<const Joint*>> body;
+  if (options.has_body || !options.body_joints.empty()) {
+    auto found = find_body(skeleton, options, clip.joint_name);
+    if (!found) return at(place, found.error());
+    body = std::move(found).value();
+  }
   clip.frame_s = header.frame_s;
   clip.world_from_head.reserve(header.frame_count);
   std::vector<double> row(skeleton.channel_count);
@@ -380,6 +430,10 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
     RETURN_IF_ERROR(parse_row(cursor, frame, row));
     if (frame < rest_share.size()) rest_share[frame] = share_at_rest(skeleton, row);
     clip.world_from_head.push_back(evaluate(path, row));
+    const Pose& at_frame = clip.world_from_head.back();
+    for (const auto& joint : body)
+      clip.joint_m.push_back(glm::conjugate(at_frame.rotation) *
+                             (evaluate(joint, row).position_m - at_frame.position_m));
   }
   if (cursor.next_line())
     return cursor.fail(ErrorCode::BadInput, "more lines follow after the {} frames announced",
@@ -387,7 +441,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
 
   if (options.skip_first_frame_if_t_pose &&
       begins_with_t_pose(clip.world_from_head, rest_share[0], rest_share[1]))
-    clip.world_from_head.erase(clip.world_from_head.begin());
+    erase_first_frame(clip);
   const bool is_z_up = options.is_z_up.value_or(guess_z_up(path));
   if (is_z_up && !options.is_z_up)
     clip.up_reason = "+Z is taken as up: there the head is above the hips in the rest pose";
@@ -401,6 +455,7 @@ Result<MotionClip> parse_bvh(const std::string& text, const std::string& place, 
   else
     clip.file_unit_m = options.unit_m;
   to_world(clip.world_from_head, clip.file_unit_m, is_z_up, options.recentre);
+  to_head_space(clip.joint_m, clip.file_unit_m, is_z_up);
   return clip;
 }
 

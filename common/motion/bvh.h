@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/motion/motion_clip.h"
@@ -20,6 +21,9 @@ inline constexpr double kMinFrameTimeS = 1e-4, kMaxFrameTimeS = 10.0;
 
 /// Bones from the lowest to the highest point of a grown-up: the body, and the foot's length.
 inline constexpr double kAssumedBodyHeightM = 1.7;
+
+/// That clips give: as many as a motion stream takes.
+inline constexpr size_t kMaxBodyJoints = 12;
 
 struct LengthUnit {
   double m = 1.0;
@@ -42,6 +46,9 @@ struct BvhOptions {
   std::optional<bool>
       is_z_up{};             // else +Y is up; empty = guessed: +Z where the head is above the hips at rest
   std::string head_joint{};  // empty: "Head" or "head", with or without a prefix ending in ':' or '_'
+  bool has_body = false;  // MotionClip's joints: neck, chest, shoulders and elbows, as far as names are known
+  std::vector<std::string>
+      body_joints{};  // these besides, by their names in the file; at most kMaxBodyJoints
   bool skip_first_frame_if_t_pose = true;
   bool recentre = true;  // subtract the first pose's horizontal position
 };

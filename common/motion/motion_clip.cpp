@@ -65,6 +65,19 @@ Pose MotionClip::sample(double t_s) const {
   return interpolate(world_from_head[index], world_from_head[index + 1], frame - std::floor(frame));
 }
 
+std::vector<glm::dvec3> MotionClip::sample_joints(double t_s) const {
+  std::vector<glm::dvec3> places(joint_name.size());
+  if (joint_m.empty()) return {};
+  const size_t last = world_from_head.size() - 1;
+  const double frame = std::clamp(t_s / frame_s, 0.0, static_cast<double>(last));
+  const auto index = std::min(static_cast<size_t>(frame), last);
+  const size_t next = std::min(index + 1, last);
+  for (size_t i = 0; i < places.size(); ++i)
+    places[i] = glm::mix(joint_m[index * places.size() + i], joint_m[next * places.size() + i],
+                         frame - static_cast<double>(index));
+  return places;
+}
+
 double WindSeries::duration_s() const {
   return time_s.empty() ? 0.0 : time_s.back();
 }

@@ -15,14 +15,20 @@ namespace strandcast {
 struct MotionClip {
   double frame_s = 1.0 / 60.0;
   std::vector<Pose> world_from_head;  // one per frame
-  double file_unit_m = 1.0;           // metres per unit of the file it came from
-  std::string unit_reason;            // why this unit, when nobody stated it; else empty
-  std::string up_reason;              // likewise why not +Y, of a file with another up axis
+  // Joints of the body, by the names that body_desc.h gives them or those of the file; none where not asked
+  // for.
+  std::vector<std::string> joint_name;
+  std::vector<glm::dvec3> joint_m;  // (frames x joints) head space
+  double file_unit_m = 1.0;         // metres per unit of the file it came from
+  std::string unit_reason;          // why this unit, when nobody stated it; else empty
+  std::string up_reason;            // likewise why not +Y, of a file with another up axis
 
   /// Time of the last pose, s; 0 for an empty clip.
   double duration_s() const;
   /// Pose at time t (lerp/slerp), clamped to the clip; the identity for an empty clip.
   Pose sample(double t_s) const;
+  /// Places of the joints at time t, likewise.
+  std::vector<glm::dvec3> sample_joints(double t_s) const;
 };
 
 /// Wind velocity over time at the head, world axes.

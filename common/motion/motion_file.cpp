@@ -23,6 +23,8 @@ Result<MotionFile> load_motion_file(const std::filesystem::path& path, const Mot
   bvh.unit_m = options.unit_m;
   if (!options.up.empty()) bvh.is_z_up = options.up == "z";
   bvh.head_joint = options.joint;
+  bvh.has_body = options.has_body;
+  bvh.body_joints = options.body_joints;
   MotionFile file;
   ASSIGN_OR_RETURN(file.clip, load_bvh(path, bvh));
   const auto note = [&](const std::string& sentence) {

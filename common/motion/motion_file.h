@@ -13,10 +13,12 @@ namespace strandcast {
 
 /// What programs call their option for the same.
 struct MotionFileOptions {
-  double unit_m = 0.0;                 // --unit; 0 = guessed
-  std::string up;                      // --up: y or z; empty = guessed
-  std::string joint;                   // --joint; empty = found by name
-  bool is_filtering_glitches = false;  // --filter-glitches
+  double unit_m = 0.0;                        // --unit; 0 = guessed
+  std::string up;                             // --up: y or z; empty = guessed
+  std::string joint;                          // --joint; empty = found by name
+  bool has_body = false;                      // joints of the body too, as far as their names are known
+  std::vector<std::string> body_joints = {};  // --body-joint: these besides
+  bool is_filtering_glitches = false;         // --filter-glitches
 };
 
 struct MotionFile {

@@ -86,6 +86,12 @@ Fact decide_carried(const SceneDesc&, const RuntimeFacts& facts) {
   return {true, facts.detail_reason};
 }
 
+Fact decide_body(const SceneDesc& scene, const RuntimeFacts&) {
+  if (scene.body.preset != kNoBody) return {true, "body.preset is " + scene.body.preset};
+  if (scene.body.acts()) return {true, "the scene lists capsules or planes of a body"};
+  return {false, "body has no preset, capsules or planes"};
+}
+
 Fact decide_strand_viewers(const SceneDesc&, const RuntimeFacts& facts) {
   if (facts.strand_viewers > 0) return {true, "a viewer receives strands"};
   return {false, "no viewer receives strands"};
@@ -136,6 +142,7 @@ constexpr std::array kFacts{
     FactRow{"has_followed_strands", &SceneFeatures::has_followed_strands, decide_followed_strands},
     FactRow{"has_half_rate", &SceneFeatures::has_half_rate, decide_half_rate},
     FactRow{"is_carried", &SceneFeatures::is_carried, decide_carried},
+    FactRow{"has_body", &SceneFeatures::has_body, decide_body},
     FactRow{"has_strand_viewers", &SceneFeatures::has_strand_viewers, decide_strand_viewers},
     FactRow{"has_frame_viewers", &SceneFeatures::has_frame_viewers, decide_frame_viewers},
 };

@@ -41,6 +41,7 @@ struct SceneFeatures {
   bool has_oriented_drag = false;     // air drags hair less along its length than across
   bool has_volume = false;            // hair acts on hair
   bool has_distance_field = false;    // the head collides as one, not as spheres
+  bool has_body = false;              // strands meet capsules and planes of a body
   bool has_followed_strands = false;  // only the first strands are simulated, the others follow them
   bool has_half_rate = false;         // every other step, twice as long
   bool is_carried = false;            // hair goes with the head as it is: there are no steps

@@ -17,6 +17,7 @@
 #include "common/kernels/volume/volume_desc.h"
 #include "common/math/pose.h"
 #include "common/math/sphere_collider.h"
+#include "common/scene/body_desc.h"
 #include "common/scene/render_methods.h"
 
 namespace strandcast {
@@ -226,6 +227,7 @@ struct SceneDesc {
       target_groom;  // to which volume.target_per_s2 drives the hair's volume; none: its own
   BendLimitDesc bend_limit;
   DetailDesc detail;
+  BodyDesc body;
   WindDesc wind;
   LookDesc look;
   CameraDesc camera;

@@ -61,6 +61,11 @@ inline constexpr Range kWaitingTime{0.0, 3600.0, "s"};
 inline constexpr Range kSimulatedShare{0.001, 1.0, ""};
 inline constexpr Range kColliderCenter{-kMaxGroomExtentM, kMaxGroomExtentM, "m"};
 inline constexpr Range kColliderRadius{1e-4, 10.0, "m"};
+inline constexpr Range kBodyFriction{0.0, 10.0, ""};
+inline constexpr Range kTipClearance{kBodyClearanceM, 0.1, "m"};
+inline constexpr Range kBodyForce{0.0, 1e6, "1/s^2"};
+inline constexpr Range kBeltSpeed{-100.0, 100.0, "m/s"};
+inline constexpr Range kJointOffset{-1.0, 1.0, "m"};
 inline constexpr Range kWindSpeed{-100.0, 100.0, "m/s"};
 inline constexpr Range kGustIntensity{0.0, 3.0, ""};
 inline constexpr Range kGustLength{0.1, 1000.0, "m"};
@@ -235,6 +240,40 @@ void visit_stream(Visitor& v, StreamDesc& stream) {
   v.number("strand_rate_hz", stream.strand_rate_hz, kStrandRate);
 }
 
+template <class Visitor>
+void visit_body(Visitor& v, BodyDesc& body) {
+  v.text("preset", body.preset, kMaxNameBytes);
+  v.require("preset", body.preset == kNoBody || body.preset == kUpperBody,
+            "is unknown (known: none, upper_body)");
+  v.repeated("capsules", body.capsules, kMaxBodyCapsules, [&](BodyCapsuleDesc& capsule) {
+    const auto joint = [&](const char* name, std::string& value) {
+      if (v.chooses(name, !value.empty())) v.text(name, value, kMaxJointNameBytes);
+    };
+    joint("from_joint", capsule.from_joint);
+    joint("to_joint", capsule.to_joint);
+    v.vector("from_m", capsule.from_m, kColliderCenter);
+    v.vector("to_m", capsule.to_m, kColliderCenter);
+    v.number("from_radius_m", capsule.from_radius_m, kColliderRadius);
+    v.number("to_radius_m", capsule.to_radius_m, kColliderRadius);
+  });
+  v.require("capsules", preset_size(body.preset) + body.capsules.size() <= kMaxBodyCapsules,
+            "with those of the preset are more than 16");
+  v.repeated("planes", body.planes, kMaxBodyPlanes, [&](BodyPlaneDesc& plane) {
+    v.vector("point_m", plane.point_m, kColliderCenter);
+    v.vector("normal", plane.normal, kDirection);
+    v.require("normal", glm::length(plane.normal) >= kMinDirectionLength, "must point somewhere");
+    v.vector("velocity_mps", plane.velocity_mps, kBeltSpeed);
+  });
+  v.text("response", body.response, kMaxNameBytes);
+  v.require("response",
+            std::find(kBodyResponses.begin(), kBodyResponses.end(), body.response) != kBodyResponses.end(),
+            "is unknown (known: turn, sphere, project, force)");
+  v.number("friction", body.friction, kBodyFriction);
+  v.number("tip_clearance_m", body.tip_clearance_m, kTipClearance);
+  v.number("force_per_s2", body.force_per_s2, kBodyForce);
+  v.vector("joint_offset_m", body.joint_offset_m, kJointOffset);
+}
+
 /// Shows every field of `scene` to the visitor, in the order of scene.proto.
 template <class Visitor>
 void visit_scene(Visitor& v, SceneDesc& scene) {
@@ -304,6 +343,7 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
                   std::end(kVolumeScatters),
               "is unknown (known: auto, host, sort, atomics)");
   });
+  v.group("body", [&] { visit_body(v, scene.body); });
   v.group("detail", [&] {
     DetailDesc& detail = scene.detail;
     v.text("mode", detail.mode, kMaxNameBytes);

@@ -8,7 +8,8 @@
 //   measure       a time or rate: finite, not negative      side       of a picture: 0 or within a range
 //   choice        an enumerator up to a last one            text       for people: a sender shortens and
 //   cleans it exact_text    text that is sent as it is, in bytes      secret     likewise, and never printed
-//   group, repeated, require and the parts of looks and cameras: as in common/scene/scene_fields.h
+//   places        points, three numbers each, which may be anything        names      different ones, none
+//   empty group, repeated, require and the parts of looks and cameras: as in common/scene/scene_fields.h
 #pragma once
 
 #include <algorithm>
@@ -66,8 +67,10 @@ void visit(Visitor& v, MotionSamples& m) {
     v.value("rotation_x", sample.world_from_head.rotation.x);
     v.value("rotation_y", sample.world_from_head.rotation.y);
     v.value("rotation_z", sample.world_from_head.rotation.z);
+    v.places("joint_m", sample.joint_m, kMaxMotionJoints);
   });
   v.number("held_back", m.held_back, kHeldBack);
+  v.names("joint_names", m.joint_names, kMaxMotionJoints, kMaxJointNameBytes);
 }
 
 template <>

@@ -144,6 +144,15 @@ class MessageWriter {
     }
     finder_.end_list();
   }
+  void places(const char* name, const std::vector<glm::vec3>& values, size_t) {
+    if (values.empty()) return;
+    const auto& field = field_of(name);
+    for (const glm::vec3& value : values)
+      for (int axis = 0; axis < 3; ++axis) at_.reflection->AddFloat(at_.message, &field, value[axis]);
+  }
+  void names(const char* name, const std::vector<std::string>& values, size_t, size_t) {
+    for (const std::string& value : values) at_.reflection->AddString(at_.message, &field_of(name), value);
+  }
   void require(const char*, bool, const char*) {}
 
  private:
@@ -248,6 +257,31 @@ class MessageReader {
       descend(name, *place, [&] { body(values[i]); });
     }
     finder_.end_list();
+  }
+  void places(const char* name, std::vector<glm::vec3>& values, size_t limit) {
+    const auto& field = field_of(name);
+    const auto size = static_cast<size_t>(at_.reflection->FieldSize(*at_.message, &field));
+    check_length(name, size, 3 * limit);
+    if (size % 3 != 0)
+      fail(name, make_error(ErrorCode::BadInput, "has {} numbers, which are not three for each joint", size));
+    if (error_) return;  // before anything is allocated
+    values.resize(size / 3);
+    for (size_t i = 0; i < size; ++i)
+      values[i / 3][static_cast<int>(i % 3)] =
+          at_.reflection->GetRepeatedFloat(*at_.message, &field, static_cast<int>(i));
+  }
+  void names(const char* name, std::vector<std::string>& values, size_t limit, size_t limit_bytes) {
+    const auto& field = field_of(name);
+    const auto size = static_cast<size_t>(at_.reflection->FieldSize(*at_.message, &field));
+    check_length(name, size, limit);
+    for (size_t i = 0; i < size && !error_; ++i) {
+      values.push_back(at_.reflection->GetRepeatedString(*at_.message, &field, static_cast<int>(i)));
+      check_printable(name, values.back());
+      check_length(name, values.back().size(), limit_bytes);
+      if (values.back().empty()) fail(name, make_error(ErrorCode::BadInput, "has an empty name"));
+      if (std::count(values.begin(), values.end(), values.back()) > 1)
+        fail(name, make_error(ErrorCode::BadInput, "has a name twice"));
+    }
   }
   void require(const char* name, bool holds, const char* sentence) {
     if (!holds) fail(name, make_error(ErrorCode::BadInput, "{}", sentence));

@@ -62,12 +62,15 @@ struct MotionSamples {  // from a Source
   struct Sample {
     int64_t time_ns = 0;  // source clock, monotonic
     Pose world_from_head;
+    std::vector<glm::vec3> joint_m = {};  // head space: of each of joint_names, or none
     bool operator==(const Sample&) const = default;
   };
   std::vector<Sample> samples;  // oldest first, at most kMaxSamplesPerMessage
   // How much slower than real time the source plays what it sends, to go with a slow simulation: 0 = not at
   // all (whatever is live), 0.75 = at a quarter of the speed, 1 = it stands still.
   double held_back = 0.0;
+  // Of the body, at most kMaxMotionJoints of 1 .. kMaxJointNameBytes bytes, each once.
+  std::vector<std::string> joint_names = {};
   bool operator==(const MotionSamples&) const = default;
 };
 struct WindSamples {  // from a Source

@@ -9,6 +9,7 @@
 #include "common/base/file.h"
 #include "common/gl/egl_context.h"
 #include "common/groom/groom_asset.h"
+#include "common/groom/head_measure.h"
 #include "common/pictures/image_codec.h"
 #include "common/render/render_device.h"
 #include "server/scene/scene_content.h"
@@ -67,12 +68,6 @@ void add_ball(const SphereCollider& sphere, Mesh& mesh) {
     }
 }
 
-Mesh balls_of(const std::vector<SphereCollider>& spheres) {
-  Mesh mesh;
-  for (const SphereCollider& sphere : spheres) add_ball(sphere, mesh);
-  return mesh;
-}
-
 /// Copies a picture into the sheet.
 void paste(const Image& picture, uint32_t column, uint32_t row, Image& sheet) {
   for (uint32_t y = 0; y < picture.height; ++y)
@@ -107,6 +102,24 @@ Status draw_row(RenderDevice& device, const SceneAsset& asset, const SceneDesc& 
 
 }  // namespace
 
+Mesh mesh_of_balls(const std::vector<SphereCollider>& balls) {
+  Mesh mesh;
+  for (const SphereCollider& ball : balls) add_ball(ball, mesh);
+  return mesh;
+}
+
+std::vector<SphereCollider> balls_along(const std::vector<BodyCapsule>& capsules) {
+  constexpr int kBalls = 8;
+  std::vector<SphereCollider> balls;
+  for (const BodyCapsule& capsule : capsules)
+    for (int i = 0; i < kBalls; ++i) {
+      const double share = static_cast<double>(i) / (kBalls - 1);
+      balls.push_back({glm::vec3(glm::mix(capsule.from_m, capsule.to_m, share)),
+                       static_cast<float>(glm::mix(capsule.from_radius_m, capsule.to_radius_m, share))});
+    }
+  return balls;
+}
+
 Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::path& folder,
                                 const MeasureConfig& config) {
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(scene));
@@ -119,8 +132,10 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
                    RenderDevice::open({config.renderer, config.gl_device, config.shader_folder}));
   // Hair alone, hair on its head, hair on what collides.
   const bool is_field = content.head_field != nullptr && content.colliders.empty();
-  const std::array<Mesh, 3> heads = {Mesh{}, content.head,
-                                     is_field ? content.head : balls_of(content.colliders)};
+  std::vector<SphereCollider> balls = content.colliders;
+  const BodyShapes body = shapes_of(scene.body, {});  // as far as it needs no stream
+  for (const SphereCollider& ball : balls_along(body.capsules)) balls.push_back(ball);
+  const std::array<Mesh, 3> heads = {Mesh{}, content.head, is_field ? content.head : mesh_of_balls(balls)};
   const Box box = box_of(content, content.head);
   Image sheet{kPictureSide * static_cast<uint32_t>(kDirections.size()),
               kPictureSide * static_cast<uint32_t>(heads.size()),
@@ -130,6 +145,12 @@ Result<std::string> check_groom(const SceneDesc& scene, const std::filesystem::p
     RETURN_IF_ERROR(draw_row(*device, make_scene_asset(content.groom, heads[row]), scene, box, row, sheet));
   std::string text;
   for (const std::string& note : content.notes) text += note + "\n";
+  if (!body.capsules.empty()) {
+    BodyInput fixed;
+    fixed.capsules = body.capsules;
+    text += to_sentence(measure_inside(fixed, content.groom), body.capsules.size()) + "\n";
+  }
+  for (const std::string& sentence : body.missing) text += sentence + ": drawn without\n";
   const std::filesystem::path picture = folder / "groom.png";
   RETURN_IF_ERROR(save_png(picture, sheet));
   const std::string last = is_field ? "on the head once more, which collides itself"

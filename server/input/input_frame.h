@@ -5,11 +5,13 @@
 #include <glm/glm.hpp>
 
 #include "common/math/pose.h"
+#include "common/scene/body_desc.h"
 
 namespace strandcast {
 
 struct InputFrame {
   Pose world_from_head;      // resampled to the asked time
+  JointPlaces joints;        // of the body, at the same time; none where the source sends none
   glm::vec3 wind_mps{0.0f};  // valid when has_wind_stream
   bool has_motion = false;   // a motion sample was ever used
   bool has_wind_stream = false;

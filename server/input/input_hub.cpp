@@ -15,6 +15,15 @@ bool is_possible(const Pose& pose) {
          glm::length(pose.position_m) <= kMaxHeadDistanceM;
 }
 
+/// Joints of all names or of none, where a body can have them.
+bool is_possible(const std::vector<glm::vec3>& joint_m, size_t name_count) {
+  if (joint_m.empty()) return true;
+  return joint_m.size() == name_count && joint_m.size() <= kMaxMotionJoints &&
+         std::all_of(joint_m.begin(), joint_m.end(), [](const glm::dvec3& place_m) {
+           return glm::length(place_m) <= kMaxJointDistanceM;  // also false for NaN
+         });
+}
+
 bool is_possible(const glm::dvec3& wind_mps) {
   // Also false for NaN, which compares false.
   return glm::length(wind_mps) <= kMaxWindStreamMps;
@@ -26,9 +35,9 @@ bool is_teleport(const Pose& a, const Pose& b, double duration_s) {
          angle_between_rad(a.rotation, b.rotation) > kTeleportTurnRadPerS * duration_s;
 }
 
-bool is_teleport(const TimedSample<Pose>& a, const TimedSample<Pose>& b) {
+bool is_teleport(const TimedSample<HeadSample>& a, const TimedSample<HeadSample>& b) {
   const double apart_s = static_cast<double>(b.time_ns - a.time_ns) * kSecondsPerNs;
-  return is_teleport(a.value, b.value, std::max(apart_s, kTeleportShortestS));
+  return is_teleport(a.value.pose, b.value.pose, std::max(apart_s, kTeleportShortestS));
 }
 
 /// How far `time_ns` lies from one sample to the next, 0..1; it is not before the first.
@@ -36,6 +45,14 @@ template <class Sample>
 double blend_at(const Sample& before, const Sample& after, int64_t time_ns) {
   const double whole = static_cast<double>(after.time_ns - before.time_ns);
   return std::clamp(static_cast<double>(time_ns - before.time_ns) / whole, 0.0, 1.0);
+}
+
+JointPlaces joints_of(const HeadSample& sample) {
+  JointPlaces joints;
+  if (sample.joint_m.empty()) return joints;
+  joints.name = *sample.joint_names;
+  joints.place_m.assign(sample.joint_m.begin(), sample.joint_m.end());
+  return joints;
 }
 
 /// A time that cannot overflow when the offset is taken from it.
@@ -104,15 +121,21 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
 void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
   newest_arrival_ns_ = std::max(newest_arrival_ns_, bounded(arrival_ns));
+  const auto names = samples.joint_names.empty()
+                         ? nullptr
+                         : std::make_shared<const std::vector<std::string>>(samples.joint_names);
   for (const MotionSamples::Sample& sample : samples.samples) {
     if (!take_allowance(motion_, source_id, newest_arrival_ns_)) {
       ++counters_.over_rate;
-    } else if (!is_possible(sample.world_from_head) || bounded(sample.time_ns) != sample.time_ns) {
+    } else if (!is_possible(sample.world_from_head) ||
+               !is_possible(sample.joint_m, samples.joint_names.size()) ||
+               bounded(sample.time_ns) != sample.time_ns) {
       ++counters_.impossible;
     } else {
       Pose pose = sample.world_from_head;
       pose.rotation = glm::normalize(pose.rotation);
-      accept(motion_, source_id, {sample.time_ns, newest_arrival_ns_, pose}, kMotionStaleNs);
+      accept(motion_, source_id,
+             {sample.time_ns, newest_arrival_ns_, HeadSample{pose, names, sample.joint_m}}, kMotionStaleNs);
     }
   }
   if (motion_.owner == source_id) motion_speed_ = 1.0 - std::clamp(samples.held_back, 0.0, 1.0);
@@ -160,9 +183,19 @@ bool InputHub::update_pose(int64_t server_time_ns) {
   const bool interpolates = index + 1 < samples.size() && time_ns > samples[index].time_ns &&
                             !is_teleport(samples[index], samples[index + 1]);
   const size_t newest = interpolates ? index + 1 : index;
-  Pose pose = samples[index].value;
-  if (interpolates)
-    pose = interpolate(pose, samples[newest].value, blend_at(samples[index], samples[newest], time_ns));
+  const HeadSample& sample = samples[index].value;
+  Pose pose = sample.pose;
+  frame_.joints = joints_of(sample);
+  if (interpolates) {
+    const HeadSample& next = samples[newest].value;
+    const double blend = blend_at(samples[index], samples[newest], time_ns);
+    pose = interpolate(pose, next.pose, blend);
+    const bool is_same_body =
+        !sample.joint_m.empty() && !next.joint_m.empty() &&
+        (sample.joint_names == next.joint_names || *sample.joint_names == *next.joint_names);
+    for (size_t i = 0; is_same_body && i < frame_.joints.place_m.size(); ++i)
+      frame_.joints.place_m[i] = glm::mix(frame_.joints.place_m[i], glm::dvec3(next.joint_m[i]), blend);
+  }
   // Both signs are the same rotation; consecutive frames keep to one so that their difference is small.
   if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
   frame_.world_from_head = pose;

@@ -16,12 +16,16 @@
 //   samples go first.
 // * A source that slows its motion to go with a slow simulation says how much; the frame has what it said
 //   last.
+// * Joints of the body come with the head's samples: one owner, one time, interpolated likewise where two
+// samples
+//   name the same joints; never across a jump of the head.
 // * A jump beyond kTeleportSpeedMps or kTeleportTurnRadPerS between samples, or between frames, is carried
 //   out in one frame, flagged as a teleport and never interpolated.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 
@@ -60,6 +64,13 @@ struct InputCounters {
   uint64_t teleports = 0;  // frames flagged
 
   uint64_t rejected() const { return late + duplicate + impossible + over_rate + not_owner; }
+};
+
+/// What a sample says: the head, and joints of the body below it.
+struct HeadSample {
+  Pose pose;
+  std::shared_ptr<const std::vector<std::string>> joint_names;  // of one message; null = none
+  std::vector<glm::vec3> joint_m = {};                          // head space
 };
 
 class InputHub {
@@ -105,7 +116,7 @@ class InputHub {
   void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
 
   mutable std::mutex mutex_;
-  Stream<Pose> motion_;
+  Stream<HeadSample> motion_;
   Stream<glm::dvec3> wind_;
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;

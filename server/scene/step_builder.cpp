@@ -1,5 +1,6 @@
 #include "server/scene/step_builder.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -74,6 +75,9 @@ StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> col
 }
 
 void StepBuilder::change(const SceneDesc& scene, std::vector<SphereCollider> colliders) {
+  const BodyDesc& body = scene.body;
+  is_body_new_ = is_body_new_ || body.preset != scene_.body.preset || body.capsules != scene_.body.capsules ||
+                 body.planes != scene_.body.planes || body.joint_offset_m != scene_.body.joint_offset_m;
   scene_ = scene;
   colliders_ = std::move(colliders);
   const WindDesc& wind = scene.wind;
@@ -112,6 +116,46 @@ void StepBuilder::add_follicle_limit() {
     substep.follicle_limit_rad = glm::radians(scene_.follicle_limit_deg);
 }
 
+void StepBuilder::add_body() {
+  const BodyDesc& desc = scene_.body;
+  BodyShapes shapes = shapes_of(desc, input_.joints);
+  // What went along with the head in a jump is where it is, and of the way of a body that is played faster
+  // than the simulation strands meet as much as they feel of the head's.
+  is_body_new_ = is_body_new_ || missing_joints_ != shapes.missing ||
+                 capsules_.size() != shapes.capsules.size() || felt_ == 0.0;
+  missing_joints_ = std::move(shapes.missing);
+  const std::vector<BodyCapsule> before =
+      is_body_new_ ? shapes.capsules : std::exchange(capsules_, shapes.capsules);
+  capsules_ = std::move(shapes.capsules);
+  const auto count = static_cast<double>(step_.substeps.size());
+  for (size_t i = 0; i < step_.substeps.size(); ++i) {
+    StepInput& substep = step_.substeps[i];
+    BodyInput& body = substep.body;
+    body.is_new = std::exchange(is_body_new_, false);
+    const auto at = [&](const glm::dvec3& from_m, const glm::dvec3& to_m, size_t done) {
+      return glm::mix(from_m, to_m, 1.0 - felt_ * (1.0 - static_cast<double>(done) / count));
+    };
+    for (size_t k = 0; k < capsules_.size(); ++k) {
+      BodyCapsule capsule = capsules_[k];
+      capsule.from_m = at(before[k].from_m, capsules_[k].from_m, i + 1);
+      capsule.to_m = at(before[k].to_m, capsules_[k].to_m, i + 1);
+      capsule.from_before_m = at(before[k].from_m, capsules_[k].from_m, i);
+      capsule.to_before_m = at(before[k].to_m, capsules_[k].to_m, i);
+      body.capsules.push_back(capsule);
+    }
+    for (const BodyPlaneDesc& plane : desc.planes) {
+      const glm::dvec3 normal = glm::normalize(plane.normal);
+      const glm::dvec3 along_mps = plane.velocity_mps - glm::dot(plane.velocity_mps, normal) * normal;
+      body.planes.push_back({plane.point_m, normal, along_mps * substep.h_s});
+    }
+    const auto named = std::find(kBodyResponses.begin(), kBodyResponses.end(), desc.response);
+    body.response = static_cast<BodyResponse>(named - kBodyResponses.begin());
+    body.friction = desc.friction;
+    body.tip_clearance_m = desc.tip_clearance_m;
+    body.force_per_s2 = desc.force_per_s2;
+  }
+}
+
 glm::dvec3 StepBuilder::head_velocity_mps() const {
   if (step_.substeps.empty()) return glm::dvec3(0.0);
   const StepInput& last = step_.substeps.back();
@@ -125,6 +169,7 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
   if (features.has_turbulence) add_gusts();
   add_colliders();
   if (features.has_follicle_limit) add_follicle_limit();
+  if (features.has_body) add_body();
   return step_;
 }
 
@@ -134,6 +179,7 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
   // The first pose is a jump too: until then the head stood at the origin.
   const bool has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
   const double felt = has_jumped ? 0.0 : felt_share(input_rate * input.motion_speed);
+  felt_ = felt;
   Pose from = world_from_head_;
   if (has_jumped)
     from = target;
@@ -159,6 +205,8 @@ void StepBuilder::begin(const InputFrame& input, double end_time_s, double input
     substep.wind_mps = glm::dvec3(0.0);
     substep.gusts.clear();
     substep.colliders.clear();
+    substep.body.capsules.clear();
+    substep.body.planes.clear();
     substep.follicle_limit_rad = kFreeFollicleRad;
     end_time_s_[i] = end_time_s - step_s * (1.0 - blend);
     head_position_m_[i] = pose.position_m;

@@ -45,6 +45,7 @@ class StepBuilder {
   void add_gusts();
   void add_colliders();
   void add_follicle_limit();
+  void add_body();
   /// Valid until the next begin().
   const SceneStep& step() const { return step_; }
 
@@ -54,6 +55,11 @@ class StepBuilder {
   /// The same as others need it who take the step too.
   StepScene step_scene(const SceneFeatures& features) const;
   StepTick step_tick(uint64_t tick) const;
+
+  /// Joints that shapes of the body need and the input of the newest step does not have, a sentence for each.
+  const std::vector<std::string>& missing_joints() const { return missing_joints_; }
+  /// Places of the body's shapes at the end of the newest step.
+  const std::vector<BodyCapsule>& body_capsules() const { return capsules_; }
 
   const Pose& world_from_head() const { return world_from_head_; }
   /// Of the head joint during the last substep of the newest step, world.
@@ -71,6 +77,10 @@ class StepBuilder {
   std::vector<GustWave> waves_;  // at time 0 with the head at the origin
   Pose world_from_head_;
   bool has_motion_ = false;
+  std::vector<BodyCapsule> capsules_;  // as of the newest step
+  std::vector<std::string> missing_joints_;
+  bool is_body_new_ = true;  // its shapes are not those of the step before
+  double felt_ = 1.0;        // of the step
   SceneStep step_;
   InputFrame input_;                         // of the step
   std::vector<double> end_time_s_;           // of each substep

@@ -41,6 +41,9 @@ Status KernelSolver::prepare_all() {
     ASSIGN_OR_RETURN(oriented_drag_,
                      OrientedDrag::make(executor_, features_, layout(), carried().way, drag_along_share_));
   }
+  if (features_.has_body && BodyCollider::holds(layout())) {
+    ASSIGN_OR_RETURN(body_collider_, BodyCollider::make(executor_, features_, *strands_, carried()));
+  }
   if (features_.has_distance_field && head_field_ != nullptr && FieldCollider::holds(layout())) {
     ASSIGN_OR_RETURN(field_collider_,
                      FieldCollider::make(executor_, features_, *strands_, carried(), *head_field_));
@@ -84,6 +87,7 @@ void KernelSolver::substep(const StepInput& input) {
   if (bend_limit_) bend_limit_->run(block, strands_->planes(), carried());
   if (follicle_limit_ && FollicleLimit::holds(input, layout()))
     follicle_limit_->run(block, input.colliders.size(), strands_->planes(), carried());
+  if (body_collider_) body_collider_->run(block, input, strands_->planes(), carried());
   // Last: whatever turned them, strands end outside of the head.
   if (field_collider_) field_collider_->run(block, strands_->planes(), carried());
   strands_->advance(input);
@@ -125,6 +129,7 @@ uint64_t KernelSolver::memory_bytes() const {
   if (oriented_drag_) bytes += oriented_drag_->size_bytes();
   if (bend_limit_) bytes += bend_limit_->size_bytes();
   if (volume_forces_) bytes += volume_forces_->size_bytes();
+  if (body_collider_) bytes += body_collider_->size_bytes();
   if (field_collider_) bytes += field_collider_->size_bytes();
   return bytes;
 }

@@ -10,6 +10,7 @@
 
 #include "common/kernels/step_block.h"
 #include "server/sim/bend_limit.h"
+#include "server/sim/body_collider.h"
 #include "server/sim/field_collider.h"
 #include "server/sim/follicle_limit.h"
 #include "server/sim/oriented_drag.h"
@@ -80,7 +81,8 @@ class KernelSolver : public Solver {
   double drag_along_share_;
   std::optional<OrientedDrag> oriented_drag_;  // where the scene's air has one
   BendLimitDesc bend_limits_;
-  std::optional<BendLimit> bend_limit_;  // where the scene has one
+  std::optional<BendLimit> bend_limit_;        // where the scene has one
+  std::optional<BodyCollider> body_collider_;  // where the scene has a body
   std::shared_ptr<const DistanceField> head_field_;
   std::optional<FieldCollider> field_collider_;  // where the scene's head collides as a field
 };

@@ -18,13 +18,21 @@ bool bears_volume(const SolverRow& row) {
 }  // namespace
 
 const std::vector<std::string>& live_fields() {
-  static const std::vector<std::string> kFields = {"solver",         "substeps",
-                                                   "gravity_mps2",   "follicle_limit_deg",
-                                                   "colliders",      "has_auto_collider",
-                                                   "bend_limit",     "volume",
-                                                   "detail",         "wind",
-                                                   "look",           "camera",
-                                                   "stream.bound_m", "stream.strand_rate_hz"};
+  static const std::vector<std::string> kFields = {"solver",
+                                                   "substeps",
+                                                   "gravity_mps2",
+                                                   "follicle_limit_deg",
+                                                   "colliders",
+                                                   "has_auto_collider",
+                                                   "bend_limit",
+                                                   "body",
+                                                   "volume",
+                                                   "detail",
+                                                   "wind",
+                                                   "look",
+                                                   "camera",
+                                                   "stream.bound_m",
+                                                   "stream.strand_rate_hz"};
   return kFields;
 }
 
@@ -43,6 +51,12 @@ Status check_solver(const SceneDesc& scene) {
     return make_error(ErrorCode::BadInput,
                       "solver {} has no kernel and knows no drag by direction: leave wind.along_share at 1",
                       row->name);
+  if (scene.body.acts() && !row->has_kernel)
+    return make_error(
+        ErrorCode::BadInput,
+        "solver {} has no kernel and meets no body: body.preset \"{}\" without capsules and planes "
+        "is for it",
+        row->name, kNoBody);
   if (scene.volume.acts() && !bears_volume(*row))
     return make_error(ErrorCode::BadInput,
                       "solver {} takes no forces between strands ({}): set volume.friction_per_s and "
@@ -68,6 +82,7 @@ void fit_to_solver(SceneDesc& scene) {
   if (!bears_volume(**row)) scene.volume = {};
   if (!(*row)->has_kernel) scene.bend_limit = {};
   if (!(*row)->has_kernel) scene.wind.along_share = WindDesc().along_share;
+  if (!(*row)->has_kernel) scene.body = {};
   std::erase_if(solver.parameters, [&](const auto& given) {
     return std::none_of(
         (*row)->parameters.begin(), (*row)->parameters.end(), [&](const SolverParameterInfo& info) {
@@ -84,6 +99,7 @@ std::string left_out_note(const SceneDesc& before, const SceneDesc& after) {
   if (before.volume.acts() && !after.volume.acts()) names.emplace_back("forces between strands (volume)");
   if (before.bend_limit.acts() && !after.bend_limit.acts()) names.emplace_back("bend_limit");
   if (before.wind.along_share != after.wind.along_share) names.emplace_back("wind.along_share");
+  if (before.body.acts() && !after.body.acts()) names.emplace_back("body");
   if (names.empty() || before.solver.name == after.solver.name) return {};
   return fmt::format("solver {} does not take {}: left out", after.solver.name, fmt::join(names, ", "));
 }
@@ -100,6 +116,7 @@ Result<SceneDesc> choose_solver(const SceneDesc& scene, const SolverDesc& scene_
     if (path.starts_with("volume")) fitted.volume = scene.volume;
     if (path == "wind.along_share") fitted.wind.along_share = scene.wind.along_share;
     if (path.starts_with("bend_limit")) fitted.bend_limit = scene.bend_limit;
+    if (path.starts_with("body")) fitted.body = scene.body;
     if (!path.starts_with(kGroup)) continue;
     const auto given = scene.solver.parameters.find(path.substr(kGroup.size()));
     if (given != scene.solver.parameters.end()) fitted.solver.parameters.insert(*given);

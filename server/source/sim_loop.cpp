@@ -9,6 +9,7 @@
 #include "common/base/check.h"
 #include "common/base/text.h"
 #include "common/base/thread_name.h"
+#include "common/groom/head_measure.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
 #include "server/sim/followed_solver.h"
@@ -30,7 +31,8 @@ bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
          a.has_colliders == b.has_colliders && a.has_follicle_limit == b.has_follicle_limit &&
          a.has_bend_limit == b.has_bend_limit && a.has_oriented_drag == b.has_oriented_drag &&
          a.has_volume == b.has_volume && a.has_distance_field == b.has_distance_field &&
-         a.has_followed_strands == b.has_followed_strands && a.has_half_rate == b.has_half_rate;
+         a.has_body == b.has_body && a.has_followed_strands == b.has_followed_strands &&
+         a.has_half_rate == b.has_half_rate;
 }
 
 /// What takes long of simulating fewer strands, ahead of when they are fewer.
@@ -547,6 +549,7 @@ void SimLoop::step(int64_t time_ns) {
   CHECK(stages_->step(turn, executor_->timer()).ok());  // stages of a step cannot fail
   if (is_stopping_) return;
   step_times_.add_ms(stages_->last_step_ms());
+  if (solver_features_.has_body) report_body();
   step_log_.add(builder_->step_tick(tick_));
   last_step_ns_ = now_ns();
   if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
@@ -593,6 +596,21 @@ void SimLoop::publish() {
   if (publisher_->quarantined().empty()) return;
   publisher_->repair(*solver_);
   report_quarantine();
+}
+
+/// What of the body is not there, and what hair began inside of it: when that changes.
+void SimLoop::report_body() {
+  if (input_.has_motion && builder_->missing_joints() != told_missing_joints_) {
+    told_missing_joints_ = builder_->missing_joints();
+    for (const std::string& sentence : told_missing_joints_)
+      log_warn("sim", "{}: that capsule is left out", sentence);
+  }
+  const std::vector<BodyCapsule>& capsules = builder_->body_capsules();
+  if (capsules.size() == told_capsule_count_) return;
+  told_capsule_count_ = capsules.size();
+  BodyInput body;
+  body.capsules = capsules;
+  log_info("sim", "{}", to_sentence(measure_inside(body, config_.content->groom), capsules.size()));
 }
 
 /// Once per kind, and again each time its total has doubled: a scene that breaks in every step fills no log.

@@ -132,6 +132,7 @@ class SimLoop {
   void publish_carried();
   PublishInput publish_input() const;
   void report_quarantine();
+  void report_body();
   void update_stats();
 
   SimLoopConfig config_;
@@ -161,7 +162,9 @@ class SimLoop {
   double hair_px_ = 0.0;
   Histogram step_times_;
   InputFrame input_;
-  uint64_t next_quarantine_report_ = 1;   // at so many broken strands since start
+  uint64_t next_quarantine_report_ = 1;  // at so many broken strands since start
+  std::vector<std::string> told_missing_joints_;
+  size_t told_capsule_count_ = 0;
   uint64_t next_overstretch_report_ = 1;  // at so many over-stretched ones
   uint64_t tick_ = 0;
   uint64_t published_tick_ = 0;

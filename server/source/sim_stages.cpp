@@ -107,6 +107,8 @@ void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& r
   const gl::Resource* limits = resource("follicle limits", sizes_.substeps * sizeof(double));
   const gl::Resource* bends = resource("bend limits", sizeof(BendLimitDesc));
   const gl::Resource* drag = resource("oriented drag", sizeof(WindDesc::along_share));
+  const gl::Resource* body = resource("body", sizes_.substeps * (kMaxBodyCapsules * sizeof(BodyCapsule) +
+                                                                 kMaxBodyPlanes * sizeof(BodyPlane)));
   const gl::Resource* field = resource("distance field", sizes_.field_bytes);
   gl::Resources read_by_solver = {motion};
   const auto add = [&](const char* name, const gl::Resource* written, const FeatureReason& reason,
@@ -128,6 +130,7 @@ void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& r
   // The solver's own: kernels before and after its own one.
   add("scene/oriented_drag", drag, fact(reasons, "has_oriented_drag"), [](StageTurn&) {});
   add("scene/bend_limit", bends, fact(reasons, "has_bend_limit"), [](StageTurn&) {});
+  add("scene/body", body, fact(reasons, "has_body"), [](StageTurn& turn) { turn.builder.add_body(); });
   // Made at load; strands look it up where they are.
   add("scene/distance_field", field, fact(reasons, "has_distance_field"), [](StageTurn&) {});
   const FeatureReason& has_volume = fact(reasons, "has_volume");

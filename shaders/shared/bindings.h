@@ -37,6 +37,7 @@ const uint kUnitRestDensity = 11u;
 // Of the tables in which it looks things up.
 const uint kUnitField = 9u;
 const uint kUnitVolume = 10u;
+const uint kUnitBody = 12u;
 
 // Storage blocks of the renderer.
 const uint kBindingKeyPosition = 0u;

@@ -32,6 +32,8 @@ const uint kMaxTessellationLevel = 64u;
 const uint kMaxVertexCount = 64u;  // per strand
 const uint kMaxSphereColliders = 16u;
 const uint kMaxGustWaves = 8u;
+const uint kMaxBodyCapsules = 16u;
+const uint kMaxBodyPlanes = 4u;
 
 #ifdef __cplusplus
 }  // namespace strandcast::shader

@@ -7,6 +7,7 @@
 // moved by counts as an impulse, once in its velocity. One invocation per strand; what touches nothing is not
 // written, not by a rounding either.
 #include "sim/carried.glsl"
+#include "sim/turned_segment.glsl"
 
 layout(local_size_x = kStrandLocalSize) in;
 
@@ -60,29 +61,11 @@ vec4 sample_field(vec3 point) {
 
 float clearance_at(vec3 groomed) { return min(kClearance, sample_field(groomed).w - kSlack); }
 
-// The end of a segment turned about its start, on its side, until it stands so high over the start along the normal:
-// straight up or down where it is too short for that.
-vec3 turned_to_height(vec3 start, vec3 towards, float segment, vec3 normal, float height) {
-  const float cosine = clamp(height / segment, -1.0, 1.0);
-  vec3 side = towards - normal * dot(towards, normal);
-  const vec3 other = select(abs(normal.x) < 0.6, vec3(0.0, normal.z, -normal.y), vec3(-normal.z, 0.0, normal.x));
-  side = select(dot(side, side) > 1e-12 * segment * segment, side, other);
-  side -= normal * dot(side, normal);  // once more: a short side is made of roundings along the normal
-  const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
-  return start + segment * (cosine * normal + sine * side);
-}
-
 vec3 normal_of(vec4 found) { return found.xyz * inversesqrt(max(dot(found.xyz, found.xyz), kTinySquared)); }
 
 // How far the place is below its clearance, along the normal.
 float depth_of(vec4 found, float clearance) {
   return (clearance - found.w) * inversesqrt(max(dot(found.xyz, found.xyz), kLeastSlopeSquared));
-}
-
-vec3 held_by_skin(vec3 before, vec3 end, vec3 normal, float depth) {
-  const vec3 slip = end - before;
-  const vec3 sliding = slip - normal * dot(slip, normal);
-  return end - sliding * min(1.0, u_step.contact.x * depth * inversesqrt(max(dot(sliding, sliding), kTinySquared)));
 }
 
 void main() {
@@ -127,7 +110,7 @@ void main() {
           if (!is_any(is_deep)) break;
           const vec3 normal = normal_of(found);
           const float depth = depth_of(found, clearance);
-          const vec3 held = held_by_skin(before, end, normal, depth);
+          const vec3 held = held_back(before, end, normal, u_step.contact.x * depth);
           const float height = dot(normal, end - start) + depth;
           end = select(is_deep, turned_to_height(start, held - start, segment, normal, height), end);
         }

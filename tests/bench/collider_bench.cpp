@@ -6,6 +6,8 @@
 //   collider_bench [--strands 10000] [--vertices 16] [--solver dftl] [--device lanes|gl] [--resolution 64]
 //   [--steps 60]
 //                  [--rest 300] [--groom FILE] [--mesh FILE]
+// With --body CLIP.bvh instead the responses to the clip's body beside a step without one; --picture FILE.png
+// shows moments of it.
 #include <fmt/format.h>
 #include <time.h>
 
@@ -30,6 +32,7 @@
 #include "server/sim/executor/executor.h"
 #include "server/sim/reference_field.h"
 #include "server/sim/solver_registry.h"
+#include "tests/bench/body_bench.h"
 
 namespace strandcast {
 namespace {
@@ -202,7 +205,8 @@ Status run(Options options) {
 int main(int argc, char** argv) {
   strandcast::Options options = {{"strands", "10000"}, {"vertices", "16"}, {"solver", "dftl"},
                                  {"device", "lanes"},  {"steps", "60"},    {"rest", "300"},
-                                 {"resolution", "64"}, {"groom", ""},      {"mesh", ""}};
+                                 {"resolution", "64"}, {"groom", ""},      {"mesh", ""},
+                                 {"body", ""},         {"picture", ""}};
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string name = std::strncmp(argv[i], "--", 2) == 0 ? argv[i] + 2 : "";
     if (!options.contains(name)) {
@@ -211,7 +215,12 @@ int main(int argc, char** argv) {
     }
     options[name] = argv[i + 1];
   }
-  const strandcast::Status status = strandcast::run(std::move(options));
+  const strandcast::Status status =
+      options["body"].empty()
+          ? strandcast::run(options)
+          : strandcast::run_body_bench({options["body"], options["strands"], options["vertices"],
+                                        options["solver"], options["device"], std::stoi(options["steps"]),
+                                        std::stoi(options["rest"]), options["picture"]});
   if (!status) fmt::print(stderr, "{}\n", status.error().to_string());
   return status ? 0 : 2;
 }

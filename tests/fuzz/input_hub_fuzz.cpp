@@ -38,8 +38,12 @@ struct HubGame {
       sample.time_ns = take_time(input);
       for (int axis = 0; axis < 3; ++axis) sample.world_from_head.position_m[axis] = take_number(input, kind);
       for (int k = 0; k < 4; ++k) sample.world_from_head.rotation[k] = take_number(input, kind);
+      for (int joint = 0; (kind & 4) != 0 && joint < (kind >> 3) % 4; ++joint)
+        sample.joint_m.emplace_back(take_number(input, kind), take_number(input, kind),
+                                    take_number(input, kind));
       message.samples.push_back(sample);
     }
+    if ((kind & 4) != 0) message.joint_names.resize((kind >> 3) % 4, "joint");
     pushed_count += message.samples.size();
     hub.push(source, message, now_ns);
   }
@@ -65,6 +69,10 @@ struct HubGame {
     constexpr double kTolerance = 1e-6;
     CHECK(std::abs(glm::length(frame.world_from_head.rotation) - 1.0) <= kTolerance);
     CHECK(glm::length(frame.world_from_head.position_m) <= kMaxHeadDistanceM * (1.0 + kTolerance));
+    CHECK(frame.joints.name.size() == frame.joints.place_m.size() &&
+          frame.joints.name.size() <= kMaxMotionJoints);
+    for (const glm::dvec3& place_m : frame.joints.place_m)
+      CHECK(glm::length(place_m) <= kMaxJointDistanceM * (1.0 + kTolerance));
     CHECK(glm::length(glm::dvec3(frame.wind_mps)) <= kMaxWindStreamMps * (1.0 + kTolerance));
     CHECK(frame.motion_time_ns <= now_ns);
     const InputCounters counters = hub.counters();

@@ -13,9 +13,12 @@ inline std::vector<ClientMessage> sample_client_messages() {
   WindSamples wind;
   for (int i = 0; i < 5; ++i) {
     motion.samples.push_back({1'000 + i, {{0.1 * i, -2.0, 1e5}, {0.5, 0.5, -0.5, 0.5}}});
+    if (i > 0)
+      motion.samples.back().joint_m = {{0.25f, -0.5f, 0.125f * static_cast<float>(i)}, {1.0f, 2.0f, 3.0f}};
     wind.samples.push_back({-7 + i, {1.5f * static_cast<float>(i), -3.0f, 0.25f}});
   }
   motion.held_back = 0.75;
+  motion.joint_names = {"neck", "left_shoulder"};
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
   return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,

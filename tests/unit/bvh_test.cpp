@@ -542,5 +542,48 @@ TEST(BvhRealFiles, CutAnywhereIsAnError) {
   }
 }
 
+/// What of the usual joints of a body a real clip has, and where they are.
+TEST(BvhRealFiles, BodiesAreFoundByTheNamesOfThreeFamiliesOfCaptures) {
+  const std::filesystem::path folder = std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap";
+  REQUIRE_SHARED(folder);
+  const std::vector<std::string> usual = {"neck",           "chest",      "left_shoulder",
+                                          "right_shoulder", "left_elbow", "right_elbow"};
+  for (const char* file : {"cmu_01_01_playground_jumps.bvh", "cmu_05_20_mb.bvh", "cmu_60_02_scaled.bvh",
+                           "fair1_dab.bvh", "pirouette.bvh"}) {
+    SCOPED_TRACE(file);
+    BvhOptions options;
+    options.has_body = true;
+    const auto clip = load_bvh(folder / file, options);
+    ASSERT_TRUE(clip) << clip.error().to_string();
+    ASSERT_EQ(clip->joint_name, usual);
+    ASSERT_EQ(clip->joint_m.size(), usual.size() * clip->world_from_head.size());
+    const std::vector<glm::dvec3> places = clip->sample_joints(0.5 * clip->duration_s());
+    for (const double t_s : {0.0, 0.3 * clip->duration_s(), clip->duration_s()}) {
+      const std::vector<glm::dvec3> at = clip->sample_joints(t_s);
+      const double across_m = glm::distance(at[2], at[3]);
+      EXPECT_GT(across_m, 0.15) << "shoulders of a grown-up";
+      EXPECT_LT(across_m, 0.55);
+      EXPECT_GT(at[2].x, at[3].x) << "the left one is at +X of a head that looks along +Z";
+      EXPECT_LT(at[0].y, 0.0) << "the neck is below the head";
+      EXPECT_NEAR(glm::distance(at[2], at[4]), glm::distance(places[2], places[4]), 0.03)
+          << "bones keep their length";
+    }
+  }
+}
+
+TEST(Bvh, JointsOfTheBodyAreSeenFromTheHead) {
+  BvhOptions options = kPlain;
+  options.body_joints = {"Neck"};
+  // The root turns by 90 degrees about Y: the head goes along, so nothing changes for it.
+  const MotionClip clip = parsed(small_with("1 2 3 0 0 0 0 0 0 0 0 0\n1 2 3 0 90 0 0 0 0 0 0 0"), options);
+  ASSERT_EQ(clip.joint_name, std::vector<std::string>{"Neck"});
+  ASSERT_EQ(clip.joint_m.size(), 2u);
+  for (const glm::dvec3& neck : clip.joint_m)
+    EXPECT_NEAR(glm::distance(neck, glm::dvec3(0, -1, -0.5)), 0.0, 1e-12);
+  options.body_joints = {"Tail"};
+  EXPECT_THAT(error_of(small_with("1 2 3 0 0 0 0 0 0 0 0 0\n1 2 3 0 0 0 0 0 0 0 0 0\n"), options),
+              HasSubstr("no joint named Tail (--body-joint, known: Hips, Neck, Head)"));
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -133,6 +133,8 @@ TEST(Features, ExplainAgreesWithAnalyse) {
     scene.follicle_limit_deg = coin() ? 180.0 : 20.0;
     scene.bend_limit.least_root_deg = coin() ? 0.0 : 5.0;
     scene.wind.along_share = coin() ? 1.0f : 0.5f;
+    if (coin()) scene.body.preset = kUpperBody;
+    scene.body.planes.resize(coin() ? 0 : 1);
     scene.volume.friction_per_s = coin() ? 0.0 : 20.0;
     scene.volume.repulsion_per_s2 = coin() ? 0.0 : 5.0;
     scene.head.collider = coin() ? kSphereCollider : kFieldCollider;
@@ -152,6 +154,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
                                             {"has_followed_strands", &explained.has_followed_strands},
                                             {"has_half_rate", &explained.has_half_rate},
                                             {"is_carried", &explained.is_carried},
+                                            {"has_body", &explained.has_body},
                                             {"has_strand_viewers", &explained.has_strand_viewers},
                                             {"has_frame_viewers", &explained.has_frame_viewers}};
     const auto reasons = explain(scene, facts);
@@ -174,6 +177,7 @@ TEST(Features, ReasonsDifferWithTheValue) {
   full.volume.friction_per_s = 1.0;
   full.bend_limit.most_root_deg = 30.0;
   full.head.collider = kFieldCollider;
+  full.body.preset = kUpperBody;
   full.colliders.resize(1);
   full.detail.simulated_share = 0.5;
   const auto off = explain(bare, {});

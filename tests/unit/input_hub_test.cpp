@@ -407,5 +407,48 @@ TEST(InputHub, AnyThreadMayPushWhileAnotherSamples) {
   EXPECT_EQ(hub.sample(kStart + 900 * kMs).world_from_head, pose_at(0.899));
 }
 
+/// A sample with joints of the body.
+MotionSamples with_joints(int64_t time_ns, double x_m, const std::vector<glm::vec3>& joint_m,
+                          const std::vector<std::string>& names = {"neck", "chest"}) {
+  MotionSamples samples = motion(time_ns, pose_at(x_m));
+  samples.samples[0].joint_m = joint_m;
+  samples.joint_names = names;
+  return samples;
+}
+
+TEST(InputHub, JointsGoWithTheHeadsSamples) {
+  InputHub hub;
+  EXPECT_TRUE(hub.sample(kStart).joints.name.empty());
+  hub.push(1, with_joints(0, 0.0, {{0, 0, 0}, {1, 0, 0}}), kStart);
+  hub.push(1, with_joints(10 * kMs, 0.1, {{0, 0.5f, 0}, {1, 1, 0}}), kStart + kMs);
+  hub.push(2, with_joints(10 * kMs, 0.1, {{2, 2, 2}, {2, 2, 2}}), kStart + kMs);  // not the owner
+  const int64_t offset_ns = kStart + kMs - 10 * kMs;                              // by the fastest sample
+  const InputFrame half = hub.sample(offset_ns + 5 * kMs);
+  EXPECT_EQ(half.joints.name, (std::vector<std::string>{"neck", "chest"}));
+  ASSERT_EQ(half.joints.place_m.size(), 2u);
+  EXPECT_NEAR(glm::distance(half.joints.place_m[0], glm::dvec3(0, 0.25, 0)), 0.0, 1e-6)
+      << "between, as the head is";
+  EXPECT_NEAR(half.world_from_head.position_m.x, 0.05, 1e-6);
+  EXPECT_EQ(hub.sample(offset_ns + 10 * kMs).joints.place_m[1], glm::dvec3(1, 1, 0));
+  EXPECT_EQ(hub.counters().not_owner, 1u);
+  // Other names, or none: nothing is between the two.
+  hub.push(1, with_joints(20 * kMs, 0.1, {{7, 0, 0}}, {"tail"}), kStart + 11 * kMs);
+  EXPECT_EQ(hub.sample(offset_ns + 15 * kMs).joints.name.size(), 2u);
+  EXPECT_EQ(hub.sample(offset_ns + 20 * kMs).joints.name, std::vector<std::string>{"tail"});
+  hub.push(1, motion(30 * kMs, pose_at(0.1)), kStart + 21 * kMs);
+  EXPECT_TRUE(hub.sample(offset_ns + 30 * kMs).joints.place_m.empty()) << "an older source";
+}
+
+TEST(InputHub, ImpossibleJointsAreRefusedWithTheirSample) {
+  InputHub hub;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  hub.push(1, with_joints(0, 0.0, {{0, 0, 0}}), kStart);                 // two names
+  hub.push(1, with_joints(1, 0.0, {{0, nan, 0}, {0, 0, 0}}), kStart);    // no number
+  hub.push(1, with_joints(2, 0.0, {{0, 11.0f, 0}, {0, 0, 0}}), kStart);  // no body
+  hub.push(1, with_joints(3, 0.0, {{0, 1, 0}, {0, 0, 0}}, {}), kStart);  // without names
+  EXPECT_EQ(hub.counters().impossible, 4u);
+  EXPECT_EQ(hub.counters().accepted, 0u);
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -138,6 +138,20 @@ SceneDesc unusual_scene() {
               .far_share = 0.125,
               .idle = "full",
               .idle_after_s = 33.0};
+  s.body = {.preset = "upper_body",
+            .capsules = {{.from_joint = "neck",
+                          .to_joint = "spine",
+                          .from_m = {0.1, 0.2, 0.3},
+                          .to_m = {0.4, 0.5, 0.6},
+                          .from_radius_m = 0.07,
+                          .to_radius_m = 0.08},
+                         {}},
+            .planes = {{.point_m = {1, 2, 3}, .normal = {0, 0, 1}, .velocity_mps = {4, 5, 6}}},
+            .response = "sphere",
+            .friction = 0.7,
+            .tip_clearance_m = 0.006,
+            .force_per_s2 = 900.0,
+            .joint_offset_m = {0.01, 0.02, 0.03}};
   return s;
 }
 
@@ -473,6 +487,58 @@ TEST(SceneFile, BrokenOverridesNeverCrash) {
     if (scene) continue;
     EXPECT_FALSE(scene.error().message.empty());
   }
+}
+
+TEST(SceneFile, WrongBodiesAreNamed) {
+  const auto refusal = [](const char* text) {
+    const auto scene = parse_scene(text, "s", {});
+    return scene ? std::string("taken") : scene.error().to_string();
+  };
+  EXPECT_EQ(refusal("body { preset: \"upper_body\" }"), "taken");
+  EXPECT_THAT(refusal("body { preset: \"dress\" }"),
+              testing::HasSubstr("body.preset is unknown (known: none, upper_body)"));
+  EXPECT_THAT(refusal("body { response: \"bounce\" }"),
+              testing::HasSubstr("body.response is unknown (known: turn, sphere, project, force)"));
+  EXPECT_THAT(refusal("body { friction: -1 }"), testing::HasSubstr("body.friction is -1"));
+  EXPECT_THAT(refusal("body { tip_clearance_m: 1 }"), testing::HasSubstr("body.tip_clearance_m is 1"));
+  EXPECT_THAT(refusal("body { capsules { from_radius_m: 0 } }"),
+              testing::HasSubstr("body.capsules.0.from_radius_m is 0"));
+  EXPECT_THAT(refusal("body { capsules { to_joint: \"\" } }"),
+              testing::HasSubstr("body.capsules.0.to_joint must be"));
+  EXPECT_THAT(refusal("body { planes { normal { x: 0 y: 0 z: 0 } } }"),
+              testing::HasSubstr("body.planes.0.normal must point somewhere"));
+  EXPECT_THAT(refusal("body { planes {} planes {} planes {} planes {} planes {} }"),
+              testing::HasSubstr("body.planes has 5 entries, the limit is 4"));
+  std::string many = "body { preset: \"upper_body\" ";
+  for (size_t i = preset_size("upper_body"); i < kMaxBodyCapsules; ++i) many += "capsules {} ";
+  EXPECT_EQ(refusal((many + "}").c_str()), "taken");
+  EXPECT_THAT(refusal((many + "capsules {} }").c_str()),
+              testing::HasSubstr("body.capsules with those of the preset are more than 16"));
+}
+
+TEST(BodyDesc, CapsulesAreWhereTheirJointsAreAndWhatIsMissingIsNamed) {
+  BodyDesc body;
+  body.joint_offset_m = {0.0, -0.1, 0.0};
+  body.capsules.resize(2);
+  body.capsules[0].from_joint = "neck";
+  body.capsules[0].from_m = {0.0, 0.0, 0.02};
+  body.capsules[0].to_m = {0.0, -0.5, 0.0};
+  body.capsules[1].from_joint = "tail";
+  body.capsules[1].to_joint = "neck";
+  const BodyShapes shapes = shapes_of(body, {{"chest", "neck"}, {{9, 9, 9}, {0.1, 0.2, 0.3}}});
+  ASSERT_EQ(shapes.capsules.size(), 1u);
+  EXPECT_EQ(shapes.capsules[0].from_m,
+            glm::dvec3(0.1, 0.2, 0.3) + glm::dvec3(0.0, -0.1, 0.0) + glm::dvec3(0, 0, 0.02));
+  EXPECT_EQ(shapes.capsules[0].to_m, glm::dvec3(0.0, -0.5, 0.0)) << "head space, where no joint is named";
+  EXPECT_EQ(
+      shapes.missing,
+      std::vector<std::string>(
+          {"body.capsules.1.from_joint: the motion stream has no joint \"tail\" (it has chest, neck)"}));
+  body = BodyDesc();
+  body.preset = kUpperBody;
+  EXPECT_TRUE(shapes_of(body, {}).capsules.empty());
+  EXPECT_EQ(shapes_of(body, {}).missing.front(),
+            "body.preset upper_body: the motion stream has no joint \"neck\" (it has none)");
 }
 
 }  // namespace

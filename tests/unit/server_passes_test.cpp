@@ -34,6 +34,7 @@ SceneDesc full_scene() {
   scene.bend_limit.most_tip_deg = 60.0;
   scene.detail.simulated_share = 0.5;
   scene.head.collider = kFieldCollider;
+  scene.body.capsules.resize(1);
   scene.head.field_resolution = 16;
   scene.colliders = {{glm::vec3(0.0f, -0.3f, 0.0f), 0.1f}};
   scene.look.methods = {"marschner", "dual", "vertex"};  // each has tables
@@ -46,6 +47,7 @@ SceneDesc bare_scene() {
   scene.volume = {};
   scene.bend_limit = {};
   scene.detail = {};
+  scene.body = {};
   scene.head.collider = kSphereCollider;
   scene.colliders.clear();
   scene.has_auto_collider = false;

@@ -283,5 +283,59 @@ TEST(StepBuilder, GustWavesVanishWithoutWind) {
   EXPECT_TRUE(make_gust_waves(wind).empty()) << "steady";
 }
 
+TEST(StepBuilder, ShoulderMovesWithinTheStepAndIsNewWhereItJumps) {
+  SceneDesc scene = still_scene();
+  scene.body.capsules.resize(2);
+  scene.body.capsules[0].from_joint = "a";
+  scene.body.capsules[0].to_joint = "b";
+  scene.body.capsules[1].from_joint = "c";
+  scene.body.joint_offset_m = {0.0, -0.1, 0.0};
+  scene.body.planes.resize(1);
+  scene.body.planes[0].normal = {0.0, 2.0, 0.0};
+  scene.body.planes[0].velocity_mps = {1.0, 5.0, 0.0};
+  SceneFeatures features;
+  features.has_body = true;
+  StepBuilder builder(scene, {});
+  const auto at = [](double y_m) {
+    InputFrame input = moved(glm::dvec3(0.0), 0.0);
+    input.joints = {{"a", "b"}, {{0.0, y_m, 0.0}, {1.0, y_m, 0.0}}};
+    return input;
+  };
+  builder.build(at(0.0), features, 0.0);
+  EXPECT_TRUE(builder.step().substeps[0].body.is_new);
+  EXPECT_EQ(builder.missing_joints(),
+            std::vector<std::string>{
+                "body.capsules.1.from_joint: the motion stream has no joint \"c\" (it has a, b)"});
+  builder.build(at(0.037), features, 1.0 / 60.0);
+  double y_m = -0.1;
+  for (const StepInput& substep : builder.step().substeps) {
+    const BodyInput& body = substep.body;
+    ASSERT_EQ(body.capsules.size(), 1u);
+    EXPECT_FALSE(body.is_new);
+    EXPECT_NEAR(body.capsules[0].from_before_m.y, y_m, 1e-12);
+    y_m += 0.037 / 4.0;
+    EXPECT_NEAR(body.capsules[0].to_m.y, y_m, 1e-12) << "a fourth of the way in each of four substeps";
+    ASSERT_EQ(body.planes.size(), 1u);
+    EXPECT_EQ(body.planes[0].normal, glm::dvec3(0.0, 1.0, 0.0));
+    EXPECT_NEAR(glm::distance(body.planes[0].shift_m, glm::dvec3(1.0 / 240.0, 0.0, 0.0)), 0.0, 1e-12)
+        << "along the surface only";
+  }
+  InputFrame jump = at(0.5);
+  jump.has_teleported = true;
+  builder.build(jump, features, 2.0 / 60.0);
+  EXPECT_TRUE(builder.step().substeps[0].body.is_new);
+  EXPECT_FALSE(builder.step().substeps[1].body.is_new);
+  EXPECT_EQ(builder.step().substeps[0].body.capsules[0].from_before_m,
+            builder.step().substeps[3].body.capsules[0].from_m);
+  scene.body.friction = 0.9;
+  builder.change(scene, {});
+  builder.build(at(0.5), features, 3.0 / 60.0);
+  EXPECT_FALSE(builder.step().substeps[0].body.is_new) << "the same shapes";
+  scene.body.capsules[0].from_radius_m = 0.2;
+  builder.change(scene, {});
+  builder.build(at(0.5), features, 4.0 / 60.0);
+  EXPECT_TRUE(builder.step().substeps[0].body.is_new);
+}
+
 }  // namespace
 }  // namespace strandcast

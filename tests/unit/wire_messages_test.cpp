@@ -158,6 +158,37 @@ TEST(WireMessages, SamplesPerMessageLimitIsExactAndFitsTheByteLimit) {
   EXPECT_EQ(decode_client_message(encode(ClientMessage(wind))).error().code, ErrorCode::LimitExceeded);
 }
 
+TEST(WireMessages, JointsOfTheBodyAreBoundedAndTheLargestMessageFits) {
+  MotionSamples motion;
+  for (size_t i = 0; i < kMaxMotionJoints; ++i)
+    motion.joint_names.push_back(std::string(kMaxJointNameBytes - 1, 'j') + static_cast<char>('a' + i));
+  MotionSamples::Sample sample{INT64_MAX, {glm::dvec3(1e300), {1.0, 2.0, 3.0, 4.0}}};
+  sample.joint_m.resize(kMaxMotionJoints, glm::vec3(std::numeric_limits<float>::infinity()));
+  motion.samples.resize(kMaxSamplesPerMessage, sample);
+  EXPECT_LE(encode(ClientMessage(motion)).size(), kMaxControlBytes);
+  EXPECT_EQ(round_trip(motion), motion) << "values are for the input hub to judge";
+  const auto refused = [](MotionSamples wrong) {
+    const auto decoded = decode_client_message(encode(ClientMessage(std::move(wrong))));
+    return decoded ? std::string("taken") : decoded.error().to_string();
+  };
+  motion.samples = {sample};
+  MotionSamples wrong = motion;
+  wrong.joint_names.emplace_back("one more");
+  EXPECT_THAT(refused(wrong), testing::HasSubstr("motion.joint_names: has length 13, the limit is 12"));
+  wrong = motion;
+  wrong.joint_names.back() += 'x';
+  EXPECT_THAT(refused(wrong), testing::HasSubstr("motion.joint_names: has length 33, the limit is 32"));
+  wrong = motion;
+  wrong.joint_names.back() = wrong.joint_names.front();
+  EXPECT_THAT(refused(wrong), testing::HasSubstr("motion.joint_names: has a name twice"));
+  wrong = motion;
+  wrong.joint_names.back().clear();
+  EXPECT_THAT(refused(wrong), testing::HasSubstr("motion.joint_names: has an empty name"));
+  wrong = motion;
+  wrong.samples[0].joint_m.emplace_back();
+  EXPECT_THAT(refused(wrong), testing::HasSubstr("samples.joint_m: has length 39, the limit is 36"));
+}
+
 TEST(WireMessages, WhatEncodeMakesOfAnyTextDecodes) {
   std::mt19937 random(3);
   for (int trial = 0; trial < 300; ++trial) {

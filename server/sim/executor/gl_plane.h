@@ -31,8 +31,8 @@ inline constexpr std::array<PlaneBinding, kPlaneRoleCount> kPlaneBindings = {{
     {shader::kUnitPlaceBefore, shader::kBindingPlaceBefore},
     {shader::kUnitRestDensity, {}},
 }};
-inline constexpr std::array<uint32_t, kTableRoleCount> kTableUnits = {shader::kUnitField,
-                                                                      shader::kUnitVolume};
+inline constexpr std::array<uint32_t, kTableRoleCount> kTableUnits = {shader::kUnitField, shader::kUnitVolume,
+                                                                      shader::kUnitBody};
 
 /// A buffer of vec4 with a buffer texture over all of it: kernels write the one and fetch from the other,
 /// which on llvmpipe costs half of a storage-block load or less.
