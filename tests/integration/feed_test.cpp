@@ -103,6 +103,19 @@ TEST(Feed, APausedSimulationHoldsTheMotion) {
   EXPECT_EQ(x_m(fed.heard.back()), x_m(fed.heard[kSamples - 2]));
 }
 
+TEST(Feed, JointsOfTheBodyGoWithTheHead) {
+  FeedPlan plan = plan_of(true);
+  plan.joint_names = {"neck", "left_shoulder"};
+  plan.joints = [](double t_s) { return std::vector<glm::dvec3>{{0.0, -0.1, 0.0}, {0.2, -0.2, t_s}}; };
+  const Fed fed = feed_to(status_of(1.0), plan);
+  ASSERT_EQ(fed.heard.size(), kSamples);
+  for (const MotionSamples& motion : fed.heard) {
+    EXPECT_EQ(motion.joint_names, plan.joint_names);
+    ASSERT_EQ(motion.samples.front().joint_m.size(), 2u);
+    EXPECT_NEAR(motion.samples.front().joint_m[1].z, x_m(motion), 1e-6) << "of one time";
+  }
+}
+
 TEST(Feed, AStageGoesOnInRealTime) {
   const Fed fed = feed_to(status_of(0.25), plan_of(true));
   expect_as_said(fed);

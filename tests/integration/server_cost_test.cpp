@@ -148,6 +148,14 @@ TEST_F(ServerCost, EachFactOfTheSceneCostsItsOwnVariants) {
   ASSERT_TRUE(start(on_gl(scene)));
   EXPECT_EQ(compiled() - before_field, bare + 1) << "a head that is a field takes one more, without spheres";
   EXPECT_EQ(decisions(server_->passes()), decisions(planned(scene, {})));
+  server_->stop();
+  server_.reset();
+  const uint64_t before_body = compiled();
+  scene = barest_scene();
+  scene.body.preset = kUpperBody;
+  ASSERT_TRUE(start(on_gl(scene)));
+  EXPECT_EQ(compiled() - before_body, bare + 1) << "so does a body";
+  EXPECT_EQ(decisions(server_->passes()), decisions(planned(scene, {})));
 }
 
 TEST_F(ServerCost, WhatViewersNeedComesAndGoesWithThem) {

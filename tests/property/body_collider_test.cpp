@@ -5,13 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <random>
 
 #include "common/base/quantile.h"
 #include "common/kernels/lane_program.h"
+#include "common/motion/bvh.h"
+#include "common/scene/scene_desc.h"
+#include "server/scene/step_builder.h"
 #include "server/sim/executor/lanes_executor.h"
 #include "server/sim/reference_body.h"
 #include "tests/support/own_workers.h"
+#include "tests/support/shared_data.h"
 #include "tests/support/solver_bounds.h"
 #include "tests/support/solver_fixture.h"
 
@@ -512,6 +517,65 @@ TEST_F(BodySolvers, TipsStayFurtherAwayThanRootsWhereTheBodyAsksForIt) {
   }
   EXPECT_GE(least_m, kTipM - 1e-4);
   EXPECT_LE(least_m, kTipM + 0.02) << "some of them do lie there";
+}
+
+TEST_F(BodySolvers, ARealBodyIsNotEnteredByHairThatBeganOutsideOfIt) {
+  const std::filesystem::path file =
+      std::filesystem::path(STRANDCAST_SHARED_DATA) / "mocap" / "cmu_01_01_playground_jumps.bvh";
+  REQUIRE_SHARED(file);
+  BvhOptions options;
+  options.has_body = true;
+  const auto clip = load_bvh(file, options);
+  ASSERT_TRUE(clip) << clip.error().to_string();
+  const Groom groom = make_hair({.strand_count = 48, .vertex_count = 20});
+  SceneDesc scene = built_in_scene();
+  scene.body.preset = kUpperBody;
+  scene.wind = {};
+  SceneFeatures features;
+  features.has_body = true;
+  for (const char* name : {"dftl", "xpbd", "direct_rod"}) {
+    SCOPED_TRACE(name);
+    auto solver = make_kept_out({&row_of(name), kLanesHost}, groom);
+    StepBuilder builder(scene, {});
+    std::vector<bool> began_inside(groom.strand_count(), false);
+    std::vector<double> depths_m;
+    double fastest_mps = 0.0;
+    // From the first jump on: as far as five seconds go.
+    for (int step = 0; step < 300; ++step) {
+      InputFrame input;
+      input.has_motion = true;
+      const double t_s = 4.0 + step * kSubstepS;
+      input.world_from_head = clip->sample(t_s);
+      input.joints = {clip->joint_name, clip->sample_joints(t_s)};
+      const SceneStep& built = builder.build(input, features, step * kSubstepS);
+      if (built.carried_to_rotation) solver->rebase(*built.carried_to_rotation);
+      for (const StepInput& substep : built.substeps) solver->substep(substep);
+      const BodyInput& body = built.substeps.back().body;
+      ASSERT_EQ(body.capsules.size(), preset_size(kUpperBody));
+      for (const BodyCapsule& shape : body.capsules)
+        fastest_mps = std::max(fastest_mps, glm::distance(shape.to_m, shape.to_before_m) / kSubstepS);
+      const SolverState state = read(*solver);
+      const glm::dquat turn = glm::conjugate(input.world_from_head.rotation);
+      for (uint32_t s = 0; s < groom.strand_count(); ++s)
+        for (uint32_t i = 1; i < 20; ++i) {
+          const glm::dvec3 a = turn * glm::dvec3(state.position_m[(i - 1) * groom.strand_count() + s]);
+          const glm::dvec3 b = turn * glm::dvec3(state.position_m[i * groom.strand_count() + s]);
+          const double inside_m =
+              -std::min(distance_to_body_m(body, b), distance_to_body_m(body, 0.5 * (a + b)));
+          if (step == 0)
+            began_inside[s] = began_inside[s] || inside_m > 0.0;
+          else if (!began_inside[s])
+            depths_m.push_back(std::max(0.0, inside_m));
+        }
+    }
+    ASSERT_FALSE(depths_m.empty());
+    EXPECT_GT(fastest_mps, 1.5) << "a body that jumps";
+    fmt::print(
+        "{}: fastest {:.2f} m/s; {} strands began inside, the others get {:.3f} mm deep, 99.9 % {:.3f}\n",
+        name, fastest_mps, std::count(began_inside.begin(), began_inside.end(), true),
+        1e3 * *std::max_element(depths_m.begin(), depths_m.end()), 1e3 * quantile(depths_m, 0.999));
+    EXPECT_LE(quantile(depths_m, 0.999), 1e-3);
+  }
 }
 
 }  // namespace
