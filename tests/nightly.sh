@@ -43,7 +43,7 @@ run_part() {
     lto) build lto && echo "all files agree" ;;
     arm) bash tests/tools/compile_for_arm.sh ;;
     wasm)
-      bash deploy/install_deps.sh emscripten nodejs dpkg-dev
+      bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;

@@ -160,6 +160,7 @@ Status Server::State::connect(EncodedFramePtr asset_frame) {
                                                            std::move(asset_frame), is_drawn_by_processors_});
   desk_->set_metrics([this] { return metrics(); });
   NetConfig net = config_.net;
+  net.page = built_in_page();
   net.strand_classes = hub_->strand_classes();
   net.strand_codecs.clear();
   for (const StrandCodecInfo& codec : codecs_) net.strand_codecs.push_back(codec.bytes);

@@ -6,7 +6,11 @@
 namespace strandcast {
 
 bool AddressGuard::take_connection(const std::string& address, int64_t time_ns) {
-  return entry(address, time_ns).rate.take(time_ns);
+  return entry(address, time_ns).connections.take(time_ns);
+}
+
+bool AddressGuard::take_request(const std::string& address, int64_t time_ns) {
+  return entry(address, time_ns).requests.take(time_ns);
 }
 
 bool AddressGuard::is_blocked(const std::string& address, int64_t time_ns) const {
@@ -26,7 +30,7 @@ AddressGuard::Entry& AddressGuard::entry(const std::string& address, int64_t tim
   auto found = entries_.find(address);
   if (found == entries_.end()) {
     if (entries_.size() >= limits_.addresses) make_room(time_ns);
-    found = entries_.emplace(address, Entry(limits_.connections_per_s)).first;
+    found = entries_.emplace(address, Entry(limits_)).first;
   }
   found->second.seen_ns = time_ns;
   return found->second;

@@ -1,4 +1,5 @@
-// AddressGuard: how fast one address connects and how often its token was wrong, in a table of bounded size.
+// AddressGuard: how fast one address connects and asks, and how often its token was wrong, in a table of
+// bounded size.
 // Plain logic without a clock; one thread.
 #pragma once
 
@@ -13,6 +14,7 @@ namespace strandcast {
 
 struct GuardLimits {
   double connections_per_s = 10.0;  // and as many at once
+  double requests_per_s = 50.0;     // on all of its connections, and as many at once
   uint32_t wrong_tokens = 5;        // in a window; one more blocks
   int64_t window_ns = 60'000'000'000;
   int64_t block_ns = 60'000'000'000;
@@ -25,6 +27,8 @@ class AddressGuard {
 
   /// False when this connection is one too many.
   bool take_connection(const std::string& address, int64_t time_ns);
+  /// False when this HTTP request is one too many.
+  bool take_request(const std::string& address, int64_t time_ns);
   /// True while no token of this address is looked at.
   bool is_blocked(const std::string& address, int64_t time_ns) const;
   void on_wrong_token(const std::string& address, int64_t time_ns);
@@ -33,8 +37,10 @@ class AddressGuard {
 
  private:
   struct Entry {
-    explicit Entry(double connections_per_s) : rate(connections_per_s) {}
-    RateLimit rate;
+    explicit Entry(const GuardLimits& limits)
+        : connections(limits.connections_per_s), requests(limits.requests_per_s) {}
+    RateLimit connections;
+    RateLimit requests;
     std::vector<int64_t> wrong_ns;  // times of wrong tokens, oldest first; limits_.wrong_tokens at most
     int64_t blocked_until_ns = 0;
     int64_t seen_ns = 0;

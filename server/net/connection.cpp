@@ -51,8 +51,8 @@ bool offers_protocol(beast::string_view header) {
   return false;
 }
 
-std::string quoted(beast::string_view text) {
-  return fmt::format("'{}'", view(text).substr(0, kMaxQuotedBytes));
+std::string quoted(std::string_view text) {
+  return fmt::format("'{}'", text.substr(0, kMaxQuotedBytes));
 }
 
 }  // namespace
@@ -68,7 +68,8 @@ Connection::Connection(Context& context, tcp::socket socket) : context_(context)
   peer_.is_proxy = is_in(context.config.trusted_proxies, peer);
   peer_.is_trusted =
       is_loopback_ && context.config.loopback_trust == LoopbackTrust::Trusted && !peer_.is_proxy;
-  peer_.accepted_ns = now_ns();
+  peer_.accepted_ns = since_ns_ = now_ns();
+  from_ = peer_;
   stream_.socket().set_option(tcp::no_delay(true), error);
 }
 
@@ -81,16 +82,6 @@ bool Connection::is_welcome() {
   if (context_.make_place(peer_)) return true;
   context_.refuse(Refusal::Full, peer_, "too many connections without a Hello");
   return false;
-}
-
-template <class Work>
-void Connection::guarded(Work&& work) {
-  try {
-    work();
-  } catch (const std::exception& exception) {
-    log_error("net", "connection from {}: {}", peer_.address, exception.what());
-    finish();
-  }
 }
 
 void Connection::start() {
@@ -122,12 +113,13 @@ void Connection::on_proxy_header(const beast::error_code& error) {
     local_address_ = ends->local_address.to_string();
     is_loopback_ = ends->local_address.is_loopback();
     if (const auto why = stand_for(ends->address)) return drop(*why, "connects too often through a proxy");
+    from_ = peer_;
   }
   begin();
 }
 
-/// From here on this is the connection of a proxy's client. It is counted like one of its own would have
-/// been.
+/// From here on this is the connection of a proxy's client, until its next request. It is counted like one of
+/// its own would have been.
 std::optional<Refusal> Connection::stand_for(const IpAddress& client) {
   const std::string key = client.key();
   const bool is_proxy = is_in(context_.config.trusted_proxies, client);
@@ -135,7 +127,8 @@ std::optional<Refusal> Connection::stand_for(const IpAddress& client) {
   peer_.address = client.to_string();
   peer_.key = key;
   peer_.is_proxy = is_proxy;
-  if (!is_proxy && !context_.guard.take_connection(key, peer_.accepted_ns)) return Refusal::Rate;
+  const bool is_counted = !is_proxy && std::exchange(counted_key_, key) != key;
+  if (is_counted && !context_.guard.take_connection(key, now_ns())) return Refusal::Rate;
   return has_many ? std::optional(Refusal::Full) : std::nullopt;
 }
 
@@ -161,6 +154,7 @@ void Connection::on_tls(const beast::error_code& error) {
 
 /// The header only: a body would be in memory before anybody could refuse it.
 void Connection::read_request() {
+  is_reading_ = true;
   parser_.emplace();
   parser_->header_limit(kMaxHttpHeaderBytes);
   parser_->body_limit(boost::none);
@@ -174,12 +168,16 @@ void Connection::read_request() {
 }
 
 void Connection::check_deadline(int64_t time_ns) {
-  if (is_finished_ || time_ns - peer_.accepted_ns < context_.config.limits.handshake_ms * kNsPerMs) return;
+  if (is_finished_) return;
+  note_progress(time_ns);
+  if (time_ns - since_ns_ < context_.config.limits.handshake_ms * kNsPerMs) return;
+  if (is_idle() && stream_.untaken_bytes() == 0) return finish();
   drop(Refusal::Timeout,
        fmt::format("no request answered within {} ms", context_.config.limits.handshake_ms));
 }
 
 void Connection::on_request(const beast::error_code& error) {
+  is_reading_ = false;
   if (is_finished_) return;
   if (is_gone(error)) return finish();
   if (error == http::error::header_limit || error == http::error::buffer_overflow)
@@ -187,7 +185,14 @@ void Connection::on_request(const beast::error_code& error) {
                   fmt::format("The header of a request has at most {} bytes.", kMaxHttpHeaderBytes));
   if (error) return refuse(Refusal::Request, http::status::bad_request, "Bad request: " + error.message());
   const Request& request = parser_->get();
-  if (is_fit(request) && is_client_known(request) && may_be_plain()) answer(request);
+  if (is_fit(request) && is_client_known(request) && may_ask() && may_be_plain()) answer(request);
+}
+
+/// A connection that is kept may not ask more often than new ones could.
+bool Connection::may_ask() {
+  if (peer_.is_trusted || peer_.is_proxy || context_.guard.take_request(peer_.key, now_ns())) return true;
+  refuse(Refusal::Rate, http::status::too_many_requests, "Too many requests of one address: wait a second.");
+  return false;
 }
 
 /// Nothing in it may mean one thing to us and another to somebody before us.
@@ -229,7 +234,8 @@ bool Connection::may_be_plain() {
   if (stream_.is_tls() || is_plain_allowed) return true;
   response_.set(http::field::upgrade, "TLS/1.2");
   response_.set(http::field::connection, "Upgrade");
-  refuse(Refusal::Tls, http::status::upgrade_required, "This server speaks TLS only: use wss:// or --tls.");
+  refuse(Refusal::Tls, http::status::upgrade_required,
+         "This server speaks TLS only: use https://, wss:// or --tls.");
   return false;
 }
 
@@ -237,15 +243,17 @@ void Connection::answer(const Request& request) {
   const auto host = request[http::field::host];
   if (!is_host_allowed(view(host), local_address_, is_loopback_, context_.config.allowed_hosts))
     return refuse(Refusal::Host, http::status::forbidden,
-                  "This Host is not served here (--allow-host adds one).", quoted(host));
+                  "This Host is not served here (--allow-host adds one).", quoted(view(host)));
   const std::string_view path = view(request.target());
   if (websocket::is_upgrade(request) && path == kWebSocketPath) return answer_upgrade(request);
   const bool is_get = request.method() == http::verb::get;
   if (is_get && path == "/healthz") return respond(http::status::ok, "ok\n");
   if (is_get && path == "/readyz") return answer_readiness();
   if (is_get && path == "/metrics") return answer_metrics(request);
+  if (answer_page(request)) return;
   refuse(Refusal::Path, http::status::not_found,
-         "Not found. Here are: /healthz /readyz /metrics /v1 (WebSocket).", quoted(request.target()));
+         "Not found. Here are: / /healthz /readyz /metrics /v1 (WebSocket).",
+         quoted(path_of_target(view(request.target()))));
 }
 
 void Connection::answer_readiness() {
@@ -286,12 +294,12 @@ void Connection::answer_upgrade(const Request& request) {
   const auto origin = request[http::field::origin];
   if (!is_origin_allowed(view(origin), view(request[http::field::host]), context_.config.allowed_origins))
     return refuse(Refusal::Origin, http::status::forbidden,
-                  "Pages of another origin may not connect (--allow-origin adds one).", quoted(origin));
+                  "Pages of another origin may not connect (--allow-origin adds one).", quoted(view(origin)));
   const auto protocols = request[http::field::sec_websocket_protocol];
   if (!offers_protocol(protocols))
     return refuse(Refusal::Path, http::status::bad_request,
                   fmt::format("The WebSocket subprotocol must be {}.", kWebSocketProtocol),
-                  quoted(protocols));
+                  quoted(view(protocols)));
   upgrade();
 }
 
@@ -299,6 +307,8 @@ void Connection::upgrade() {
   // A client may say Hello before it has our answer.
   const auto read_too_far = buffer_.cdata();
   stream_.put_back({static_cast<const std::byte*>(read_too_far.data()), read_too_far.size()});
+  if (answered_ > 0)
+    peer_.accepted_ns = now_ns();  // the time for its Hello does not begin with another request
   const SessionId id = context_.next_session++;
   const bool has_room = context_.has_room(peer_.key);
   auto session = std::make_shared<Session>(context_, id, std::move(stream_), peer_);

@@ -1,5 +1,5 @@
-// Connection: one TCP connection until its only HTTP request is answered or has become a Session. Network
-// thread.
+// Connection: one TCP connection until its last HTTP request is answered or has become a Session. It is kept
+// for another request behind a file of the page, and ends behind all else. Network thread.
 #pragma once
 
 #include <memory>
@@ -9,6 +9,7 @@
 
 #include "server/net/beast_private.h"
 #include "server/net/context_private.h"
+#include "server/net/page.h"
 
 namespace strandcast::net {
 
@@ -23,12 +24,23 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void check_deadline(int64_t time_ns);
   void abort();
   const Peer& peer() const { return peer_; }
+  /// True while nothing of a request is there and one was answered before: whoever has it may as well make
+  /// another connection.
+  bool is_idle() const;
 
  private:
   using Request = http::request<http::empty_body>;
 
+  /// An exception ends this connection only.
   template <class Work>
-  void guarded(Work&& work);
+  void guarded(Work&& work) {
+    try {
+      work();
+    } catch (const std::exception& exception) {
+      log_error("net", "connection from {}: {}", peer_.address, exception.what());
+      finish();
+    }
+  }
   void read_proxy_header(size_t size);
   void on_proxy_header(const beast::error_code& error);
   std::optional<Refusal> stand_for(const IpAddress& client);
@@ -43,6 +55,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void answer_readiness();
   void answer_metrics(const Request& request);
   void answer_upgrade(const Request& request);
+  bool answer_page(const Request& request);
+  void send_page_file(const Request& request, const PageFile& file);
+  void write_page();
+  void on_page_written(const beast::error_code& error, size_t size);
+  void read_next_request();
+  void note_progress(int64_t time_ns);
+  bool may_ask();
   void upgrade();
   void drop(Refusal why, const std::string& sentence);
   void refuse(Refusal why, http::status status, const std::string& sentence, const std::string& detail = {});
@@ -52,6 +71,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   Context& context_;
   NetStream stream_;
   Peer peer_;
+  Peer from_;                // whoever connected; differs behind X-Forwarded-For
+  std::string counted_key_;  // of the last client that a proxy's field named
   std::string local_address_;
   bool is_loopback_ = false;
   bool is_finished_ = false;
@@ -59,6 +80,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
   beast::flat_buffer buffer_{kMaxHttpReadBytes};
   std::optional<http::request_parser<http::empty_body>> parser_;
   http::response<http::string_body> response_;
+  http::response<http::span_body<const char>> page_response_;
+  std::optional<http::response_serializer<http::span_body<const char>>> page_serializer_;
+  int64_t since_ns_ = 0;     // begin of the wait for a request, or the last progress of an answer
+  size_t answered_ = 0;      // files of the page
+  size_t handed_bytes_ = 0;  // of them, to the kernel
+  size_t noted_bytes_ = 0;   // of those, taken by the other side at since_ns_
+  bool is_reading_ = false;
 };
 
 }  // namespace strandcast::net

@@ -14,6 +14,7 @@ namespace {
 /// Somebody without a Hello that was accepted.
 struct Waiting {
   const Peer* peer = nullptr;
+  bool is_idle = false;  // between two requests
   std::function<void()> end;
 };
 
@@ -24,9 +25,9 @@ bool is_waiting(const Session& session) {
 std::vector<Waiting> all_waiting(const Context& context) {
   std::vector<Waiting> all;
   for (const auto& connection : context.connections)
-    all.push_back({&connection->peer(), [connection] { connection->abort(); }});
+    all.push_back({&connection->peer(), connection->is_idle(), [connection] { connection->abort(); }});
   for (const auto& [id, session] : context.sessions)
-    if (is_waiting(*session)) all.push_back({&session->peer(), [one = session] { one->abort(); }});
+    if (is_waiting(*session)) all.push_back({&session->peer(), false, [one = session] { one->abort(); }});
   return all;
 }
 
@@ -40,14 +41,26 @@ const Waiting& least_worthy(const std::vector<Waiting>& waiting) {
   });
 }
 
+/// Ends the connection that came first of those between two requests; false when there is none. Of one
+/// address, if its key is given.
+bool end_idle(const std::vector<Waiting>& waiting, const std::string* peer_key) {
+  const Waiting* oldest = nullptr;
+  for (const Waiting& one : waiting)
+    if (one.is_idle && (peer_key == nullptr || one.peer->key == *peer_key) &&
+        (oldest == nullptr || one.peer->accepted_ns < oldest->peer->accepted_ns))
+      oldest = &one;
+  if (oldest != nullptr) oldest->end();
+  return oldest != nullptr;
+}
+
 }  // namespace
 
 Context::Context(const NetConfig& net_config, NetHandler& net_handler)
     : config(net_config),
       handler(net_handler),
       strands(net_config.strand_classes, net_config.strand_codecs),
-      guard({net_config.limits.connections_per_s, net_config.limits.wrong_tokens,
-             net_config.limits.wrong_token_window_ms * kNsPerMs,
+      guard({net_config.limits.connections_per_s, net_config.limits.requests_per_s,
+             net_config.limits.wrong_tokens, net_config.limits.wrong_token_window_ms * kNsPerMs,
              net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}),
       refusal_lines({net_config.limits.refusal_lines_per_address, net_config.limits.refusal_lines}),
       session_lines({net_config.limits.session_lines, net_config.limits.session_lines}) {}
@@ -86,9 +99,11 @@ size_t Context::waiting_of(const std::string& peer_key) const {
 bool Context::make_place(const Peer& peer) {
   std::vector<Waiting> waiting = all_waiting(*this);
   std::erase_if(waiting, [&](const Waiting& one) { return one.peer->is_trusted != peer.is_trusted; });
-  if (peer.is_trusted) return waiting.size() < config.limits.sessions + kSpareConnections;
-  if (!peer.is_proxy && waiting_of(peer.key) >= kSpareConnectionsPerAddress) return false;
-  if (waiting.size() < kSpareConnections) return true;
+  if (peer.is_trusted)
+    return waiting.size() < config.limits.sessions + kSpareConnections || end_idle(waiting, nullptr);
+  if (!peer.is_proxy && waiting_of(peer.key) >= kSpareConnectionsPerAddress)
+    return end_idle(waiting, &peer.key);
+  if (waiting.size() < kSpareConnections || end_idle(waiting, nullptr)) return true;
   const Waiting& oldest = least_worthy(waiting);
   refuse(Refusal::Full, *oldest.peer, "gave its place to somebody else before it said Hello");
   oldest.end();

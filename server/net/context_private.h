@@ -33,6 +33,11 @@ inline constexpr size_t kSpareConnectionsPerAddress = 16;
 inline constexpr const char* kBlockedSentence =
     "Too many wrong tokens came from this address: wait a minute.";
 
+/// On one connection; the last answer ends it.
+inline constexpr size_t kMaxRequestsOfConnection = 100;
+/// An answer whose taker takes less than this in handshake_ms does not get on.
+inline constexpr size_t kLeastProgressBytes = 4u << 10;
+
 /// First line and fields of a request.
 inline constexpr size_t kMaxHttpHeaderBytes = 8u << 10;
 /// What is read of a request: the header, and one byte that tells a longer one. The rest waits in the kernel.
@@ -78,8 +83,8 @@ struct Context {
   bool has_room(const std::string& peer_key) const;
   /// How many of this peer have no Hello that was accepted.
   size_t waiting_of(const std::string& peer_key) const;
-  /// True when one more may wait for its Hello. Among strangers the oldest of the address that has most gives
-  /// its place to the newest.
+  /// True when one more may wait for its Hello. One between two requests gives its place first; among
+  /// strangers then the oldest of the address that has most.
   bool make_place(const Peer& peer);
   /// Those that have joined.
   SessionList list_sessions(int64_t time_ns) const;

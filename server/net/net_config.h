@@ -10,6 +10,7 @@
 #include "common/net/tls_context.h"
 #include "common/wire/messages.h"
 #include "server/net/ip_address.h"
+#include "server/net/page.h"
 #include "server/net/roles.h"
 #include "server/net/strand_class.h"
 
@@ -25,10 +26,11 @@ using SessionId = uint64_t;  // never reused by one server
 struct NetLimits {
   uint32_t sessions = kMaxSessions;
   uint32_t sessions_per_address = kMaxSessionsPerAddress;
-  int64_t handshake_ms = 5'000;  // TCP accept to Hello, or to the end of another HTTP request
-  int64_t idle_ms = 15'000;      // nothing received, pings included
-  int64_t stalled_ms = 4'500;    // no progress of one write, or a viewer's silence once an answer is due
-  int64_t unused_ms = 30'000;    // an acknowledgement is due, although the client sends other things
+  int64_t handshake_ms =
+      5'000;                   // TCP accept to Hello, or to another HTTP request; an answer without progress
+  int64_t idle_ms = 15'000;    // nothing received, pings included
+  int64_t stalled_ms = 4'500;  // no progress of one write, or a viewer's silence once an answer is due
+  int64_t unused_ms = 30'000;  // an acknowledgement is due, although the client sends other things
   int64_t keyframe_interval_ms = 250;  // between keyframes asked for one session
   int64_t close_ms = 2'000;            // for Goodbye and the closing handshake
   int64_t link_interval_ms = 250;      // between two looks at a link for the choice of its mode
@@ -36,6 +38,7 @@ struct NetLimits {
   double messages_per_s = 1'000.0;     // per session, and as many at once
   // Of one address, where it is not on trusted loopback.
   double connections_per_s = 10.0;  // and as many at once
+  double requests_per_s = 50.0;     // HTTP, and as many at once
   uint32_t wrong_tokens = 5;        // in wrong_token_window_ms; one more blocks
   int64_t wrong_token_window_ms = 60'000;
   int64_t wrong_token_block_ms = 60'000;    // no token is looked at from there
@@ -68,6 +71,7 @@ struct NetConfig {
   std::vector<AddressRange> trusted_proxies;
   ProxyProtocol proxy_protocol = ProxyProtocol::None;
   NetLimits limits;
+  PageFiles page;                                                    // of constants
   std::vector<StrandClass> strand_classes = {StrandClass{}};         // at first; best first
   std::vector<StrandByteModel> strand_codecs = {StrandByteModel{}};  // that each of them is served by
 };
