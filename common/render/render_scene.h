@@ -11,6 +11,7 @@
 #include "common/render/passes/picture_target.h"
 #include "common/render/passes/strand_buffers.h"
 #include "common/render/passes/table_textures.h"
+#include "common/render/rest_facts.h"
 #include "common/scene/features.h"
 #include "common/scene/scene_desc.h"
 #include "common/scene/shadow_methods.h"
@@ -20,13 +21,6 @@ namespace strandcast {
 
 class Culling;
 class ShadowMap;
-
-/// Measures of the rest shape.
-struct RestFacts {
-  float mean_length_m = 0.0f;
-  float extent_m = 0.0f;     // largest side of the bounding box
-  float mean_bend_m = 0.0f;  // of a strand's curve between two vertices: its second derivative
-};
 
 /// Numbers of the methods that no scene sets.
 struct MethodSettings {
@@ -69,9 +63,6 @@ struct RenderScene {
   StrandLayer strand_layer;
   PictureTarget picture;
 };
-
-/// The look within what renderers can draw.
-LookDesc drawable(LookDesc look);
 
 /// What the light lattice has to know. `cells`: along the hair's largest side.
 LightLatticeDesc describe_lattice(const SceneAsset& asset, const RenderScene& scene, uint32_t cells);
