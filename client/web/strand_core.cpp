@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "client/web/core_error.h"
 #include "common/base/worker_pool.h"
+#include "common/replay/strand_fill.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_codec.h"
 
@@ -19,6 +21,7 @@ struct StrandCoreDecoder {
   std::unique_ptr<StrandDecoder> decoder;
   std::shared_ptr<const Snapshot> newest;
   StrandCoreState state{};
+  StrandFill fill;                    // of the asset
   std::vector<glm::vec3> position_m;  // of `newest`, once they are asked for
 };
 
@@ -29,11 +32,6 @@ std::string& last_error() {
   return text;
 }
 ErrorCode last_error_code = ErrorCode::Internal;
-
-void remember(const Error& error) {
-  last_error() = error.to_string();
-  last_error_code = error.code;
-}
 
 StrandCoreState state_of(const Snapshot& snapshot) {
   const glm::dvec3& position_m = snapshot.world_from_head.position_m;
@@ -56,10 +54,16 @@ Status set_asset(StrandCoreDecoder& core, std::span<const std::byte> payload) {
                       asset.strand_count, asset.vertex_count, core.limits.strand_count,
                       core.limits.vertex_count);
   core.decoder->set_rest_shape(asset.rest_position_m);
+  core.fill = StrandFill(asset.rest_position_m, asset.vertex_count);
   return {};
 }
 
 }  // namespace
+
+void remember_core_error(const Error& error) {
+  last_error() = error.to_string();
+  last_error_code = error.code;
+}
 
 STRAND_CORE_EXPORT void* strand_core_allocate(size_t size_bytes) {
   return std::malloc(size_bytes);
@@ -74,7 +78,7 @@ STRAND_CORE_EXPORT StrandCoreDecoder* strand_core_make(const char* codec, size_t
   core->limits = {strand_count, vertex_count};
   auto decoder = make_strand_decoder(std::string(codec, codec_bytes), core->limits, core->workers);
   if (!decoder) {
-    remember(decoder.error());
+    remember_core_error(decoder.error());
     return nullptr;
   }
   core->decoder = std::move(decoder).value();
@@ -87,7 +91,7 @@ STRAND_CORE_EXPORT void strand_core_delete(StrandCoreDecoder* decoder) {
 STRAND_CORE_EXPORT int strand_core_set_asset(StrandCoreDecoder* decoder, const std::byte* payload,
                                              size_t size_bytes) {
   const Status status = set_asset(*decoder, {payload, size_bytes});
-  if (!status) remember(status.error());
+  if (!status) remember_core_error(status.error());
   return status.ok() ? 1 : 0;
 }
 
@@ -95,7 +99,7 @@ STRAND_CORE_EXPORT int strand_core_decode(StrandCoreDecoder* decoder, const std:
                                           size_t size_bytes) {
   auto decoded = decoder->decoder->decode({message, size_bytes});
   if (!decoded) {
-    remember(decoded.error());
+    remember_core_error(decoded.error());
     return 0;
   }
   decoder->newest = std::move(decoded).value();
@@ -111,6 +115,14 @@ STRAND_CORE_EXPORT const float* strand_core_positions(StrandCoreDecoder* decoder
   if (decoder->newest == nullptr) return nullptr;
   if (decoder->position_m.empty()) decoder->position_m = positions_in_head(*decoder->newest);
   return &decoder->position_m.front().x;
+}
+STRAND_CORE_EXPORT const float* strand_core_all_positions(StrandCoreDecoder* decoder) {
+  if (decoder->newest == nullptr) return nullptr;
+  decoder->position_m = decoder->fill.positions(*decoder->newest);
+  return &decoder->position_m.front().x;
+}
+STRAND_CORE_EXPORT uint32_t strand_core_position_floats(const StrandCoreDecoder* decoder) {
+  return static_cast<uint32_t>(3 * decoder->position_m.size());
 }
 STRAND_CORE_EXPORT uint64_t strand_core_hash(const StrandCoreDecoder* decoder) {
   return decoder->newest == nullptr ? 0 : state_hash(*decoder->newest);

@@ -46,6 +46,11 @@ const StrandCoreState* strand_core_state(const StrandCoreDecoder* decoder);
 /// Head space, m: (vertex_count x strand_count x 3) vertex-major, strand fastest. nullptr before the first
 /// decoded message.
 const float* strand_core_positions(StrandCoreDecoder* decoder);
+/// Of all strands of the asset: those that the state does not have are filled in
+/// (common/replay/strand_fill.h). Without an asset as strand_core_positions().
+const float* strand_core_all_positions(StrandCoreDecoder* decoder);
+/// Of what either gave last.
+uint32_t strand_core_position_floats(const StrandCoreDecoder* decoder);
 /// Of the newest state, computed from it (proto/WIRE.md); every decoded one had its message's. 0 before the
 /// first.
 uint64_t strand_core_hash(const StrandCoreDecoder* decoder);

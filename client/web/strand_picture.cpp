@@ -1,0 +1,382 @@
+#include "client/web/strand_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/web/core_error.h"
+#include "common/base/worker_pool.h"
+#include "common/render/gl_tiles/tile_block.h"
+#include "common/render/rest_facts.h"
+#include "common/render/scalp_cover.h"
+#include "common/render/tiles/strand_expansion.h"
+#include "common/render/tiles/strand_shading.h"
+#include "common/render/tiles/tile_bins.h"
+#include "common/render/tiles/tile_raster.h"
+#include "common/render/view.h"
+
+#define STRAND_CORE_EXPORT extern "C" __attribute__((visibility("default"), used))
+
+using namespace strandcast;
+
+namespace {
+
+// Points of all drawn strands at most: fewer strands are drawn instead of more.
+constexpr uint64_t kMaxPoints = uint64_t{2} << 20;
+// Above the skin, in LatticeFrame::soft_m.
+constexpr float kShadowLift = 1.5f;
+
+uint32_t offset_of(const void* data) {
+  return static_cast<uint32_t>(reinterpret_cast<uintptr_t>(data));
+}
+
+/// Stored depths as IEEE halves, in units of optical depth.
+std::vector<uint16_t> make_half_depths() {
+  std::vector<uint16_t> halves(65536);
+  for (uint32_t stored = 1; stored < halves.size(); ++stored) {
+    const float depth = static_cast<float>(stored) * kLightDepthUnit;  // 2^-10 .. 64: normal as a half
+    uint32_t bits;
+    std::memcpy(&bits, &depth, sizeof bits);
+    halves[stored] = static_cast<uint16_t>((bits + 0x1000u - (112u << 23)) >> 13);
+  }
+  return halves;
+}
+
+LookDesc look_of(const StrandPictureLook& n, std::string hair_color) {
+  const auto vec = [](const float* v) { return glm::vec3(v[0], v[1], v[2]); };
+  const auto count = [](float v) { return v > 0.0f && v < 1e6f ? static_cast<uint32_t>(v) : 0u; };
+  LookDesc look;
+  look.hair_color = std::move(hair_color);
+  look.root_color = vec(n.root_color);
+  look.tip_color = vec(n.tip_color);
+  look.eumelanin = n.eumelanin;
+  look.pheomelanin = n.pheomelanin;
+  look.strand_radius_m = n.strand_radius_m;
+  look.tip_scale = n.tip_scale;
+  look.followers = count(n.followers);
+  look.segments = count(n.segments);
+  look.light_direction = vec(n.light_direction);
+  look.light_color = vec(n.light_color);
+  look.ambient = n.ambient;
+  look.background = vec(n.background);
+  look.skin_color = vec(n.skin_color);
+  look.rim_direction = vec(n.rim_direction);
+  look.rim_color = vec(n.rim_color);
+  look.exposure = n.exposure;
+  look.style = {n.clump,        n.locks > 1.0f ? count(n.locks) : 1u,
+                n.spread,       n.wave_m,
+                n.wave_count,   n.frizz_m,
+                n.frizz_count,  n.stray_share,
+                n.stray_spread, n.length_spread,
+                n.short_share,  n.tip_fade};
+  look.shading = {n.diffuse,          n.scatter,
+                  n.highlight,        n.transmission,
+                  n.second_highlight, n.highlight_width_deg,
+                  n.cuticle_deg,      n.cuticle_spread_deg,
+                  n.root_darkening,   n.strand_variation,
+                  n.lock_variation,   n.warmth_variation,
+                  n.wetness};
+  return drawable(std::move(look));
+}
+
+}  // namespace
+
+struct StrandPicture {
+  explicit StrandPicture(SceneAsset from)
+      : asset(std::move(from)),
+        rest(measure_rest(asset)),
+        position_m(asset.rest_position_m),
+        expansion(asset, rest.mean_length_m),
+        lattice(describe_lattice(asset, rest, describe_light(asset, look, rest), kLightCells)),
+        cover(scalp_cover(asset, rest.extent_m * kCoverReach)),
+        half_depth(make_half_depths()),
+        srgb(make_srgb_table()) {
+    facts.key_count = asset.strand_count;
+    facts.vertex_count = asset.vertex_count;
+    facts.triangle_count = static_cast<uint32_t>(asset.triangle.size());
+    facts.mean_length_m = rest.mean_length_m;
+    facts.mean_bend_m = rest.mean_bend_m;
+    facts.max_points = kMaxPoints;
+    expansion.set_look(look);
+    const Mesh& mesh = asset.head;
+    head = {static_cast<uint32_t>(mesh.position_m.size()),
+            static_cast<uint32_t>(mesh.triangle.size()),
+            offset_of(mesh.position_m.data()),
+            offset_of(mesh.normal.data()),
+            offset_of(cover.data()),
+            offset_of(mesh.triangle.data())};
+    if (mesh.triangle.empty()) return;
+    drawn_head.mesh = &mesh;
+    drawn_head.cover = &cover;
+  }
+
+  SceneAsset asset;
+  RestFacts rest;
+  LookDesc look;
+  DetailFacts facts;
+  WorkerPool workers{1};
+  std::vector<glm::vec3> position_m;
+  StrandExpansion expansion;
+  StrandPoints points;
+  LightLattice lattice;
+  std::vector<float> cover;
+  StrandPictureHead head{};
+  StrandPictureParts parts{};
+  TileBlock block{};
+
+  // Of what `points` and `lattice` were made.
+  uint64_t state_number = 1, expanded_state = 0;
+  StrandDetail detail;
+  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
+  LightDirections lights;
+  float width_m = 0.0f;
+
+  // For a graphics card.
+  std::vector<uint16_t> half_depth, key_depth, other_depth;
+  std::vector<float> place_m;
+  std::vector<uint32_t> strand, strand_of;
+  std::vector<float> away_m;
+  std::vector<uint64_t> order, sorted;
+  std::vector<uint32_t> corner;
+  uint64_t placed_state = 0;
+
+  // For a picture made here.
+  HeadPicture drawn_head;
+  TileBins bins;
+  TileScratch scratch;
+  std::vector<uint8_t> srgb, rgba;
+};
+
+namespace {
+
+constexpr simd::InstructionSet kSet = simd::InstructionSet::Plain;
+
+struct Turn {
+  View view;
+  glm::dquat rotation;
+};
+
+Result<Turn> turn_of(const StrandPictureView& wish) {
+  CameraDesc camera;
+  camera.offset_m = {wish.offset_m[0], wish.offset_m[1], wish.offset_m[2]};
+  camera.target_m = {wish.target_m[0], wish.target_m[1], wish.target_m[2]};
+  camera.fov_y_rad = wish.fov_y_rad;
+  const float* const r = wish.head_rotation;
+  Turn turn;
+  turn.rotation = glm::dquat(static_cast<double>(r[0]), static_cast<double>(r[1]), static_cast<double>(r[2]),
+                             static_cast<double>(r[3]));
+  const glm::uvec2 size(static_cast<uint32_t>(std::clamp(wish.width_px, 1.0f, 8192.0f)),
+                        static_cast<uint32_t>(std::clamp(wish.height_px, 1.0f, 8192.0f)));
+  ASSIGN_OR_RETURN(turn.view, make_view(camera, turn.rotation, size));
+  return turn;
+}
+
+bool is_same(const StrandDetail& a, const StrandDetail& b) {
+  return a.segments_per_gap == b.segments_per_gap && a.followers == b.followers &&
+         a.strand_count == b.strand_count;
+}
+
+/// Strands on their curves, and their light: anew only where something changed.
+void expand_and_light(StrandPicture& p, const Turn& turn, float strand_share, bool is_drawn_here) {
+  DrawTerms terms;
+  terms.strand_share = strand_share;
+  const StrandDetail detail = choose_detail(p.facts, p.look, turn.view, terms);
+  // Who draws here moves points onto the screen, in place.
+  const bool is_expanded = p.expanded_state == p.state_number && is_same(detail, p.detail) && !is_drawn_here;
+  if (is_expanded && turn.rotation == p.rotation) return;
+  p.detail = detail;
+  p.rotation = turn.rotation;
+  p.expansion.expand(p.position_m, detail, p.workers, kSet, p.points);
+  p.expanded_state = p.state_number;
+  ++p.parts.light_number;
+  p.width_m = drawn_width_m(p.facts, p.look, std::max(p.points.strand_count(), 1u));
+  p.lights = light_directions(p.look, turn.rotation, turn.view.up);
+  const LatticeFrame frame = fit_lattice(p.lattice.desc(), p.lights, p.position_m,
+                                         style_room_m(style_numbers(p.look, p.facts.mean_length_m)));
+  p.lattice.build(frame, p.points, {p.width_m, p.look.tip_scale, p.look.style.tip_fade}, p.lights, p.workers);
+}
+
+/// Depths, points and strands as a graphics card takes them.
+void place_for_card(StrandPicture& p) {
+  if (p.placed_state == p.parts.light_number) return;
+  p.placed_state = p.parts.light_number;
+  const LightLatticeView& view = p.lattice.view();
+  const auto cells = [](const glm::ivec3& size) { return static_cast<size_t>(size.x) * size.y * size.z; };
+  p.key_depth.resize(cells(view.size));
+  for (size_t i = 0; i < p.key_depth.size(); ++i) p.key_depth[i] = p.half_depth[view.key[i]];
+  const size_t halves = cells(view.half_size);
+  p.other_depth.resize(2 * halves);
+  for (size_t i = 0; i < halves; ++i) {
+    p.other_depth[i] = p.half_depth[view.others[i] & 0xffffu];
+    p.other_depth[halves + i] = p.half_depth[view.others[i] >> 16];
+  }
+  const size_t count = p.points.point.size();
+  p.place_m.assign(3 * (count + 2), 0.0f);
+  for (size_t i = 0; i < count; ++i)
+    std::memcpy(&p.place_m[3 * (i + 1)], &p.points.point[i], 3 * sizeof(float));
+  std::vector<uint32_t> strand;
+  strand.reserve(size_t{4} * p.points.strand_count());
+  for (uint32_t s = 0; s < p.points.strand_count(); ++s) {
+    const uint32_t first = p.points.first_point[s];
+    for (const uint32_t n : {first, p.points.first_point[s + 1] - first, p.points.index[s], p.points.lock[s]})
+      strand.push_back(n);
+  }
+  if (strand == p.strand) return;
+  p.strand = std::move(strand);
+  p.strand_of.resize(count);
+  for (uint32_t s = 0; s < p.points.strand_count(); ++s)
+    std::fill(p.strand_of.begin() + p.points.first_point[s],
+              p.strand_of.begin() + p.points.first_point[s + 1], s);
+  ++p.parts.layout_number;
+}
+
+/// Segments by the depths of their middles, from back to front.
+void order_segments(StrandPicture& p, const View& view) {
+  const size_t count = p.points.point.size();
+  const glm::mat4& m = view.clip_from_head;
+  const glm::vec4 away(m[0].w, m[1].w, m[2].w, m[3].w);
+  p.away_m.resize(count);
+  float low = 1e30f;
+  float high = -1e30f;
+  for (size_t i = 0; i < count; ++i) {
+    const float* const at = &p.place_m[3 * (i + 1)];
+    const float z = away.x * at[0] + away.y * at[1] + away.z * at[2] + away.w;
+    p.away_m[i] = z;
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  constexpr float kSteps = 65535.0f;
+  const float scale = kSteps / std::max(2.0f * (high - low), 1e-9f);
+  p.order.clear();
+  p.order.reserve(count);
+  std::array<std::array<uint32_t, 256>, 2> counts{};
+  for (uint32_t s = 0; s < p.points.strand_count(); ++s)
+    for (uint32_t i = p.points.first_point[s]; i + 1 < p.points.first_point[s + 1]; ++i) {
+      const float nearest = std::min(p.away_m[i], p.away_m[i + 1]);
+      if (!(nearest > view.near_m)) continue;
+      const float step = std::clamp((p.away_m[i] + p.away_m[i + 1] - 2.0f * low) * scale, 0.0f, kSteps);
+      const auto key = 65535u - static_cast<uint32_t>(step);
+      p.order.push_back(uint64_t{key} << 32 | i);
+      ++counts[0][key & 255];
+      ++counts[1][key >> 8];
+    }
+  p.sorted.resize(p.order.size());
+  for (uint32_t pass = 0; pass < 2; ++pass) {
+    uint32_t sum = 0;
+    for (uint32_t& entry : counts[pass]) sum += std::exchange(entry, sum);
+    for (const uint64_t one : p.order) p.sorted[counts[pass][one >> (32 + 8 * pass) & 255]++] = one;
+    std::swap(p.order, p.sorted);
+  }
+  // Each point has two corners, each segment two triangles between four of them.
+  p.corner.resize(6 * p.order.size());
+  uint32_t* out = p.corner.data();
+  for (const uint64_t one : p.order) {
+    const uint32_t first = 2 * static_cast<uint32_t>(one);
+    for (const uint32_t corner : {0u, 1u, 2u, 2u, 1u, 3u}) *out++ = first + corner;
+  }
+}
+
+void draw_here(StrandPicture& p, const Turn& turn) {
+  const glm::uvec2 size(turn.view.target_px);
+  const ShadeInput shade{
+      shading_numbers(p.look), p.lights,       p.lattice.view(), turn.view, p.width_m, p.look.tip_scale,
+      p.look.style.tip_fade,   DebugView::None};
+  shade_points(shade, p.workers, kSet, p.points);
+  p.expanded_state = 0;
+  const TileGrid grid{size};
+  p.bins.bin_segments(p.points, grid, turn.view.near_m, p.workers);
+  if (p.drawn_head.mesh != nullptr) {
+    p.drawn_head.shadow_lift_m = kShadowLift * p.lattice.view().soft_m;
+    place_head(turn.view, p.workers, p.drawn_head);
+  }
+  p.bins.bin_boxes(p.drawn_head.box, grid);
+  p.rgba.resize(size_t{4} * size.x * size.y);
+  const TileInput input{&p.points, &p.bins,           &p.drawn_head, &shade,
+                        grid,      p.look.background, p.srgb.data(), p.rgba.data()};
+  for (uint32_t tile = 0; tile < grid.count(); ++tile) draw_tile(kSet, {&input, &p.scratch, tile});
+}
+
+void remember_error(const Error& error) {
+  remember_core_error(error);
+}
+
+}  // namespace
+
+STRAND_CORE_EXPORT StrandPicture* strand_picture_make(const std::byte* payload, size_t size_bytes) {
+  auto asset = decode_scene_asset({payload, size_bytes});
+  if (!asset) {
+    remember_error(asset.error());
+    return nullptr;
+  }
+  return std::make_unique<StrandPicture>(std::move(asset).value()).release();
+}
+STRAND_CORE_EXPORT void strand_picture_delete(StrandPicture* picture) {
+  delete picture;
+}
+STRAND_CORE_EXPORT const StrandPictureHead* strand_picture_head(const StrandPicture* picture) {
+  return &picture->head;
+}
+
+STRAND_CORE_EXPORT void strand_picture_set_look(StrandPicture* picture, const StrandPictureLook* look,
+                                                const char* hair_color, size_t hair_color_bytes) {
+  picture->look = look_of(*look, std::string(hair_color, hair_color_bytes));
+  picture->expansion.set_look(picture->look);
+  ++picture->state_number;
+}
+STRAND_CORE_EXPORT float* strand_picture_positions(StrandPicture* picture) {
+  return picture->position_m.empty() ? nullptr : &picture->position_m.front().x;
+}
+STRAND_CORE_EXPORT void strand_picture_changed(StrandPicture* picture) {
+  ++picture->state_number;
+}
+
+STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_prepare(StrandPicture* picture,
+                                                                    const StrandPictureView* view) {
+  StrandPicture& p = *picture;
+  const auto turn = turn_of(*view);
+  if (!turn) {
+    remember_error(turn.error());
+    return nullptr;
+  }
+  expand_and_light(p, *turn, view->strand_share, false);
+  place_for_card(p);
+  order_segments(p, turn->view);
+  const LightLatticeView& lattice = p.lattice.view();
+  p.block = make_tile_block(
+      {p.look, turn->view, p.facts, p.detail, p.lights, lattice, kShadowLift * lattice.soft_m});
+  StrandPictureParts& parts = p.parts;
+  parts.block = offset_of(&p.block);
+  parts.block_bytes = sizeof p.block;
+  parts.point_count = static_cast<uint32_t>(p.points.point.size());
+  parts.points = offset_of(p.place_m.data());
+  parts.strands = offset_of(p.strand.data());
+  parts.strand_count = p.points.strand_count();
+  parts.strand_of = offset_of(p.strand_of.data());
+  parts.corner_count = static_cast<uint32_t>(p.corner.size());
+  parts.corners = offset_of(p.corner.data());
+  parts.key_depth = offset_of(p.key_depth.data());
+  parts.other_depth = offset_of(p.other_depth.data());
+  for (int axis = 0; axis < 3; ++axis) {
+    parts.lattice_size[axis] = static_cast<uint32_t>(lattice.size[axis]);
+    parts.half_size[axis] = static_cast<uint32_t>(lattice.half_size[axis]);
+  }
+  return &parts;
+}
+
+STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_draw(StrandPicture* picture,
+                                                                 const StrandPictureView* view) {
+  StrandPicture& p = *picture;
+  const auto turn = turn_of(*view);
+  if (!turn) {
+    remember_error(turn.error());
+    return nullptr;
+  }
+  expand_and_light(p, *turn, view->strand_share, true);
+  draw_here(p, *turn);
+  p.parts.rgba = offset_of(p.rgba.data());
+  return &p.parts;
+}

@@ -1,0 +1,91 @@
+// What a page draws strands from, for scripts, by plain functions as in strand_core.h: strands expanded, lit
+// and ordered for a graphics card, or drawn here, tile by tile, where there is none. Whoever calls has one
+// thread. Memory may grow in every call: views of it are made anew behind each.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+struct StrandPicture;
+
+/// Numbers of a look, all of LookDesc (common/scene/scene_desc.h) but its name of a colour and its methods.
+struct StrandPictureLook {
+  float root_color[3], tip_color[3];                            // 0
+  float eumelanin, pheomelanin, strand_radius_m, tip_scale;     // 6
+  float followers, segments;                                    // 10
+  float light_direction[3], light_color[3];                     // 12
+  float ambient;                                                // 18
+  float background[3], skin_color[3];                           // 19
+  float rim_direction[3], rim_color[3];                         // 25
+  float exposure;                                               // 31
+  float clump, locks, spread, wave_m, wave_count, frizz_m;      // 32, in the order of StrandStyle
+  float frizz_count, stray_share, stray_spread, length_spread;  // 38
+  float short_share, tip_fade;                                  // 42
+  float diffuse, scatter, highlight, transmission;              // 44, in the order of HairShading
+  float second_highlight, highlight_width_deg, cuticle_deg;     // 48
+  float cuticle_spread_deg, root_darkening, strand_variation;   // 51
+  float lock_variation, warmth_variation, wetness;              // 54
+};
+static_assert(sizeof(StrandPictureLook) == 57 * sizeof(float));
+
+/// One picture.
+struct StrandPictureView {
+  float width_px, height_px;
+  float offset_m[3], target_m[3], fov_y_rad;  // of the camera
+  float head_rotation[4];                     // w x y z
+  float strand_share;                         // of those that a picture of this size shows
+};
+static_assert(sizeof(StrandPictureView) == 14 * sizeof(float));
+
+/// Where scripts find what was made; pointers are offsets in the module's memory.
+struct StrandPictureParts {
+  uint32_t block;          // 0: TileBlock, as shaders/render/tile_frame.glsl declares it
+  uint32_t block_bytes;    // 4
+  uint32_t point_count;    // 8
+  uint32_t points;         // 12: (point_count + 2) x 3 f32: m, head space, one more at both ends
+  uint32_t strands;        // 16: (strand_count) x 4 u32: first point, points, number among all, lock
+  uint32_t strand_count;   // 20
+  uint32_t strand_of;      // 24: (point_count) u32
+  uint32_t layout_number;  // 28: another one where `strands` and `strand_of` are others
+  uint32_t corner_count;   // 32
+  uint32_t corners;  // 36: (corner_count) u32: triangles from back to front; point i has corners 2 i, 2 i + 1
+  uint32_t key_depth;        // 40: (lattice_size) halves
+  uint32_t other_depth;      // 44: 2 x (half_size) halves: rim, then sky
+  uint32_t lattice_size[3];  // 48
+  uint32_t half_size[3];     // 60
+  uint32_t light_number;     // 72: another one where the depths are others
+  uint32_t rgba;             // 76: (height x width x 4) of strand_picture_draw(), top row first
+};
+static_assert(sizeof(StrandPictureParts) == 80);
+
+/// Of the head that is drawn under the hair.
+struct StrandPictureHead {
+  uint32_t vertex_count;    // 0
+  uint32_t triangle_count;  // 4
+  uint32_t positions;       // 8: (vertex_count) x 3 f32, m, head space
+  uint32_t normals;         // 12: likewise
+  uint32_t covers;          // 16: (vertex_count) f32: 0 bare skin .. 1 under hair
+  uint32_t triangles;       // 20: (triangle_count) x 3 u32
+};
+static_assert(sizeof(StrandPictureHead) == 24);
+
+extern "C" {
+
+/// Of the payload of an asset message; nullptr, and strand_core_error() says why.
+StrandPicture* strand_picture_make(const std::byte* payload, size_t size_bytes);
+void strand_picture_delete(StrandPicture* picture);
+const StrandPictureHead* strand_picture_head(const StrandPicture* picture);
+
+/// `hair_color`: a name of common/scene/hair_color.h.
+void strand_picture_set_look(StrandPicture* picture, const StrandPictureLook* look, const char* hair_color,
+                             size_t hair_color_bytes);
+/// Where the next state's positions go: head space, m, (vertex_count x strand_count x 3), all strands.
+float* strand_picture_positions(StrandPicture* picture);
+/// New ones are there.
+void strand_picture_changed(StrandPicture* picture);
+
+/// Strands for a graphics card; nullptr for a view that is none.
+const StrandPictureParts* strand_picture_prepare(StrandPicture* picture, const StrandPictureView* view);
+/// The whole picture, made by this processor.
+const StrandPictureParts* strand_picture_draw(StrandPicture* picture, const StrandPictureView* view);
+}
