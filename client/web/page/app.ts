@@ -1,10 +1,508 @@
-// The page: starts the worker that has the connection, and shows what it says.
-const assets: { worker: string } = JSON.parse(
-  document.querySelector<HTMLMetaElement>('meta[name="strandcast-assets"]')!.content);
+// The page: its window, controls and measurements. The connection and the drawing are in workers (session.ts,
+// drawer.ts); what comes here is small, but for the server's pictures.
+import { linkTo, readFragment, withoutToken } from './address';
+import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
+import { Hud, Row, Warnings } from './ui/hud';
+import { followKey, followPointers, presets } from './ui/orbit';
+import { Panel } from './ui/panel';
+import {
+  CameraMessage, Command, Device, FrameQualityMessage, LookMessage, Mode, Role, StatusMessage, StreamQualityMessage,
+  WelcomeMessage,
+} from './wire';
 
-const worker = new Worker(assets.worker, { type: 'module' });
-worker.onmessage = (event: MessageEvent<{ mode: string; text: string }>) => {
-  document.getElementById('state')!.textContent = event.data.text;
-  document.documentElement.dataset.strandcast = JSON.stringify({ mode: event.data.mode });
-};
-worker.postMessage({ url: location.origin.replace(/^http/, 'ws') + '/v1' });
+const MOST_PICTURE_SIDE = 1280; // of pictures that the server draws for this window
+const SAMPLES = 4;
+
+// The token leaves the address before anything is asked for.
+const wishes = readFragment(location.hash);
+history.replaceState(null, '', location.pathname + location.search + withoutToken(location.hash));
+
+const at = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
+const stage = at('stage');
+const pictures = at<HTMLCanvasElement>('pictures');
+const strands = at<HTMLCanvasElement>('strands');
+const hud = new Hud(at<HTMLButtonElement>('hud-line'), at('hud-table'));
+const warnings = new Warnings(at('warnings'));
+
+interface Assets {
+  worker: string;
+  core: string;
+}
+function assets(): Assets {
+  const content = document.querySelector<HTMLMetaElement>('meta[name=strandcast-assets]')?.content ?? '';
+  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { worker: 'worker.js', core: 'strand_core.wasm' };
+}
+
+const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: [number, number, number]): [number, number, number] =>
+  v ? [v.x, v.y, v.z] : otherwise;
+function cameraOf(message: CameraMessage | undefined): Camera {
+  const offset = toScene(message?.offset_m, [0.22, 0.07, 0.62]);
+  return {
+    offset: Math.hypot(...offset) > 0.12 ? offset : [0.22, 0.07, 0.62],
+    target: toScene(message?.target_m, [0, -0.055, 0]), fov: message?.fov_y_rad || 0.61,
+  };
+}
+
+const sentence = (text: string): string => (text ? `${text[0]!.toUpperCase()}${text.slice(1).replace(/\.$/, '')}.` : '');
+
+/** Farther away where the window is higher than wide: a head is as wide as the scene's author saw it. */
+function fitted(camera: Camera): Camera {
+  const by = Math.min(Math.max(0.85 / (stage.clientWidth / Math.max(stage.clientHeight, 1)), 1), 2);
+  return { ...camera, offset: camera.offset.map((at) => at * by) as Camera['offset'] };
+}
+
+/** A value of a look by its path, in a copy. */
+function withValue(look: LookMessage, path: string, value: string): LookMessage {
+  const copy = structuredClone(look) as LookMessage;
+  const names = path.split('.').slice(1);
+  let place = copy as unknown as { [name: string]: unknown };
+  for (const name of names.slice(0, -1)) place = place[name] as { [name: string]: unknown };
+  const last = names[names.length - 1]!;
+  place[last] = typeof place[last] === 'number' ? Number(value) : value;
+  return copy;
+}
+
+class Viewer {
+  private readonly net: Worker;
+  private readonly draw?: Worker;
+  private asked: Asked;
+  private welcome?: WelcomeMessage;
+  private status?: StatusMessage;
+  private quality?: StreamQualityMessage;
+  private frameQuality?: FrameQualityMessage;
+  private look?: LookMessage; // the scene's
+  private ownLook?: LookMessage; // of this window alone
+  private home: Camera = cameraOf(undefined);
+  private camera: Camera = this.home;
+  private isOwnCamera = false;
+  private isHeld = false;
+  private shown: number = -1;
+  private reason = '';
+  private figures?: NetFigures;
+  private drawFigures?: DrawFigures;
+  private drawnBy = '';
+  private drawWhy = '';
+  private device: number = Device.unknown;
+  private rate = { bytes: 0, timeMs: 0, kbits: 0 };
+  private pictureTimes: number[] = [];
+  private isConnected = false;
+  private sentCamera = '';
+  private retryAtMs = 0;
+  private readonly panel: Panel;
+
+  constructor() {
+    const size = wishes.size ?? this.pictureSize();
+    const canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
+    const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
+    this.asked = {
+      url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec,
+      role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: canDraw,
+    };
+    const { worker, core } = assets();
+    const coreUrl = new URL(core, location.href).href;
+    const states = new MessageChannel();
+    this.net = new Worker(worker, { type: 'module', name: 'net' });
+    this.net.onmessage = (event: MessageEvent<FromNet>) => this.fromNet(event.data);
+    this.net.onerror = () => this.ended('this browser does not start the page’s worker');
+    this.toNet({ kind: 'start', core: coreUrl, asked: this.asked, states: states.port1 }, [states.port1]);
+    if (canDraw) {
+      this.draw = new Worker(worker, { type: 'module', name: 'draw' });
+      this.draw.onmessage = (event: MessageEvent<FromDraw>) => this.fromDraw(event.data);
+      const canvas = strands.transferControlToOffscreen();
+      this.toDraw({ kind: 'start', core: coreUrl, canvas, states: states.port2, wish: wishes.draw, samples: SAMPLES },
+        [canvas as unknown as Transferable, states.port2]);
+    } else {
+      this.device = Device.none;
+      this.drawWhy = 'this browser cannot draw beside the page';
+    }
+    if (wishes.camera) {
+      this.camera = wishes.camera;
+      this.isOwnCamera = true;
+    }
+    this.panel = new Panel(at('panel'), {
+      set: (path, value) => this.set(path, value),
+      askScene: () => this.toNet({ kind: 'scene' }),
+      close: () => this.togglePanel(),
+    });
+    this.bind();
+    setInterval(() => this.tick(), 500);
+    if (!isSecureContext) {
+      warnings.say('This page came without TLS: the browser then decodes no video. Over https pictures would take less of the link.');
+    }
+  }
+
+  private toNet(message: ToNet, transfer: Transferable[] = []): void {
+    this.net.postMessage(message, transfer);
+  }
+  private toDraw(message: ToDraw, transfer: Transferable[] = []): void {
+    this.draw?.postMessage(message, transfer);
+  }
+  private get isController(): boolean {
+    return this.welcome?.role === Role.controller || this.welcome?.role === Role.admin;
+  }
+
+  // ---- from the connection
+
+  private fromNet(message: FromNet): void {
+    switch (message.kind) {
+      case 'welcome':
+        return this.begin(message.welcome);
+      case 'state':
+        return this.connection(message.state, message.reason, message.retryMs);
+      case 'shown':
+        this.shown = message.mode;
+        this.reason = message.reason || this.reason;
+        return this.showMode();
+      case 'modeReason':
+        this.reason = message.reason;
+        return this.tick();
+      case 'look':
+        return this.sceneLook(message.look, message.camera);
+      case 'status':
+        this.status = message.status;
+        at('pause').classList.toggle('paused', message.status.is_paused);
+        at('pause').querySelector('.label')!.textContent = message.status.is_paused ? 'Resume' : 'Pause';
+        at<HTMLButtonElement>('step').disabled = !message.status.is_paused;
+        return;
+      case 'quality':
+        this.quality = message.quality;
+        return;
+      case 'frameQuality':
+        this.frameQuality = message.quality;
+        return;
+      case 'notice':
+        return warnings.say(message.text, message.isError);
+      case 'sceneText':
+        return this.panel.showScene(message.text);
+      case 'picture':
+        return this.showPicture(message.picture, message.width, message.height);
+      case 'figures':
+        this.figures = message.figures;
+        return;
+    }
+  }
+
+  private begin(welcome: WelcomeMessage): void {
+    this.welcome = welcome;
+    this.reason = welcome.mode_reason;
+    this.quality = undefined;
+    document.title = `${welcome.scene_name}: Strandcast`;
+    at('simulation-tools').hidden = !this.isController;
+    this.sceneLook(welcome.look, welcome.camera);
+    this.panel.setRole(this.isController, this.shown !== Mode.frames);
+    if (this.panel.isOpen) this.toNet({ kind: 'scene' });
+    this.sentCamera = '';
+    this.lookFrom(this.camera);
+    const isFull = welcome.look?.methods && Object.values(welcome.look.methods).some((name) => name && name !== 'main');
+    if (isFull) warnings.say('This look asks for ways to draw that only the server has: strands are drawn here by the usual ones.');
+  }
+  private sceneLook(look: LookMessage | undefined, camera: CameraMessage | undefined): void {
+    if (look) {
+      this.look = look;
+      this.showLook();
+    }
+    if (!camera) return;
+    this.home = cameraOf(camera);
+    if (!this.isOwnCamera) this.lookFrom(fitted(this.home));
+  }
+  private showLook(): void {
+    const look = this.ownLook ?? this.look!;
+    this.toDraw({ kind: 'look', look });
+    this.panel.showLook(look);
+  }
+
+  private connection(state: 'connecting' | 'open' | 'waiting' | 'ended', reason: string, retryMs: number): void {
+    this.isConnected = state === 'open';
+    const box = at('trouble');
+    const isTokenWanted = state === 'ended' && /token|role/i.test(reason);
+    const wasAway = !box.hidden;
+    // What was seen stays seen for the moment that a reconnection takes.
+    box.hidden = state === 'open' || (state === 'connecting' && box.hidden && this.shown >= 0);
+    at('trouble-title').textContent = state === 'ended' ? `No connection to ${location.host}`
+      : this.welcome ? `Connection to ${location.host} lost` : `Connecting to ${location.host}`;
+    if (reason || state === 'open') at('trouble-why').textContent = sentence(reason);
+    this.retryAtMs = state === 'waiting' ? performance.now() + retryMs : 0;
+    at('trouble-next').textContent = state === 'connecting' ? 'Waiting for its answer.' : '';
+    at('try-now').hidden = state !== 'waiting' && !(state === 'ended' && !isTokenWanted);
+    at('token-form').hidden = !isTokenWanted;
+    if (isTokenWanted) at('token').focus();
+    if (state === 'open' && wasAway && this.shown >= 0) warnings.say('Connected again.');
+    this.tick();
+  }
+  private ended(reason: string): void {
+    this.connection('ended', reason, 0);
+  }
+
+  private showPicture(picture: VideoFrame | ImageBitmap, width: number, height: number): void {
+    if (pictures.width !== width) pictures.width = width;
+    if (pictures.height !== height) pictures.height = height;
+    pictures.getContext('2d', { alpha: false })!.drawImage(picture as ImageBitmap, 0, 0, width, height);
+    picture.close();
+    this.pictureTimes.push(performance.now());
+    requestAnimationFrame(() => this.toNet({ kind: 'pictureShown' }));
+  }
+  private showMode(): void {
+    const isFrames = this.shown === Mode.frames;
+    pictures.hidden = !isFrames;
+    strands.hidden = isFrames;
+    this.toDraw({ kind: 'visible', isVisible: !isFrames });
+    this.panel.setRole(this.isController, !isFrames);
+    this.sentCamera = '';
+    this.lookFrom(this.camera);
+    this.tick();
+  }
+
+  // ---- from the drawing
+
+  private fromDraw(message: FromDraw): void {
+    switch (message.kind) {
+      case 'ready':
+        this.device = message.device;
+        this.drawnBy = message.drawnBy;
+        this.drawWhy = message.why;
+        this.sendSize();
+        return;
+      case 'figures':
+        this.drawFigures = message.figures;
+        return;
+      case 'drawn':
+        return;
+      case 'shot':
+        if (message.blob) this.save(message.blob);
+        return;
+      case 'failed':
+        this.device = Device.none;
+        this.drawWhy = message.reason;
+        warnings.say(`Strands cannot be drawn here: ${message.reason}. The server’s pictures are shown.`, true);
+        return this.toNet({ kind: 'mode', mode: Mode.frames });
+    }
+  }
+
+  // ---- what a person does
+
+  private pictureSize(): { width: number; height: number } {
+    const ratio = Math.min(devicePixelRatio, MOST_PICTURE_SIDE / Math.max(innerWidth, innerHeight, 1));
+    const side = (length: number): number => Math.max(64, Math.round((length * ratio) / 16) * 16);
+    return { width: side(innerWidth), height: side(innerHeight) };
+  }
+  private sendSize(): void {
+    const ratio = Math.min(devicePixelRatio, 2);
+    const size = wishes.size ?? { width: Math.round(stage.clientWidth * ratio), height: Math.round(stage.clientHeight * ratio) };
+    this.toDraw({ kind: 'size', ...size });
+  }
+  private lookFrom(camera: Camera): void {
+    this.camera = camera;
+    this.toDraw({ kind: 'camera', camera, isMoving: this.isHeld });
+    const text = JSON.stringify(camera);
+    if (text === this.sentCamera || !this.welcome) return;
+    this.sentCamera = text;
+    this.toNet({ kind: 'camera', camera });
+  }
+  private change = (move: (camera: Camera) => Camera): void => {
+    this.isOwnCamera = true;
+    at<HTMLSelectElement>('view').value = '';
+    this.lookFrom(move(this.camera));
+  };
+  private usePreset(index: number): void {
+    const preset = presets[index];
+    if (!preset) return;
+    this.isOwnCamera = index !== 0;
+    at<HTMLSelectElement>('view').value = String(index);
+    this.lookFrom(preset.from(fitted(this.home)));
+  }
+  private set(path: string, value: string): void {
+    if (this.isController) return this.toNet({ kind: 'set', assignment: `${path}=${value}` });
+    if (!this.look || !path.startsWith('look.')) return;
+    this.ownLook = withValue(this.ownLook ?? this.look, path, value);
+    this.showLook();
+  }
+  private command(command: number): void {
+    if (this.isController) this.toNet({ kind: 'command', command });
+    else warnings.say('You watch here: the token or the server gives no right to steer.');
+  }
+  private togglePause(): void {
+    this.command(this.status?.is_paused ? Command.resume : Command.pause);
+  }
+  private setMode(mode: number): void {
+    this.asked.mode = mode;
+    at<HTMLSelectElement>('mode').value = String(mode);
+    this.toNet({ kind: 'mode', mode });
+  }
+  private togglePanel(): void {
+    this.panel.toggle();
+    at('look').setAttribute('aria-expanded', String(this.panel.isOpen));
+    if (this.panel.isOpen) at('panel').querySelector('button')?.focus();
+    else at('look').focus();
+  }
+  private toggleKeys(): void {
+    const keys = at('keys');
+    keys.hidden = !keys.hidden;
+    at('help').setAttribute('aria-expanded', String(!keys.hidden));
+  }
+  private shoot(): void {
+    if (this.shown === Mode.frames) pictures.toBlob((blob) => blob && this.save(blob));
+    else this.toDraw({ kind: 'shot' });
+  }
+  private save(blob: Blob): void {
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(blob);
+    link.download = `strandcast-${new Date().toISOString().slice(0, 19).replace(/[:T]/g, '-')}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    warnings.say('Picture saved.');
+  }
+  private async copyLink(): Promise<void> {
+    const link = linkTo(location.origin + location.pathname, this.camera, this.asked.mode);
+    history.replaceState(null, '', link);
+    try {
+      await navigator.clipboard.writeText(link);
+      warnings.say('A link to this view is copied; it holds no token.');
+    } catch {
+      warnings.say('The link to this view stands in the address; it holds no token.');
+    }
+  }
+
+  private bind(): void {
+    const moves = {
+      change: this.change,
+      hold: (isHeld: boolean) => {
+        this.isHeld = isHeld;
+        this.lookFrom(this.camera);
+      },
+    };
+    followPointers(stage, moves);
+    const view = at<HTMLSelectElement>('view');
+    view.append(new Option('your own', ''));
+    presets.forEach((preset, i) => view.append(new Option(preset.name, String(i))));
+    view.value = this.isOwnCamera ? '' : '0';
+    view.addEventListener('change', () => view.value !== '' && this.usePreset(Number(view.value)));
+    const mode = at<HTMLSelectElement>('mode');
+    mode.value = String(wishes.mode);
+    mode.addEventListener('change', () => this.setMode(Number(mode.value)));
+    at('pause').addEventListener('click', () => this.togglePause());
+    at('step').addEventListener('click', () => this.command(Command.stepOnce));
+    at('reset').addEventListener('click', () => this.command(Command.reset));
+    at('shot').addEventListener('click', () => this.shoot());
+    at('link').addEventListener('click', () => void this.copyLink());
+    at('look').addEventListener('click', () => this.togglePanel());
+    at('help').addEventListener('click', () => this.toggleKeys());
+    at('try-now').addEventListener('click', () => this.toNet({ kind: 'reconnect', asked: this.asked }));
+    at('token-form').addEventListener('submit', (event) => {
+      event.preventDefault();
+      const field = at<HTMLInputElement>('token');
+      this.asked = { ...this.asked, token: field.value.trim(), role: wishes.isViewOnly ? Role.viewer : Role.controller };
+      field.value = '';
+      this.toNet({ kind: 'reconnect', asked: this.asked });
+    });
+    new ResizeObserver(() => this.sendSize()).observe(stage);
+    addEventListener('keydown', (event) => this.key(event, moves));
+  }
+  private key(event: KeyboardEvent, moves: Parameters<typeof followKey>[1]): void {
+    const target = event.target as HTMLElement;
+    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName)) return;
+    if (event.key === 'Escape') {
+      if (!at('keys').hidden) this.toggleKeys();
+      else if (this.panel.isOpen) this.togglePanel();
+      return;
+    }
+    if (event.key === ' ' && target.tagName === 'BUTTON') return;
+    if (followKey(event, moves)) return event.preventDefault();
+    const actions: { [key: string]: () => void } = {
+      ' ': () => this.togglePause(), n: () => this.command(Command.stepOnce), r: () => this.usePreset(0),
+      m: () => this.setMode({ [Mode.auto]: Mode.strands, [Mode.strands]: Mode.frames, [Mode.frames]: Mode.auto }[this.asked.mode] ?? Mode.auto),
+      s: () => this.shoot(), l: () => this.togglePanel(), u: () => hud.toggle(), h: () => this.toggleKeys(),
+      f: () => void (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()),
+    };
+    const action = actions[event.key.toLowerCase()];
+    if (action) action();
+    else if (/^[1-6]$/.test(event.key)) this.usePreset(Number(event.key));
+    else return;
+    event.preventDefault();
+    this.tick();
+  }
+
+  // ---- twice a second
+
+  private tick(): void {
+    const now = performance.now();
+    if (this.retryAtMs) {
+      const seconds = Math.max(0, (this.retryAtMs - now) / 1000);
+      at('trouble-next').textContent = `Trying again in ${seconds.toFixed(0)} s.`;
+    }
+    const figures = this.figures;
+    const bytes = figures?.receivedBytes ?? 0;
+    if (now - this.rate.timeMs > 1500) {
+      const kbits = (Math.max(0, bytes - this.rate.bytes) * 8) / Math.max(now - this.rate.timeMs, 1);
+      this.rate = { bytes, timeMs: now, kbits };
+    }
+    this.pictureTimes = this.pictureTimes.filter((time) => now - time < 2000);
+    const isFrames = this.shown === Mode.frames;
+    const hz = isFrames ? this.pictureTimes.length / 2 : this.drawFigures?.shownHz ?? 0;
+    this.toNet({ kind: 'drawn', drawMs: this.drawFigures?.drawMs ?? 0, shownHz: hz, device: this.device });
+    this.showWarnings();
+    if (!this.welcome || !figures) return hud.show(this.isConnected ? 'Connected' : 'Connecting', []);
+    hud.show(this.line(hz), this.rows(hz));
+  }
+  private showWarnings(): void {
+    const all: string[] = [];
+    if (this.status?.is_paused) all.push(this.isController ? 'Paused: Space resumes, N steps' : 'Paused');
+    if (this.isConnected && this.status?.is_motion_stale) all.push('No head motion arrives at the server');
+    if (this.isConnected && this.status?.slow_motion) all.push(this.status.slow_motion);
+    warnings.keep(all);
+  }
+  private latencyMs(): number {
+    const drawMs = this.shown === Mode.frames ? 0 : this.drawFigures?.drawMs ?? 0;
+    return this.figures!.motionMs ? this.figures!.motionMs + drawMs : 0;
+  }
+  private line(hz: number): string {
+    const what = this.shown === Mode.frames ? 'server’s pictures' : 'strands';
+    const parts = [`${hz >= 9.5 ? hz.toFixed(0) : hz.toFixed(1)} fps`, what, `${this.rate.kbits.toFixed(0)} kbit/s`];
+    if (this.latencyMs()) parts.push(`${this.latencyMs().toFixed(0)} ms from motion`);
+    return this.isConnected ? parts.join(' · ') : `not connected · ${what}`;
+  }
+  private rows(hz: number): Row[] {
+    const welcome = this.welcome!;
+    const figures = this.figures!;
+    const isFrames = this.shown === Mode.frames;
+    const rows: Row[] = [
+      ['scene', `${welcome.scene_name}, ${welcome.strand_count} strands x ${welcome.vertex_count}`],
+      ['mode', `${isFrames ? 'the server’s pictures' : 'strands, drawn here'}; asked for ${['strands', 'pictures', 'auto'][this.asked.mode]}`],
+    ];
+    const add = (name: string, text: string): void => void (text && rows.push([name, text]));
+    add('because', this.reason);
+    add('you', this.isController ? 'may steer' : 'watch');
+    add('shown', `${hz.toFixed(1)} pictures/s`);
+    add('drawn by', isFrames ? 'the server' : `${this.drawnBy}: ${this.drawWhy}`);
+    const drawn = this.drawFigures;
+    if (!isFrames && drawn) {
+      add('drawn in', `${drawn.drawMs.toFixed(0)} ms, ${(drawn.share * 100).toFixed(0)} % of the sides`);
+      if (drawn.segments) add('of', `${drawn.strands} strands, ${drawn.segments} segments`);
+    }
+    if (isFrames) {
+      const quality = this.frameQuality;
+      add('pictures by', figures.pictureCodec);
+      if (quality) add('pictures', `${quality.width} x ${quality.height}, quality ${quality.quality}, at most ${quality.rate_hz.toFixed(0)} Hz: ${quality.reason}`);
+    } else {
+      add('strands by', figures.codec + (figures.codecReason ? `: ${figures.codecReason}` : ''));
+      if (this.quality)
+        add('stream of', `${(this.quality.strand_share * 100).toFixed(0)} % of the strands every ${this.quality.rate_divisor} steps within ${(this.quality.bound_m * 1000).toPrecision(2)} mm: ${this.quality.reason}`);
+    }
+    add('decoded in', `${figures.decodeMs.toFixed(2)} ms`);
+    const status = this.status;
+    if (status) {
+      add('simulation', `${status.sim_ms.toFixed(2)} ms, x${status.realtime_factor.toFixed(2)} real time`);
+      add('encoded in', `${status.encode_ms.toFixed(2)} ms`);
+    }
+    add('simulated by', welcome.sim_device);
+    add('received', `${this.rate.kbits.toFixed(0)} kbit/s, ${figures.decodedFrames} frames`);
+    if (figures.ageMs > 0) add('age', `${figures.ageMs.toFixed(0)} ms`);
+    if (this.latencyMs()) add('motion to photon', `${this.latencyMs().toFixed(0)} ms`);
+    add('round trip', `${figures.roundTripMs.toFixed(1)} ms${status ? `, ${status.queue_delay_ms.toFixed(0)} ms queued` : ''}`);
+    add('dropped', `${status?.dropped_frames ?? 0} at the server, ${figures.missedFrames} missed, ${figures.rejectedFrames} refused, ${figures.replacedStates} not drawn`);
+    if (figures.lastError) add('last refused', figures.lastError);
+    if (status) add('tick', `${status.tick}, ${status.viewer_count} ${status.viewer_count === 1 ? 'viewer' : 'viewers'}`);
+    return rows;
+  }
+}
+
+new Viewer();

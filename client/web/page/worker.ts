@@ -1,7 +1,6 @@
-// The worker: has the connection.
-onmessage = (event: MessageEvent<{ url: string }>) => {
-  const socket = new WebSocket(event.data.url, 'strandcast.v1');
-  const tell = (mode: string, text: string) => postMessage({ mode, text });
-  socket.onopen = () => tell('open', 'The server answers.');
-  socket.onclose = (closed) => tell('closed', `The connection ended: ${closed.reason || closed.code}.`);
-};
+// Entry of the workers' bundle: which of the two it is, its name says.
+import { runDrawer } from './drawer';
+import { runNet } from './session';
+
+if (self.name === 'draw') runDrawer();
+else runNet();

@@ -1,0 +1,45 @@
+// What stands behind the # of the page's address: a token, which is taken out of it at once, and what a link to a
+// view says. Nothing of it is ever sent but the token, in the Hello.
+import type { Camera, Vec3 } from './messages';
+
+export interface Wishes {
+  token: string;
+  mode: number; // of wire.ts; auto where nothing is said
+  camera?: Camera;
+  codec: string;
+  draw: string; // "gl" or "tiles" insists
+  isViewOnly: boolean;
+  size?: { width: number; height: number };
+}
+
+const MODES: { [name: string]: number } = { strands: 0, pictures: 1, frames: 1, auto: 2 };
+const DIGITS = 4;
+
+export function readFragment(fragment: string): Wishes {
+  const words = new URLSearchParams(fragment.replace(/^#/, ''));
+  const wishes: Wishes = {
+    token: words.get('token') ?? '', mode: MODES[words.get('mode') ?? 'auto'] ?? 2, codec: words.get('codec') ?? '',
+    draw: words.get('draw') ?? '', isViewOnly: words.has('view-only'),
+  };
+  const numbers = (words.get('view') ?? '').split(',').map(Number);
+  if (numbers.length === 7 && numbers.every(Number.isFinite) && Math.hypot(numbers[0]!, numbers[1]!, numbers[2]!) > 0.01 &&
+      numbers[6]! > 0.02 && numbers[6]! < 2.8)
+    wishes.camera = { offset: numbers.slice(0, 3) as Vec3, target: numbers.slice(3, 6) as Vec3, fov: numbers[6]! };
+  const size = /^(\d+)x(\d+)$/.exec(words.get('size') ?? '');
+  if (size) wishes.size = { width: Number(size[1]), height: Number(size[2]) };
+  return wishes;
+}
+
+/** The fragment without its token. */
+export function withoutToken(fragment: string): string {
+  const words = new URLSearchParams(fragment.replace(/^#/, ''));
+  words.delete('token');
+  const rest = words.toString().replace(/=(?=&|$)/g, '').replace(/%2C/g, ',');
+  return rest ? `#${rest}` : '';
+}
+
+export function linkTo(base: string, camera: Camera, mode: number): string {
+  const view = [...camera.offset, ...camera.target, camera.fov].map((n) => Number(n.toFixed(DIGITS))).join(',');
+  const name = Object.keys(MODES).find((one) => MODES[one] === mode);
+  return `${base}#view=${view}${name && name !== 'auto' ? `&mode=${name}` : ''}`;
+}

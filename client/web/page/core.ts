@@ -1,0 +1,95 @@
+// The strand core in WebAssembly (client/web/strand_core.h, strand_picture.h), typed.
+import { loadStrandCore } from '../strand_core.mjs';
+
+export interface CoreFunctions {
+  memory: WebAssembly.Memory;
+  strand_core_allocate(bytes: number): number;
+  strand_core_free(at: number): void;
+  strand_core_make(codec: number, bytes: number, strands: number, vertices: number): number;
+  strand_core_delete(decoder: number): void;
+  strand_core_set_asset(decoder: number, at: number, bytes: number): number;
+  strand_core_decode(decoder: number, at: number, bytes: number): number;
+  strand_core_state(decoder: number): number;
+  strand_core_positions(decoder: number): number;
+  strand_core_all_positions(decoder: number): number;
+  strand_core_position_floats(decoder: number): number;
+  strand_core_error(): number;
+  strand_picture_make(at: number, bytes: number): number;
+  strand_picture_delete(picture: number): void;
+  strand_picture_head(picture: number): number;
+  strand_picture_set_look(picture: number, look: number, color: number, colorBytes: number): void;
+  strand_picture_positions(picture: number): number;
+  strand_picture_changed(picture: number): void;
+  strand_picture_prepare(picture: number, view: number): number;
+  strand_picture_draw(picture: number, view: number): number;
+}
+
+export class Core {
+  private constructor(readonly call: CoreFunctions) {}
+
+  static async load(url: string): Promise<Core> {
+    const response = await fetch(url);
+    if (!response.ok) throw new Error(`${url}: the server says ${response.status}`);
+    return new Core((await loadStrandCore(await response.arrayBuffer())) as CoreFunctions);
+  }
+
+  view(): DataView {
+    return new DataView(this.call.memory.buffer);
+  }
+  bytes(): Uint8Array {
+    return new Uint8Array(this.call.memory.buffer);
+  }
+  /** Calls use(pointer, size) with the bytes in the module's memory. */
+  lend<T>(bytes: Uint8Array, use: (at: number, size: number) => T): T {
+    const at = this.call.strand_core_allocate(Math.max(bytes.length, 1));
+    if (!at) throw new Error('there is no memory left');
+    this.bytes().set(bytes, at);
+    try {
+      return use(at, bytes.length);
+    } finally {
+      this.call.strand_core_free(at);
+    }
+  }
+  error(): string {
+    const memory = this.bytes();
+    const begin = this.call.strand_core_error();
+    return new TextDecoder().decode(memory.slice(begin, memory.indexOf(0, begin)));
+  }
+}
+
+/** A decoder of one codec, with the newest state. */
+export class StrandDecoder {
+  private readonly decoder: number;
+  constructor(private readonly core: Core, readonly codec: string, strands: number, vertices: number) {
+    this.decoder = core.lend(new TextEncoder().encode(codec), (at, size) =>
+      core.call.strand_core_make(at, size, strands, vertices));
+    if (!this.decoder) throw new Error(core.error());
+  }
+  delete(): void {
+    this.core.call.strand_core_delete(this.decoder);
+  }
+  setAsset(payload: Uint8Array): void {
+    if (!this.core.lend(payload, (at, size) => this.core.call.strand_core_set_asset(this.decoder, at, size)))
+      throw new Error(this.core.error());
+  }
+  /** Throws where the message cannot be used, or its state's hash is another one: the state is then what it was. */
+  decode(message: Uint8Array): void {
+    if (!this.core.lend(message, (at, size) => this.core.call.strand_core_decode(this.decoder, at, size)))
+      throw new Error(this.core.error());
+  }
+  motionTimeNs(): number {
+    return Number(this.core.view().getBigInt64(this.core.call.strand_core_state(this.decoder) + 16, true));
+  }
+  /** Copies of what is drawn: positions of all strands in head space, and how the head is turned. */
+  state(): { positions: Float32Array; rotation: [number, number, number, number] } {
+    const positionsAt = this.core.call.strand_core_all_positions(this.decoder);
+    const state = this.core.call.strand_core_state(this.decoder);
+    const view = this.core.view();
+    const rotation = [48, 56, 64, 72].map((offset) => view.getFloat64(state + offset, true));
+    const floats = this.core.call.strand_core_position_floats(this.decoder);
+    return {
+      positions: new Float32Array(this.core.call.memory.buffer, positionsAt, floats).slice(),
+      rotation: rotation as [number, number, number, number],
+    };
+  }
+}

@@ -1,0 +1,3 @@
+// Of a program that only captures.
+out vec4 out_color;
+void main() { out_color = vec4(0.0); }

@@ -1,0 +1,93 @@
+// What the page's threads tell one another. The page itself (app.ts) has the window, one worker the connection
+// (session.ts), one the drawing (drawer.ts). States go straight from the connection to the drawing, pictures to
+// the page; at most one of each is on its way, and the newest waits.
+import type { CameraMessage, FrameQualityMessage, LookMessage, StatusMessage, StreamQualityMessage, WelcomeMessage } from './wire';
+
+export type Vec3 = [number, number, number];
+export interface Camera {
+  offset: Vec3; // m, from the point looked at, world axes
+  target: Vec3; // m, from the head joint, world axes
+  fov: number; // rad, vertical
+}
+
+export interface Asked {
+  url: string; // ws: or wss:
+  token: string;
+  mode: number;
+  role: number;
+  codec: string;
+  width: number; // of pictures that the server draws
+  height: number;
+  drawsStrands: boolean;
+}
+
+export type ToNet =
+  | { kind: 'start'; core: string; asked: Asked; states: MessagePort }
+  | { kind: 'reconnect'; asked: Asked }
+  | { kind: 'mode'; mode: number }
+  | { kind: 'camera'; camera: Camera }
+  | { kind: 'command'; command: number }
+  | { kind: 'set'; assignment: string }
+  | { kind: 'scene' }
+  | { kind: 'drawn'; drawMs: number; shownHz: number; device: number }
+  | { kind: 'pictureShown' };
+
+/** Numbers of the connection, twice a second. */
+export interface NetFigures {
+  mode: number; // shown
+  decodeMs: number; // median
+  receivedBytes: number;
+  decodedFrames: number;
+  rejectedFrames: number;
+  missedFrames: number;
+  replacedStates: number; // decoded, and never drawn: a newer one was there first
+  ageMs: number; // of the newest state or picture, since the server sent it
+  motionMs: number; // from a motion sample at the server to what was decoded and shows it
+  roundTripMs: number;
+  codec: string;
+  codecReason: string;
+  pictureCodec: string;
+  lastError: string;
+}
+
+export type FromNet =
+  | { kind: 'welcome'; welcome: WelcomeMessage }
+  | { kind: 'state'; state: 'connecting' | 'open' | 'waiting' | 'ended'; reason: string; retryMs: number }
+  | { kind: 'asset' }
+  | { kind: 'shown'; mode: number; reason: string }
+  | { kind: 'modeReason'; reason: string }
+  | { kind: 'look'; look?: LookMessage; camera?: CameraMessage }
+  | { kind: 'status'; status: StatusMessage }
+  | { kind: 'quality'; quality: StreamQualityMessage }
+  | { kind: 'frameQuality'; quality: FrameQualityMessage }
+  | { kind: 'notice'; isError: boolean; text: string }
+  | { kind: 'sceneText'; text: string }
+  | { kind: 'picture'; picture: VideoFrame | ImageBitmap; width: number; height: number }
+  | { kind: 'figures'; figures: NetFigures };
+
+/** From the connection to the drawing, by their own port; the drawing asks for each with 'next'. */
+export type State =
+  | { kind: 'asset'; payload: ArrayBuffer }
+  | { kind: 'strands'; positions: Float32Array; rotation: [number, number, number, number] };
+
+export type ToDraw =
+  | { kind: 'start'; core: string; canvas: OffscreenCanvas; states: MessagePort; wish: string; samples: number }
+  | { kind: 'look'; look: LookMessage }
+  | { kind: 'camera'; camera: Camera; isMoving: boolean }
+  | { kind: 'size'; width: number; height: number }
+  | { kind: 'visible'; isVisible: boolean }
+  | { kind: 'shot' };
+
+export interface DrawFigures {
+  drawMs: number; // median of pictures in motion
+  shownHz: number;
+  share: number; // of the window's sides
+  strands: number;
+  segments: number;
+}
+export type FromDraw =
+  | { kind: 'ready'; device: number; drawnBy: string; why: string }
+  | { kind: 'figures'; figures: DrawFigures }
+  | { kind: 'drawn' }
+  | { kind: 'shot'; blob: Blob | null }
+  | { kind: 'failed'; reason: string };

@@ -1,0 +1,132 @@
+// Strands as the core makes them ready to be drawn (client/web/strand_picture.h).
+import type { Core } from './core';
+import type { Camera } from './messages';
+import type { LookMessage } from './wire';
+
+export interface PictureParts {
+  block: number;
+  blockBytes: number;
+  pointCount: number;
+  points: number;
+  strands: number;
+  strandCount: number;
+  strandOf: number;
+  layoutNumber: number;
+  cornerCount: number;
+  corners: number;
+  keyDepth: number;
+  otherDepth: number;
+  latticeSize: [number, number, number];
+  halfSize: [number, number, number];
+  lightNumber: number;
+  rgba: number;
+}
+
+export interface PictureHead {
+  positions: Float32Array;
+  normals: Float32Array;
+  covers: Float32Array;
+  triangles: Uint32Array;
+}
+
+const LOOK_FLOATS = 57;
+const VIEW_FLOATS = 14;
+
+const rgb = (c?: { r: number; g: number; b: number }): number[] => [c?.r ?? 0, c?.g ?? 0, c?.b ?? 0];
+const xyz = (v?: { x: number; y: number; z: number }): number[] => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
+
+/** In the order of StrandPictureLook. A server tells all of a look. */
+export function lookNumbers(look: LookMessage): Float32Array {
+  const style = look.style;
+  const shading = look.shading;
+  if (!style || !shading) throw new Error('the server tells no whole look');
+  return Float32Array.from([
+    ...rgb(look.root_color), ...rgb(look.tip_color), look.eumelanin, look.pheomelanin, look.strand_radius_m,
+    look.tip_scale, look.followers, look.segments, ...xyz(look.light_direction), ...rgb(look.light_color), look.ambient,
+    ...rgb(look.background), ...rgb(look.skin_color), ...xyz(look.rim_direction), ...rgb(look.rim_color), look.exposure,
+    style.clump, style.locks, style.spread, style.wave_m, style.wave_count, style.frizz_m, style.frizz_count,
+    style.stray_share, style.stray_spread, style.length_spread, style.short_share, style.tip_fade,
+    shading.diffuse, shading.scatter, shading.highlight, shading.transmission, shading.second_highlight,
+    shading.highlight_width_deg, shading.cuticle_deg, shading.cuticle_spread_deg, shading.root_darkening,
+    shading.strand_variation, shading.lock_variation, shading.warmth_variation, shading.wetness,
+  ]);
+}
+
+const bytesOf = (floats: Float32Array): Uint8Array => new Uint8Array(floats.buffer, floats.byteOffset, floats.byteLength);
+
+export class StrandPicture {
+  private readonly picture: number;
+  private viewAt: number;
+  private rotation: readonly number[] = [1, 0, 0, 0];
+  background: number[] = [0, 0, 0];
+
+  constructor(private readonly core: Core, asset: Uint8Array) {
+    this.picture = core.lend(asset, (at, size) => core.call.strand_picture_make(at, size));
+    if (!this.picture) throw new Error(core.error());
+    this.viewAt = core.call.strand_core_allocate(4 * VIEW_FLOATS);
+  }
+  delete(): void {
+    this.core.call.strand_picture_delete(this.picture);
+    this.core.call.strand_core_free(this.viewAt);
+  }
+  bytes(at: number, count: number): Uint8Array {
+    return new Uint8Array(this.core.call.memory.buffer, at, count);
+  }
+  shorts(at: number, count: number): Uint16Array {
+    return new Uint16Array(this.core.call.memory.buffer, at, count);
+  }
+  uints(at: number, count: number): Uint32Array {
+    return new Uint32Array(this.core.call.memory.buffer, at, count);
+  }
+  floats(at: number, count: number): Float32Array {
+    return new Float32Array(this.core.call.memory.buffer, at, count);
+  }
+
+  setLook(look: LookMessage): void {
+    const numbers = lookNumbers(look);
+    if (numbers.length !== LOOK_FLOATS) throw new Error('a look has other numbers');
+    this.background = rgb(look.background);
+    this.core.lend(bytesOf(numbers), (at) =>
+      this.core.lend(new TextEncoder().encode(look.hair_color), (name, size) =>
+        this.core.call.strand_picture_set_look(this.picture, at, name, size)));
+  }
+  setState(positions: Float32Array, rotation: readonly number[]): void {
+    const at = this.core.call.strand_picture_positions(this.picture);
+    if (at) this.floats(at, positions.length).set(positions);
+    this.rotation = rotation;
+    this.core.call.strand_picture_changed(this.picture);
+  }
+  head(): PictureHead {
+    const at = this.core.call.strand_picture_head(this.picture);
+    const [vertices, triangles, positions, normals, covers, corners] = this.uints(at, 6) as unknown as number[];
+    return {
+      positions: this.floats(positions!, 3 * vertices!), normals: this.floats(normals!, 3 * vertices!),
+      covers: this.floats(covers!, vertices!), triangles: this.uints(corners!, 3 * triangles!),
+    };
+  }
+
+  private lookFrom(camera: Camera, size: { width: number; height: number }, share: number): void {
+    this.floats(this.viewAt, VIEW_FLOATS).set([
+      size.width, size.height, ...camera.offset, ...camera.target, camera.fov, ...this.rotation, share,
+    ]);
+  }
+  private parts(at: number): PictureParts {
+    if (!at) throw new Error(this.core.error());
+    const n = Array.from(this.uints(at, 20));
+    return {
+      block: n[0]!, blockBytes: n[1]!, pointCount: n[2]!, points: n[3]!, strands: n[4]!, strandCount: n[5]!,
+      strandOf: n[6]!, layoutNumber: n[7]!, cornerCount: n[8]!, corners: n[9]!, keyDepth: n[10]!, otherDepth: n[11]!,
+      latticeSize: [n[12]!, n[13]!, n[14]!], halfSize: [n[15]!, n[16]!, n[17]!], lightNumber: n[18]!, rgba: n[19]!,
+    };
+  }
+  /** For a graphics card. */
+  prepare(camera: Camera, size: { width: number; height: number }, share: number): PictureParts {
+    this.lookFrom(camera, size, share);
+    return this.parts(this.core.call.strand_picture_prepare(this.picture, this.viewAt));
+  }
+  /** By this processor: (height x width x 4). */
+  draw(camera: Camera, size: { width: number; height: number }, share: number): Uint8Array {
+    this.lookFrom(camera, size, share);
+    return this.bytes(this.parts(this.core.call.strand_picture_draw(this.picture, this.viewAt)).rgba, 4 * size.width * size.height);
+  }
+}

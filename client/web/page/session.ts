@@ -1,0 +1,487 @@
+// The connection, in a worker of its own: socket, decoding, acknowledgements and clock. Nothing here waits for
+// whoever draws: the newest state waits for it, and the one before is dropped.
+import { ClockOffset, nowNs, Recent } from './clock';
+import { Core, StrandDecoder } from './core';
+import type { Asked, Camera, FromNet, NetFigures, State, ToNet } from './messages';
+import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
+import { mayComeBack, ReconnectPolicy, wordsFor } from './reconnect';
+import {
+  ClientMessage, decodeServerMessage, encodeClientMessage, FrameHeader, kControl, kFrameHeaderBytes, Mode, Opcode,
+  PictureCodec, Partly, readFrameHeader, Role, type WelcomeMessage,
+} from './wire';
+
+const PROTOCOL = 'strandcast.v1';
+const QUICK_PINGS = 10;
+const QUICK_PING_MS = 20;
+const PING_MS = 1000;
+const KEYFRAME_REQUEST_MS = 1000;
+const CAMERA_MS = 33;
+const IDLE_MS = 15_000;
+const REPORT_MS = 1000;
+const PICTURE_NAMES: { [codec: number]: string } = {
+  [PictureCodec.jpeg]: 'JPEG', [PictureCodec.jpegTiles]: 'JPEG tiles', [PictureCodec.vp8]: 'VP8', [PictureCodec.h264]: 'H.264',
+};
+
+const post = (message: FromNet, transfer: Transferable[] = []): void =>
+  (self as unknown as WorkerScope).postMessage(message, transfer);
+
+/** What lasts over reconnections. */
+class Net {
+  private core!: Core;
+  private asked!: Asked;
+  private states!: MessagePort;
+  private pictureCodecs = 0;
+  private socket?: WebSocket;
+  private connection?: Connection;
+  private readonly policy = new ReconnectPolicy();
+  private retry = 0;
+  private openedMs = 0;
+  drawn = { drawMs: 0, shownHz: 0, device: 0 };
+  private wantsState = false;
+  private waitingAsset?: ArrayBuffer;
+  isPictureFree = true;
+
+  async start(message: Extract<ToNet, { kind: 'start' }>): Promise<void> {
+    this.asked = message.asked;
+    this.states = message.states;
+    this.states.onmessage = () => {
+      this.wantsState = true;
+      this.offerState();
+    };
+    const [core, codecs] = await Promise.all([Core.load(message.core), decodablePictures()]);
+    this.core = core;
+    this.pictureCodecs = codecs;
+    this.connect();
+    setInterval(() => this.connection?.report(), 500);
+  }
+  reconnect(asked: Asked): void {
+    this.asked = asked;
+    clearTimeout(this.retry);
+    if (this.socket) {
+      this.socket.onclose = null;
+      this.socket.close(1000);
+      this.connection?.end();
+    }
+    this.connect();
+  }
+
+  private connect(): void {
+    post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
+    let socket: WebSocket;
+    try {
+      socket = new WebSocket(this.asked.url, PROTOCOL);
+    } catch (error) {
+      post({ kind: 'state', state: 'ended', reason: String((error as Error).message), retryMs: 0 });
+      return;
+    }
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    let wasOpen = false;
+    socket.onopen = () => {
+      wasOpen = true;
+      this.openedMs = performance.now();
+      this.connection = new Connection(this, this.core, socket, this.asked);
+      this.connection.hello(this.pictureCodecs);
+    };
+    socket.onmessage = (event) => this.connection?.receive(event.data as unknown);
+    socket.onclose = (event) => {
+      const reason = this.connection?.goodbye || event.reason || wordsFor(event.code, wasOpen);
+      const hadWelcome = this.connection?.hasWelcome ?? false;
+      this.connection?.end();
+      this.connection = undefined;
+      // A token may be good for watching only.
+      if (event.code === 1008 && !hadWelcome && this.asked.role === Role.controller) {
+        this.asked = { ...this.asked, role: Role.viewer };
+        return this.connect();
+      }
+      if (!mayComeBack(event.code)) return post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
+      const retryMs = this.policy.nextDelayMs(wasOpen ? performance.now() - this.openedMs : 0);
+      post({ kind: 'state', state: 'waiting', reason, retryMs });
+      this.retry = self.setTimeout(() => this.connect(), retryMs);
+    };
+  }
+
+  command(message: ToNet): void {
+    const connection = this.connection;
+    switch (message.kind) {
+      case 'mode':
+        this.asked.mode = message.mode;
+        return connection?.send({ mode_request: { mode: message.mode } });
+      case 'camera':
+        return connection?.lookFrom(message.camera);
+      case 'command':
+        return connection?.send({ command: { command: message.command } });
+      case 'set':
+        return connection?.send({ set_parameter: { assignment: message.assignment } });
+      case 'scene':
+        return connection?.send({ scene_request: {} });
+      case 'drawn':
+        this.drawn = message;
+        return;
+      case 'pictureShown':
+        this.isPictureFree = true;
+        return connection?.offerPicture();
+    }
+  }
+
+  /** Asset first: what is drawn needs it. */
+  setAsset(payload: Uint8Array): void {
+    this.waitingAsset = payload.slice().buffer;
+    this.offerState();
+  }
+  offerState(): void {
+    if (!this.wantsState) return;
+    let state: State | undefined;
+    if (this.waitingAsset) {
+      state = { kind: 'asset', payload: this.waitingAsset };
+      this.waitingAsset = undefined;
+      this.states.postMessage(state, [state.payload]);
+    } else if ((state = this.connection?.takeState())) {
+      this.states.postMessage(state, [state.positions.buffer]);
+    }
+    if (state) this.wantsState = false;
+  }
+}
+
+/** One connection. */
+class Connection {
+  goodbye = '';
+  hasWelcome = false;
+  private welcome?: WelcomeMessage;
+  private readonly clock = new ClockOffset();
+  private pings: number[] = [];
+  private pingCount = 0;
+  private readonly timers: number[] = [];
+  private lastReceivedMs = performance.now();
+  private now?: StrandDecoder;
+  private next?: StrandDecoder;
+  private assetPayload?: Uint8Array;
+  private strandStream = -1;
+  private lastSequence = 0;
+  private hasState = false;
+  private isStateFresh = false;
+  private readonly pictures = new PictureDecoder();
+  private pictureQueue: Promise<void> = Promise.resolve();
+  private waitingPicture?: Decoded;
+  private pictureSize = { width: 0, height: 0 };
+  private lastPicture = { stream: -1, sequence: 0 };
+  private readonly strandMs = new Recent();
+  private readonly pictureMs = new Recent();
+  private readonly motionMs = new Recent();
+  private motions = new Map<number, number>();
+  private lastMotionNs = 0;
+  private newestSentNs = 0;
+  private lastKeyframeRequestMs = -KEYFRAME_REQUEST_MS;
+  private lastReportMs = 0;
+  private shown = -1;
+  private reason = '';
+  private camera?: Camera;
+  private cameraTimer = 0;
+  private figures = { receivedBytes: 0, decodedFrames: 0, rejectedFrames: 0, missedFrames: 0, replacedStates: 0, lastError: '' };
+  private codec = '';
+  private codecReason = '';
+  private pictureCodec = '';
+
+  constructor(private readonly net: Net, private readonly core: Core, private readonly socket: WebSocket, private readonly asked: Asked) {}
+
+  send(message: Partly<typeof ClientMessage>): void {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(encodeClientMessage(message));
+  }
+  hello(pictureCodecs: number): void {
+    this.send({
+      hello: {
+        role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: 'browser', token: this.asked.token,
+        frame_width: this.asked.width, frame_height: this.asked.height, acknowledges: true,
+        picture_codecs: pictureCodecs, codec_wish: this.asked.codec,
+      },
+    });
+  }
+  end(): void {
+    for (const timer of this.timers) clearTimeout(timer);
+    clearTimeout(this.cameraTimer);
+    this.now?.delete();
+    this.next?.delete();
+    this.now = this.next = undefined;
+    this.pictures.close();
+    this.waitingPicture?.close();
+    this.waitingPicture = undefined;
+  }
+
+  /** Whatever a server sends: it may end this connection, never this page. */
+  receive(data: unknown): void {
+    this.lastReceivedMs = performance.now();
+    try {
+      if (!(data instanceof ArrayBuffer) || data.byteLength === 0) throw new Error('the server sent no message of bytes');
+      const message = new Uint8Array(data);
+      this.figures.receivedBytes += message.length;
+      if (message[0] === kControl) this.control(message);
+      else if (!this.welcome) throw new Error('the server sent media before its Welcome');
+      else this.media(message);
+    } catch (error) {
+      this.goodbye ||= `the server sent what cannot be read: ${(error as Error).message}`;
+      this.socket.close(4000);
+    }
+  }
+
+  private control(bytes: Uint8Array): void {
+    const message = decodeServerMessage(bytes);
+    if (message.welcome) this.begin(message.welcome);
+    else if (message.goodbye) this.goodbye = message.goodbye.reason;
+    else if (message.notice && !this.welcome) post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
+    else if (!this.welcome) throw new Error('the server sent something else before its Welcome');
+    if (message.pong) this.pong(message.pong);
+    if (message.status) {
+      for (const motion of message.status.picture_motions) this.motions.set(motion.sim_time_ns, motion.motion_time_ns);
+      post({ kind: 'status', status: message.status });
+    }
+    if (message.notice && this.welcome) post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
+    if (message.quality) {
+      this.followCodec(message.quality.codec, message.quality.reason);
+      post({ kind: 'quality', quality: message.quality });
+    }
+    if (message.frame_quality) {
+      this.pictureCodec = PICTURE_NAMES[message.frame_quality.codec] ?? '';
+      post({ kind: 'frameQuality', quality: message.frame_quality });
+    }
+    if (message.mode_change) {
+      this.reason = message.mode_change.reason;
+      post({ kind: 'modeReason', reason: this.reason });
+    }
+    if (message.look_change) post({ kind: 'look', look: message.look_change.look, camera: message.look_change.camera });
+    if (message.scene_text) post({ kind: 'sceneText', text: message.scene_text.text });
+  }
+
+  private begin(welcome: WelcomeMessage): void {
+    if (this.welcome) throw new Error('the server sent a second Welcome');
+    this.now = new StrandDecoder(this.core, welcome.codec, welcome.strand_count, welcome.vertex_count);
+    this.welcome = welcome;
+    this.hasWelcome = true;
+    this.reason = welcome.mode_reason;
+    this.codec = welcome.codec;
+    this.codecReason = welcome.codec_reason;
+    post({ kind: 'welcome', welcome });
+    post({ kind: 'state', state: 'open', reason: '', retryMs: 0 });
+    this.ping();
+    this.timers.push(self.setInterval(() => {
+      if (performance.now() - this.lastReceivedMs > IDLE_MS) {
+        this.goodbye ||= 'nothing came from the server for 15 s';
+        this.socket.close(4000);
+      }
+    }, 1000));
+  }
+
+  // ---- clock
+
+  private ping(): void {
+    const time = nowNs();
+    this.pings.push(time);
+    if (this.pings.length > 100) this.pings.shift();
+    this.send({ ping: { client_time_ns: time } });
+    this.timers[0] = self.setTimeout(() => this.ping(), ++this.pingCount < QUICK_PINGS ? QUICK_PING_MS : PING_MS);
+  }
+  private pong(pong: { client_time_ns: number; server_receive_ns: number; server_send_ns: number }): void {
+    const at = this.pings.indexOf(pong.client_time_ns);
+    if (at < 0) return; // no answer to a probe of ours
+    this.pings.splice(at, 1);
+    this.clock.add(pong.client_time_ns, pong.server_receive_ns, pong.server_send_ns, nowNs());
+  }
+
+  // ---- media
+
+  private media(message: Uint8Array): void {
+    const header = readFrameHeader(message);
+    const received = nowNs();
+    switch (header.opcode) {
+      case Opcode.asset:
+        return this.takeAsset(header, message, received);
+      case Opcode.strandKeyframe:
+      case Opcode.strandDelta:
+        return this.takeStrands(header, message, received);
+      case Opcode.jpegFrame:
+      case Opcode.jpegTiles:
+      case Opcode.vp8Frame:
+      case Opcode.h264Frame:
+        this.pictureQueue = this.pictureQueue.then(() => this.takePicture(header, message, received));
+        return;
+      default:
+        throw new Error(`a media message of kind ${header.opcode}`);
+    }
+  }
+  private acknowledge(header: FrameHeader, received: number): void {
+    this.send({
+      frame_ack: {
+        sequence: header.sequence, receive_time_ns: received, stream_id: header.streamId,
+        decode_us: Math.max(0, Math.round((nowNs() - received) / 1000)),
+      },
+    });
+  }
+  private reject(error: Error): void {
+    ++this.figures.rejectedFrames;
+    this.figures.lastError = error.message;
+    if (performance.now() - this.lastKeyframeRequestMs < KEYFRAME_REQUEST_MS) return;
+    this.lastKeyframeRequestMs = performance.now();
+    this.send({ keyframe_request: {} });
+  }
+  private takeAsset(header: FrameHeader, message: Uint8Array, received: number): void {
+    const payload = message.subarray(kFrameHeaderBytes);
+    this.now!.setAsset(payload);
+    this.next?.setAsset(payload);
+    this.assetPayload = payload;
+    this.acknowledge(header, received);
+    this.net.setAsset(payload);
+    post({ kind: 'asset' });
+  }
+
+  private followCodec(codec: string, reason: string): void {
+    if (!codec || codec === (this.next ?? this.now)!.codec) return;
+    this.next?.delete();
+    this.next = undefined;
+    this.codecReason = reason;
+    if (codec === this.now!.codec) return;
+    const welcome = this.welcome!;
+    this.next = new StrandDecoder(this.core, codec, welcome.strand_count, welcome.vertex_count);
+    if (this.assetPayload) this.next.setAsset(this.assetPayload);
+    if (!this.hasState) this.beginNext();
+  }
+  private beginNext(): void {
+    this.now!.delete();
+    this.now = this.next!;
+    this.next = undefined;
+    this.codec = this.now.codec;
+    this.strandMs.clear();
+  }
+
+  private takeStrands(header: FrameHeader, message: Uint8Array, received: number): void {
+    const isKeyframe = header.opcode === Opcode.strandKeyframe;
+    const isOther = header.streamId !== this.strandStream;
+    if (isOther && !isKeyframe) return this.reject(new Error(`delta ${header.sequence} is of stream ${header.streamId}`));
+    if (isOther) this.lastSequence = 0;
+    if (this.lastSequence && header.sequence > this.lastSequence + 1)
+      this.figures.missedFrames += header.sequence - this.lastSequence - 1;
+    this.lastSequence = header.sequence;
+    const isNext = this.next !== undefined && isKeyframe && isOther;
+    const begin = performance.now();
+    try {
+      (isNext ? this.next! : this.now!).decode(message);
+    } catch (error) {
+      return this.reject(error as Error);
+    }
+    this.acknowledge(header, received);
+    if (isNext) this.beginNext();
+    this.strandMs.add(performance.now() - begin);
+    ++this.figures.decodedFrames;
+    this.strandStream = header.streamId;
+    this.noteMotion(this.now!.motionTimeNs(), header);
+    if (this.isStateFresh) ++this.figures.replacedStates;
+    this.hasState = this.isStateFresh = true;
+    if (this.assetPayload) this.show(Mode.strands);
+    this.net.offerState();
+  }
+  /** The newest state once; copied only when somebody draws it. */
+  takeState(): Extract<State, { kind: 'strands' }> | undefined {
+    if (!this.isStateFresh || !this.assetPayload) return undefined;
+    this.isStateFresh = false;
+    return { kind: 'strands', ...this.now!.state() };
+  }
+  private noteMotion(motionNs: number, header: FrameHeader): void {
+    this.newestSentNs = header.sendTimeNs;
+    if (motionNs === 0 || motionNs === this.lastMotionNs || !this.clock.hasValue) return;
+    // Only the first state with a new sample counts: in later ones it is held, not late.
+    if (this.lastMotionNs !== 0) this.motionMs.add((this.clock.toServerNs(nowNs()) - motionNs) * 1e-6);
+    this.lastMotionNs = motionNs;
+  }
+
+  private async takePicture(header: FrameHeader, message: Uint8Array, received: number): Promise<void> {
+    const begin = performance.now();
+    let picture: Decoded;
+    try {
+      picture = await this.pictures.decode(header, message);
+    } catch (error) {
+      return this.reject(error as Error);
+    }
+    if (this.socket.readyState !== WebSocket.OPEN) return picture.close();
+    this.acknowledge(header, received);
+    this.pictureMs.add(performance.now() - begin);
+    ++this.figures.decodedFrames;
+    if (header.streamId === this.lastPicture.stream && header.sequence > this.lastPicture.sequence + 1)
+      this.figures.missedFrames += header.sequence - this.lastPicture.sequence - 1;
+    this.lastPicture = { stream: header.streamId, sequence: header.sequence };
+    const motion = this.motions.get(header.simTimeNs);
+    if (motion !== undefined) this.noteMotion(motion, header);
+    this.motions = new Map([...this.motions].slice(-64));
+    this.newestSentNs = header.sendTimeNs;
+    if (this.waitingPicture) {
+      this.waitingPicture.close();
+      ++this.figures.replacedStates;
+    }
+    this.waitingPicture = picture;
+    this.pictureSize = 'displayWidth' in picture
+      ? { width: picture.displayWidth, height: picture.displayHeight }
+      : { width: picture.width, height: picture.height };
+    this.offerPicture();
+    this.show(Mode.frames);
+  }
+  offerPicture(): void {
+    if (!this.waitingPicture || !this.net.isPictureFree) return;
+    this.net.isPictureFree = false;
+    const picture = this.waitingPicture;
+    this.waitingPicture = undefined;
+    post({ kind: 'picture', picture, ...this.pictureSize }, [picture as unknown as Transferable]);
+  }
+
+  /** A frame of this mode was decoded. */
+  private show(mode: number): void {
+    if (this.shown === mode) return;
+    this.shown = mode;
+    this.lastSequence = 0;
+    this.lastPicture = { stream: -1, sequence: 0 };
+    this.motionMs.clear();
+    this.lastMotionNs = 0;
+    post({ kind: 'shown', mode, reason: this.reason });
+  }
+
+  lookFrom(camera: Camera): void {
+    this.camera = camera;
+    if (this.cameraTimer) return;
+    this.cameraTimer = self.setTimeout(() => {
+      this.cameraTimer = 0;
+      const { offset, target, fov } = this.camera!;
+      const vec = (v: number[]): { x: number; y: number; z: number } => ({ x: v[0]!, y: v[1]!, z: v[2]! });
+      this.send({ camera: { camera: { offset_m: vec(offset), target_m: vec(target), fov_y_rad: fov } } });
+    }, CAMERA_MS);
+  }
+
+  /** To the page, and once a second to the server, which chooses by it. */
+  report(): void {
+    if (!this.welcome) return;
+    const figures: NetFigures = {
+      ...this.figures, mode: this.shown,
+      decodeMs: this.shown === Mode.frames ? this.pictureMs.median : this.strandMs.median,
+      ageMs: this.newestSentNs && this.clock.hasValue ? (this.clock.toServerNs(nowNs()) - this.newestSentNs) * 1e-6 : 0,
+      motionMs: this.motionMs.median, roundTripMs: this.clock.roundTripMs, codec: this.codec,
+      codecReason: this.codecReason, pictureCodec: this.pictureCodec,
+    };
+    post({ kind: 'figures', figures });
+    if (performance.now() - this.lastReportMs < REPORT_MS) return;
+    this.lastReportMs = performance.now();
+    const { drawMs, shownHz, device } = this.net.drawn;
+    this.send({
+      viewer_report: {
+        decode_ms: Math.min(this.strandMs.median, 60_000), draw_ms: Math.min(drawMs, 60_000),
+        picture_decode_ms: Math.min(this.pictureMs.median, 60_000), shown_hz: Math.min(shownHz, 1000), device,
+      },
+    });
+  }
+}
+
+export function runNet(): void {
+  const net = new Net();
+  self.onmessage = (event: MessageEvent<ToNet>) => {
+    const message = event.data;
+    if (message.kind === 'start') {
+      net.start(message).catch((error: Error) =>
+        post({ kind: 'state', state: 'ended', reason: error.message, retryMs: 0 }));
+    } else if (message.kind === 'reconnect') net.reconnect(message.asked);
+    else net.command(message);
+  };
+}

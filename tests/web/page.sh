@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# The page's sources: strictly typed, and their parts as tests/web/page.test.mjs says.
+#   bash tests/web/page.sh
+set -euo pipefail
+here="$(realpath "$(dirname "$0")")"
+node="$(command -v node || command -v nodejs || true)"
+for tool in "$node" esbuild tsc; do
+  command -v "$tool" >/dev/null || { echo "skipped: needs nodejs, esbuild and node-typescript"; exit 77; }
+done
+tsc --project "$here/../../client/web/page"
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+esbuild "$here/page_parts.ts" --bundle --format=esm --target=es2022 --loader:.glsl=text --loader:.h=text \
+  --log-level=warning --outfile="$work/page.mjs"
+"$node" "$here/page.test.mjs" "$work/page.mjs"

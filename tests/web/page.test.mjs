@@ -1,0 +1,290 @@
+// The page's parts that need no browser, as esbuild bundled them (tests/web/page.sh): messages field by field against
+// the .proto files and byte by byte against the kept ones, ranges and colours against the sources they are copies of.
+//   node page.test.mjs BUNDLE.mjs
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import { fileURLToPath, pathToFileURL } from 'node:url';
+
+const root = path.join(path.dirname(fileURLToPath(import.meta.url)), '../..');
+const read = (name) => fs.readFileSync(path.join(root, name), 'utf8');
+const page = await import(pathToFileURL(path.resolve(process.argv[2])));
+let checks = 0;
+const check = (what, test) => {
+  try {
+    test();
+    ++checks;
+  } catch (error) {
+    console.error(`${what}: ${error.message}`);
+    process.exitCode = 1;
+  }
+};
+
+// ---- messages, as the .proto files declare them
+
+const messages = new Map(); // name -> Map of field -> [number, type, repeated]
+const enumerators = new Map(); // name -> number
+for (const name of ['scene', 'session', 'input']) {
+  const text = read(`proto/strandcast/v1/${name}.proto`).replace(/\/\/.*$/gm, '');
+  const stack = [];
+  for (const [statement] of text.matchAll(/(message|enum|oneof)\s+\w+\s*\{|\}|[^;{}]+;/g)) {
+    const words = statement.trim().replace(/[;{]/g, '').split(/\s*=\s*|\s+/);
+    if (/^(message|enum|oneof)\s/.test(statement.trim())) {
+      stack.push(words);
+      if (words[0] === 'message') messages.set(words[1], new Map());
+    } else if (statement === '}') stack.pop();
+    else if (stack.length && stack[stack.length - 1][0] === 'enum') enumerators.set(words[0], Number(words[1]));
+    else if (stack.length) {
+      const isRepeated = words[0] === 'repeated';
+      if (isRepeated || words[0] === 'optional') words.shift();
+      const message = stack.filter(([kind]) => kind === 'message').pop()[1];
+      messages.get(message).set(words[1], [Number(words[2]), words[0], isRepeated]);
+    }
+  }
+}
+const NOT_SENT = new Set(['ClientMessage.motion', 'ClientMessage.wind']);
+for (const [name, schema] of Object.entries(page.schemas)) {
+  check(name, () => {
+    const declared = messages.get(name);
+    assert.ok(declared, 'no .proto file has it');
+    for (const field of Object.keys(schema)) assert.ok(declared.has(field), `.proto has no ${field}`);
+    for (const [field, [number, type, isRepeated]] of declared) {
+      if (NOT_SENT.has(`${name}.${field}`)) continue;
+      assert.ok(schema[field], `${field} is missing`);
+      const [ours, kind, repeated] = schema[field];
+      assert.equal(ours, number, field);
+      assert.equal(repeated === 'repeated', isRepeated, field);
+      if (typeof kind === 'string') assert.equal(kind, messages.has(type) ? 'message' : /^[A-Z]/.test(type) ? 'enum' : type, field);
+      else assert.equal(kind, page.schemas[type], field);
+    }
+  });
+}
+
+// ---- messages as C++ wrote them down, in bytes and in words
+
+function readText(text) {
+  const words = [...text.matchAll(/"(?:[^"\\]|\\.)*"|[{}]|[\w.+-]+|:/g)].map(([word]) => word);
+  let at = 0;
+  const message = () => {
+    const fields = [];
+    while (at < words.length && words[at] !== '}') {
+      const name = words[at++];
+      if (words[at] === ':') ++at;
+      if (words[at] === '{') {
+        ++at;
+        fields.push([name, message()]);
+        ++at;
+      } else fields.push([name, words[at++]]);
+    }
+    return fields;
+  };
+  return message();
+}
+function valueOf(word, kind) {
+  if (kind === 'string') return word.slice(1, -1).replace(/\\(.)/g, '$1');
+  if (kind === 'bool') return word === 'true';
+  const value = kind === 'enum' && enumerators.has(word) ? enumerators.get(word) : Number(word.replace(/^nan$/, 'NaN'));
+  return kind === 'float' ? Math.fround(value) : value;
+}
+function messageOf(fields, schema) {
+  const message = {};
+  for (const [name, value] of fields) {
+    const [, kind, repeated] = schema[name];
+    const one = typeof kind === 'string' ? valueOf(value, kind) : messageOf(value, kind);
+    if (repeated) (message[name] ??= []).push(one);
+    else message[name] = one;
+  }
+  return message;
+}
+/** What is told, with all that is not at its default. */
+const whole = (message, schema) => page.decodeMessage(schema, page.encodeMessage(schema, message));
+const kept = fs.readdirSync(path.join(root, 'tests/conformance/vectors')).filter((name) => name.startsWith('control_'));
+let [sent, received] = [0, 0];
+for (const file of kept) {
+  for (const line of read(`tests/conformance/vectors/${file}`).split('\n').filter(Boolean)) {
+    const [, side, hex, text] = /^(\w+) ([0-9a-f]+) (.*)$/.exec(line);
+    const bytes = Uint8Array.from(Buffer.from(hex, 'hex'));
+    const kind = readText(text)[0][0];
+    if (side === 'client' && NOT_SENT.has(`ClientMessage.${kind}`)) continue;
+    const schema = side === 'client' ? page.schemas.ClientMessage : page.schemas.ServerMessage;
+    check(`${file}: ${text.slice(0, 60)}`, () => {
+      const message = messageOf(readText(text), schema);
+      const decoded = page.decodeMessage(schema, bytes.subarray(1));
+      if (side === 'client') {
+        ++sent;
+        assert.equal(Buffer.from(page.encodeClientMessage(message)).toString('hex'), hex);
+      } else {
+        ++received;
+        assert.deepEqual(decoded, whole(message, schema));
+        // Cut off anywhere it is refused, or it ends between two fields: never more.
+        for (let size = 0; size < bytes.length; ++size)
+          try {
+            page.decodeServerMessage(bytes.subarray(0, size));
+          } catch (error) {
+            assert.match(error.message, /message|field|number|encoded|UTF-8/i);
+          }
+      }
+    });
+  }
+}
+check('kept messages', () => assert.ok(sent >= 10 && received >= 8, `${sent} sent, ${received} received`));
+
+// proto/WIRE.md, section 4.
+check('media header', () => {
+  const bytes = Uint8Array.from(Buffer.from('21000102030405060708090a030000001011121314151617feffffffffffffff010203', 'hex'));
+  const header = page.readFrameHeader(bytes);
+  assert.equal(header.opcode, 0x21);
+  assert.equal(header.streamId, 0x0201);
+  assert.equal(header.sequence, 0x06050403);
+  assert.equal(header.baseSequence, 0x0a090807);
+  assert.equal(header.simTimeNs, 0x1716151413121110);
+  assert.equal(header.sendTimeNs, -2);
+  assert.throws(() => page.readFrameHeader(bytes.subarray(0, 34)));
+});
+
+// ---- copies of what C++ has
+
+const ranges = new Map();
+for (const [, name, low, high, unit] of read('common/scene/scene_fields.h').matchAll(/Range (k\w+)\{([^,]+), ([^,]+), "([^"]*)"\}/g))
+  ranges.set(name, [Number(low), Number(high), unit]);
+const fields = [...page.lookSections, ...page.simulationSections].flatMap((section) => section.fields);
+for (const field of fields)
+  check(field.path, () => {
+    assert.deepEqual([field.minimum, field.maximum, field.unit], ranges.get(field.range));
+    const name = field.path.split('.').pop();
+    // What the visitor of scene fields calls by this range, alone or as a vector.
+    const calls = [...read('common/scene/scene_fields.h').matchAll(/v\.\w+\("(\w+)", [^;]*?(k\w+)\)/g)];
+    const own = calls.filter(([, called]) => called === name || field.path.split('.').includes(called));
+    assert.ok(own.some(([, , range]) => range === field.range), `no field has ${field.range}`);
+  });
+
+check('hair colours', () => {
+  const srgb = (linear) => Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
+  const hex = (numbers) => `#${numbers.split(',').map((n) => srgb(parseFloat(n)).toString(16).padStart(2, '0')).join('')}`;
+  const presets = [...read('common/scene/hair_color.cpp').matchAll(/\{"(\w+)", \{\{([^}]*)\}, \{([^}]*)\}\}\}/g)];
+  assert.deepEqual(page.hairColors, presets.map(([, name, rootColor, tip]) => [name, hex(rootColor), hex(tip)]));
+});
+
+check('numbers of a look', () => {
+  const header = read('client/web/strand_picture.h');
+  const inside = header.slice(header.indexOf('struct StrandPictureLook'), header.indexOf('static_assert')).replace(/\/\/.*$/gm, '');
+  const places = [...inside.matchAll(/(\w+)(\[3\])?(?=[,;])/g)].flatMap(([, name, isVector]) => (isVector ? [name, name, name] : [name]));
+  // Each number another one: what comes out says where it came from.
+  let next = 0;
+  const values = new Map();
+  const fill = (schema) => Object.fromEntries(Object.entries(schema).filter(([, [, kind]]) => kind !== 'string').map(([name, [, kind]]) => {
+    if (typeof kind !== 'string') {
+      const inner = fill(kind);
+      const parts = kind.x || kind.r ? Object.values(inner) : undefined;
+      if (parts) values.set(name, parts);
+      return [name, inner];
+    }
+    if (!/^[xyzrgb]$/.test(name)) values.set(name, [next + 1]);
+    return [name, ++next];
+  }));
+  const look = { ...fill(page.schemas.Look), hair_color: 'red' };
+  const expected = [...new Set(places)].flatMap((name) => values.get(name) ?? assert.fail(`no look has ${name}`));
+  assert.deepEqual([...page.lookNumbers(look)], expected);
+});
+
+// ---- behaviour
+
+check('a token leaves the address', () => {
+  const wishes = page.readFragment('#token=s%2Be%20cret&mode=strands&view=0.2,0.1,0.6,0,-0.05,0,0.6');
+  assert.equal(wishes.token, 's+e cret');
+  assert.equal(wishes.mode, 0);
+  assert.deepEqual(wishes.camera.offset, [0.2, 0.1, 0.6]);
+  const rest = page.withoutToken('#token=secret&mode=strands&view-only');
+  assert.equal(rest, '#mode=strands&view-only');
+  const link = page.linkTo('http://h:1/', wishes.camera, 0);
+  assert.deepEqual(page.readFragment(new URL(link).hash).camera, wishes.camera);
+  assert.ok(!link.includes('token'));
+  assert.equal(page.readFragment('#view=0,0,0,0,0,0,1').camera, undefined);
+});
+
+check('the camera turns about its target', () => {
+  const camera = { offset: [0.22, 0.07, 0.62], target: [0, -0.05, 0], fov: 0.61 };
+  const distance = Math.hypot(...camera.offset);
+  let turned = camera;
+  for (let i = 0; i < 20; ++i) turned = page.orbit(turned, 0.11, 0.2);
+  assert.ok(Math.abs(Math.hypot(...turned.offset) - distance) < 1e-9);
+  assert.ok(Math.asin(turned.offset[1] / distance) <= 1.5 + 1e-9);
+  assert.deepEqual(turned.target, camera.target);
+  const back = page.orbit(page.orbit(camera, 0.1, 0.05), -0.1, -0.05);
+  back.offset.forEach((at, i) => assert.ok(Math.abs(at - camera.offset[i]) < 1e-9));
+  // Half a circle over the window's height.
+  const half = page.orbit(camera, 1, 0).offset;
+  assert.ok(Math.abs(half[0] + camera.offset[0]) < 1e-4 && Math.abs(half[2] + camera.offset[2]) < 1e-4);
+  const near = page.zoom(camera, 1000);
+  assert.ok(Math.abs(Math.hypot(...near.offset) - 0.12) < 1e-9);
+  const moved = page.pan(camera, 0.1, 0);
+  const step = moved.target.map((at, i) => at - camera.target[i]);
+  assert.ok(Math.abs(step[0] * camera.offset[0] + step[1] * camera.offset[1] + step[2] * camera.offset[2]) < 1e-9);
+});
+
+check('reconnections wait longer and longer', () => {
+  const policy = new page.ReconnectPolicy(() => 0.5);
+  const waits = Array.from({ length: 7 }, () => policy.nextDelayMs(0));
+  assert.deepEqual(waits, [250, 500, 1000, 2000, 4000, 5000, 5000]);
+  assert.equal(policy.nextDelayMs(20_000), 250);
+  // proto/WIRE.md, section 9.
+  for (const code of [1001, 1006, 1011, 1013]) assert.ok(page.mayComeBack(code), String(code));
+  for (const code of [1002, 1007, 1008, 1009, 4001, 4002, 4003]) assert.ok(!page.mayComeBack(code), String(code));
+});
+
+check('the clock believes the shortest round trip', () => {
+  const clock = new page.ClockOffset();
+  clock.add(1000, 501_500, 501_500, 2000);
+  clock.add(5000, 505_900, 505_900, 6000 + 1_000_000);
+  assert.equal(clock.toServerNs(0), 500_000);
+  clock.add(9000, 1, 0, 10_000); // ran backwards
+  assert.equal(clock.toServerNs(0), 500_000);
+  assert.equal(clock.roundTripMs, 1000e-6);
+});
+
+check('scenes in words', () => {
+  const text = 'name: "a { b: 3" wind { mean_mps { x: 1.5 y: -2e-1 z: 0 } } solver { name: "dftl" parameters { key: "gain" value: 0.25 } parameters { key: "rounds" value: 4 } } gravity_mps2 { y: -9.81 }';
+  const numbers = page.readScene(text);
+  assert.equal(numbers.get('wind.mean_mps.y'), -0.2);
+  assert.equal(numbers.get('gravity_mps2.y'), -9.81);
+  assert.equal(numbers.get('b'), undefined);
+  assert.deepEqual([...page.solverParameters(text)], [['gain', 0.25], ['rounds', 4]]);
+});
+
+check('tiles', () => {
+  const [, hex] = /^tiles(?: \d+)+ ([0-9a-f]+)/m.exec(read('tests/conformance/vectors/tiles.txt'));
+  const bytes = Uint8Array.from(Buffer.from(hex, 'hex'));
+  const { width, height, tiles } = page.parseTiles(bytes);
+  assert.deepEqual([width, height], [70, 130]);
+  assert.equal(tiles.length, 6);
+  for (let size = 0; size < bytes.length; size += 7) assert.throws(() => page.parseTiles(bytes.subarray(0, size)));
+  const alike = tiles.filter((tile) => tile.chroma === tiles[0].chroma && tile.quality === tiles[0].quality);
+  const jpeg = page.jpegOfScans(alike);
+  // Each scan as it was, with a restart marker behind it, the last one with the picture's end.
+  let at = jpeg.length;
+  for (let i = alike.length - 1; i >= 0; --i) {
+    assert.deepEqual([...jpeg.subarray(at - 2, at)], [0xff, i + 1 === alike.length ? 0xd9 : 0xd0 + (i % 8)]);
+    at -= 2 + alike[i].scan.length;
+    assert.deepEqual(jpeg.subarray(at, at + alike[i].scan.length), alike[i].scan);
+  }
+  // Tables of Huffman codes hold as many values as they say, K.3 to K.6: 12, 162, 12, 162.
+  const huffman = Buffer.from(jpeg).indexOf(Buffer.from([0xff, 0xc4]));
+  assert.equal(jpeg[huffman + 2] * 256 + jpeg[huffman + 3], 2 + 4 * 17 + 2 * (12 + 162));
+  let table = huffman + 4;
+  for (const values of [12, 162, 12, 162]) {
+    const sum = jpeg.subarray(table + 1, table + 17).reduce((a, b) => a + b, 0);
+    assert.equal(sum, values);
+    assert.equal(new Set(jpeg.subarray(table + 17, table + 17 + sum)).size, values);
+    table += 17 + sum;
+  }
+});
+
+check('shaders', () => {
+  const text = page.shaderText('#include "render/tile_frame.glsl"\n#include "lib/hash.glsl"\nvoid main() {}\n');
+  assert.ok(text.startsWith('#version 300 es\n'));
+  assert.equal(text.split('uint mix_u32(').length, 2, 'a file enters once');
+  assert.ok(!/^\s*#(include "|pragma)|binding =/m.test(text));
+  assert.throws(() => page.shaderText('#include "lib/none.glsl"'));
+});
+
+console.log(`${checks} checks of the page passed`);

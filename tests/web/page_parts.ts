@@ -1,0 +1,11 @@
+// What tests/web/page.test.mjs looks at.
+export * from '../../client/web/page/address';
+export * from '../../client/web/page/clock';
+export * from '../../client/web/page/fields';
+export { shaderText } from '../../client/web/page/gl/shader_text';
+export * from '../../client/web/page/jpeg_tiles';
+export { lookNumbers } from '../../client/web/page/picture';
+export * from '../../client/web/page/reconnect';
+export * from '../../client/web/page/scene_text';
+export { orbit, pan, zoom } from '../../client/web/page/ui/orbit';
+export * from '../../client/web/page/wire';
