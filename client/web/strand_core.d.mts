@@ -1,2 +1,2 @@
 // Types of strand_core.mjs for the page.
-export function loadStrandCore(bytes: BufferSource, print?: (text: string) => void): Promise<unknown>;
+export function loadStrandCore(module: BufferSource | WebAssembly.Module, print?: (text: string) => void): Promise<unknown>;

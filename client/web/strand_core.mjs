@@ -1,7 +1,7 @@
-// Loads strand_core.wasm (client/web/strand_core.h) in a browser or in Node: bytes of the module -> its
-// functions. All that it asks of its surroundings is answered here: it has no files and no arguments, and what
+// Loads strand_core.wasm (client/web/strand_core.h) in a browser or in Node: the module or its bytes ->
+// its functions. All that it asks of its surroundings is answered here: it has no files and no arguments, and what
 // it prints is a broken invariant before it stops.
-export async function loadStrandCore(bytes, print = console.error) {
+export async function loadStrandCore(module, print = console.error) {
   let memory;
   const view = () => new DataView(memory.buffer);
   const write = (file, parts, count, writtenAt) => {
@@ -23,13 +23,14 @@ export async function loadStrandCore(bytes, print = console.error) {
   const stop = (code) => {
     throw new Error(`strand core stopped with ${code}`);
   };
-  const { instance } = await WebAssembly.instantiate(bytes, {
+  const made = await WebAssembly.instantiate(module, {
     env: { emscripten_notify_memory_growth: () => {} },
     wasi_snapshot_preview1: {
       fd_write: write, fd_seek: () => 8, fd_close: () => 8, proc_exit: stop,
       environ_sizes_get: nothing, environ_get: () => 0,
     },
   });
+  const instance = made.instance ?? made;
   memory = instance.exports.memory;
   instance.exports._initialize();
   return instance.exports;

@@ -1,6 +1,7 @@
 // The page: its window, controls and measurements. The connection and the drawing are in workers (session.ts,
 // drawer.ts); what comes here is small, but for the server's pictures.
 import { linkTo, readFragment, withoutToken } from './address';
+import { compileCore } from './core';
 import type { Asked, Camera, DrawFigures, FromDraw, FromNet, NetFigures, ToDraw, ToNet } from './messages';
 import { Hud, Row, Warnings } from './ui/hud';
 import { followKey, followPointers, presets } from './ui/orbit';
@@ -99,22 +100,32 @@ class Viewer {
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: canDraw,
     };
     const { worker, core } = assets();
-    const coreUrl = new URL(core, location.href).href;
+    const start = (name: string): Worker => {
+      const made = new Worker(worker, { type: 'module', name });
+      made.onerror = () => this.ended('this browser does not start the page’s workers');
+      return made;
+    };
     const states = new MessageChannel();
-    this.net = new Worker(worker, { type: 'module', name: 'net' });
+    const sockets = new MessageChannel();
+    const compiled = compileCore(new URL(core, location.href).href);
+    start('socket').postMessage(sockets.port2, [sockets.port2]);
+    this.net = start('net');
     this.net.onmessage = (event: MessageEvent<FromNet>) => this.fromNet(event.data);
-    this.net.onerror = () => this.ended('this browser does not start the page’s worker');
-    this.toNet({ kind: 'start', core: coreUrl, asked: this.asked, states: states.port1 }, [states.port1]);
     if (canDraw) {
-      this.draw = new Worker(worker, { type: 'module', name: 'draw' });
+      this.draw = start('draw');
       this.draw.onmessage = (event: MessageEvent<FromDraw>) => this.fromDraw(event.data);
-      const canvas = strands.transferControlToOffscreen();
-      this.toDraw({ kind: 'start', core: coreUrl, canvas, states: states.port2, wish: wishes.draw, samples: SAMPLES },
-        [canvas as unknown as Transferable, states.port2]);
     } else {
       this.device = Device.none;
       this.drawWhy = 'this browser cannot draw beside the page';
     }
+    compiled.then((module) => {
+      this.toNet({ kind: 'start', core: module, asked: this.asked, states: states.port1, sockets: sockets.port1 },
+        [states.port1, sockets.port1]);
+      if (!canDraw) return;
+      const canvas = strands.transferControlToOffscreen();
+      this.toDraw({ kind: 'start', core: module, canvas, states: states.port2, wish: wishes.draw, samples: SAMPLES },
+        [canvas as unknown as Transferable, states.port2]);
+    }, (error: Error) => this.ended(error.message));
     if (wishes.camera) {
       this.camera = wishes.camera;
       this.isOwnCamera = true;

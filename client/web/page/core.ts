@@ -24,13 +24,18 @@ export interface CoreFunctions {
   strand_picture_draw(picture: number, view: number): number;
 }
 
+/** Once for all workers; while it still comes. */
+export async function compileCore(url: string): Promise<WebAssembly.Module> {
+  const response = await fetch(url);
+  if (!response.ok) throw new Error(`${url}: the server says ${response.status}`);
+  return WebAssembly.compileStreaming(response);
+}
+
 export class Core {
   private constructor(readonly call: CoreFunctions) {}
 
-  static async load(url: string): Promise<Core> {
-    const response = await fetch(url);
-    if (!response.ok) throw new Error(`${url}: the server says ${response.status}`);
-    return new Core((await loadStrandCore(await response.arrayBuffer())) as CoreFunctions);
+  static async load(module: WebAssembly.Module): Promise<Core> {
+    return new Core((await loadStrandCore(module)) as CoreFunctions);
   }
 
   view(): DataView {

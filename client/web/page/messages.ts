@@ -1,5 +1,6 @@
 // What the page's threads tell one another. The page itself (app.ts) has the window, one worker the connection
-// (session.ts), one the drawing (drawer.ts). States go straight from the connection to the drawing, pictures to
+// (session.ts), one its socket (socket.ts), one the drawing
+// (drawer.ts). States go straight from the connection to the drawing, pictures to
 // the page; at most one of each is on its way, and the newest waits.
 import type { CameraMessage, FrameQualityMessage, LookMessage, StatusMessage, StreamQualityMessage, WelcomeMessage } from './wire';
 
@@ -22,7 +23,7 @@ export interface Asked {
 }
 
 export type ToNet =
-  | { kind: 'start'; core: string; asked: Asked; states: MessagePort }
+  | { kind: 'start'; core: WebAssembly.Module; asked: Asked; states: MessagePort; sockets: MessagePort }
   | { kind: 'reconnect'; asked: Asked }
   | { kind: 'mode'; mode: number }
   | { kind: 'camera'; camera: Camera }
@@ -71,7 +72,7 @@ export type State =
   | { kind: 'strands'; positions: Float32Array; rotation: [number, number, number, number] };
 
 export type ToDraw =
-  | { kind: 'start'; core: string; canvas: OffscreenCanvas; states: MessagePort; wish: string; samples: number }
+  | { kind: 'start'; core: WebAssembly.Module; canvas: OffscreenCanvas; states: MessagePort; wish: string; samples: number }
   | { kind: 'look'; look: LookMessage }
   | { kind: 'camera'; camera: Camera; isMoving: boolean }
   | { kind: 'size'; width: number; height: number }

@@ -1,10 +1,11 @@
-// The connection, in a worker of its own: socket, decoding, acknowledgements and clock. Nothing here waits for
+// The connection, in a worker of its own: decoding, acknowledgements and clock. Nothing here waits for
 // whoever draws: the newest state waits for it, and the one before is dropped.
 import { ClockOffset, nowNs, Recent } from './clock';
 import { Core, StrandDecoder } from './core';
 import type { Asked, Camera, FromNet, NetFigures, State, ToNet } from './messages';
 import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
 import { mayComeBack, ReconnectPolicy, wordsFor } from './reconnect';
+import { DistantSocket } from './socket';
 import {
   ClientMessage, decodeServerMessage, encodeClientMessage, FrameHeader, kControl, kFrameHeaderBytes, Mode, Opcode,
   PictureCodec, Partly, readFrameHeader, Role, type WelcomeMessage,
@@ -31,7 +32,8 @@ class Net {
   private asked!: Asked;
   private states!: MessagePort;
   private pictureCodecs = 0;
-  private socket?: WebSocket;
+  private sockets!: MessagePort;
+  private socket?: DistantSocket;
   private connection?: Connection;
   private readonly policy = new ReconnectPolicy();
   private retry = 0;
@@ -44,6 +46,7 @@ class Net {
   async start(message: Extract<ToNet, { kind: 'start' }>): Promise<void> {
     this.asked = message.asked;
     this.states = message.states;
+    this.sockets = message.sockets;
     this.states.onmessage = () => {
       this.wantsState = true;
       this.offerState();
@@ -58,7 +61,7 @@ class Net {
     this.asked = asked;
     clearTimeout(this.retry);
     if (this.socket) {
-      this.socket.onclose = null;
+      this.socket.onclose = undefined;
       this.socket.close(1000);
       this.connection?.end();
     }
@@ -67,14 +70,7 @@ class Net {
 
   private connect(): void {
     post({ kind: 'state', state: 'connecting', reason: '', retryMs: 0 });
-    let socket: WebSocket;
-    try {
-      socket = new WebSocket(this.asked.url, PROTOCOL);
-    } catch (error) {
-      post({ kind: 'state', state: 'ended', reason: String((error as Error).message), retryMs: 0 });
-      return;
-    }
-    socket.binaryType = 'arraybuffer';
+    const socket = new DistantSocket(this.sockets, this.asked.url, PROTOCOL);
     this.socket = socket;
     let wasOpen = false;
     socket.onopen = () => {
@@ -83,18 +79,18 @@ class Net {
       this.connection = new Connection(this, this.core, socket, this.asked);
       this.connection.hello(this.pictureCodecs);
     };
-    socket.onmessage = (event) => this.connection?.receive(event.data as unknown);
-    socket.onclose = (event) => {
-      const reason = this.connection?.goodbye || event.reason || wordsFor(event.code, wasOpen);
+    socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
+    socket.onclose = (code, said) => {
+      const reason = this.connection?.goodbye || said || wordsFor(code, wasOpen);
       const hadWelcome = this.connection?.hasWelcome ?? false;
       this.connection?.end();
       this.connection = undefined;
       // A token may be good for watching only.
-      if (event.code === 1008 && !hadWelcome && this.asked.role === Role.controller) {
+      if (code === 1008 && !hadWelcome && this.asked.role === Role.controller) {
         this.asked = { ...this.asked, role: Role.viewer };
         return this.connect();
       }
-      if (!mayComeBack(event.code)) return post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
+      if (!mayComeBack(code)) return post({ kind: 'state', state: 'ended', reason, retryMs: 0 });
       const retryMs = this.policy.nextDelayMs(wasOpen ? performance.now() - this.openedMs : 0);
       post({ kind: 'state', state: 'waiting', reason, retryMs });
       this.retry = self.setTimeout(() => this.connect(), retryMs);
@@ -182,10 +178,10 @@ class Connection {
   private codecReason = '';
   private pictureCodec = '';
 
-  constructor(private readonly net: Net, private readonly core: Core, private readonly socket: WebSocket, private readonly asked: Asked) {}
+  constructor(private readonly net: Net, private readonly core: Core, private readonly socket: DistantSocket, private readonly asked: Asked) {}
 
   send(message: Partly<typeof ClientMessage>): void {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(encodeClientMessage(message));
+    this.socket.send(encodeClientMessage(message));
   }
   hello(pictureCodecs: number): void {
     this.send({
@@ -208,28 +204,28 @@ class Connection {
   }
 
   /** Whatever a server sends: it may end this connection, never this page. */
-  receive(data: unknown): void {
+  receive(data: unknown, receivedNs: number): void {
     this.lastReceivedMs = performance.now();
     try {
       if (!(data instanceof ArrayBuffer) || data.byteLength === 0) throw new Error('the server sent no message of bytes');
       const message = new Uint8Array(data);
       this.figures.receivedBytes += message.length;
-      if (message[0] === kControl) this.control(message);
+      if (message[0] === kControl) this.control(message, receivedNs);
       else if (!this.welcome) throw new Error('the server sent media before its Welcome');
-      else this.media(message);
+      else this.media(message, receivedNs);
     } catch (error) {
       this.goodbye ||= `the server sent what cannot be read: ${(error as Error).message}`;
       this.socket.close(4000);
     }
   }
 
-  private control(bytes: Uint8Array): void {
+  private control(bytes: Uint8Array, received: number): void {
     const message = decodeServerMessage(bytes);
     if (message.welcome) this.begin(message.welcome);
     else if (message.goodbye) this.goodbye = message.goodbye.reason;
     else if (message.notice && !this.welcome) post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
     else if (!this.welcome) throw new Error('the server sent something else before its Welcome');
-    if (message.pong) this.pong(message.pong);
+    if (message.pong) this.pong(message.pong, received);
     if (message.status) {
       for (const motion of message.status.picture_motions) this.motions.set(motion.sim_time_ns, motion.motion_time_ns);
       post({ kind: 'status', status: message.status });
@@ -279,18 +275,17 @@ class Connection {
     this.send({ ping: { client_time_ns: time } });
     this.timers[0] = self.setTimeout(() => this.ping(), ++this.pingCount < QUICK_PINGS ? QUICK_PING_MS : PING_MS);
   }
-  private pong(pong: { client_time_ns: number; server_receive_ns: number; server_send_ns: number }): void {
+  private pong(pong: { client_time_ns: number; server_receive_ns: number; server_send_ns: number }, received: number): void {
     const at = this.pings.indexOf(pong.client_time_ns);
     if (at < 0) return; // no answer to a probe of ours
     this.pings.splice(at, 1);
-    this.clock.add(pong.client_time_ns, pong.server_receive_ns, pong.server_send_ns, nowNs());
+    this.clock.add(pong.client_time_ns, pong.server_receive_ns, pong.server_send_ns, received);
   }
 
   // ---- media
 
-  private media(message: Uint8Array): void {
+  private media(message: Uint8Array, received: number): void {
     const header = readFrameHeader(message);
-    const received = nowNs();
     switch (header.opcode) {
       case Opcode.asset:
         return this.takeAsset(header, message, received);
@@ -399,7 +394,7 @@ class Connection {
     } catch (error) {
       return this.reject(error as Error);
     }
-    if (this.socket.readyState !== WebSocket.OPEN) return picture.close();
+    if (!this.socket.isOpen) return picture.close();
     this.acknowledge(header, received);
     this.pictureMs.add(performance.now() - begin);
     ++this.figures.decodedFrames;

@@ -1,0 +1,71 @@
+// The socket in a worker of its own: what arrives is stamped when it arrives, however long decoding of what came
+// before takes, so that the server does not take a busy viewer for a slow link. DistantSocket is its other end.
+type ToSocket =
+  | { kind: 'open'; number: number; url: string; protocol: string; originMs: number }
+  | { kind: 'send'; number: number; bytes: Uint8Array }
+  | { kind: 'close'; number: number; code: number };
+type FromSocket =
+  | { kind: 'open'; number: number }
+  | { kind: 'message'; number: number; data: unknown; receivedNs: number }
+  | { kind: 'closed'; number: number; code: number; reason: string };
+
+export function runSocket(): void {
+  self.onmessage = (event: MessageEvent<MessagePort>) => {
+    const port = event.data;
+    let socket: WebSocket | undefined;
+    let present = 0;
+    port.onmessage = ({ data: wish }: MessageEvent<ToSocket>) => {
+      const post = (message: FromSocket, transfer: Transferable[] = []): void => port.postMessage(message, transfer);
+      if (wish.kind === 'open') {
+        const { number, url, protocol, originMs } = wish;
+        present = number;
+        const early = performance.timeOrigin - originMs;
+        try {
+          socket = new WebSocket(url, protocol);
+        } catch (error) {
+          return post({ kind: 'closed', number, code: 1008, reason: (error as Error).message });
+        }
+        socket.binaryType = 'arraybuffer';
+        socket.onopen = () => post({ kind: 'open', number });
+        socket.onmessage = ({ data }: MessageEvent<unknown>) => {
+          const receivedNs = Math.round((performance.now() + early) * 1e6);
+          post({ kind: 'message', number, data, receivedNs }, data instanceof ArrayBuffer ? [data] : []);
+        };
+        socket.onclose = ({ code, reason }) => post({ kind: 'closed', number, code, reason });
+      } else if (wish.number === present && socket) {
+        if (wish.kind === 'close') socket.close(wish.code);
+        else if (socket.readyState === WebSocket.OPEN) socket.send(wish.bytes);
+      }
+    };
+  };
+}
+
+let lastNumber = 0;
+
+export class DistantSocket {
+  isOpen = false;
+  onopen?: () => void;
+  onmessage?: (data: unknown, receivedNs: number) => void;
+  onclose?: (code: number, reason: string) => void;
+  private readonly number = ++lastNumber;
+  constructor(private readonly port: MessagePort, url: string, protocol: string) {
+    port.onmessage = ({ data: message }: MessageEvent<FromSocket>) => {
+      if (message.number !== this.number) return;
+      if (message.kind === 'message') return this.onmessage?.(message.data, message.receivedNs);
+      this.isOpen = message.kind === 'open';
+      if (message.kind === 'open') this.onopen?.();
+      else this.onclose?.(message.code, message.reason);
+    };
+    this.post({ kind: 'open', number: this.number, url, protocol, originMs: performance.timeOrigin });
+  }
+  private post(wish: ToSocket, transfer: Transferable[] = []): void {
+    this.port.postMessage(wish, transfer);
+  }
+  send(bytes: Uint8Array): void {
+    if (this.isOpen) this.post({ kind: 'send', number: this.number, bytes }, [bytes.buffer]);
+  }
+  close(code: number): void {
+    this.isOpen = false;
+    this.post({ kind: 'close', number: this.number, code });
+  }
+}
