@@ -96,7 +96,7 @@ class Viewer {
     const canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
     const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
     this.asked = {
-      url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec,
+      url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, pictures: wishes.pictures,
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: canDraw,
     };
     const { worker, core } = assets();
@@ -486,7 +486,7 @@ class Viewer {
     add('drawn by', isFrames ? 'the server' : `${this.drawnBy}: ${this.drawWhy}`);
     const drawn = this.drawFigures;
     if (!isFrames && drawn) {
-      add('drawn in', `${drawn.drawMs.toFixed(0)} ms, ${(drawn.share * 100).toFixed(0)} % of the sides`);
+      add('drawn in', `${drawn.stepMs.toFixed(0)} ms, ${(drawn.share * 100).toFixed(0)} % of the sides`);
       if (drawn.segments) add('of', `${drawn.strands} strands, ${drawn.segments} segments`);
     }
     if (isFrames) {

@@ -248,7 +248,7 @@ class Drawer {
     post({
       kind: 'figures',
       figures: {
-        drawMs: this.fairMs.median || this.stepMs[this.step]!.median, shownHz: this.shown.length / 2,
+        drawMs: this.fairMs.median || this.stepMs[this.step]!.median, stepMs: this.stepMs[this.step]!.median, shownHz: this.shown.length / 2,
         share: STEPS[this.drawnStep]!.size, ...this.counts,
       },
     });

@@ -16,7 +16,8 @@ export interface Asked {
   token: string;
   mode: number;
   role: number;
-  codec: string;
+  codec: string; // of strands, insisted on
+  pictures: string; // of pictures, likewise
   width: number; // of pictures that the server draws
   height: number;
   drawsStrands: boolean;
@@ -80,7 +81,8 @@ export type ToDraw =
   | { kind: 'shot' };
 
 export interface DrawFigures {
-  drawMs: number; // median of pictures in motion
+  drawMs: number; // median of pictures in motion, of at least half the sides
+  stepMs: number; // of pictures as they are drawn now
   shownHz: number;
   share: number; // of the window's sides
   strands: number;

@@ -19,6 +19,9 @@ const KEYFRAME_REQUEST_MS = 1000;
 const CAMERA_MS = 33;
 const IDLE_MS = 15_000;
 const REPORT_MS = 1000;
+const PICTURE_BITS: { [wish: string]: number } = {
+  jpeg: 0, tiles: 1 << PictureCodec.jpegTiles, vp8: 1 << PictureCodec.vp8, h264: 1 << PictureCodec.h264,
+};
 const PICTURE_NAMES: { [codec: number]: string } = {
   [PictureCodec.jpeg]: 'JPEG', [PictureCodec.jpegTiles]: 'JPEG tiles', [PictureCodec.vp8]: 'VP8', [PictureCodec.h264]: 'H.264',
 };
@@ -188,7 +191,7 @@ class Connection {
       hello: {
         role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: 'browser', token: this.asked.token,
         frame_width: this.asked.width, frame_height: this.asked.height, acknowledges: true,
-        picture_codecs: pictureCodecs, codec_wish: this.asked.codec,
+        picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec,
       },
     });
   }
