@@ -23,7 +23,7 @@ const stage = at('stage');
 const pictures = at<HTMLCanvasElement>('pictures');
 const strands = at<HTMLCanvasElement>('strands');
 const hud = new Hud(at<HTMLButtonElement>('hud-line'), at('hud-table'));
-const warnings = new Warnings(at('warnings'));
+const warnings = new Warnings(at('warnings'), at('lasting'));
 
 interface Assets {
   worker: string;

@@ -36,9 +36,7 @@ export class Hud {
 
 /** Short sentences over the picture, for a while each. */
 export class Warnings {
-  private lasting: HTMLElement[] = [];
-  private lastingText = '';
-  constructor(private readonly place: HTMLElement) {}
+  constructor(private readonly place: HTMLElement, private readonly lasting: HTMLElement) {}
   say(text: string, isError = false): void {
     const line = document.createElement('p');
     line.textContent = text;
@@ -49,14 +47,7 @@ export class Warnings {
   }
   /** Stay as long as they are told. */
   keep(texts: readonly string[]): void {
-    if (texts.join('\n') === this.lastingText) return;
-    this.lastingText = texts.join('\n');
-    for (const line of this.lasting) line.remove();
-    this.lasting = texts.map((text) => {
-      const line = document.createElement('p');
-      line.textContent = text;
-      this.place.prepend(line);
-      return line;
-    });
+    const text = texts.join('\n');
+    if (this.lasting.textContent !== text) this.lasting.textContent = text;
   }
 }
