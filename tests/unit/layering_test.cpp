@@ -69,7 +69,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
                              kAll)},
       {"server", with({"server/app", "server/net"}, kAll)},
       {"client/net", with({"common/net", "common/replay"}, kWire)},
-      {"client/web", kStrands},
+      // No protobuf, no network, no OpenGL: the page has its own.
+      {"client/web", with({"common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
       {"client/app", with({"client/net", "client/window"}, kAll)},
       {"client", with({"client/app"}, kAll)},

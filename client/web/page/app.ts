@@ -86,6 +86,7 @@ class Viewer {
   private device: number = Device.unknown;
   private rate = { bytes: 0, timeMs: 0, kbits: 0 };
   private pictureTimes: number[] = [];
+  private pictureCount = 0;
   private isConnected = false;
   private sentCamera = '';
   private retryAtMs = 0;
@@ -224,6 +225,7 @@ class Viewer {
 
   private connection(state: 'connecting' | 'open' | 'waiting' | 'ended', reason: string, retryMs: number): void {
     this.isConnected = state === 'open';
+    document.body.dataset.connection = state;
     const box = at('trouble');
     const isTokenWanted = state === 'ended' && /token|role/i.test(reason);
     const wasAway = !box.hidden;
@@ -250,7 +252,14 @@ class Viewer {
     pictures.getContext('2d', { alpha: false })!.drawImage(picture as ImageBitmap, 0, 0, width, height);
     picture.close();
     this.pictureTimes.push(performance.now());
+    this.notePicture(Mode.frames);
     requestAnimationFrame(() => this.toNet({ kind: 'pictureShown' }));
+  }
+  /** For who measures the page: what it shows, and how many pictures it has shown. */
+  private notePicture(mode: number): void {
+    if (!this.pictureCount++) performance.mark('first picture');
+    document.body.dataset.pictures = String(this.pictureCount);
+    document.body.dataset.shows = mode === Mode.frames ? 'pictures' : 'strands';
   }
   private showMode(): void {
     const isFrames = this.shown === Mode.frames;
@@ -277,7 +286,7 @@ class Viewer {
         this.drawFigures = message.figures;
         return;
       case 'drawn':
-        return;
+        return this.notePicture(Mode.strands);
       case 'shot':
         if (message.blob) this.save(message.blob);
         return;
