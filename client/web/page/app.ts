@@ -115,6 +115,9 @@ class Viewer {
     if (canDraw) {
       this.draw = start('draw');
       this.draw.onmessage = (event: MessageEvent<FromDraw>) => this.fromDraw(event.data);
+      // What draws is found while the core still comes.
+      const canvas = strands.transferControlToOffscreen();
+      this.toDraw({ kind: 'start', canvas, wish: wishes.draw, samples: SAMPLES }, [canvas as unknown as Transferable]);
     } else {
       this.device = Device.none;
       this.drawWhy = 'this browser cannot draw beside the page';
@@ -122,10 +125,7 @@ class Viewer {
     compiled.then((module) => {
       this.toNet({ kind: 'start', core: module, asked: this.asked, states: states.port1, sockets: sockets.port1 },
         [states.port1, sockets.port1]);
-      if (!canDraw) return;
-      const canvas = strands.transferControlToOffscreen();
-      this.toDraw({ kind: 'start', core: module, canvas, states: states.port2, wish: wishes.draw, samples: SAMPLES },
-        [canvas as unknown as Transferable, states.port2]);
+      this.toDraw({ kind: 'core', core: module, states: states.port2 }, [states.port2]);
     }, (error: Error) => this.ended(error.message));
     if (wishes.camera) {
       this.camera = wishes.camera;

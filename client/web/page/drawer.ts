@@ -133,6 +133,7 @@ class Drawer {
   private isBusy = false;
   private isCameraMoving = false;
   private lastMovedMs = 0;
+  private askedMs = 0;
   private drawnStep = 0;
   private step = 0;
   private readonly stepMs = STEPS.map(() => new Recent(5));
@@ -141,22 +142,30 @@ class Drawer {
   private counts = { strands: 0, segments: 0 };
   private shotAsked = false;
 
-  async start(message: Extract<ToDraw, { kind: 'start' }>): Promise<void> {
+  start(message: Extract<ToDraw, { kind: 'start' }>): void {
     this.canvas = message.canvas;
-    this.states = message.states;
     const { painter, why } = choosePainter(message.canvas, message.wish, message.samples);
     this.painter = painter;
     if (painter.device === Device.software) this.step = 2;
-    this.core = await Core.load(message.core);
     post({ kind: 'ready', device: painter.device, drawnBy: painter.drawnBy, why });
+  }
+  async begin(message: Extract<ToDraw, { kind: 'core' }>): Promise<void> {
+    if (!this.painter) return; // said already
+    this.core = await Core.load(message.core);
+    this.states = message.states;
     this.states.onmessage = (event: MessageEvent<State>) => this.take(event.data);
-    this.states.postMessage('next');
+    this.askNext();
     setInterval(() => this.report(), 500);
     const turn = (): void => {
       void this.turn();
       requestAnimationFrame(turn);
     };
     requestAnimationFrame(turn);
+  }
+  /** The next state is taken while this one is shown, not before: none waits here. */
+  private askNext(): void {
+    this.askedMs = performance.now();
+    this.states.postMessage('next');
   }
 
   private take(state: State): void {
@@ -166,8 +175,7 @@ class Drawer {
       this.hasState = false;
       if (this.look) this.picture.setLook(this.look);
       this.painter.setPicture(this.picture);
-      this.states.postMessage('next');
-      return;
+      return this.askNext();
     }
     if (!this.picture) return;
     this.picture.setState(state.positions, state.rotation);
@@ -179,7 +187,7 @@ class Drawer {
     this.lastMovedMs = performance.now();
   }
 
-  command(message: Exclude<ToDraw, { kind: 'start' }>): void {
+  command(message: Exclude<ToDraw, { kind: 'start' } | { kind: 'core' }>): void {
     switch (message.kind) {
       case 'look':
         this.look = message.look;
@@ -204,7 +212,7 @@ class Drawer {
   private async turn(): Promise<void> {
     if (this.isBusy || !this.picture || !this.hasState || !this.camera || !this.look) return;
     const begin = performance.now();
-    const isStanding = begin - this.lastMovedMs > STAND_MS && !this.isCameraMoving;
+    const isStanding = begin - Math.max(this.lastMovedMs, this.askedMs) > STAND_MS && !this.isCameraMoving;
     const step = isStanding || this.shotAsked ? 0 : this.step;
     if (!this.shotAsked && (!this.isVisible || (!this.isDirty && (step === this.drawnStep || !isStanding)))) return;
     this.isBusy = true;
@@ -231,8 +239,7 @@ class Drawer {
       this.picture = undefined;
     }
     this.isBusy = false;
-    // The next state is taken while this one is shown, not before: none waits here.
-    this.states.postMessage('next');
+    this.askNext();
   }
   private learn(step: number, ms: number): void {
     this.stepMs[step]!.add(ms);
@@ -259,8 +266,13 @@ export function runDrawer(): void {
   const drawer = new Drawer();
   self.onmessage = (event: MessageEvent<ToDraw>) => {
     const message = event.data;
-    if (message.kind === 'start') {
-      drawer.start(message).catch((error: Error) => post({ kind: 'failed', reason: error.message }));
-    } else drawer.command(message);
+    const fail = (error: Error): void => post({ kind: 'failed', reason: error.message });
+    try {
+      if (message.kind === 'start') drawer.start(message);
+      else if (message.kind === 'core') drawer.begin(message).catch(fail);
+      else drawer.command(message);
+    } catch (error) {
+      fail(error as Error);
+    }
   };
 }

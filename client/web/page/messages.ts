@@ -73,7 +73,8 @@ export type State =
   | { kind: 'strands'; positions: Float32Array; rotation: [number, number, number, number] };
 
 export type ToDraw =
-  | { kind: 'start'; core: WebAssembly.Module; canvas: OffscreenCanvas; states: MessagePort; wish: string; samples: number }
+  | { kind: 'start'; canvas: OffscreenCanvas; wish: string; samples: number }
+  | { kind: 'core'; core: WebAssembly.Module; states: MessagePort }
   | { kind: 'look'; look: LookMessage }
   | { kind: 'camera'; camera: Camera; isMoving: boolean }
   | { kind: 'size'; width: number; height: number }
