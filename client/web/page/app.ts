@@ -133,7 +133,7 @@ class Viewer {
     }
     this.panel = new Panel(at('panel'), {
       set: (path, value) => this.set(path, value),
-      askScene: () => this.toNet({ kind: 'scene' }),
+      askScene: () => this.askScene(),
       close: () => this.togglePanel(),
     });
     this.bind();
@@ -202,7 +202,7 @@ class Viewer {
     at('simulation-tools').hidden = !this.isController;
     this.sceneLook(welcome.look, welcome.camera);
     this.panel.setRole(this.isController, this.shown !== Mode.frames);
-    if (this.panel.isOpen) this.toNet({ kind: 'scene' });
+    if (this.panel.isOpen) this.askScene();
     this.sentCamera = '';
     this.lookFrom(this.camera);
     const isFull = welcome.look?.methods && Object.values(welcome.look.methods).some((name) => name && name !== 'main');
@@ -335,6 +335,10 @@ class Viewer {
     if (!this.look || !path.startsWith('look.')) return;
     this.ownLook = withValue(this.ownLook ?? this.look, path, value);
     this.showLook();
+  }
+  /** Who only watches may not even ask. */
+  private askScene(): void {
+    if (this.isController) this.toNet({ kind: 'scene' });
   }
   private command(command: number): void {
     if (this.isController) this.toNet({ kind: 'command', command });
