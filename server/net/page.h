@@ -12,12 +12,12 @@ namespace strandcast {
 enum class PageFileName { Fixed, Hashed };
 
 struct PageFile {
-  std::string_view path;  // "/", "/app.0123456789.js"
-  std::string_view media_type;
-  std::string_view version;  // of its content: letters and digits
+  std::string_view path = {};  // "/", "/app.0123456789.js"
+  std::string_view media_type = {};
+  std::string_view version = {};  // of its content: letters and digits
   PageFileName name = PageFileName::Fixed;
-  std::string_view plain;
-  std::string_view gzip;
+  std::string_view plain = {};
+  std::string_view gzip = {};
 };
 using PageFiles = std::span<const PageFile>;  // without the page: none
 

@@ -1,9 +1,10 @@
 // libFuzzer entry: who may talk to the server. Lines: Host header, Origin header, address the connection came
-// in on, a name that is allowed besides.
+// in on, a name that is allowed besides, Accept-Encoding, If-None-Match, the target.
 #include <algorithm>
 
 #include "common/base/check.h"
 #include "server/net/access.h"
+#include "server/net/page.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -35,5 +36,18 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (is_origin_allowed(origin, host, {allowed}))
       CHECK(is_origin_allowed(origin, host, {}) || origin.size() == allowed.size());
   }
+
+  const std::string coding = input.take_line();
+  const std::string tags = input.take_line();
+  const std::string target = input.take_line();
+  CHECK(!accepts_gzip(coding) || coding.find('*') != std::string::npos || coding.size() >= 4);
+  CHECK(accepts_gzip("gzip," + coding) && !accepts_gzip("gzip;q=0," + coding));
+  CHECK(names_tag("\"a\"," + tags, "\"a\""));
+  CHECK(!names_tag(tags, "\"a\"") || tags.find('*') != std::string::npos ||
+        tags.find("\"a\"") != std::string::npos);
+  const std::string_view path = path_of_target(target);
+  CHECK(target.starts_with(path) && path.find('?') == std::string_view::npos);
+  const PageFile page{.path = "/"};
+  CHECK((find_page_file({&page, 1}, path) != nullptr) == (path == "/"));
   return 0;
 }

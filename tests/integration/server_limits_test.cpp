@@ -192,6 +192,7 @@ TEST(NetLimitsByDefault, AreAsPromised) {
   EXPECT_EQ(limits.sessions_per_address, 64u);
   EXPECT_EQ(limits.messages_per_s, 1'000.0);
   EXPECT_EQ(limits.connections_per_s, 10.0);
+  EXPECT_EQ(limits.requests_per_s, 50.0);
   EXPECT_EQ(limits.wrong_tokens, 5u);
   EXPECT_EQ(limits.wrong_token_window_ms, 60'000);
   EXPECT_EQ(limits.wrong_token_block_ms, 60'000);

@@ -105,6 +105,27 @@ bool RawClient::read_raw(size_t byte_count) {
       [&](auto handler) { asio::async_read(state_->socket.next_layer(), asio::buffer(bytes), handler); });
 }
 
+std::string RawClient::read_answer() {
+  constexpr std::string_view kLength = "Content-Length: ";
+  std::string text;
+  tcp::socket& socket = state_->socket.next_layer();
+  while (!text.ends_with("\r\n\r\n")) {
+    char one = 0;
+    if (state_->wait([&](auto handler) { asio::async_read(socket, asio::buffer(&one, 1), handler); }))
+      return text;
+    text.push_back(one);
+  }
+  const size_t field = text.find(kLength);
+  const size_t header_bytes = text.size();
+  if (field == std::string::npos) return text;
+  text.resize(header_bytes + std::stoul(text.substr(field + kLength.size())));
+  const error_code error = state_->wait([&](auto handler) {
+    asio::async_read(socket, asio::buffer(text.data() + header_bytes, text.size() - header_bytes), handler);
+  });
+  if (error) text.resize(header_bytes);
+  return text;
+}
+
 std::string RawClient::read_raw_to_end() {
   std::string text;
   state_->wait([&](auto handler) {

@@ -50,6 +50,8 @@ class RawClient {
   void send_raw(const std::string& bytes);
   /// So many bytes below WebSocket; false when the connection ends before.
   bool read_raw(size_t byte_count);
+  /// One answer to a GET, by its Content-Length: header and body; less when the connection ends before.
+  std::string read_answer();
   /// Everything until the server closes, below WebSocket.
   std::string read_raw_to_end();
 

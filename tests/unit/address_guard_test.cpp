@@ -18,6 +18,16 @@ TEST(AddressGuard, TenConnectionsAtOnceAndTenASecond) {
   EXPECT_FALSE(guard.take_connection("a", kStartNs + kSecondNs / 10 + 1'000));
 }
 
+TEST(AddressGuard, FiftyRequestsAtOnceAndFiftyASecondWhateverTheConnections) {
+  AddressGuard guard({});
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(guard.take_request("a", kStartNs)) << i;
+  EXPECT_FALSE(guard.take_request("a", kStartNs)) << "one over";
+  EXPECT_TRUE(guard.take_connection("a", kStartNs)) << "these are counted for themselves";
+  EXPECT_TRUE(guard.take_request("b", kStartNs)) << "others are not affected";
+  EXPECT_TRUE(guard.take_request("a", kStartNs + kSecondNs / 50 + 1'000));
+  EXPECT_FALSE(guard.take_request("a", kStartNs + kSecondNs / 50 + 1'000));
+}
+
 TEST(AddressGuard, FiveWrongTokensInAMinuteAreForgivenAndTheSixthBlocksForAMinute) {
   AddressGuard guard({});
   for (int i = 0; i < 5; ++i) guard.on_wrong_token("a", kStartNs + i);
