@@ -1,7 +1,7 @@
 # The strand core for browsers, with emscripten's compiler: its libraries from common/, what they need besides, and
 # client/web. fmt and glm are headers; of zstd the decoder is compiled from Debian's source, which client/web/fetch_zstd.sh
 # leaves in the build folder.
-add_compile_options(-msimd128 -Wno-defaulted-function-deleted)  # its standard library compares less
+add_compile_options(-msimd128 $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> -Wno-defaulted-function-deleted)  # its standard library compares less
 
 set(headers ${CMAKE_BINARY_DIR}/headers)  # not all of /usr/include: its C library is another one
 file(MAKE_DIRECTORY ${headers})
@@ -11,7 +11,7 @@ endforeach()
 target_include_directories(strandcast_flags SYSTEM INTERFACE ${headers})
 
 add_library(fmt INTERFACE)
-target_compile_definitions(fmt INTERFACE FMT_HEADER_ONLY)
+target_compile_definitions(fmt INTERFACE FMT_HEADER_ONLY FMT_STATIC_THOUSANDS_SEPARATOR=',' FMT_USE_LONG_DOUBLE=0)  # no locales
 add_library(fmt::fmt ALIAS fmt)
 add_library(threads INTERFACE)  # there are none
 add_library(Threads::Threads ALIAS threads)

@@ -20,18 +20,20 @@ usage: bash deploy/run.sh [options]
   --seconds N          stop after N seconds; headless, what came is drawn then  (default: 6 headless, else never)
   --out DIR            where picture, clip, report and logs go                  (default: out)
   --headless           no window, even where there is a display
+  --web                builds the page for browsers too, prints its link and opens it where there is a display
   --help
 TEXT
 }
 
 fail() { echo "run.sh: $1" >&2; exit 2; }
 
-motion=builtin; wind=gusts; motion_options=(); server_options=(); seconds=; out=out; headless=
+motion=builtin; wind=gusts; motion_options=(); server_options=(); seconds=; out=out; headless=; web=
 need_file() { [ -f "$2" ] || fail "$1: no such file: $2"; }
 while [ $# -gt 0 ]; do
   case "$1" in
     --help|-h) usage; exit 0 ;;
     --headless) headless=1; shift; continue ;;
+    --web) web=1; shift; continue ;;
     --filter-glitches) motion_options+=(--filter-glitches); shift; continue ;;
     --groom|--motion|--motion-unit|--motion-up|--joint|--wind|--scene|--set|--seconds|--out) ;;
     *) usage >&2; fail "unknown option: $1" ;;
@@ -59,7 +61,7 @@ out=$(realpath "$out")
 
 root=$(realpath "$(dirname "$0")/..")
 cd "$root"
-bash deploy/install_deps.sh
+bash deploy/install_deps.sh ${web:+emscripten esbuild nodejs dpkg-dev}
 echo "Building (the first time takes a few minutes) ..."
 # From here on everything that takes time runs beside this shell, in a process group of its own, so that Ctrl-C or a
 # signal to this shell alone ends all of it at once.
@@ -83,7 +85,7 @@ trap 'stop_all; exit 0' INT TERM
 run() { "$@" & groups+=("$!"); wait "$!"; }
 
 build() {
-  cmake --preset release -DBUILD_TESTING=OFF >/dev/null \
+  cmake --preset release -DBUILD_TESTING=OFF ${web:+-DSTRANDCAST_WEB=ON} >/dev/null \
     && cmake --build --preset release --target strandcast-server strandcast-view strandcast-ctl
 }
 run build >"$out/build.log" 2>&1 \
@@ -118,7 +120,15 @@ until grep -q '^feeding ' "$out/feed.log"; do
 done
 grep -v '^feeding ' "$out/feed.log" || true
 
-if [ -n "$headless" ]; then
+if [ -n "$web" ]; then
+  link="http://127.0.0.1:$port/"
+  echo "Page:    $link"
+  if [ -z "$headless" ]; then
+    command -v xdg-open >/dev/null && xdg-open "$link" >/dev/null 2>&1 || echo "Open it in a browser."
+  fi
+  echo "Ctrl-C stops everything."
+  run sleep "${seconds:-infinity}"
+elif [ -n "$headless" ]; then
   run "$bin/strandcast-view" --connect "127.0.0.1:$port" --headless --size 1280x720 --seconds "${seconds:-6}" \
     --screenshot "$out/hair.png" --clip "$out/hair.webp" --clip-size 640x360 --report "$out/report.txt"
   echo

@@ -5,7 +5,7 @@
 #   bash tests/nightly.sh --seconds 5 fuzz     the short form: only the fuzzers, 5 s each
 # Parts: fuzz, grids (property and comparing tests), dev (address and undefined behaviour, all tests), tsan (threads, all
 # tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
-# kernels compile for NEON), wasm (does the strand core in WebAssembly decode what this one does, bit for bit). A part that fails
+# kernels compile for NEON), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -43,7 +43,7 @@ run_part() {
     lto) build lto && echo "all files agree" ;;
     arm) bash tests/tools/compile_for_arm.sh ;;
     wasm)
-      bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev
+      bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;

@@ -1,8 +1,9 @@
 // Makes the page's files what the server has of them (server/net/page.h): names with a hash of the content where the
 // browser may keep them for good, and everything compressed besides.
-//   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css APP.js WORKER.js CORE.wasm [KERNEL=CORE.wasm ...]
+//   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css APP.js WORKER.js KERNEL=CORE.wasm ...
 // Of the index, @ASSETS@ becomes {"worker", "core", "kernels": {KERNEL: ...}} with the names of these files, as JSON in an
-// attribute, and the names of the style and the script become theirs. Prints what each file takes.
+// attribute, and the names of the style and the script become theirs. "core" is the first one, which the page begins
+// with. Prints what each file takes.
 import crypto from 'node:crypto';
 import fs from 'node:fs';
 import path from 'node:path';
@@ -17,9 +18,9 @@ const MEDIA_TYPES = {
   '.wasm': 'application/wasm',
 };
 
-const [out, index, style, app, worker, core, ...kernels] = process.argv.slice(2);
-if (!core) {
-  console.error('usage: node pack_page.mjs OUT.cpp INDEX.html STYLE.css APP.js WORKER.js CORE.wasm [KERNEL=CORE.wasm ...]');
+const [out, index, style, app, worker, ...modules] = process.argv.slice(2);
+if (!modules.length) {
+  console.error('usage: node pack_page.mjs OUT.cpp INDEX.html STYLE.css APP.js WORKER.js KERNEL=CORE.wasm ...');
   process.exit(2);
 }
 const files = [];
@@ -40,10 +41,11 @@ function replaceOnce(text, what, by) {
   return text.replace(what, () => by);
 }
 
-const assets = { worker: addHashed(worker), core: addHashed(core), kernels: {} };
-for (const kernel of kernels) {
-  const [name, file] = kernel.split('=');
-  assets.kernels[name] = addHashed(file);
+const assets = { worker: addHashed(worker), core: '', kernels: {} };
+for (const module of modules) {
+  const [kernel, file] = module.split('=');
+  assets.kernels[kernel] = addHashed(file);
+  assets.core ||= assets.kernels[kernel];
 }
 let page = fs.readFileSync(index, 'utf8');
 page = replaceOnce(page, '@ASSETS@', attribute(JSON.stringify(assets)));

@@ -1,17 +1,15 @@
 #include "client/web/strand_core.h"
 
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "client/web/core_error.h"
+#include "client/web/core_export.h"
 #include "common/base/worker_pool.h"
+#include "common/kernels/step_speed.h"
 #include "common/replay/strand_fill.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_codec.h"
-
-#define STRAND_CORE_EXPORT extern "C" __attribute__((visibility("default"), used))
 
 using namespace strandcast;
 
@@ -26,12 +24,6 @@ struct StrandCoreDecoder {
 };
 
 namespace {
-
-std::string& last_error() {
-  static std::string text;
-  return text;
-}
-ErrorCode last_error_code = ErrorCode::Internal;
 
 StrandCoreState state_of(const Snapshot& snapshot) {
   const glm::dvec3& position_m = snapshot.world_from_head.position_m;
@@ -59,18 +51,6 @@ Status set_asset(StrandCoreDecoder& core, std::span<const std::byte> payload) {
 }
 
 }  // namespace
-
-void remember_core_error(const Error& error) {
-  last_error() = error.to_string();
-  last_error_code = error.code;
-}
-
-STRAND_CORE_EXPORT void* strand_core_allocate(size_t size_bytes) {
-  return std::malloc(size_bytes);
-}
-STRAND_CORE_EXPORT void strand_core_free(void* memory) {
-  std::free(memory);
-}
 
 STRAND_CORE_EXPORT StrandCoreDecoder* strand_core_make(const char* codec, size_t codec_bytes,
                                                        uint32_t strand_count, uint32_t vertex_count) {
@@ -124,13 +104,9 @@ STRAND_CORE_EXPORT const float* strand_core_all_positions(StrandCoreDecoder* dec
 STRAND_CORE_EXPORT uint32_t strand_core_position_floats(const StrandCoreDecoder* decoder) {
   return static_cast<uint32_t>(3 * decoder->position_m.size());
 }
+STRAND_CORE_EXPORT double strand_core_step_ns() {
+  return measure_kernel_step_ns();
+}
 STRAND_CORE_EXPORT uint64_t strand_core_hash(const StrandCoreDecoder* decoder) {
   return decoder->newest == nullptr ? 0 : state_hash(*decoder->newest);
-}
-
-STRAND_CORE_EXPORT const char* strand_core_error() {
-  return last_error().c_str();
-}
-STRAND_CORE_EXPORT const char* strand_core_error_kind() {
-  return to_string(last_error_code);
 }

@@ -20,6 +20,11 @@ export async function loadStrandCore(module, print = console.error) {
     view().setUint32(sizeAt, 0, true);
     return 0;
   };
+  // Its arguments before the last are a clock and a precision, of 64 bits in one part or two.
+  const now = (...parts) => {
+    view().setBigUint64(parts[parts.length - 1], BigInt(Math.round(performance.now() * 1e6)), true);
+    return 0;
+  };
   const stop = (code) => {
     throw new Error(`strand core stopped with ${code}`);
   };
@@ -27,7 +32,7 @@ export async function loadStrandCore(module, print = console.error) {
     env: { emscripten_notify_memory_growth: () => {} },
     wasi_snapshot_preview1: {
       fd_write: write, fd_seek: () => 8, fd_close: () => 8, proc_exit: stop,
-      environ_sizes_get: nothing, environ_get: () => 0,
+      environ_sizes_get: nothing, environ_get: () => 0, clock_time_get: now,
     },
   });
   const instance = made.instance ?? made;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "client/web/core_error.h"
+#include "client/web/core_export.h"
 #include "common/base/worker_pool.h"
 #include "common/render/gl_tiles/tile_block.h"
 #include "common/render/rest_facts.h"
@@ -18,8 +18,6 @@
 #include "common/render/tiles/tile_bins.h"
 #include "common/render/tiles/tile_raster.h"
 #include "common/render/view.h"
-
-#define STRAND_CORE_EXPORT extern "C" __attribute__((visibility("default"), used))
 
 using namespace strandcast;
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Prints, per stream, the median processor milliseconds of decoding a frame natively (one thread) and in WebAssembly
-# (Node), of one run, and the size of the module. Needs a build with -DSTRANDCAST_WEB=ON.
+# (Node), of one run, and what the page's files take. Needs a build with -DSTRANDCAST_WEB=ON.
 # usage: bash tests/bench/wasm.sh [--build DIR] [--frames N]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -14,14 +14,15 @@ while [ $# -gt 1 ]; do
   esac
   shift 2
 done
-module="$build/web/bin/strand_core.wasm"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-echo "module: $(stat -c %s "$module") bytes, $(gzip -9 -c "$module" | wc -c) compressed"
+for module in "$build"/web/bin/strand_core*.wasm "$build"/web/page/*.js; do
+  echo "$(basename "$module"): $(stat -c %s "$module") bytes, $(gzip -9 -c "$module" | wc -c) compressed"
+done
 for stream in "dftl step 2000x16" "dftl step 10000x16" "direct_rod step 2000x16" "direct_rod step 10000x16" \
   "dftl tangent 2000x16" "dftl tangent 10000x16"; do
   # shellcheck disable=SC2086
   "$build/bin/record_tapes" stream "$work/tape" $stream "$frames"
-  node tests/web/play.mjs "$module" "$work/tape" | head -n 1
+  node tests/web/play.mjs "$build/web/bin/strand_core_${stream%% *}.wasm" "$work/tape" | head -n 1
 done

@@ -253,6 +253,22 @@ TEST_F(Tls, HttpGoesOverItToo) {
   EXPECT_EQ(answer.error().code, ErrorCode::Unauthorized) << answer.error().to_string();
 }
 
+// A file of many records, and another one on the same connection by whoever keeps it.
+TEST_F(Tls, ThePageGoesOverItToo) {
+  static const std::string large(900'000, 'x');
+  static const PageFile page[] = {{"/", "text/html", "aa", PageFileName::Fixed, large, large}};
+  NetConfig config = far_away(with_certificate());
+  config.page = page;
+  start(config);
+  const auto answer = http_get({"127.0.0.1", server_->port(), true}, "/", std::chrono::milliseconds(30'000),
+                               {files_.certificate, {}});
+  ASSERT_TRUE(answer.ok()) << answer.error().to_string();
+  EXPECT_EQ(answer->status, 200u);
+  EXPECT_EQ(answer->body.size(), large.size());
+  EXPECT_THAT(test::http_get(server_->port(), "/"), HasSubstr("426 Upgrade Required"))
+      << "and over nothing else";
+}
+
 TEST_F(Tls, BrokenAndUnfinishedHandshakesEndThatConnectionOnly) {
   NetConfig config = with_certificate();
   config.limits.handshake_ms = 300;

@@ -1,6 +1,6 @@
 // Plays tapes (tests/web/tape.h) to the strand core in WebAssembly: what every message decodes to has the hash, or the
 // error the words, that the native decoders had. Never may it trap.
-//   node tests/web/play.mjs strand_core.wasm TAPE...
+//   node tests/web/play.mjs strand_core.wasm [--only NAME] TAPE...     only what has this name on the tapes
 // Prints a line per name on a tape, with medians of both sides where the tape has times; the exit status is 1 when
 // anything differs.
 import fs from 'node:fs';
@@ -100,8 +100,9 @@ class Result {
 const show = (value) => (typeof value === 'bigint' ? value.toString(16).padStart(16, '0') : `"${value}"`);
 
 const [wasm, ...tapes] = process.argv.slice(2);
+const only = tapes[0] === '--only' ? tapes.splice(0, 2)[1] : undefined;
 if (!tapes.length) {
-  console.error('usage: node play.mjs strand_core.wasm TAPE...');
+  console.error('usage: node play.mjs strand_core.wasm [--only NAME] TAPE...');
   process.exit(2);
 }
 const core = new Core(await loadStrandCore(fs.readFileSync(wasm)));
@@ -119,7 +120,10 @@ for (const tape of tapes) {
   for (const record of records(tape)) {
     if (record.kind === 'N') {
       finish();
-      result = new Result(record.bytes.toString());
+      const name = record.bytes.toString();
+      result = only === undefined || only === name ? new Result(name) : undefined;
+    } else if (!result) {
+      continue;
     } else if (record.kind === 'D') {
       core.make(record.bytes.subarray(8).toString(), record.bytes.readUInt32LE(0), record.bytes.readUInt32LE(4));
       sinceMade = 0;

@@ -28,10 +28,11 @@ const warnings = new Warnings(at('warnings'), at('lasting'));
 interface Assets {
   worker: string;
   core: string;
+  kernels: { [name: string]: string };
 }
 function assets(): Assets {
   const content = document.querySelector<HTMLMetaElement>('meta[name=strandcast-assets]')?.content ?? '';
-  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { worker: 'worker.js', core: 'strand_core.wasm' };
+  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { worker: 'worker.js', core: 'strand_core.wasm', kernels: {} };
 }
 
 const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: [number, number, number]): [number, number, number] =>
@@ -100,7 +101,7 @@ class Viewer {
       url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, pictures: wishes.pictures,
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: canDraw,
     };
-    const { worker, core } = assets();
+    const { worker, core, kernels } = assets();
     const start = (name: string): Worker => {
       const made = new Worker(worker, { type: 'module', name });
       made.onerror = () => this.ended('this browser does not start the page’s workers');
@@ -123,7 +124,7 @@ class Viewer {
       this.drawWhy = 'this browser cannot draw beside the page';
     }
     compiled.then((module) => {
-      this.toNet({ kind: 'start', core: module, asked: this.asked, states: states.port1, sockets: sockets.port1 },
+      this.toNet({ kind: 'start', core: module, kernels, asked: this.asked, states: states.port1, sockets: sockets.port1 },
         [states.port1, sockets.port1]);
       this.toDraw({ kind: 'core', core: module, states: states.port2 }, [states.port2]);
     }, (error: Error) => this.ended(error.message));
@@ -464,8 +465,17 @@ class Viewer {
     const hz = isFrames ? this.pictureTimes.length / 2 : this.drawFigures?.shownHz ?? 0;
     this.toNet({ kind: 'drawn', drawMs: this.drawFigures?.drawMs ?? 0, shownHz: hz, device: this.device });
     this.showWarnings();
+    this.tellTests(hz);
     if (!this.welcome || !figures) return hud.show(this.isConnected ? 'Connected' : 'Connecting', []);
     hud.show(this.line(hz), this.rows(hz));
+  }
+  /** What tests/web/page_browser.mjs reads; nothing here reads it. */
+  private tellTests(hz: number): void {
+    document.documentElement.dataset.strandcast = JSON.stringify({
+      isConnected: this.isConnected, mode: ['strands', 'pictures'][this.shown] ?? '', hz, camera: this.camera.offset,
+      states: this.figures?.decodedFrames ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
+      hash_ok: !this.figures?.rejectedFrames, error: at('trouble').hidden ? '' : at('trouble-why').textContent,
+    });
   }
   private showWarnings(): void {
     const all: string[] = [];

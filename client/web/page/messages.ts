@@ -24,7 +24,7 @@ export interface Asked {
 }
 
 export type ToNet =
-  | { kind: 'start'; core: WebAssembly.Module; asked: Asked; states: MessagePort; sockets: MessagePort }
+  | { kind: 'start'; core: WebAssembly.Module; kernels: { [name: string]: string }; asked: Asked; states: MessagePort; sockets: MessagePort }
   | { kind: 'reconnect'; asked: Asked }
   | { kind: 'mode'; mode: number }
   | { kind: 'camera'; camera: Camera }

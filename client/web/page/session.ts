@@ -1,7 +1,7 @@
 // The connection, in a worker of its own: decoding, acknowledgements and clock. Nothing here waits for
 // whoever draws: the newest state waits for it, and the one before is dropped.
 import { ClockOffset, nowNs, Recent } from './clock';
-import { Core, StrandDecoder } from './core';
+import { compileCore, Core, StrandDecoder } from './core';
 import type { Asked, Camera, FromNet, NetFigures, State, ToNet } from './messages';
 import { decodablePictures, PictureDecoder, type Decoded } from './pictures';
 import { mayComeBack, ReconnectPolicy, wordsFor } from './reconnect';
@@ -29,9 +29,15 @@ const PICTURE_NAMES: { [codec: number]: string } = {
 const post = (message: FromNet, transfer: Transferable[] = []): void =>
   (self as unknown as WorkerScope).postMessage(message, transfer);
 
+/** Clocks of browsers are coarse: what is quicker than they can tell is still something. */
+const LEAST_STEP_NS = 5;
+
 /** What lasts over reconnections. */
 class Net {
   private core!: Core;
+  private kernels: { [name: string]: string } = {};
+  private isLoading = false;
+  stepNs = 0; // of one vertex in a solver's step here
   private asked!: Asked;
   private states!: MessagePort;
   private pictureCodecs = 0;
@@ -56,9 +62,27 @@ class Net {
     };
     const [core, codecs] = await Promise.all([Core.load(message.core), decodablePictures()]);
     this.core = core;
+    this.kernels = message.kernels;
+    this.stepNs = Math.max(core.call.strand_core_step_ns(), LEAST_STEP_NS);
     this.pictureCodecs = codecs;
     this.connect();
     setInterval(() => this.connection?.report(), 500);
+  }
+  /** True when the stream is stepped by a kernel that stands in another module: it comes with that one again. */
+  changesCore(error: Error): boolean {
+    if (this.isLoading) return true;
+    const name = /this build has no sim\/(\w+)\.comp/.exec(error.message)?.[1] ?? '';
+    const file = this.kernels[name];
+    if (!file) return false;
+    delete this.kernels[name]; // once
+    this.isLoading = true;
+    void compileCore(new URL(file, self.location.href).href).then(Core.load)
+      .then((core) => (this.core = core), () => undefined)
+      .then(() => {
+        this.isLoading = false;
+        this.reconnect(this.asked);
+      });
+    return true;
   }
   reconnect(asked: Asked): void {
     this.asked = asked;
@@ -191,7 +215,7 @@ class Connection {
       hello: {
         role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: 'browser', token: this.asked.token,
         frame_width: this.asked.width, frame_height: this.asked.height, acknowledges: true,
-        picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec,
+        picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec, step_ns: this.net.stepNs,
       },
     });
   }
@@ -362,6 +386,7 @@ class Connection {
     try {
       (isNext ? this.next! : this.now!).decode(message);
     } catch (error) {
+      if (this.net.changesCore(error as Error)) return;
       return this.reject(error as Error);
     }
     this.acknowledge(header, received);

@@ -1,0 +1,208 @@
+// The page of a server in a real browser: joins, sees states and pictures, turns the camera, comes back after a restart, says
+// what is wrong with a token, and lets none of it leave the Hello.
+//   node tests/web/page_browser.mjs strandcast-server [FOLDER for screenshots]
+// Ends with 77 where there is no browser; a line per test; the exit status is 1 when any fails.
+import { spawn } from 'node:child_process';
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import http from 'node:http';
+import os from 'node:os';
+import path from 'node:path';
+import { Browser, findChromium, sleep } from './browser.mjs';
+
+const [program, shots] = process.argv.slice(2);
+if (!program) {
+  console.error('usage: node page_browser.mjs strandcast-server [FOLDER]');
+  process.exit(2);
+}
+if (!findChromium()) {
+  console.log('skipped: needs a browser (chromium)');
+  process.exit(77);
+}
+const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));
+const SMALL = ['--set', 'groom.procedural.strand_count=400', '--set', 'groom.procedural.vertex_count=12'];
+
+class Server {
+  static async start(options = [], port = 0) {
+    const server = new Server();
+    server.log = '';
+    const portFile = path.join(work, `port${Math.random()}`);
+    server.child = spawn(program, ['--port', String(port), '--port-file', portFile, ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
+    server.child.stderr.setEncoding('utf8').on('data', (text) => (server.log += text));
+    for (let i = 0; i < 600 && !(fs.existsSync(portFile) && fs.readFileSync(portFile, 'utf8').trim()); ++i) {
+      if (server.child.exitCode !== null) throw new Error(server.log);
+      await sleep(50);
+    }
+    server.port = Number(fs.readFileSync(portFile, 'utf8'));
+    server.url = `http://127.0.0.1:${server.port}/`;
+    return server;
+  }
+  async end() {
+    if (this.child.exitCode !== null || this.child.signalCode !== null) return;
+    this.child.kill('SIGTERM');
+    await new Promise((done) => this.child.once('exit', done));
+  }
+}
+
+function get(url, headers = {}) {
+  return new Promise((done, fail) => {
+    http.get(url, { headers, agent: false }, (answer) => {
+      const parts = [];
+      answer.on('data', (part) => parts.push(part)).on('end', () => done({ status: answer.statusCode, headers: answer.headers, body: Buffer.concat(parts) }));
+    }).on('error', fail);
+  });
+}
+
+let browser;
+let server;
+const all = {
+  async 'strands come, and every state has its hash'() {
+    const tab = await browser.open(`${server.url}#mode=strands`);
+    const state = await tab.until((now) => now.mode === 'strands' && now.states > 30 && now.hz > 0, 'strands');
+    assert.equal(state.hash_ok, true);
+    assert.equal(state.error, '');
+    if (shots) await tab.screenshot(path.join(shots, 'strands.png'));
+    assert.deepEqual(tab.errors, [], 'nothing is an error in the console');
+    const files = new Set(tab.requests.map((one) => one.url).filter((url) => url.startsWith('http')));
+    assert.ok(files.size <= 5, `${files.size} files: ${[...files]}`);
+    for (const one of tab.requests) assert.ok(new URL(one.url).host === new URL(server.url).host, one.url);
+    await tab.close();
+  },
+  async 'the server\'s pictures come'() {
+    const tab = await browser.open(`${server.url}#mode=pictures`);
+    await tab.until((now) => now.mode === 'pictures' && now.pictures > 5, 'pictures');
+    if (shots) await tab.screenshot(path.join(shots, 'pictures.png'));
+    assert.deepEqual(tab.errors, []);
+    await tab.close();
+  },
+  async 'mouse and keys turn the camera'() {
+    const tab = await browser.open(`${server.url}#mode=strands`);
+    const before = await tab.until((now) => now.states > 3, 'a state');
+    await tab.drag([320, 120], [400, 140]);
+    const dragged = await tab.until((now) => String(now.camera) !== String(before.camera), 'another camera');
+    await tab.evaluate('document.getElementById("stage").focus()');
+    for (let i = 0; i < 5; ++i) await tab.press('ArrowLeft');
+    await tab.until((now) => String(now.camera) !== String(dragged.camera), 'another camera by keys');
+    await tab.close();
+  },
+  async 'a stream of another solver brings its kernel'() {
+    const other = await Server.start([...SMALL, '--set', 'solver.name=direct_rod']);
+    const tab = await browser.open(`${other.url}#mode=strands&codec=step`);
+    const state = await tab.until((now) => now.states > 10 && now.codec === 'step', 'states');
+    assert.equal(state.hash_ok, true);
+    assert.ok(tab.requests.some((one) => one.url.includes('strand_core_direct_rod')) || (await tab.evaluate(
+      'performance.getEntriesByType("resource").length')) > 0);
+    await tab.close();
+    await other.end();
+  },
+  async 'a second tab sees the same, from the cache'() {
+    const first = await browser.open(`${server.url}#mode=strands`);
+    await first.until((now) => now.states > 3, 'states');
+    const begin = server.log.length;
+    const second = await browser.open(`${server.url}#mode=strands`);
+    await second.until((now) => now.states > 3, 'states in the second tab');
+    await first.until((now) => now.isConnected, 'the first one stays');
+    assert.ok(!server.log.slice(begin).includes('refused'));
+    await first.close();
+    await second.close();
+  },
+  async 'comes back after a restart of the server'() {
+    const mortal = await Server.start(SMALL);
+    const tab = await browser.open(`${mortal.url}#mode=strands`);
+    await tab.until((now) => now.states > 3, 'states');
+    await mortal.end();
+    await tab.until((now) => !now.isConnected, 'the loss is noticed');
+    const again = await Server.start(SMALL, mortal.port);
+    await tab.until((now) => now.isConnected && now.states > 3, 'states of the new server');
+    await tab.close();
+    await again.end();
+  },
+  async 'tokens: a wrong one is named, a right one lets in, and none is anywhere but in the Hello'() {
+    const right = 'right-0123456789abcdef';
+    const wrong = 'wrong-0123456789abcdef';
+    const file = path.join(work, 'tokens');
+    fs.writeFileSync(file, `viewer ${right}\n`, { mode: 0o600 });
+    const strict = await Server.start([...SMALL, '--token-file', file, '--distrust-loopback']);
+    const bad = await browser.open(`${strict.url}#token=${wrong}`);
+    await bad.until((now) => /token/i.test(now.error ?? ''), 'the reason');
+    await bad.close();
+    const tab = await browser.open(`${strict.url}#token=${right}&mode=strands&view-only`);
+    await tab.until((now) => now.states > 3, 'states');
+    const address = await tab.evaluate('location.href');
+    const history = await tab.send('Page.getNavigationHistory');
+    for (const secret of [right, wrong]) {
+      assert.ok(!address.includes(secret));
+      assert.ok(!strict.log.includes(secret), 'in the log');
+      assert.ok(!history.entries.some((one) => one.url.includes(secret)), 'in the history');
+      for (const one of tab.requests) {
+        assert.ok(!one.url.includes(secret), 'in an address');
+        assert.ok(!JSON.stringify(one.headers).includes(secret), 'in a field');
+      }
+    }
+    const referring = tab.requests.filter((one) => Object.keys(one.headers).some((name) => name.toLowerCase() === 'referer' && one.headers[name]));
+    assert.deepEqual(referring, [], 'nobody is told where a request comes from');
+    await tab.close();
+    await strict.end();
+  },
+  async 'a page of another origin is refused, and may not show this one'() {
+    const foreign = http.createServer((_, answer) => {
+      answer.setHeader('Content-Type', 'text/html');
+      answer.end(`<iframe src="${server.url}"></iframe><script>
+        const socket = new WebSocket('${server.url.replace('http', 'ws')}v1', 'strandcast.v1');
+        socket.onopen = () => (document.title = 'open'); socket.onerror = () => (document.title = 'refused');</script>`);
+    });
+    await new Promise((done) => foreign.listen(0, '127.0.0.1', done));
+    const tab = await browser.open(`http://127.0.0.1:${foreign.address().port}/`);
+    await tab.until(async () => (await tab.evaluate('document.title')) === 'refused', 'the refusal');
+    await tab.until(() => tab.errors.some((error) => /frame-ancestors|ERR_BLOCKED/.test(error)), 'no frame');
+    assert.match(server.log, /refused 127\.0\.0\.1 origin/);
+    await tab.close();
+    foreign.close();
+  },
+  async 'files are compressed, kept and typed'() {
+    const page = await get(server.url, { 'accept-encoding': 'gzip' });
+    assert.equal(page.headers['content-encoding'], 'gzip');
+    assert.equal(page.headers['cache-control'], 'no-cache');
+    assert.equal((await get(server.url, { 'accept-encoding': 'gzip', 'if-none-match': page.headers.etag })).status, 304);
+    const text = (await get(server.url)).body.toString();
+    const assets = JSON.parse(/name="strandcast-assets" content="([^"]*)"/.exec(text)[1].replaceAll('&quot;', '"').replaceAll('&amp;', '&'));
+    const linked = [...text.matchAll(/(?:src|href)="([^"]+\.(?:js|css))"/g)].map((one) => one[1]);
+    const begun = [assets.worker, assets.core, ...linked]; // what every page begins with
+    let bytes = page.body.length;
+    for (const name of new Set([...begun, ...Object.values(assets.kernels)])) {
+      const file = await get(server.url + name, { 'accept-encoding': 'gzip' });
+      assert.equal(file.status, 200, name);
+      assert.equal(file.headers['content-encoding'], 'gzip');
+      assert.match(file.headers['cache-control'], /immutable/);
+      assert.equal(file.headers['content-type'].split(';')[0],
+        { js: 'text/javascript', css: 'text/css', wasm: 'application/wasm' }[name.split('.').pop()]);
+      if (begun.includes(name)) bytes += file.body.length;
+    }
+    console.log(`  ${begun.length + 1} requests, ${bytes} bytes compressed`);
+  },
+};
+
+const wanted = process.env.STRANDCAST_TEST ?? '';
+const tests = Object.fromEntries(Object.entries(all).filter(([name]) => name.includes(wanted)));
+let failed = 0;
+try {
+  if (shots) fs.mkdirSync(shots, { recursive: true });
+  browser = await Browser.start();
+  server = await Server.start(SMALL);
+  for (const [name, test] of Object.entries(tests)) {
+    const begin = Date.now();
+    try {
+      await test();
+      console.log(`passed: ${name} (${((Date.now() - begin) / 1000).toFixed(1)} s)`);
+    } catch (error) {
+      ++failed;
+      console.log(`FAILED: ${name}: ${error.stack}`);
+    }
+  }
+} finally {
+  await browser?.end();
+  await server?.end();
+  fs.rmSync(work, { recursive: true, force: true });
+}
+console.log(`${Object.keys(tests).length - failed} of ${Object.keys(tests).length} passed`);
+process.exit(failed ? 1 : 0);
