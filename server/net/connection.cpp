@@ -177,9 +177,11 @@ void Connection::check_deadline(int64_t time_ns) {
 }
 
 void Connection::on_request(const beast::error_code& error) {
+  const bool was_idle = is_idle();
   is_reading_ = false;
   if (is_finished_) return;
-  if (is_gone(error)) return finish();
+  // Between two requests every end is one: TLS may be cut off there too.
+  if (is_gone(error) || (error && was_idle)) return finish();
   if (error == http::error::header_limit || error == http::error::buffer_overflow)
     return refuse(Refusal::Request, http::status::request_header_fields_too_large,
                   fmt::format("The header of a request has at most {} bytes.", kMaxHttpHeaderBytes));

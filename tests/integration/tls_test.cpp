@@ -265,6 +265,7 @@ TEST_F(Tls, ThePageGoesOverItToo) {
   ASSERT_TRUE(answer.ok()) << answer.error().to_string();
   EXPECT_EQ(answer->status, 200u);
   EXPECT_EQ(answer->body.size(), large.size());
+  EXPECT_EQ(server_->counters().refused_http, 0u) << "whoever goes then has done nothing wrong";
   EXPECT_THAT(test::http_get(server_->port(), "/"), HasSubstr("426 Upgrade Required"))
       << "and over nothing else";
 }
