@@ -147,6 +147,8 @@ struct StrandPicture {
   TileBins bins;
   TileScratch scratch;
   std::vector<uint8_t> srgb, rgba;
+  ShadeInput shade{};
+  TileGrid grid;
 };
 
 namespace {
@@ -278,28 +280,27 @@ void order_segments(StrandPicture& p, const View& view) {
   }
 }
 
-void draw_here(StrandPicture& p, const Turn& turn) {
-  const glm::uvec2 size(turn.view.target_px);
-  const ShadeInput shade{
+void begin_here(StrandPicture& p, const Turn& turn) {
+  p.grid = {glm::uvec2(turn.view.target_px)};
+  p.shade = {
       shading_numbers(p.look), p.lights,       p.lattice.view(), turn.view, p.width_m, p.look.tip_scale,
       p.look.style.tip_fade,   DebugView::None};
-  shade_points(shade, p.workers, kSet, p.points);
+  shade_points(p.shade, p.workers, kSet, p.points);
   p.expanded_state = 0;
-  const TileGrid grid{size};
-  p.bins.bin_segments(p.points, grid, turn.view.near_m, p.workers);
+  p.bins.bin_segments(p.points, p.grid, turn.view.near_m, p.workers);
   if (p.drawn_head.mesh != nullptr) {
     p.drawn_head.shadow_lift_m = kShadowLift * p.lattice.view().soft_m;
     place_head(turn.view, p.workers, p.drawn_head);
   }
-  p.bins.bin_boxes(p.drawn_head.box, grid);
-  p.rgba.resize(size_t{4} * size.x * size.y);
-  const TileInput input{&p.points, &p.bins,           &p.drawn_head, &shade,
-                        grid,      p.look.background, p.srgb.data(), p.rgba.data()};
-  for (uint32_t tile = 0; tile < grid.count(); ++tile) draw_tile(kSet, {&input, &p.scratch, tile});
+  p.bins.bin_boxes(p.drawn_head.box, p.grid);
+  p.rgba.resize(size_t{4} * p.grid.size_px.x * p.grid.size_px.y);
 }
 
-void remember_error(const Error& error) {
-  remember_core_error(error);
+void draw_tiles(StrandPicture& p, uint32_t begin, uint32_t end) {
+  const TileInput input{&p.points, &p.bins,           &p.drawn_head, &p.shade,
+                        p.grid,    p.look.background, p.srgb.data(), p.rgba.data()};
+  for (uint32_t tile = begin; tile < std::min(end, p.grid.count()); ++tile)
+    draw_tile(kSet, {&input, &p.scratch, tile});
 }
 
 }  // namespace
@@ -307,7 +308,7 @@ void remember_error(const Error& error) {
 STRAND_CORE_EXPORT StrandPicture* strand_picture_make(const std::byte* payload, size_t size_bytes) {
   auto asset = decode_scene_asset({payload, size_bytes});
   if (!asset) {
-    remember_error(asset.error());
+    remember_core_error(asset.error());
     return nullptr;
   }
   return std::make_unique<StrandPicture>(std::move(asset).value()).release();
@@ -337,7 +338,7 @@ STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_prepare(StrandPictur
   StrandPicture& p = *picture;
   const auto turn = turn_of(*view);
   if (!turn) {
-    remember_error(turn.error());
+    remember_core_error(turn.error());
     return nullptr;
   }
   expand_and_light(p, *turn, view->strand_share, false);
@@ -365,16 +366,20 @@ STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_prepare(StrandPictur
   return &parts;
 }
 
-STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_draw(StrandPicture* picture,
-                                                                 const StrandPictureView* view) {
+STRAND_CORE_EXPORT const StrandPictureParts* strand_picture_begin(StrandPicture* picture,
+                                                                  const StrandPictureView* view) {
   StrandPicture& p = *picture;
   const auto turn = turn_of(*view);
   if (!turn) {
-    remember_error(turn.error());
+    remember_core_error(turn.error());
     return nullptr;
   }
   expand_and_light(p, *turn, view->strand_share, true);
-  draw_here(p, *turn);
+  begin_here(p, *turn);
   p.parts.rgba = offset_of(p.rgba.data());
+  p.parts.tile_count = p.grid.count();
   return &p.parts;
+}
+STRAND_CORE_EXPORT void strand_picture_draw_tiles(StrandPicture* picture, uint32_t begin, uint32_t end) {
+  draw_tiles(*picture, begin, end);
 }

@@ -54,9 +54,10 @@ struct StrandPictureParts {
   uint32_t lattice_size[3];  // 48
   uint32_t half_size[3];     // 60
   uint32_t light_number;     // 72: another one where the depths are others
-  uint32_t rgba;             // 76: (height x width x 4) of strand_picture_draw(), top row first
+  uint32_t rgba;             // 76: (height x width x 4) of strand_picture_draw_tiles(), top row first
+  uint32_t tile_count;       // 80: of the picture begun
 };
-static_assert(sizeof(StrandPictureParts) == 80);
+static_assert(sizeof(StrandPictureParts) == 84);
 
 /// Of the head that is drawn under the hair.
 struct StrandPictureHead {
@@ -86,6 +87,9 @@ void strand_picture_changed(StrandPicture* picture);
 
 /// Strands for a graphics card; nullptr for a view that is none.
 const StrandPictureParts* strand_picture_prepare(StrandPicture* picture, const StrandPictureView* view);
-/// The whole picture, made by this processor.
-const StrandPictureParts* strand_picture_draw(StrandPicture* picture, const StrandPictureView* view);
+/// Begins a picture made by this processor ...
+const StrandPictureParts* strand_picture_begin(StrandPicture* picture, const StrandPictureView* view);
+/// ... and draws tiles of it, so that whoever waits for another one need not wait for all of them. Nothing
+/// else is asked of the picture between.
+void strand_picture_draw_tiles(StrandPicture* picture, uint32_t begin, uint32_t end);
 }

@@ -480,7 +480,7 @@ class Viewer {
   private showWarnings(): void {
     const all: string[] = [];
     if (this.status?.is_paused) all.push(this.isController ? 'Paused: Space resumes, N steps' : 'Paused');
-    if (this.isConnected && this.status?.is_motion_stale) all.push('No head motion arrives at the server');
+    if (this.isConnected && this.status?.is_motion_stale && !this.status.is_paused) all.push('No head motion arrives at the server');
     if (this.isConnected && this.status?.slow_motion) all.push(this.status.slow_motion);
     warnings.keep(all);
   }
@@ -490,7 +490,7 @@ class Viewer {
   }
   private line(hz: number): string {
     const what = this.shown === Mode.frames ? 'server’s pictures' : 'strands';
-    const parts = [`${hz >= 9.5 ? hz.toFixed(0) : hz.toFixed(1)} fps`, what, `${this.rate.kbits.toFixed(0)} kbit/s`];
+    const parts = [hz > 0 ? `${hz >= 9.5 ? hz.toFixed(0) : hz.toFixed(1)} fps` : 'nothing moves', what, `${this.rate.kbits.toFixed(0)} kbit/s`];
     if (this.latencyMs()) parts.push(`${this.latencyMs().toFixed(0)} ms from motion`);
     return this.isConnected ? parts.join(' · ') : `not connected · ${what}`;
   }

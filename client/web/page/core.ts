@@ -22,7 +22,8 @@ export interface CoreFunctions {
   strand_picture_positions(picture: number): number;
   strand_picture_changed(picture: number): void;
   strand_picture_prepare(picture: number, view: number): number;
-  strand_picture_draw(picture: number, view: number): number;
+  strand_picture_begin(picture: number, view: number): number;
+  strand_picture_draw_tiles(picture: number, begin: number, end: number): void;
 }
 
 /** Once for all workers; while it still comes. */

@@ -28,13 +28,18 @@ interface Size {
   height: number;
 }
 
+interface Counts {
+  strands: number;
+  segments: number;
+}
+
 /** Pictures onto the canvas. */
 interface Painter {
   readonly device: number;
   readonly drawnBy: string;
   setPicture(picture: StrandPicture): void;
-  /** Resolves when the picture is there. */
-  paint(picture: StrandPicture, camera: Camera, size: Size, share: number): Promise<{ strands: number; segments: number }>;
+  /** Resolves when the picture is there, or left because it is unwanted. */
+  paint(picture: StrandPicture, camera: Camera, size: Size, share: number, isUnwanted?: () => Promise<boolean>): Promise<Counts | undefined>;
 }
 
 class GlPainter implements Painter {
@@ -46,7 +51,7 @@ class GlPainter implements Painter {
   setPicture(picture: StrandPicture): void {
     this.strands.setHead(picture);
   }
-  async paint(picture: StrandPicture, camera: Camera, size: Size, share: number): Promise<{ strands: number; segments: number }> {
+  async paint(picture: StrandPicture, camera: Camera, size: Size, share: number): Promise<Counts> {
     if (this.canvas.width !== size.width) this.canvas.width = size.width;
     if (this.canvas.height !== size.height) this.canvas.height = size.height;
     const parts = picture.prepare(camera, size, share);
@@ -80,8 +85,9 @@ class TilePainter implements Painter {
     this.drawing = drawing;
   }
   setPicture(): void {}
-  async paint(picture: StrandPicture, camera: Camera, size: Size, share: number): Promise<{ strands: number; segments: number }> {
-    const rgba = picture.draw(camera, size, share);
+  async paint(picture: StrandPicture, camera: Camera, size: Size, share: number, isUnwanted?: () => Promise<boolean>): Promise<Counts | undefined> {
+    const rgba = await picture.draw(camera, size, share, isUnwanted);
+    if (!rgba) return undefined;
     if (this.canvas.width !== size.width) this.canvas.width = size.width;
     if (this.canvas.height !== size.height) this.canvas.height = size.height;
     this.drawing.putImageData(new ImageData(new Uint8ClampedArray(rgba), size.width, size.height), 0, 0);
@@ -146,6 +152,10 @@ class Drawer {
     this.canvas = message.canvas;
     const { painter, why } = choosePainter(message.canvas, message.wish, message.samples);
     this.painter = painter;
+    message.canvas.addEventListener('webglcontextlost', () => {
+      this.picture = undefined;
+      post({ kind: 'failed', reason: 'the graphics card was taken away' });
+    });
     if (painter.device === Device.software) this.step = 2;
     post({ kind: 'ready', device: painter.device, drawnBy: painter.drawnBy, why });
   }
@@ -173,6 +183,7 @@ class Drawer {
       this.picture?.delete();
       this.picture = new StrandPicture(this.core, new Uint8Array(state.payload));
       this.hasState = false;
+      this.isDirty = true; // what is under way is left
       if (this.look) this.picture.setLook(this.look);
       this.painter.setPicture(this.picture);
       return this.askNext();
@@ -222,7 +233,16 @@ class Drawer {
       const pixels = {
         width: Math.max(16, Math.round(this.size.width * size)), height: Math.max(16, Math.round(this.size.height * size)),
       };
-      const counts = await this.painter.paint(this.picture, this.camera, pixels, share);
+      // What stands may be left for what moves.
+      const isUnwanted = isStanding && !this.shotAsked
+        ? async (): Promise<boolean> => (await new Promise((go) => setTimeout(go, 0)), this.isDirty)
+        : undefined;
+      const picture = this.picture;
+      const counts = await this.painter.paint(picture, this.camera, pixels, share, isUnwanted);
+      if (!counts) {
+        this.isBusy = false;
+        return;
+      }
       this.counts = counts;
       this.drawnStep = step;
       const ms = performance.now() - begin;

@@ -20,6 +20,7 @@ export interface PictureParts {
   halfSize: [number, number, number];
   lightNumber: number;
   rgba: number;
+  tileCount: number;
 }
 
 export interface PictureHead {
@@ -31,6 +32,7 @@ export interface PictureHead {
 
 const LOOK_FLOATS = 57;
 const VIEW_FLOATS = 14;
+const PARTS = 8; // of a picture that may be left
 
 const rgb = (c?: { r: number; g: number; b: number }): number[] => [c?.r ?? 0, c?.g ?? 0, c?.b ?? 0];
 const xyz = (v?: { x: number; y: number; z: number }): number[] => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
@@ -112,11 +114,11 @@ export class StrandPicture {
   }
   private parts(at: number): PictureParts {
     if (!at) throw new Error(this.core.error());
-    const n = Array.from(this.uints(at, 20));
+    const n = Array.from(this.uints(at, 21));
     return {
       block: n[0]!, blockBytes: n[1]!, pointCount: n[2]!, points: n[3]!, strands: n[4]!, strandCount: n[5]!,
       strandOf: n[6]!, layoutNumber: n[7]!, cornerCount: n[8]!, corners: n[9]!, keyDepth: n[10]!, otherDepth: n[11]!,
-      latticeSize: [n[12]!, n[13]!, n[14]!], halfSize: [n[15]!, n[16]!, n[17]!], lightNumber: n[18]!, rgba: n[19]!,
+      latticeSize: [n[12]!, n[13]!, n[14]!], halfSize: [n[15]!, n[16]!, n[17]!], lightNumber: n[18]!, rgba: n[19]!, tileCount: n[20]!,
     };
   }
   /** For a graphics card. */
@@ -124,9 +126,16 @@ export class StrandPicture {
     this.lookFrom(camera, size, share);
     return this.parts(this.core.call.strand_picture_prepare(this.picture, this.viewAt));
   }
-  /** By this processor: (height x width x 4). */
-  draw(camera: Camera, size: { width: number; height: number }, share: number): Uint8Array {
+  /** By this processor, a part of the tiles at a time: (height x width x 4). Nothing where somebody does not want it any more. */
+  async draw(camera: Camera, size: { width: number; height: number }, share: number,
+             isUnwanted?: () => Promise<boolean>): Promise<Uint8Array | undefined> {
     this.lookFrom(camera, size, share);
-    return this.bytes(this.parts(this.core.call.strand_picture_draw(this.picture, this.viewAt)).rgba, 4 * size.width * size.height);
+    const parts = this.parts(this.core.call.strand_picture_begin(this.picture, this.viewAt));
+    const step = isUnwanted ? Math.ceil(parts.tileCount / PARTS) : parts.tileCount;
+    for (let begin = 0; begin < parts.tileCount; begin += step) {
+      if (isUnwanted && (await isUnwanted())) return undefined;
+      this.core.call.strand_picture_draw_tiles(this.picture, begin, begin + step);
+    }
+    return this.bytes(parts.rgba, 4 * size.width * size.height);
   }
 }
