@@ -509,7 +509,7 @@ class Viewer {
     add('drawn by', isFrames ? 'the server' : `${this.drawnBy}: ${this.drawWhy}`);
     const drawn = this.drawFigures;
     if (!isFrames && drawn) {
-      add('drawn in', `${drawn.stepMs.toFixed(0)} ms, ${(drawn.share * 100).toFixed(0)} % of the sides`);
+      add('drawn in', `${drawn.stepMs ? `${drawn.stepMs.toFixed(0)} ms, ` : ''}${(drawn.share * 100).toFixed(0)} % of the sides`);
       if (drawn.segments) add('of', `${drawn.strands} strands, ${drawn.segments} segments`);
     }
     if (isFrames) {
