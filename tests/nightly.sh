@@ -44,7 +44,7 @@ run_part() {
     arm) bash tests/tools/compile_for_arm.sh ;;
     wasm)
       bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium
-      build ci -DSTRANDCAST_WEB=ON && STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
+      build ci -DSTRANDCAST_WEB=ON && STRANDCAST_SOAK_S=600 STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
         cmake --preset ci -DSTRANDCAST_WEB=OFF >/dev/null
       ;;
   esac

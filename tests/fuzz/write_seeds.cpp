@@ -307,6 +307,8 @@ void add_texts(const SeedFolder& seeds) {
   seeds.add("address", "ipv6", "[::1]:80");
   seeds.add("address", "name", "hair.example");
   seeds.add("http_access", "name", "Hair.Example:7878\nhttps://hair.example:7878\n10.0.0.7\nhair.example");
+  seeds.add("http_access", "page",
+            "127.0.0.1:7878\n\n127.0.0.1\n\ngzip;q=0.5, *;q=0\nW/\"a\", \"b\"\n/?token=a");
   seeds.add("http_access", "ipv6", "[::1]:7878\nhttp://[::1]:7878\n::1\n\n");
   seeds.add("proxy", "ipv4", "10.0.0.0/8\n198.51.100.1, 203.0.113.9:4711, 10.0.0.1\n" + test::proxy_v4(9));
   seeds.add("proxy", "ipv6",
