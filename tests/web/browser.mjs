@@ -70,7 +70,7 @@ export class Browser {
       this.child.kill('SIGKILL');
       await new Promise((done) => this.child.once('exit', done));
     }
-    fs.rmSync(this.profile, { recursive: true, force: true, maxRetries: 5 });
+    fs.rmSync(this.profile, { recursive: true, force: true, maxRetries: 20 }); // its last files come late
   }
 }
 
