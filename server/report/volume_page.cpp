@@ -25,14 +25,11 @@ bool is_plain(const VolumeError& error, uint32_t smoothing, VolumeHairs hairs) {
   return error.interval == 1 && error.smoothing == smoothing && error.hairs == hairs;
 }
 
-/// The one of guides with the least error of the density; nullptr without any.
-const VolumeError* best_for_guides(const VolumeStudy& study) {
-  const VolumeError* best = nullptr;
+/// The one of guides with so many cells, smoothed as the truth; nullptr without it.
+const VolumeError* find_guides(const VolumeStudy& study, uint32_t resolution) {
   for (const VolumeError& error : study.errors)
-    if (error.hairs == VolumeHairs::Guides && error.interval == 1 &&
-        (best == nullptr || error.density < best->density))
-      best = &error;
-  return best;
+    if (is_plain(error, kTrueSmoothing, VolumeHairs::Guides) && error.resolution == resolution) return &error;
+  return nullptr;
 }
 
 template <class Row>
@@ -54,7 +51,9 @@ void add_errors(HtmlPage& page, const VolumeStudy& study) {
                   "those of the truth. Coarse "
                   "cells blur, fine ones see single guides instead of hair.",
                   study.guide_count, study.hair_count, study.vertex_count, kTrueResolution, kTrueSmoothing));
-  page.figure(volume_plot(study), "Error of the density against processor time of a step.");
+  page.figure(volume_plot(study),
+              "Error of the density against processor time of a step: of whom, how often smoothed, and made "
+              "every so many steps. From the left: more and more cells.");
   HtmlTable table{
       "Every volume that was tried",
       {"cells", "cell, mm", "smoothed", "made every", "of", "density", "slope", "velocity", "ms a step"},
@@ -126,15 +125,14 @@ void add_covered(HtmlPage& page, const VolumeStudy& study) {
                     "vertices are crowded instead of {}.",
                     percent(usual->volume_share), percent(none->volume_share), percent(usual->crowded_share),
                     percent(none->crowded_share)));
-  if (const VolumeError* const best = best_for_guides(study); best != nullptr)
-    page.paragraph(
-        fmt::format("Strips (Koh and Huang 2001; 003, 2.1) move many hairs as one patch, to simulate fewer "
-                    "vertices. Guides that stand "
-                    "for the hairs around them do so with {} of the vertices here, and know the density of "
-                    "all hair within {} ({} "
-                    "cells, smoothed {} times), without taking any freedom from strands.",
-                    percent(static_cast<double>(study.guide_count) / study.hair_count),
-                    percent(best->density), best->resolution, best->smoothing));
+  if (const VolumeError* const same = find_guides(study, kTrueResolution); same != nullptr)
+    page.paragraph(fmt::format(
+        "Strips (Koh and Huang 2001; 003, 2.1) move many hairs as one patch, to simulate fewer vertices. "
+        "Guides that stand for "
+        "the hairs around them do so with {} of the vertices here, and know the density of all hair within "
+        "{} on the same "
+        "cells, without taking any freedom from strands.",
+        percent(static_cast<double>(study.guide_count) / study.hair_count), percent(same->density)));
   page.paragraph(
       fmt::format("Breaking (002, 4.2): a hair of {:.0f} cm in a shake of 10 g pulls at its root with {:.2f} "
                   "mN, and breaks at {:.0f} N, "
@@ -149,13 +147,17 @@ void add_covered(HtmlPage& page, const VolumeStudy& study) {
 
 std::string volume_summary(const VolumeStudy& study) {
   std::string text;
-  if (const VolumeError* const best = best_for_guides(study); best != nullptr)
+  if (const VolumeError* const same = find_guides(study, kTrueResolution); same != nullptr)
     text += fmt::format(
-        "{} guides know the density of {} hairs best with {} cells of {:.0f} mm, smoothed {} time(s): within "
-        "{}, in {:.2f} "
-        "ms a step.\n",
-        study.guide_count, study.hair_count, best->resolution, 1e3f * best->cell_m, best->smoothing,
-        percent(best->density), best->cpu_ms);
+        "{} guides know the density of {} hairs within {} on the same {} cells of {:.0f} mm, in {:.2f} ms a "
+        "step.\n",
+        study.guide_count, study.hair_count, percent(same->density), same->resolution, 1e3f * same->cell_m,
+        same->cpu_ms);
+  for (const uint32_t resolution : {kTrueResolution / 2, 2 * kTrueResolution})
+    if (const VolumeError* const other = find_guides(study, resolution); other != nullptr)
+      text += fmt::format("On {} cells they {} by {}, in {:.2f} ms.\n", resolution,
+                          resolution < kTrueResolution ? "blur it" : "see single guides, and miss it",
+                          percent(other->density), other->cpu_ms);
   const ScatterResult* const atomics = find_by_name(study.scatters, "atomics");
   for (const ScatterResult& scatter : study.scatters)
     text += fmt::format(
@@ -207,7 +209,7 @@ std::string volume_plot(const VolumeStudy& study) {
   for (const VolumeHairs hairs : {VolumeHairs::Guides, VolumeHairs::All})
     for (uint32_t smoothing = 0; smoothing <= kMaxVolumeSmoothing; ++smoothing) {
       PlotSeries series;
-      series.name = fmt::format("{}, smoothed {} time(s)", to_string(hairs), smoothing);
+      series.name = fmt::format("{}, {}x", to_string(hairs), smoothing);
       for (const VolumeError& error : study.errors)
         if (is_plain(error, smoothing, hairs))
           series.points.push_back({error.cpu_ms, error.density, fmt::format("{} cells", error.resolution)});
@@ -217,8 +219,7 @@ std::string volume_plot(const VolumeStudy& study) {
   for (const VolumeError& error : study.errors) {
     if (error.interval == 1) continue;
     PlotSeries& series = by_interval[error.interval];
-    series.name =
-        fmt::format("guides, smoothed {} time(s), made every {} steps", error.smoothing, error.interval);
+    series.name = fmt::format("guides, {}x, every {}", error.smoothing, error.interval);
     series.points.push_back({error.cpu_ms, error.density, fmt::format("{} cells", error.resolution)});
   }
   for (auto& [interval, series] : by_interval) plot.series.push_back(std::move(series));

@@ -244,7 +244,7 @@ TEST_F(ReportProgram, ASmallVolumeReportKeepsTheLaws) {
       folder_, fmt::format("volume --quick --set groom.procedural.strand_count=600 --guides 150 --out '{}'",
                            out.string()));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_THAT(outcome.output, HasSubstr("150 guides know the density of 600 hairs best with "));
+  EXPECT_THAT(outcome.output, HasSubstr("150 guides know the density of 600 hairs within "));
 
   rows_ = parse_csv(load_text(out / "volume_error.csv", 1u << 20).value());
   std::map<std::string, double> error;  // of the truth's cells and smoothing
