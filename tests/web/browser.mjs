@@ -16,6 +16,17 @@ export function findChromium() {
 }
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
+/** Its last files come late, from processes that outlive the first. What is left after that is the system's. */
+async function removeFolder(folder) {
+  for (let attempt = 0; attempt < 50; ++attempt) {
+    try {
+      return fs.rmSync(folder, { recursive: true, force: true });
+    } catch {
+      await sleep(100);
+    }
+  }
+}
+
 export class Browser {
   /** draws: 'mesa' (ANGLE on the system's OpenGL, llvmpipe where there is no GPU) or 'swiftshader'. */
   static async start(draws = process.env.STRANDCAST_BROWSER_DRAWS ?? 'mesa') {
@@ -70,7 +81,7 @@ export class Browser {
       this.child.kill('SIGKILL');
       await new Promise((done) => this.child.once('exit', done));
     }
-    fs.rmSync(this.profile, { recursive: true, force: true, maxRetries: 20 }); // its last files come late
+    await removeFolder(this.profile);
   }
 }
 

@@ -482,6 +482,7 @@ class Viewer {
     if (this.status?.is_paused) all.push(this.isController ? 'Paused: Space resumes, N steps' : 'Paused');
     if (this.isConnected && this.status?.is_motion_stale && !this.status.is_paused) all.push('No head motion arrives at the server');
     if (this.isConnected && this.status?.slow_motion) all.push(this.status.slow_motion);
+    if (this.isConnected && this.status?.detail) all.push(this.status.detail);
     warnings.keep(all);
   }
   private latencyMs(): number {

@@ -63,7 +63,7 @@ const SetParameter = { assignment: [1, 'string'] } as const;
 const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'] } as const;
 const ViewerReport = {
   decode_ms: [1, 'double'], draw_ms: [2, 'double'], picture_decode_ms: [3, 'double'], shown_hz: [4, 'double'],
-  device: [5, 'enum'],
+  device: [5, 'enum'], hair_px: [6, 'double'],
 } as const;
 const ModeRequest = { mode: [1, 'enum'] } as const;
 const Empty = {} as const;
@@ -88,7 +88,7 @@ export const ServerStatus = {
   realtime_factor: [5, 'double'], is_paused: [6, 'bool'], is_motion_stale: [7, 'bool'], viewer_count: [8, 'uint32'],
   dropped_frames: [9, 'uint64'], rejected_samples: [10, 'uint64'], quarantined_strands: [11, 'uint64'],
   overstretched_strands: [12, 'uint64'], queue_delay_ms: [13, 'double'], slow_motion: [14, 'string'],
-  picture_motions: [15, PictureMotion, 'repeated'],
+  picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'],
 } as const;
 export const StreamQuality = {
   stream_id: [1, 'uint32'], rate_divisor: [2, 'uint32'], strand_share: [3, 'float'], bound_m: [4, 'float'],

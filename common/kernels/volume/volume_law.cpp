@@ -11,6 +11,16 @@ constexpr double kLeastShareOfMean = 0.5;
 // The push's own stiffness is taken so many times into account: neighbours give way in the same step.
 constexpr double kGive = 2.0;
 
+std::vector<glm::vec4> nodes_at_rest(HairVolume& volume, const VolumeStrands& strands) {
+  StrandBlocks rest(strands.strand_count, strands.vertex_count);
+  pack_blocks(strands.rest_in_head_m, rest);
+  VolumeInput input;
+  input.position_m = rest.view();
+  std::vector<glm::vec4> nodes(volume.most_nodes());
+  volume.update(input, nodes);
+  return nodes;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<VolumeLaw>> VolumeLaw::make(const VolumeStrands& strands, const VolumeDesc& desc,
@@ -31,13 +41,7 @@ Result<std::unique_ptr<VolumeLaw>> VolumeLaw::make(const VolumeStrands& strands,
 Status VolumeLaw::take_target(const VolumeStrands& hair, VolumeOptions options) {
   options.cell_m = volume_.cell_m();
   ASSIGN_OR_RETURN(HairVolume volume, HairVolume::make(hair, options));
-  StrandBlocks rest(hair.strand_count, hair.vertex_count);
-  pack_blocks(hair.rest_in_head_m, rest);
-  VolumeInput input;
-  input.position_m = rest.view();
-  std::vector<glm::vec4> nodes(volume.most_nodes());
-  volume.update(input, nodes);
-  target_ = make_target(volume.grid(), nodes);
+  target_ = make_target(volume.grid(), nodes_at_rest(volume, hair));
   const auto scale = static_cast<float>(volume_.length_m() / volume.length_m());
   for (float& density : target_.density_mpm3) density *= scale;
   return {};
@@ -61,12 +65,7 @@ KernelDesc VolumeLaw::kernel(bool has_way) const {
 
 /// How dense every vertex lies in the groom, and what the scene lets it be.
 void VolumeLaw::find_rest_density(const VolumeStrands& strands) {
-  StrandBlocks rest(strands.strand_count, strands.vertex_count);
-  pack_blocks(strands.rest_in_head_m, rest);
-  VolumeInput input;
-  input.position_m = rest.view();
-  std::vector<glm::vec4> nodes(volume_.most_nodes());
-  volume_.update(input, nodes);
+  const std::vector<glm::vec4> nodes = nodes_at_rest(volume_, strands);
   if (desc_.target_per_s2 > 0.0) target_ = make_target(volume_.grid(), nodes);
   const size_t vertices = strands.rest_in_head_m.size();
   std::vector<double> density(vertices);
