@@ -75,6 +75,11 @@ Fact decide_followed_strands(const SceneDesc& scene, const RuntimeFacts& facts) 
   return {true, is_far ? facts.detail_reason : "detail.simulated_share is below 1"};
 }
 
+Fact decide_fewer_vertices(const SceneDesc&, const RuntimeFacts& facts) {
+  if (!leaves_out(facts, DetailLevel::FewerVertices)) return {false, "every vertex is simulated"};
+  return {true, facts.detail_reason};
+}
+
 Fact decide_half_rate(const SceneDesc& scene, const RuntimeFacts& facts) {
   if (!leaves_out(facts, DetailLevel::HalfRate)) return {false, "every step is simulated"};
   if (scene.step_rate_hz < kLeastHalvedRateHz) return {false, "step_rate_hz is too low to be halved"};
@@ -140,6 +145,7 @@ constexpr std::array kFacts{
     FactRow{"has_volume", &SceneFeatures::has_volume, decide_volume},
     FactRow{"has_distance_field", &SceneFeatures::has_distance_field, decide_distance_field},
     FactRow{"has_followed_strands", &SceneFeatures::has_followed_strands, decide_followed_strands},
+    FactRow{"has_fewer_vertices", &SceneFeatures::has_fewer_vertices, decide_fewer_vertices},
     FactRow{"has_half_rate", &SceneFeatures::has_half_rate, decide_half_rate},
     FactRow{"is_carried", &SceneFeatures::is_carried, decide_carried},
     FactRow{"has_body", &SceneFeatures::has_body, decide_body},
@@ -164,7 +170,8 @@ SceneFeatures analyse(const SceneDesc& scene, const RuntimeFacts& facts) {
 }
 
 const char* to_string(DetailLevel level) {
-  constexpr std::array kNames{"full", "no hair-hair", "fewer strands", "half rate", "follow the head"};
+  constexpr std::array kNames{"full",           "no hair-hair", "fewer strands",
+                              "fewer vertices", "half rate",    "follow the head"};
   static_assert(kNames.size() == kDetailLevels);
   return kNames[static_cast<size_t>(level)];
 }

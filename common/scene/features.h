@@ -13,12 +13,14 @@ namespace strandcast {
 /// How much of the simulation runs: each level leaves out what the one before it does, and more.
 enum class DetailLevel {
   Full,
-  NoHairHair,    // hair does not act on hair
-  FewerStrands,  // DetailDesc::far_share of them, which the others follow
-  HalfRate,      // every other step, twice as long
-  FollowHead     // none: hair goes with the head as it is
+  NoHairHair,     // hair does not act on hair
+  FewerStrands,   // DetailDesc::far_share of them, which the others follow
+  FewerVertices,  // every kFarVertexStride-th of a strand's, and its tip
+  HalfRate,       // every other step, twice as long
+  FollowHead      // none: hair goes with the head as it is
 };
-inline constexpr size_t kDetailLevels = 5;
+inline constexpr size_t kDetailLevels = 6;
+inline constexpr uint32_t kFarVertexStride = 2;
 
 struct RuntimeFacts {
   bool has_wind_stream = false;
@@ -43,6 +45,7 @@ struct SceneFeatures {
   bool has_distance_field = false;    // the head collides as one, not as spheres
   bool has_body = false;              // strands meet capsules and planes of a body
   bool has_followed_strands = false;  // only the first strands are simulated, the others follow them
+  bool has_fewer_vertices = false;    // only some vertices of a strand are simulated
   bool has_half_rate = false;         // every other step, twice as long
   bool is_carried = false;            // hair goes with the head as it is: there are no steps
   bool has_strand_viewers = false;
@@ -51,7 +54,7 @@ struct SceneFeatures {
   bool operator==(const SceneFeatures&) const = default;
 };
 
-/// "full", "no hair-hair", "fewer strands", "half rate", "follow the head".
+/// "full", "no hair-hair", "fewer strands", "fewer vertices", "half rate", "follow the head".
 const char* to_string(DetailLevel level);
 
 SceneFeatures analyse(const SceneDesc& scene, const RuntimeFacts& facts);

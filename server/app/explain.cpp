@@ -62,8 +62,8 @@ Status measure_strands(Bench& bench, const SceneContent& content) {
                                           .bend_limit = scene.bend_limit,
                                           .volume_target = content.volume_target,
                                           .drag_along_share = scene.wind.along_share}));
-  if (features.has_followed_strands && can_follow(content.groom))
-    solver = std::make_unique<FollowedSolver>(std::move(solver), simulated_share(scene, bench.facts));
+  if (const SimulatedPart part = simulated_part(scene, bench.facts, content.groom); !part.is_all())
+    solver = std::make_unique<FollowedSolver>(std::move(solver), part);
   RETURN_IF_ERROR(solver->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   ASSIGN_OR_RETURN(auto encoder, make_strand_encoder(scene.stream.codec));
   encoder->set_rest_shape(bench.asset.rest_position_m);

@@ -21,7 +21,9 @@ constexpr Row kRows[] = {
     {"sim_realtime_factor", "Simulated time per real time.",
      [](const ServerCounters& all) { return all.sim.realtime_factor; }},
     {"sim_detail_level",
-     "What the simulation leaves out: 0 nothing, 1 hair on hair, 2 most strands, 3 every other step, 4 all.",
+     "What the simulation leaves out: 0 nothing, 1 hair on hair, 2 most strands, 3 half of the vertices, 4 "
+     "every other "
+     "step, 5 all.",
      [](const ServerCounters& all) { return static_cast<double>(all.sim.detail); }},
     {"sim_detail_changes_total", "Changes of that level.",
      [](const ServerCounters& all) { return static_cast<double>(all.sim.detail_changes); }},

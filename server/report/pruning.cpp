@@ -14,6 +14,7 @@
 #include "server/report/html_page.h"
 #include "server/report/scene_run.h"
 #include "server/report/svg_bars.h"
+#include "server/sim/followed_solver.h"
 #include "server/sim/solver_registry.h"
 
 namespace strandcast {
@@ -152,6 +153,10 @@ uint64_t reader_bytes(const PruningRun& run) {
   return sum;
 }
 
+const char* vertices_text(const FollowedDesc& part) {
+  return part.has_every_vertex ? "all" : "half";
+}
+
 }  // namespace
 
 Result<PruningRun> run_pruning(const PruningDesc& desc, Executor& executor) {
@@ -181,20 +186,26 @@ Result<PruningRun> run_pruning(const PruningDesc& desc, Executor& executor) {
   return run;
 }
 
-Result<FollowedRun> run_followed(const PruningDesc& desc, double share, bool has_volume, Executor& executor) {
+Result<FollowedRun> run_followed(const PruningDesc& desc, const FollowedDesc& part, Executor& executor) {
   FollowedRun run;
   run.scene = desc.scene.name;
-  run.share = share;
-  run.has_volume = has_volume;
+  run.part = part;
   PruningDesc whole = desc;
-  if (!has_volume) whole.scene.volume = {};
+  if (!part.has_volume) whole.scene.volume = {};
   SceneDesc followed = whole.scene;
-  followed.detail.simulated_share = share;
+  RuntimeFacts facts;
+  if (part.has_every_vertex) {
+    followed.detail.simulated_share = part.share;
+  } else {
+    followed.detail.far_share = part.share;
+    facts = {.detail = DetailLevel::FewerVertices, .detail_reason = "asked for"};
+  }
   ASSIGN_OR_RETURN(const SceneContent content, load_scene_content(whole.scene));
   ASSIGN_OR_RETURN(const auto all, SceneRun::make(whole.scene, content, {}, executor));
-  ASSIGN_OR_RETURN(const auto some, SceneRun::make(followed, content, {}, executor));
+  ASSIGN_OR_RETURN(const auto some, SceneRun::make(followed, content, facts, executor));
   const uint32_t strands = content.groom.strand_count();
-  run.simulated = static_cast<uint32_t>(std::ceil(share * strands));
+  run.simulated = guide_count(strands, part.share);
+  const VertexFollow vertices(content.groom, part.has_every_vertex ? 1 : kFarVertexStride);
   std::vector<double> errors_mm;
   double squares = 0.0, all_bytes = 0.0, some_bytes = 0.0;
   for (int step = 1; step <= desc.steps; ++step) {
@@ -213,7 +224,8 @@ Result<FollowedRun> run_followed(const PruningDesc& desc, double share, bool has
     if (step * 3 < desc.steps || step % 10 != 0) continue;
     const std::vector<glm::vec3> a = positions_in_head(*truth), b = positions_in_head(*guess);
     for (size_t i = 0; i < a.size(); ++i) {
-      if (i % strands < run.simulated) continue;
+      const bool is_kept = std::ranges::binary_search(vertices.kept(), static_cast<uint32_t>(i / strands));
+      if (i % strands < run.simulated && is_kept) continue;
       const double error_mm = kMmPerM * glm::distance(glm::dvec3(a[i]), glm::dvec3(b[i]));
       errors_mm.push_back(error_mm);
       squares += error_mm * error_mm;
@@ -276,15 +288,15 @@ std::string pruning_text(const std::vector<PruningRun>& runs, const std::vector<
                         run.is_same_unread ? "same" : "MOVED", "-");
   }
   if (followed.empty()) return text;
-  text += "\nMost strands follow a share of them\n";
-  text +=
-      fmt::format("{:<10} {:<7} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8}\n", "scene", "volume",
-                  "share", "all ms", "ms", "follow ms", "all Mb/s", "Mb/s", "saved kB", "rms mm", "p95 mm");
+  text += "\nMost of the hair follows a part of it\n";
+  text += fmt::format("{:<10} {:<7} {:>6} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8}\n", "scene",
+                      "volume", "share", "vertices", "all ms", "ms", "follow ms", "all Mb/s", "Mb/s",
+                      "saved kB", "rms mm", "p95 mm");
   for (const FollowedRun& run : followed)
     text += fmt::format(
-        "{:<10} {:<7} {:>6.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.2f} {:>9.2f} {:>9} {:>8.2f} {:>8.2f}\n",
-        run.scene, run.has_volume ? "on" : "off", run.share, run.all_step_ms, run.step_ms, run.follow_ms,
-        run.all_mbit_per_s, run.mbit_per_s,
+        "{:<10} {:<7} {:>6.3f} {:>8} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.2f} {:>9.2f} {:>9} {:>8.2f} {:>8.2f}\n",
+        run.scene, run.part.has_volume ? "on" : "off", run.part.share, vertices_text(run.part),
+        run.all_step_ms, run.step_ms, run.follow_ms, run.all_mbit_per_s, run.mbit_per_s,
         kilobytes(static_cast<double>(run.all_bytes) - static_cast<double>(run.bytes)), run.rms_mm,
         run.p95_mm);
   return text;
@@ -311,11 +323,12 @@ std::string pruning_csv(const std::vector<PruningRun>& runs) {
 }
 
 std::string followed_csv(const std::vector<FollowedRun>& followed) {
-  CsvFile csv({"scene", "volume", "share", "simulated", "all_step_ms", "step_ms", "follow_ms",
+  CsvFile csv({"scene", "volume", "share", "vertices", "simulated", "all_step_ms", "step_ms", "follow_ms",
                "all_solver_bytes", "solver_bytes", "all_mbit_per_s", "mbit_per_s", "rms_mm", "p95_mm"});
   for (const FollowedRun& run : followed)
-    csv.add_row({run.scene, yes_or_no(run.has_volume), csv_number(run.share), csv_number(run.simulated),
-                 csv_number(run.all_step_ms), csv_number(run.step_ms), csv_number(run.follow_ms),
+    csv.add_row({run.scene, yes_or_no(run.part.has_volume), csv_number(run.part.share),
+                 vertices_text(run.part), csv_number(run.simulated), csv_number(run.all_step_ms),
+                 csv_number(run.step_ms), csv_number(run.follow_ms),
                  csv_number(static_cast<double>(run.all_bytes)), csv_number(static_cast<double>(run.bytes)),
                  csv_number(run.all_mbit_per_s), csv_number(run.mbit_per_s), csv_number(run.rms_mm),
                  csv_number(run.p95_mm)});
@@ -359,12 +372,13 @@ std::string pruning_page(const std::vector<PruningRun>& runs, const std::vector<
       readers.rows.push_back(
           {run.scene, pass.pass, fmt::format("{:.3f}", pass.ms), kilobytes(static_cast<double>(pass.bytes))});
   page.table(readers);
-  HtmlTable guides{
-      "Strands that follow a share of them, against all simulated",
-      {"scene", "volume", "share", "all ms", "ms", "follow ms", "all Mbit/s", "Mbit/s", "rms mm", "p95 mm"},
-      {}};
+  HtmlTable guides{"Hair that follows a part of it, against all simulated",
+                   {"scene", "volume", "share", "vertices", "all ms", "ms", "follow ms", "all Mbit/s",
+                    "Mbit/s", "rms mm", "p95 mm"},
+                   {}};
   for (const FollowedRun& run : followed)
-    guides.rows.push_back({run.scene, run.has_volume ? "on" : "off", fmt::format("{:.3f}", run.share),
+    guides.rows.push_back({run.scene, run.part.has_volume ? "on" : "off",
+                           fmt::format("{:.3f}", run.part.share), vertices_text(run.part),
                            fmt::format("{:.3f}", run.all_step_ms), fmt::format("{:.3f}", run.step_ms),
                            fmt::format("{:.3f}", run.follow_ms), fmt::format("{:.2f}", run.all_mbit_per_s),
                            fmt::format("{:.2f}", run.mbit_per_s), fmt::format("{:.2f}", run.rms_mm),

@@ -55,11 +55,17 @@ struct PruningRun {
   bool is_same_unread = false;            // hair after all steps, whether or not states were published
 };
 
-/// What a share of the strands simulated is worth against all of them.
+/// How much of the hair of a scene is simulated.
+struct FollowedDesc {
+  double share = 1.0;            // of the strands
+  bool has_every_vertex = true;  // else as DetailLevel::FewerVertices has them, which has no volume either
+  bool has_volume = false;       // the scene as it is, or without forces between strands
+};
+
+/// What a part of the hair simulated is worth against all of it.
 struct FollowedRun {
   std::string scene;
-  double share = 1.0;
-  bool has_volume = false;
+  FollowedDesc part;
   uint32_t simulated = 0;
   double all_step_ms = 0.0;  // medians
   double step_ms = 0.0;
@@ -68,13 +74,12 @@ struct FollowedRun {
   uint64_t bytes = 0;
   double all_mbit_per_s = 0.0;  // deltas of the scene's codec at 60 states a second
   double mbit_per_s = 0.0;
-  double rms_mm = 0.0;  // of the vertices that follow, from where they are with all strands simulated
+  double rms_mm = 0.0;  // of the vertices that follow, from where they are with all of it simulated
   double p95_mm = 0.0;
 };
 
 Result<PruningRun> run_pruning(const PruningDesc& desc, Executor& executor);
-/// The scene as it is, or without forces between strands.
-Result<FollowedRun> run_followed(const PruningDesc& desc, double share, bool has_volume, Executor& executor);
+Result<FollowedRun> run_followed(const PruningDesc& desc, const FollowedDesc& part, Executor& executor);
 
 std::string pruning_text(const std::vector<PruningRun>& runs, const std::vector<FollowedRun>& followed);
 std::string pruning_csv(const std::vector<PruningRun>& runs);

@@ -68,11 +68,12 @@ Status run_command(const PruningOptions& options) {
     const bool has_volume = desc.scene.volume.acts();
     if (desc.scene.name != "default" && !has_volume) continue;
     for (const double share : options.shares) {
-      ASSIGN_OR_RETURN(const FollowedRun off, run_followed(desc, share, false, *executor));
-      followed.push_back(off);
-      if (!has_volume) continue;
-      ASSIGN_OR_RETURN(const FollowedRun on, run_followed(desc, share, true, *executor));
-      followed.push_back(on);
+      std::vector<FollowedDesc> parts{{.share = share}, {.share = share, .has_every_vertex = false}};
+      if (has_volume) parts.push_back({.share = share, .has_volume = true});
+      for (const FollowedDesc& part : parts) {
+        ASSIGN_OR_RETURN(FollowedRun measured, run_followed(desc, part, *executor));
+        followed.push_back(std::move(measured));
+      }
     }
   }
   fmt::print("{}", pruning_text(runs, followed));

@@ -23,8 +23,8 @@ Result<std::unique_ptr<SceneRun>> SceneRun::make(const SceneDesc& scene, const S
   context.head_field = content.head_field;
   context.bend_limit = scene.bend_limit;
   ASSIGN_OR_RETURN(run->solver_, row->make(parameters, context));
-  if (run->features_.has_followed_strands && can_follow(content.groom))
-    run->solver_ = std::make_unique<FollowedSolver>(std::move(run->solver_), simulated_share(scene, facts));
+  if (const SimulatedPart part = simulated_part(scene, facts, content.groom); !part.is_all())
+    run->solver_ = std::make_unique<FollowedSolver>(std::move(run->solver_), part);
   RETURN_IF_ERROR(run->solver_->load(content.groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   run->builder_.emplace(scene, content.colliders);
   ASSIGN_OR_RETURN(const float quantum_m, lattice_step_m(scene.stream.codec, scene.stream.bound_m));

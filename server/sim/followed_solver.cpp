@@ -25,15 +25,19 @@ void take_first(std::span<const glm::vec3> all, uint32_t strand_count, uint32_t 
                 first.begin() + static_cast<ptrdiff_t>(v * count));
 }
 
-/// Guides are where they were, to the last bit.
-void put_first(std::span<const glm::vec3> first, uint32_t count, uint32_t strand_count,
-               std::vector<glm::vec3>& all) {
-  for (size_t v = 0; v < first.size() / count; ++v)
-    std::copy_n(first.begin() + static_cast<ptrdiff_t>(v * count), count,
-                all.begin() + static_cast<ptrdiff_t>(v * strand_count));
+}  // namespace
+
+SimulatedPart simulated_part(const SceneDesc& scene, const RuntimeFacts& facts, const Groom& groom) {
+  const SceneFeatures features = analyse(scene, facts);
+  if (!can_follow(groom)) return {};
+  return {features.has_followed_strands ? simulated_share(scene, facts) : 1.0,
+          features.has_fewer_vertices ? kFarVertexStride : 1};
 }
 
-}  // namespace
+Groom simulated_groom(const Groom& groom, const SimulatedPart& part) {
+  const Groom guides = first_strands(groom, guide_count(groom.strand_count(), part.strand_share));
+  return VertexFollow(guides, part.vertex_stride).simulated(guides);
+}
 
 Groom first_strands(const Groom& groom, uint32_t count) {
   CHECK(count <= groom.strand_count());
@@ -51,8 +55,10 @@ Status FollowedSolver::load(const Groom& groom, const glm::dquat& world_from_hea
         ErrorCode::BadInput,
         "strands that are held at their tips cannot follow others: leave detail.simulated_share "
         "and detail.far_share at 1");
-  const uint32_t count = strandcast::guide_count(groom.strand_count(), share_);
-  RETURN_IF_ERROR(guides_->load(first_strands(groom, count), world_from_head_rotation));
+  const uint32_t count = strandcast::guide_count(groom.strand_count(), part_.strand_share);
+  const Groom guides = first_strands(groom, count);
+  vertices_.emplace(guides, part_.vertex_stride);
+  RETURN_IF_ERROR(guides_->load(vertices_->simulated(guides), world_from_head_rotation));
   follow_.emplace(groom, count);
   world_from_head_rotation_ = world_from_head_rotation;
   head_velocity_mps_ = head_spin_radps_ = glm::dvec3(0.0);
@@ -60,7 +66,9 @@ Status FollowedSolver::load(const Groom& groom, const glm::dquat& world_from_hea
   const size_t size = size_t{follow_->strand_count()} * follow_->vertex_count();
   all_.position_m.resize(size);
   all_.velocity_mps.resize(size);
-  in_head_m_.resize(size + size_t{count} * follow_->vertex_count());
+  all_in_head_m_.resize(size);
+  simulated_in_head_m_.resize(vertices_->kept_size());
+  guides_m_.resize(size_t{count} * follow_->vertex_count());
   position_blocks_ = StrandBlocks(follow_->strand_count(), follow_->vertex_count());
   velocity_blocks_ = StrandBlocks(follow_->strand_count(), follow_->vertex_count());
   return {};
@@ -79,24 +87,32 @@ void FollowedSolver::substep(const StepInput& input) {
   is_followed_ = false;
 }
 
-void FollowedSolver::expand(const std::vector<glm::vec3>& guides_in_world_m,
+void FollowedSolver::expand(const std::vector<glm::vec3>& simulated_in_world_m,
                             const glm::dquat& world_from_head_rotation,
                             std::vector<glm::vec3>& all_in_world_m) {
   const glm::dmat3 world_from_head = glm::mat3_cast(world_from_head_rotation);
-  const std::span<glm::vec3> guides_in_head = std::span(in_head_m_).first(guides_in_world_m.size());
-  const std::span<glm::vec3> all_in_head = std::span(in_head_m_).subspan(guides_in_world_m.size());
-  turn(glm::transpose(world_from_head), guides_in_world_m, guides_in_head);
-  follow_->follow(guides_in_head, all_in_head);
-  all_in_world_m.resize(all_in_head.size());
-  turn(world_from_head, all_in_head, all_in_world_m);
-  put_first(guides_in_world_m, follow_->guide_count(), follow_->strand_count(), all_in_world_m);
+  turn(glm::transpose(world_from_head), simulated_in_world_m, simulated_in_head_m_);
+  vertices_->follow(simulated_in_head_m_, guides_m_);
+  follow_->follow(guides_m_, all_in_head_m_);
+  all_in_world_m.resize(all_in_head_m_.size());
+  turn(world_from_head, all_in_head_m_, all_in_world_m);
+  put_simulated(simulated_in_world_m, all_in_world_m);
+}
+
+/// What is simulated is where it was, to the last bit.
+void FollowedSolver::put_simulated(std::span<const glm::vec3> simulated, std::span<glm::vec3> all) const {
+  const uint32_t count = follow_->guide_count();
+  for (size_t k = 0; k < vertices_->kept().size(); ++k)
+    std::copy_n(simulated.data() + k * count, count,
+                all.data() + size_t{vertices_->kept()[k]} * follow_->strand_count());
 }
 
 void FollowedSolver::follow_guides() {
   if (is_followed_) return;
-  guides_->read(of_guides_);
-  expand(of_guides_.position_m, world_from_head_rotation_, all_.position_m);
-  follow_->blend(of_guides_.velocity_mps, all_.velocity_mps);
+  guides_->read(simulated_);
+  expand(simulated_.position_m, world_from_head_rotation_, all_.position_m);
+  vertices_->blend(simulated_.velocity_mps, guides_m_);
+  follow_->blend(guides_m_, all_.velocity_mps);
   pack_blocks(all_.position_m, position_blocks_);
   pack_blocks(all_.velocity_mps, velocity_blocks_);
   is_followed_ = true;
@@ -110,14 +126,14 @@ SolverBlocks FollowedSolver::read_blocks() {
 // Seen from the head joint strands are looked at once more a little later: what they have moved by is their
 // velocity, beside the head's.
 void FollowedSolver::read(SolverState& state) {
-  guides_->read(of_guides_);
-  expand(of_guides_.position_m, world_from_head_rotation_, state.position_m);
+  guides_->read(simulated_);
+  expand(simulated_.position_m, world_from_head_rotation_, state.position_m);
   const glm::vec3 head_velocity(head_velocity_mps_), head_spin(head_spin_radps_);
   const size_t pinned = size_t{follow_->pinned_count()} * follow_->guide_count();
-  std::vector<glm::vec3> ahead(of_guides_.position_m);
+  std::vector<glm::vec3> ahead(simulated_.position_m);
   for (size_t i = 0; i < ahead.size(); ++i) {
     const glm::vec3 relative =
-        i < pinned ? glm::cross(head_spin, ahead[i]) : of_guides_.velocity_mps[i] - head_velocity;
+        i < pinned ? glm::cross(head_spin, ahead[i]) : simulated_.velocity_mps[i] - head_velocity;
     ahead[i] += kAheadS * relative;
   }
   const double spin = glm::length(head_spin_radps_);
@@ -126,14 +142,19 @@ void FollowedSolver::read(SolverState& state) {
   expand(ahead, turn_ahead * world_from_head_rotation_, state.velocity_mps);
   for (size_t i = 0; i < state.velocity_mps.size(); ++i)
     state.velocity_mps[i] = head_velocity + (state.velocity_mps[i] - state.position_m[i]) / kAheadS;
-  put_first(of_guides_.velocity_mps, follow_->guide_count(), follow_->strand_count(), state.velocity_mps);
+  put_simulated(simulated_.velocity_mps, state.velocity_mps);
   is_followed_ = false;
 }
 
 void FollowedSolver::write(const SolverState& state) {
-  take_first(state.position_m, follow_->strand_count(), follow_->guide_count(), of_guides_.position_m);
-  take_first(state.velocity_mps, follow_->strand_count(), follow_->guide_count(), of_guides_.velocity_mps);
-  guides_->write(of_guides_);
+  const auto take = [&](std::span<const glm::vec3> all, std::vector<glm::vec3>& simulated) {
+    take_first(all, follow_->strand_count(), follow_->guide_count(), guides_m_);
+    simulated.resize(vertices_->kept_size());
+    vertices_->take(guides_m_, simulated);
+  };
+  take(state.position_m, simulated_.position_m);
+  take(state.velocity_mps, simulated_.velocity_mps);
+  guides_->write(simulated_);
   is_followed_ = false;
 }
 
@@ -146,9 +167,10 @@ void FollowedSolver::rebase(const glm::dquat& world_from_head_rotation) {
 
 uint64_t FollowedSolver::memory_bytes() const {
   if (!follow_) return guides_->memory_bytes();
-  return guides_->memory_bytes() + follow_->size_bytes() + in_head_m_.size() * sizeof(glm::vec3) +
-         (all_.position_m.size() + all_.velocity_mps.size()) * sizeof(glm::vec3) +
-         (position_blocks_.size() + velocity_blocks_.size()) * sizeof(float);
+  const size_t vectors = simulated_in_head_m_.size() + guides_m_.size() + all_in_head_m_.size() +
+                         all_.position_m.size() + all_.velocity_mps.size();
+  return guides_->memory_bytes() + vertices_->size_bytes() + follow_->size_bytes() +
+         vectors * sizeof(glm::vec3) + (position_blocks_.size() + velocity_blocks_.size()) * sizeof(float);
 }
 
 }  // namespace strandcast

@@ -1,20 +1,38 @@
-// FollowedSolver: a solver of the first strands that gives all of them: the others follow (StrandFollow) when
-// somebody reads, and take no step. From the thread of the solver that it has.
+// FollowedSolver: a solver of a part of the hair, the first strands or some vertices of each, that gives all
+// of it: the rest follows (StrandFollow, VertexFollow) when somebody reads, and takes no step. From the
+// thread of the solver that it has.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "common/scene/features.h"
 #include "server/sim/solver.h"
 #include "server/sim/strand_follow.h"
+#include "server/sim/vertex_follow.h"
 
 namespace strandcast {
 
+/// What of the hair is simulated.
+struct SimulatedPart {
+  double strand_share = 1.0;   // the first strands; in (0, 1]
+  uint32_t vertex_stride = 1;  // every so many of a strand's vertices, at least 1
+
+  bool is_all() const { return strand_share >= 1.0 && vertex_stride == 1; }
+  bool operator==(const SimulatedPart&) const = default;
+};
+
+/// As scene and facts decide; all of hair that cannot follow.
+SimulatedPart simulated_part(const SceneDesc& scene, const RuntimeFacts& facts, const Groom& groom);
+/// Of a uniform groom that can_follow().
+Groom simulated_groom(const Groom& groom, const SimulatedPart& part);
+
 class FollowedSolver : public Solver {
  public:
-  /// `guides` has strands of its own. `share` of the strands are simulated, in (0, 1].
-  FollowedSolver(std::unique_ptr<Solver> guides, double share) : guides_(std::move(guides)), share_(share) {}
+  /// `guides` has strands of its own.
+  FollowedSolver(std::unique_ptr<Solver> guides, SimulatedPart part)
+      : guides_(std::move(guides)), part_(part) {}
 
   Status load(const Groom& groom, const glm::dquat& world_from_head_rotation) override;
   void substep(const StepInput& input) override;
@@ -29,23 +47,30 @@ class FollowedSolver : public Solver {
   void rebase(const glm::dquat& world_from_head_rotation) override;
   uint32_t strand_count() const override { return follow_ ? follow_->strand_count() : 0; }
   uint32_t guide_count() const { return follow_ ? follow_->guide_count() : 0; }
+  /// Of a strand, that are simulated.
+  uint32_t simulated_vertices() const {
+    return vertices_ ? static_cast<uint32_t>(vertices_->kept().size()) : 0;
+  }
   uint64_t memory_bytes() const override;
 
  private:
-  void expand(const std::vector<glm::vec3>& guides_in_world_m, const glm::dquat& world_from_head_rotation,
+  void expand(const std::vector<glm::vec3>& simulated_in_world_m, const glm::dquat& world_from_head_rotation,
               std::vector<glm::vec3>& all_in_world_m);
 
+  void put_simulated(std::span<const glm::vec3> simulated, std::span<glm::vec3> all) const;
+
   std::unique_ptr<Solver> guides_;
-  const double share_;
+  const SimulatedPart part_;
+  std::optional<VertexFollow> vertices_;  // of the guides
   std::optional<StrandFollow> follow_;
   glm::dquat world_from_head_rotation_{1.0, 0.0, 0.0, 0.0};
   // Of the head in the newest substep, world: what roots move with.
   glm::dvec3 head_velocity_mps_{0.0};
   glm::dvec3 head_spin_radps_{0.0};
   bool is_followed_ = false;  // all_ and the blocks are of the guides as they are
-  SolverState of_guides_;
+  SolverState simulated_;
   SolverState all_;
-  std::vector<glm::vec3> in_head_m_;
+  std::vector<glm::vec3> simulated_in_head_m_, guides_m_, all_in_head_m_;
   StrandBlocks position_blocks_;
   StrandBlocks velocity_blocks_;
 };

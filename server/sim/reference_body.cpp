@@ -17,6 +17,10 @@ constexpr double kResidueM = 5e-5;
 constexpr double kLookAgainM = 2e-4;
 constexpr double kFarM = 1e6;
 
+/// Of a segment's length: a side that is shorter is none, and what of a side is short of kKeptSide is made up
+/// by where it was.
+constexpr double kNoSide = 1e-4, kKeptSide = 0.1;
+
 /// A ball of a capsule, by its place along the axis.
 struct Ball {
   glm::dvec3 center_m{0.0};
@@ -132,9 +136,12 @@ glm::dvec3 onto_ball(const Ball& ball, const glm::dvec3& start, const glm::dvec3
                         (2.0 * length_m * distance_m);
   glm::dvec3 side = held - glm::dot(held, axis) * axis;
   const glm::dvec3 side_was = was - glm::dot(was, axis) * axis;
-  if (glm::dot(side, side_was) < 0.0)
-    side -= 2.0 * glm::dot(side, side_was) / glm::dot(side_was, side_was) * side_was;
-  if (glm::length(side) <= 1e-3 * length_m) side = side_was;
+  if (glm::length(side_was) > kNoSide * length_m) {
+    const glm::dvec3 way_was = glm::normalize(side_was);
+    const double along = glm::dot(side, way_was);
+    side += (std::abs(along) - along) * way_was;
+    side += std::max(0.0, kKeptSide * length_m - glm::length(side)) * way_was;
+  }
   return lean(axis, flat_side(side, axis, side_was), length_m, cosine);
 }
 

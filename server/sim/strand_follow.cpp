@@ -6,6 +6,7 @@
 #include "common/base/check.h"
 #include "common/base/worker_pool.h"
 #include "common/math/point_tree.h"
+#include "server/sim/shortest_turn.h"
 
 namespace strandcast {
 namespace {
@@ -23,16 +24,6 @@ constexpr uint32_t kVerticesPerRange = 8'192;
 glm::vec3 direction_of(const glm::vec3& v) {
   const float length = glm::length(v);
   return length > kShortestM ? v / length : glm::vec3(0.0f);
-}
-
-/// `v` turned as `from` is turned to `to` on the shortest way; both are unit vectors, or without a direction.
-/// Keeps its length.
-glm::vec3 turned(const glm::vec3& v, const glm::vec3& from, const glm::vec3& to) {
-  constexpr float kOpposite = 1e-4f;
-  const float cosine = glm::dot(from, to);
-  if (1.0f + cosine < kOpposite) return v - 2.0f * glm::dot(from, v) * from;
-  const glm::vec3 axis = glm::cross(from, to);
-  return cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1.0f + cosine));
 }
 
 }  // namespace
@@ -141,7 +132,7 @@ void StrandFollow::follow_some(const glm::vec3* guides_in_head_m, glm::vec3* all
         const uint32_t guide = guides_[f].strand[g];
         mean += guides_[f].weight[g] * (of_guides[guide] - before[guide]);
       }
-      out[f] = (out - strand_count_)[f] + turned(own[f], at_rest[f], direction_of(mean));
+      out[f] = (out - strand_count_)[f] + shortest_turn(own[f], at_rest[f], direction_of(mean));
     }
   }
 }

@@ -13,7 +13,7 @@
 namespace strandcast {
 
 /// Size of the hair on the largest screen below which a level begins, of DetailDesc::full_at_px.
-inline constexpr double kLevelShares[kDetailLevels - 1] = {1.0, 0.5, 0.25, 0.0625};
+inline constexpr double kLevelShares[kDetailLevels - 1] = {1.0, 0.5, 0.25, 0.125, 0.0625};
 
 /// What all readers together see.
 struct ReaderSight {

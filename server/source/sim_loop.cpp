@@ -32,18 +32,15 @@ bool needs_same_solver(const SceneFeatures& a, const SceneFeatures& b) {
          a.has_bend_limit == b.has_bend_limit && a.has_oriented_drag == b.has_oriented_drag &&
          a.has_volume == b.has_volume && a.has_distance_field == b.has_distance_field &&
          a.has_body == b.has_body && a.has_followed_strands == b.has_followed_strands &&
-         a.has_half_rate == b.has_half_rate;
+         a.has_fewer_vertices == b.has_fewer_vertices && a.has_half_rate == b.has_half_rate;
 }
 
-/// What takes long of simulating fewer strands, ahead of when they are fewer.
+/// What takes long of simulating less of the hair, ahead of when it is less.
 Status prepare_guides(const SceneDesc& scene, const Groom& groom, const glm::dvec3& groom_gravity) {
-  if (!can_follow(groom)) return {};
-  const DetailDesc& detail = scene.detail;
-  for (const DetailLevel level : {DetailLevel::Full, DetailLevel::FewerStrands}) {
-    const double share = simulated_share(scene, {.detail = level});
-    if (share >= 1.0 || (level != DetailLevel::Full && detail.mode != kDetailAuto)) continue;
-    const Groom guides = first_strands(groom, guide_count(groom.strand_count(), share));
-    const auto notes = prepare_solver(scene, guides, groom_gravity);
+  for (const DetailLevel level : {DetailLevel::Full, DetailLevel::FewerStrands, DetailLevel::FewerVertices}) {
+    const SimulatedPart part = simulated_part(scene, {.detail = level}, groom);
+    if (part.is_all() || (level != DetailLevel::Full && scene.detail.mode != kDetailAuto)) continue;
+    const auto notes = prepare_solver(scene, simulated_groom(groom, part), groom_gravity);
     if (!notes) return notes.error();
   }
   return {};
@@ -352,7 +349,8 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   ASSIGN_OR_RETURN(const SolverRow* row, find_solver(scene.solver.name));
   ASSIGN_OR_RETURN(const SolverParameters parameters, moving_parameters(*row, scene));
   catch_up();
-  const bool are_followed = features.has_followed_strands && can_follow(config_.content->groom);
+  const SimulatedPart part = simulated_part(scene, facts_, config_.content->groom);
+  const bool are_followed = !part.is_all();
   const bool are_kept = !are_followed && solver_ != nullptr && solver_->strands() != nullptr;
   const auto strands = are_kept ? strands_ : std::make_shared<StrandState>(*executor_);
   const glm::dvec3& groom_gravity = builder_->groom_gravity_in_head_mps2();
@@ -370,8 +368,7 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
                                  config_.content->volume_target,
                                  scene.wind.along_share};
   ASSIGN_OR_RETURN(std::unique_ptr<Solver> solver, row->make(parameters, context));
-  const double share = simulated_share(scene, facts_);
-  if (are_followed) solver = std::make_unique<FollowedSolver>(std::move(solver), share);
+  if (are_followed) solver = std::make_unique<FollowedSolver>(std::move(solver), part);
   const bool is_first = solver_ == nullptr;
   const glm::dquat& rotation = builder_->world_from_head().rotation;
   RETURN_IF_ERROR(solver_ == nullptr ? solver->load(config_.content->groom, rotation)
@@ -381,9 +378,9 @@ Status SimLoop::rebuild_solver(const SceneDesc& scene, const SceneFeatures& feat
   strands_ = solver_->strands() != nullptr ? strands : nullptr;
   publisher_->watch_stretch(row->stretch_bound);
   solver_features_ = features;
-  solver_share_ = share;
+  solver_part_ = part;
   const uint32_t strand_count = config_.content->groom.strand_count();
-  simulated_strands_ = are_followed ? guide_count(strand_count, share) : strand_count;
+  simulated_strands_ = guide_count(strand_count, part.strand_share);
   // Reads planes back, for a codec whose viewers take steps too. What takes no whole steps is not told.
   const bool is_whole = !features.has_half_rate;
   if (strand_codec_info(scene.stream.codec)->predicts)
@@ -427,7 +424,8 @@ void SimLoop::apply_facts(const RuntimeFacts& facts) {
 }
 
 bool SimLoop::needs_other_solver(const SceneDesc& scene, const SceneFeatures& features) const {
-  return !needs_same_solver(features, solver_features_) || simulated_share(scene, facts_) != solver_share_;
+  return !needs_same_solver(features, solver_features_) ||
+         simulated_part(scene, facts_, config_.content->groom) != solver_part_;
 }
 
 /// The scene as its steps are: at half the rate they are twice as long, and where the model cannot bear that

@@ -29,6 +29,7 @@
 #include "server/scene/step_builder.h"
 #include "server/scene/step_log.h"
 #include "server/sim/executor/executor.h"
+#include "server/sim/followed_solver.h"
 #include "server/sim/solver_registry.h"
 #include "server/sim/strand_state.h"
 #include "server/source/sim_detail.h"
@@ -144,7 +145,7 @@ class SimLoop {
   std::shared_ptr<StrandState> strands_;  // of solvers with a kernel, one after the other; else null
   std::unique_ptr<Solver> solver_;
   SceneFeatures solver_features_;  // what the solver was built for
-  double solver_share_ = 1.0;      // of strands that it simulates
+  SimulatedPart solver_part_;      // of the hair that it simulates
   SimDetail detail_{DetailDesc()};
   uint64_t detail_changes_ = 0;
   uint32_t simulated_strands_ = 0;

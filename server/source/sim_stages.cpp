@@ -66,22 +66,16 @@ SimStages::SimStages(const StageSizes& sizes, const std::vector<FeatureReason>& 
 }
 
 /// Times go on where nothing has changed.
-void SimStages::plan_publish(const FeatureReason& has_followed_strands) {
-  const FeatureReason planned = std::exchange(publish_planned_for_, has_followed_strands);
-  if (publish_ != nullptr && planned.value == has_followed_strands.value &&
-      planned.reason == has_followed_strands.reason)
-    return;
+void SimStages::plan_publish(const FeatureReason& follows) {
+  const FeatureReason planned = std::exchange(publish_planned_for_, follows);
+  if (publish_ != nullptr && planned.value == follows.value && planned.reason == follows.reason) return;
   publish_ = std::make_unique<gl::PassList<StageTurn>>();
   const auto add = [this](gl::PassDeclaration declaration, Stage::Work work) {
     publish_->add(std::make_unique<Stage>(std::move(declaration), gl::PassClock::Host, work));
   };
   gl::Resources read = {state_.get()};
-  if (has_followed_strands.value) read.push_back(&followed_);
-  add({"publish/follow",
-       {state_.get()},
-       {&followed_},
-       has_followed_strands.value,
-       has_followed_strands.reason},
+  if (follows.value) read.push_back(&followed_);
+  add({"publish/follow", {state_.get()}, {&followed_}, follows.value, follows.reason},
       [](StageTurn& turn) { turn.solver.follow_guides(); });
   add({"publish/read", read, {&host_state_}, true, {}},
       [](StageTurn& turn) { turn.publisher.read(turn.solver); });
@@ -94,7 +88,8 @@ void SimStages::plan_publish(const FeatureReason& has_followed_strands) {
 
 void SimStages::plan_step(uint32_t substeps, const std::vector<FeatureReason>& reasons) {
   sizes_.substeps = substeps;
-  plan_publish(fact(reasons, "has_followed_strands"));
+  const FeatureReason& vertices = fact(reasons, "has_fewer_vertices");
+  plan_publish(vertices.value ? vertices : fact(reasons, "has_followed_strands"));
   step_ = std::make_unique<gl::PassList<StageTurn>>();
   const auto resource = [this](const char* name, uint64_t size_bytes) {
     return &step_->keep(std::make_unique<gl::Resource>(name, size_bytes));

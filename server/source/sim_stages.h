@@ -73,7 +73,8 @@ class SimStages {
   gl::PassReports report() const;
 
  private:
-  void plan_publish(const FeatureReason& has_followed_strands);
+  /// `follows`: whether hair that takes no step follows what does.
+  void plan_publish(const FeatureReason& follows);
   struct KnownLater final : gl::Resource {
     KnownLater(std::string name, uint64_t bytes_at_most) : Resource(std::move(name)), bytes(bytes_at_most) {}
     uint64_t size_bytes() const override { return bytes; }
@@ -88,7 +89,7 @@ class SimStages {
   gl::Resource snapshot_;
   std::unique_ptr<gl::PassList<StageTurn>> step_;
   std::unique_ptr<gl::PassList<StageTurn>> publish_;
-  FeatureReason publish_planned_for_;  // has_followed_strands
+  FeatureReason publish_planned_for_;  // whether anything follows
   bool is_watched_ = false;
 };
 

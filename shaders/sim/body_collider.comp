@@ -30,6 +30,9 @@ const float kResidue = 5e-5;
 // An end that the middle's turn moved by more than twice this may have met something else.
 const float kLookAgain = 2e-4;
 const float kFar = 1e6;
+// Of a segment's length: what of its side is less is made up by the side where it was.
+const float kSideKept = 0.1;
+const float kSideNoise = 1e-8;  // squared
 
 struct BodyContact {
   vec3 normal;
@@ -97,8 +100,10 @@ float distance_to_body(vec3 point) { return -deepest_in_body(point, point, 0.0).
 // The end of a segment turned about its start until it lies on a ball: both equations of 003 figure 4.1 at once, by the
 // law of cosines; straight away from the ball where they have no solution. Of their two roots in the plane of segment
 // and centre it is the one that the segment is nearer to, unless that is beyond the line from the start to the centre,
-// seen from where the end was: nothing gets there but through the ball. That place is outside and stays, so the choice
-// does not change from substep to substep.
+// seen from where the end was: nothing gets there but through the ball. Then its mirror image is; and what points nearly
+// at the centre, so that its plane says little, leans the more towards where the end was. The side is never shorter than
+// kSideKept / sqrt(2) that way, so the choice never flickers: it is at most as many times as unsteady as the segment as
+// that is shorter than it, and never leaves the half where the end was.
 vec3 turned_onto_ball(vec3 start, vec3 towards, vec3 was, float segment, vec3 center, float radius) {
   const vec3 to_center = center - start;
   const float squared = max(dot(to_center, to_center), kTinySquared);
@@ -106,12 +111,15 @@ vec3 turned_onto_ball(vec3 start, vec3 towards, vec3 was, float segment, vec3 ce
   const vec3 axis = to_center * inverse;
   const float cosine =
       clamp((segment * segment + squared - radius * radius) * inverse / max(2.0 * segment, kTinySquared), -1.0, 1.0);
-  vec3 side = towards - axis * dot(towards, axis);
+  const vec3 side_now = towards - axis * dot(towards, axis);
   const vec3 side_was = was - axis * dot(was, axis);
-  const float across = min(dot(side, side_was), 0.0) / max(dot(side_was, side_was), kTinySquared);
-  side -= 2.0 * across * side_was;
-  const vec3 other = select(dot(side_was, side_was) > 1e-12 * segment * segment, side_was, any_side(axis));
-  side = select(dot(side, side) > 1e-6 * segment * segment, side, other);  // else it is where it was
+  const float was_squared = max(dot(side_was, side_was), kTinySquared);
+  const vec3 mirrored = side_now - 2.0 * (min(dot(side_now, side_was), 0.0) / was_squared) * side_was;
+  const float short_of = max(kSideKept * segment - sqrt(dot(mirrored, mirrored)), 0.0);
+  const vec3 kept = mirrored + side_was * (short_of * inversesqrt(was_squared));
+  const float noise = kSideNoise * segment * segment;  // shorter than this a side is made of roundings
+  vec3 side = select(dot(side_now, side_now) > noise, side_now, any_side(axis));
+  side = select(was_squared > noise, kept, side);
   side -= axis * dot(side, axis);  // once more: a short side is made of roundings along the axis
   const float sine = sqrt(1.0 - cosine * cosine) * inversesqrt(max(dot(side, side), kTinySquared));
   return start + segment * (cosine * axis + sine * side);

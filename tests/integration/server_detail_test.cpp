@@ -168,7 +168,7 @@ TEST_F(DetailLoop, LevelsChangeWithoutALeap) {
   loop_->set_demand(one_viewer(2.0 * scene.detail.full_at_px));
   (void)watch(60);
   const double moving_m = largest_move_m(watch(60));
-  for (const double share : {0.9, 0.3, 0.15}) {
+  for (const double share : {0.9, 0.3, 0.15, 0.1}) {
     // Below the level's size, with its hysteresis.
     loop_->set_demand(one_viewer(share * (1.0 - scene.detail.hysteresis) * scene.detail.full_at_px));
     (void)sink_.take();
@@ -187,7 +187,7 @@ TEST_F(DetailLoop, HalfTheRateIsHalfTheStatesAndGoesOn) {
   SceneDesc scene = small_detail_scene();
   scene.detail.mode = kDetailAuto;
   if (!start(scene)) return;
-  loop_->set_demand(one_viewer(0.15 * scene.detail.full_at_px));
+  loop_->set_demand(one_viewer(0.08 * scene.detail.full_at_px));
   ASSERT_TRUE(comes_to(DetailLevel::HalfRate));
   (void)sink_.take();
   const auto states = watch(20);
@@ -256,7 +256,7 @@ TEST_F(DetailServer, AServerThatEverybodyLeftSimulatesNothingAndTheNextViewerSee
   for (const gl::PassReport& pass : server_->passes())
     EXPECT_EQ(pass.name == "sim/step" && pass.fate == gl::PassFate::Kept, false) << pass.reason;
   const std::string metrics = test::http_get(server_->port(), "/metrics");
-  EXPECT_NE(metrics.find("strandcast_sim_detail_level 4"), std::string::npos);
+  EXPECT_NE(metrics.find("strandcast_sim_detail_level 5"), std::string::npos);
   EXPECT_NE(metrics.find("level=\"follow the head\""), std::string::npos);
 
   const auto viewer = open(client_config());
@@ -285,7 +285,7 @@ TEST_F(DetailServer, AFarCameraOfPicturesGetsFewerStrandsAndANearOneAll) {
   EXPECT_EQ(server_->counters().sim.detail, DetailLevel::Full);
   EXPECT_EQ(server_->counters().sim.simulated_strands, 150u);
   CameraDesc far = scene.camera;
-  far.offset_m = 12.0f * glm::normalize(far.offset_m);
+  far.offset_m = 17.0f * glm::normalize(far.offset_m);
   viewer.send(CameraChange{far});
   ASSERT_TRUE(comes_to(DetailLevel::HalfRate));
   EXPECT_LT(server_->counters().sim.simulated_strands, 150u);

@@ -202,8 +202,8 @@ TEST_P(EveryExecutor, DoesWhatTheLawSaysInDouble) {
                quantile(errors_m, 0.95), quantile(errors_m, 0.99),
                *std::max_element(errors_m.begin(), errors_m.end()));
     EXPECT_GT(moved_count, layout.size() / 20) << "the strands do meet the body";
-    // Which of two shapes is deeper, and which side a segment falls to, may turn on a rounding.
-    EXPECT_LE(quantile(errors_m, 0.95), 2e-6);
+    EXPECT_LE(quantile(errors_m, 0.99), 2e-6);
+    EXPECT_LE(quantile(errors_m, 1.0), 1e-5) << "where a choice is near to another";
     if (response != BodyResponse::Project) {
       EXPECT_LE(length_excess_m(groom, run.after, 2e-6), 0.0);
     }
@@ -218,6 +218,128 @@ TEST_P(EveryExecutor, WhatTouchesNothingIsNotMoved) {
   const PassRun run = run_pass(executor_, make_hair({}), body, 0.5);
   EXPECT_EQ(run.after.position_m, run.before.position_m);
   EXPECT_EQ(run.after.velocity_mps, run.before.velocity_mps);
+}
+
+/// Single segments beside each other over one ball, put somewhere by a model and turned out of it by the
+/// pass, step after step. Seen from their starts, which stay.
+class SegmentsOverABall {
+ public:
+  static constexpr uint32_t kCount = 16;
+  static constexpr double kLengthM = 0.02, kBallM = 0.1;
+  /// Their starts are so high over the ball.
+  SegmentsOverABall(Executor& executor, double height_m)
+      : strands_(executor), start_m_(0.0, kBallM + height_m, 0.0) {
+    std::vector<std::vector<glm::vec3>> straight(
+        kCount, {glm::vec3(start_m_), glm::vec3(start_m_ - glm::dvec3(0.0, kLengthM, 0.0))});
+    EXPECT_TRUE(strands_.load(groom_from(straight, Pinning::Root), {1.0, 0.0, 0.0, 0.0}));
+    auto collider = BodyCollider::make(executor, {}, strands_, {});
+    EXPECT_TRUE(collider) << collider.error().to_string();
+    collider_.emplace(std::move(collider).value());
+  }
+  /// Ends from the starts, by the model, and where the pass has them. Without a ball they stay.
+  std::vector<glm::dvec3> step(const std::vector<glm::dvec3>& ends_m, bool has_ball) {
+    const StrandLayout& layout = strands_.layout();
+    SolverState state;
+    state.position_m.resize(layout.size());
+    state.velocity_mps.resize(layout.size());
+    for (uint32_t s = 0; s < kCount; ++s)
+      for (uint32_t i = 0; i < 2; ++i)
+        state.position_m[layout.index(i, s)] = glm::vec3(i == 0 ? start_m_ : start_m_ + ends_m[s]);
+    strands_.write(state);
+    StepInput input = calm_input(kSubstepS);
+    input.body.friction = 0.0;
+    input.body.response = BodyResponse::Sphere;
+    input.body.capsules = {ball({0.0, has_ball ? 0.0 : -5.0, 0.0}, kBallM)};
+    collider_->run(make_step_block(input, {}, layout.counts(), strands_.head()), input, strands_.planes(),
+                   {});
+    strands_.read(state);
+    std::vector<glm::dvec3> out(kCount);
+    for (uint32_t s = 0; s < kCount; ++s)
+      out[s] = glm::dvec3(state.position_m[layout.index(1, s)]) - start_m_;
+    return out;
+  }
+  static glm::dvec3 leaning(double angle_rad, double around_rad) {
+    return kLengthM * glm::dvec3(std::sin(angle_rad) * std::cos(around_rad), -std::cos(angle_rad),
+                                 std::sin(angle_rad) * std::sin(around_rad));
+  }
+
+ private:
+  StrandState strands_;
+  glm::dvec3 start_m_;
+  std::optional<BodyCollider> collider_;
+};
+
+/// Farthest that an end goes from one step to the next.
+double largest_move_m(const std::vector<glm::dvec3>& from, const std::vector<glm::dvec3>& to) {
+  double largest_m = 0.0;
+  for (size_t s = 0; s < from.size(); ++s) largest_m = std::max(largest_m, glm::distance(from[s], to[s]));
+  return largest_m;
+}
+
+// 003 figure 4.1 has two roots in a plane, and a circle of them in space. A model that has segments point at
+// the centre, a little beside it, on any side, and every step on another, moves them a little.
+TEST_P(EveryExecutor, WhatPointsAtTheCentreStaysOnItsSideOfTheBall) {
+  constexpr double kUnsteadyM = 1e-4;
+  SegmentsOverABall segments(executor_, 0.01);
+  std::vector<glm::dvec3> model(SegmentsOverABall::kCount);
+  for (size_t s = 0; s < model.size(); ++s) model[s] = segments.leaning(1.2, 0.4 * static_cast<double>(s));
+  (void)segments.step(model, false);
+  model.assign(model.size(), segments.leaning(0.0, 0.0));
+  std::vector<glm::dvec3> shown = segments.step(model, true);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> around(0.0, 6.28), beside(0.0, kUnsteadyM / segments.kLengthM);
+  double largest_m = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    for (glm::dvec3& end : model) end = segments.leaning(beside(random), around(random));
+    const std::vector<glm::dvec3> now = segments.step(model, true);
+    largest_m = std::max(largest_m, largest_move_m(shown, now));
+    shown = now;
+  }
+  // Both lie on the circle of solutions, of radius L sine; the side is at least 0.1 L / sqrt(2) long.
+  const double most_m = 2.0 * kUnsteadyM * std::sqrt(2.0) / 0.1;
+  fmt::print("ends move by {:.3g} mm at the most, {:.3g} mm as asked for\n", 1e3 * largest_m,
+             2e3 * kUnsteadyM);
+  EXPECT_LT(largest_m, most_m);
+  EXPECT_GT(largest_m, 0.0);
+}
+
+// As far to the one side as to the other, in turns: the end is on one side of the ball, or on the other.
+TEST_P(EveryExecutor, WhatIsThrownFromSideToSideStaysOnOne) {
+  SegmentsOverABall segments(executor_, 0.01);
+  std::vector<glm::dvec3> model(SegmentsOverABall::kCount);
+  const auto lean = [&](double angle_rad) {
+    for (size_t s = 0; s < model.size(); ++s)
+      model[s] =
+          segments.leaning(angle_rad * (0.1 + 0.06 * static_cast<double>(s)), 0.4 * static_cast<double>(s));
+  };
+  lean(1.2);
+  (void)segments.step(model, false);
+  lean(0.4);
+  const std::vector<glm::dvec3> first = segments.step(model, true);
+  double sum_m = 0.0;
+  for (int i = 0; i < 20; ++i) {
+    lean(i % 2 == 0 ? -0.4 : 0.4);
+    sum_m += largest_move_m(first, segments.step(model, true));
+  }
+  EXPECT_LT(sum_m / 20.0, 1e-5);
+}
+
+// Where the plane says enough it alone decides, as the two equations have it.
+TEST_P(EveryExecutor, WhatLeansFarGoesAroundTheBallWithTheModel) {
+  SegmentsOverABall segments(executor_, 0.01);
+  std::vector<glm::dvec3> model(SegmentsOverABall::kCount);
+  const auto turn = [&](double around_rad) {
+    for (glm::dvec3& end : model) end = segments.leaning(0.3, around_rad);
+  };
+  turn(0.0);
+  (void)segments.step(model, false);
+  for (int i = 1; i <= 60; ++i) {
+    turn(0.1 * i);
+    for (const glm::dvec3& end : segments.step(model, true)) {
+      const double turned = std::remainder(std::atan2(end.z, end.x) - 0.1 * i, 2.0 * 3.14159265358979);
+      ASSERT_NEAR(turned, 0.0, 1e-4) << i;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, EveryExecutor, testing::ValuesIn(sim_devices()), name_of_device);

@@ -152,6 +152,7 @@ TEST(Features, ExplainAgreesWithAnalyse) {
                                             {"has_volume", &explained.has_volume},
                                             {"has_distance_field", &explained.has_distance_field},
                                             {"has_followed_strands", &explained.has_followed_strands},
+                                            {"has_fewer_vertices", &explained.has_fewer_vertices},
                                             {"has_half_rate", &explained.has_half_rate},
                                             {"is_carried", &explained.is_carried},
                                             {"has_body", &explained.has_body},
@@ -185,7 +186,7 @@ TEST(Features, ReasonsDifferWithTheValue) {
                                  .frame_viewers = 1,
                                  .detail = DetailLevel::FollowHead,
                                  .detail_reason = "nobody reads",
-                                 .forced = {"has_half_rate"}});
+                                 .forced = {"has_half_rate", "has_fewer_vertices"}});
   for (size_t i = 0; i < off.size(); ++i) {
     EXPECT_FALSE(off[i].value) << off[i].name;
     EXPECT_TRUE(on[i].value) << on[i].name;
@@ -204,6 +205,10 @@ TEST(Features, EachLevelOfDetailLeavesOutWhatTheOneBeforeDoes) {
   EXPECT_FALSE(alone.has_volume || alone.has_followed_strands);
   const SceneFeatures fewer = at(DetailLevel::FewerStrands), half = at(DetailLevel::HalfRate);
   EXPECT_TRUE(fewer.has_followed_strands && !fewer.has_volume && !fewer.has_half_rate);
+  const SceneFeatures sparse = at(DetailLevel::FewerVertices);
+  EXPECT_FALSE(fewer.has_fewer_vertices);
+  EXPECT_TRUE(sparse.has_followed_strands && sparse.has_fewer_vertices && !sparse.has_half_rate);
+  EXPECT_TRUE(half.has_fewer_vertices);
   EXPECT_TRUE(half.has_followed_strands && !half.has_volume && half.has_half_rate && !half.is_carried);
   // What takes no step is not made anew either.
   SceneFeatures carried = at(DetailLevel::FollowHead);

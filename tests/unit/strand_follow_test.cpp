@@ -108,6 +108,95 @@ TEST(StrandFollow, ShareOfStrands) {
   EXPECT_FALSE(can_follow(with_pinning(groom, Pinning::BothEnds))) << "tips would come loose";
 }
 
+constexpr uint32_t kStride = 2;
+
+/// Strands that are bent at every vertex, each otherwise, as long as in the groom.
+std::vector<glm::vec3> bent(const Groom& groom) {
+  const uint32_t count = groom.strand_count();
+  std::vector<glm::vec3> rest = rest_of(groom, count), moved = rest;
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0.0f, 0.4f);
+  for (size_t i = size_t{2} * count; i < moved.size(); ++i) {
+    const glm::vec3 way = rest[i] - rest[i - count];
+    const glm::vec3 to = glm::normalize(way) + glm::vec3(noise(random), noise(random), noise(random));
+    moved[i] = moved[i - count] + glm::length(way) * glm::normalize(to);
+  }
+  return moved;
+}
+
+TEST(VertexFollow, KeepsRootsAndTipAndLeavesOutOthersEvenly) {
+  const Groom groom = grown();
+  const VertexFollow follow(groom, kStride);
+  EXPECT_EQ(follow.kept(), (std::vector<uint32_t>{0, 1, 3, 5, 7, 9, 11}));
+  EXPECT_EQ(VertexFollow(groom, 3).kept(), (std::vector<uint32_t>{0, 1, 2, 5, 8, 11}));
+  EXPECT_EQ(VertexFollow(groom, 1).kept().size(), kVertices);
+  EXPECT_EQ(VertexFollow(groom, 1000).kept(), (std::vector<uint32_t>{0, 1, 11}));
+  const Groom fewer = follow.simulated(groom);
+  ASSERT_EQ(fewer.strand_count(), kStrands);
+  ASSERT_EQ(fewer.uniform_vertex_count(), follow.kept().size());
+  for (uint32_t s = 0; s < kStrands; ++s)
+    for (size_t k = 0; k < follow.kept().size(); ++k) {
+      const size_t of_all = groom.offset[s] + follow.kept()[k];
+      if (s % 50 != 0) continue;
+      EXPECT_EQ(fewer.rest_position_m[fewer.offset[s] + k], groom.rest_position_m[of_all]);
+      EXPECT_EQ(fewer.pinned[fewer.offset[s] + k], groom.pinned[of_all]);
+    }
+}
+
+TEST(VertexFollow, AtRestAllAreGroomed) {
+  const Groom groom = grown();
+  const VertexFollow follow(groom, kStride);
+  const std::vector<glm::vec3> rest = rest_of(groom, kStrands);
+  std::vector<glm::vec3> kept(follow.kept_size()), all(rest.size());
+  follow.take(rest, kept);
+  follow.follow(kept, all);
+  for (size_t i = 0; i < all.size(); ++i) ASSERT_LT(glm::distance(all[i], rest[i]), 1e-6f) << i;
+}
+
+TEST(VertexFollow, SimulatedOnesStandAndOthersLieBetweenThemInTheGroomsShape) {
+  const Groom groom = grown();
+  const VertexFollow follow(groom, kStride);
+  const std::vector<glm::vec3> rest = rest_of(groom, kStrands);
+  std::vector<glm::vec3> kept(follow.kept_size()), all(rest.size());
+  follow.take(bent(groom), kept);
+  // One strand that lies in one point.
+  for (size_t k = 0; k < follow.kept().size(); ++k) kept[k * kStrands] = glm::vec3(0.1f);
+  follow.follow(kept, all);
+  for (size_t k = 0; k < follow.kept().size(); ++k)
+    for (uint32_t s = 0; s < kStrands; ++s)
+      ASSERT_EQ(all[size_t{follow.kept()[k]} * kStrands + s], kept[k * kStrands + s]);
+  for (size_t k = 1; k < follow.kept().size(); ++k) {
+    const size_t from = size_t{follow.kept()[k - 1]} * kStrands, to = size_t{follow.kept()[k]} * kStrands;
+    for (size_t v = follow.kept()[k - 1] + 1; v < follow.kept()[k]; ++v)
+      for (uint32_t s = 0; s < kStrands; ++s) {
+        const size_t i = v * kStrands + s;
+        const float whole = glm::distance(all[to + s], all[from + s]);
+        const float rest_whole = glm::distance(rest[to + s], rest[from + s]);
+        ASSERT_TRUE(std::isfinite(glm::length(all[i])));
+        // A similar triangle.
+        for (const size_t end : {from + s, to + s})
+          ASSERT_NEAR(glm::distance(all[i], all[end]) * rest_whole, glm::distance(rest[i], rest[end]) * whole,
+                      1e-5f * rest_whole * rest_whole)
+              << s << " " << v;
+      }
+  }
+}
+
+TEST(VertexFollow, TakesWhatItPuts) {
+  const Groom groom = grown();
+  const VertexFollow follow(groom, kStride);
+  const std::vector<glm::vec3> moved = bent(groom);
+  std::vector<glm::vec3> kept(follow.kept_size()), again(kept.size()), all(moved.size(), glm::vec3(0.0f));
+  follow.take(moved, kept);
+  follow.blend(kept, all);
+  follow.take(all, again);
+  EXPECT_EQ(again, kept);
+  for (uint32_t s = 0; s < kStrands; ++s) {
+    const glm::vec3 mean = 0.5f * (moved[3 * kStrands + s] + moved[5 * kStrands + s]);
+    ASSERT_LT(glm::distance(all[4 * kStrands + s], mean), 1e-6f);
+  }
+}
+
 /// Some steps of a turning, moving head.
 StepInput input_at(int step) {
   StepInput input;
@@ -136,7 +225,7 @@ TEST_P(FollowedSolvers, GuidesMoveAsIfTheyWereAlone) {
   const Groom groom = grown();
   const glm::dquat upright(1.0, 0.0, 0.0, 0.0);
   auto alone = make("dftl");
-  FollowedSolver followed(make("dftl"), double{kGuides} / kStrands);
+  FollowedSolver followed(make("dftl"), {double{kGuides} / kStrands, 1});
   ASSERT_TRUE(alone->load(first_strands(groom, kGuides), upright));
   ASSERT_TRUE(followed.load(groom, upright));
   ASSERT_EQ(followed.guide_count(), kGuides);
@@ -160,10 +249,50 @@ TEST_P(FollowedSolvers, GuidesMoveAsIfTheyWereAlone) {
                 b.position_m[v * kStrands + s].y);
 }
 
+TEST_P(FollowedSolvers, VerticesThatAreSimulatedMoveAsIfTheyWereAlone) {
+  const Groom groom = grown();
+  const glm::dquat upright(1.0, 0.0, 0.0, 0.0);
+  for (const double share : {1.0, double{kGuides} / kStrands}) {
+    const SimulatedPart part{share, kStride};
+    auto alone = make("direct_rod");
+    FollowedSolver followed(make("direct_rod"), part);
+    ASSERT_TRUE(alone->load(simulated_groom(groom, part), upright));
+    ASSERT_TRUE(followed.load(groom, upright));
+    const uint32_t count = followed.guide_count();
+    ASSERT_EQ(count, guide_count(kStrands, share));
+    ASSERT_EQ(followed.simulated_vertices(), 7u);
+    SolverState a, b;
+    for (int step = 0; step < 30; ++step) {
+      alone->substep(input_at(step));
+      followed.substep(input_at(step));
+      if (step != 15) continue;
+      // Handed over as from another level and back: what stands is taken up where it stands.
+      followed.read(b);
+      followed.write(b);
+    }
+    alone->read(a);
+    followed.read(b);
+    const std::vector<uint32_t> kept = VertexFollow(groom, kStride).kept();
+    for (size_t k = 0; k < kept.size(); ++k)
+      for (uint32_t s = 0; s < count; ++s) {
+        const size_t of_all = size_t{kept[k]} * kStrands + s;
+        ASSERT_LT(glm::distance(a.position_m[k * count + s], b.position_m[of_all]), 1e-4f) << k << " " << s;
+      }
+    // Of the strands that are simulated every length that the model keeps.
+    for (uint32_t s = 0; s < count; ++s)
+      for (uint32_t v = 1; v < kVertices; ++v) {
+        const glm::vec3* rest = groom.rest_position_m.data() + groom.offset[s];
+        const float length = glm::distance(rest[v], rest[v - 1]);
+        const size_t i = size_t{v} * kStrands + s;
+        ASSERT_NEAR(glm::distance(b.position_m[i], b.position_m[i - kStrands]), length, 2e-3f * length);
+      }
+  }
+}
+
 // What is told of the velocities is how they go on: seen from the head, positions differ by them.
 TEST_P(FollowedSolvers, VelocitiesAreOfTheStrandsThatFollow) {
   const Groom groom = grown();
-  FollowedSolver followed(make("dftl"), double{kGuides} / kStrands);
+  FollowedSolver followed(make("dftl"), {double{kGuides} / kStrands, 1});
   ASSERT_TRUE(followed.load(groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   constexpr double kShortStepS = 1.0 / 960.0;
   const auto step = [&](int i) {
@@ -191,7 +320,7 @@ TEST_P(FollowedSolvers, VelocitiesAreOfTheStrandsThatFollow) {
 
 TEST_P(FollowedSolvers, SeenFromTheHeadAJumpChangesNothing) {
   const Groom groom = grown();
-  FollowedSolver followed(make("direct_rod"), double{kGuides} / kStrands);
+  FollowedSolver followed(make("direct_rod"), {double{kGuides} / kStrands, 1});
   ASSERT_TRUE(followed.load(groom, glm::dquat(1.0, 0.0, 0.0, 0.0)));
   for (int step = 0; step < 5; ++step) followed.substep(input_at(step));
   const glm::dquat from = input_at(4).world_from_head_rotation;

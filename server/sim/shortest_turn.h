@@ -1,0 +1,18 @@
+// The shortest turn from one direction to another, on vectors. Pure functions.
+#pragma once
+
+#include <glm/glm.hpp>
+
+namespace strandcast {
+
+/// `v` turned as `from` is turned to `to` on the shortest way; both are unit vectors, or without a direction.
+/// Keeps its length.
+inline glm::vec3 shortest_turn(const glm::vec3& v, const glm::vec3& from, const glm::vec3& to) {
+  constexpr float kOpposite = 1e-4f;
+  const float cosine = glm::dot(from, to);
+  if (1.0f + cosine < kOpposite) return v - 2.0f * glm::dot(from, v) * from;
+  const glm::vec3 axis = glm::cross(from, to);
+  return cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1.0f + cosine));
+}
+
+}  // namespace strandcast
