@@ -10,6 +10,7 @@
 #include "common/base/result.h"
 #include "common/base/worker_pool.h"
 #include "common/groom/mesh.h"
+#include "common/kernels/strand_passes.h"
 
 namespace strandcast {
 
@@ -28,6 +29,7 @@ struct DistanceField {
   // neighbours at x + 1, at y + 1 and at both. A lookup between nodes then takes two of them.
   std::vector<glm::vec4> quad;
 
+  FieldGrid grid() const { return {origin_m, cell_m, node_count}; }
   struct Sample {
     double distance_m = 0.0;  // negative inside
     glm::dvec3 gradient{0.0};

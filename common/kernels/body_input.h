@@ -31,6 +31,8 @@ struct BodyCapsule {
   glm::dvec3 from_m{0.0}, to_m{0.0};                // at the end of the substep
   glm::dvec3 from_before_m{0.0}, to_before_m{0.0};  // at its beginning
   double from_radius_m = 0.05, to_radius_m = 0.05;
+
+  bool operator==(const BodyCapsule&) const = default;
 };
 
 /// Strands stay on the side that the normal points to.
@@ -38,6 +40,8 @@ struct BodyPlane {
   glm::dvec3 point_m{0.0};
   glm::dvec3 normal{0.0, 1.0, 0.0};  // unit
   glm::dvec3 shift_m{0.0};           // of its surface along itself during the substep
+
+  bool operator==(const BodyPlane&) const = default;
 };
 
 struct BodyInput {
@@ -49,6 +53,9 @@ struct BodyInput {
   double force_per_s2 = 0.0;  // of BodyResponse::Force
   /// It was not there before: what is inside of it has begun there, and stays as deep as it is.
   bool is_new = false;
+
+  bool acts() const { return !capsules.empty() || !planes.empty(); }
+  bool operator==(const BodyInput&) const = default;
 };
 
 }  // namespace strandcast

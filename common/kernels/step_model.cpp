@@ -15,6 +15,24 @@ Pose between(const Pose& a, const Pose& b, double blend) {
   return pose;
 }
 
+/// The body during a share of a tick.
+BodyInput body_of(const StepScene& scene, const StepTick& tick, double begin, double end) {
+  BodyInput body = scene.body;
+  const std::vector<glm::dvec3>& from = tick.body_before_m.empty() ? tick.body_m : tick.body_before_m;
+  const auto at = [&](size_t point, double share) {
+    return from[point] + share * (tick.body_m[point] - from[point]);
+  };
+  for (size_t i = 0; i < body.capsules.size(); ++i) {
+    BodyCapsule& capsule = body.capsules[i];
+    capsule.from_m = at(2 * i, end);
+    capsule.to_m = at(2 * i + 1, end);
+    capsule.from_before_m = at(2 * i, begin);
+    capsule.to_before_m = at(2 * i + 1, begin);
+  }
+  body.is_new = tick.is_body_new && begin == 0.0;
+  return body;
+}
+
 }  // namespace
 
 const std::vector<StepKernel>& step_kernels() {
@@ -87,6 +105,8 @@ std::vector<StepInput> substeps_of(const StepScene& scene, const StepTick& tick,
     for (const SphereCollider& collider : scene.colliders)
       substep.colliders.push_back(
           {glm::vec3(pose.rotation * glm::dvec3(collider.center_m)), collider.radius_m});
+    if (tick.has_body && tick.body_m.size() == 2 * scene.body.capsules.size())
+      substep.body = body_of(scene, tick, static_cast<double>(i) / count, blend);
     if (tick.has_waves) {
       const double time_s = end_time_s - scene.step_s * (1.0 - blend);
       for (GustWave wave : scene.waves) {

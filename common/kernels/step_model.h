@@ -15,6 +15,8 @@
 #include "common/kernels/plane_role.h"
 #include "common/kernels/step_block.h"
 #include "common/kernels/step_input.h"
+#include "common/kernels/strand_passes.h"
+#include "common/kernels/told_field.h"
 #include "common/kernels/volume/volume_desc.h"
 #include "common/math/pose.h"
 
@@ -51,6 +53,13 @@ struct StepModel {
   std::vector<glm::vec4> rod_strand;  // (kRodStrandRows x strand_count)
   /// How strands act on each other; whether it is made anew in every step is not told.
   VolumeDesc volume;
+  // What else acts on the strands; which body it is stands in the scene.
+  std::optional<BendAngles> bend;
+  double drag_along_share = 1.0;
+  bool meets_body = false;
+  std::shared_ptr<const ToldField> field;  // null: none
+
+  bool has_passes() const { return bend || drag_along_share != 1.0 || meets_body || field != nullptr; }
 };
 /// A volume that is finer is not told of: strands are predicted without it.
 inline constexpr uint32_t kMostToldResolution = 64;
@@ -71,6 +80,8 @@ struct StepScene {
   std::vector<SphereCollider> colliders;  // head space
   glm::dvec3 mean_wind_mps{0.0};          // waves stand still in air that moves with it
   std::vector<GustWave> waves;            // at time 0 with the head at the origin
+  /// Of a body; where its capsules are is told by ticks.
+  BodyInput body;
 
   bool operator==(const StepScene&) const = default;
 };
@@ -84,6 +95,11 @@ struct StepTick {
   std::optional<Pose> carried_to;
   glm::dvec3 wind_mps{0.0};  // mean wind at the head, world
   bool has_waves = false;
+  /// Both ends of each capsule of the scene's body, head space; empty: where they are is not known.
+  std::vector<glm::dvec3> body_m;         // at its end
+  std::vector<glm::dvec3> body_before_m;  // at its beginning; empty: as at its end
+  bool has_body = false;
+  bool is_body_new = false;
 };
 /// Ticks that a trail goes back, at most: what takes longer is no step any more.
 inline constexpr size_t kMostTrailTicks = 8;

@@ -228,6 +228,12 @@ StepScene StepBuilder::step_scene(const SceneFeatures& features) const {
   if (features.has_colliders) scene.colliders = colliders_;
   scene.mean_wind_mps = scene_.wind.mean_mps;
   if (features.has_turbulence) scene.waves = waves_;
+  if (features.has_body && !step_.substeps.empty()) {
+    scene.body = step_.substeps.back().body;
+    scene.body.is_new = false;
+    for (BodyCapsule& capsule : scene.body.capsules)
+      capsule = {.from_radius_m = capsule.from_radius_m, .to_radius_m = capsule.to_radius_m};
+  }
   return scene;
 }
 
@@ -242,6 +248,11 @@ StepTick StepBuilder::step_tick(uint64_t tick) const {
     result.carried_to = Pose{world_from_head_.position_m - shift_m, *step_.carried_to_rotation};
   result.wind_mps = step_.substeps.back().wind_mps;
   result.has_waves = !step_.substeps.back().gusts.empty();
+  const BodyInput& body = step_.substeps.back().body;
+  result.has_body = body.acts();
+  result.is_body_new = step_.substeps.front().body.is_new;
+  for (const BodyCapsule& capsule : body.capsules)
+    result.body_m.insert(result.body_m.end(), {capsule.from_m, capsule.to_m});
   return result;
 }
 

@@ -14,7 +14,13 @@ void StepLog::add(const StepTick& tick) {
 
 double StepLog::step_cost() const {
   if (model_ == nullptr) return 0.0;
-  const double cost = find_step_kernel(model_->kernel.shader_path)->cost;
+  // What acts on strands besides, as measured beside dftl.
+  constexpr double kBendCost = 1.0, kDragCost = 0.5, kBodyCost = 1.0, kFieldCost = 4.0;
+  double cost = find_step_kernel(model_->kernel.shader_path)->cost;
+  if (model_->bend) cost += kBendCost;
+  if (model_->drag_along_share != 1.0) cost += kDragCost;
+  if (model_->meets_body) cost += kBodyCost;
+  if (model_->field != nullptr) cost += kFieldCost;
   if (!tells_volume(*model_)) return cost;
   // The volume once a step, what it does to each vertex in each substep.
   constexpr double kVolumeCost = 12.0;

@@ -5,10 +5,13 @@
 
 #include <memory>
 
+#include "common/kernels/strand_passes.h"
 #include "common/scene/scene_desc.h"
 #include "server/sim/follicle_limit.h"
 
 namespace strandcast {
+
+BendAngles bend_angles(const BendLimitDesc& limits);
 
 class BendLimit {
  public:

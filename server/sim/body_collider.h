@@ -5,7 +5,6 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "server/sim/follicle_limit.h"
 #include "server/sim/strand_state.h"
@@ -34,8 +33,5 @@ class BodyCollider {
       before_;  // (vertex_count x strand_count) head space, m; w = the clearance that a vertex has had
   bool is_new_ = true;
 };
-
-/// The shapes as the kernel looks them up, with every number held to the limits of a step.
-std::vector<glm::vec4> body_table(const BodyInput& body, double h_s, bool is_new);
 
 }  // namespace strandcast

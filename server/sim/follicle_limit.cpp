@@ -1,13 +1,12 @@
 #include "server/sim/follicle_limit.h"
 
+#include "common/kernels/strand_passes.h"
+
 namespace strandcast {
 
 Result<FollicleLimit> FollicleLimit::make(Executor& executor, const SceneFeatures& features,
                                           const StrandLayout& layout, const CarriedPlanes& carried) {
-  KernelDesc kernel;
-  kernel.shader_path = "sim/follicle_limit.comp";
-  kernel.variant = {{"MEMORY", carried.axis != nullptr ? 2 : carried.way != nullptr ? 1 : 0}};
-  kernel.meets_air = false;
+  const KernelDesc kernel = follicle_limit_kernel(carried.memory());
   FollicleLimit limit;
   ASSIGN_OR_RETURN(limit.program_, executor.make_program(kernel, features, layout));
   return limit;

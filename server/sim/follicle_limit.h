@@ -16,6 +16,8 @@ namespace strandcast {
 struct CarriedPlanes {
   StrandPlane* way = nullptr;   // of every vertex in the last substep; world, m
   StrandPlane* axis = nullptr;  // of every segment; world. Only with `way`
+
+  int memory() const { return pass_memory(way != nullptr, axis != nullptr); }
 };
 
 class FollicleLimit {

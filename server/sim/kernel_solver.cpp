@@ -111,6 +111,11 @@ std::shared_ptr<const StepModel> KernelSolver::step_model() {
   model->parameters = parameters_;
   // A target that nobody else knows is not told: strands are then predicted without their volume.
   if (features_.has_volume && volume_target_ == nullptr) model->volume = volume_;
+  if (bend_limit_) model->bend = bend_angles(bend_limits_);
+  if (oriented_drag_) model->drag_along_share = drag_along_share_;
+  model->meets_body = body_collider_.has_value();
+  if (field_collider_ && head_field_->grid().size() <= kMostToldNodes)
+    model->field = std::make_shared<ToldField>(told_field(head_field_->grid(), head_field_->quad));
   model->strand_count = layout().strand_count;
   model->vertex_count = layout().vertex_count;
   model->pinned_root_count = layout().pinned_root_count;

@@ -1,15 +1,13 @@
 #include "server/sim/oriented_drag.h"
 
+#include "common/kernels/strand_passes.h"
+
 namespace strandcast {
 
 Result<OrientedDrag> OrientedDrag::make(Executor& executor, const SceneFeatures& features,
                                         const StrandLayout& layout, const StrandPlane* way,
                                         double along_share) {
-  KernelDesc kernel;
-  kernel.shader_path = "sim/oriented_drag.comp";
-  kernel.variant = {{"HAS_WAY", way != nullptr ? 1 : 0}};
-  kernel.constants = {{"u_given_back", 1.0 - along_share}};
-  kernel.meets_colliders = false;
+  const KernelDesc kernel = oriented_drag_kernel(along_share, way != nullptr);
   OrientedDrag drag;
   ASSIGN_OR_RETURN(drag.program_, executor.make_program(kernel, features, layout));
   return drag;

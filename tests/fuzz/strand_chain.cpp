@@ -82,12 +82,25 @@ std::shared_ptr<const StepModel> step_model(const HairSize& size, std::span<cons
   return model;
 }
 
+/// With all that may act on strands besides.
+std::shared_ptr<const StepModel> with_passes(const StepModel& model) {
+  auto with = std::make_shared<StepModel>(model);
+  with->bend = BendAngles{.most_root_rad = 0.8, .most_tip_rad = 0.8};
+  with->drag_along_share = 0.5;
+  with->meets_body = true;
+  ToldField field{{glm::vec3(-0.12f), 0.08f, glm::uvec3(4)}, {}};
+  for (int node = 0; node < 64; ++node)
+    field.distance.push_back(static_cast<int16_t>(900 * (node % 5) - 1800));
+  with->field = std::make_shared<ToldField>(field);
+  return with;
+}
+
 /// The trails of a chain's states, one after the other.
 class Trails {
  public:
   Trails(const HairSize& size, const HairMotion& hair)
       : model_(step_model(size, hair.rest_in_head(), size.strands % 2 == 0)),
-        other_model_(step_model(size, hair.rest_in_head(), size.strands % 2 != 0)) {
+        other_model_(with_passes(*step_model(size, hair.rest_in_head(), size.strands % 2 != 0))) {
     auto scene = std::make_shared<StepScene>();
     scene->colliders = {{glm::vec3(0.0f), 0.1f}};
     scene->waves = {{{0.5f, 0.0f, 0.2f}, {1.0f, 0.0f, 6.0f}, 0.3f}};
@@ -96,11 +109,20 @@ class Trails {
     scene->follicle_sine = 0.47943f;
     scene_ = scene;
     scene->substeps = 2;
+    scene->body.capsules.resize(1);
+    scene->body.planes.resize(1);
     other_scene_ = std::make_shared<StepScene>(*scene);
   }
   std::shared_ptr<const StepTrail> of(const Snapshot& snapshot, size_t frame) {
     constexpr glm::dvec3 kWindMps(0.6, 0.1, 0.2);
-    ticks_.push_back({snapshot.tick, snapshot.world_from_head, {}, kWindMps, true});
+    StepTick tick;
+    tick.tick = snapshot.tick;
+    tick.world_from_head = snapshot.world_from_head;
+    tick.wind_mps = kWindMps;
+    tick.has_waves = true;
+    tick.has_body = frame >= kOtherSceneFrame;
+    if (tick.has_body) tick.body_m = {{0.0, -0.1, 0.05}, {0.05, -0.1, 0.001 * static_cast<double>(frame)}};
+    ticks_.push_back(tick);
     if (ticks_.size() > kMostTrailTicks) ticks_.erase(ticks_.begin());
     return std::make_shared<StepTrail>(StepTrail{frame < kOtherModelFrame ? model_ : other_model_,
                                                  frame < kOtherSceneFrame ? scene_ : other_scene_, ticks_});

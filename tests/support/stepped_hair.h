@@ -47,6 +47,12 @@ inline Pose walking_head(double t_s) {
   return pose;
 }
 
+/// A joint that goes up and down beside the neck.
+inline constexpr const char* kJoint = "shoulder";
+inline glm::dvec3 lifted_joint(double t_s) {
+  return {0.1, -0.14 + 0.05 * std::sin(6.0 * t_s), 0.01 * std::sin(4.0 * t_s)};
+}
+
 class SteppedHair {
  public:
   static constexpr float kBoundM = 1e-4f;
@@ -66,7 +72,9 @@ class SteppedHair {
   SteppedState step() {
     InputFrame input;
     input.has_motion = true;
-    input.world_from_head = walking_head(static_cast<double>(tick_ + 1) / scene_.step_rate_hz);
+    const double time_s = static_cast<double>(tick_ + 1) / scene_.step_rate_hz;
+    input.world_from_head = walking_head(time_s);
+    input.joints = {{kJoint}, {lifted_joint(time_s)}};
     return step(input);
   }
   SteppedState step(InputFrame input, double input_rate = 1.0) {
@@ -157,6 +165,7 @@ class SteppedHair {
     context.volume = scene_.volume;
     context.bend_limit = scene_.bend_limit;
     context.head_field = content_.head_field;
+    context.drag_along_share = scene_.wind.along_share;
     auto solver = row->make(parameters, context);
     EXPECT_TRUE(solver) << solver.error().to_string();
     return std::move(solver).value();
@@ -168,6 +177,7 @@ class SteppedHair {
     if (features_.has_turbulence) builder_.add_gusts();
     if (features_.has_colliders) builder_.add_colliders();
     if (features_.has_follicle_limit) builder_.add_follicle_limit();
+    if (features_.has_body) builder_.add_body();
     const SceneStep& step = builder_.step();
     if (step.carried_to_rotation) solver_->rebase(*step.carried_to_rotation);
     for (const StepInput& substep : step.substeps) solver_->substep(substep);

@@ -209,14 +209,41 @@ TEST(StepCodec, ALostFrameIsMissedAndAKeyframeGoesOn) {
   }
 }
 
+/// What acts on strands besides a model's kernel, each in a scene.
+struct BesideCase {
+  const char* name;
+  void (*add)(SceneDesc&);
+  void (*forget)(StepModel&);
+};
+const BesideCase kBesides[] = {
+    {"bend_limit",
+     [](SceneDesc& scene) { scene.bend_limit.most_root_deg = scene.bend_limit.most_tip_deg = 4.0; },
+     [](StepModel& model) { model.bend.reset(); }},
+    {"oriented_drag", [](SceneDesc& scene) { scene.wind.along_share = 0.3f; },
+     [](StepModel& model) { model.drag_along_share = 1.0; }},
+    {"body",
+     [](SceneDesc& scene) {
+       scene.body.capsules = {{kJoint, kJoint}, {"", "", {-0.2, -0.2, 0.0}, {0.1, -0.2, 0.0}, 0.06, 0.05}};
+       scene.body.planes = {{{0.0, -0.24, 0.0}, {0.0, 1.0, 0.1}, {0.05, 0.0, 0.0}}};
+       scene.body.joint_offset_m = glm::dvec3(0.0);
+     },
+     [](StepModel& model) { model.meets_body = false; }},
+    {"field", [](SceneDesc& scene) { scene.head.collider = kFieldCollider; },
+     [](StepModel& model) { model.field = nullptr; }},
+};
+
 // What is refused changes nothing. A bit of an integer that nothing was made of may be damaged without being
 // noticed, and matters to nobody.
 TEST(StepCodec, DamagedBytesChangeNothing) {
   constexpr size_t kBodyAt = kFrameHeaderBytes + kStrandFixedBytes;
   constexpr int kFrames = 30;
-  for (const std::string& solver : kSolvers) {
+  for (const std::string& solver : {kSolvers[0], kSolvers[1], std::string("dftl and all besides")}) {
     SCOPED_TRACE(solver);
-    SteppedHair hair = walking_hair(solver);
+    SceneDesc scene = stepped_scene(kStrands, kVertices, solver.substr(0, solver.find(' ')));
+    if (solver.find(' ') != std::string::npos)
+      for (const BesideCase& beside : kBesides) beside.add(scene);
+    SteppedHair hair(scene);
+    hair.settle(40);
     Stream stream(hair);
     size_t refused = 0;
     for (int i = 0; i < kFrames; ++i) {
@@ -528,6 +555,94 @@ TEST(StepCodec, ForcesBetweenStrandsArePredicted) {
   }
 }
 
+size_t bytes_of_deltas(const SteppedHair& hair, const std::vector<SteppedState>& states) {
+  Stream stream(hair);
+  size_t bytes = 0;
+  for (const SteppedState& state : states) {
+    stream.pass(state);
+    if (!is_keyframe(*stream.frame)) bytes += stream.bytes();
+  }
+  EXPECT_EQ(stream.keyframes, 1);
+  return bytes;
+}
+
+// The decoder bends, drags and pushes what it has decoded likewise; who joins knows no less.
+TEST(StepCodec, WhatActsOnStrandsBesidesIsPredicted) {
+  for (const std::string& solver : kSolvers) {
+    for (const BesideCase& beside : kBesides) {
+      SCOPED_TRACE(solver + " " + beside.name);
+      SceneDesc scene = stepped_scene(300, kVertices, solver);
+      beside.add(scene);
+      SteppedHair hair(scene);
+      hair.settle(40);
+      const std::vector<SteppedState> states = recorded(hair, 40);
+      ASSERT_TRUE(states.front().snapshot.trail->model->has_passes());
+      const size_t told = bytes_of_deltas(hair, states);
+      // The same strands with a model that says nothing of it.
+      const auto silent = std::make_shared<StepModel>(*states.front().snapshot.trail->model);
+      beside.forget(*silent);
+      std::vector<SteppedState> of_silent = states;
+      for (SteppedState& state : of_silent) {
+        auto trail = std::make_shared<StepTrail>(*state.snapshot.trail);
+        trail->model = silent;
+        state.snapshot.trail = trail;
+      }
+      const size_t untold = bytes_of_deltas(hair, of_silent);
+      fmt::print("{} {}: {} bytes, {} untold\n", solver, beside.name, told, untold);
+      EXPECT_LT(told, untold * 3 / 4);
+      std::set<std::vector<std::vector<std::byte>>> all;
+      const std::vector<SteppedState> some(states.begin(), states.begin() + 6);
+      for (const simd::InstructionSet set : simd::instruction_sets())
+        for (const uint32_t threads : {1u, 3u})
+          all.insert(messages_of(hair, some, *own_workers(threads), set));
+      EXPECT_EQ(all.size(), 1u) << "sets and threads";
+
+      Stream joined(hair);
+      const auto joiner = Stream::watcher(hair);
+      for (size_t i = 0; i < states.size(); ++i) {
+        if (i != 10) {
+          joined.pass(states[i]);
+        } else {
+          const JoinFrames frames = joined.encoder->encode_for_join(states[i].snapshot);
+          ASSERT_TRUE(joined.decoder->decode(frames.frame->message));
+          ASSERT_TRUE(joiner->decode(frames.keyframe->message));
+        }
+        if (i > 10) {
+          const auto decoded = joiner->decode(joined.frame->message);
+          ASSERT_TRUE(decoded) << i << ": " << decoded.error().to_string();
+        }
+      }
+    }
+  }
+}
+
+// What a joiner gets besides: of a head only what is near its skin.
+TEST(StepCodec, AHeadsFieldTakesLittleOfAKeyframe) {
+  SceneDesc scene = stepped_scene(kStrands, kVertices);
+  scene.head.collider = kFieldCollider;
+  SteppedHair hair(scene);
+  const StepModel& model = *hair.step().snapshot.trail->model;
+  ASSERT_NE(model.field, nullptr);
+  std::vector<std::byte> bytes;
+  step::write_model(model, hair.rest_in_head_m(), kStrands, bytes);
+  fmt::print("{} nodes in {} bytes\n", model.field->grid.size(), bytes.size());
+  EXPECT_LT(bytes.size(), 40'000u);
+  // Where strands are turned it is the field, to half a step.
+  const auto quads = field_quads(*model.field);
+  const auto content = load_scene_content(scene);
+  ASSERT_TRUE(content.ok());
+  const std::vector<glm::vec4>& exact = content->head_field->quad;
+  ASSERT_EQ(quads.size(), exact.size());
+  size_t near = 0;
+  for (size_t i = 0; i < exact.size(); ++i)
+    for (int corner = 0; corner < 4; ++corner) {
+      if (exact[i][corner] > 0.014f || exact[i][corner] < -0.039f) continue;
+      ++near;
+      ASSERT_NEAR(quads[i][corner], exact[i][corner], 0.5001f * kToldFieldStepM);
+    }
+  EXPECT_GT(near, exact.size() / 20);
+}
+
 // Layout in proto/WIRE.md.
 TEST(StepWire, RefusesWhatNoStepCanBe) {
   const double kNoNumber = std::nan("");
@@ -541,7 +656,7 @@ TEST(StepWire, RefusesWhatNoStepCanBe) {
   ByteReader good(model);
   ASSERT_TRUE(read_model(good));
   EXPECT_TRUE(good.rest().empty());
-  EXPECT_EQ(code_of(model, 0, uint8_t{200}, read_model), ErrorCode::Unsupported);
+  EXPECT_EQ(code_of(model, 0, uint8_t{63}, read_model), ErrorCode::Unsupported);
   EXPECT_EQ(code_of(model, 2, uint8_t{0}, read_model), ErrorCode::BadInput);
   EXPECT_EQ(code_of(model, 3, uint8_t{kVertices}, read_model), ErrorCode::BadInput);
   EXPECT_EQ(code_of(model, 4, kNoNumber, read_model), ErrorCode::BadInput);
@@ -581,12 +696,58 @@ TEST(StepWire, RefusesWhatNoStepCanBe) {
   scene.resize(scene.size() - 1);
   EXPECT_EQ(code_of(scene, 0, scene[0], read_scene), ErrorCode::BadInput);
 
-  step::WindSteps wind{};
+  StepModel beside = *trail.model;
+  beside.bend = BendAngles{.most_root_rad = 1.0};
+  beside.drag_along_share = 0.5;
+  beside.meets_body = true;
+  ToldField field{{glm::vec3(0.0f), 0.01f, glm::uvec3(3, 4, 5)}, {}};
+  for (int i = 0; i < 60; ++i) field.distance.push_back(static_cast<int16_t>((i * 7919) % 4001 - 2000));
+  beside.field = std::make_shared<ToldField>(field);
+  std::vector<std::byte> besides;
+  step::write_model(beside, hair.rest_in_head_m(), kStrands, besides);
+  ByteReader good_besides(besides);
+  const auto besides_read = read_model(good_besides);
+  ASSERT_TRUE(besides_read) << besides_read.error().to_string();
+  EXPECT_TRUE(good_besides.rest().empty());
+  EXPECT_EQ(besides_read->bend, beside.bend);
+  EXPECT_EQ(besides_read->drag_along_share, 0.5);
+  EXPECT_TRUE(besides_read->meets_body);
+  EXPECT_EQ(besides_read->field->grid, field.grid);
+  EXPECT_EQ(besides_read->field->distance, field.distance);
+  const size_t flags_at = model.size();
+  EXPECT_EQ(code_of(besides, flags_at, uint8_t{0x1f}, read_model), ErrorCode::Unsupported);
+  EXPECT_EQ(code_of(besides, flags_at + 1, kNoNumber, read_model), ErrorCode::BadInput);
+  EXPECT_EQ(code_of(besides, flags_at + 1, 4.0, read_model), ErrorCode::BadInput) << "an angle above pi";
+  const size_t drag_at = flags_at + 1 + 4 * sizeof(double), grid_at = drag_at + sizeof(double);
+  EXPECT_EQ(code_of(besides, drag_at, 1.5, read_model), ErrorCode::BadInput);
+  EXPECT_EQ(code_of(besides, grid_at + 3 * sizeof(float), 0.0f, read_model), ErrorCode::LimitExceeded);
+  EXPECT_EQ(code_of(besides, grid_at + 4 * sizeof(float), uint16_t{1}, read_model), ErrorCode::LimitExceeded);
+  std::vector<std::byte> huge = besides;
+  for (size_t axis = 0; axis < 3; ++axis) huge[grid_at + 4 * sizeof(float) + 2 * axis + 1] = std::byte{1};
+  EXPECT_EQ(code_of(huge, 0, huge[0], read_model), ErrorCode::LimitExceeded);
+  besides.resize(besides.size() - 1);
+  EXPECT_EQ(code_of(besides, 0, besides[0], read_model), ErrorCode::BadInput);
+
+  StepScene with_body = *trail.scene;
+  with_body.body.capsules.resize(2);
+  with_body.body.planes.resize(1);
+  std::vector<std::byte> body;
+  step::write_scene(with_body, body);
+  const size_t body_at = scene.size() + 1;
+  EXPECT_EQ(code_of(body, body_at, uint8_t{17}, read_scene), ErrorCode::LimitExceeded);
+  const size_t planes_at = body_at + 1 + 4 * sizeof(float);
+  EXPECT_EQ(code_of(body, planes_at, uint8_t{5}, read_scene), ErrorCode::LimitExceeded);
+  EXPECT_EQ(code_of(body, planes_at + 1 + 3 * sizeof(double), 7.0, read_scene), ErrorCode::BadInput);
+  EXPECT_EQ(code_of(body, planes_at + 1 + 9 * sizeof(double), uint8_t{4}, read_scene), ErrorCode::BadInput);
+  body.resize(body.size() - 1);
+  EXPECT_EQ(code_of(body, 0, body[0], read_scene), ErrorCode::BadInput);
+
+  step::TickBase base;
   std::vector<std::byte> ticks;
-  step::write_ticks(trail.ticks, wind, ticks);
+  step::write_ticks(trail.ticks, *trail.scene, base, ticks);
   const auto read_ticks = [&](ByteReader& reader) {
-    step::WindSteps from{};
-    return step::read_ticks(reader, 100, Pose{}, from);
+    step::TickBase from;
+    return step::read_ticks(reader, {100, Pose{}}, *trail.scene, from);
   };
   EXPECT_EQ(code_of(ticks, 0, static_cast<uint8_t>(kMostTrailTicks + 1), read_ticks),
             ErrorCode::LimitExceeded);
@@ -604,6 +765,51 @@ TEST(StepWire, WhatIsReadIsWhatWasWritten) {
   const auto scene = step::read_scene(reader);
   ASSERT_TRUE(scene);
   EXPECT_EQ(*scene, *trail.scene);
+  StepScene with_body = *trail.scene;
+  with_body.body.capsules.resize(2);
+  with_body.body.capsules[1].to_radius_m = 0.125;
+  with_body.body.capsules[0].from_radius_m = with_body.body.capsules[0].to_radius_m = 0.25;
+  with_body.body.capsules[1].from_radius_m = 0.5;
+  with_body.body.planes = {{{0.0, -0.2, 0.1}, {0.0, 0.6, 0.8}, {0.001, 0.0, 0.0}}};
+  with_body.body.response = BodyResponse::Sphere;
+  std::vector<std::byte> body_bytes;
+  step::write_scene(with_body, body_bytes);
+  ByteReader body_reader(body_bytes);
+  const auto body_scene = step::read_scene(body_reader);
+  ASSERT_TRUE(body_scene) << body_scene.error().to_string();
+  EXPECT_EQ(*body_scene, with_body);
+  // Where capsules are, to the step in which it is told, beside where they were.
+  std::vector<StepTick> ticks(3);
+  for (size_t i = 0; i < ticks.size(); ++i) {
+    ticks[i].tick = 10 + i;
+    ticks[i].has_body = true;
+    for (int point = 0; point < 4; ++point)
+      ticks[i].body_m.emplace_back(0.1 * point, -0.2 + 0.01 * static_cast<double>(i), 1.0 / 3.0);
+  }
+  ticks[2].is_body_new = true;
+  step::TickBase to, from;
+  std::vector<std::byte> tick_bytes;
+  step::write_ticks(ticks, with_body, to, tick_bytes);
+  ByteReader tick_reader(tick_bytes);
+  const auto read = step::read_ticks(tick_reader, {12, ticks[2].world_from_head}, with_body, from);
+  ASSERT_TRUE(read) << read.error().to_string();
+  EXPECT_EQ(to.body, from.body);
+  ASSERT_EQ(read->size(), ticks.size());
+  constexpr double kStepM = 1.0 / 65536.0;
+  for (size_t i = 0; i < ticks.size(); ++i) {
+    ASSERT_EQ((*read)[i].body_m.size(), 4u);
+    for (size_t point = 0; point < 4; ++point)
+      EXPECT_LT(glm::distance((*read)[i].body_m[point], ticks[i].body_m[point]), kStepM);
+    EXPECT_EQ((*read)[i].body_before_m, i == 1 ? (*read)[0].body_m : std::vector<glm::dvec3>());
+  }
+  // Of another body nothing is said.
+  with_body.body.capsules.resize(1);
+  std::vector<std::byte> other;
+  step::write_ticks(ticks, with_body, to, other);
+  ByteReader other_reader(other);
+  const auto unsaid = step::read_ticks(other_reader, {12, ticks[2].world_from_head}, with_body, from);
+  ASSERT_TRUE(unsaid);
+  for (const StepTick& tick : *unsaid) EXPECT_FALSE(tick.has_body);
   // Rods to the step in which they are told.
   std::vector<std::byte> model_bytes;
   step::write_model(*trail.model, hair.rest_in_head_m(), kStrands, model_bytes);

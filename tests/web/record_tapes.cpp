@@ -184,7 +184,10 @@ Status record_tiny(Tape& tape) {
     for (uint64_t frame = 1; frame <= kFrames; ++frame) {
       const double force = frame < kFrames / 2 ? 1.0 : kTinyForce;
       const auto& scene = frame < kFrames / 2 ? scenes[0] : scenes[1];
-      ticks.push_back({frame, {}, {}, glm::dvec3(0.6, 0.1, 0.2) * force, false});
+      StepTick tick;
+      tick.tick = frame;
+      tick.wind_mps = glm::dvec3(0.6, 0.1, 0.2) * force;
+      ticks.push_back(tick);
       if (ticks.size() > kMostTrailTicks) ticks.erase(ticks.begin());
       QuantiseInput state;
       state.tick = frame;

@@ -79,11 +79,9 @@ Status Predictor::prepare() {
                    : sets.empty() ? simd::InstructionSet::Plain
                                   : sets.back();
   const LaneKernel* kernel = find_lane_kernel(model_.kernel, set);
-  KernelDesc follicle;
-  follicle.shader_path = "sim/follicle_limit.comp";
-  follicle.meets_air = false;
   const bool has_twist = model_.kernel.variant_of("HAS_TWIST") != 0;
-  follicle.variant = {{"MEMORY", !kernel_.carries_way ? 0 : has_twist ? 2 : 1}};
+  const KernelDesc follicle =
+      follicle_limit_kernel(pass_memory(kernel_.carries_way, has_twist && kernel_.carries_way));
   const LaneKernel* follicle_kernel = find_lane_kernel(follicle, set);
   if (kernel == nullptr || follicle_kernel == nullptr)
     return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
@@ -105,7 +103,39 @@ Status Predictor::prepare() {
     if (role != PlaneRole::RodAxis || has_twist) at(state_.planes, role) = make(vertex_count);
   fill_rest();
   fill_fixed();
+  RETURN_IF_ERROR(prepare_passes(set));
   return tells_volume(model_) ? prepare_volume(set) : Status{};
+}
+
+/// Strands whose tips are held are left alone by all but the drag, as in the simulation.
+Status Predictor::prepare_passes(simd::InstructionSet set) {
+  const bool has_twist = model_.kernel.variant_of("HAS_TWIST") != 0;
+  const int memory = pass_memory(kernel_.carries_way, kernel_.carries_way && has_twist);
+  const bool has_free_tips = model_.pinned_tail_count == 0 && model_.pinned_root_count < model_.vertex_count;
+  const auto make = [&](const KernelDesc& desc, std::optional<LaneProgram>& program) -> Status {
+    const LaneKernel* kernel = find_lane_kernel(desc, set);
+    if (kernel == nullptr)
+      return make_error(ErrorCode::Unsupported, "this build has no {} for this processor to predict with",
+                        desc.shader_path);
+    program.emplace(
+        *kernel, desc,
+        LaneWork{places_, model_.vertex_count, false, true, &ground_.workers, Priority::Encoding});
+    return {};
+  };
+  if (model_.drag_along_share != 1.0)
+    RETURN_IF_ERROR(make(oriented_drag_kernel(model_.drag_along_share, kernel_.carries_way), drag_program_));
+  if (!has_free_tips) return {};
+  if (model_.bend) RETURN_IF_ERROR(make(bend_limit_kernel(*model_.bend, memory), bend_program_));
+  if (model_.meets_body) {
+    RETURN_IF_ERROR(make(body_collider_kernel(memory), body_program_));
+    state_.body_before = std::make_unique<StrandBlocks>(places_, model_.vertex_count);
+  }
+  if (model_.field != nullptr) {
+    RETURN_IF_ERROR(make(field_collider_kernel(model_.field->grid, memory), field_program_));
+    field_before_ = std::make_unique<StrandBlocks>(places_, model_.vertex_count);
+    field_table_ = field_quads(*model_.field);
+  }
+  return {};
 }
 
 /// Places without a strand have no hair.
@@ -223,6 +253,7 @@ void Predictor::put_positions(const tangent::Planes<int32_t>& decoded, float qua
 }
 
 void Predictor::start(const Decoded& now, const Decoded& before, double seconds, float quantum_m) {
+  state_.is_body_known = false;
   state_.pose = now.world_from_head;
   state_.head = HeadPath::at_rest(now.world_from_head.rotation);
   put_positions(now.lattice, quantum_m);
@@ -269,31 +300,100 @@ void Predictor::turn(const glm::dquat& by) {
       });
 }
 
-void Predictor::run(const StepInput& input) {
+StepBlock Predictor::block_of(const StepInput& input) const {
   const uint32_t tail = model_.vertex_count - model_.pinned_tail_count;
   const StrandCounts counts{places_, model_.vertex_count, model_.pinned_root_count, tail};
   StepBlock block = make_step_block(input, model_.parameters, counts, state_.head);
   block.follicle_cosine = scene_.follicle_cosine;
   block.follicle_sine = scene_.follicle_sine;
+  return block;
+}
+
+LanePlanes Predictor::bound_planes() const {
   LanePlanes planes{};
   for (size_t role = 0; role < kPlaneRoleCount; ++role)
     planes[role] = fixed_[role] ? fixed_[role].get() : state_.planes[role].get();
+  return planes;
+}
+
+void Predictor::run(const StepInput& input) {
+  const StepBlock block = block_of(input);
+  LanePlanes planes = bound_planes();
   if (volume_) run_volume(input, block, planes);
+  LanePlanes of_passes = planes;
+  if (!kernel_.carries_way) of_passes[static_cast<size_t>(PlaneRole::Displacement)] = nullptr;
+  if (drag_program_) drag_program_->run(block, 0, of_passes);
   program_->run(block, input.colliders.size(), planes);
+  if (bend_program_) bend_program_->run(block, 0, of_passes);
   if (has_follicle_limit(input) && model_.pinned_tail_count == 0 &&
-      model_.pinned_root_count < model_.vertex_count) {
-    if (!kernel_.carries_way) planes[static_cast<size_t>(PlaneRole::Displacement)] = nullptr;
-    follicle_program_->run(block, input.colliders.size(), planes);
-  }
+      model_.pinned_root_count < model_.vertex_count)
+    follicle_program_->run(block, input.colliders.size(), of_passes);
+  if (body_program_ && input.body.acts()) run_body(input, block, of_passes);
+  if (field_program_) run_field(block, of_passes);
   state_.head.advance(input);
 }
 
-void Predictor::advance(std::span<const StepTick> ticks, double end_time_s) {
+void Predictor::run_body(const StepInput& input, const StepBlock& block, LanePlanes planes) {
+  const std::vector<glm::vec4> table = body_table(input.body, limited_substep_s(input), input.body.is_new);
+  LaneTables tables{};
+  tables[static_cast<size_t>(TableRole::Body)] = {&table.data()->x, static_cast<uint32_t>(table.size())};
+  planes[static_cast<size_t>(PlaneRole::PlaceBefore)] = state_.body_before.get();
+  body_program_->run(block, 0, planes, tables);
+}
+
+/// How near to the body strands may come is not told to joiners: who is inside of it, as it stands before the
+/// first substep, has begun there. Who is about as far outside as hair is kept counts as outside: strands
+/// that rest there were decoded a little nearer, or farther.
+void Predictor::begin_body(const StepInput& first) {
+  constexpr float kAbout = 3e-4f;
+  StepInput before = first;
+  before.world_from_head_rotation = state_.pose.rotation;
+  before.head_shift_m = glm::dvec3(0.0);
+  before.body.is_new = true;
+  before.body.response = BodyResponse::Turn;
+  for (BodyCapsule& capsule : before.body.capsules) {
+    capsule.from_m = capsule.from_before_m;
+    capsule.to_m = capsule.to_before_m;
+  }
+  LanePlanes planes = bound_planes();
+  if (!kernel_.carries_way) planes[static_cast<size_t>(PlaneRole::Displacement)] = nullptr;
+  run_body(before, block_of(before), planes);
+  for (uint32_t block = 0; block < block_count(); ++block)
+    for (uint32_t v = 0; v < model_.vertex_count; ++v) {
+      float* clearance = state_.body_before->row(block, v, 3);
+      for (size_t lane = 0; lane < kBlockStrands; ++lane)
+        if (clearance[lane] > static_cast<float>(kBodyClearanceM) - kAbout)
+          clearance[lane] = static_cast<float>(kMaxColliderM);
+    }
+}
+
+void Predictor::run_field(const StepBlock& block, LanePlanes planes) {
+  LaneTables tables{};
+  tables[static_cast<size_t>(TableRole::Field)] = {&field_table_.data()->x,
+                                                   static_cast<uint32_t>(field_table_.size())};
+  planes[static_cast<size_t>(PlaneRole::PlaceBefore)] = field_before_.get();
+  field_program_->run(block, 0, planes, tables);
+}
+
+void Predictor::advance(const Origin& origin, std::span<const StepTick> ticks, double end_time_s) {
+  for (StrandBlocks* before : {field_before_.get(), state_.body_before.get()}) {
+    if (before == nullptr) continue;
+    const Turn upright = turn_of(glm::dquat(1.0, 0.0, 0.0, 0.0));
+    for_blocks([&](uint32_t begin, uint32_t end) {
+      place_blocks(ground_.set,
+                   {ground_.layout, origin.lattice, upright, origin.quantum_m, *before, begin, end});
+    });
+  }
   for (size_t i = 0; i < ticks.size(); ++i) {
     const StepTick& tick = ticks[i];
     if (tick.carried_to) turn(state_.head.rebase(tick.carried_to->rotation));
     const double time_s = end_time_s - scene_.step_s * static_cast<double>(ticks.size() - 1 - i);
-    for (const StepInput& substep : substeps_of(scene_, tick, state_.pose, time_s)) run(substep);
+    const std::vector<StepInput> substeps = substeps_of(scene_, tick, state_.pose, time_s);
+    if (body_program_ && substeps.front().body.acts()) {
+      if (!state_.is_body_known && !tick.is_body_new) begin_body(substeps.front());
+      state_.is_body_known = true;
+    }
+    for (const StepInput& substep : substeps) run(substep);
     state_.pose = tick.world_from_head;
   }
 }
@@ -321,12 +421,16 @@ void Predictor::correct(const Correction& of) {
 
 void Predictor::save() {
   for (size_t role = 0; role < kPlaneRoleCount; ++role) copy_blocks(state_.planes[role], saved_.planes[role]);
+  copy_blocks(state_.body_before, saved_.body_before);
+  saved_.is_body_known = state_.is_body_known;
   saved_.head = state_.head;
   saved_.pose = state_.pose;
 }
 
 void Predictor::restore() {
   std::swap(state_.planes, saved_.planes);
+  std::swap(state_.body_before, saved_.body_before);
+  state_.is_body_known = saved_.is_body_known;
   state_.head = saved_.head;
   state_.pose = saved_.pose;
 }

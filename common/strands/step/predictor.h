@@ -49,8 +49,13 @@ class Predictor {
   };
   void start(const Decoded& now, const Decoded& before, double seconds, float quantum_m);
 
+  /// Where strands were decoded last, from where the next steps are taken.
+  struct Origin {
+    const tangent::Planes<int32_t>& lattice;
+    float quantum_m;
+  };
   /// One step each; `end_time_s` of the last one.
-  void advance(std::span<const StepTick> ticks, double end_time_s);
+  void advance(const Origin& origin, std::span<const StepTick> ticks, double end_time_s);
   /// Where strands are, on the lattice; 0 where there is no strand.
   void expect(float quantum_m, tangent::Planes<int32_t>& lattice) const;
   /// They were expected there, and are here. `seconds` that the frame took.
@@ -91,6 +96,12 @@ class Predictor {
   void fill_fixed();
   Status prepare_volume(simd::InstructionSet set);
   void run_volume(const StepInput& input, const StepBlock& block, const LanePlanes& planes);
+  Status prepare_passes(simd::InstructionSet set);
+  StepBlock block_of(const StepInput& input) const;
+  LanePlanes bound_planes() const;
+  void run_body(const StepInput& input, const StepBlock& block, LanePlanes planes);
+  void run_field(const StepBlock& block, LanePlanes planes);
+  void begin_body(const StepInput& first);
   void put_positions(const tangent::Planes<int32_t>& decoded, float quantum_m);
   void find_axes(StrandBlocks& axes) const;
   void turn(const glm::dquat& by);
@@ -116,6 +127,8 @@ class Predictor {
     std::array<std::unique_ptr<StrandBlocks>, kPlaneRoleCount> planes;
     HeadPath head;
     Pose pose;
+    std::unique_ptr<StrandBlocks> body_before;  // where strands were, w = how near to the body they may come
+    bool is_body_known = false;                 // w is
   };
 
   StepModel model_;
@@ -135,6 +148,13 @@ class Predictor {
   std::unique_ptr<VolumeLaw> volume_;
   std::vector<glm::vec4> volume_table_;
   std::optional<LaneProgram> volume_program_;
+  // What else the model tells of.
+  std::optional<LaneProgram> drag_program_;
+  std::optional<LaneProgram> bend_program_;
+  std::optional<LaneProgram> body_program_;
+  std::optional<LaneProgram> field_program_;
+  std::unique_ptr<StrandBlocks> field_before_;  // of the ticks at work
+  std::vector<glm::vec4> field_table_;
 };
 
 }  // namespace strandcast::step

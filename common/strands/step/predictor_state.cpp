@@ -111,6 +111,7 @@ float Predictor::share_history() {
 }
 
 void Predictor::settle(const tangent::Planes<int32_t>& decoded, float quantum_m) {
+  state_.is_body_known = false;  // joiners do not
   put_positions(decoded, quantum_m);
   history_s_ = share_history();
   for (const StatePlane& plane : state_planes()) {

@@ -69,7 +69,8 @@ bool is_near(const tangent::Planes<int32_t>& decoded, const tangent::Planes<int3
 void Steps::step(std::span<const StepTick> ticks, const Moment& now, const tangent::Layout& layout,
                  tangent::History& history) {
   for (auto& plane : expected_) plane.resize(layout.plane_size());
-  predictor_->advance(ticks, static_cast<double>(now.sim_time_ns) / kNsPerS);
+  predictor_->advance({history.lattice, history.quantum_m}, ticks,
+                      static_cast<double>(now.sim_time_ns) / kNsPerS);
   predictor_->expect(history.quantum_m, expected_);
 }
 
@@ -94,7 +95,7 @@ void Steps::follow(const Moment& now, const tangent::Frame& frame, const tangent
 }
 
 void Steps::settle(const tangent::History& history) {
-  wind_ = {};
+  base_ = {};
   if (predictor_) predictor_->settle(history.lattice, history.quantum_m);
 }
 
@@ -136,7 +137,7 @@ void EncoderSteps::restart(const SnapshotInfo& snapshot, const tangent::Layout& 
   told_model_.reset();
   told_scene_.reset();
   has_model_ = false;
-  wind_ = {};
+  base_ = {};
   is_stepping_ = false;
   last_ = moment_of(snapshot);
   bytes_.clear();
@@ -202,18 +203,18 @@ uint8_t EncoderSteps::say(const SnapshotInfo& snapshot, const tangent::Layout& l
   if (!predictor_ || !has_model_ || !is_covered) return flags;
   if (vertex_rounds(predictor_->model(), scene_, count) > kMostVertexRounds) return flags;
   std::vector<std::byte> said;
-  WindSteps wind = wind_;
-  write_ticks(ticks_since(snapshot), wind, said);
+  TickBase base = base_;
+  write_ticks(ticks_since(snapshot), scene_, base, said);
   ByteReader reader(said);
-  WindSteps wind_read = wind_;
+  TickBase base_read = base_;
   const Result<std::vector<StepTick>> ticks =
-      read_ticks(reader, snapshot.tick, snapshot.world_from_head, wind_read);
+      read_ticks(reader, {snapshot.tick, snapshot.world_from_head}, scene_, base_read);
   CHECK(ticks.ok());
   step(*ticks, moment_of(snapshot), layout, history);
   if (count == 0 && !is_near(history.lattice, target)) return flags;
   const uint8_t how = judge(layout, history, target);
   if (how == 0) return flags;
-  wind_ = wind_read;
+  base_ = std::move(base_read);
   bytes_.insert(bytes_.end(), said.begin(), said.end());
   is_stepping_ = (how & kStepFlag) != 0;
   is_following_ = how == kFollowFlag;
@@ -265,12 +266,12 @@ Status DecoderSteps::begin(uint8_t flags, const Moment& now, const tangent::Layo
   }
   const bool is_step = (flags & kStepFlag) != 0;
   const bool is_following = (flags & kFollowFlag) != 0;
-  WindSteps wind = wind_;
+  TickBase base = base_;
   std::vector<StepTick> ticks;
   if (is_step || is_following) {
     if (!predictor_ || next || (is_step && is_following))
       return make_error(ErrorCode::BadInput, "a frame is predicted by steps of a solver that was not told");
-    ASSIGN_OR_RETURN(ticks, read_ticks(body, now.tick, now.world_from_head, wind));
+    ASSIGN_OR_RETURN(ticks, read_ticks(body, {now.tick, now.world_from_head}, scene ? *scene : scene_, base));
     const uint64_t work = vertex_rounds(predictor_->model(), scene ? *scene : scene_, ticks.size());
     if (work > kMostVertexRounds)
       return make_error(ErrorCode::LimitExceeded, "steps of {} rounds of vertices in a frame, at most {}",
@@ -282,13 +283,13 @@ Status DecoderSteps::begin(uint8_t flags, const Moment& now, const tangent::Layo
                       "what a frame says of steps has check {:04x}, announced was {:04x}", check, announced);
   // From here on nothing fails before the frame's own checks do.
   saved_scene_ = scene_;
-  saved_wind_ = wind_;
+  saved_base_ = base_;
   is_saved_ = predictor_ != nullptr;
   if (predictor_) predictor_->save();
   if (scene) scene_ = std::move(*scene);
   if (predictor_) predictor_->set_scene(scene_);
   next_predictor_ = std::move(next);
-  wind_ = wind;
+  base_ = std::move(base);
   is_stepping_ = is_step;
   is_following_ = is_following;
   if (!is_step && !is_following) return {};
@@ -302,7 +303,7 @@ void DecoderSteps::abandon(tangent::History& history) {
   is_stepping_ = is_following_ = false;
   next_predictor_.reset();
   scene_ = saved_scene_;
-  wind_ = saved_wind_;
+  base_ = saved_base_;
   if (is_saved_) predictor_->restore();
   if (predictor_) predictor_->set_scene(scene_);
 }
@@ -327,7 +328,7 @@ void DecoderSteps::take_over(Joined joined, const Moment& now, const tangent::Hi
   predictor_ = std::move(joined.predictor);
   next_predictor_.reset();
   scene_ = std::move(joined.scene);
-  wind_ = {};
+  base_ = {};
   last_ = now;
   is_stepping_ = is_following_ = is_saved_ = false;
   if (!predictor_) return;

@@ -59,7 +59,7 @@ class Steps {
   std::unique_ptr<Predictor> predictor_;
   std::unique_ptr<Predictor> next_predictor_;  // of a model that came with the frame
   StepScene scene_;
-  WindSteps wind_{};
+  TickBase base_;
   Moment last_;
   tangent::Planes<int32_t> expected_;
   bool is_stepping_ = false;
@@ -123,7 +123,7 @@ class DecoderSteps : public Steps {
 
  private:
   StepScene saved_scene_;
-  WindSteps saved_wind_{};
+  TickBase saved_base_;
   bool is_saved_ = false;
 };
 

@@ -21,13 +21,23 @@ constexpr uint32_t kDroppedBits = 12;             // of a stiffness
 constexpr float kMostStiffness = 1e12f;
 constexpr double kLargest = 1e20;  // of parameters and constants
 constexpr uint8_t kVolume = 0x80;  // beside a kernel's number
+constexpr uint8_t kPasses = 0x40;
+constexpr uint8_t kBend = 1, kDrag = 2, kMeetsBody = 4, kField = 8;  // of the passes
+constexpr uint8_t kSceneBody = 0x80;                                 // beside the substeps
+constexpr double kMostCellM = 1.0;
+constexpr double kBodyStepM = 1.0 / 65536.0;
+constexpr auto kMostBodySteps = static_cast<int32_t>(kMaxColliderM / kBodyStepM);
+constexpr double kMostNormal = 1.001;
+constexpr double kMostForcePerS2 = 1e6;
 constexpr double kMostVolumeRate = 1e6;
 constexpr double kMostWindWidthM = 1.0;
 constexpr double kMostDensityScale = 100.0;
 constexpr uint8_t kWaves = 1;
 constexpr uint8_t kCarried = 2;
 constexpr uint8_t kCarriedElsewhere = 4;  // not to where the tick ends
-constexpr uint8_t kTickFlags = kWaves | kCarried | kCarriedElsewhere;
+constexpr uint8_t kTickBody = 8;
+constexpr uint8_t kTickNewBody = 16;
+constexpr uint8_t kTickFlags = kWaves | kCarried | kCarriedElsewhere | kTickBody | kTickNewBody;
 
 void put_varint(uint32_t value, std::vector<std::byte>& bytes) {
   for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<std::byte>(value | 0x80u));
@@ -238,13 +248,175 @@ Result<VolumeDesc> read_volume(ByteReader& bytes) {
   return volume;
 }
 
+/// A node by those before it, as if the field were linear along each edge of a cell.
+int32_t linear_guess(std::span<const int16_t> distance, const glm::uvec3& count, const glm::uvec3& node) {
+  const size_t row = count.x, slice = row * count.y;
+  const size_t here = node.z * slice + node.y * row + node.x;
+  const auto before = [&](bool x, bool y, bool z) -> int32_t {
+    if ((x && node.x == 0) || (y && node.y == 0) || (z && node.z == 0)) return 0;
+    return distance[here - (x ? 1 : 0) - (y ? row : 0) - (z ? slice : 0)];
+  };
+  if (node.x == 0) return node.y > 0 ? before(false, true, false) : before(false, false, true);
+  if (node.y == 0) return before(true, false, false);
+  if (node.z == 0) return before(true, false, false) + before(false, true, false) - before(true, true, false);
+  return before(true, false, false) + before(false, true, false) + before(false, false, true) -
+         before(true, true, false) - before(true, false, true) - before(false, true, true) +
+         before(true, true, true);
+}
+
+template <class Code>
+void code_field(ToldField& field, Code code) {
+  const glm::uvec3 count = field.grid.node_count;
+  glm::uvec3 node;
+  size_t i = 0;
+  for (node.z = 0; node.z < count.z; ++node.z)
+    for (node.y = 0; node.y < count.y; ++node.y)
+      for (node.x = 0; node.x < count.x; ++node.x)
+        code(field.distance[i++], linear_guess(field.distance, count, node));
+}
+
+void write_field(const ToldField& told, std::vector<std::byte>& bytes) {
+  ByteWriter to(bytes);
+  put_vector(told.grid.origin_m, to);
+  to.put(told.grid.cell_m);
+  for (int axis = 0; axis < 3; ++axis) to.put(static_cast<uint16_t>(told.grid.node_count[axis]));
+  ToldField field = told;
+  ValueWriter writer;
+  NumberTables tables;
+  code_field(field, [&](int16_t& value, int32_t guess) { tables.put(value - guess, writer); });
+  writer.finish(bytes);
+}
+
+Result<std::shared_ptr<const ToldField>> read_field(ByteReader& bytes) {
+  Numbers from{bytes};
+  auto field = std::make_shared<ToldField>();
+  field->grid.origin_m = from.vector<float, glm::vec3>(kMaxColliderM);
+  field->grid.cell_m = from.take<float>(kMostCellM);
+  for (int axis = 0; axis < 3; ++axis) field->grid.node_count[axis] = bytes.take<uint16_t>();
+  RETURN_IF_ERROR(from.status("the field"));
+  const glm::uvec3& count = field->grid.node_count;
+  if (!(field->grid.cell_m > 0.0f) || count.x < 2 || count.y < 2 || count.z < 2 ||
+      field->grid.size() > kMostToldNodes)
+    return make_error(ErrorCode::LimitExceeded, "a step's field has {} x {} x {} nodes, at most {} are",
+                      count.x, count.y, count.z, kMostToldNodes);
+  ValueReader reader;
+  ASSIGN_OR_RETURN(const auto rest, reader.open(bytes.rest()));
+  bytes.take_bytes(bytes.rest().size() - rest.size());
+  field->distance.resize(field->grid.size());
+  NumberTables tables;
+  code_field(*field, [&](int16_t& value, int32_t guess) {
+    value = static_cast<int16_t>(wrapping_sum(guess, tables.take(reader)));
+  });
+  if (!reader.is_spent())
+    return make_error(ErrorCode::BadInput, "the field of a step does not end where it should");
+  return std::shared_ptr<const ToldField>(std::move(field));
+}
+
+void write_passes(const StepModel& model, std::vector<std::byte>& bytes) {
+  ByteWriter to(bytes);
+  uint8_t flags = model.bend ? kBend : 0;
+  if (model.drag_along_share != 1.0) flags |= kDrag;
+  if (model.meets_body) flags |= kMeetsBody;
+  if (model.field != nullptr) flags |= kField;
+  to.put(flags);
+  if (model.bend)
+    for (const double angle : {model.bend->least_root_rad, model.bend->least_tip_rad,
+                               model.bend->most_root_rad, model.bend->most_tip_rad})
+      to.put(angle);
+  if ((flags & kDrag) != 0) to.put(model.drag_along_share);
+  if (model.field != nullptr) write_field(*model.field, bytes);
+}
+
+Status read_passes(ByteReader& bytes, StepModel& model) {
+  Numbers from{bytes};
+  const auto flags = bytes.take<uint8_t>();
+  if (flags > (kBend | kDrag | kMeetsBody | kField))
+    return make_error(ErrorCode::Unsupported, "a step does {:#x} besides, which this build does not know",
+                      flags);
+  if ((flags & kBend) != 0) {
+    BendAngles& bend = model.bend.emplace();
+    for (double* angle : {&bend.least_root_rad, &bend.least_tip_rad, &bend.most_root_rad, &bend.most_tip_rad})
+      *angle = from.take<double>(std::numbers::pi);
+  }
+  if ((flags & kDrag) != 0) model.drag_along_share = from.take<double>(1.0);
+  model.meets_body = (flags & kMeetsBody) != 0;
+  RETURN_IF_ERROR(from.status("what a step does besides"));
+  if ((flags & kField) != 0) {
+    ASSIGN_OR_RETURN(model.field, read_field(bytes));
+  }
+  return {};
+}
+
+void write_body(const BodyInput& body, ByteWriter& to) {
+  to.put(static_cast<uint8_t>(body.capsules.size()));
+  for (const BodyCapsule& capsule : body.capsules) {
+    to.put(static_cast<float>(capsule.from_radius_m));
+    to.put(static_cast<float>(capsule.to_radius_m));
+  }
+  to.put(static_cast<uint8_t>(body.planes.size()));
+  for (const BodyPlane& plane : body.planes)
+    for (const glm::dvec3& vector : {plane.point_m, plane.normal, plane.shift_m}) put_vector(vector, to);
+  to.put(static_cast<uint8_t>(body.response));
+  for (const double value : {body.friction, body.tip_clearance_m, body.force_per_s2}) to.put(value);
+}
+
+Result<BodyInput> read_body(ByteReader& bytes) {
+  Numbers from{bytes};
+  BodyInput body;
+  const auto capsule_count = bytes.take<uint8_t>();
+  if (capsule_count > kMaxBodyCapsules)
+    return make_error(ErrorCode::LimitExceeded, "a step's body has {} capsules, most are {}", capsule_count,
+                      kMaxBodyCapsules);
+  body.capsules.resize(capsule_count);
+  for (BodyCapsule& capsule : body.capsules) {
+    capsule.from_radius_m = from.take<float>(kMaxColliderM);
+    capsule.to_radius_m = from.take<float>(kMaxColliderM);
+  }
+  const auto plane_count = bytes.take<uint8_t>();
+  if (plane_count > kMaxBodyPlanes)
+    return make_error(ErrorCode::LimitExceeded, "a step's body has {} planes, most are {}", plane_count,
+                      kMaxBodyPlanes);
+  body.planes.resize(plane_count);
+  for (BodyPlane& plane : body.planes) {
+    plane.point_m = from.vector<double, glm::dvec3>(kMaxColliderM);
+    plane.normal = from.vector<double, glm::dvec3>(kMostNormal);
+    plane.shift_m = from.vector<double, glm::dvec3>(kMaxColliderM);
+  }
+  const auto response = bytes.take<uint8_t>();
+  if (response >= kBodyResponses.size())
+    return make_error(ErrorCode::BadInput, "strands of a step answer to a body in way {}", response);
+  body.response = static_cast<BodyResponse>(response);
+  body.friction = from.take<double>(kLargest);
+  body.tip_clearance_m = from.take<double>(kMaxColliderM);
+  body.force_per_s2 = from.take<double>(kMostForcePerS2);
+  RETURN_IF_ERROR(from.status("the body"));
+  return body;
+}
+
+PointSteps point_steps(const glm::dvec3& point_m) {
+  PointSteps steps;
+  for (int axis = 0; axis < 3; ++axis)
+    steps[static_cast<size_t>(axis)] =
+        static_cast<int32_t>(std::lrint(limited(point_m[axis], kMaxColliderM) / kBodyStepM));
+  return steps;
+}
+glm::dvec3 point_of(const PointSteps& steps) {
+  return kBodyStepM * glm::dvec3(steps[0], steps[1], steps[2]);
+}
+
+/// Whether a tick can say where the scene's body is.
+bool tells_body(const StepTick& tick, const StepScene& scene) {
+  return tick.has_body && tick.body_m.size() == 2 * scene.body.capsules.size();
+}
+
 }  // namespace
 
 void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head_m, uint32_t strand_count,
                  std::vector<std::byte>& bytes) {
   ByteWriter to(bytes);
   const StepKernel* kernel = find_step_kernel(model.kernel.shader_path);
-  to.put(static_cast<uint8_t>(kernel->number | (tells_volume(model) ? kVolume : 0)));
+  to.put(static_cast<uint8_t>(kernel->number | (tells_volume(model) ? kVolume : 0) |
+                              (model.has_passes() ? kPasses : 0)));
   to.put(static_cast<uint8_t>(model.kernel.variant_of("HAS_TWIST")));
   to.put(static_cast<uint8_t>(model.pinned_root_count));
   to.put(static_cast<uint8_t>(model.pinned_tail_count));
@@ -257,6 +429,7 @@ void write_model(const StepModel& model, std::span<const glm::vec3> rest_in_head
     std::visit([&](auto number) { to.put(number); }, value);
   }
   if (tells_volume(model)) write_volume(model.volume, to);
+  if (model.has_passes()) write_passes(model, bytes);
   if (!kernel->fixed.empty()) write_rods(model, rest_in_head_m, strand_count, bytes);
 }
 
@@ -267,7 +440,7 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
     return make_error(ErrorCode::Unsupported, "strands without a rest shape cannot be predicted by a step");
   StepModel model;
   const auto first = bytes.take<uint8_t>();
-  const auto number = static_cast<uint8_t>(first & ~kVolume);
+  const auto number = static_cast<uint8_t>(first & ~(kVolume | kPasses));
   const StepKernel* kernel = find_step_kernel(number);
   if (kernel == nullptr)
     return make_error(ErrorCode::Unsupported, "a step of kernel {}, which this build does not know", number);
@@ -289,6 +462,7 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
   if ((first & kVolume) != 0) {
     ASSIGN_OR_RETURN(model.volume, read_volume(bytes));
   }
+  if ((first & kPasses) != 0) RETURN_IF_ERROR(read_passes(bytes, model));
   if (!kernel->fixed.empty()) RETURN_IF_ERROR(read_rods(bytes, rest_in_head_m, model));
   return model;
 }
@@ -296,6 +470,10 @@ Result<StepModel> read_model(ByteReader& bytes, std::span<const glm::vec3> rest_
 // What a volume takes, in rounds of a vertex.
 constexpr uint64_t kRoundsPerSample = 8;
 constexpr uint64_t kRoundsPerCell = 2;
+// And what else acts on strands.
+constexpr uint64_t kRoundsOfPass = 2;
+constexpr uint64_t kRoundsOfField = 8;
+constexpr uint64_t kRoundsOfShape = 2;
 
 uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t tick_count) {
   uint64_t rounds = 1;
@@ -309,13 +487,18 @@ uint64_t vertex_rounds(const StepModel& model, const StepScene& scene, size_t ti
         uint64_t{model.volume.resolution} * model.volume.resolution * model.volume.resolution;
     of_volume = kRoundsPerSample * vertices + kRoundsPerCell * cells + 2 * scene.substeps * vertices;
   }
+  if (model.bend) rounds += kRoundsOfPass;
+  if (model.drag_along_share != 1.0) rounds += kRoundsOfPass;
+  if (model.field != nullptr) rounds += kRoundsOfField;
+  if (model.meets_body)
+    rounds += kRoundsOfPass + kRoundsOfShape * (scene.body.capsules.size() + scene.body.planes.size());
   return tick_count * (rounds * scene.substeps * vertices + of_volume);
 }
 
 void write_scene(const StepScene& scene, std::vector<std::byte>& bytes) {
   ByteWriter to(bytes);
   to.put(scene.step_s);
-  to.put(static_cast<uint8_t>(scene.substeps));
+  to.put(static_cast<uint8_t>(scene.substeps | (scene.body.acts() ? kSceneBody : 0)));
   put_vector(scene.gravity_mps2, to);
   put_vector(scene.groom_gravity_in_head_mps2, to);
   to.put(scene.follicle_limit_rad);
@@ -333,13 +516,15 @@ void write_scene(const StepScene& scene, std::vector<std::byte>& bytes) {
     put_vector(wave.wave_vector_rad_per_m, to);
     to.put(wave.phase_rad);
   }
+  if (scene.body.acts()) write_body(scene.body, to);
 }
 
 Result<StepScene> read_scene(ByteReader& bytes) {
   Numbers from{bytes};
   StepScene scene;
   scene.step_s = from.take<double>(kMaxSubstepS * kMaxSubsteps);
-  scene.substeps = bytes.take<uint8_t>();
+  const auto substeps = bytes.take<uint8_t>();
+  scene.substeps = static_cast<uint8_t>(substeps & ~kSceneBody);
   if (scene.substeps < 1 || scene.substeps > kMaxSubsteps)
     return make_error(ErrorCode::LimitExceeded, "a step of {} substeps, not 1..{}", scene.substeps,
                       kMaxSubsteps);
@@ -369,6 +554,9 @@ Result<StepScene> read_scene(ByteReader& bytes) {
     scene.waves.push_back(wave);
   }
   RETURN_IF_ERROR(from.status("the scene"));
+  if ((substeps & kSceneBody) != 0) {
+    ASSIGN_OR_RETURN(scene.body, read_body(bytes));
+  }
   return scene;
 }
 
@@ -384,43 +572,75 @@ glm::dvec3 wind_of(const WindSteps& steps) {
   return kWindStepMps * glm::dvec3(steps[0], steps[1], steps[2]);
 }
 
-void write_ticks(std::span<const StepTick> ticks, WindSteps& wind, std::vector<std::byte>& bytes) {
+void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBase& base,
+                 std::vector<std::byte>& bytes) {
   ByteWriter to(bytes);
   to.put(static_cast<uint8_t>(ticks.size()));
+  const auto put_beside = [&](const PointSteps& now, const PointSteps& before) {
+    for (size_t axis = 0; axis < 3; ++axis) put_varint(fold_sign(now[axis] - before[axis]), bytes);
+  };
   for (const StepTick& tick : ticks) {
     const Pose& last = ticks.back().world_from_head;
     uint8_t flags = tick.has_waves ? kWaves : 0;
     if (tick.carried_to) flags |= kCarried;
     if (tick.carried_to && *tick.carried_to != tick.world_from_head) flags |= kCarriedElsewhere;
+    if (tells_body(tick, scene)) flags |= kTickBody;
+    if (tick.is_body_new) flags |= kTickNewBody;
     to.put(flags);
     const WindSteps now = wind_steps(tick.wind_mps);
-    for (size_t axis = 0; axis < 3; ++axis) put_varint(fold_sign(now[axis] - wind[axis]), bytes);
-    wind = now;
+    put_beside(now, base.wind);
+    base.wind = now;
+    if ((flags & kTickBody) != 0) {
+      base.body.resize(tick.body_m.size());  // new ones count from 0
+      for (size_t i = 0; i < base.body.size(); ++i) {
+        const PointSteps point = point_steps(tick.body_m[i]);
+        put_beside(point, base.body[i]);
+        base.body[i] = point;
+      }
+    } else {
+      base.body.clear();
+    }
     if (&tick != &ticks.back()) put_near(tick.world_from_head, last, to);
     if ((flags & kCarriedElsewhere) != 0) put_near(*tick.carried_to, last, to);
   }
 }
 
-Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, uint64_t frame_tick, const Pose& frame_pose,
-                                         WindSteps& wind) {
+Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& last, const StepScene& scene,
+                                         TickBase& base) {
   Numbers from{bytes};
   const auto count = bytes.take<uint8_t>();
   if (count > kMostTrailTicks)
     return make_error(ErrorCode::LimitExceeded, "a frame of {} steps, most are {}", count, kMostTrailTicks);
+  const auto take_beside = [&](PointSteps& steps, int32_t most) {
+    for (int32_t& value : steps)
+      value = std::clamp(wrapping_sum(value, unfold_sign(take_varint(bytes))), -most, most);
+  };
   std::vector<StepTick> ticks(count);
   for (size_t i = 0; i < count; ++i) {
     StepTick& tick = ticks[i];
-    tick.tick = frame_tick - (count - 1 - i);
+    tick.tick = last.tick - (count - 1 - i);
     const auto flags = bytes.take<uint8_t>();
     if (flags > kTickFlags) return make_error(ErrorCode::BadInput, "a step has flags {}", flags);
     tick.has_waves = (flags & kWaves) != 0;
-    for (int32_t& steps : wind)
-      steps =
-          std::clamp(wrapping_sum(steps, unfold_sign(take_varint(bytes))), -kMostWindSteps, kMostWindSteps);
-    tick.wind_mps = wind_of(wind);
-    tick.world_from_head = i + 1 < count ? take_near(frame_pose, from) : frame_pose;
+    tick.has_body = (flags & kTickBody) != 0;
+    tick.is_body_new = (flags & kTickNewBody) != 0;
+    take_beside(base.wind, kMostWindSteps);
+    tick.wind_mps = wind_of(base.wind);
+    if (tick.has_body) {
+      const size_t points = 2 * scene.body.capsules.size();
+      if (base.body.size() == points && !tick.is_body_new)
+        for (const PointSteps& point : base.body) tick.body_before_m.push_back(point_of(point));
+      base.body.resize(points);
+      for (PointSteps& point : base.body) {
+        take_beside(point, kMostBodySteps);
+        tick.body_m.push_back(point_of(point));
+      }
+    } else {
+      base.body.clear();
+    }
+    tick.world_from_head = i + 1 < count ? take_near(last.world_from_head, from) : last.world_from_head;
     if ((flags & kCarriedElsewhere) != 0)
-      tick.carried_to = take_near(frame_pose, from);
+      tick.carried_to = take_near(last.world_from_head, from);
     else if ((flags & kCarried) != 0)
       tick.carried_to = tick.world_from_head;
   }

@@ -37,12 +37,24 @@ Result<StepScene> read_scene(ByteReader& bytes);
 using WindSteps = std::array<int32_t, 3>;
 WindSteps wind_steps(const glm::dvec3& wind_mps);
 glm::dvec3 wind_of(const WindSteps& steps);
+/// A point of a body likewise.
+using PointSteps = std::array<int32_t, 3>;
 
-/// Ticks up to a frame; wind counts from `wind`, which becomes that of the last one. `frame_pose` is the
-/// last tick's.
-void write_ticks(std::span<const StepTick> ticks, WindSteps& wind, std::vector<std::byte>& bytes);
-/// `frame_tick` is the last one's number.
-Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, uint64_t frame_tick, const Pose& frame_pose,
-                                         WindSteps& wind);
+/// What ticks are told beside, of the tick before.
+struct TickBase {
+  WindSteps wind{};
+  std::vector<PointSteps> body;  // empty: not known
+};
+
+/// Ticks up to a frame, under this scene; `base` becomes that of the last one, whose pose is the frame's.
+void write_ticks(std::span<const StepTick> ticks, const StepScene& scene, TickBase& base,
+                 std::vector<std::byte>& bytes);
+/// The last tick of a frame.
+struct FrameTick {
+  uint64_t tick = 0;
+  Pose world_from_head;
+};
+Result<std::vector<StepTick>> read_ticks(ByteReader& bytes, const FrameTick& last, const StepScene& scene,
+                                         TickBase& base);
 
 }  // namespace strandcast::step
