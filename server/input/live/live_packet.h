@@ -1,0 +1,31 @@
+// What one packet of a live source says, whatever protocol it came by: poses and wind in Strandcast's world.
+// Plain data.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/math/pose.h"
+
+namespace strandcast {
+
+/// Where one subject (a rigid body, a performer's head, a tracker) is.
+struct LivePose {
+  std::string subject;                    // as its sender names it; empty where a protocol has only one
+  Pose world_from_subject;                // right-handed, +Y up, m
+  bool has_position = true;               // false: the sender tells how it is turned, not where it is
+  std::optional<int64_t> source_time_ns;  // of the sender's clock
+  std::optional<uint32_t> frame;          // the sender's number of it, which tells the order; wraps around
+  std::vector<std::string> joint_names;   // of the body below a head
+  std::vector<glm::dvec3> joint_m;        // of each, in the world
+};
+
+struct LivePacket {
+  std::vector<LivePose> poses;
+  std::optional<glm::dvec3> wind_mps;  // in the world
+};
+
+}  // namespace strandcast
