@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <numbers>
 #include <random>
 #include <utility>
 
 #include "common/scene/features.h"
+#include "server/report/process_time.h"
 
 namespace strandcast {
 namespace {
@@ -15,10 +15,6 @@ namespace {
 constexpr uint32_t kLookSmoothing = 1;
 constexpr double kCrowded = 2.0;  // times as dense as in the groom
 constexpr double kNyquistQuantile = 0.999;
-
-double process_cpu_ms() {
-  return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 }  // namespace
 

@@ -3,22 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <limits>
 
 #include "common/base/quantile.h"
 #include "common/gl/egl_context.h"
 #include "common/kernels/volume/hair_volume.h"
+#include "server/report/process_time.h"
 #include "server/sim/executor/gl_executor.h"
 #include "server/sim/executor/gl_scatter_study.h"
 #include "server/sim/volume/reference_volume.h"
 
 namespace strandcast {
 namespace {
-
-double process_cpu_ms() {
-  return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 struct Way {
   const char* name;
