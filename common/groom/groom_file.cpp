@@ -7,8 +7,11 @@
 
 #include "common/base/text.h"
 #include "common/groom/hair_loader.h"
+#include "common/groom/ply_loader.h"
 #include "common/groom/resample.h"
+#include "common/groom/stated_groom.h"
 #include "common/groom/tfx_loader.h"
+#include "common/groom/usda_loader.h"
 
 namespace strandcast {
 namespace {
@@ -60,17 +63,35 @@ Error call_text(const std::filesystem::path& path, Error error) {
                                       path.extension().string(), hint));
 }
 
-Result<Groom> load_by_extension(const std::filesystem::path& path) {
+/// What to do with a file of a format that nobody here reads; empty for any other.
+std::string way_out_of(const std::filesystem::path& path, const std::string& extension) {
+  const bool is_binary_usd = text_beginning(path).starts_with("PXR-USDC") || extension == ".usdc";
+  if (is_binary_usd || extension == ".usdz")
+    return "this is USD in binary or packed: make text of it ('usdcat IN -o hair.usda', or export .usda from "
+           "Blender or Houdini)";
+  if (extension == ".abc")
+    return "Alembic is not read: import it in Blender or Houdini and export its curves as .usda";
+  return {};
+}
+
+Result<StatedGroom> unstated(const std::filesystem::path& path, Result<Groom> groom) {
+  if (groom) return StatedGroom{std::move(groom).value(), {}, {}, {}, {}, {}};
+  return groom.error().code == ErrorCode::NotFound ? groom.error() : call_text(path, groom.error());
+}
+
+Result<StatedGroom> load_by_extension(const std::filesystem::path& path, const GroomFileOptions& options) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".tfx" || extension == ".hair") {
-    auto groom = extension == ".tfx" ? load_tfx(path) : load_hair(path);
-    if (groom || groom.error().code == ErrorCode::NotFound) return groom;
-    return call_text(path, groom.error());
-  }
-  return at(path.string(), make_error(ErrorCode::Unsupported,
-                                      "unknown groom file extension '{}', known: .tfx, .hair", extension));
+  if (extension == ".tfx") return unstated(path, load_tfx(path));
+  if (extension == ".hair") return unstated(path, load_hair(path));
+  if (extension == ".ply") return load_ply(path, options.strand_vertex_count);
+  if (const std::string way_out = way_out_of(path, extension); !way_out.empty())
+    return at(path.string(), make_error(ErrorCode::Unsupported, "{}", way_out));
+  if (extension == ".usda" || extension == ".usd") return load_usda(path);
+  return at(path.string(),
+            make_error(ErrorCode::Unsupported,
+                       "unknown groom file extension '{}', known: .tfx, .hair, .ply, .usda", extension));
 }
 
 uint32_t target_vertex_count(const Groom& groom, uint32_t wanted) {
@@ -104,24 +125,42 @@ Groom join(std::vector<Groom> parts) {
   return whole;
 }
 
-/// All files of the options in file units.
-Result<Groom> load_parts(const GroomFileOptions& options) {
+/// What two parts of one head of hair say, when both say it, has to be the same.
+template <class T>
+Status agree(const std::optional<T>& first, const std::optional<T>& part, const char* what) {
+  if (!first || !part || *first == *part) return {};
+  return make_error(ErrorCode::BadInput, "it states another {} than the first file: parts share one", what);
+}
+
+/// All files of the options in file units; the first that states a unit or an up axis does so for all.
+Result<StatedGroom> load_parts(const GroomFileOptions& options) {
   if (options.more_paths.size() + 1 > kMaxGroomFiles)
     return make_error(ErrorCode::LimitExceeded, "{} groom files, at most {} make one head of hair",
                       options.more_paths.size() + 1, kMaxGroomFiles);
+  ASSIGN_OR_RETURN(StatedGroom whole, load_by_extension(options.path, options));
   std::vector<Groom> parts(1);
-  ASSIGN_OR_RETURN(parts.front(), load_by_extension(options.path));
+  parts.front() = std::move(whole.groom);
   uint64_t vertex_total = parts.front().rest_position_m.size();
   for (const std::filesystem::path& path : options.more_paths) {
-    ASSIGN_OR_RETURN(Groom part, load_by_extension(path));
-    vertex_total += part.rest_position_m.size();
+    ASSIGN_OR_RETURN(StatedGroom part, load_by_extension(path, options));
+    vertex_total += part.groom.rest_position_m.size();
     if (vertex_total > kMaxGroomVertices)
       return at(path.string(), make_error(ErrorCode::LimitExceeded,
                                           "{} vertices with the files before it, at most {} are allowed",
                                           vertex_total, kMaxGroomVertices));
-    parts.push_back(std::move(part));
+    if (const Status same = agree(whole.unit_m, part.unit_m, "unit"); !same)
+      return at(path.string(), same.error());
+    if (const Status same = agree(whole.is_z_up, part.is_z_up, "up axis"); !same)
+      return at(path.string(), same.error());
+    if (!whole.unit_m) whole.unit_reason = part.unit_reason;
+    if (!whole.is_z_up) whole.up_axis_reason = part.up_axis_reason;
+    if (part.unit_m) whole.unit_m = part.unit_m;
+    if (part.is_z_up) whole.is_z_up = part.is_z_up;
+    whole.notes.insert(whole.notes.end(), part.notes.begin(), part.notes.end());
+    parts.push_back(std::move(part.groom));
   }
-  return join(std::move(parts));
+  whole.groom = join(std::move(parts));
+  return whole;
 }
 
 std::string unit_text(float unit_m) {
@@ -139,15 +178,22 @@ std::string size_text(const Groom& groom) {
   return fmt::format("{:.2f} x {:.2f} x {:.2f} m", size_m.x, size_m.y, size_m.z);
 }
 
-/// Turns, moves and scales a groom in file units.
-PlacedGroom place(Groom groom, const GroomFileOptions& options) {
+/// Turns, moves and scales a groom in file units. What the options do not say the file may; the rest is
+/// guessed.
+PlacedGroom place(StatedGroom stated, const GroomFileOptions& options) {
+  Groom& groom = stated.groom;
   PlacedGroom placed;
+  placed.notes = std::move(stated.notes);
   GroomPlacement& placement = placed.placement;
   const auto note = [&](const std::string& what, const std::string& reason, const char* setting) {
     placed.notes.push_back(fmt::format("{}: {} (groom.file.{} states it)", what, reason, setting));
   };
   if (options.is_z_up) {
     placement.is_z_up = *options.is_z_up;
+  } else if (stated.is_z_up) {
+    placement.is_z_up = *stated.is_z_up;
+    placed.notes.push_back(fmt::format("+{} of the file is up: {} (groom.file.up_axis overrides it)",
+                                       *stated.is_z_up ? 'Z' : 'Y', stated.up_axis_reason));
   } else {
     const Guess<bool> guess = guess_z_up(groom);
     placement.is_z_up = guess.value;
@@ -171,6 +217,10 @@ PlacedGroom place(Groom groom, const GroomFileOptions& options) {
   }
   if (options.unit_m > 0.0f) {
     placement.unit_m = options.unit_m;
+  } else if (stated.unit_m) {
+    placement.unit_m = *stated.unit_m;
+    placed.notes.push_back(fmt::format("1 unit = {}: {} (groom.file.unit_m overrides it)",
+                                       unit_text(*stated.unit_m), stated.unit_reason));
   } else {
     const Guess<float> guess = guess_unit(groom);
     placement.unit_m = guess.value;
@@ -195,7 +245,7 @@ float guess_unit_m(const Groom& groom) {
 Result<PlacedGroom> load_placed_groom(const GroomFileOptions& options) {
   const std::string place_name = options.path.string();
   if (const Status checked = check_options(options); !checked) return at(place_name, checked.error());
-  ASSIGN_OR_RETURN(Groom loaded, load_parts(options));
+  ASSIGN_OR_RETURN(StatedGroom loaded, load_parts(options));
   PlacedGroom placed = place(std::move(loaded), options);
   // Before resampling, so that overflown coordinates never enter its sums.
   if (const Status checked = validate(placed.groom); !checked) return at(place_name, checked.error());

@@ -18,21 +18,23 @@ namespace strandcast {
 inline constexpr size_t kMaxGroomFiles = 8;  // that one head of hair comes in
 
 struct GroomFileOptions {
-  std::filesystem::path path;                     // .tfx or .hair
+  std::filesystem::path path;                     // .tfx, .hair, .ply or .usda
   std::vector<std::filesystem::path> more_paths;  // further parts of the same hair: the same unit and axes
-  float unit_m = 0.0f;                  // metres per file unit; 0 = guessed from the size of the head
-  std::optional<bool> is_z_up = false;  // as GroomPlacement; empty = guessed
+  float unit_m = 0.0f;  // metres per file unit; 0 = as the file says, else guessed from the size of the head
+  std::optional<bool> is_z_up = false;  // as GroomPlacement; empty = as the file says, else guessed
   std::optional<float> yaw_deg = 0.0f;  // as GroomPlacement; empty = guessed
   glm::vec3 origin{0.0f};               // as GroomPlacement
   // Resample to this many, 2..kMaxVertexCount; 0 = keep, as far as a uniform groom can.
   uint32_t vertex_count = 0;
-  std::optional<Pinning> pinning;  // empty: as the file says
+  std::optional<Pinning> pinning;    // empty: as the file says
+  uint32_t strand_vertex_count = 0;  // of a .ply, as load_ply()
 };
 
 struct PlacedGroom {
   Groom groom;
   GroomPlacement placement;
-  std::vector<std::string> notes;  // a sentence for each thing that was guessed, with the reason
+  std::vector<std::string>
+      notes;  // a sentence for each thing that the file says or that was guessed, and why
 };
 
 /// The value of guess_unit().

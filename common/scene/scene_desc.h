@@ -38,19 +38,20 @@ struct ProceduralGroomDesc {
 };
 
 struct FileGroomDesc {
-  std::filesystem::path path;  // .tfx or .hair
+  std::filesystem::path path;  // .tfx, .hair, .ply or .usda
   std::vector<std::filesystem::path>
       more_paths;       // further parts of the same hair, at most kMaxGroomFiles - 1
-  float unit_m = 0.0f;  // metres per file unit; 0 = guessed from the size of the head
+  float unit_m = 0.0f;  // metres per file unit; 0 = as the file says, else guessed from the size of the head
   UpAxis up_axis = UpAxis::Y;
-  bool has_up_axis = false;  // false: guessed from the hair
+  bool has_up_axis = false;  // false: as the file says, else guessed from the hair
   float yaw_deg = 0.0f;      // about the up axis, counter-clockwise seen from above
   bool has_yaw = false;      // false: guessed from the hairline
   glm::vec3 origin{0.0f};  // point of the file (in file units, after the up axis) that becomes the head joint
   bool has_origin = false;    // false: the middle of the head under the roots
   uint32_t vertex_count = 0;  // resample to this many; 0 = keep (rounded into the limits)
   Pinning pinning = Pinning::RootPair;
-  bool has_pinning = false;  // false: as the file says
+  bool has_pinning = false;          // false: as the file says
+  uint32_t strand_vertex_count = 0;  // of a .ply: points of one strand; 0 = as the file says, else guessed
 
   bool operator==(const FileGroomDesc&) const = default;
 };

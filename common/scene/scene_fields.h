@@ -31,6 +31,7 @@ inline constexpr double kMinDirectionLength = 1e-3;
 inline constexpr Range kStrandCount{1, kMaxStrandCount, ""};
 inline constexpr Range kVertexCount{kMinVertexCount, kMaxVertexCount, ""};
 inline constexpr Range kResampledVertexCount{0, kMaxVertexCount, ""};
+inline constexpr Range kFileVertexCount{0, kMaxSourceVertexCount, ""};
 inline constexpr Range kStrandLength{0.005, kMaxGrownLengthM, "m"};
 inline constexpr Range kLengthVariation{0.0, 0.95, ""};
 inline constexpr Range kCurlRadius{0.0, kMaxCurlRadiusM, "m"};
@@ -129,6 +130,8 @@ void visit_groom(Visitor& v, GroomDesc& groom) {
     file->has_yaw = v.chooses("yaw_deg", file->has_yaw);
     if (file->has_yaw) v.number("yaw_deg", file->yaw_deg, kYaw);
     v.paths("more_paths", file->more_paths, kMaxGroomFiles - 1);
+    v.number("strand_vertex_count", file->strand_vertex_count, kFileVertexCount);
+    v.require("strand_vertex_count", file->strand_vertex_count != 1, "is 1, a strand has at least 2 vertices");
   });
 }
 

@@ -34,6 +34,7 @@ Result<PlacedGroom> load_hair_of(const FileGroomDesc& file) {
   options.yaw_deg = file.has_yaw ? std::optional(file.yaw_deg) : std::nullopt;
   if (file.has_origin) options.origin = file.origin;
   options.vertex_count = file.vertex_count;
+  options.strand_vertex_count = file.strand_vertex_count;
   if (file.has_pinning) options.pinning = file.pinning;
   ASSIGN_OR_RETURN(PlacedGroom hair, load_placed_groom(options));
   if (!file.has_origin) {

@@ -278,6 +278,56 @@ void add_grooms(const SeedFolder& seeds) {
             "f 1 3 4\nf -1 -2 -3 -4\ng name\n");
 }
 
+void add_curves(const SeedFolder& seeds) {
+  const std::string points = "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::string rows = "0 0 0\n0 1 0\n0 2.5e-1 -1.5\n1 0 0\n1 +1 0\n";
+  const auto ply = [&](const std::string& name, uint8_t count, const std::string& elements,
+                       const std::string& more_rows) {
+    seeds.add("ply", name,
+              joined({packed(count), bytes_of("ply\nformat ascii 1.0\n" + elements + "end_header\n" + rows),
+                      bytes_of(more_rows)}));
+  };
+  ply("points", 5, "comment unit_m 0.01\ncomment up_axis Z\n" + points, "");
+  ply("guessed", 0, points, "");
+  ply("segments", 0, points + "element strand 2\nproperty ushort nsegs\n", "2\n1\n");
+  ply("lists", 0, points + "element curve 2\nproperty list uchar int vertex_indices\n", "3 0 1 2\n2 3 4\n");
+  ply("edges", 0, points + "element edge 3\nproperty int vertex1\nproperty int vertex2\n", "0 1\n2 1\n4 3\n");
+  const std::string binary =
+      "element vertex 2\nproperty double x\nproperty float y\nproperty uchar red\n"
+      "property float z\nelement strand 1\nproperty list uchar ushort vertices\nend_header\n";
+  seeds.add("ply", "binary",
+            joined({packed(uint8_t{0}), bytes_of("ply\nformat binary_little_endian 1.0\n" + binary),
+                    packed(0.5, 1.0f, uint8_t{9}, 2.0f), packed(0.25, 1.0f, uint8_t{9}, 3.0f),
+                    packed(uint8_t{2}, uint16_t{1}, uint16_t{0})}));
+  seeds.add("ply", "big_endian",
+            joined({packed(uint8_t{2}), bytes_of("ply\nformat binary_big_endian 1.0\n" + binary),
+                    Bytes(2 * 17), packed(uint8_t{1}, uint16_t{0})}));
+  seeds.add(
+      "usda", "linear",
+      "#usda 1.0\n(\n doc = \"\"\"a\n}\"\"\"\n metersPerUnit = 0.01\n upAxis = \"Z\"\n)\n"
+      "def Xform \"a\" ( kind = \"component\" )\n{\n double3 xformOp:translate:pivot = (1, 2, 3)\n"
+      " float3 xformOp:rotateXYZ.timeSamples = { 1: (10, 20, 30), 2: (0, 0, 0), }\n"
+      " uniform token[] xformOpOrder = [\"xformOp:translate:pivot\", \"xformOp:rotateXYZ\", "
+      "\"!invert!xformOp:translate:pivot\"]\n def BasisCurves \"b\" {\n uniform token type = \"linear\"\n"
+      "  int[] curveVertexCounts = [3, 2]\n  float[] widths = [0.1] ( interpolation = \"constant\" )\n"
+      "  point3f[] points = [(0, 0, 0), (0, 0, 1), (0, 1, 2.5e0), (1, 0, 0), (1, 0, -1)]\n }\n}\n");
+  for (const char* const basis : {"bezier", "bspline", "catmullRom"})
+    seeds.add(
+        "usda", basis,
+        fmt::format("#usda 1.0\ndef BasisCurves \"b\" {{ uniform token basis = \"{}\" uniform token wrap = "
+                    "\"{}\" int[] curveVertexCounts = [4] point3f[] points.timeSamples = {{ -1.5: [(0,0,0), "
+                    "(0,0,1), (0,1,2), (1,0,0)], 2: None, }} }}",
+                    basis, basis[0] == 'b' ? "nonperiodic" : "pinned"));
+  seeds.add("usda", "tree",
+            "#usda 1.0\nclass \"c\" {}\nover \"o\" ( active = false ) { custom rel r = </c> }\n"
+            "def \"v\" ( prepend references = @a.usd@</x> (offset = 1) ) { variantSet \"s\" = { \"o\" { } }\n"
+            "reorder nameChildren = [\"a\"]\n matrix4d xformOp:transform = "
+            "((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1))\n"
+            "uniform token[] xformOpOrder = [\"!resetXformStack!\", \"xformOp:transform\"]\n"
+            "def BasisCurves \"b\" { token type = \"linear\" int[] curveVertexCounts = [2] "
+            "point3f[] points = [(0,0,0), (0,0,1)] token outputs:x } }\n");
+}
+
 void add_texts(const SeedFolder& seeds) {
   const std::string bvh =
       "HIERARCHY\nROOT Hips\n{\n OFFSET 9 9 9\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation "
@@ -332,6 +382,7 @@ int main(int argument_count, char** arguments) {
   add_chains(seeds);
   add_pictures(seeds);
   add_grooms(seeds);
+  add_curves(seeds);
   add_texts(seeds);
   return 0;
 }

@@ -36,6 +36,7 @@ SceneDesc unusual_scene() {
                      .origin = {1.5f, -2, 1e-3f},
                      .has_origin = true};
   file.vertex_count = 24;
+  file.strand_vertex_count = 100;
   file.pinning = Pinning::BothEnds;
   file.has_pinning = true;
   s.groom = file;

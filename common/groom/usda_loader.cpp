@@ -1,0 +1,176 @@
+#include "common/groom/usda_loader.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/file.h"
+#include "common/groom/curve_basis.h"
+#include "common/groom/text_scan.h"
+#include "common/groom/usda_stage.h"
+
+namespace strandcast {
+namespace {
+
+/// What notes say of all curves together.
+struct Tally {
+  size_t curves_prims = 0;
+  size_t left_out_prims = 0;
+  size_t cubic_strands = 0;
+  std::string basis;
+  std::optional<double> time_code;
+  float least_width = 0.0f, most_width = 0.0f;
+};
+
+struct CurveKind {
+  bool is_linear = true;
+  CurveBasis basis = CurveBasis::Bezier;
+  CurveEnds ends = CurveEnds::Open;
+};
+
+Result<CurveKind> kind_of(const UsdaCurves& curves) {
+  CurveKind kind;
+  if (curves.wrap == "periodic")
+    return make_error(ErrorCode::BadInput, "wrap is 'periodic': closed curves are no strands");
+  if (curves.wrap != "nonperiodic" && curves.wrap != "pinned")
+    return make_error(ErrorCode::BadInput, "wrap is {}, known are nonperiodic and pinned",
+                      strandcast::quoted(curves.wrap));
+  kind.ends = curves.wrap == "pinned" ? CurveEnds::Pinned : CurveEnds::Open;
+  kind.is_linear = curves.type == "linear";
+  if (kind.is_linear) return kind;
+  if (curves.type != "cubic")
+    return make_error(ErrorCode::BadInput, "type is {}, known are linear and cubic", strandcast::quoted(curves.type));
+  if (curves.basis == "bspline") {
+    kind.basis = CurveBasis::BSpline;
+  } else if (curves.basis == "catmullRom") {
+    kind.basis = CurveBasis::CatmullRom;
+  } else if (curves.basis != "bezier") {
+    return make_error(ErrorCode::BadInput, "basis is {}, known are bezier, bspline and catmullRom",
+                      strandcast::quoted(curves.basis));
+  }
+  return kind;
+}
+
+Status check_counts(const UsdaCurves& curves) {
+  uint64_t total = 0;
+  for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
+    const uint32_t count = curves.vertex_counts[curve];
+    if (count < kMinVertexCount || count > kMaxSourceVertexCount)
+      return make_error(ErrorCode::BadInput, "curve {} has {} vertices, allowed are {} to {}", curve, count,
+                        kMinVertexCount, kMaxSourceVertexCount);
+    total += count;
+  }
+  if (total != curves.points.size())
+    return make_error(ErrorCode::BadInput, "curveVertexCounts need {} points, there are {}", total,
+                      curves.points.size());
+  return {};
+}
+
+Status add_curves(const UsdaStage& stage, size_t prim, Groom& groom, Tally& tally) {
+  const UsdaCurves& curves = *stage.prim[prim].curves;
+  RETURN_IF_ERROR(check_counts(curves));
+  if (groom.strand_count() + curves.vertex_counts.size() > kMaxStrandCount ||
+      groom.rest_position_m.size() + curves.points.size() > kMaxGroomVertices)
+    return make_error(ErrorCode::LimitExceeded, "more than {} strands or {} vertices", kMaxStrandCount,
+                      kMaxGroomVertices);
+  ASSIGN_OR_RETURN(const CurveKind kind, kind_of(curves));
+  ASSIGN_OR_RETURN(const glm::dmat4 world, world_from_prim(stage, prim));
+  const std::span<const glm::vec3> points(curves.points);
+  size_t first = 0;
+  for (size_t curve = 0; curve < curves.vertex_counts.size(); ++curve) {
+    const auto control = points.subspan(first, curves.vertex_counts[curve]);
+    first += control.size();
+    std::vector<glm::vec3> strand(control.begin(), control.end());
+    if (!kind.is_linear) {
+      auto on_curve = points_on_curve(control, kind.basis, kind.ends);
+      if (!on_curve) return at(fmt::format("curve {}", curve), on_curve.error());
+      strand = std::move(on_curve).value();
+      ++tally.cubic_strands;
+      tally.basis = curves.basis;
+    }
+    for (const glm::vec3& point : strand) {
+      const glm::vec3 placed(world * glm::dvec4(point, 1.0));
+      if (!std::isfinite(placed.x + placed.y + placed.z))
+        return make_error(ErrorCode::BadInput, "curve {} has a point that is not finite in the file", curve);
+      groom.rest_position_m.push_back(placed);
+    }
+    groom.offset.push_back(static_cast<uint32_t>(groom.rest_position_m.size()));
+  }
+  ++tally.curves_prims;
+  if (curves.time_code) tally.time_code = curves.time_code;
+  for (const float width : curves.widths) {
+    tally.least_width = tally.most_width == 0.0f ? width : std::min(tally.least_width, width);
+    tally.most_width = std::max(tally.most_width, width);
+  }
+  return {};
+}
+
+std::string where_else(const UsdaStage& stage) {
+  if (stage.reference_count > 0)
+    return "; it refers to other files, prims or variants, which are not followed: flatten it first "
+           "(usdcat --flatten)";
+  if (stage.other_curve_count > 0) return "; NurbsCurves and HermiteCurves are not read";
+  return "";
+}
+
+std::vector<std::string> notes_of(const UsdaStage& stage, const Tally& tally) {
+  std::vector<std::string> notes;
+  if (tally.curves_prims > 1) notes.push_back(fmt::format("strands of {} BasisCurves", tally.curves_prims));
+  if (tally.time_code)
+    notes.push_back(
+        fmt::format("strands as at time code {}, the first of their time samples", *tally.time_code));
+  if (tally.cubic_strands > 0)
+    notes.push_back(
+        fmt::format("{} cubic curves ({}) became as many points on each curve as it has control "
+                    "points; groom.file.vertex_count asks for others",
+                    tally.cubic_strands, tally.basis));
+  if (tally.most_width > 0.0f)
+    notes.push_back(
+        fmt::format("widths of {:.4g} to {:.4g} units are not taken over: look.strand_radius_m says "
+                    "how thick hair is drawn",
+                    tally.least_width, tally.most_width));
+  if (tally.left_out_prims > 0)
+    notes.push_back(fmt::format("{} BasisCurves are left out: inactive, invisible, a class or an override",
+                                tally.left_out_prims));
+  if (stage.reference_count > 0)
+    notes.push_back(fmt::format("{} references, layers or variants are not followed", stage.reference_count));
+  if (stage.other_curve_count > 0)
+    notes.push_back(fmt::format("{} NurbsCurves or HermiteCurves are not read", stage.other_curve_count));
+  return notes;
+}
+
+}  // namespace
+
+Result<StatedGroom> read_usda(std::string_view text) {
+  ASSIGN_OR_RETURN(const UsdaStage stage, read_usda_stage(text));
+  StatedGroom stated;
+  stated.groom.offset.push_back(0);
+  Tally tally;
+  for (size_t prim = 0; prim < stage.prim.size(); ++prim) {
+    if (!stage.prim[prim].curves) continue;
+    if (is_left_out(stage, prim)) {
+      ++tally.left_out_prims;
+      continue;
+    }
+    const Status added = add_curves(stage, prim, stated.groom, tally);
+    if (!added) return at(fmt::format("prim {}", strandcast::quoted(stage.prim[prim].name)), added.error());
+  }
+  if (stated.groom.strand_count() == 0)
+    return make_error(ErrorCode::BadInput, "there are no BasisCurves to read{}", where_else(stage));
+  if (stage.meters_per_unit) stated.unit_m = static_cast<float>(*stage.meters_per_unit);
+  stated.is_z_up = stage.is_z_up;
+  stated.unit_reason = "its metersPerUnit says so";
+  stated.up_axis_reason = "its upAxis says so";
+  stated.notes = notes_of(stage, tally);
+  stated.groom = with_pinning(std::move(stated.groom), Pinning::Root);
+  return stated;
+}
+
+Result<StatedGroom> load_usda(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string text, load_text(path, kMaxGroomFileBytes));
+  auto stated = read_usda(text);
+  if (!stated) return at(path.string(), stated.error());
+  stated->groom.name = path.stem().string();
+  return stated;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,241 @@
+#include "common/groom/usda_stage.h"
+
+#include <algorithm>
+
+#include "common/groom/groom.h"
+#include "common/groom/text_scan.h"
+#include "common/groom/usda_scan.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kMatrixNumbers = 16;
+
+class StageReader {
+ public:
+  explicit StageReader(std::string_view text) : scan_(text) {}
+
+  Result<UsdaStage> read() {
+    if (scan_.take('(')) RETURN_IF_ERROR(read_layer_metadata());
+    while (!scan_.is_at_end()) {
+      const std::string_view word = scan_.word();
+      if (word == "reorder") {
+        RETURN_IF_ERROR(skip_reorder());
+        continue;
+      }
+      RETURN_IF_ERROR(read_prim(word, std::nullopt, 0));
+    }
+    return std::move(stage_);
+  }
+
+ private:
+  static bool begins_prim(std::string_view word) {
+    return word == "def" || word == "over" || word == "class";
+  }
+  static bool is_list_edit(std::string_view word) {
+    return word == "prepend" || word == "append" || word == "add" || word == "delete" || word == "reorder";
+  }
+
+  /// "reorder rootPrims = [..]"
+  Status skip_reorder() {
+    if (scan_.word().empty()) return scan_.error(ErrorCode::BadInput, "{} after 'reorder'", scan_.found());
+    RETURN_IF_ERROR(scan_.expect('='));
+    return scan_.skip_value();
+  }
+
+  /// Walks items "key = value" up to the bracket that ends them; `take_item` takes the value of a key.
+  template <class TakeItem>
+  Status read_metadata(const TakeItem& take_item) {
+    while (!scan_.take(')')) {
+      const char c = scan_.peek();
+      if (c == '"' || c == '\'') {
+        ASSIGN_OR_RETURN([[maybe_unused]] const std::string_view comment, scan_.string());
+        continue;
+      }
+      std::string_view key = scan_.word();
+      if (is_list_edit(key)) key = scan_.word();
+      if (key.empty()) return scan_.error(ErrorCode::BadInput, "{} is no metadata", scan_.found());
+      RETURN_IF_ERROR(scan_.expect('='));
+      RETURN_IF_ERROR(take_item(key));
+    }
+    return {};
+  }
+
+  Status read_layer_metadata() {
+    return read_metadata([this](std::string_view key) -> Status {
+      if (key == "upAxis") {
+        ASSIGN_OR_RETURN(const std::string_view axis, scan_.string());
+        if (axis != "Y" && axis != "Z")
+          return scan_.error(ErrorCode::BadInput, "upAxis is {}, known are Y and Z", quoted(axis));
+        stage_.is_z_up = axis == "Z";
+        return {};
+      }
+      if (key == "metersPerUnit") {
+        ASSIGN_OR_RETURN(const double value, scan_.number());
+        constexpr double kMostM = 1e3;
+        if (!(value > 0.0 && value <= kMostM))
+          return scan_.error(ErrorCode::BadInput, "metersPerUnit is {}, allowed is up to {}", value, kMostM);
+        stage_.meters_per_unit = value;
+        return {};
+      }
+      if (key == "subLayers") ++stage_.reference_count;
+      return scan_.skip_value();
+    });
+  }
+
+  Status read_prim_metadata(UsdaPrim& prim) {
+    return read_metadata([&](std::string_view key) -> Status {
+      if (key == "active") {
+        const std::string_view value = scan_.word();
+        if (value == "false" || value == "0") prim.is_left_out = true;
+        return {};
+      }
+      if (key == "references" || key == "payload" || key == "inherits" || key == "specializes")
+        ++stage_.reference_count;
+      return scan_.skip_value();
+    });
+  }
+
+  /// From behind its specifier.
+  Status read_prim(std::string_view specifier, std::optional<size_t> parent, size_t depth) {
+    if (!begins_prim(specifier))
+      return scan_.error(ErrorCode::BadInput, "{} found where a prim is needed",
+                         specifier.empty() ? scan_.found() : quoted(specifier));
+    if (depth == kMaxUsdaDepth)
+      return scan_.error(ErrorCode::LimitExceeded, "prims in each other, more than {}", kMaxUsdaDepth);
+    if (stage_.prim.size() == kMaxUsdaPrims)
+      return scan_.error(ErrorCode::LimitExceeded, "more than {} prims", kMaxUsdaPrims);
+    const std::string_view type = scan_.word();
+    UsdaPrim prim;
+    ASSIGN_OR_RETURN(const std::string_view name, scan_.string());
+    prim.parent = parent;
+    prim.name = one_line(name, 80);
+    prim.is_left_out = specifier != "def";
+    if (scan_.take('(')) RETURN_IF_ERROR(read_prim_metadata(prim));
+    if (type == "NurbsCurves" || type == "HermiteCurves") ++stage_.other_curve_count;
+    if (type == "BasisCurves") prim.curves.emplace();
+    const size_t index = stage_.prim.size();
+    stage_.prim.push_back(std::move(prim));
+    RETURN_IF_ERROR(scan_.expect('{'));
+    while (!scan_.take('}')) RETURN_IF_ERROR(read_item(index, depth));
+    return {};
+  }
+
+  Status read_item(size_t index, size_t depth) {
+    const std::string_view word = scan_.word();
+    if (begins_prim(word)) return read_prim(word, index, depth + 1);
+    if (word == "variantSet") {
+      ++stage_.reference_count;
+      ASSIGN_OR_RETURN([[maybe_unused]] const std::string_view name, scan_.string());
+      RETURN_IF_ERROR(scan_.expect('='));
+      return scan_.skip_value();
+    }
+    return read_property(word, index);
+  }
+
+  static bool is_modifier(std::string_view word) {
+    return word == "custom" || word == "uniform" || word == "varying" || word == "config" ||
+           is_list_edit(word);
+  }
+
+  Status read_property(std::string_view word, size_t index) {
+    const bool is_reorder = word == "reorder";
+    while (is_modifier(word)) word = scan_.word();
+    if (word.empty()) return scan_.error(ErrorCode::BadInput, "{} is no property", scan_.found());
+    // "reorder nameChildren = [..]" has no type.
+    if (is_reorder && scan_.take('=')) return scan_.skip_value();
+    if (scan_.take('[')) RETURN_IF_ERROR(scan_.expect(']'));
+    const std::string_view name = scan_.word();
+    if (name.empty()) return scan_.error(ErrorCode::BadInput, "{} is no property's name", scan_.found());
+    if (scan_.take('=')) RETURN_IF_ERROR(read_value(name, index));
+    return scan_.take('(') ? scan_.skip_rest(')') : Status();
+  }
+
+  Status read_value(std::string_view name, size_t index) {
+    constexpr std::string_view kSamples = ".timeSamples";
+    if (!name.ends_with(kSamples)) return take_value(name, index, std::nullopt);
+    name.remove_suffix(kSamples.size());
+    RETURN_IF_ERROR(scan_.expect('{'));
+    if (scan_.take('}')) return {};
+    ASSIGN_OR_RETURN(const double time, scan_.time_code());
+    RETURN_IF_ERROR(take_value(name, index, time));
+    return scan_.skip_rest('}');
+  }
+
+  /// The value of a property, of its first time sample where `time` is set: what has no time goes before.
+  Status take_value(std::string_view name, size_t index, std::optional<double> time) {
+    UsdaPrim& prim = stage_.prim[index];
+    if (name == "visibility") {
+      ASSIGN_OR_RETURN(const std::string_view value, scan_.string());
+      if (value == "invisible") prim.is_left_out = true;
+      return {};
+    }
+    if (name == "xformOpOrder") {
+      ASSIGN_OR_RETURN(const auto order, scan_.strings(kMaxUsdaXformOps));
+      prim.op_order.assign(order.begin(), order.end());
+      return {};
+    }
+    if (name.starts_with("xformOp:")) return take_op(name, prim, time.has_value());
+    return prim.curves ? take_curves(name, *prim.curves, time) : scan_.skip_value();
+  }
+
+  Status take_op(std::string_view name, UsdaPrim& prim, bool is_sample) {
+    ASSIGN_OR_RETURN(std::vector<double> value, scan_.numbers(kMatrixNumbers));
+    const auto known =
+        std::find_if(prim.op.begin(), prim.op.end(), [&](const UsdaXformOp& op) { return op.name == name; });
+    if (known != prim.op.end()) {
+      if (!is_sample) known->value = std::move(value);
+      return {};
+    }
+    if (prim.op.size() == kMaxUsdaXformOps)
+      return scan_.error(ErrorCode::LimitExceeded, "more than {} transforms of one prim", kMaxUsdaXformOps);
+    prim.op.push_back({std::string(name), std::move(value)});
+    return {};
+  }
+
+  Status take_curves(std::string_view name, UsdaCurves& curves, std::optional<double> time) {
+    if (name == "points") {
+      if (time && !curves.points.empty()) return scan_.skip_value();
+      ASSIGN_OR_RETURN(curves.points, scan_.points(kMaxGroomVertices));
+      curves.time_code = time;
+      return {};
+    }
+    if (name == "curveVertexCounts") {
+      if (time && !curves.vertex_counts.empty()) return scan_.skip_value();
+      ASSIGN_OR_RETURN(curves.vertex_counts, scan_.counts(kMaxStrandCount));
+      return {};
+    }
+    if (name == "widths") {
+      if (time && !curves.widths.empty()) return scan_.skip_value();
+      ASSIGN_OR_RETURN(curves.widths, scan_.floats(kMaxGroomVertices));
+      return {};
+    }
+    std::string* const token = name == "type"    ? &curves.type
+                               : name == "basis" ? &curves.basis
+                               : name == "wrap"  ? &curves.wrap
+                                                 : nullptr;
+    if (token == nullptr) return scan_.skip_value();
+    ASSIGN_OR_RETURN(const std::string_view value, scan_.string());
+    *token = one_line(value, 40);
+    return {};
+  }
+
+  UsdaScan scan_;
+  UsdaStage stage_;
+};
+
+}  // namespace
+
+Result<UsdaStage> read_usda_stage(std::string_view text) {
+  if (!text.starts_with("#usda 1."))
+    return make_error(ErrorCode::BadInput, "does not begin with '#usda 1.0': not a USD text file");
+  return StageReader(text).read();
+}
+
+bool is_left_out(const UsdaStage& stage, size_t prim) {
+  for (std::optional<size_t> i = prim; i; i = stage.prim[*i].parent)
+    if (stage.prim[*i].is_left_out) return true;
+  return false;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,14 @@
+// libFuzzer entry: strands in USD text.
+#include "common/groom/usda_loader.h"
+
+#include "tests/fuzz/fuzz_input.h"
+#include "tests/fuzz/groom_checks.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace strandcast;
+  const auto stated = read_usda(FuzzInput(data, size).take_rest_as_text());
+  if (!stated) return 0;
+  CHECK(!stated->unit_m || *stated->unit_m > 0.0f);
+  check_loaded_groom(stated->groom);
+  return 0;
+}

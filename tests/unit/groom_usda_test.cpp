@@ -1,0 +1,254 @@
+// Strands in USD text files: what is read, what is left out and said, and what is refused with its line.
+#include <cmath>
+
+#include "common/groom/curve_basis.h"
+#include "common/groom/groom_file.h"
+#include "common/groom/usda_loader.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+std::string refusal(const std::string& text) {
+  const auto groom = read_usda(text);
+  return groom ? "accepted" : groom.error().to_string();
+}
+/// A stage with one prim of curves in a transform; `body` follows the points.
+std::string stage(const std::string& body, const std::string& xform = "", const std::string& layer = "") {
+  return "#usda 1.0\n(\n    doc = \"\"\"two\nlines, } and #\"\"\"\n    metersPerUnit = 0.01\n    upAxis = "
+         "\"Z\"\n" +
+         layer + ")\n\ndef Xform \"Head\" (\n    kind = \"component\"\n)\n{\n" + xform +
+         "    def BasisCurves \"Hair\"\n    {\n" + body + "    }\n}\n";
+}
+const std::string kLines =
+    "uniform token type = \"linear\"\nint[] curveVertexCounts = [3, 2]\n"
+    "point3f[] points = [(0, 0, 0), (0, 0, 1), (0, 1, 2.5e0), (1, 0, 0), (1, 0, -1)]\n";
+const std::vector<glm::vec3> kPoints = {{0, 0, 0}, {0, 0, 1}, {0, 1, 2.5f}, {1, 0, 0}, {1, 0, -1}};
+
+void expect_near(const std::vector<glm::vec3>& points, const std::vector<glm::vec3>& expected) {
+  ASSERT_EQ(points.size(), expected.size());
+  for (size_t i = 0; i < points.size(); ++i)
+    EXPECT_LT(glm::distance(points[i], expected[i]), 1e-6f)
+        << i << ": " << points[i].x << ", " << points[i].y << ", " << points[i].z;
+}
+std::vector<glm::vec3> points_with(const std::string& xform) {
+  const auto groom = read_usda(stage(kLines, xform));
+  EXPECT_TRUE(groom) << groom.error().to_string();
+  return groom ? groom->groom.rest_position_m : std::vector<glm::vec3>{};
+}
+
+TEST(Usda, ReadsLinesWithUnitAndUpAxis) {
+  const auto groom = read_usda(stage(kLines));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.offset, (std::vector<uint32_t>{0, 3, 5}));
+  EXPECT_EQ(groom->groom.rest_position_m, kPoints);
+  EXPECT_EQ(groom->groom.pinned, (std::vector<uint8_t>{1, 0, 0, 1, 0}));
+  EXPECT_EQ(groom->unit_m, 0.01f);
+  EXPECT_EQ(groom->is_z_up, true);
+}
+
+TEST(Usda, UnitAndAxisAreStatedAndSaidInTheNotes) {
+  const TemporaryFolder folder;
+  GroomFileOptions options;
+  options.path = folder.write("hair.usda", stage(kLines));
+  options.is_z_up.reset();
+  const auto placed = load_placed_groom(options);
+  ASSERT_TRUE(placed) << placed.error().to_string();
+  EXPECT_TRUE(placed->placement.is_z_up);
+  EXPECT_FLOAT_EQ(placed->placement.unit_m, 0.01f);
+  EXPECT_THAT(placed->notes, Contains(HasSubstr("1 unit = 10 mm: its metersPerUnit says so")));
+  EXPECT_THAT(placed->notes, Contains(HasSubstr("+Z of the file is up: its upAxis says so")));
+  options.unit_m = 0.5f;
+  EXPECT_FLOAT_EQ(load_placed_groom(options)->placement.unit_m, 0.5f);
+  // Parts of one head of hair cannot be in two units.
+  options.unit_m = 0.0f;
+  std::string metres = stage(kLines);
+  metres.replace(metres.find("0.01"), 4, "1.00");
+  options.more_paths = {folder.write("brows.usda", metres)};
+  EXPECT_THAT(load_placed_groom(options).error().to_string(),
+              AllOf(HasSubstr("brows.usda"), HasSubstr("another unit")));
+}
+
+TEST(Usda, OtherFormsOfUsdAndAlembicAreToldTheWayOut) {
+  const TemporaryFolder folder;
+  for (const auto& [name, text] :
+       {std::pair("a.usdc", "PXR-USDC"), {"b.usda", "PXR-USDC"}, {"c.usdz", "PK"}, {"d.abc", "Ogawa"}}) {
+    GroomFileOptions options;
+    options.path = folder.write(name, text);
+    EXPECT_THAT(load_groom(options).error().to_string(), AllOf(HasSubstr(name), HasSubstr(".usda"))) << name;
+  }
+}
+
+TEST(Usda, TransformsAreThoseOfUsd) {
+  expect_near(points_with("double3 xformOp:translate = (1, 2, 3)\nuniform token[] xformOpOrder = "
+                          "[\"xformOp:translate\"]\n"),
+              {{1, 2, 3}, {1, 2, 4}, {1, 3, 5.5f}, {2, 2, 3}, {2, 2, 2}});
+  // The last op comes first: scaled, then moved.
+  expect_near(points_with("double3 xformOp:translate = (1, 0, 0)\nfloat3 xformOp:scale = (2, 1, 10)\n"
+                          "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:scale\"]\n"),
+              {{1, 0, 0}, {1, 0, 10}, {1, 1, 25}, {3, 0, 0}, {3, 0, -10}});
+  // About X first: +Z becomes -Y, and about Z that becomes +X.
+  expect_near(points_with("float3 xformOp:rotateXYZ = (90, 0, 90)\n"
+                          "uniform token[] xformOpOrder = [\"xformOp:rotateXYZ\"]\n"),
+              {{0, 0, 0}, {1, 0, 0}, {2.5f, 0, 1}, {0, 1, 0}, {-1, 1, 0}});
+  // A row is what USD multiplies a row vector with: the last one moves.
+  expect_near(
+      points_with("matrix4d xformOp:transform = ( (0, 1, 0, 0), (-1, 0, 0, 0), (0, 0, 1, 0), (5, 6, 7, 1) )\n"
+                  "uniform token[] xformOpOrder = [\"xformOp:transform\"]\n"),
+      {{5, 6, 7}, {5, 6, 8}, {4, 6, 9.5f}, {5, 7, 7}, {5, 7, 6}});
+  // Around a pivot, and of what is not in the order nothing counts.
+  expect_near(
+      points_with("double3 xformOp:translate = (9, 9, 9)\ndouble3 xformOp:translate:pivot = (1, 0, 0)\n"
+                  "float xformOp:rotateZ = 180\nuniform token[] xformOpOrder = [\"xformOp:translate:pivot\", "
+                  "\"xformOp:rotateZ\", \"!invert!xformOp:translate:pivot\"]\n"),
+      {{2, 0, 0}, {2, 0, 1}, {2, -1, 2.5f}, {1, 0, 0}, {1, 0, -1}});
+  expect_near(points_with("quatf xformOp:orient = (0, 0, 0, 1)\n"
+                          "uniform token[] xformOpOrder = [\"xformOp:orient\"]\n"),
+              {{0, 0, 0}, {0, 0, 1}, {0, -1, 2.5f}, {-1, 0, 0}, {-1, 0, -1}});
+  // Of samples the first.
+  expect_near(points_with("double3 xformOp:translate.timeSamples = { 3: (1, 0, 0), 4: (2, 0, 0), }\n"
+                          "uniform token[] xformOpOrder = [\"xformOp:translate\"]\n"),
+              {{1, 0, 0}, {1, 0, 1}, {1, 1, 2.5f}, {2, 0, 0}, {2, 0, -1}});
+}
+
+TEST(Usda, AStackIsResetByAPrimOfItsOwn) {
+  const std::string moved =
+      "double3 xformOp:translate = (1, 2, 3)\nuniform token[] xformOpOrder = "
+      "[\"xformOp:translate\"]\n";
+  const auto groom =
+      read_usda(stage(kLines + "uniform token[] xformOpOrder = [\"!resetXformStack!\"]\n", moved));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.rest_position_m, kPoints);
+}
+
+TEST(Usda, PointsWithoutATimeGoBeforeTimeSamplesAndOfTheseTheFirst) {
+  const std::string counts = "uniform token type = \"linear\"\nint[] curveVertexCounts = [2]\n";
+  const std::string samples =
+      "point3f[] points.timeSamples = {\n 7.5: [(0, 0, 0), (0, 0, 1)],\n 8: [(5, 5, 5)],\n}\n";
+  const auto timed = read_usda(stage(counts + samples));
+  ASSERT_TRUE(timed) << timed.error().to_string();
+  EXPECT_EQ(timed->groom.rest_position_m[1], glm::vec3(0, 0, 1));
+  EXPECT_THAT(timed->notes, Contains(HasSubstr("time code 7.5, the first")));
+  const std::string still = "point3f[] points = [(1, 1, 1), (2, 2, 2)]\n";
+  for (const std::string& both : {samples + still, still + samples}) {
+    const auto groom = read_usda(stage(counts + both));
+    ASSERT_TRUE(groom) << groom.error().to_string();
+    EXPECT_EQ(groom->groom.rest_position_m[1], glm::vec3(2, 2, 2));
+  }
+}
+
+TEST(Usda, CubicCurvesBecomePointsOnThem) {
+  // A Bezier curve of x = t, y = t^2 - t^3 by its control points.
+  const auto bezier =
+      points_on_curve(std::vector<glm::vec3>{{0, 0, 0}, {1 / 3.0f, 0, 0}, {2 / 3.0f, 1 / 3.0f, 0}, {1, 0, 0}},
+                      CurveBasis::Bezier, CurveEnds::Open);
+  ASSERT_TRUE(bezier) << bezier.error().to_string();
+  for (size_t i = 0; i < 4; ++i) {
+    const float t = static_cast<float>(i) / 3.0f;
+    EXPECT_LT(glm::distance((*bezier)[i], glm::vec3(t, t * t - t * t * t, 0)), 1e-6f) << i;
+  }
+  // Evenly spaced control points of a B-spline or Catmull-Rom curve give the line that they are on; open ones
+  // run from the second to the last but one.
+  std::vector<glm::vec3> line;
+  for (int i = 0; i < 8; ++i) line.emplace_back(static_cast<float>(i), 0, 1);
+  for (const CurveBasis basis : {CurveBasis::BSpline, CurveBasis::CatmullRom}) {
+    const auto open = points_on_curve(line, basis, CurveEnds::Open);
+    const auto pinned = points_on_curve(line, basis, CurveEnds::Pinned);
+    ASSERT_TRUE(open && pinned);
+    for (size_t i = 0; i < 8; ++i) {
+      EXPECT_LT(glm::distance((*open)[i], glm::vec3(1.0f + 5.0f * static_cast<float>(i) / 7.0f, 0, 1)),
+                1e-5f);
+      EXPECT_LT(glm::distance((*pinned)[i], line[i]), 1e-5f);
+    }
+  }
+  // A Catmull-Rom curve goes through its inner points, a B-spline past them: at a knot by 1/6, 4/6, 1/6.
+  const std::vector<glm::vec3> bent = {{0, 0, 0}, {1, 3, 0}, {2, 0, 0}, {3, 3, 0}};
+  EXPECT_LT(glm::distance(points_on_curve(bent, CurveBasis::CatmullRom, CurveEnds::Open)->front(), bent[1]),
+            1e-6f);
+  EXPECT_LT(
+      glm::distance(points_on_curve(bent, CurveBasis::BSpline, CurveEnds::Open)->front(), glm::vec3(1, 2, 0)),
+      1e-6f);
+  EXPECT_LT(glm::distance(points_on_curve(bent, CurveBasis::BSpline, CurveEnds::Pinned)->front(), bent[0]),
+            1e-6f);
+  EXPECT_FALSE(points_on_curve(line, CurveBasis::Bezier, CurveEnds::Open)) << "8 is not 3 n + 1";
+  EXPECT_FALSE(points_on_curve(std::span(line).first(3), CurveBasis::BSpline, CurveEnds::Open));
+}
+
+TEST(Usda, CubicCurvesAreSaidToHaveBecomePoints) {
+  const auto groom =
+      read_usda(stage("uniform token type = \"cubic\"\nuniform token basis = \"bspline\"\n"
+                      "uniform token wrap = \"pinned\"\nint[] curveVertexCounts = [4]\n"
+                      "point3f[] points = [(0,0,0), (0,0,1), (0,0,2), (0,0,3)]\n"));
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.uniform_vertex_count(), 4u);
+  EXPECT_THAT(groom->notes,
+              Contains(HasSubstr("1 cubic curves (bspline) became as many points on each curve")));
+}
+
+TEST(Usda, SeveralPrimsAreOneGroomAndWhatDoesNotCountIsLeftOut) {
+  const std::string curves = "BasisCurves \"Hair\"\n{\n" + kLines +
+                             "float[] widths = [0.1, 0.02] (\n interpolation = "
+                             "\"vertex\"\n)\n}\n";
+  const std::string text = "#usda 1.0\n\ndef " + curves + "class " + curves + "over " + curves +
+                           "def Scope \"Off\" ( active = false )\n{\n def " + curves + "}\n" +
+                           "def Xform \"Gone\" {\n token visibility = \"invisible\"\n def " + curves + "}\n" +
+                           "def NurbsCurves \"n\" {}\ndef \"refers\" ( prepend references = "
+                           "@other.usda@</Hair> (offset = 1) ) {}\n"
+                           "def Xform \"In\" { custom rel prop = </Hair>\n reorder nameChildren = [\"a\"]\n"
+                           "variantSet \"v\" = { \"one\" { def " +
+                           curves +
+                           "} }\n token outputs:surface\n"
+                           "dictionary d = { string s = \"}\" }\n def " +
+                           curves + "}\n";
+  const auto groom = read_usda(text);
+  ASSERT_TRUE(groom) << groom.error().to_string();
+  EXPECT_EQ(groom->groom.strand_count(), 4u);
+  EXPECT_FALSE(groom->unit_m || groom->is_z_up) << "nothing is stated, so both are guessed as of any file";
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("strands of 2 BasisCurves")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("4 BasisCurves are left out")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("2 references, layers or variants are not followed")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("1 NurbsCurves or HermiteCurves are not read")));
+  EXPECT_THAT(groom->notes, Contains(HasSubstr("widths of 0.02 to 0.1 units are not taken over")));
+}
+
+TEST(Usda, WhatIsWrongIsNamedWithItsLine) {
+  EXPECT_THAT(refusal("#usd"), HasSubstr("does not begin with '#usda 1.0'"));
+  EXPECT_THAT(refusal("#usda 1.0\n"), HasSubstr("no BasisCurves"));
+  EXPECT_THAT(refusal("#usda 1.0\ndef \"a\" ( references = @b.usda@ ) {}\n"), HasSubstr("usdcat --flatten"));
+  EXPECT_THAT(refusal(stage(kLines, "", "upAxis = \"X\"\n")), HasSubstr("upAxis is 'X'"));
+  EXPECT_THAT(refusal(stage(kLines, "", "metersPerUnit = -1\n")), HasSubstr("line 7: metersPerUnit is -1"));
+  EXPECT_THAT(refusal(stage("int[] curveVertexCounts = [2]\npoint3f[] points = [(0, 0, 0), (0, 0)]\n")),
+              HasSubstr("line 16: ')]' found where ',' is needed"));
+  EXPECT_THAT(refusal(stage("point3f[] points = [(0, 0, 1e99)]\n")),
+              HasSubstr("a point has the coordinate 1e+99"));
+  EXPECT_THAT(
+      refusal(stage("uniform token type = \"linear\"\nint[] curveVertexCounts = [2]\npoint3f[] points = "
+                    "[(0, 0, 0)]\n")),
+      AllOf(HasSubstr("prim 'Hair'"), HasSubstr("need 2 points, there are 1")));
+  EXPECT_THAT(refusal(stage("int[] curveVertexCounts = [1]\npoint3f[] points = [(0, 0, 0)]\n")),
+              HasSubstr("curve 0 has 1 vertices"));
+  EXPECT_THAT(refusal(stage(kLines + "uniform token wrap = \"periodic\"\n")), HasSubstr("closed curves"));
+  EXPECT_THAT(refusal(stage(kLines + "uniform token type = \"wavy\"\n")), HasSubstr("type is 'wavy'"));
+  EXPECT_THAT(refusal(stage(kLines, "uniform token[] xformOpOrder = [\"xformOp:bend\"]\n")),
+              HasSubstr("names the transform 'xformOp:bend'"));
+  std::string deep = "#usda 1.0\n";
+  for (int i = 0; i < 100; ++i) deep += "def \"a\" {\n";
+  EXPECT_THAT(refusal(deep), HasSubstr("prims in each other"));
+  EXPECT_THAT(refusal("#usda 1.0\ndef \"a\" { int[] a = " + std::string(100, '[')),
+              HasSubstr("too many brackets"));
+}
+
+TEST(Usda, EveryTruncationIsRefused) {
+  const std::string whole =
+      stage(kLines + "float[] widths = [1]\n", "double3 xformOp:translate = (1, 2, 3)\n");
+  for (size_t size = 0; size + 2 < whole.size(); ++size)
+    ASSERT_NE(refusal(whole.substr(0, size)), "accepted") << size << " bytes of " << whole.size();
+  EXPECT_EQ(refusal(whole), "accepted");
+}
+
+}  // namespace
+}  // namespace strandcast
