@@ -50,24 +50,9 @@ std::optional<Error> stopped(const CtlTarget& target) {
   return make_error(ErrorCode::Unavailable, "stopped before the server had answered");
 }
 
-Result<ClientConfig> config_for(const CtlTarget& target, Role role) {
-  ClientConfig config;
-  ASSIGN_OR_RETURN(config.address, address_of(target));
-  config.tls_authorities = target.tls_authorities;
-  config.hello.role = role;
-  config.hello.mode = StreamMode::Strands;
-  config.hello.name = "strandcast-ctl";
-  config.hello.token = target.token;
-  config.cancel = [target] { return stopped(target); };
-  if (!target.token_file.empty()) {
-    ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file, role));
-  }
-  return config;
-}
-
 /// To say or to hear something, not to watch: no strand is sent for it.
 Result<std::unique_ptr<ViewerClient>> connect(const CtlTarget& target, Role role) {
-  ASSIGN_OR_RETURN(ClientConfig config, config_for(target, role));
+  ASSIGN_OR_RETURN(ClientConfig config, client_config_for(target, role));
   config.hello.gets_no_stream = true;
   return ViewerClient::connect(config);
 }
@@ -182,6 +167,21 @@ std::string to_table(const SessionList& list) {
 }
 
 }  // namespace
+
+Result<ClientConfig> client_config_for(const CtlTarget& target, Role role) {
+  ClientConfig config;
+  ASSIGN_OR_RETURN(config.address, address_of(target));
+  config.tls_authorities = target.tls_authorities;
+  config.hello.role = role;
+  config.hello.mode = StreamMode::Strands;
+  config.hello.name = "strandcast-ctl";
+  config.hello.token = target.token;
+  config.cancel = [target] { return stopped(target); };
+  if (!target.token_file.empty()) {
+    ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file, role));
+  }
+  return config;
+}
 
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
   // Files first: a typing error must not need a server to be found.
@@ -302,7 +302,7 @@ int run_save(const CtlTarget& target, const std::filesystem::path& path) {
 }
 
 int run_check(const CtlTarget& target, uint64_t frames, double timeout_s) {
-  auto config = config_for(target, Role::Viewer);
+  auto config = client_config_for(target, Role::Viewer);
   if (!config) return fail(config.error());
   config->hello.step_ns = measured_step_ns();  // it decodes what viewers here get
   const auto check = check_stream(*config, frames, timeout_s);

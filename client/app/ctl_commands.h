@@ -41,6 +41,9 @@ struct FeedOptions {
   uint32_t seed = 1;
 };
 
+/// How to join the server in this role, as a viewer of strands.
+Result<ClientConfig> client_config_for(const CtlTarget& target, Role role);
+
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop);
 /// Prints a line per status; `seconds` 0 = until stopped.
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop);

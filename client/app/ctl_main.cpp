@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "client/app/ctl_commands.h"
+#include "client/app/export_command.h"
 #include "client/app/feed.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
@@ -25,6 +26,7 @@ struct CommandLine {
   double check_timeout_s = 60.0;
   uint64_t session = 0;
   std::string scene_path;
+  ExportCommand exported;
 };
 
 void declare_feed(CLI::App& app, CommandLine& line) {
@@ -104,6 +106,8 @@ int run(int argc, char** argv) {
       ->required();
   CLI::App* save = app.add_subcommand("save", "Keep the scene as it runs, look and all, as a scene file");
   save->add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
+  CLI::App* exported = app.add_subcommand("export", "Write the strands as curves for other programs");
+  declare_export(*exported, line.exported);
   CLI::App* check = app.add_subcommand("check", "Decode frames with two viewers and compare their states");
   check->add_option("--frames", line.check_frames, "Frames to decode")
       ->check(CLI::Range(uint64_t{2}, uint64_t{1'000'000}))
@@ -144,6 +148,7 @@ int run(int argc, char** argv) {
   if (*reset) return run_command(line.target, ControlCommand{Command::Reset});
   if (*set) return run_command(line.target, SetParameter{line.assignment});
   if (*save) return run_save(line.target, line.scene_path);
+  if (*exported) return run_export(line.target, line.exported, stop);
   if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);
   if (*sessions) return run_admin(line.target, {AdminAction::ListSessions, 0});
   if (*kick) return run_admin(line.target, {AdminAction::Kick, line.session});

@@ -53,8 +53,9 @@ double Progress::seconds_left() const {
 void Progress::print(std::string_view name) {
   const double left_s = seconds_left();
   const std::string left = std::isnan(left_s) ? "" : fmt::format(", about {:.0f} s left", left_s);
+  const std::string of = run_count_ > 0 ? fmt::format(" of {}", run_count_) : "";
   const std::string line =
-      fmt::format("{}: run {} of {}{}: {}", options_.what, run_index_, run_count_, left, name);
+      fmt::format("{}: {} {}{}{}: {}", options_.what, options_.run_name, run_index_, of, left, name);
   if (is_terminal_) {
     fmt::print(stderr, "\r{:{}}", line, width_);
   } else {

@@ -14,6 +14,7 @@ class Progress {
   struct Options {
     std::string what;
     bool is_quiet = false;
+    std::string run_name = "run";  // what one is called
   };
   explicit Progress(Options options);
   ~Progress();

@@ -18,10 +18,6 @@ uint64_t bytes_of(const std::deque<std::shared_ptr<const Snapshot>>& snapshots) 
 
 }  // namespace
 
-PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill) {
-  return PosedStrands{snapshot.world_from_head, fill.positions(snapshot)};
-}
-
 void SnapshotTimeline::add(std::shared_ptr<const Snapshot> snapshot, int64_t receive_time_ns,
                            Continuity continuity) {
   // A keyframe on request repeats the state that is already here.
@@ -54,29 +50,6 @@ std::shared_ptr<const Snapshot> SnapshotTimeline::newest() const {
   return snapshots_.empty() ? nullptr : snapshots_.back();
 }
 
-void TimelinePlayer::set_fill(StrandFill fill) {
-  fill_ = std::move(fill);
-  knots_ = {};
-}
-
-/// Makes the strands of the states around the way to `later` that are not there from the way before.
-void TimelinePlayer::enter(const std::deque<std::shared_ptr<const Snapshot>>& snapshots, size_t later) {
-  if (knots_[1].snapshot == snapshots[later - 1] && knots_[2].snapshot == snapshots[later]) return;
-  chosen_ = choose_interpolation(snapshots, later);
-  std::array<Knot, 4> next;
-  const bool is_cubic = chosen_ == Interpolation::Cubic;
-  for (size_t i = is_cubic ? 0 : 1; i < (is_cubic ? next.size() : next.size() - 1); ++i) {
-    const auto& snapshot = snapshots[later - 2 + i];
-    const auto known = std::find_if(knots_.begin(), knots_.end(),
-                                    [&](const Knot& knot) { return knot.snapshot == snapshot; });
-    next[i] = known != knots_.end() ? std::move(*known) : Knot{snapshot, posed_strands_of(*snapshot, fill_)};
-    // Without a rest shape a change to fewer strands leaves no cubic.
-    if (next[i].strands.position_m.size() != next[is_cubic ? 0 : 1].strands.position_m.size())
-      chosen_ = Interpolation::Linear;
-  }
-  knots_ = std::move(next);
-}
-
 std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& timeline,
                                                        int64_t client_time_ns) {
   const auto& snapshots = timeline.snapshots();
@@ -84,8 +57,8 @@ std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& t
   if (std::exchange(restarts_, timeline.restarts()) != timeline.restarts()) cursor_ = {};
   if (snapshots.empty()) return std::nullopt;
   if (timeline.playout() == Playout::LowLatency || snapshots.size() < 2 || !timeline.clock().has_value()) {
-    knots_ = {};
-    return posed_strands_of(*snapshots.back(), fill_);
+    blend_.leave();
+    return blend_.at(*snapshots.back());
   }
 
   // While nothing new comes, time rests on the newest state; what then arrives late is caught up from there.
@@ -95,19 +68,12 @@ std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& t
   const auto later = std::find_if(snapshots.begin(), snapshots.end(), [sim_time_ns](const auto& snapshot) {
     return snapshot->sim_time_ns > sim_time_ns;
   });
-  if (later == snapshots.end()) return posed_strands_of(*snapshots.back(), fill_);
-  if (later == snapshots.begin()) return posed_strands_of(**later, fill_);
-  enter(snapshots, static_cast<size_t>(later - snapshots.begin()));
-  interpolation_ = chosen_;
-  const int64_t from_ns = knots_[1].snapshot->sim_time_ns;
-  const int64_t to_ns = knots_[2].snapshot->sim_time_ns;
-  // Both have all strands, also when the stream has changed to one with fewer in between.
-  if (chosen_ != Interpolation::Cubic)
-    return blend(knots_[1].strands, knots_[2].strands,
-                 static_cast<double>(sim_time_ns - from_ns) / static_cast<double>(to_ns - from_ns));
-  const KnotTimes times = {knots_[0].snapshot->sim_time_ns, from_ns, to_ns, knots_[3].snapshot->sim_time_ns};
-  return blend({&knots_[0].strands, &knots_[1].strands, &knots_[2].strands, &knots_[3].strands},
-               cubic_terms(times, sim_time_ns));
+  if (later == snapshots.end()) return blend_.at(*snapshots.back());
+  if (later == snapshots.begin()) return blend_.at(**later);
+  PosedStrands strands =
+      blend_.between(snapshots, static_cast<size_t>(later - snapshots.begin()), sim_time_ns);
+  interpolation_ = blend_.interpolation();
+  return strands;
 }
 
 }  // namespace strandcast

@@ -3,15 +3,14 @@
 // copy. Pure logic.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 
-#include "common/replay/interpolation.h"
 #include "common/replay/playout_clock.h"
-#include "common/replay/strand_fill.h"
+#include "common/replay/state_blend.h"
 #include "common/strands/posed_strands.h"
 #include "common/strands/snapshot.h"
 
@@ -62,29 +61,17 @@ class SnapshotTimeline {
 class TimelinePlayer {
  public:
   /// For states without all strands, made from the asset's rest shape.
-  void set_fill(StrandFill fill);
+  void set_fill(StrandFill fill) { blend_.set_fill(std::move(fill)); }
   /// What to draw at client time `client_time_ns`; nothing while the timeline is empty.
   std::optional<PosedStrands> strands_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
   /// How the newest strands were made.
   Interpolation interpolation() const { return interpolation_; }
 
  private:
-  /// A state with all its strands, made once for all pictures that need it.
-  struct Knot {
-    std::shared_ptr<const Snapshot> snapshot;
-    PosedStrands strands;
-  };
-  void enter(const std::deque<std::shared_ptr<const Snapshot>>& snapshots, size_t later);
-
-  StrandFill fill_;
+  StateBlend blend_;
   PlayoutCursor cursor_;
   uint64_t restarts_ = 0;
   Interpolation interpolation_ = Interpolation::None;
-  Interpolation chosen_ = Interpolation::None;  // between the inner two of knots_
-  std::array<Knot, 4> knots_;                   // a line has no outer ones
 };
-
-/// The strands of one snapshot, as the server draws them when it has all.
-PosedStrands posed_strands_of(const Snapshot& snapshot, StrandFill& fill);
 
 }  // namespace strandcast

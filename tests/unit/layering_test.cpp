@@ -72,7 +72,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       // No protobuf, no network, no OpenGL: the page has its own.
       {"client/web", with({"common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
-      {"client/app", with({"client/net", "client/window"}, kAll)},
+      {"client/export", with({"common/replay", "common/log"}, kStrands)},
+      {"client/app", with({"client/net", "client/window", "client/export"}, kAll)},
       {"client", with({"client/app"}, kAll)},
   };
   return kAllowed;

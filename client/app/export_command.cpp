@@ -1,0 +1,106 @@
+#include "client/app/export_command.h"
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <utility>
+
+#include "client/app/live_states.h"
+#include "client/export/export_strands.h"
+
+namespace strandcast {
+namespace {
+
+constexpr int kUsualFps = 30;
+constexpr double kMostSeconds = 86'400.0;
+
+int fail(const Error& error) {
+  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
+  return kBadInputExit;
+}
+
+std::string size_text(uint64_t bytes) {
+  constexpr double kBytesPerMb = 1e6;
+  return fmt::format("{:.1f} MB", static_cast<double>(bytes) / kBytesPerMb);
+}
+
+void print(const ExportOptions& options, const ExportReport& report) {
+  std::cout << fmt::format("{} strands x {} vertices, {} frames at {} fps from {:.3f} s on, {} in {}: {}\n",
+                           report.strand_count, report.vertex_count, report.frame_count, options.fps,
+                           report.first_s, size_text(report.bytes),
+                           report.file_count == 1 ? "one file" : fmt::format("{} files", report.file_count),
+                           options.path.string());
+  for (const std::string& remark : report.remarks) std::cout << "  " << remark << '\n';
+}
+
+}  // namespace
+
+void declare_export(CLI::App& app, ExportCommand& command) {
+  app.add_option(
+         "paths", command.paths,
+         "OUT.usda, OUT.ply or OUT.csv: what the server sends from now on; a file of this name is replaced")
+      ->required()
+      ->expected(1, 2);
+  app.add_option("--fps", command.fps, "Frames per second (default: 30)")
+      ->check(CLI::IsMember({24, 25, 30, 60}));
+  app.add_option("--units", command.unit, "Unit of the file")
+      ->check(CLI::IsMember({"cm", "m"}))
+      ->capture_default_str();
+  app.add_option("--up", command.up, "Up axis of the file; the face looks to +Z, or to -Y where Z is up")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->capture_default_str();
+  app.add_option("--space", command.space,
+                 "head: as seen from the head, which stands still; world: with its motion")
+      ->check(CLI::IsMember({"head", "world"}))
+      ->capture_default_str();
+  app.add_flag("--guides", command.is_guides,
+               "Tell Unreal that these strands guide others, and are not drawn");
+  const auto seconds = CLI::Range(0.0, kMostSeconds);
+  app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
+  app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);
+  app.add_option("--seconds", command.seconds,
+                 "Length in seconds (default: until stopped; what was written by then is whole)")
+      ->check(seconds);
+  app.add_option("--at", command.at_s, "One frame alone, so many seconds after the first state (.ply)")
+      ->check(seconds);
+}
+
+Result<ExportOptions> export_options(const ExportCommand& command) {
+  ExportOptions options;
+  options.path = command.paths.back();
+  options.fps = command.fps.value_or(kUsualFps);
+  options.unit = command.unit == "m" ? ExportUnit::Metre : ExportUnit::Centimetre;
+  options.up = command.up == "z" ? ExportUp::Z : ExportUp::Y;
+  options.space = command.space == "world" ? ExportSpace::World : ExportSpace::Head;
+  options.role = command.is_guides ? ExportRole::Guides : ExportRole::Strands;
+  const bool is_range = command.from_s || command.to_s || command.seconds || command.fps;
+  if (command.at_s && is_range)
+    return make_error(ErrorCode::BadInput,
+                      "--at is one frame: --fps, --from, --to and --seconds say nothing of it");
+  if (command.to_s && command.seconds)
+    return make_error(ErrorCode::BadInput, "--to and --seconds both say where it ends: give one of them");
+  options.from_s = command.at_s.value_or(command.from_s.value_or(0.0));
+  if (command.seconds) options.to_s = options.from_s + *command.seconds;
+  if (command.to_s) options.to_s = command.to_s;
+  // A file holds one frame of .ply: a sequence is asked for.
+  options.is_one_frame = command.at_s || (options.path.extension() == ".ply" && !is_range);
+  RETURN_IF_ERROR(check_export(options));
+  return options;
+}
+
+int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop) {
+  const auto options = export_options(command);
+  if (!options) return fail(options.error());
+  if (command.paths.size() > 1)
+    return fail(make_error(ErrorCode::BadInput, "'{}' and '{}': name the one file to write",
+                           command.paths.front(), command.paths.back()));
+  const auto config = client_config_for(target, Role::Viewer);
+  if (!config) return fail(config.error());
+  auto states = LiveStates::open(*config, stop);
+  if (!states) return fail(states.error());
+  const auto report = export_strands(**states, *options, stop);
+  if (!report) return fail(report.error());
+  print(*options, *report);
+  return kDoneExit;
+}
+
+}  // namespace strandcast

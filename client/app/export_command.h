@@ -1,0 +1,36 @@
+// strandcast-ctl export: strands of a running server as a file for other programs.
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/app/ctl_commands.h"
+#include "client/export/export_options.h"
+
+namespace CLI {
+class App;
+}
+
+namespace strandcast {
+
+struct ExportCommand {
+  std::vector<std::string> paths;  // the file to write; before it a recording, instead of a server
+  std::optional<int> fps;
+  std::string unit = "cm";
+  std::string up = "y";
+  std::string space = "head";
+  bool is_guides = false;
+  std::optional<double> from_s, to_s, seconds, at_s;
+};
+
+/// Adds the options of the sub-command to `app`, which outlives neither.
+void declare_export(CLI::App& app, ExportCommand& command);
+
+/// What the command line says, checked. BadInput says what fits together.
+Result<ExportOptions> export_options(const ExportCommand& command);
+
+int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop);
+
+}  // namespace strandcast

@@ -1,0 +1,35 @@
+// LiveStates: the states of a running server for an export, from a viewer of strands that shows nothing.
+// One thread.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/app/viewer_session.h"
+#include "client/export/export_source.h"
+
+namespace strandcast {
+
+class LiveStates : public ExportSource {
+ public:
+  /// Joins the server and waits for its first state. `stop` ends every wait.
+  static Result<std::unique_ptr<LiveStates>> open(const ClientConfig& config, const std::atomic<bool>& stop);
+
+  const ExportScene& scene() const override { return scene_; }
+  /// Waits for a state; null once stopped, Timeout when none comes.
+  Result<std::shared_ptr<const Snapshot>> next() override;
+  std::vector<std::string> remarks() const override;
+
+ private:
+  LiveStates(std::unique_ptr<ViewerSession> session, const std::atomic<bool>& stop);
+
+  std::unique_ptr<ViewerSession> session_;
+  const std::atomic<bool>& stop_;
+  ExportScene scene_;
+  std::deque<std::shared_ptr<const Snapshot>> waiting_;  // as much as one pump() brings
+};
+
+}  // namespace strandcast

@@ -1,0 +1,36 @@
+// What an export is to be like. Plain data.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+namespace strandcast {
+
+enum class ExportUnit { Centimetre, Metre };
+enum class ExportUp { Y, Z };
+enum class ExportSpace { Head, World };
+/// What Unreal makes of the curves.
+enum class ExportRole {
+  Strands,  // hair that is drawn
+  Guides,   // hair that drives other hair
+};
+
+struct ExportOptions {
+  std::filesystem::path path;  // .usda, .ply or .csv
+  double fps = 30.0;           // 24, 25, 30 or 60
+  ExportUnit unit = ExportUnit::Centimetre;
+  ExportUp up = ExportUp::Y;
+  ExportSpace space = ExportSpace::Head;
+  ExportRole role = ExportRole::Strands;
+  double from_s = 0.0;         // after the first state
+  std::optional<double> to_s;  // likewise; empty: to the last state
+  bool is_one_frame = false;   // the one at from_s, without the rest shape (.ply)
+  bool is_quiet = false;       // no progress on standard error
+};
+
+/// Metres per unit of the file.
+inline double metres_of(ExportUnit unit) {
+  return unit == ExportUnit::Centimetre ? 0.01 : 1.0;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,164 @@
+#include "client/export/export_strands.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "client/export/frame_sampler.h"
+#include "client/export/strand_writer.h"
+#include "common/log/progress.h"
+
+namespace strandcast {
+namespace {
+
+using MakeWriter = Result<std::unique_ptr<StrandWriter>> (*)(const ExportOptions&, const StrandSet&);
+
+std::string extension_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+MakeWriter writer_for(const std::string& extension) {
+  if (extension == ".usda") return make_usda_writer;
+  if (extension == ".ply") return make_ply_writer;
+  if (extension == ".csv") return make_csv_writer;
+  return nullptr;
+}
+
+/// One export from the first state to the end of the file.
+class Export {
+ public:
+  Export(ExportSource& source, const ExportOptions& options)
+      : source_(source),
+        options_(options),
+        sampler_({options.fps, options.from_s, options.to_s},
+                 StrandFill(source.scene().asset->rest_position_m, source.scene().asset->vertex_count)),
+        progress_({"export", options.is_quiet, "frame"}) {
+    if (options.to_s) {
+      const auto frames = static_cast<uint32_t>((*options.to_s - options.from_s) * options.fps) + 1;
+      progress_.expect(frames, frames);
+    }
+  }
+
+  Status run(const std::atomic<bool>& stop) {
+    while (!stop && !sampler_.is_done() && !is_whole_) {
+      auto state = source_.next();
+      if (!state && report_.frame_count == 0) return state.error();
+      if (!state) report_.remarks.push_back(fmt::format("it ends early: {}", state.error().to_string()));
+      if (!state || *state == nullptr) break;
+      const SceneAsset& asset = *source_.scene().asset;
+      if ((*state)->strand_count < asset.strand_count) ++thin_states_;
+      if (sampler_.add(*state) == FrameSampler::Outcome::WentBack) {
+        report_.remarks.push_back("it ends where the simulation was reset");
+        break;
+      }
+      RETURN_IF_ERROR(write_frames());
+    }
+    sampler_.finish();
+    return write_frames();
+  }
+
+  Result<ExportReport> finish() {
+    if (!writer_)
+      return make_error(ErrorCode::BadInput,
+                        "there is no state {:.6g} s after the first one: nothing to export", options_.from_s);
+    ASSIGN_OR_RETURN(const WrittenBytes written, writer_->finish());
+    report_.file_count = written.files;
+    report_.bytes = written.bytes;
+    report_.strand_count = strands_->strand_count();
+    report_.vertex_count = strands_->vertex_count();
+    add_remarks();
+    return std::move(report_);
+  }
+
+ private:
+  Status write_frames() {
+    while (!is_whole_) {
+      const std::optional<SampledFrame> frame = sampler_.next();
+      if (!frame) return {};
+      RETURN_IF_ERROR(write(*frame));
+      is_whole_ = options_.is_one_frame;
+    }
+    return {};
+  }
+
+  Status write(const SampledFrame& frame) {
+    if (!writer_) {
+      strands_.emplace(source_.scene(), options_, frame.strands);
+      if (strands_->strand_count() == 0)
+        return make_error(ErrorCode::BadInput, "none of {} strands has a length", strands_->left_out_count());
+      ASSIGN_OR_RETURN(writer_, writer_for(extension_of(options_.path))(options_, *strands_));
+      report_.first_s = frame.time_s;
+    }
+    progress_.begin_run(options_.path.string());
+    if (strands_->collapsed_count(frame.strands) > 0) ++collapsed_frames_;
+    const std::vector<glm::dvec3> points = strands_->points(frame.strands);
+    RETURN_IF_ERROR(writer_->write({frame.index + 1, frame.time_s, points}));
+    progress_.end_run(1.0);
+    ++report_.frame_count;
+    return {};
+  }
+
+  void add_remarks() {
+    std::vector<std::string>& remarks = report_.remarks;
+    if (strands_->left_out_count() > 0)
+      remarks.push_back(
+          fmt::format("{} strands of no length are left out of all frames", strands_->left_out_count()));
+    if (collapsed_frames_ > 0)
+      remarks.push_back(fmt::format(
+          "in {} frames strands lost their length: programs may refuse these curves", collapsed_frames_));
+    if (thin_states_ > 0)
+      remarks.push_back(
+          fmt::format("{} states came with fewer strands, the others were filled in: the link was too "
+                      "slow for all",
+                      thin_states_));
+    for (std::string& remark : source_.remarks()) remarks.push_back(std::move(remark));
+  }
+
+  ExportSource& source_;
+  const ExportOptions options_;
+  FrameSampler sampler_;
+  std::optional<StrandSet> strands_;  // once the first frame is there; the writer refers to it
+  std::unique_ptr<StrandWriter> writer_;
+  Progress progress_;
+  ExportReport report_;
+  bool is_whole_ = false;
+  uint64_t collapsed_frames_ = 0;
+  uint64_t thin_states_ = 0;
+};
+
+}  // namespace
+
+Status check_export(const ExportOptions& options) {
+  const std::string extension = extension_of(options.path);
+  const auto fail = [&](ErrorCode code, std::string_view sentence) {
+    return at(options.path.string(), make_error(code, "{}", sentence));
+  };
+  if (extension == ".abc")
+    return fail(ErrorCode::Unsupported,
+                "Alembic is not written: export .usda, and convert it in Blender or Houdini");
+  if (extension == ".usdc" || extension == ".usd" || extension == ".usdz")
+    return fail(ErrorCode::Unsupported,
+                "USD is written as text: export .usda ('usdcat out.usda -o out.usdc' makes it binary)");
+  if (writer_for(extension) == nullptr)
+    return fail(ErrorCode::BadInput, "the extension says the format; known are .usda, .ply and .csv");
+  if (!std::isfinite(options.from_s) || options.from_s < 0.0)
+    return make_error(ErrorCode::BadInput, "the beginning is {} s, it has to be 0 or later", options.from_s);
+  if (options.to_s && !(*options.to_s >= options.from_s))
+    return make_error(ErrorCode::BadInput, "the end, {} s, is before the beginning, {} s", *options.to_s,
+                      options.from_s);
+  return {};
+}
+
+Result<ExportReport> export_strands(ExportSource& source, const ExportOptions& options,
+                                    const std::atomic<bool>& stop) {
+  RETURN_IF_ERROR(check_export(options));
+  Export run(source, options);
+  RETURN_IF_ERROR(run.run(stop));
+  return run.finish();
+}
+
+}  // namespace strandcast

@@ -1,0 +1,57 @@
+// FrameSampler: frames at an even rate from states at any, by the interpolation that viewers use. Keeps the
+// few states that the next frames need. Pure logic; one thread.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "common/replay/state_blend.h"
+
+namespace strandcast {
+
+struct SampledFrame {
+  uint64_t index = 0;   // from 0
+  double time_s = 0.0;  // simulated
+  PosedStrands strands;
+};
+
+struct SampleRange {
+  double fps = 30.0;
+  double from_s = 0.0;         // after the first state
+  std::optional<double> to_s;  // likewise; empty: to the last state
+};
+
+class FrameSampler {
+ public:
+  enum class Outcome {
+    Kept,
+    Repeated,  // its time is that of the state before: it replaces that one
+    WentBack,  // time began anew: it is not kept, and no other will be
+  };
+
+  /// `fill` makes strands that states lack.
+  FrameSampler(const SampleRange& range, StrandFill fill);
+
+  Outcome add(std::shared_ptr<const Snapshot> state);
+  /// No more states come: frames up to the last one are due.
+  void finish() { is_finished_ = true; }
+  /// The next frame that can be made of the states so far.
+  std::optional<SampledFrame> next();
+  /// All frames of the range were given out.
+  bool is_done() const;
+
+ private:
+  int64_t time_ns(uint64_t index) const;
+  void forget_states();
+
+  SampleRange range_;
+  StateBlend blend_;
+  std::deque<std::shared_ptr<const Snapshot>> states_;
+  std::optional<int64_t> first_ns_;  // of the first state
+  uint64_t next_index_ = 0;
+  bool is_finished_ = false;
+};
+
+}  // namespace strandcast

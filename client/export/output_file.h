@@ -1,0 +1,43 @@
+// OutputFile: a file that is written piece by piece, however large, and is there under its name only once it
+// is whole. One thread.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string_view>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+class OutputFile {
+ public:
+  /// Begins a file beside `path`; its folder is made where there is none.
+  static Result<OutputFile> create(const std::filesystem::path& path);
+  /// What was not finished is removed.
+  ~OutputFile();
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+  OutputFile(const OutputFile&) = delete;
+
+  Status append(std::string_view bytes);
+  /// Writes over what stands at `offset`.
+  Status patch(uint64_t offset, std::string_view bytes);
+  /// Gives the file its name; one that was there is replaced.
+  Status finish();
+
+  uint64_t size_bytes() const { return size_bytes_; }
+
+ private:
+  OutputFile(std::filesystem::path path, std::filesystem::path part, std::FILE* file);
+  Status fail(const char* what) const;
+
+  std::filesystem::path path_;
+  std::filesystem::path part_;
+  std::FILE* file_;
+  uint64_t size_bytes_ = 0;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,42 @@
+// StrandWriter: writes frames of strands to a file of some format, one by one, so that memory stays the same
+// however long an export is. One thread.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <span>
+
+#include "client/export/export_options.h"
+#include "client/export/strand_set.h"
+#include "common/base/result.h"
+
+namespace strandcast {
+
+/// A frame in the units and axes of the file.
+struct ExportFrame {
+  uint64_t number = 0;                 // from 1
+  double time_s = 0.0;                 // simulated
+  std::span<const glm::dvec3> points;  // (strand_count x vertex_count) strand after strand, root first
+};
+
+struct WrittenBytes {
+  uint64_t files = 0;
+  uint64_t bytes = 0;
+};
+
+class StrandWriter {
+ public:
+  virtual ~StrandWriter() = default;
+  virtual Status write(const ExportFrame& frame) = 0;
+  /// Completes what was written; nothing follows.
+  virtual Result<WrittenBytes> finish() = 0;
+};
+
+/// Writers of each format, the rest shape written as frame 0. `strands` outlives them.
+Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
+                                                       const StrandSet& strands);
+Result<std::unique_ptr<StrandWriter>> make_ply_writer(const ExportOptions& options, const StrandSet& strands);
+Result<std::unique_ptr<StrandWriter>> make_csv_writer(const ExportOptions& options, const StrandSet& strands);
+
+}  // namespace strandcast

@@ -1,0 +1,194 @@
+// USD text: one BasisCurves with its points as time samples, in the conventions that Unreal takes for grooms.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/export/number_text.h"
+#include "client/export/output_file.h"
+#include "client/export/strand_writer.h"
+#include "common/base/worker_pool.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kPointsPerPiece = 4'096;
+constexpr size_t kMostPointChars = 3 * kMostDecimalChars + 8;  // "(x, y, z), "
+constexpr int kGroomVersionMajor = 1, kGroomVersionMinor = 5;  // of Unreal's groom conventions
+
+/// Decimals of a coordinate: steps of kExportStepM.
+int decimals_of(ExportUnit unit) {
+  return unit == ExportUnit::Centimetre ? 4 : 6;
+}
+
+struct Extent {
+  glm::dvec3 low, high;
+};
+
+class UsdaWriter : public StrandWriter {
+ public:
+  UsdaWriter(const ExportOptions& options, const StrandSet& strands, OutputFile file)
+      : options_(options), strands_(strands), file_(std::move(file)) {
+    half_width_ = 0.5 * *std::max_element(strands.widths().begin(), strands.widths().end());
+  }
+
+  Status begin() {
+    RETURN_IF_ERROR(file_.append(layer_text()));
+    RETURN_IF_ERROR(file_.append(curves_text()));
+    const std::vector<glm::dvec3> rest = strands_.rest_points();
+    RETURN_IF_ERROR(file_.append("        point3f[] points = "));
+    RETURN_IF_ERROR(append_points(rest));
+    RETURN_IF_ERROR(file_.append("\n        point3f[] points.timeSamples = {\n"));
+    return append_sample(0, rest);
+  }
+
+  Status write(const ExportFrame& frame) override {
+    last_frame_ = frame.number;
+    return append_sample(frame.number, frame.points);
+  }
+
+  Result<WrittenBytes> finish() override {
+    RETURN_IF_ERROR(file_.append("        }\n        float3[] extent = "));
+    RETURN_IF_ERROR(
+        file_.append(extent_text(extents_.front()) + "\n        float3[] extent.timeSamples = {\n"));
+    for (size_t frame = 0; frame < extents_.size(); ++frame)
+      RETURN_IF_ERROR(
+          file_.append(fmt::format("            {}: {},\n", frame, extent_text(extents_[frame]))));
+    RETURN_IF_ERROR(file_.append("        }\n    }\n}\n"));
+    RETURN_IF_ERROR(file_.patch(end_time_at_, fmt::format("{}", last_frame_)));
+    const uint64_t bytes = file_.size_bytes();
+    RETURN_IF_ERROR(file_.finish());
+    return WrittenBytes{1, bytes};
+  }
+
+ private:
+  std::string layer_text() {
+    std::string text = "#usda 1.0\n(\n";
+    text += "    defaultPrim = \"Hair\"\n";
+    text += fmt::format(
+        "    doc = \"{} strands of {} vertices, root first, in {}. Time code 0 is the rest shape, the motion "
+        "begins at 1.\"\n",
+        strands_.strand_count(), strands_.vertex_count(),
+        options_.space == ExportSpace::Head ? "the head's own space" : "the world");
+    text += fmt::format("    metersPerUnit = {}\n", metres_of(options_.unit));
+    text += fmt::format("    upAxis = \"{}\"\n", options_.up == ExportUp::Y ? 'Y' : 'Z');
+    text += "    startTimeCode = 1\n    endTimeCode = ";
+    end_time_at_ = text.size();
+    // How many frames there will be is known at the end.
+    text += std::string(20, ' ') + "\n";
+    text +=
+        fmt::format("    timeCodesPerSecond = {}\n    framesPerSecond = {}\n", options_.fps, options_.fps);
+    text += ")\n\ndef Xform \"Hair\" (\n    kind = \"component\"\n)\n{\n";
+    return text;
+  }
+
+  std::string curves_text() const {
+    const bool is_guide = options_.role == ExportRole::Guides;
+    std::string text =
+        "    def BasisCurves \"Strands\" (\n        prepend apiSchemas = [\"GroomAPI\"]\n    )\n    {\n";
+    text += "        uniform token type = \"linear\"\n        uniform token wrap = \"nonperiodic\"\n";
+    text +=
+        "        int[] curveVertexCounts = " + repeated(fmt::format("{}", strands_.vertex_count())) + "\n";
+    text += "        float[] widths = " + widths_text() +
+            " (\n            interpolation = \"vertex\"\n        )\n";
+    text += fmt::format("        custom int userProperties:groom_version_major = {}\n", kGroomVersionMajor);
+    text += fmt::format("        custom int userProperties:groom_version_minor = {}\n", kGroomVersionMinor);
+    const std::string uniform = " (\n            interpolation = \"uniform\"\n        )\n";
+    text += "        int[] primvars:groom_guide = " + repeated(is_guide ? "1" : "0") + uniform;
+    text += "        int[] primvars:groom_group_id = " + repeated("0") + uniform;
+    text += "        texCoord2f[] primvars:groom_root_uv = " + root_uv_text() + uniform;
+    return text;
+  }
+
+  /// An array of the same value for each strand.
+  std::string repeated(const std::string& value) const {
+    std::string text = "[";
+    for (uint32_t strand = 0; strand < strands_.strand_count(); ++strand)
+      text += (strand > 0 ? ", " : "") + value;
+    return text + "]";
+  }
+
+  std::string widths_text() const {
+    std::string one;
+    for (const float width : strands_.widths()) {
+      if (!one.empty()) one += ", ";
+      append_shortest(one, width);
+    }
+    return repeated(one);
+  }
+
+  std::string root_uv_text() const {
+    std::string text = "[";
+    for (const glm::vec2& uv : strands_.root_uv())
+      text += fmt::format("{}({:.5g}, {:.5g})", text.size() > 1 ? ", " : "", uv.x, uv.y);
+    return text + "]";
+  }
+
+  std::string extent_text(const Extent& extent) const {
+    const glm::dvec3 low = extent.low - half_width_, high = extent.high + half_width_;
+    return fmt::format("[({:.7g}, {:.7g}, {:.7g}), ({:.7g}, {:.7g}, {:.7g})]", low.x, low.y, low.z, high.x,
+                       high.y, high.z);
+  }
+
+  Status append_sample(uint64_t time_code, std::span<const glm::dvec3> points) {
+    Extent extent{points.front(), points.front()};
+    for (const glm::dvec3& point : points)
+      extent = {glm::min(extent.low, point), glm::max(extent.high, point)};
+    extents_.push_back(extent);
+    RETURN_IF_ERROR(file_.append(fmt::format("            {}: ", time_code)));
+    RETURN_IF_ERROR(append_points(points));
+    return file_.append(",\n");
+  }
+
+  /// Pieces are made side by side and written in their order.
+  Status append_points(std::span<const glm::dvec3> points) {
+    const int decimals = decimals_of(options_.unit);
+    const size_t piece_count = (points.size() + kPointsPerPiece - 1) / kPointsPerPiece;
+    pieces_.resize(piece_count);
+    shared_workers().at(Priority::Background).for_ranges(piece_count, 1, [&](size_t begin, size_t end) {
+      for (size_t piece = begin; piece < end; ++piece) {
+        const auto some = points.subspan(piece * kPointsPerPiece,
+                                         std::min(kPointsPerPiece, points.size() - piece * kPointsPerPiece));
+        std::string& text = pieces_[piece];
+        text.resize(some.size() * kMostPointChars);
+        char* out = text.data();
+        for (const glm::dvec3& point : some) {
+          *out++ = '(';
+          for (int axis = 0; axis < 3; ++axis) {
+            out = put_decimal(out, point[axis], decimals);
+            *out++ = axis < 2 ? ',' : ')';
+          }
+          *out++ = ',';
+        }
+        text.resize(static_cast<size_t>(out - text.data()));
+      }
+    });
+    if (!pieces_.empty()) pieces_.back().back() = ']';  // instead of the last comma
+    RETURN_IF_ERROR(file_.append("["));
+    for (const std::string& piece : pieces_) RETURN_IF_ERROR(file_.append(piece));
+    return {};
+  }
+
+  const ExportOptions options_;
+  const StrandSet& strands_;
+  OutputFile file_;
+  double half_width_ = 0.0;
+  uint64_t end_time_at_ = 0;
+  uint64_t last_frame_ = 1;
+  std::vector<std::string> pieces_;  // of points, kept for their memory
+  std::vector<Extent> extents_;      // of all frames: 48 bytes for each
+};
+
+}  // namespace
+
+Result<std::unique_ptr<StrandWriter>> make_usda_writer(const ExportOptions& options,
+                                                       const StrandSet& strands) {
+  ASSIGN_OR_RETURN(OutputFile file, OutputFile::create(options.path));
+  auto writer = std::make_unique<UsdaWriter>(options, strands, std::move(file));
+  RETURN_IF_ERROR(writer->begin());
+  return std::unique_ptr<StrandWriter>(std::move(writer));
+}
+
+}  // namespace strandcast

@@ -1,0 +1,390 @@
+// Exports: frames at an even rate, and files that come back as what went in.
+#include <algorithm>
+#include <cmath>
+
+#include "client/export/export_strands.h"
+#include "client/export/frame_sampler.h"
+#include "client/export/number_text.h"
+#include "common/base/file.h"
+#include "common/groom/groom_file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+constexpr uint32_t kStrands = 7, kVertices = 5;
+constexpr float kQuantumM = 1e-5f;
+constexpr double kReimportM = 1e-5;
+constexpr int64_t kStepNs = 16'666'667;
+
+/// Hair that hangs from a ring and swings as cubics of time do, on a head that walks and turns.
+glm::vec3 place_of(uint32_t strand, uint32_t vertex, double t_s) {
+  const double angle = 0.9 * strand, down = 0.05 * vertex;
+  const double swing = vertex * (0.01 * t_s + 0.02 * t_s * t_s - 0.015 * t_s * t_s * t_s);
+  return {0.1 * std::cos(angle) + swing, 0.1 - down, 0.1 * std::sin(angle) - 0.5 * swing};
+}
+Pose pose_of(double t_s) {
+  return {{0.3 * t_s, 1.6, -0.2 * t_s}, glm::angleAxis(0.4 * t_s, glm::dvec3(0, 1, 0))};
+}
+std::vector<glm::vec3> positions_at(double t_s) {
+  std::vector<glm::vec3> positions;
+  for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
+    for (uint32_t strand = 0; strand < kStrands; ++strand) positions.push_back(place_of(strand, vertex, t_s));
+  return positions;
+}
+std::shared_ptr<const Snapshot> state_at(int64_t sim_time_ns, const std::vector<glm::vec3>& positions) {
+  QuantiseInput input;
+  input.sim_time_ns = sim_time_ns;
+  input.world_from_head = pose_of(static_cast<double>(sim_time_ns) * 1e-9);
+  input.strand_count = kStrands;
+  input.vertex_count = kVertices;
+  input.quantum_m = kQuantumM;
+  input.position_in_head_m = positions;
+  return std::make_shared<Snapshot>(quantise(input).snapshot);
+}
+std::shared_ptr<const Snapshot> state_at(int64_t sim_time_ns) {
+  return state_at(sim_time_ns, positions_at(static_cast<double>(sim_time_ns) * 1e-9));
+}
+
+class MadeStates : public ExportSource {
+ public:
+  explicit MadeStates(size_t count) {
+    SceneAsset asset;
+    asset.strand_count = kStrands;
+    asset.vertex_count = kVertices;
+    asset.rest_position_m = positions_at(0.0);
+    scene_ = {std::make_shared<const SceneAsset>(asset), 0.0002f, 0.25f};
+    for (size_t i = 0; i < count; ++i) states_.push_back(state_at(static_cast<int64_t>(i) * kStepNs));
+  }
+  const ExportScene& scene() const override { return scene_; }
+  Result<std::shared_ptr<const Snapshot>> next() override {
+    if (next_ < states_.size()) return states_[next_++];
+    if (end_) return *end_;
+    return std::shared_ptr<const Snapshot>();
+  }
+  std::vector<std::string> remarks() const override { return {"the source says so"}; }
+
+  ExportScene scene_;
+  std::vector<std::shared_ptr<const Snapshot>> states_;
+  std::optional<Error> end_;
+  size_t next_ = 0;
+};
+
+const std::atomic<bool> kNeverStopped{false};
+
+ExportReport exported(MadeStates& states, ExportOptions options) {
+  options.is_quiet = true;
+  const auto report = export_strands(states, options, kNeverStopped);
+  EXPECT_TRUE(report) << report.error().to_string();
+  return report ? *report : ExportReport{};
+}
+
+/// Strands of a file as head space, strand after strand.
+Groom imported(const std::filesystem::path& path) {
+  GroomFileOptions options;
+  options.path = path;
+  options.is_z_up.reset();
+  const auto placed = load_placed_groom(options);
+  EXPECT_TRUE(placed) << placed.error().to_string();
+  return placed ? placed->groom : Groom{};
+}
+
+TEST(NumberText, IsShortAndRoundsToTheStep) {
+  const auto text = [](double value, int decimals) {
+    char digits[kMostDecimalChars];
+    return std::string(digits, put_decimal(digits, value, decimals));
+  };
+  EXPECT_EQ(text(0.0, 4), "0");
+  EXPECT_EQ(text(-0.00001, 4), "0");
+  EXPECT_EQ(text(-0.00005, 4), "-0.0001");
+  EXPECT_EQ(text(12.5, 4), "12.5");
+  EXPECT_EQ(text(-12.0203, 4), "-12.0203");
+  EXPECT_EQ(text(0.000001, 6), "0.000001");
+  EXPECT_EQ(text(9.99999, 4), "10");
+  EXPECT_EQ(text(123456.0, 0), "123456");
+  EXPECT_LE(text(-999'999'999.123456789, 9).size(), kMostDecimalChars);
+}
+
+TEST(FrameSampler, FramesAreEvenAndNeedTheStateAfterTheLaterOne) {
+  FrameSampler sampler({24.0, 0.0, {}}, StrandFill());
+  uint64_t given = 0;
+  for (int i = 0; i < 60; ++i) {
+    EXPECT_EQ(sampler.add(state_at(i * kStepNs)), FrameSampler::Outcome::Kept);
+    while (const auto frame = sampler.next()) {
+      EXPECT_EQ(frame->index, given);
+      EXPECT_NEAR(frame->time_s, static_cast<double>(given) / 24.0, 1e-9);
+      const double newest_s = static_cast<double>(i) * kStepNs * 1e-9;
+      EXPECT_TRUE(given == 0 || frame->time_s < newest_s - 0.5 * kStepNs * 1e-9);
+      // Cubics of time are hit but for the lattice, also where the first and last have only a line.
+      const auto exact = positions_at(frame->time_s);
+      for (size_t v = 0; v < exact.size(); ++v)
+        EXPECT_LT(glm::distance(frame->strands.position_m[v], exact[v]), given == 1 ? 1e-4f : 3e-5f) << given;
+      ++given;
+    }
+  }
+  sampler.finish();
+  while (sampler.next()) ++given;
+  EXPECT_EQ(given, static_cast<uint64_t>(59.0 * kStepNs * 1e-9 * 24.0) + 1);
+}
+
+TEST(FrameSampler, ARangeIsKeptAndTimeThatBeginsAnewEndsIt) {
+  FrameSampler sampler({30.0, 0.1, 0.3}, StrandFill());
+  std::vector<double> times;
+  int64_t at_ns = 5'000'000'000;  // a server that has run for a while
+  while (!sampler.is_done()) {
+    sampler.add(state_at(at_ns));
+    at_ns += kStepNs;
+    while (const auto frame = sampler.next()) times.push_back(frame->time_s);
+  }
+  ASSERT_EQ(times.size(), 7u);
+  EXPECT_NEAR(times.front(), 5.1, 1e-9);
+  EXPECT_NEAR(times.back(), 5.3, 1e-9);
+
+  FrameSampler reset({30.0, 0.0, {}}, StrandFill());
+  EXPECT_EQ(reset.add(state_at(2 * kStepNs)), FrameSampler::Outcome::Kept);
+  EXPECT_EQ(reset.add(state_at(2 * kStepNs)), FrameSampler::Outcome::Repeated);
+  EXPECT_EQ(reset.add(state_at(0)), FrameSampler::Outcome::WentBack);
+}
+
+TEST(Export, EveryFormatUnitAxisAndSpaceComesBackWithinTheBound) {
+  const TemporaryFolder folder;
+  for (const char* const extension : {".usda", ".ply"}) {
+    for (const ExportUnit unit : {ExportUnit::Centimetre, ExportUnit::Metre}) {
+      for (const ExportUp up : {ExportUp::Y, ExportUp::Z}) {
+        for (const ExportSpace space : {ExportSpace::Head, ExportSpace::World}) {
+          MadeStates states(30);
+          ExportOptions options;
+          options.path = folder.path() / (std::string("hair") + extension);
+          options.unit = unit;
+          options.up = up;
+          options.space = space;
+          options.from_s = 0.2;
+          options.is_one_frame = true;
+          const ExportReport report = exported(states, options);
+          EXPECT_EQ(report.frame_count, 1u);
+          EXPECT_EQ(report.strand_count, kStrands);
+          const Groom groom = imported(options.path);
+          ASSERT_EQ(groom.strand_count(), kStrands);
+          ASSERT_EQ(groom.uniform_vertex_count(), kVertices);
+          // USD's own points are the rest shape; on the head of the first frame.
+          const bool is_rest = options.path.extension() == ".usda";
+          const Pose pose = space == ExportSpace::World ? pose_of(0.2) : Pose{};
+          for (uint32_t strand = 0; strand < kStrands; ++strand) {
+            for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
+              const glm::dvec3 expected = pose * glm::dvec3(place_of(strand, vertex, is_rest ? 0.0 : 0.2));
+              const glm::dvec3 found(groom.rest_position_m[groom.offset[strand] + vertex]);
+              EXPECT_LT(glm::distance(found, expected), kReimportM + (is_rest ? 0.0 : 2.0 * kQuantumM));
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+/// Rows of a CSV file: numbers, NaN where there is nothing.
+std::vector<std::vector<double>> rows_of(const std::filesystem::path& path) {
+  const auto text = load_text(path, 1 << 24);
+  EXPECT_TRUE(text);
+  std::vector<std::vector<double>> rows;
+  std::istringstream lines(*text);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "frame,time_s,strand,vertex,x_cm,y_cm,z_cm,width_cm");
+  while (std::getline(lines, line)) {
+    std::vector<double>& row = rows.emplace_back();
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');)
+      row.push_back(cell.empty() ? NAN : std::stod(cell));
+  }
+  return rows;
+}
+
+TEST(Export, CsvHasARowForEachVertexOfEachFrameInOrder) {
+  const TemporaryFolder folder;
+  MadeStates states(61);
+  ExportOptions options;
+  options.path = folder.path() / "new folder" / "hair.csv";
+  options.fps = 24;
+  const ExportReport report = exported(states, options);
+  EXPECT_EQ(report.frame_count, 25u);
+  EXPECT_THAT(report.remarks, Contains("the source says so"));
+  const auto rows = rows_of(options.path);
+  ASSERT_EQ(rows.size(), 26u * kStrands * kVertices);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const auto& row = rows[i];
+    ASSERT_EQ(row.size(), 8u);
+    const auto frame = static_cast<double>(i / (kStrands * kVertices));
+    EXPECT_EQ(row[0], frame);
+    EXPECT_EQ(row[2], static_cast<double>(i / kVertices % kStrands));
+    EXPECT_EQ(row[3], static_cast<double>(i % kVertices));
+    const double t_s = (frame - 1.0) / 24.0;
+    if (frame == 0.0)
+      EXPECT_TRUE(std::isnan(row[1]));
+    else
+      EXPECT_NEAR(row[1], t_s, 1e-6);
+    const glm::vec3 expected =
+        place_of(static_cast<uint32_t>(row[2]), static_cast<uint32_t>(row[3]), std::max(t_s, 0.0));
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(row[4 + static_cast<size_t>(axis)], 100.0 * expected[axis], 100.0 * (kReimportM + 1e-4));
+    // 0.4 mm at the root, a quarter of it at the tip.
+    EXPECT_NEAR(row[7], 0.04 * (1.0 - 0.75 * row[3] / (kVertices - 1)), 1e-6);
+  }
+}
+
+TEST(Export, UsdaSaysWhatProgramsGuessWrongOtherwise) {
+  const TemporaryFolder folder;
+  MadeStates states(61);
+  ExportOptions options;
+  options.path = folder.path() / "hair.usda";
+  options.fps = 25;
+  options.up = ExportUp::Z;
+  options.role = ExportRole::Guides;
+  exported(states, options);
+  const std::string text = *load_text(options.path, 1 << 24);
+  for (const char* const said : {"#usda 1.0\n",
+                                 "metersPerUnit = 0.01\n",
+                                 "upAxis = \"Z\"\n",
+                                 "startTimeCode = 1\n",
+                                 "endTimeCode = 26 ",
+                                 "timeCodesPerSecond = 25\n",
+                                 "framesPerSecond = 25\n",
+                                 "defaultPrim = \"Hair\"\n",
+                                 "prepend apiSchemas = [\"GroomAPI\"]",
+                                 "uniform token type = \"linear\"",
+                                 "uniform token wrap = \"nonperiodic\"",
+                                 "int[] curveVertexCounts = [5, 5, 5, 5, 5, 5, 5]",
+                                 "userProperties:groom_version_major = 1",
+                                 "userProperties:groom_version_minor = 5",
+                                 "primvars:groom_guide = [1, 1, 1, 1, 1, 1, 1]",
+                                 "primvars:groom_group_id = [0, 0, 0, 0, 0, 0, 0]",
+                                 "primvars:groom_root_uv = [(",
+                                 "float[] widths = [0.04, ",
+                                 "\n            0: [(",
+                                 "\n            26: [("})
+    EXPECT_THAT(text, HasSubstr(said));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "hair.usda.part"));
+}
+
+TEST(Export, UsdaFramesAreTheStatesAtTheirTimes) {
+  const TemporaryFolder folder;
+  MadeStates states(61);
+  ExportOptions options;
+  options.path = folder.path() / "hair.usda";
+  options.space = ExportSpace::World;
+  options.fps = 24;
+  options.from_s = 0.25;
+  exported(states, options);
+  const std::string text = *load_text(options.path, 1 << 24);
+  const auto line_after = [&text](const std::string& begin) {
+    const size_t at = text.find(begin) + begin.size();
+    EXPECT_NE(text.find(begin), std::string::npos) << begin;
+    return text.substr(at, text.find('\n', at) - at);
+  };
+  const std::string rest = line_after("point3f[] points = ");
+  for (int frame = 1; frame <= 19; ++frame) {
+    // As the file's points, which the reader takes.
+    std::string still = text;
+    std::string points = line_after(fmt::format("\n            {}: ", frame));
+    points.pop_back();
+    still.replace(still.find(rest), rest.size(), points);
+    const Groom groom = imported(folder.write("still.usda", still));
+    ASSERT_EQ(groom.strand_count(), kStrands);
+    const double t_s = 0.25 + (frame - 1) / 24.0;
+    for (uint32_t strand = 0; strand < kStrands; ++strand) {
+      for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
+        const glm::dvec3 expected = pose_of(t_s) * glm::dvec3(place_of(strand, vertex, t_s));
+        const glm::dvec3 found(groom.rest_position_m[groom.offset[strand] + vertex]);
+        // What the states' lattice and the line at the end add is not the file's.
+        EXPECT_LT(glm::distance(found, expected), kReimportM + (frame < 19 ? 3.0 : 20.0) * kQuantumM)
+            << frame;
+      }
+    }
+  }
+}
+
+TEST(Export, PlySequencesAreNumberedFromTheRestShape) {
+  const TemporaryFolder folder;
+  MadeStates states(30);
+  ExportOptions options;
+  options.path = folder.path() / "hair.ply";
+  options.to_s = 0.1;
+  const ExportReport report = exported(states, options);
+  EXPECT_EQ(report.frame_count, 4u);
+  EXPECT_EQ(report.file_count, 5u);
+  for (const char* const name : {"hair_0000.ply", "hair_0001.ply", "hair_0004.ply"})
+    EXPECT_EQ(imported(folder.path() / name).strand_count(), kStrands) << name;
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "hair_0005.ply"));
+  EXPECT_THAT(*load_text(folder.path() / "hair_0002.ply", 1 << 20),
+              HasSubstr("at 0.0333333 s of the simulation"));
+}
+
+TEST(Export, CurvesOfNoLengthAreLeftOutOfAllFramesAndCounted) {
+  const TemporaryFolder folder;
+  MadeStates states(0);
+  auto asset = std::make_shared<SceneAsset>(*states.scene_.asset);
+  for (uint32_t vertex = 0; vertex < kVertices; ++vertex)
+    asset->rest_position_m[vertex * kStrands + 2] = asset->rest_position_m[2];  // at rest
+  states.scene_.asset = asset;
+  for (int i = 0; i < 10; ++i) {
+    auto positions = positions_at(0.0);
+    for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
+      positions[vertex * kStrands + 4] = positions[4];             // in the first frame
+      if (i > 5) positions[vertex * kStrands + 6] = positions[6];  // later
+    }
+    states.states_.push_back(state_at(i * kStepNs, positions));
+  }
+  ExportOptions options;
+  options.path = folder.path() / "hair.csv";
+  const ExportReport report = exported(states, options);
+  EXPECT_EQ(report.strand_count, kStrands - 2);
+  EXPECT_THAT(report.remarks, Contains(HasSubstr("2 strands of no length are left out")));
+  EXPECT_THAT(report.remarks, Contains(HasSubstr("in 2 frames strands lost their length")));
+  EXPECT_EQ(rows_of(options.path).size(), (report.frame_count + 1) * (kStrands - 2) * kVertices);
+}
+
+TEST(Export, WhatWasWrittenWhenTheSourceFailsIsWhole) {
+  const TemporaryFolder folder;
+  MadeStates states(20);
+  states.end_ = make_error(ErrorCode::Unavailable, "the server has gone");
+  ExportOptions options;
+  options.path = folder.path() / "hair.usda";
+  const ExportReport report = exported(states, options);
+  EXPECT_EQ(report.frame_count, 10u);
+  EXPECT_THAT(report.remarks, Contains(AllOf(HasSubstr("ends early"), HasSubstr("the server has gone"))));
+  EXPECT_EQ(imported(options.path).strand_count(), kStrands);
+  // Without a frame there is no file, and the error is the source's.
+  MadeStates none(0);
+  none.end_ = states.end_;
+  options.path = folder.path() / "none.usda";
+  EXPECT_THAT(export_strands(none, options, kNeverStopped).error().to_string(),
+              HasSubstr("the server has gone"));
+  EXPECT_FALSE(std::filesystem::exists(options.path));
+}
+
+TEST(Export, WhatCannotBeWrittenIsToldTheWayOut) {
+  const auto refusal = [](const char* path) {
+    ExportOptions options;
+    options.path = path;
+    const Status checked = check_export(options);
+    return checked ? "accepted" : checked.error().to_string();
+  };
+  EXPECT_EQ(refusal("a.usda"), "accepted");
+  EXPECT_EQ(refusal("A.CSV"), "accepted");
+  EXPECT_THAT(refusal("a.abc"),
+              AllOf(HasSubstr("Alembic is not written"), HasSubstr(".usda"), HasSubstr("Blender")));
+  EXPECT_THAT(refusal("a.usdc"), HasSubstr("usdcat"));
+  EXPECT_THAT(refusal("a.obj"), HasSubstr("known are .usda, .ply and .csv"));
+  ExportOptions backwards;
+  backwards.path = "a.usda";
+  backwards.from_s = 2.0;
+  backwards.to_s = 1.0;
+  EXPECT_THAT(check_export(backwards).error().to_string(), HasSubstr("before the beginning"));
+}
+
+}  // namespace
+}  // namespace strandcast
