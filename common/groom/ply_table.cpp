@@ -161,7 +161,8 @@ Result<PlyHeader> read_ply_header(std::string_view file) {
   for (const PlyElement& element : header.element) {
     // Rows without anything in them would take no bytes: their number says nothing about the file.
     if (element.property.empty() && element.row_count > 0)
-      return make_error(ErrorCode::BadInput, "element {} has rows and no property", strandcast::quoted(element.name));
+      return make_error(ErrorCode::BadInput, "element {} has rows and no property",
+                        strandcast::quoted(element.name));
   }
   return header;
 }

@@ -38,7 +38,8 @@ Result<CurveKind> kind_of(const UsdaCurves& curves) {
   kind.is_linear = curves.type == "linear";
   if (kind.is_linear) return kind;
   if (curves.type != "cubic")
-    return make_error(ErrorCode::BadInput, "type is {}, known are linear and cubic", strandcast::quoted(curves.type));
+    return make_error(ErrorCode::BadInput, "type is {}, known are linear and cubic",
+                      strandcast::quoted(curves.type));
   if (curves.basis == "bspline") {
     kind.basis = CurveBasis::BSpline;
   } else if (curves.basis == "catmullRom") {

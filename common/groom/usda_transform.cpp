@@ -52,8 +52,8 @@ Result<glm::dmat4> matrix_of(std::string_view type, const UsdaXformOp& op) {
     return matrix;
   }
   if (type.starts_with("rotate")) return rotation(type.substr(6), value);
-  return make_error(ErrorCode::BadInput, "transform {} with {} numbers is not known", strandcast::quoted(op.name),
-                    value.size());
+  return make_error(ErrorCode::BadInput, "transform {} with {} numbers is not known",
+                    strandcast::quoted(op.name), value.size());
 }
 
 struct Local {

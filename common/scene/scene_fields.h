@@ -131,7 +131,8 @@ void visit_groom(Visitor& v, GroomDesc& groom) {
     if (file->has_yaw) v.number("yaw_deg", file->yaw_deg, kYaw);
     v.paths("more_paths", file->more_paths, kMaxGroomFiles - 1);
     v.number("strand_vertex_count", file->strand_vertex_count, kFileVertexCount);
-    v.require("strand_vertex_count", file->strand_vertex_count != 1, "is 1, a strand has at least 2 vertices");
+    v.require("strand_vertex_count", file->strand_vertex_count != 1,
+              "is 1, a strand has at least 2 vertices");
   });
 }
 
