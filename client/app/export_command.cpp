@@ -24,11 +24,15 @@ std::string size_text(uint64_t bytes) {
 }
 
 void print(const ExportOptions& options, const ExportReport& report) {
-  std::cout << fmt::format("{} strands x {} vertices, {} frames at {} fps from {:.3f} s on, {} in {}: {}\n",
-                           report.strand_count, report.vertex_count, report.frame_count, options.fps,
-                           report.first_s, size_text(report.bytes),
-                           report.file_count == 1 ? "one file" : fmt::format("{} files", report.file_count),
-                           options.path.string());
+  const std::string frames = report.frame_count == 1
+                                 ? fmt::format("the frame at {:.3f} s", report.first_s)
+                                 : fmt::format("{} frames at {} fps from {:.3f} s on", report.frame_count,
+                                               options.fps, report.first_s);
+  std::cout << fmt::format(
+      "{} strands x {} vertices, {}, {} in {}{}\n", report.strand_count, report.vertex_count, frames,
+      size_text(report.bytes),
+      report.file_count == 1 ? std::string() : fmt::format("{} files up to ", report.file_count),
+      report.last_path.string());
   for (const std::string& remark : report.remarks) std::cout << "  " << remark << '\n';
 }
 

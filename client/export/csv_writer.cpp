@@ -17,7 +17,10 @@ constexpr size_t kMostRowChars = 8 * kMostDecimalChars;
 class CsvWriter : public StrandWriter {
  public:
   CsvWriter(const ExportOptions& options, const StrandSet& strands, OutputFile file)
-      : decimals_(options.unit == ExportUnit::Centimetre ? 4 : 6), strands_(strands), file_(std::move(file)) {
+      : decimals_(options.unit == ExportUnit::Centimetre ? 4 : 6),
+        path_(options.path),
+        strands_(strands),
+        file_(std::move(file)) {
     unit_ = options.unit == ExportUnit::Centimetre ? "cm" : "m";
   }
 
@@ -36,7 +39,7 @@ class CsvWriter : public StrandWriter {
   Result<WrittenBytes> finish() override {
     const uint64_t bytes = file_.size_bytes();
     RETURN_IF_ERROR(file_.finish());
-    return WrittenBytes{1, bytes};
+    return WrittenBytes{1, bytes, path_};
   }
 
  private:
@@ -44,7 +47,7 @@ class CsvWriter : public StrandWriter {
     const uint32_t vertex_count = strands_.vertex_count();
     std::vector<std::string> widths(vertex_count);
     for (uint32_t vertex = 0; vertex < vertex_count; ++vertex)
-      append_shortest(widths[vertex], strands_.widths()[vertex]);
+      widths[vertex] = fmt::format("{:.6g}", strands_.widths()[vertex]);
     rows_.resize(points.size() * (begin.size() + kMostRowChars));
     char* out = rows_.data();
     const auto put = [&out](std::string_view text) { out = std::copy(text.begin(), text.end(), out); };
@@ -65,6 +68,7 @@ class CsvWriter : public StrandWriter {
   }
 
   const int decimals_;
+  const std::filesystem::path path_;
   std::string unit_;
   const StrandSet& strands_;
   OutputFile file_;

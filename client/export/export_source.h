@@ -2,7 +2,9 @@
 // recording.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,11 @@ class ExportSource {
   virtual ~ExportSource() = default;
 
   virtual const ExportScene& scene() const = 0;
+  /// Leaves states out that frames from `from_s` after the first state on do not need, where it can. Returns
+  /// the time of the first state where it is known already. Comes before next().
+  virtual Result<std::optional<int64_t>> skip_to([[maybe_unused]] double from_s) {
+    return std::optional<int64_t>();
+  }
   /// The next state, of a later time than the last one unless time began anew; null when there are no more.
   virtual Result<std::shared_ptr<const Snapshot>> next() = 0;
   /// Sentences about what a person should know of the states so far: "12 states were lost on the way".

@@ -31,10 +31,10 @@ MakeWriter writer_for(const std::string& extension) {
 /// One export from the first state to the end of the file.
 class Export {
  public:
-  Export(ExportSource& source, const ExportOptions& options)
+  Export(ExportSource& source, const ExportOptions& options, std::optional<int64_t> first_ns)
       : source_(source),
         options_(options),
-        sampler_({options.fps, options.from_s, options.to_s},
+        sampler_({options.fps, options.from_s, options.to_s, first_ns},
                  StrandFill(source.scene().asset->rest_position_m, source.scene().asset->vertex_count)),
         progress_({"export", options.is_quiet, "frame"}) {
     if (options.to_s) {
@@ -68,6 +68,7 @@ class Export {
     ASSIGN_OR_RETURN(const WrittenBytes written, writer_->finish());
     report_.file_count = written.files;
     report_.bytes = written.bytes;
+    report_.last_path = written.last_path;
     report_.strand_count = strands_->strand_count();
     report_.vertex_count = strands_->vertex_count();
     add_remarks();
@@ -156,7 +157,8 @@ Status check_export(const ExportOptions& options) {
 Result<ExportReport> export_strands(ExportSource& source, const ExportOptions& options,
                                     const std::atomic<bool>& stop) {
   RETURN_IF_ERROR(check_export(options));
-  Export run(source, options);
+  ASSIGN_OR_RETURN(const std::optional<int64_t> first_ns, source.skip_to(options.from_s));
+  Export run(source, options, first_ns);
   RETURN_IF_ERROR(run.run(stop));
   return run.finish();
 }

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct ExportReport {
   double first_s = 0.0;      // simulated time of the first frame
   uint64_t file_count = 0;
   uint64_t bytes = 0;
+  std::filesystem::path last_path;   // of the file, or the last of them
   std::vector<std::string> remarks;  // a sentence for each thing that a person should know
 };
 

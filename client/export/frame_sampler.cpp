@@ -11,7 +11,8 @@ constexpr double kNsPerS = 1e9;
 
 }  // namespace
 
-FrameSampler::FrameSampler(const SampleRange& range, StrandFill fill) : range_(range) {
+FrameSampler::FrameSampler(const SampleRange& range, StrandFill fill)
+    : range_(range), first_ns_(range.first_ns) {
   blend_.set_fill(std::move(fill));
 }
 

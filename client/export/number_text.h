@@ -2,13 +2,12 @@
 #pragma once
 
 #include <charconv>
-#include <cmath>
+#include <cstddef>
 #include <cstdint>
-#include <string>
 
 namespace strandcast {
 
-/// Appends to a buffer that has room: kMostDecimalChars more than it holds.
+/// Room that a number takes at most.
 inline constexpr size_t kMostDecimalChars = 24;
 
 /// Writes `value` rounded to `decimals` (0 to 9) at `out` and returns its end. |value| is below 1e9.
@@ -31,12 +30,6 @@ inline char* put_decimal(char* out, double value, int decimals) {
   char* const end = out + digits;
   for (char* digit = end; digit != out; rest /= 10) *--digit = static_cast<char>('0' + rest % 10);
   return end;
-}
-
-/// The shortest text that is read as the same float.
-inline void append_shortest(std::string& text, float value) {
-  char digits[kMostDecimalChars];
-  text.append(digits, std::to_chars(digits, digits + sizeof(digits), value).ptr);
 }
 
 }  // namespace strandcast

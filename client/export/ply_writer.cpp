@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "client/export/number_text.h"
 #include "client/export/output_file.h"
 #include "client/export/strand_writer.h"
 
@@ -38,8 +37,6 @@ class PlyWriter : public StrandWriter {
   }
 
   std::string header(const std::string& moment) const {
-    std::string unit;
-    append_shortest(unit, static_cast<float>(metres_of(options_.unit)));
     const uint64_t points = uint64_t{strands_.strand_count()} * strands_.vertex_count();
     return fmt::format(
         "ply\nformat binary_little_endian 1.0\n"
@@ -48,7 +45,7 @@ class PlyWriter : public StrandWriter {
         "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float width\n"
         "element strand {}\nproperty ushort nsegs\nend_header\n",
         strands_.strand_count(), strands_.vertex_count(), moment,
-        options_.space == ExportSpace::Head ? "the head's own space" : "the world", unit,
+        options_.space == ExportSpace::Head ? "the head's own space" : "the world", metres_of(options_.unit),
         options_.up == ExportUp::Y ? 'Y' : 'Z', strands_.vertex_count(), points, strands_.strand_count());
   }
 
@@ -65,7 +62,8 @@ class PlyWriter : public StrandWriter {
     }
     for (uint32_t strand = 0; strand < strands_.strand_count(); ++strand)
       put(static_cast<uint16_t>(strands_.vertex_count() - 1));
-    ASSIGN_OR_RETURN(OutputFile file, OutputFile::create(path_of(number)));
+    written_.last_path = path_of(number);
+    ASSIGN_OR_RETURN(OutputFile file, OutputFile::create(written_.last_path));
     RETURN_IF_ERROR(file.append(bytes));
     RETURN_IF_ERROR(file.finish());
     ++written_.files;

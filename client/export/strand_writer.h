@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
@@ -23,6 +24,7 @@ struct ExportFrame {
 struct WrittenBytes {
   uint64_t files = 0;
   uint64_t bytes = 0;
+  std::filesystem::path last_path;
 };
 
 class StrandWriter {

@@ -60,7 +60,7 @@ class UsdaWriter : public StrandWriter {
     RETURN_IF_ERROR(file_.patch(end_time_at_, fmt::format("{}", last_frame_)));
     const uint64_t bytes = file_.size_bytes();
     RETURN_IF_ERROR(file_.finish());
-    return WrittenBytes{1, bytes};
+    return WrittenBytes{1, bytes, options_.path};
   }
 
  private:
@@ -112,10 +112,8 @@ class UsdaWriter : public StrandWriter {
 
   std::string widths_text() const {
     std::string one;
-    for (const float width : strands_.widths()) {
-      if (!one.empty()) one += ", ";
-      append_shortest(one, width);
-    }
+    for (const float width : strands_.widths())
+      one += fmt::format("{}{:.6g}", one.empty() ? "" : ", ", width);
     return repeated(one);
   }
 

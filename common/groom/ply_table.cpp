@@ -101,8 +101,10 @@ Status add_line(TextScan& scan, PlyHeader& header, bool& has_format) {
     header.element.back().property.push_back(std::move(property));
   } else if (key == "comment") {
     std::string words;
-    for (std::string_view word = scan.next_word(); !word.empty(); word = scan.next_word())
-      words += (words.empty() ? "" : " ") + std::string(word);
+    for (std::string_view word = scan.next_word(); !word.empty(); word = scan.next_word()) {
+      if (!words.empty()) words += ' ';
+      words += word;
+    }
     header.comment.push_back(std::move(words));
   } else if (key != "obj_info") {
     return line_error(scan, ErrorCode::BadInput,

@@ -159,7 +159,7 @@ Result<std::vector<T>> UsdaScan::array(size_t limit, const ReadItem& read_item) 
 
 Result<std::vector<glm::vec3>> UsdaScan::points(size_t limit) {
   return array<glm::vec3>(limit, [this]() -> Result<glm::vec3> {
-    glm::vec3 point;
+    glm::vec3 point{0.0f};
     RETURN_IF_ERROR(expect('('));
     for (int axis = 0; axis < 3; ++axis) {
       if (axis > 0) RETURN_IF_ERROR(expect(','));
