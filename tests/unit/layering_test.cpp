@@ -48,6 +48,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/groom", kStrands},
       {"common/scene", kScene},
       {"common/wire", kWire},
+      {"common/record", kWire},
       {"common/net", kBase},
       {"common/gl", kGl},
       {"common/render", kRender},

@@ -1,0 +1,90 @@
+// RecordingReader: a recording of ours (MCAP, proto/RECORDING.md), whole or cut off where the server was
+// killed. Its index is used where it has one and is made by walking over the chunks where not; one chunk at
+// a time is in memory. Input is untrusted. One thread; reads a file that is still being written up to where
+// it was flushed when it was opened.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/record/byte_source.h"
+#include "common/strands/frame_header.h"
+#include "common/strands/scene_asset.h"
+#include "common/wire/recording_messages.h"
+
+namespace strandcast {
+
+/// A keyframe or delta of the recorded strands, as a viewer got it: what StrandDecoder::decode() takes.
+struct RecordedFrame {
+  EncodedFramePtr frame;
+  bool is_keyframe() const { return frame->header.opcode == Opcode::StrandKeyframe; }
+};
+
+struct RecordedItem {
+  int64_t time_ns = 0;  // server clock when the recorder got it
+  std::variant<RecordedFrame, RecordedMessage> what;
+};
+
+/// What next() gives.
+enum class RecordedPart {
+  Frames,    // strands, and losses of them
+  Messages,  // all else
+  All,
+};
+
+/// What the file says without its frames being decoded.
+struct RecordingInfo {
+  uint64_t file_bytes = 0;
+  bool is_indexed = false;    // it was closed, or recovered
+  uint64_t cut_bytes = 0;     // at the end, of a chunk that was not written whole
+  std::string index_trouble;  // why an index that is there was not used; empty = all is well
+  uint64_t chunk_count = 0;
+  uint64_t frame_bytes = 0;    // of chunks with strands
+  uint64_t message_bytes = 0;  // of the others, compressed
+  int64_t first_sim_time_ns = 0;
+  int64_t last_sim_time_ns = 0;               // of the strands
+  uint64_t frame_count = 0;                   // where the index knows it, else 0
+  std::vector<int64_t> keyframe_sim_time_ns;  // in the order of the file; never decreasing in a sound one
+};
+
+class RecordingReader {
+ public:
+  /// NotFound, BadInput (no recording of ours, or nothing of it was flushed) or Unsupported (of a later
+  /// version): one sentence that names the file.
+  static Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path,
+                                                       RecordedPart part = RecordedPart::All);
+  static Result<std::unique_ptr<RecordingReader>> open(std::unique_ptr<ByteSource> source,
+                                                       RecordedPart part = RecordedPart::All);
+  ~RecordingReader();
+  RecordingReader(const RecordingReader&) = delete;
+  RecordingReader& operator=(const RecordingReader&) = delete;
+
+  const RecordingStart& start() const;
+  const RecordingInfo& info() const;
+  /// What viewers got once: topology, strands at rest, the head. The Asset message whole, header in front.
+  const EncodedFramePtr& asset_frame() const;
+  /// The same, decoded. Its payload's hash is checked against start().asset_hash.
+  Result<SceneAsset> asset() const;
+
+  /// The next item, by the time when it was recorded; nothing at the end. RecordingStart and the asset are
+  /// not among them. An error is that of one damaged chunk, or one message in it; the call after goes on
+  /// behind it.
+  Result<std::optional<RecordedItem>> next();
+
+  /// The next frame is then the last keyframe at or before this time of the simulation, or the first one;
+  /// messages go on from where that keyframe was written. Decode from there to the frame that is wanted.
+  Status seek(int64_t sim_time_ns);
+
+ private:
+  class State;
+  explicit RecordingReader(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,131 @@
+// What a recording holds besides strands, as domain types: what came in, what each step of the simulation
+// took of it, what was changed and by whom, and what came out. Layout: proto/RECORDING.md. Decoding checks
+// every field as that of control messages does. No I/O.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/math/pose.h"
+#include "common/scene/body_desc.h"
+#include "common/scene/scene_file.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+inline constexpr uint32_t kRecordingVersion = 1;
+inline constexpr size_t kMaxRecordedSceneBytes = kMaxSceneFileBytes;
+
+/// The first message of a recording.
+struct RecordingStart {
+  uint32_t version = kRecordingVersion;
+  std::string server_version;
+  std::string sim_device;       // what simulated: "gl", "lanes"; empty = nothing did
+  std::string sim_device_name;  // for people
+  std::string codec;            // of the recorded strands
+  std::string scene_text;       // as the scene was at the start, with absolute paths
+  int64_t server_time_ns = 0;   // server clock at the start, which all times below but sim_time_ns go by
+  int64_t unix_time_ns = 0;     // the same moment for people
+  uint64_t asset_hash = 0;      // hash_bytes of the asset's payload
+  bool operator==(const RecordingStart&) const = default;
+};
+
+/// Motion or wind as it came in.
+struct RecordedMotion {
+  uint64_t source = 0;
+  int64_t arrival_ns = 0;
+  MotionSamples samples;
+  bool operator==(const RecordedMotion&) const = default;
+};
+struct RecordedWind {
+  uint64_t source = 0;
+  int64_t arrival_ns = 0;
+  WindSamples samples;
+  bool operator==(const RecordedWind&) const = default;
+};
+
+/// What one step took of all inputs: with the scene and the changes it decides the state that the step ends
+/// in.
+struct RecordedStep {
+  uint64_t tick = 0;
+  int64_t time_ns = 0;      // that the end of the step stands for
+  double input_rate = 1.0;  // time of the inputs that passed per simulated time
+  Pose world_from_head;
+  JointPlaces joints = {};
+  glm::vec3 wind_mps{0.0f};  // when has_wind_stream
+  bool has_motion = false;
+  bool has_wind_stream = false;
+  bool is_motion_stale = true;
+  bool has_teleported = false;
+  double motion_speed = 1.0;
+  int64_t motion_time_ns = 0;
+  uint64_t rejected_samples = 0;
+  bool operator==(const RecordedStep&) const = default;
+};
+
+/// A command or assignment that was carried out or refused between the step `tick` and the next.
+struct RecordedChange {
+  uint64_t tick = 0;
+  std::variant<ControlCommand, SetParameter> what;
+  std::string who;  // for people: name, role and address of the session; empty = not known
+  Notice answer;
+  bool operator==(const RecordedChange&) const = default;
+};
+
+/// From the state published after step `tick` on, positions are published on another lattice.
+struct RecordedStream {
+  uint64_t tick = 0;
+  std::string codec;
+  double bound_m = 0.0;
+  bool operator==(const RecordedStream&) const = default;
+};
+
+/// What was published.
+struct RecordedState {
+  uint64_t tick = 0;
+  int64_t sim_time_ns = 0;
+  uint64_t state_hash = 0;  // of the published state, before a codec changed it
+  bool operator==(const RecordedState&) const = default;
+};
+
+/// The camera of one viewer of pictures, or of one who said what it looks through.
+struct RecordedCamera {
+  uint64_t viewer = 0;
+  CameraDesc camera;
+  bool operator==(const RecordedCamera&) const = default;
+};
+
+/// So much could not be written between what is before and what is after.
+struct RecordedLoss {
+  uint64_t frames = 0;
+  uint64_t messages = 0;
+  uint64_t bytes = 0;
+  bool operator==(const RecordedLoss&) const = default;
+};
+
+using RecordedMessage =
+    std::variant<RecordingStart, RecordedMotion, RecordedWind, RecordedStep, RecordedChange, RecordedStream,
+                 RecordedState, RecordedCamera, RecordedLoss, LookChange, ServerStatus>;
+
+/// One kind of them, as its channel in the file says it.
+struct RecordedKind {
+  const char* topic;   // "/steps"
+  const char* schema;  // full name of the protobuf message
+};
+/// In the order of RecordedMessage.
+std::span<const RecordedKind> recorded_kinds();
+/// Of a protobuf message of ours by its full name: a FileDescriptorSet with all that it needs.
+std::vector<std::byte> message_descriptors(const std::string& schema);
+
+/// The protobuf message alone; strings are shortened and cleaned as in control messages.
+std::vector<std::byte> encode(const RecordedMessage& message);
+/// Inverse for untrusted bytes; `kind` is an index of recorded_kinds().
+Result<RecordedMessage> decode_recorded(size_t kind, std::span<const std::byte> bytes);
+
+}  // namespace strandcast
