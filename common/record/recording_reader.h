@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,7 +34,7 @@ struct RecordedItem {
 
 /// What next() gives.
 enum class RecordedPart {
-  Frames,    // strands, and losses of them
+  Frames,    // strands
   Messages,  // all else
   All,
 };
@@ -48,8 +49,9 @@ struct RecordingInfo {
   uint64_t frame_bytes = 0;    // of chunks with strands
   uint64_t message_bytes = 0;  // of the others, compressed
   int64_t first_sim_time_ns = 0;
-  int64_t last_sim_time_ns = 0;               // of the strands
-  uint64_t frame_count = 0;                   // where the index knows it, else 0
+  int64_t last_sim_time_ns = 0;                    // of the strands
+  uint64_t frame_count = 0;                        // where the index knows it, else 0
+  std::map<std::string, uint64_t> message_counts;  // by topic, likewise
   std::vector<int64_t> keyframe_sim_time_ns;  // in the order of the file; never decreasing in a sound one
 };
 

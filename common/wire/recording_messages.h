@@ -21,6 +21,7 @@ namespace strandcast {
 
 inline constexpr uint32_t kRecordingVersion = 1;
 inline constexpr size_t kMaxRecordedSceneBytes = kMaxSceneFileBytes;
+inline constexpr size_t kMaxRecordedMessageBytes = kMaxRecordedSceneBytes + (64u << 10);
 
 /// The first message of a recording.
 struct RecordingStart {
@@ -122,6 +123,11 @@ struct RecordedKind {
 std::span<const RecordedKind> recorded_kinds();
 /// Of a protobuf message of ours by its full name: a FileDescriptorSet with all that it needs.
 std::vector<std::byte> message_descriptors(const std::string& schema);
+
+inline constexpr const char* kMediaSchema = "strandcast.v1.MediaMessage";
+/// What a viewer gets (header and payload) as a MediaMessage, and out of one: a view into it.
+std::vector<std::byte> encode_media(std::span<const std::byte> message);
+Result<std::span<const std::byte>> decode_media(std::span<const std::byte> bytes);
 
 /// The protobuf message alone; strings are shortened and cleaned as in control messages.
 std::vector<std::byte> encode(const RecordedMessage& message);

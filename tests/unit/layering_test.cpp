@@ -33,7 +33,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
   static const std::set<std::string> kGl = with({"common/gl", "shaders/shared", "common/log"}, kBase);
   static const std::set<std::string> kRender =
       with(with({"common/render", "common/simd", "shaders/lib"}, kGl), kStreams);
-  static const std::set<std::string> kAll = with(with(with(kRender, kWire), kReplay), kKernels);
+  static const std::set<std::string> kAll =
+      with(with(with(with(kRender, kWire), kReplay), kKernels), {"common/record"});
   static const std::map<std::string, std::set<std::string>> kAllowed = {
       {"common/base", {}},
       {"common/simd", kBase},
@@ -62,13 +63,14 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"server/source",
        with({"server/input", "server/sim", "server/scene", "server/publish", "server/stream"},
             with(kRender, kWire))},
+      {"server/record", with({"server/input", "server/source", "server/stream", "common/record"}, kWire)},
       {"server/app", with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode",
-                           "server/net", "server/stream", "server/source"},
+                           "server/net", "server/stream", "server/source", "server/record"},
                           kAll)},
       {"server/report", with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode",
                               "server/stream", "server/net", "server/source", "server/app"},
                              kAll)},
-      {"server", with({"server/app", "server/net"}, kAll)},
+      {"server", with({"server/app", "server/net", "server/record"}, kAll)},
       {"client/net", with({"common/net", "common/replay"}, kWire)},
       // No protobuf, no network, no OpenGL: the page has its own.
       {"client/web", with({"common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
@@ -94,7 +96,7 @@ const std::vector<LibraryRule>& library_rules() {
                                             "client/window"};
   static const std::set<std::string> kApp = {"server/app", "server/report", "client/app", "server", "client"};
   static const std::vector<LibraryRule> kRules = {
-      {"google/protobuf", kProto, {".cpp"}},
+      {"google/protobuf", kProto, {".cpp", "_private.h"}},
       {"strandcast/v1/", kProto, {".cpp"}},
       {"boost/", kNet, {".cpp", "_private.h"}},
       {"openssl/", {"common/net"}, {".cpp"}},

@@ -1,0 +1,67 @@
+// RecordFile: a new file that is written on a thread of its own. Whoever gives it bytes never waits for the
+// disk: what waits for it is bounded, and what finds no room is refused.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "common/base/result.h"
+#include "common/record/mcap_writer.h"
+
+namespace strandcast {
+
+/// What may wait for the disk, and so much more of what is vital.
+inline constexpr uint64_t kMaxWaitingBytes = 64u << 20;
+inline constexpr uint64_t kVitalBytes = 16u << 20;
+
+enum class IfPresent { Refuse, Replace };
+
+class RecordFile : public mcap::ByteSink {
+ public:
+  /// Makes the file. BadInput where it is there and may not be replaced; NotFound or Unavailable where it
+  /// cannot be written. What it held stays until keep().
+  static Result<std::unique_ptr<RecordFile>> make(const std::filesystem::path& path, IfPresent if_present);
+  /// finish(); a file that was not kept is as it was, or gone if it is new.
+  ~RecordFile() override;
+  RecordFile(const RecordFile&) = delete;
+  RecordFile& operator=(const RecordFile&) = delete;
+
+  /// From now on bytes are written. Call once, before take().
+  void keep();
+  bool take(mcap::Bytes bytes, bool is_vital) override;
+  /// Waits until all is written, or cannot be.
+  void finish();
+
+  uint64_t waiting_bytes() const;
+  uint64_t written_bytes() const;
+  /// Why nothing is written any more; what was written whole before is in the file.
+  std::optional<Error> failure() const;
+
+ private:
+  RecordFile(int file, std::filesystem::path path, bool is_new);
+  void run();
+  Status write(const mcap::Bytes& bytes);
+
+  const int file_;
+  const std::filesystem::path path_;
+  const bool is_new_;
+  bool is_kept_ = false;
+
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable changed_;
+  std::deque<mcap::Bytes> waiting_;
+  uint64_t waiting_bytes_ = 0;
+  uint64_t written_bytes_ = 0;
+  bool is_finishing_ = false;
+  std::optional<Error> failure_;
+
+  std::thread thread_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,336 @@
+#include "common/record/recording_reader.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/hash.h"
+#include "common/record/chunk_list.h"
+#include "common/record/recording_layout.h"
+
+namespace strandcast {
+namespace {
+
+/// More than the head of a message in front of its data.
+constexpr size_t kMessageHeadBytes = mcap::kRecordHeadBytes + 22;
+
+/// What a channel carries.
+enum class ChannelRole { Unknown, Asset, Keyframe, Delta, Message };
+struct ChannelUse {
+  ChannelRole role = ChannelRole::Unknown;
+  size_t kind = 0;  // of a message: index of RecordedMessage
+};
+
+ChannelUse use_of(const std::string& topic) {
+  if (topic == kAssetTopic) return {ChannelRole::Asset};
+  if (topic == kKeyframeTopic) return {ChannelRole::Keyframe};
+  if (topic == kDeltaTopic) return {ChannelRole::Delta};
+  const auto kinds = recorded_kinds();
+  const auto found =
+      std::find_if(kinds.begin(), kinds.end(), [&](const RecordedKind& kind) { return topic == kind.topic; });
+  if (found == kinds.end()) return {};
+  return {ChannelRole::Message, static_cast<size_t>(found - kinds.begin())};
+}
+
+bool is_media(ChannelRole role) {
+  return role == ChannelRole::Asset || role == ChannelRole::Keyframe || role == ChannelRole::Delta;
+}
+
+/// Where a keyframe begins a chunk.
+struct KeyframePlace {
+  size_t chunk = 0;  // of the lane
+  int64_t sim_time_ns = 0;
+  uint64_t log_time = 0;
+};
+
+/// Chunks of one sort, one after the other, and the one that is being read.
+struct Lane {
+  std::vector<ChunkPlace> chunks;
+  size_t next_chunk = 0;
+  mcap::Bytes records;
+  size_t offset = 0;  // in the records
+  std::optional<RecordedItem> item;
+
+  bool has_record() const { return offset < records.size(); }
+  void go_to(size_t chunk) {
+    next_chunk = chunk;
+    records.clear();
+    offset = 0;
+    item.reset();
+  }
+};
+
+}  // namespace
+
+class RecordingReader::State {
+ public:
+  State(std::unique_ptr<ByteSource> source, RecordedPart part) : source_(std::move(source)), part_(part) {}
+
+  Status open();
+  Result<std::optional<RecordedItem>> next();
+  Status seek(int64_t sim_time_ns);
+
+  RecordingStart start;
+  RecordingInfo info;
+  EncodedFramePtr asset;
+
+ private:
+  Status sort_chunks(const ChunkList& list);
+  Status read_start();
+  Status read_asset();
+  void find_last_time();
+  Status fill(Lane& lane);
+  Result<std::optional<RecordedItem>> item_of(const mcap::Message& message) const;
+  ChannelUse use(uint16_t channel) const;
+  int64_t server_time(uint64_t log_time) const;
+
+  const std::unique_ptr<ByteSource> source_;
+  const RecordedPart part_;
+  std::map<uint16_t, ChannelUse> uses_;
+  Lane frames_;
+  Lane messages_;
+  std::vector<KeyframePlace> keyframes_;
+};
+
+ChannelUse RecordingReader::State::use(uint16_t channel) const {
+  const auto found = uses_.find(channel);
+  return found != uses_.end() ? found->second : ChannelUse{};
+}
+
+/// Hostile times may wrap around, and do no harm.
+int64_t RecordingReader::State::server_time(uint64_t log_time) const {
+  return static_cast<int64_t>(log_time - static_cast<uint64_t>(start.unix_time_ns) +
+                              static_cast<uint64_t>(start.server_time_ns));
+}
+
+Status RecordingReader::State::open() {
+  ASSIGN_OR_RETURN(const ChunkList list, list_chunks(*source_));
+  info.file_bytes = source_->size_bytes();
+  info.is_indexed = list.is_indexed;
+  info.index_trouble = list.index_trouble;
+  info.cut_bytes = list.cut_bytes;
+  info.chunk_count = list.chunks.size();
+  for (const auto& [id, topic] : list.topics) uses_[id] = use_of(topic);
+  for (const auto& [id, count] : list.message_counts) {
+    const ChannelRole role = use(id).role;
+    if (role == ChannelRole::Keyframe || role == ChannelRole::Delta) info.frame_count += count;
+    if (role == ChannelRole::Message) info.message_counts[list.topics.at(id)] += count;
+  }
+  RETURN_IF_ERROR(sort_chunks(list));
+  RETURN_IF_ERROR(read_start());
+  RETURN_IF_ERROR(read_asset());
+  find_last_time();
+  return seek(info.first_sim_time_ns);
+}
+
+/// By what the first message of each says; a chunk that is damaged there counts to the messages, where it is
+/// told.
+Status RecordingReader::State::sort_chunks(const ChunkList& list) {
+  for (const ChunkPlace& place : list.chunks) {
+    mcap::Bytes bytes(static_cast<size_t>(std::min<uint64_t>(
+        place.size_bytes, mcap::kRecordHeadBytes + mcap::kMostChunkHeadBytes + kMessageHeadBytes)));
+    RETURN_IF_ERROR(source_->read(place.offset, bytes));
+    const auto content = std::span<const std::byte>(bytes).subspan(mcap::kRecordHeadBytes);
+    const uint64_t content_bytes = place.size_bytes - mcap::kRecordHeadBytes;
+    const auto chunk = mcap::read_chunk(content, content_bytes);
+    std::optional<mcap::Message> first;
+    if (chunk && chunk->compression.empty()) {
+      const size_t head_bytes = static_cast<size_t>(content_bytes - chunk->records_size);
+      const auto records = content.subspan(std::min(head_bytes, content.size()));
+      if (records.size() >= kMessageHeadBytes)
+        if (const auto message = mcap::read_message(
+                records.subspan(mcap::kRecordHeadBytes, kMessageHeadBytes - mcap::kRecordHeadBytes)))
+          first = *message;
+    }
+    const ChannelRole role = first ? use(first->channel_id).role : ChannelRole::Unknown;
+    if (!is_media(role)) {
+      info.message_bytes += place.size_bytes;
+      messages_.chunks.push_back(place);
+      continue;
+    }
+    if (role == ChannelRole::Keyframe) {
+      keyframes_.push_back(
+          {frames_.chunks.size(), static_cast<int64_t>(first->publish_time), first->log_time});
+      info.keyframe_sim_time_ns.push_back(keyframes_.back().sim_time_ns);
+    }
+    info.frame_bytes += place.size_bytes;
+    frames_.chunks.push_back(place);
+  }
+  return {};
+}
+
+/// The first message of the first chunk.
+Status RecordingReader::State::read_start() {
+  const Error missing =
+      make_error(ErrorCode::BadInput, "the recording was cut off before anything was in it");
+  if (messages_.chunks.empty()) return missing;
+  ASSIGN_OR_RETURN(const LoadedChunk chunk, load_chunk(*source_, messages_.chunks.front()));
+  ASSIGN_OR_RETURN(const mcap::Record record, mcap::read_record(chunk.records));
+  if (record.opcode != mcap::Opcode::Message) return missing;
+  ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record.content));
+  const ChannelUse found = use(message.channel_id);
+  if (found.role != ChannelRole::Message || found.kind != 0)
+    return make_error(ErrorCode::BadInput, "the recording does not begin with what it is of");
+  ASSIGN_OR_RETURN(RecordedMessage first, decode_recorded(found.kind, message.data));
+  start = std::get<RecordingStart>(std::move(first));
+  if (start.version != kRecordingVersion)
+    return make_error(ErrorCode::Unsupported,
+                      "the recording has version {} of the format, and this program reads {}: take the "
+                      "program of its server ({})",
+                      start.version, kRecordingVersion, start.server_version);
+  return {};
+}
+
+Status RecordingReader::State::read_asset() {
+  const Error missing =
+      make_error(ErrorCode::BadInput, "the recording was cut off before its hair was in it");
+  if (frames_.chunks.empty()) return missing;
+  ASSIGN_OR_RETURN(const LoadedChunk chunk, load_chunk(*source_, frames_.chunks.front()));
+  ASSIGN_OR_RETURN(const mcap::Record record, mcap::read_record(chunk.records));
+  if (record.opcode != mcap::Opcode::Message) return missing;
+  ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record.content));
+  if (use(message.channel_id).role != ChannelRole::Asset) return missing;
+  ASSIGN_OR_RETURN(const auto media, decode_media(message.data));
+  ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(media));
+  if (header.opcode != strandcast::Opcode::Asset) return missing;
+  if (hash_bytes(media.subspan(kFrameHeaderBytes)) != start.asset_hash)
+    return make_error(ErrorCode::BadInput, "the hair in the recording is not what its beginning says");
+  asset = std::make_shared<const EncodedFrame>(
+      EncodedFrame{header, std::vector<std::byte>(media.begin(), media.end())});
+  return {};
+}
+
+/// Of the last frame that can be read, as far as the last chunk says.
+void RecordingReader::State::find_last_time() {
+  if (!keyframes_.empty()) info.first_sim_time_ns = keyframes_.front().sim_time_ns;
+  info.last_sim_time_ns = keyframes_.empty() ? 0 : keyframes_.back().sim_time_ns;
+  if (frames_.chunks.size() < 2) return;
+  const auto chunk = load_chunk(*source_, frames_.chunks.back());
+  if (!chunk) return;
+  auto rest = std::span<const std::byte>(chunk->records);
+  while (!rest.empty()) {
+    const auto record = mcap::read_record(rest);
+    if (!record) return;
+    rest = rest.subspan(record->size_bytes);
+    const auto message = mcap::read_message(record->content);
+    if (record->opcode == mcap::Opcode::Message && message)
+      info.last_sim_time_ns = std::max(info.last_sim_time_ns, static_cast<int64_t>(message->publish_time));
+  }
+}
+
+Result<std::optional<RecordedItem>> RecordingReader::State::item_of(const mcap::Message& message) const {
+  const ChannelUse found = use(message.channel_id);
+  const int64_t time_ns = server_time(message.log_time);
+  if (found.role == ChannelRole::Message) {
+    if (part_ == RecordedPart::Frames || found.kind == 0) return std::optional<RecordedItem>();
+    ASSIGN_OR_RETURN(RecordedMessage decoded, decode_recorded(found.kind, message.data));
+    return std::optional(RecordedItem{time_ns, std::move(decoded)});
+  }
+  if (part_ == RecordedPart::Messages || !is_media(found.role) || found.role == ChannelRole::Asset)
+    return std::optional<RecordedItem>();
+  ASSIGN_OR_RETURN(const auto media, decode_media(message.data));
+  ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(media));
+  const bool is_keyframe = header.opcode == strandcast::Opcode::StrandKeyframe;
+  if (!is_keyframe && header.opcode != strandcast::Opcode::StrandDelta)
+    return make_error(ErrorCode::BadInput, "a frame has the opcode 0x{:02x}, it is none of strands",
+                      static_cast<int>(header.opcode));
+  return std::optional(
+      RecordedItem{time_ns, RecordedFrame{std::make_shared<const EncodedFrame>(
+                                EncodedFrame{header, std::vector<std::byte>(media.begin(), media.end())})}});
+}
+
+/// The next item of a lane, if one is left. After an error it goes on behind what is damaged.
+Status RecordingReader::State::fill(Lane& lane) {
+  while (!lane.item) {
+    if (!lane.has_record()) {
+      if (lane.next_chunk >= lane.chunks.size()) return {};
+      lane.records.clear();
+      lane.offset = 0;
+      ASSIGN_OR_RETURN(LoadedChunk chunk, load_chunk(*source_, lane.chunks[lane.next_chunk++]));
+      lane.records = std::move(chunk.records);
+      continue;
+    }
+    const auto record = mcap::read_record(std::span<const std::byte>(lane.records).subspan(lane.offset));
+    if (!record) {
+      lane.offset = lane.records.size();
+      return record.error();
+    }
+    lane.offset += record->size_bytes;
+    if (record->opcode != mcap::Opcode::Message) continue;
+    ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record->content));
+    ASSIGN_OR_RETURN(lane.item, item_of(message));
+  }
+  return {};
+}
+
+Result<std::optional<RecordedItem>> RecordingReader::State::next() {
+  if (part_ != RecordedPart::Messages) RETURN_IF_ERROR(fill(frames_));
+  if (part_ != RecordedPart::Frames) RETURN_IF_ERROR(fill(messages_));
+  if (!frames_.item && !messages_.item) return std::optional<RecordedItem>();
+  const bool is_message =
+      messages_.item && (!frames_.item || messages_.item->time_ns <= frames_.item->time_ns);
+  return std::exchange((is_message ? messages_ : frames_).item, std::nullopt);
+}
+
+Status RecordingReader::State::seek(int64_t sim_time_ns) {
+  const KeyframePlace* place = nullptr;
+  for (const KeyframePlace& keyframe : keyframes_)
+    if (place == nullptr || keyframe.sim_time_ns <= sim_time_ns) place = &keyframe;
+  if (place == nullptr) {  // there are no strands
+    frames_.go_to(0);
+    messages_.go_to(0);
+    return {};
+  }
+  frames_.go_to(place->chunk);
+  // Messages are in chunks that begin before; what of them is older than the keyframe is passed over.
+  size_t chunk = 0;
+  for (size_t i = 0; i < messages_.chunks.size(); ++i)
+    if (messages_.chunks[i].start_time <= place->log_time) chunk = i;
+  const bool is_beginning = place == &keyframes_.front();
+  messages_.go_to(is_beginning ? 0 : chunk);
+  if (is_beginning || part_ == RecordedPart::Frames) return {};
+  while (true) {
+    // What is damaged is passed over.
+    if (!fill(messages_) || !messages_.item) return {};
+    if (messages_.item->time_ns >= server_time(place->log_time)) return {};
+    messages_.item.reset();
+  }
+}
+
+RecordingReader::RecordingReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+RecordingReader::~RecordingReader() = default;
+
+Result<std::unique_ptr<RecordingReader>> RecordingReader::open(std::unique_ptr<ByteSource> source,
+                                                               RecordedPart part) {
+  auto state = std::make_unique<State>(std::move(source), part);
+  RETURN_IF_ERROR(state->open());
+  return std::unique_ptr<RecordingReader>(new RecordingReader(std::move(state)));
+}
+
+Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::filesystem::path& path,
+                                                               RecordedPart part) {
+  ASSIGN_OR_RETURN(auto source, open_byte_source(path));
+  auto reader = open(std::move(source), part);
+  if (!reader) return at(path.string(), reader.error());
+  return reader;
+}
+
+const RecordingStart& RecordingReader::start() const {
+  return state_->start;
+}
+const RecordingInfo& RecordingReader::info() const {
+  return state_->info;
+}
+const EncodedFramePtr& RecordingReader::asset_frame() const {
+  return state_->asset;
+}
+Result<SceneAsset> RecordingReader::asset() const {
+  return decode_scene_asset(std::span<const std::byte>(state_->asset->message).subspan(kFrameHeaderBytes));
+}
+Result<std::optional<RecordedItem>> RecordingReader::next() {
+  return state_->next();
+}
+Status RecordingReader::seek(int64_t sim_time_ns) {
+  return state_->seek(sim_time_ns);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,55 @@
+// RecordingWriter: puts what happens on a server into the chunks of a recording: strands as they are, all
+// else compressed. A keyframe begins a chunk, so that whoever looks for one reads no other. One thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/record/mcap_writer.h"
+#include "common/record/recording_layout.h"
+#include "common/strands/frame_header.h"
+#include "common/strands/zstd_block.h"
+#include "common/wire/recording_messages.h"
+
+namespace strandcast {
+
+class RecordingWriter {
+ public:
+  /// Writes the beginning; `sink` outlives it. `asset`: the Asset message.
+  RecordingWriter(mcap::ByteSink& sink, RecordingStart start, const EncodedFrame& asset);
+
+  /// `time_ns`: server clock; never decreasing. `sim_time_ns`: of the newest state.
+  void add(int64_t time_ns, int64_t sim_time_ns, const RecordedMessage& message);
+  /// A keyframe or delta.
+  void add(int64_t time_ns, const EncodedFrame& frame);
+  /// All that was added is given to the sink, as far as it takes it.
+  void flush();
+  /// Likewise, and the index. Nothing can be added after.
+  void finish();
+
+  uint64_t size_bytes() const { return file_.size_bytes(); }
+  /// So much was lost since start before it could be added.
+  void note_lost(const RecordedLoss& outside) { lost_outside_ = outside; }
+  /// That, and what the sink did not take.
+  RecordedLoss lost() const;
+
+ private:
+  uint64_t log_time(int64_t time_ns) const;
+  void put(mcap::ChunkBody& body, mcap::Message message);
+  void close_frames();
+  void close_messages();
+
+  const RecordingStart start_;
+  mcap::McapWriter file_;
+  mcap::ChunkBody frames_;
+  mcap::ChunkBody messages_;
+  ZstdCompressor compressor_;
+  RecordedLoss lost_outside_;
+  RecordedLoss lost_here_;
+  RecordedLoss told_;                // of what was lost, in the file
+  std::vector<uint32_t> sequences_;  // of the newest message, by channel
+  int64_t newest_ns_ = 0;
+  int64_t newest_sim_ns_ = 0;
+};
+
+}  // namespace strandcast

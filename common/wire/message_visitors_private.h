@@ -1,0 +1,415 @@
+// The visitors of the lists of fields that write messages and read them with their checks. Private to
+// common/wire: messages of the wire (messages.cpp) and of recordings (recording_messages.cpp) share them.
+#pragma once
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/base/text.h"
+#include "common/wire/message_fields_private.h"
+
+namespace strandcast {
+
+namespace pb = google::protobuf;
+using scene_fields::Range;
+using wire_fields::kKind;
+
+/// A message and what its type says of it, which costs protobuf more to find than a field to read.
+template <class Message>
+struct Place {
+  explicit Place(Message& m) : message(&m), type(m.GetDescriptor()), reflection(m.GetReflection()) {}
+
+  Message* message;
+  const pb::Descriptor* type;
+  const pb::Reflection* reflection;
+};
+using PlaceToWrite = Place<pb::Message>;
+using PlaceToRead = Place<const pb::Message>;
+
+/// Finds fields by name, a literal. The elements of a list ask for the same ones in the same order, so only
+/// the first of them searches.
+class FieldFinder {
+ public:
+  struct Field {
+    const char* name;
+    const pb::FieldDescriptor* descriptor;
+    bool may_be_missing;  // and then keeps its default; what cannot be is 0
+  };
+
+  Field find(const pb::Descriptor* type, const char* name) {
+    if (next_ < found_.size() && found_[next_].name == name &&
+        found_[next_].descriptor->containing_type() == type)
+      return found_[next_++];
+    const auto* descriptor = type->FindFieldByName(name);
+    CHECK(descriptor != nullptr);
+    const Field field{name, descriptor, descriptor->has_presence()};
+    if (is_list_ && next_ == found_.size()) {
+      found_.push_back(field);
+      ++next_;
+    }
+    return field;
+  }
+  void begin_element() {
+    is_list_ = true;
+    next_ = 0;
+  }
+  void end_list() {
+    is_list_ = false;
+    next_ = 0;
+    found_.clear();
+  }
+
+ private:
+  std::vector<Field> found_;
+  size_t next_ = 0;
+  bool is_list_ = false;
+};
+
+using PartNames = std::array<const char*, 3>;
+constexpr PartNames kVectorParts = {"x", "y", "z"};
+constexpr PartNames kColorParts = {"r", "g", "b"};
+
+/// Copies fields into a message, all of them.
+class MessageWriter {
+ public:
+  explicit MessageWriter(pb::Message& message) : at_(message) {}
+
+  template <class T>
+  void value(const char* name, const T& value) {
+    const auto& field = field_of(name);
+    switch (field.cpp_type()) {
+      case pb::FieldDescriptor::CPPTYPE_DOUBLE:
+        return at_.reflection->SetDouble(at_.message, &field, static_cast<double>(value));
+      case pb::FieldDescriptor::CPPTYPE_FLOAT:
+        return at_.reflection->SetFloat(at_.message, &field, static_cast<float>(value));
+      case pb::FieldDescriptor::CPPTYPE_INT64:
+        return at_.reflection->SetInt64(at_.message, &field, static_cast<int64_t>(value));
+      case pb::FieldDescriptor::CPPTYPE_UINT64:
+        return at_.reflection->SetUInt64(at_.message, &field, static_cast<uint64_t>(value));
+      case pb::FieldDescriptor::CPPTYPE_BOOL:
+        return at_.reflection->SetBool(at_.message, &field, static_cast<bool>(value));
+      default:
+        return at_.reflection->SetUInt32(at_.message, &field, static_cast<uint32_t>(value));
+    }
+  }
+  template <class T>
+  void number(const char* name, const T& number, const Range&) {
+    value(name, number);
+  }
+  void measure(const char* name, double number) { value(name, number); }
+  void side(const char* name, uint32_t number, const Range&) { value(name, number); }
+  template <class Enum>
+  void choice(const char* name, Enum chosen, Enum, int first = 0) {
+    at_.reflection->SetEnumValue(at_.message, &field_of(name), first + static_cast<int>(chosen));
+  }
+  void text(const char* name, const std::string& value, size_t limit) {
+    exact_text(name, printable(value, limit), limit);
+  }
+  void exact_text(const char* name, const std::string& value, size_t) {
+    at_.reflection->SetString(at_.message, &field_of(name), value);
+  }
+  void secret(const char* name, const std::string& value, size_t limit) { exact_text(name, value, limit); }
+  void vector(const char* name, const glm::vec3& value, const Range&) { parts(name, value, kVectorParts); }
+  void color(const char* name, const glm::vec3& value, const Range&) { parts(name, value, kColorParts); }
+  template <class Body>
+  void group(const char* name, Body body) {
+    descend(PlaceToWrite(*at_.reflection->MutableMessage(at_.message, &field_of(name))), body);
+  }
+  template <class T, class Body>
+  void repeated(const char* name, std::vector<T>& values, size_t, Body body) {
+    const auto& field = field_of(name);
+    std::optional<PlaceToWrite> place;
+    for (T& value : values) {
+      finder_.begin_element();
+      pb::Message& element = *at_.reflection->AddMessage(at_.message, &field);
+      if (place)
+        place->message = &element;  // all of one type
+      else
+        place.emplace(element);
+      descend(*place, [&] { body(value); });
+    }
+    finder_.end_list();
+  }
+  void places(const char* name, const std::vector<glm::vec3>& values, size_t) {
+    if (values.empty()) return;
+    const auto& field = field_of(name);
+    for (const glm::vec3& value : values)
+      for (int axis = 0; axis < 3; ++axis) at_.reflection->AddFloat(at_.message, &field, value[axis]);
+  }
+  void places(const char* name, const std::vector<glm::dvec3>& values, size_t) {
+    if (values.empty()) return;
+    const auto& field = field_of(name);
+    for (const glm::dvec3& value : values)
+      for (int axis = 0; axis < 3; ++axis) at_.reflection->AddDouble(at_.message, &field, value[axis]);
+  }
+  template <class Variant>
+  void one_of(const char*, const Variant& whole) {
+    std::visit(
+        [&](auto kind) {  // a copy: the list of fields is shared with the reader, which writes
+          group(kKind<decltype(kind)>, [&] { wire_fields::visit(*this, kind); });
+        },
+        whole);
+  }
+  void names(const char* name, const std::vector<std::string>& values, size_t, size_t) {
+    for (const std::string& value : values) at_.reflection->AddString(at_.message, &field_of(name), value);
+  }
+  void require(const char*, bool, const char*) {}
+
+ private:
+  const pb::FieldDescriptor& field_of(const char* name) { return *finder_.find(at_.type, name).descriptor; }
+
+  void parts(const char* name, const glm::vec3& whole, const PartNames& names) {
+    group(name, [&] {
+      for (int i = 0; i < 3; ++i) value(names[static_cast<size_t>(i)], whole[i]);
+    });
+  }
+  template <class Body>
+  void descend(const PlaceToWrite& inner, Body body) {
+    const PlaceToWrite outer = std::exchange(at_, inner);
+    body();
+    at_ = outer;
+  }
+
+  PlaceToWrite at_;
+  FieldFinder finder_;
+};
+
+/// Copies fields out of a message and checks them; keeps the first error, which names the field and its
+/// group.
+class MessageReader {
+ public:
+  explicit MessageReader(const pb::Message& message) : at_(message) {}
+
+  Status status() const { return error_ ? Status(*error_) : Status(); }
+
+  template <class T>
+  void value(const char* name, T& value) {
+    const auto field = finder_.find(at_.type, name);
+    if (is_given(field)) value = static_cast<T>(get<T>(*field.descriptor));
+  }
+  template <class T>
+  void number(const char* name, T& value, const Range& range) {
+    const auto field = finder_.find(at_.type, name);
+    const auto given = is_given(field) ? get<T>(*field.descriptor) : value;
+    value = static_cast<T>(given);
+    check(name, static_cast<double>(given), range);
+  }
+  void measure(const char* name, double& number) {
+    value(name, number);
+    if (!std::isfinite(number) || number < 0.0)
+      fail(name, make_error(ErrorCode::BadInput, "is {}, it must be finite and not negative", number));
+  }
+  void side(const char* name, uint32_t& pixels, const Range& range) {
+    value(name, pixels);
+    if (pixels != 0) check(name, pixels, range);
+  }
+  template <class Enum>
+  void choice(const char* name, Enum& value, Enum last, int first = 0) {
+    const int given = at_.reflection->GetEnumValue(*at_.message, &field_of(name));
+    const int end = first + static_cast<int>(last);
+    if (given < first || given > end)
+      return fail(name, make_error(ErrorCode::BadInput, "is {}, known are {}..{}", given, first, end));
+    value = static_cast<Enum>(given - first);
+  }
+  void text(const char* name, std::string& value, size_t limit) {
+    const auto field = finder_.find(at_.type, name);
+    if (!is_given(field)) return;
+    value = at_.reflection->GetString(*at_.message, field.descriptor);
+    check_printable(name, value);
+    // The parser has checked that it is UTF-8.
+    check_length(name, static_cast<size_t>(std::count_if(value.begin(), value.end(), begins_character)),
+                 limit);
+  }
+  void exact_text(const char* name, std::string& value, size_t limit_bytes) {
+    value = get_string(name);
+    check_printable(name, value);
+    check_length(name, value.size(), limit_bytes);
+  }
+  void secret(const char* name, std::string& value, size_t limit_bytes) {
+    value = get_string(name);
+    check_length(name, value.size(), limit_bytes);
+  }
+  void vector(const char* name, glm::vec3& value, const Range& range) {
+    parts(name, value, range, kVectorParts);
+  }
+  void color(const char* name, glm::vec3& value, const Range& range) {
+    parts(name, value, range, kColorParts);
+  }
+  template <class Body>
+  void group(const char* name, Body body) {
+    descend(name, PlaceToRead(at_.reflection->GetMessage(*at_.message, &field_of(name))), body);
+  }
+  template <class T, class Body>
+  void repeated(const char* name, std::vector<T>& values, size_t limit, Body body) {
+    const auto& field = field_of(name);
+    const auto size = static_cast<size_t>(at_.reflection->FieldSize(*at_.message, &field));
+    check_length(name, size, limit);
+    if (error_) return;  // before anything is allocated
+    values.resize(size);
+    std::optional<PlaceToRead> place;
+    for (size_t i = 0; i < size; ++i) {
+      finder_.begin_element();
+      const auto& element = at_.reflection->GetRepeatedMessage(*at_.message, &field, static_cast<int>(i));
+      if (place)
+        place->message = &element;  // all of one type
+      else
+        place.emplace(element);
+      descend(name, *place, [&] { body(values[i]); });
+    }
+    finder_.end_list();
+  }
+  void places(const char* name, std::vector<glm::vec3>& values, size_t limit) {
+    read_places(name, values, limit, [this](const pb::FieldDescriptor& field, int i) {
+      return at_.reflection->GetRepeatedFloat(*at_.message, &field, i);
+    });
+  }
+  void places(const char* name, std::vector<glm::dvec3>& values, size_t limit) {
+    read_places(name, values, limit, [this](const pb::FieldDescriptor& field, int i) {
+      return at_.reflection->GetRepeatedDouble(*at_.message, &field, i);
+    });
+  }
+  template <class Variant>
+  void one_of(const char* name, Variant& whole) {
+    const auto* field =
+        at_.reflection->GetOneofFieldDescriptor(*at_.message, at_.type->FindOneofByName(name));
+    if (field == nullptr || !read_kind(field->name(), *this, whole))
+      fail(name, make_error(ErrorCode::BadInput, "is of no known kind"));
+  }
+  void names(const char* name, std::vector<std::string>& values, size_t limit, size_t limit_bytes) {
+    const auto& field = field_of(name);
+    const auto size = static_cast<size_t>(at_.reflection->FieldSize(*at_.message, &field));
+    check_length(name, size, limit);
+    for (size_t i = 0; i < size && !error_; ++i) {
+      values.push_back(at_.reflection->GetRepeatedString(*at_.message, &field, static_cast<int>(i)));
+      check_printable(name, values.back());
+      check_length(name, values.back().size(), limit_bytes);
+      if (values.back().empty()) fail(name, make_error(ErrorCode::BadInput, "has an empty name"));
+      if (std::count(values.begin(), values.end(), values.back()) > 1)
+        fail(name, make_error(ErrorCode::BadInput, "has a name twice"));
+    }
+  }
+  void require(const char* name, bool holds, const char* sentence) {
+    if (!holds) fail(name, make_error(ErrorCode::BadInput, "{}", sentence));
+  }
+
+ private:
+  template <class Point, class Get>
+  void read_places(const char* name, std::vector<Point>& values, size_t limit, Get get) {
+    const auto& field = field_of(name);
+    const auto size = static_cast<size_t>(at_.reflection->FieldSize(*at_.message, &field));
+    check_length(name, size, 3 * limit);
+    if (size % 3 != 0)
+      fail(name, make_error(ErrorCode::BadInput, "has {} numbers, which are not three for each joint", size));
+    if (error_) return;  // before anything is allocated
+    values.resize(size / 3);
+    for (size_t i = 0; i < size; ++i)
+      values[i / 3][static_cast<int>(i % 3)] = get(field, static_cast<int>(i));
+  }
+
+  /// Fields of looks and cameras that are missing keep their default, all others are then 0.
+  bool is_given(const FieldFinder::Field& field) const {
+    return !field.may_be_missing || at_.reflection->HasField(*at_.message, field.descriptor);
+  }
+
+  /// As wide as it came: what does not fit into a T is checked first.
+  template <class T>
+  auto get(const pb::FieldDescriptor& field) const {
+    if constexpr (std::is_same_v<T, bool>)
+      return at_.reflection->GetBool(*at_.message, &field);
+    else if constexpr (std::is_same_v<T, int64_t>)
+      return at_.reflection->GetInt64(*at_.message, &field);
+    else if constexpr (std::is_same_v<T, uint64_t>)
+      return at_.reflection->GetUInt64(*at_.message, &field);
+    else if constexpr (std::is_integral_v<T>)
+      return at_.reflection->GetUInt32(*at_.message, &field);
+    else
+      return field.cpp_type() == pb::FieldDescriptor::CPPTYPE_FLOAT
+                 ? static_cast<T>(at_.reflection->GetFloat(*at_.message, &field))
+                 : static_cast<T>(at_.reflection->GetDouble(*at_.message, &field));
+  }
+  const pb::FieldDescriptor& field_of(const char* name) { return *finder_.find(at_.type, name).descriptor; }
+  std::string get_string(const char* name) {
+    return at_.reflection->GetString(*at_.message, &field_of(name));
+  }
+
+  static bool begins_character(char byte) { return (static_cast<unsigned char>(byte) & 0xc0) != 0x80; }
+
+  void check(const char* name, double number, const Range& range) {
+    // Ranges are doubles; a float at the end of one may lie a rounding outside.
+    constexpr double kSlack = 1e-6;
+    const double low = range.minimum - kSlack * std::abs(range.minimum);
+    const double high = range.maximum + kSlack * std::abs(range.maximum);
+    if (number >= low && number <= high) return;
+    fail(name, make_error(ErrorCode::BadInput, "is {}, it must be within {:g} .. {:g}{}{}", number,
+                          range.minimum, range.maximum, *range.unit ? " " : "", range.unit));
+  }
+  void check_printable(const char* name, const std::string& text) {
+    for (const char character : text) {
+      const auto byte = static_cast<unsigned char>(character);
+      if (byte < 0x20 || byte == 0x7f)
+        return fail(name, make_error(ErrorCode::BadInput, "holds the unprintable character 0x{:02x}", byte));
+    }
+  }
+  void check_length(const char* name, size_t length, size_t limit) {
+    if (length > limit)
+      fail(name, make_error(ErrorCode::LimitExceeded, "has length {}, the limit is {}", length, limit));
+  }
+
+  void parts(const char* name, glm::vec3& whole, const Range& range, const PartNames& names) {
+    const auto& field = field_of(name);
+    const PlaceToRead inner(at_.reflection->GetMessage(*at_.message, &field));
+    for (int i = 0; i < 3; ++i) {
+      const auto* part = finder_.find(inner.type, names[static_cast<size_t>(i)]).descriptor;
+      if (inner.reflection->HasField(*inner.message, part))
+        whole[i] = static_cast<float>(inner.reflection->GetDouble(*inner.message, part));
+      check(name, whole[i], range);
+    }
+  }
+  template <class Body>
+  void descend(const char* name, const PlaceToRead& inner, Body body) {
+    const PlaceToRead outer = std::exchange(at_, inner);
+    const char* const outer_group = std::exchange(group_, name);
+    body();
+    at_ = outer;
+    group_ = outer_group;
+  }
+
+  void fail(const char* name, Error error) {
+    if (error_) return;
+    // "command" rather than "command.command".
+    const bool has_group = group_ != nullptr && std::strcmp(group_, name) != 0;
+    error_ = at(has_group ? fmt::format("{}.{}", group_, name) : name, std::move(error));
+  }
+
+  PlaceToRead at_;
+  FieldFinder finder_;
+  const char* group_ = nullptr;  // that the message is
+  std::optional<Error> error_;
+};
+
+/// Reads the field `name` into the alternative of that kind, from the i-th on; false when there is none.
+template <size_t i = 0, class Variant>
+bool read_kind(const std::string& name, MessageReader& reader, Variant& result) {
+  if constexpr (i == std::variant_size_v<Variant>) {
+    return false;
+  } else {
+    constexpr const char* kName = kKind<std::variant_alternative_t<i, Variant>>;
+    if (name != kName) return read_kind<i + 1>(name, reader, result);
+    reader.group(kName, [&] { wire_fields::visit(reader, result.template emplace<i>()); });
+    return true;
+  }
+}
+
+}  // namespace strandcast

@@ -1,0 +1,146 @@
+#include "common/wire/recording_messages.h"
+
+#include <google/protobuf/descriptor.pb.h>
+
+#include <array>
+#include <memory>
+#include <set>
+#include <tuple>
+
+#include "common/wire/message_visitors_private.h"
+#include "common/wire/parse_message_private.h"
+#include "common/wire/recording_fields_private.h"
+#include "strandcast/v1/recording.pb.h"
+
+namespace strandcast {
+namespace {
+
+/// The message of each kind, in the order of RecordedMessage.
+using Wires = std::tuple<v1::RecordingStart, v1::RecordedMotion, v1::RecordedWind, v1::RecordedStep,
+                         v1::RecordedChange, v1::RecordedStream, v1::RecordedState, v1::RecordedCamera,
+                         v1::RecordedLoss, v1::LookChange, v1::ServerStatus>;
+constexpr size_t kKindCount = std::variant_size_v<RecordedMessage>;
+static_assert(std::tuple_size_v<Wires> == kKindCount);
+
+constexpr std::array<RecordedKind, kKindCount> kKinds{{
+    {"/recording", "strandcast.v1.RecordingStart"},
+    {"/input/motion", "strandcast.v1.RecordedMotion"},
+    {"/input/wind", "strandcast.v1.RecordedWind"},
+    {"/steps", "strandcast.v1.RecordedStep"},
+    {"/changes", "strandcast.v1.RecordedChange"},
+    {"/stream", "strandcast.v1.RecordedStream"},
+    {"/states", "strandcast.v1.RecordedState"},
+    {"/cameras", "strandcast.v1.RecordedCamera"},
+    {"/losses", "strandcast.v1.RecordedLoss"},
+    {"/look", "strandcast.v1.LookChange"},
+    {"/status", "strandcast.v1.ServerStatus"},
+}};
+
+constexpr std::byte kMediaTag{0x0a};  // field 1, of bytes
+constexpr size_t kVarintBits = 7;
+constexpr size_t kVarintMore = 1u << kVarintBits;
+constexpr size_t kMostVarintBytes = 9;  // 63 bits
+
+template <class Kind, size_t... i>
+constexpr size_t find_kind(std::index_sequence<i...>) {
+  return ((std::is_same_v<Kind, std::variant_alternative_t<i, RecordedMessage>> ? i : 0) + ...);
+}
+template <class Kind>
+constexpr size_t kIndexOf = find_kind<Kind>(std::make_index_sequence<kKindCount>());
+
+std::vector<std::byte> serialised(const pb::Message& message) {
+  std::vector<std::byte> bytes(message.ByteSizeLong());
+  CHECK(message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size())));
+  return bytes;
+}
+
+template <size_t kind>
+Result<RecordedMessage> decode_as(std::span<const std::byte> bytes) {
+  std::tuple_element_t<kind, Wires> wire;
+  if (!parse_message(bytes, wire))
+    return make_error(ErrorCode::BadInput, "a message of {} bytes on {} is not valid protobuf", bytes.size(),
+                      kKinds[kind].topic);
+  RecordedMessage message(std::in_place_index<kind>);
+  MessageReader reader(wire);
+  wire_fields::visit(reader, std::get<kind>(message));
+  if (const Status status = reader.status(); !status) return at(kKinds[kind].topic, status.error());
+  return message;
+}
+
+template <size_t... kind>
+Result<RecordedMessage> decode_one(size_t wanted, std::span<const std::byte> bytes,
+                                   std::index_sequence<kind...>) {
+  using Decode = Result<RecordedMessage> (*)(std::span<const std::byte>);
+  constexpr std::array<Decode, sizeof...(kind)> kDecoders{decode_as<kind>...};
+  return kDecoders[wanted](bytes);
+}
+
+/// With those that it needs, each behind what it needs itself.
+void add_file(const pb::FileDescriptor& file, pb::FileDescriptorSet& set, std::set<std::string>& known) {
+  if (!known.insert(file.name()).second) return;
+  for (int i = 0; i < file.dependency_count(); ++i) add_file(*file.dependency(i), set, known);
+  file.CopyTo(set.add_file());
+}
+
+}  // namespace
+
+std::span<const RecordedKind> recorded_kinds() {
+  return kKinds;
+}
+
+std::vector<std::byte> message_descriptors(const std::string& schema) {
+  v1::RecordingStart::descriptor();  // the file that knows all others is linked
+  const auto* type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(schema);
+  CHECK(type != nullptr);
+  pb::FileDescriptorSet set;
+  std::set<std::string> known;
+  add_file(*type->file(), set, known);
+  return serialised(set);
+}
+
+/// By hand: a large message is copied once.
+std::vector<std::byte> encode_media(std::span<const std::byte> message) {
+  std::vector<std::byte> bytes{kMediaTag};
+  bytes.reserve(message.size() + kMostVarintBytes + 1);
+  size_t size = message.size();
+  for (; size >= kVarintMore; size >>= kVarintBits)
+    bytes.push_back(static_cast<std::byte>(size % kVarintMore + kVarintMore));
+  bytes.push_back(static_cast<std::byte>(size));
+  bytes.insert(bytes.end(), message.begin(), message.end());
+  return bytes;
+}
+
+/// Exactly the one field: what a later version adds has another schema.
+Result<std::span<const std::byte>> decode_media(std::span<const std::byte> bytes) {
+  uint64_t size = 0;
+  size_t at = 1;
+  for (uint32_t shift = 0; at < bytes.size() && at <= kMostVarintBytes; ++at, shift += kVarintBits) {
+    const auto byte = static_cast<uint64_t>(bytes[at]);
+    size |= (byte % kVarintMore) << shift;
+    if (byte < kVarintMore) break;
+  }
+  if (bytes.empty() || bytes[0] != kMediaTag || at + 1 > bytes.size() || size != bytes.size() - at - 1)
+    return make_error(ErrorCode::BadInput, "a message of {} bytes is no MediaMessage", bytes.size());
+  return bytes.subspan(at + 1);
+}
+
+std::vector<std::byte> encode(const RecordedMessage& message) {
+  return std::visit(
+      [&](auto kind) {  // a copy: the list of fields is shared with the reader, which writes
+        std::tuple_element_t<kIndexOf<decltype(kind)>, Wires> wire;
+        MessageWriter writer(wire);
+        wire_fields::visit(writer, kind);
+        return serialised(wire);
+      },
+      message);
+}
+
+Result<RecordedMessage> decode_recorded(size_t kind, std::span<const std::byte> bytes) {
+  CHECK(kind < kKindCount);
+  if (bytes.size() > kMaxRecordedMessageBytes)
+    return make_error(ErrorCode::LimitExceeded, "a message on {} has {} bytes, the limit is {}",
+                      kKinds[kind].topic, bytes.size(), kMaxRecordedMessageBytes);
+  return decode_one(kind, bytes, std::make_index_sequence<kKindCount>());
+}
+
+}  // namespace strandcast
