@@ -2,9 +2,11 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <memory>
 #include <utility>
 
 #include "client/app/live_states.h"
+#include "client/app/recorded_states.h"
 #include "client/export/export_strands.h"
 
 namespace strandcast {
@@ -36,12 +38,25 @@ void print(const ExportOptions& options, const ExportReport& report) {
   for (const std::string& remark : report.remarks) std::cout << "  " << remark << '\n';
 }
 
+/// From a recording where one is named, else from the server.
+Result<std::unique_ptr<ExportSource>> open_source(const CtlTarget& target, const ExportCommand& command,
+                                                  const std::atomic<bool>& stop) {
+  if (command.paths.size() > 1) {
+    ASSIGN_OR_RETURN(auto recorded, RecordedStates::open(command.paths.front()));
+    return std::unique_ptr<ExportSource>(std::move(recorded));
+  }
+  ASSIGN_OR_RETURN(const ClientConfig config, client_config_for(target, Role::Viewer));
+  ASSIGN_OR_RETURN(auto live, LiveStates::open(config, stop));
+  return std::unique_ptr<ExportSource>(std::move(live));
+}
+
 }  // namespace
 
 void declare_export(CLI::App& app, ExportCommand& command) {
-  app.add_option(
-         "paths", command.paths,
-         "OUT.usda, OUT.ply or OUT.csv: what the server sends from now on; a file of this name is replaced")
+  app.add_option("paths", command.paths,
+                 "[RECORDING.mcap] OUT.usda, OUT.ply or OUT.csv: what was recorded, or what the server sends "
+                 "from now "
+                 "on; a file of the second name is replaced")
       ->required()
       ->expected(1, 2);
   app.add_option("--fps", command.fps, "Frames per second (default: 30)")
@@ -62,7 +77,8 @@ void declare_export(CLI::App& app, ExportCommand& command) {
   app.add_option("--from", command.from_s, "Begin so many seconds after the first state")->check(seconds);
   app.add_option("--to", command.to_s, "End so many seconds after the first state")->check(seconds);
   app.add_option("--seconds", command.seconds,
-                 "Length in seconds (default: until stopped; what was written by then is whole)")
+                 "Length in seconds (default: to the end of the recording, or until stopped; what was "
+                 "written by then is whole)")
       ->check(seconds);
   app.add_option("--at", command.at_s, "One frame alone, so many seconds after the first state (.ply)")
       ->check(seconds);
@@ -94,14 +110,9 @@ Result<ExportOptions> export_options(const ExportCommand& command) {
 int run_export(const CtlTarget& target, const ExportCommand& command, const std::atomic<bool>& stop) {
   const auto options = export_options(command);
   if (!options) return fail(options.error());
-  if (command.paths.size() > 1)
-    return fail(make_error(ErrorCode::BadInput, "'{}' and '{}': name the one file to write",
-                           command.paths.front(), command.paths.back()));
-  const auto config = client_config_for(target, Role::Viewer);
-  if (!config) return fail(config.error());
-  auto states = LiveStates::open(*config, stop);
-  if (!states) return fail(states.error());
-  const auto report = export_strands(**states, *options, stop);
+  const auto source = open_source(target, command, stop);
+  if (!source) return fail(source.error());
+  const auto report = export_strands(**source, *options, stop);
   if (!report) return fail(report.error());
   print(*options, *report);
   return kDoneExit;

@@ -1,4 +1,4 @@
-// strandcast-ctl export: strands of a running server as a file for other programs.
+// strandcast-ctl export: strands of a running server or a recording as a file for other programs.
 #pragma once
 
 #include <atomic>

@@ -4,6 +4,8 @@
 
 #include "client/app/diagnose.h"
 #include "client/app/headless_view.h"
+#include "client/app/playback_window.h"
+#include "client/app/recording_film.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
 #include "client/app/view_report.h"
@@ -35,6 +37,16 @@ int run(int argc, char** argv) {
     const Diagnosis diagnosis = diagnose(options, stop);
     std::cout << to_text(diagnosis);
     return would_work(diagnosis) ? 0 : kMissingExit;
+  }
+  if (!options.film.empty()) {
+    const auto made = run_film(options, stop);
+    if (!made) return fail(made.error().to_string());
+    std::cout << *made;
+    return 0;
+  }
+  if (!options.recording.empty()) {
+    const Status played = run_playback(options, stop);
+    return played ? 0 : fail(played.error().to_string());
   }
   auto report = options.is_headless ? run_headless(options, stop) : run_windowed(options, stop);
   if (!report) return fail(report.error().to_string());

@@ -7,6 +7,7 @@
 #include <map>
 #include <sstream>
 
+#include "client/app/recording_film.h"
 #include "client/app/step_speed.h"
 #include "common/base/file.h"
 #include "common/base/version.h"
@@ -102,6 +103,13 @@ struct RawOptions {
 };
 
 void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
+  app.add_option("recording", options.recording, "A recording (.mcap) to play, instead of a server");
+  app.add_option("--export", options.film,
+                 "Draw the recording into a film (.webm, or .webp) or into pictures (frames/%04d.png), "
+                 "without a window");
+  app.add_option("--fps", options.film_fps, "Frames per second of --export")
+      ->check(CLI::Range(1.0, kMaxClipFps))
+      ->capture_default_str();
   app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
   app.add_option(
       "--diagnose", raw.diagnose,
@@ -167,6 +175,21 @@ Status check_folder_of(const std::filesystem::path& file) {
   return at(file.string(), make_error(ErrorCode::BadInput, "there is no folder '{}'", folder.string()));
 }
 
+/// What goes with a recording, and what does not.
+Status check_recording(const ViewOptions& options) {
+  if (!options.film.empty()) {
+    if (options.recording.empty())
+      return make_error(ErrorCode::BadInput,
+                        "--export draws a recording: name it (strandcast-view run.mcap --export {})",
+                        options.film.string());
+    return check_film_path(options.film);
+  }
+  if (options.recording.empty()) return {};
+  if (options.is_headless || !options.screenshot.empty() || !options.clip.empty())
+    return make_error(ErrorCode::BadInput, "a recording without a window is drawn by --export FILE");
+  return {};
+}
+
 Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   options.is_diagnosis = !raw.diagnose.empty();
   ASSIGN_OR_RETURN(options.address, parse_address(options.is_diagnosis ? raw.diagnose : raw.connect));
@@ -189,6 +212,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
     options.codec_wish = raw.codec;
   }
   if (raw.playout == "smooth") options.playout = Playout::Smooth;
+  RETURN_IF_ERROR(check_recording(options));
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,
                       "--screenshot and --clip need --headless (in the window, S takes a picture)");
@@ -200,7 +224,8 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
 }  // namespace
 
 ViewCommandLine read_view_command_line(int argc, const char* const* argv) {
-  CLI::App app("Strandcast viewer: shows the hair of a running strandcast-server.", "strandcast-view");
+  CLI::App app("Strandcast viewer: shows the hair of a running strandcast-server, or of a recording.",
+               "strandcast-view");
   app.set_version_flag("--version", fmt::format("strandcast-view {}", version()));
   RawOptions raw;
   ViewOptions options;

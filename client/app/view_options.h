@@ -14,6 +14,9 @@ namespace strandcast {
 
 struct ViewOptions {
   Address address;
+  std::filesystem::path recording;  // shown instead of a server; empty = none
+  std::filesystem::path film;       // that a recording is drawn into, without a window; empty = none
+  double film_fps = 30.0;
   StreamMode mode = StreamMode::Auto;
   Playout playout = Playout::LowLatency;
   std::filesystem::path tls_authorities;

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "client/export/number_text.h"
-#include "client/export/output_file.h"
 #include "client/export/strand_writer.h"
+#include "common/base/output_file.h"
 
 namespace strandcast {
 namespace {

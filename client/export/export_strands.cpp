@@ -52,7 +52,7 @@ class Export {
       const SceneAsset& asset = *source_.scene().asset;
       if ((*state)->strand_count < asset.strand_count) ++thin_states_;
       if (sampler_.add(*state) == FrameSampler::Outcome::WentBack) {
-        report_.remarks.push_back("it ends where the simulation was reset");
+        report_.remarks.emplace_back("it ends where the simulation was reset");
         break;
       }
       RETURN_IF_ERROR(write_frames());

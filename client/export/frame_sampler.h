@@ -19,9 +19,10 @@ struct SampledFrame {
 
 struct SampleRange {
   double fps = 30.0;
-  double from_s = 0.0;              // after the first state
-  std::optional<double> to_s;       // likewise; empty: to the last state
-  std::optional<int64_t> first_ns;  // time of the first state, where others before the range are left out
+  double from_s = 0.0;         // after the first state
+  std::optional<double> to_s;  // likewise; empty: to the last state
+  std::optional<int64_t> first_ns =
+      {};  // time of the first state, where others before the range are left out
 };
 
 class FrameSampler {

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "client/export/output_file.h"
 #include "client/export/strand_writer.h"
+#include "common/base/output_file.h"
 
 namespace strandcast {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "client/export/number_text.h"
-#include "client/export/output_file.h"
 #include "client/export/strand_writer.h"
+#include "common/base/output_file.h"
 #include "common/base/worker_pool.h"
 
 namespace strandcast {

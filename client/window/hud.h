@@ -20,11 +20,30 @@ struct HudBanner {
   std::string doing;     // what is tried, or what the keys do
 };
 
+/// Below the picture of a recording that is played.
+struct TimelineState {
+  double time_s = 0.0;
+  double length_s = 0.0;
+  double speed = 1.0;
+  bool is_playing = false;
+  bool is_looping = false;
+};
+/// What was done with it since the last time.
+struct TimelineActions {
+  std::optional<double> time_s;  // it was dragged to
+  std::optional<double> speed;
+  bool wants_play_toggle = false;
+  bool wants_loop_toggle = false;
+
+  bool is_empty() const { return !time_s && !speed && !wants_play_toggle && !wants_loop_toggle; }
+};
+
 struct HudState {
   std::string title;                  // what is seen, in one line
   std::vector<std::string> warnings;  // what a person should know now, and the newest notice
   std::vector<HudRow> rows;           // measurements, for the unfolded panel
   std::optional<HudBanner> banner;
+  std::optional<TimelineState> timeline;  // with it, what is seen is a recording
 };
 
 /// How much of the panel is there.

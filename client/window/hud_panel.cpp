@@ -1,11 +1,14 @@
 #include "client/window/hud_panel.h"
 
+#include <fmt/format.h>
 #include <imgui.h>
 
 #include <algorithm>
 #include <array>
 #include <cfloat>
 #include <filesystem>
+#include <span>
+#include <string>
 #include <utility>
 
 namespace strandcast {
@@ -16,6 +19,7 @@ constexpr float kMarginLetters = 0.8f;
 constexpr float kLabelLetters = 7.0f;
 constexpr float kKeyLetters = 9.5f;
 constexpr float kBannerLetters = 34.0f;
+constexpr float kSpeedLetters = 6.0f;
 constexpr float kPanelAlpha = 0.6f;
 constexpr float kSolidAlpha = 0.92f;
 constexpr float kFontPx = 15.0f;
@@ -108,33 +112,80 @@ PanelSize draw_hud_panel(const HudState& hud, HudFold fold) {
   return panel("measurements", {{margin, margin}, {0.0f, 0.0f}, max_width, kPanelAlpha}, [&] {
     text(kTextColor, hud.title);
     for (const std::string& warning : hud.warnings) text(kWarningColor, warning);
-    if (fold == HudFold::Small) return text(kLabelColor, "H help   L look   U details");
+    const std::string keys = hud.timeline ? "H help   " : "H help   L look   ";
+    if (fold == HudFold::Small) return text(kLabelColor, keys + "U details");
     ImGui::Spacing();
     for (const HudRow& entry : hud.rows) row(entry.label, entry.value, letters(kLabelLetters));
-    text(kLabelColor, "H help   L look   U hides this");
+    text(kLabelColor, keys + "U hides this");
   });
 }
 
-PanelSize draw_help_panel() {
-  static constexpr std::array<std::pair<const char*, const char*>, 14> kHelp{{
+PanelSize draw_help_panel(HelpTopic topic) {
+  using Row = std::pair<const char*, const char*>;
+  static constexpr std::array<Row, 4> kView{{
       {"left drag", "turn about the head"},
       {"middle, right drag", "move the view"},
       {"wheel", "closer, farther"},
       {"R", "back to the first view"},
+  }};
+  static constexpr std::array<Row, 5> kServer{{
       {"Space", "pause or resume the server"},
       {"N", "one simulation step"},
       {"P", "newest state or smooth playout"},
       {"M", "auto, strands drawn here, or the server's pictures"},
       {"L", "look of the hair: colours, style, light; save it as a scene"},
+  }};
+  static constexpr std::array<Row, 5> kRecording{{
+      {"Space", "play or pause"},
+      {"Left, Right", "the state before or after"},
+      {"Home, End", "the beginning, the end"},
+      {"Up, Down", "twice or half as fast"},
+      {"O", "begin anew at the end, or stop there"},
+  }};
+  static constexpr std::array<Row, 5> kAll{{
       {"V", "hair, or what its drawing is made of: tangents, density, shadow, layers, tiles"},
       {"S", "save a picture"},
       {"U", "details, nothing, or one line in the corner"},
       {"H, F1", "this help"},
       {"Esc, Q", "quit"},
   }};
+  const std::span<const Row> own = topic == HelpTopic::Recording ? std::span<const Row>(kRecording) : kServer;
   return panel("help", in_the_middle(letters(kBannerLetters), kSolidAlpha), [&] {
-    for (const auto& [key, meaning] : kHelp) row(key, meaning, letters(kKeyLetters));
+    for (const std::span<const Row> rows : {std::span<const Row>(kView), own, std::span<const Row>(kAll)})
+      for (const auto& [key, meaning] : rows) row(key, meaning, letters(kKeyLetters));
   });
+}
+
+PanelSize draw_timeline(const TimelineState& timeline, TimelineActions& actions) {
+  const ImVec2 area = ImGui::GetIO().DisplaySize;
+  const float margin = letters(kMarginLetters);
+  const float width = area.x - 2.0f * margin;
+  ImGui::SetNextWindowPos({margin, area.y - margin}, ImGuiCond_Always, {0.0f, 1.0f});
+  ImGui::SetNextWindowSize({width, 0.0f});
+  ImGui::SetNextWindowBgAlpha(kPanelAlpha);
+  constexpr ImGuiWindowFlags kFlags =
+      ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNav;
+  PanelSize size;
+  if (ImGui::Begin("timeline", nullptr, kFlags)) {
+    if (ImGui::Button(timeline.is_playing ? "Pause" : " Play ")) actions.wants_play_toggle = true;
+    ImGui::SameLine();
+    bool is_looping = timeline.is_looping;
+    if (ImGui::Checkbox("loop", &is_looping)) actions.wants_loop_toggle = true;
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(letters(kSpeedLetters));
+    auto speed = static_cast<float>(timeline.speed);
+    if (ImGui::SliderFloat("##speed", &speed, 1.0f / 16.0f, 8.0f, "%.3gx", ImGuiSliderFlags_Logarithmic))
+      actions.speed = speed;
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(-1.0f);
+    auto time_s = static_cast<float>(timeline.time_s);
+    const std::string shown = fmt::format("{:.2f} of {:.2f} s", timeline.time_s, timeline.length_s);
+    if (ImGui::SliderFloat("##time", &time_s, 0.0f, static_cast<float>(timeline.length_s), shown.c_str()))
+      actions.time_s = time_s;
+    size = {ImGui::GetWindowWidth(), ImGui::GetWindowHeight()};
+  }
+  ImGui::End();
+  return size;
 }
 
 PanelSize draw_banner(const HudBanner& banner) {

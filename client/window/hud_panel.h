@@ -9,6 +9,9 @@ namespace strandcast {
 inline constexpr float kMaxPanelShare = 1.0f / 3.0f;
 inline constexpr float kMinPanelLetters = 22.0f;
 
+/// Which keys there are.
+enum class HelpTopic { Server, Recording };
+
 /// Width and height on the screen, in the window's units.
 struct PanelSize {
   float width = 0.0f;
@@ -21,7 +24,9 @@ void set_panel_style(float content_scale);
 /// Top left: the title and warnings; unfolded, the measurements too.
 PanelSize draw_hud_panel(const HudState& hud, HudFold fold);
 /// Mouse and keys, in the middle, over all else.
-PanelSize draw_help_panel();
+PanelSize draw_help_panel(HelpTopic topic);
+/// Along the lower edge. Adds what the person does to `actions`.
+PanelSize draw_timeline(const TimelineState& timeline, TimelineActions& actions);
 /// What is wrong with the connection, in the middle.
 PanelSize draw_banner(const HudBanner& banner);
 

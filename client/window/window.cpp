@@ -50,6 +50,7 @@ struct Window::State {
   HudFold fold = HudFold::Small;
   bool is_help_visible = false;
   bool is_form_visible = false;
+  bool has_timeline = false;  // in the newest picture
   glm::dvec2 cursor{0.0};
   WindowActions actions;
   GLuint picture = 0;  // plain OpenGL 3.3: it must work where nothing better is to be had
@@ -66,6 +67,9 @@ struct Window::State {
     if (window != nullptr) glfwDestroyWindow(window);
     glfwTerminate();
   }
+
+  /// Something on the screen answers to the pointer.
+  bool has_widgets() const { return is_form_visible || has_timeline; }
 
   void on_key(int key) {
     actions.is_touched = true;
@@ -96,6 +100,27 @@ struct Window::State {
       case GLFW_KEY_V:
         actions.wants_debug_view = true;
         break;
+      case GLFW_KEY_RIGHT:
+        ++actions.state_steps;
+        break;
+      case GLFW_KEY_LEFT:
+        --actions.state_steps;
+        break;
+      case GLFW_KEY_UP:
+        ++actions.speed_steps;
+        break;
+      case GLFW_KEY_DOWN:
+        --actions.speed_steps;
+        break;
+      case GLFW_KEY_HOME:
+        actions.wants_beginning = true;
+        break;
+      case GLFW_KEY_END:
+        actions.wants_end = true;
+        break;
+      case GLFW_KEY_O:
+        actions.timeline.wants_loop_toggle = true;
+        break;
       case GLFW_KEY_U:
         fold = next_fold(fold);
         break;
@@ -115,7 +140,7 @@ struct Window::State {
     const glm::dvec2 moved = position - cursor;
     cursor = position;
     // Its fields answer to the pointer.
-    actions.is_touched = actions.is_touched || is_form_visible;
+    actions.is_touched = actions.is_touched || has_widgets();
     int width = 0;
     int height = 0;
     glfwGetWindowSize(window, &width, &height);
@@ -131,7 +156,9 @@ struct Window::State {
   void install_callbacks() {
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, [](GLFWwindow* source, int key, int, int action, int) {
-      if (action == GLFW_PRESS) static_cast<State*>(glfwGetWindowUserPointer(source))->on_key(key);
+      const bool is_repeated = action == GLFW_REPEAT && (key == GLFW_KEY_LEFT || key == GLFW_KEY_RIGHT);
+      if (action == GLFW_PRESS || is_repeated)
+        static_cast<State*>(glfwGetWindowUserPointer(source))->on_key(key);
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* source, double x, double y) {
       static_cast<State*>(glfwGetWindowUserPointer(source))->on_cursor({x, y});
@@ -143,11 +170,11 @@ struct Window::State {
     });
     glfwSetMouseButtonCallback(window, [](GLFWwindow* source, int, int, int) {
       State& state = *static_cast<State*>(glfwGetWindowUserPointer(source));
-      state.actions.is_touched = state.actions.is_touched || state.is_form_visible;
+      state.actions.is_touched = state.actions.is_touched || state.has_widgets();
     });
     glfwSetCharCallback(window, [](GLFWwindow* source, unsigned int) {
       State& state = *static_cast<State*>(glfwGetWindowUserPointer(source));
-      state.actions.is_touched = state.actions.is_touched || state.is_form_visible;
+      state.actions.is_touched = state.actions.is_touched || state.has_widgets();
     });
     // Uncovered, or of another size: the old picture is gone.
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* source) {
@@ -164,7 +191,8 @@ struct Window::State {
     draw_hud_panel(hud, fold);
     if (form && is_form_visible) draw_form_panel(*form, actions.form);
     if (hud.banner) draw_banner(*hud.banner);
-    if (is_help_visible) draw_help_panel();
+    if (hud.timeline) draw_timeline(*hud.timeline, actions.timeline);
+    if (is_help_visible) draw_help_panel(hud.timeline ? HelpTopic::Recording : HelpTopic::Server);
   }
 };
 
@@ -263,6 +291,7 @@ bool Window::is_form_visible() const {
 void Window::present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud,
                      const std::optional<FormState>& form) {
   const RenderSize size = framebuffer_size();
+  state_->has_timeline = hud.timeline.has_value();
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   // Panels learn their size from what they held before: the first time is not drawn.
@@ -282,7 +311,7 @@ void Window::present(const std::shared_ptr<const Image>& image, PictureFit fit, 
   glClear(GL_COLOR_BUFFER_BIT);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glfwSwapBuffers(state_->window);
-  if (!state_->actions.form.is_empty()) wake();
+  if (!state_->actions.form.is_empty() || !state_->actions.timeline.is_empty()) wake();
 }
 
 }  // namespace strandcast

@@ -28,10 +28,15 @@ struct WindowActions {
   bool wants_mode_toggle = false;     // M: strands, frames or auto
   bool wants_playout_toggle = false;  // P: low latency or smooth
   bool wants_debug_view = false;      // V: the next one
+  int state_steps = 0;                // right less left arrow
+  int speed_steps = 0;                // up less down arrow
+  bool wants_beginning = false;       // Home
+  bool wants_end = false;             // End
   glm::vec2 orbit_heights{0.0f};      // left drag, in window heights
   glm::vec2 pan_heights{0.0f};        // middle or right drag
   float zoom_steps = 0.0f;            // wheel
   FormActions form;                   // what was done in the form
+  TimelineActions timeline;           // or on the timeline; O wants a loop too
 };
 
 /// How a picture of other sides than the window's is shown.

@@ -90,7 +90,7 @@ TEST(HudPanel, HelpAndBannerStayInsideASmallWindow) {
   EXPECT_LE(shown.width, 320.0f);
   const PanelSize wide = bench.lay_out({1280.0f, 720.0f}, [&] { return draw_banner(banner); });
   EXPECT_GT(shown.height, wide.height) << "what does not fit in a line goes on in the next";
-  EXPECT_LE(bench.lay_out({320.0f, 240.0f}, [] { return draw_help_panel(); }).width, 320.0f);
+  EXPECT_LE(bench.lay_out({320.0f, 240.0f}, [] { return draw_help_panel(HelpTopic::Server); }).width, 320.0f);
 }
 
 TEST(HudFold, GoesRound) {

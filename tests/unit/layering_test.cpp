@@ -76,7 +76,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"client/web", with({"common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
       {"client/export", with({"common/replay", "common/log"}, kStrands)},
-      {"client/app", with({"client/net", "client/window", "client/export"}, kAll)},
+      {"client/app", with({"client/net", "client/window", "client/export", "common/record"}, kAll)},
       {"client", with({"client/app"}, kAll)},
   };
   return kAllowed;

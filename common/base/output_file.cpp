@@ -1,4 +1,4 @@
-#include "client/export/output_file.h"
+#include "common/base/output_file.h"
 
 #include <cerrno>
 #include <cstring>
