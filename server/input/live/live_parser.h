@@ -34,8 +34,8 @@ struct LiveProtocol {
   const char* name;
   const char* summary;  // for people
   LiveTransport transport;
-  uint16_t default_port;                 // where data come in, or (Tcp) where the peer listens
-  uint16_t request_port;                 // of the peer, for greeting() and request(); 0 = they are not needed
+  uint16_t default_port;  // where data come in, or (Tcp) where the peer listens
+  uint16_t request_port;  // Udp: of the peer, where greeting() and request() go; 0 = there are none
   std::vector<const char*> axis_orders;  // how its numbers may be meant, the usual one first; may be empty
   const char* multicast_group;           // "" = none
 };

@@ -1,0 +1,117 @@
+// FreeD, message D1, of cameras and heads in virtual production: Vinten's manual, appendix A.3.2 and B.
+#include <array>
+
+#include "common/strands/byte_io.h"
+#include "server/input/live/conventions.h"
+#include "server/input/live/parsers_private.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kPacketBytes = 29;
+constexpr uint8_t kPoseType = 0xD1;
+constexpr uint8_t kFamilyMask = 0xF0;  // all types of FreeD begin with D
+constexpr uint8_t kFamily = 0xD0;
+constexpr uint8_t kChecksumBegin = 0x40;
+constexpr double kUnitsPerDegree = 32768.0;
+constexpr double kUnitsPerMm = 64.0;
+
+/// What a packet says, in its own units.
+struct FreedFields {
+  uint8_t camera = 0;
+  std::array<int32_t, 3> angle{};     // in the order of the packet
+  std::array<int32_t, 3> position{};  // x, y, height
+  uint32_t zoom = 0;
+  uint32_t focus = 0;
+};
+
+uint8_t checksum_of(std::span<const std::byte> bytes) {
+  uint8_t sum = kChecksumBegin;
+  for (const std::byte byte : bytes) sum = static_cast<uint8_t>(sum - std::to_integer<uint8_t>(byte));
+  return sum;
+}
+
+uint32_t take_three(ByteReader& reader) {
+  const uint32_t high = reader.take<uint8_t>(), middle = reader.take<uint8_t>(), low = reader.take<uint8_t>();
+  return high << 16 | middle << 8 | low;
+}
+int32_t take_signed_three(ByteReader& reader) {
+  constexpr uint32_t kSign = 1u << 23;
+  return static_cast<int32_t>(take_three(reader) ^ kSign) - static_cast<int32_t>(kSign);
+}
+
+FreedFields take_fields(ByteReader reader) {
+  FreedFields fields;
+  (void)reader.take<uint8_t>();
+  fields.camera = reader.take<uint8_t>();
+  for (int32_t& angle : fields.angle) angle = take_signed_three(reader);
+  for (int32_t& position : fields.position) position = take_signed_three(reader);
+  fields.zoom = take_three(reader);
+  fields.focus = take_three(reader);
+  return fields;
+}
+
+class FreedParser : public LiveParser {
+ public:
+  /// Which of the three angles pan and tilt are.
+  FreedParser(size_t pan_at, size_t tilt_at) : pan_at_(pan_at), tilt_at_(tilt_at) {}
+
+  Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
+    const uint8_t type = bytes.empty() ? uint8_t{0} : std::to_integer<uint8_t>(bytes.front());
+    if ((type & kFamilyMask) == kFamily && type != kPoseType) {
+      ++ignored_;
+      return LivePacket{};
+    }
+    if (bytes.size() != kPacketBytes || type != kPoseType)
+      return make_error(
+          ErrorCode::BadInput,
+          "a packet of FreeD D1 has {} bytes and begins with 0xD1, this one has {} and begins with {:#04x}",
+          kPacketBytes, bytes.size(), type);
+    const uint8_t sent = std::to_integer<uint8_t>(bytes.back());
+    const uint8_t computed = checksum_of(bytes.first(kPacketBytes - 1));
+    if (sent != computed)
+      return make_error(ErrorCode::BadInput,
+                        "a packet of FreeD with the wrong checksum: {:#04x} where {:#04x} is right", sent,
+                        computed);
+    last_ = take_fields(ByteReader(bytes));
+    LivePacket packet;
+    LivePose& pose = packet.poses.emplace_back();
+    pose.subject = fmt::format("{}", last_->camera);
+    pose.world_from_subject = pose_from_freed(last_pose());
+    return packet;
+  }
+
+  uint64_t ignored() const override { return ignored_; }
+
+  std::vector<std::string> describe() const override {
+    if (!last_) return {};
+    const FreedPose pose = last_pose();
+    const glm::dvec3& p = pose.position_mm;
+    return {
+        fmt::format("camera {}", last_->camera),
+        fmt::format("pan {:.3f} tilt {:.3f} roll {:.3f} degrees", pose.pan_deg, pose.tilt_deg, pose.roll_deg),
+        fmt::format("x {:.2f} y {:.2f} height {:.2f} mm", p.x, p.y, p.z),
+        fmt::format("zoom {} focus {}", last_->zoom, last_->focus)};
+  }
+
+ private:
+  FreedPose last_pose() const {
+    constexpr size_t kRollAt = 2;
+    const FreedFields& fields = *last_;
+    const auto degrees = [&](size_t at) { return fields.angle[at] / kUnitsPerDegree; };
+    return {glm::dvec3(fields.position[0], fields.position[1], fields.position[2]) / kUnitsPerMm,
+            degrees(pan_at_), degrees(tilt_at_), degrees(kRollAt)};
+  }
+
+  size_t pan_at_, tilt_at_;
+  std::optional<FreedFields> last_;
+  uint64_t ignored_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<LiveParser> make_freed_parser(size_t axis_order) {
+  return std::make_unique<FreedParser>(axis_order, 1 - axis_order);
+}
+
+}  // namespace strandcast

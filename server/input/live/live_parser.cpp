@@ -1,0 +1,81 @@
+#include "server/input/live/live_parser.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/text.h"
+#include "server/input/live/parsers_private.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kMaxQuotedBytes = 40;
+
+}  // namespace
+
+std::span<const LiveProtocol> live_protocols() {
+  constexpr LiveTransport kUdp = LiveTransport::Udp, kTcp = LiveTransport::Tcp;
+  const std::vector<const char*> up_axes = {"y-up", "z-up"};
+  static const std::vector<LiveProtocol> kProtocols = {
+      {"vmc", "VMC of a performer (bones, trackers), and wind as OSC", kUdp, 39539, 0, {}, ""},
+      {"opentrack", "opentrack's output \"UDP over network\"", kUdp, 4242, 0, {"xyz-ypr", "ypr-xyz"}, ""},
+      {"freed", "FreeD D1 of cameras and heads", kUdp, 40000, 0, {"pan-tilt-roll", "tilt-pan-roll"}, ""},
+      {"natnet", "OptiTrack's NatNet 3.0 to 4.1 (Motive)", kUdp, 1511, 1510, up_axes, "239.255.42.99"},
+      {"vrpn", "trackers of a VRPN server", kTcp, 3883, 0, up_axes, ""},
+      {"livelinkface",
+       "Live Link Face of a phone: how the head is turned",
+       kUdp,
+       11111,
+       0,
+       {"half-turns", "radians"},
+       ""},
+  };
+  return kProtocols;
+}
+
+Result<std::unique_ptr<LiveParser>> make_live_parser(const LiveParserConfig& config) {
+  std::vector<const char*> names;
+  for (const LiveProtocol& protocol : live_protocols()) names.push_back(protocol.name);
+  ASSIGN_OR_RETURN(const size_t index, find_name("live protocol", config.protocol, names));
+  size_t order = 0;
+  if (!config.axis_order.empty()) {
+    ASSIGN_OR_RETURN(order, find_name("axis order", config.axis_order, live_protocols()[index].axis_orders));
+  }
+  if (config.protocol == "vmc") return make_vmc_parser(config);
+  if (config.protocol == "opentrack") return make_opentrack_parser(order);
+  if (config.protocol == "freed") return make_freed_parser(order);
+  if (config.protocol == "natnet") return make_natnet_parser(order, config.protocol_version);
+  if (config.protocol == "vrpn") return make_vrpn_parser(order);
+  return make_live_link_face_parser(order);
+}
+
+Result<size_t> find_name(const char* kind, const std::string& name, const std::vector<const char*>& known) {
+  const auto found = std::find(known.begin(), known.end(), name);
+  if (found != known.end()) return static_cast<size_t>(found - known.begin());
+  if (known.empty())
+    return make_error(ErrorCode::NotFound, "there is no {} to choose for this protocol", kind);
+  return make_error(ErrorCode::NotFound, "there is no {} \"{}\"; there are {}", kind,
+                    excerpt(name, kMaxQuotedBytes), fmt::join(known, ", "));
+}
+
+std::optional<int64_t> nanoseconds_of(double seconds) {
+  constexpr double kMostSeconds = 9e9;  // 285 years: below what 63 bits of nanoseconds hold
+  if (!(std::abs(seconds) <= kMostSeconds)) return std::nullopt;
+  return static_cast<int64_t>(std::llround(seconds * 1e9));
+}
+
+void MonitorLines::add(std::string line) {
+  if (has_room())
+    lines_.push_back(std::move(line));
+  else
+    ++left_out_;
+}
+
+std::vector<std::string> MonitorLines::take() && {
+  if (left_out_ > 0) lines_.push_back(fmt::format("and {} more", left_out_));
+  return std::move(lines_);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,61 @@
+// OSC 1.0 out of one datagram: bundles are unfolded, every message is checked to its last byte before any of
+// them is handed out. Own and strict, as the OSC libraries that there are trust sizes that come from outside.
+// Any thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+constexpr size_t kMaxOscBundleDepth = 4;       // bundles within bundles
+constexpr size_t kMaxOscBundleElements = 256;  // of one bundle
+/// UDP carries no more.
+constexpr uint32_t kMaxDatagramBytes = 65'507;
+
+/// Parts of the datagram that it was read from.
+struct OscMessage {
+  std::string_view address;              // from its '/'
+  std::string_view tags;                 // of the arguments, without the comma
+  std::span<const std::byte> arguments;  // of known kinds whole; of others up to the message's end
+};
+
+struct OscPacket {
+  std::vector<OscMessage> messages;  // in their order, those of inner bundles at their place
+  bool is_bundle = false;            // else the datagram is one message
+  uint64_t unknown_tags = 0;         // messages left out, as nobody knows how long their arguments are
+};
+
+/// Reads a datagram of at most `limit_bytes`. An error names the byte.
+Result<OscPacket> read_osc(std::span<const std::byte> datagram, uint32_t limit_bytes);
+
+/// Takes a message's arguments from the front. Another kind than asked for, or none left: nothing, and
+/// nothing more after that. Arguments beyond those taken do not matter.
+class OscArguments {
+ public:
+  explicit OscArguments(const OscMessage& message) : tags_(message.tags), bytes_(message.arguments) {}
+
+  std::optional<int32_t> take_int();
+  std::optional<float> take_float();
+  std::optional<std::string_view> take_string();
+  /// True while everything asked for was there.
+  bool ok() const { return ok_; }
+
+ private:
+  bool next_is(char tag);
+  std::string_view tags_;
+  std::span<const std::byte> bytes_;
+  bool ok_ = true;
+};
+
+/// "/address  1 2.5 "text"", for a person.
+std::string to_line(const OscMessage& message);
+
+}  // namespace strandcast

@@ -1,0 +1,267 @@
+// VMC, version 3.1, of a performer: the bones of an avatar, trackers and time as OSC; and wind as OSC of our
+// own.
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "common/base/text.h"
+#include "common/scene/body_desc.h"
+#include "server/input/live/conventions.h"
+#include "server/input/live/osc_reader.h"
+#include "server/input/live/parsers_private.h"
+
+namespace strandcast {
+namespace {
+
+constexpr size_t kNoParent = SIZE_MAX;
+
+/// A bone by its name in Unity and where it is under its parent in a usual body, for senders that tell
+/// rotations only. Right-handed, arms held out. A parent that nobody sends hangs on its own parent in the
+/// same place.
+struct BoneInfo {
+  const char* name;
+  size_t parent;
+  glm::dvec3 bind_m;
+};
+enum Bone : size_t {
+  kRoot,
+  kHips,
+  kSpine,
+  kChest,
+  kUpperChest,
+  kNeck,
+  kHead,
+  kLeftShoulder,
+  kLeftUpperArm,
+  kLeftLowerArm,
+  kRightShoulder,
+  kRightUpperArm,
+  kRightLowerArm,
+  kBoneCount
+};
+constexpr std::array<BoneInfo, kBoneCount> kBones = {{
+    {"root", kNoParent, {0.0, 0.0, 0.0}},
+    {"Hips", kRoot, {0.0, 0.95, 0.0}},
+    {"Spine", kHips, {0.0, 0.10, 0.0}},
+    {"Chest", kSpine, {0.0, 0.12, 0.0}},
+    {"UpperChest", kChest, {0.0, 0.12, 0.0}},
+    {"Neck", kUpperChest, {0.0, 0.14, 0.0}},
+    {"Head", kNeck, {0.0, 0.10, 0.0}},
+    {"LeftShoulder", kUpperChest, {0.03, 0.10, 0.0}},
+    {"LeftUpperArm", kLeftShoulder, {0.13, 0.0, 0.0}},
+    {"LeftLowerArm", kLeftUpperArm, {0.28, 0.0, 0.0}},
+    {"RightShoulder", kUpperChest, {-0.03, 0.10, 0.0}},
+    {"RightUpperArm", kRightShoulder, {-0.13, 0.0, 0.0}},
+    {"RightLowerArm", kRightUpperArm, {-0.28, 0.0, 0.0}},
+}};
+using BoneSet = uint32_t;
+constexpr BoneSet bit_of(size_t bone) {
+  return BoneSet{1} << bone;
+}
+
+/// A sender that leaves bones out in so many frames on end does not send them any more.
+constexpr int kForgottenAfterFrames = 30;
+
+/// Unit length, or NaN where a quaternion has no direction: a chain of bones would hide which it was.
+glm::dquat unit_or_nan(const glm::dquat& rotation) {
+  constexpr double kLeastLength = 0.5, kMostLength = 2.0;
+  const double length = glm::length(rotation);
+  if (length >= kLeastLength && length <= kMostLength) return rotation * (1.0 / length);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  return {nan, nan, nan, nan};
+}
+
+Pose operator*(const Pose& parent, const Pose& child) {
+  return {parent * child.position_m, parent.rotation * child.rotation};
+}
+
+/// The name and the pose that many of VMC's messages begin with.
+struct NamedPose {
+  std::string_view name;
+  glm::dvec3 position_m{0.0};
+  Pose pose;
+};
+std::optional<NamedPose> take_pose(OscArguments& arguments) {
+  NamedPose named;
+  named.name = arguments.take_string().value_or("");
+  std::array<double, 7> value{};
+  for (double& number : value) number = arguments.take_float().value_or(0.0f);
+  if (!arguments.ok()) return std::nullopt;
+  named.position_m = {value[0], value[1], value[2]};
+  named.pose =
+      pose_from_unity(named.position_m, unit_or_nan(quaternion_of({value[3], value[4], value[5], value[6]})));
+  return named;
+}
+
+/// What a performer told of the body so far. A frame of it is spread over several datagrams or messages, and
+/// nothing says where it ends: with the last of the bones that frames had, or before a bone that comes again,
+/// or before the root or the hips, with which senders begin.
+class VmcBody {
+ public:
+  explicit VmcBody(bool ignores_zero_positions) : ignores_zero_positions_(ignores_zero_positions) {}
+
+  std::optional<int64_t> time_ns;  // newest that was told
+
+  /// A bone; where it begins another frame, what the frame before has not told yet.
+  void set(size_t bone, const NamedPose& named, std::vector<LivePose>& poses) {
+    const bool begins = bone == kRoot || (bone == kHips && (seen_ & bit_of(kRoot)) == 0);
+    if ((seen_ & bit_of(bone)) != 0 || (begins && seen_ != 0)) {
+      tell(poses);
+      end_frame();
+    }
+    local_[bone] = named.pose;
+    if (ignores_zero_positions_ && named.position_m == glm::dvec3(0.0))
+      local_[bone].position_m = kBones[bone].bind_m;
+    seen_ |= bit_of(bone);
+    known_ |= bit_of(bone);
+    has_news_ = true;
+  }
+
+  /// At a datagram's end: the frame, where it is whole, or where nobody knows yet what a whole one has.
+  void end_datagram(bool is_bundle, std::vector<LivePose>& poses) {
+    const bool is_first = expected_ == 0;
+    const bool is_whole =
+        is_first ? is_bundle && (seen_ & bit_of(kHead)) != 0 : (seen_ & expected_) == expected_;
+    if (is_whole) tell(poses);
+  }
+
+ private:
+  void tell(std::vector<LivePose>& poses) {
+    if (!has_news_ || (known_ & bit_of(kHead)) == 0) return;
+    has_news_ = false;
+    std::array<Pose, kBoneCount> world;
+    for (size_t bone = 0; bone < kBoneCount; ++bone) {
+      const Pose parent = kBones[bone].parent == kNoParent ? Pose{} : world[kBones[bone].parent];
+      world[bone] = (known_ & bit_of(bone)) != 0 ? parent * local_[bone] : parent;
+    }
+    LivePose& pose = poses.emplace_back();
+    pose.world_from_subject = world[kHead];
+    pose.has_position = (known_ & (bit_of(kRoot) | bit_of(kHips))) != 0;
+    pose.source_time_ns = time_ns;
+    const auto add_joint = [&](const char* name, size_t bone) {
+      if ((known_ & bit_of(bone)) == 0) return;
+      pose.joint_names.emplace_back(name);
+      pose.joint_m.push_back(world[bone].position_m);
+    };
+    add_joint(kNeckJoint, kNeck);
+    add_joint(kChestJoint, (known_ & bit_of(kUpperChest)) != 0 ? kUpperChest : kChest);
+    add_joint(kLeftShoulderJoint, kLeftUpperArm);
+    add_joint(kRightShoulderJoint, kRightUpperArm);
+    add_joint(kLeftElbowJoint, kLeftLowerArm);
+    add_joint(kRightElbowJoint, kRightLowerArm);
+  }
+
+  /// Learns what a whole frame has.
+  void end_frame() {
+    lately_ |= seen_;
+    if ((seen_ & expected_) == expected_) {
+      expected_ |= seen_;
+      short_frames_ = 0;
+      lately_ = 0;
+    } else if (++short_frames_ >= kForgottenAfterFrames) {
+      expected_ = lately_;
+      short_frames_ = 0;
+      lately_ = 0;
+    }
+    seen_ = 0;
+  }
+
+  bool ignores_zero_positions_;
+  std::array<Pose, kBoneCount> local_;
+  BoneSet known_ = 0;      // ever
+  BoneSet seen_ = 0;       // of the frame that is coming in
+  bool has_news_ = false;  // that no pose tells
+  BoneSet expected_ = 0;   // of a whole frame
+  BoneSet lately_ = 0;     // of the frames since the last whole one
+  int short_frames_ = 0;
+};
+
+class VmcParser : public LiveParser {
+ public:
+  explicit VmcParser(const LiveParserConfig& config)
+      : limit_bytes_(std::min(config.max_datagram_bytes, kMaxDatagramBytes)),
+        body_(config.ignores_zero_positions) {}
+
+  Result<LivePacket> parse(std::span<const std::byte> bytes, int64_t) override {
+    ASSIGN_OR_RETURN(const OscPacket osc, read_osc(bytes, limit_bytes_));
+    last_.assign(bytes.begin(), bytes.end());
+    ignored_ += osc.unknown_tags;
+    LivePacket packet;
+    for (const OscMessage& message : osc.messages)
+      if (!apply(message, packet)) ++ignored_;
+    body_.end_datagram(osc.is_bundle, packet.poses);
+    return packet;
+  }
+
+  uint64_t ignored() const override { return ignored_; }
+
+  std::vector<std::string> describe() const override {
+    MonitorLines lines;
+    const auto osc = read_osc(last_, limit_bytes_);
+    if (last_.empty() || !osc) return {};
+    for (const OscMessage& message : osc->messages) lines.add(lines.has_room() ? to_line(message) : "");
+    return std::move(lines).take();
+  }
+
+ private:
+  /// False for a message that is not known, or has other arguments than its address asks for.
+  bool apply(const OscMessage& message, LivePacket& packet) {
+    OscArguments arguments(message);
+    const std::string_view address = message.address;
+    if (address == "/VMC/Ext/Bone/Pos") return apply_bone(arguments, packet);
+    if (address == "/VMC/Ext/Root/Pos") {
+      const auto root = take_pose(arguments);
+      if (root) body_.set(kRoot, *root, packet.poses);
+      return root.has_value();
+    }
+    if (address == "/VMC/Ext/Hmd/Pos" || address == "/VMC/Ext/Con/Pos" || address == "/VMC/Ext/Tra/Pos")
+      return apply_device(arguments, packet);
+    if (address == "/VMC/Ext/T") {
+      const auto time_s = arguments.take_float();
+      if (time_s) body_.time_ns = nanoseconds_of(*time_s);
+      return time_s.has_value();
+    }
+    if (address == "/strandcast/wind") return apply_wind(arguments, packet);
+    // Faces, cameras, lights, devices in another scale: known, and of no use here.
+    return address.starts_with("/VMC/");
+  }
+
+  bool apply_bone(OscArguments& arguments, LivePacket& packet) {
+    const auto named = take_pose(arguments);
+    if (!named) return false;
+    for (size_t bone = kHips; bone < kBoneCount; ++bone)
+      if (named->name == kBones[bone].name) body_.set(bone, *named, packet.poses);
+    return true;
+  }
+
+  bool apply_device(OscArguments& arguments, LivePacket& packet) {
+    const auto named = take_pose(arguments);
+    if (!named) return false;
+    LivePose& pose = packet.poses.emplace_back();
+    pose.subject = one_line(named->name, kMaxSubjectBytes);
+    pose.world_from_subject = named->pose;
+    pose.source_time_ns = body_.time_ns;
+    return true;
+  }
+
+  static bool apply_wind(OscArguments& arguments, LivePacket& packet) {
+    glm::dvec3 wind_mps(0.0);
+    for (int axis = 0; axis < 3; ++axis) wind_mps[axis] = arguments.take_float().value_or(0.0f);
+    if (arguments.ok()) packet.wind_mps = wind_mps;
+    return arguments.ok();
+  }
+
+  uint32_t limit_bytes_;
+  VmcBody body_;
+  std::vector<std::byte> last_;
+  uint64_t ignored_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<LiveParser> make_vmc_parser(const LiveParserConfig& config) {
+  return std::make_unique<VmcParser>(config);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,241 @@
+// Parsers of head and camera trackers. Packets are written by tests/support/live_packets.h from the
+// documents, in each sender's axes and units; what comes out is looked at as a face: where it looks, where
+// its crown points.
+#include <cmath>
+
+#include "server/input/live/live_parser.h"
+#include "tests/support/live_packets.h"
+#include "tests/support/live_poses.h"
+
+namespace strandcast {
+namespace {
+
+using test::PacketBytes;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::unique_ptr<LiveParser> parser_of(const std::string& protocol, const std::string& axis_order = "") {
+  LiveParserConfig config;
+  config.protocol = protocol;
+  config.axis_order = axis_order;
+  auto parser = make_live_parser(config);
+  EXPECT_TRUE(parser) << parser.error().to_string();
+  return std::move(*parser);
+}
+
+LivePose only_pose(LiveParser& parser, const PacketBytes& bytes) {
+  const auto packet = parser.parse(bytes, 0);
+  EXPECT_TRUE(packet) << packet.error().to_string();
+  EXPECT_TRUE(packet && packet->poses.size() == 1);
+  return packet && packet->poses.size() == 1 ? packet->poses[0] : LivePose{};
+}
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+/// A face that was turned to its left, then up about its own ears, then tilted to its right about its own
+/// nose. By hand: +X is to the left, so it looks along (sin left cos up, sin up, cos left cos up); untilted
+/// its crown is the same with up 90 degrees more, and its right ear along (-cos left, 0, sin left); the tilt
+/// mixes these two.
+struct Turned {
+  double left, up, tilt_right;
+
+  glm::dvec3 face() const {
+    return {std::sin(left) * std::cos(up), std::sin(up), std::cos(left) * std::cos(up)};
+  }
+  glm::dvec3 crown() const {
+    const glm::dvec3 straight(-std::sin(left) * std::sin(up), std::cos(up), -std::cos(left) * std::sin(up));
+    const glm::dvec3 right_ear(-std::cos(left), 0, std::sin(left));
+    return std::cos(tilt_right) * straight + std::sin(tilt_right) * right_ear;
+  }
+};
+void expect_turned(const LivePose& pose, const Turned& turned) {
+  EXPECT_TRUE(test::looks_along(pose, turned.face()));
+  EXPECT_TRUE(test::has_crown_along(pose, turned.crown()));
+}
+
+TEST(LiveParsers, AreFoundByName) {
+  LiveParserConfig config;
+  for (const LiveProtocol& protocol : live_protocols()) {
+    config.protocol = protocol.name;
+    config.axis_order = "";
+    const auto parser = make_live_parser(config);
+    ASSERT_TRUE(parser) << protocol.name;
+    EXPECT_EQ((*parser)->ignored(), 0u);
+    EXPECT_THAT((*parser)->describe(), IsEmpty());
+    EXPECT_GT(protocol.default_port, 0);
+    for (const char* order : protocol.axis_orders) {
+      config.axis_order = order;
+      EXPECT_TRUE(make_live_parser(config)) << protocol.name << " " << order;
+    }
+    config.axis_order = "sideways";
+    EXPECT_EQ(make_live_parser(config).error().code, ErrorCode::NotFound) << protocol.name;
+  }
+  config.protocol = "opentrak";
+  const auto unknown = make_live_parser(config);
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::NotFound);
+  EXPECT_THAT(unknown.error().message,
+              testing::AllOf(HasSubstr("\"opentrak\""), HasSubstr("opentrack"), HasSubstr("vmc")));
+  config = {};
+  config.protocol = "opentrack";
+  config.axis_order = "yaw-first";
+  EXPECT_THAT(make_live_parser(config).error().message, HasSubstr("xyz-ypr, ypr-xyz"));
+}
+
+// opentrack's neural tracker makes the six numbers from a pose whose axes it names (ahead, up, right): +x to
+// the head's left, y up, +z away from the camera; yaw to the right, pitch up, roll to the left.
+TEST(OpentrackParser, TurnsAHeadAsItsTrackersDo) {
+  const auto parser = parser_of("opentrack");
+  const LivePose pose = only_pose(*parser, test::opentrack({10, 20, 30, 40, 15, -25}));
+  EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {0.10, 0.20, -0.30}));
+  EXPECT_TRUE(pose.has_position);
+  EXPECT_FALSE(pose.source_time_ns.has_value());
+  expect_turned(pose, {-40 * kDegree, 15 * kDegree, 25 * kDegree});
+  EXPECT_TRUE(test::looks_along(only_pose(*parser, test::opentrack({0, 0, 0, 90, 0, 0})), {-1, 0, 0}));
+  EXPECT_TRUE(test::looks_along(only_pose(*parser, test::opentrack({0, 0, 0, 0, 90, 0})), {0, 1, 0}));
+  EXPECT_TRUE(test::has_crown_along(only_pose(*parser, test::opentrack({0, 0, 0, 0, 0, 90})), {1, 0, 0}));
+  EXPECT_THAT(parser->describe(),
+              ElementsAre("x 0.00 y 0.00 z 0.00 cm", "yaw 0.00 pitch 0.00 roll 90.00 degrees"));
+}
+
+TEST(OpentrackParser, TakesAnglesFirstWhereTold) {
+  const auto parser = parser_of("opentrack", "ypr-xyz");
+  const LivePose pose = only_pose(*parser, test::opentrack({40, 15, -25, 10, 20, 30}));
+  EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {0.10, 0.20, -0.30}));
+  expect_turned(pose, {-40 * kDegree, 15 * kDegree, 25 * kDegree});
+}
+
+TEST(OpentrackParser, TakesWholePacketsOnly) {
+  const auto parser = parser_of("opentrack");
+  const PacketBytes packet = test::opentrack({1, 2, 3, 4, 5, 6});
+  for (size_t size = 0; size < packet.size(); ++size)
+    EXPECT_FALSE(parser->parse(std::span(packet).first(size), 0)) << size;
+  const auto longer = parser->parse(PacketBytes(packet.size() + 1), 0);
+  ASSERT_FALSE(longer);
+  EXPECT_THAT(longer.error().message, HasSubstr("has 48 bytes and this one 49"));
+  const LivePose pose = only_pose(*parser, test::opentrack({NAN, 0, 0, INFINITY, 0, 0}));
+  EXPECT_FALSE(is_finite(pose.world_from_subject)) << "left to whoever takes it";
+}
+
+// By the manual's appendix B: a camera at rest looks along +Y with +Z up, so +X is to its right. Pan to the
+// right, tilt up, roll clockwise as seen from behind, to the right.
+TEST(FreedParser, TurnsACameraAsTheManualSays) {
+  const auto parser = parser_of("freed");
+  test::FreedPacket packet;
+  packet.camera = 7;
+  packet.angle_deg = {40, 15, -25};
+  packet.position_mm = {1000, 2000, 1500};
+  const LivePose pose = only_pose(*parser, test::freed(packet));
+  EXPECT_EQ(pose.subject, "7");
+  EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {-1.0, 1.5, 2.0}));
+  expect_turned(pose, {-40 * kDegree, 15 * kDegree, -25 * kDegree});
+  EXPECT_THAT(parser->describe(), ElementsAre("camera 7", "pan 40.000 tilt 15.000 roll -25.000 degrees",
+                                              "x 1000.00 y 2000.00 height 1500.00 mm", "zoom 0 focus 0"));
+  const auto swapped = parser_of("freed", "tilt-pan-roll");
+  packet.angle_deg = {15, 40, -25};
+  expect_turned(only_pose(*swapped, test::freed(packet)), {-40 * kDegree, 15 * kDegree, -25 * kDegree});
+}
+
+// Ends of the ranges as the manual writes them: pan -180 is A60000, tilt +90 is 2D0000. Positions are 1/64
+// mm.
+TEST(FreedParser, ReadsTheNumbersOfTheManual) {
+  test::PacketWriter writer(std::endian::big);
+  for (const int byte : {0xD1, 0x02, 0xA6, 0,    0, 0x2D, 0, 0,    0xFF, 0x80, 0,    0xFF, 0xFF, 0xC0,
+                         0,    0,    0x40, 0x80, 0, 0,    0, 0x02, 0x03, 0x04, 0x05, 0x06, 0,    0})
+    writer.put(static_cast<uint8_t>(byte));
+  int sum = 0x40;
+  for (const std::byte byte : writer.bytes()) sum -= std::to_integer<int>(byte);
+  const auto parser = parser_of("freed");
+  (void)only_pose(*parser, writer.put(static_cast<uint8_t>(sum)).bytes());
+  EXPECT_THAT(parser->describe(),
+              ElementsAre("camera 2", "pan -180.000 tilt 90.000 roll -1.000 degrees",
+                          "x -1.00 y 1.00 height -131072.00 mm", "zoom 515 focus 263430"));
+}
+
+TEST(FreedParser, RefusesWrongChecksumsAndOtherSizes) {
+  const auto parser = parser_of("freed");
+  const PacketBytes right = test::freed({});
+  for (size_t i = 1; i < right.size(); ++i) {
+    PacketBytes wrong = right;
+    wrong[i] ^= std::byte{0x10};
+    const auto refused = parser->parse(wrong, 0);
+    ASSERT_FALSE(refused) << i;
+    EXPECT_THAT(refused.error().message, HasSubstr("wrong checksum"));
+  }
+  for (size_t size = 0; size < right.size(); ++size)
+    EXPECT_FALSE(parser->parse(std::span(right).first(size), 0));
+  EXPECT_EQ(parser->ignored(), 0u);
+  PacketBytes other = right;
+  other[0] = std::byte{0xD3};
+  EXPECT_THAT(parser->parse(other, 0)->poses, IsEmpty()) << "another message of the same family";
+  EXPECT_EQ(parser->ignored(), 1u);
+  EXPECT_THAT(parser->describe(), IsEmpty());
+}
+
+// The app maps turns of -180 to 180 degrees to -1 to 1, about the axes of ARKit's face: left, down, tilt to
+// the right.
+TEST(LiveLinkFaceParser, TurnsAHeadAsArKitDoes) {
+  const auto parser = parser_of("livelinkface");
+  test::FacePacketFields fields;
+  fields.yaw = 40.0f / 180;
+  fields.pitch = -15.0f / 180;
+  fields.roll = -25.0f / 180;
+  const PacketBytes packet = test::live_link_face(fields);
+  const LivePose pose = only_pose(*parser, packet);
+  EXPECT_FALSE(pose.has_position);
+  EXPECT_EQ(pose.subject, "iPhone");
+  EXPECT_EQ(pose.frame, 100u);
+  EXPECT_EQ(pose.source_time_ns, 1'675'000'000) << "100.5 frames at 60 a second";
+  expect_turned(pose, {40 * kDegree, 15 * kDegree, -25 * kDegree});
+
+  test::PacketWriter sized(std::endian::big);
+  sized.put(static_cast<uint32_t>(packet.size())).append(packet);
+  EXPECT_EQ(only_pose(*parser, sized.bytes()).world_from_subject, pose.world_from_subject)
+      << "its size in front";
+
+  const auto in_radians = parser_of("livelinkface", "radians");
+  fields.yaw = static_cast<float>(40 * kDegree);
+  fields.pitch = static_cast<float>(-15 * kDegree);
+  fields.roll = static_cast<float>(-25 * kDegree);
+  expect_turned(only_pose(*in_radians, test::live_link_face(fields)),
+                {40 * kDegree, 15 * kDegree, -25 * kDegree});
+  EXPECT_THAT(in_radians->describe(), ElementsAre(HasSubstr("\"iPhone\""), "frame 100 at 1.6750 s",
+                                                  "head yaw 0.6981 pitch -0.2618 roll -0.4363"));
+}
+
+// 320 bytes for a device of 32 letters and a subject of 18, as a reader that was checked against the app has
+// it.
+TEST(LiveLinkFaceParser, HasTheSizeOfRealPackets) {
+  test::FacePacketFields fields;
+  fields.device = std::string(32, 'd');
+  fields.subject = std::string(18, 's');
+  EXPECT_EQ(test::live_link_face(fields).size(), 320u);
+}
+
+TEST(LiveLinkFaceParser, TakesPacketsWithoutAFaceAndRefusesBrokenOnes) {
+  const auto parser = parser_of("livelinkface");
+  const PacketBytes packet = test::live_link_face({});
+  const size_t names_end = 1 + 4 + 32 + 4 + 6;
+  const size_t times_end = names_end + 16;
+  for (size_t size = 0; size < packet.size(); ++size) {
+    const auto read = parser->parse(std::span(packet).first(size), 0);
+    EXPECT_EQ(read.ok(), size == names_end || size == times_end) << size;
+    EXPECT_TRUE(!read || read->poses.empty());
+  }
+  PacketBytes wrong = packet;
+  wrong[0] = std::byte{7};
+  EXPECT_THAT(parser->parse(wrong, 0).error().message, HasSubstr("version 6 and this one with 7"));
+  wrong = packet;
+  wrong[1] = std::byte{0xFF};  // a name of four thousand million letters
+  EXPECT_FALSE(parser->parse(wrong, 0));
+  wrong = packet;
+  wrong[times_end] = std::byte{60};
+  EXPECT_FALSE(parser->parse(wrong, 0));
+  wrong = packet;
+  wrong.push_back(std::byte{0});
+  EXPECT_FALSE(parser->parse(wrong, 0));
+}
+
+}  // namespace
+}  // namespace strandcast
