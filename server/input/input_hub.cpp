@@ -155,6 +155,12 @@ void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arri
   }
 }
 
+void InputHub::set_delay(uint64_t source_id, int64_t delay_ns) {
+  const std::lock_guard lock(mutex_);
+  delays_ns_.erase(source_id);
+  if (delay_ns > 0) delays_ns_.emplace(source_id, delay_ns);
+}
+
 template <class Value>
 void InputHub::forget(Stream<Value>& stream, uint64_t source_id) {
   stream.allowances.erase(source_id);
@@ -174,7 +180,9 @@ void InputHub::remove_source(uint64_t source_id) {
 bool InputHub::update_pose(int64_t server_time_ns) {
   const auto& samples = motion_.track.samples();
   if (samples.empty()) return false;
-  const int64_t time_ns = motion_.clock.to_source_ns(server_time_ns);
+  const auto delay = motion_.owner ? delays_ns_.find(*motion_.owner) : delays_ns_.end();
+  const int64_t delay_ns = delay != delays_ns_.end() ? delay->second : 0;
+  const int64_t time_ns = motion_.clock.to_source_ns(server_time_ns) - delay_ns;
   const size_t index = motion_.track.index_at(time_ns);
   bool has_jumped = false;
   // Everything older than the last frame's sample is gone from the track, so this looks at each pair once.

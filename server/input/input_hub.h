@@ -80,6 +80,10 @@ class InputHub {
   void push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
   void push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
 
+  /// What this source says of the head is shown so much later, so that there is a sample after as well as one
+  /// before: 0 until told. Lasts until told otherwise.
+  void set_delay(uint64_t source_id, int64_t delay_ns);
+
   /// Forgets a source. The head keeps its last pose (stale at once); the scene's own wind returns.
   void remove_source(uint64_t source_id);
 
@@ -118,6 +122,7 @@ class InputHub {
   mutable std::mutex mutex_;
   Stream<HeadSample> motion_;
   Stream<glm::dvec3> wind_;
+  std::map<uint64_t, int64_t> delays_ns_;  // of motion, by source; those that are not 0
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;
   double motion_speed_ = 1.0;  // as the owner said last

@@ -46,6 +46,25 @@ TEST(InputHub, HoldsTheNewestSampleWithoutDelay) {
   EXPECT_EQ(hub.sample(kStart + 300 * kMs).motion_time_ns, kStart + 10 * kMs);
 }
 
+TEST(InputHub, ADelayedSourceIsShownBetweenItsSamples) {
+  InputHub hub;
+  hub.set_delay(1, 10 * kMs);
+  for (int i = 0; i < 10; ++i) hub.push(1, motion(i * 10 * kMs, pose_at(0.1 * i)), kStart + i * 10 * kMs);
+  EXPECT_NEAR(hub.sample(kStart + 90 * kMs).world_from_head.position_m.x, 0.8, 1e-12);
+  EXPECT_NEAR(hub.sample(kStart + 95 * kMs).world_from_head.position_m.x, 0.85, 1e-12);
+  EXPECT_NEAR(hub.sample(kStart + 120 * kMs).world_from_head.position_m.x, 0.9, 1e-12)
+      << "the newest is held";
+  // Of this source alone, and not for ever.
+  hub.remove_source(1);
+  hub.push(2, motion(0, pose_at(1.0)), kStart + 200 * kMs);
+  hub.push(2, motion(10 * kMs, pose_at(2.0)), kStart + 210 * kMs);
+  EXPECT_EQ(hub.sample(kStart + 210 * kMs).world_from_head, pose_at(2.0));
+  hub.set_delay(2, 5 * kMs);
+  hub.set_delay(2, 0);
+  hub.push(2, motion(20 * kMs, pose_at(3.0)), kStart + 220 * kMs);
+  EXPECT_EQ(hub.sample(kStart + 220 * kMs).world_from_head, pose_at(3.0));
+}
+
 TEST(InputHub, SaysHowFastItsOwnerPlaysTheMotion) {
   InputHub hub;
   EXPECT_EQ(hub.sample(kStart).motion_speed, 1.0);

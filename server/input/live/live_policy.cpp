@@ -1,0 +1,392 @@
+#include "server/input/live/live_policy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/scene/body_desc.h"
+#include "server/input/input_hub.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kSecondsPerNs = 1e-9;
+constexpr int64_t kBetweenJumpsNs = 1'000'000;  // the hub sees a jump where two samples are this near
+constexpr int64_t kShortestStepNs = 1'000;      // between two poses
+constexpr double kVelocityMemoryS = 0.03;       // a velocity is that of about so long
+constexpr uint32_t kSteadyCount = 8;            // equal steps in a row that make a habit
+constexpr double kSteadyShare = 0.2;            // how much periods of a steady source differ
+constexpr double kLeastTurn = 1e-9;             // of a quaternion's vector part
+
+bool is_possible(const LivePose& pose) {
+  if (!is_finite(pose.world_from_subject)) return false;
+  const double norm = glm::length(pose.world_from_subject.rotation);
+  const bool is_rotation = norm >= kMinQuaternionNorm && norm <= kMaxQuaternionNorm;
+  return is_rotation && glm::length(pose.world_from_subject.position_m) <= kMaxHeadDistanceM;
+}
+
+/// The part of a rotation that is about +Y.
+glm::dquat heading_of(const glm::dquat& rotation) {
+  const double norm = std::hypot(rotation.w, rotation.y);
+  if (norm < kLeastTurn) return {1.0, 0.0, 0.0, 0.0};
+  return {rotation.w / norm, 0.0, rotation.y / norm, 0.0};
+}
+
+/// A rotation as an axis times its angle, the short way.
+glm::dvec3 turn_of(glm::dquat rotation) {
+  if (rotation.w < 0.0) rotation = -rotation;
+  const glm::dvec3 part(rotation.x, rotation.y, rotation.z);
+  const double sine = glm::length(part);
+  if (sine < kLeastTurn) return 2.0 * part;
+  return part * (2.0 * std::atan2(sine, rotation.w) / sine);
+}
+
+glm::dquat rotation_by(const glm::dvec3& turn_rad) {
+  const double angle_rad = glm::length(turn_rad);
+  if (angle_rad < kLeastTurn) return {1.0, 0.0, 0.0, 0.0};
+  return glm::angleAxis(angle_rad, turn_rad / angle_rad);
+}
+
+/// From 0 to 1, at rest at both ends.
+double eased(double share) {
+  const double t = std::clamp(share, 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+}  // namespace
+
+// ---- what comes
+
+void LivePolicy::take(const LivePose& pose, int64_t arrival_ns) {
+  if (!is_possible(pose)) {
+    ++counters_.impossible;
+    return;
+  }
+  LivePose fit = pose;
+  fit.world_from_subject.rotation = glm::normalize(fit.world_from_subject.rotation);
+  if (is_stale(arrival_ns)) {
+    forget_order();
+    jumps_ = jumps_ || !last_;
+    doubted_m_.reset();
+  }
+  order(fit, arrival_ns);
+}
+
+std::vector<LiveHead> LivePolicy::advance(int64_t now_ns) {
+  while (!waiting_.empty() && now_ns - waiting_.front().arrival_ns >= kResequenceNs) release_first();
+  rest(now_ns);
+  return std::exchange(due_, {});
+}
+
+bool LivePolicy::is_stale(int64_t now_ns) const {
+  return !seen_ || now_ns - seen_ns_ > kMotionStaleNs;
+}
+
+void LivePolicy::begin_another() {
+  forget_order();
+  seen_.reset();
+  held_.reset();
+  doubted_m_.reset();
+  jumps_ = true;
+}
+
+bool LivePolicy::calibrate(int64_t now_ns) {
+  if (is_stale(now_ns)) return false;
+  Calibration calibration;
+  const glm::dquat heading = heading_of(seen_->rotation);
+  calibration.from_stage = glm::conjugate(heading);
+  calibration.from_mount = glm::conjugate(calibration.from_stage * seen_->rotation);
+  calibration.origin_m = seen_->position_m;
+  calibration_ = calibration;
+  jumps_ = true;
+  return true;
+}
+
+void LivePolicy::reset_calibration() {
+  calibration_.reset();
+  jumps_ = true;
+}
+
+// ---- order
+
+void LivePolicy::forget_order() {
+  waiting_.clear();
+  last_frame_.reset();
+  last_source_ns_.reset();
+  stride_ = 1;
+  last_gap_ = 0;
+  equal_gaps_ = 0;
+  late_in_a_row_ = 0;
+  steady_periods_ = 0;
+  period_ns_ = 0.0;
+  clock_ = {};
+}
+
+/// How many places this pose comes after the one that is expected; negative: it is late. Nothing where that
+/// is not known.
+std::optional<int64_t> LivePolicy::places_ahead(const LivePose& pose) const {
+  if (pose.frame && last_frame_) {
+    const auto after = static_cast<int64_t>(static_cast<int32_t>(*pose.frame - *last_frame_));
+    if (after <= 0) return after - 1;
+    return after < stride_ ? 0 : (after - 1) / stride_;
+  }
+  if (pose.frame || !pose.source_time_ns || !last_source_ns_) return std::nullopt;
+  const double after_ns = static_cast<double>(*pose.source_time_ns) - static_cast<double>(*last_source_ns_);
+  if (after_ns <= 0.0) return -1;
+  if (steady_periods_ < kSteadyCount) return 0;
+  const double places = std::round(after_ns / period_ns_) - 1.0;
+  return static_cast<int64_t>(std::clamp(places, 0.0, static_cast<double>(kRestartFrames + 1)));
+}
+
+/// Counts one that is late, unless it begins another count.
+bool LivePolicy::is_late(const LivePose& pose) {
+  const bool is_far =
+      (pose.frame && last_frame_ &&
+       static_cast<int32_t>(*pose.frame - *last_frame_) < -static_cast<int32_t>(kRestartFrames)) ||
+      (!pose.frame && pose.source_time_ns && last_source_ns_ &&
+       static_cast<double>(*pose.source_time_ns) - static_cast<double>(*last_source_ns_) <
+           -static_cast<double>(kClockJumpNs));
+  if (is_far || ++late_in_a_row_ >= kRestartPoses) {
+    forget_order();
+    return false;
+  }
+  ++counters_.late;
+  return true;
+}
+
+void LivePolicy::order(const LivePose& pose, int64_t arrival_ns) {
+  const std::optional<int64_t> ahead = places_ahead(pose);
+  if (ahead && *ahead < 0 && is_late(pose)) return;
+  if (!ahead || *ahead <= 0 || *ahead > kRestartFrames) {
+    release(pose, arrival_ns);
+    const size_t waited = waiting_.size();
+    release_ready();
+    counters_.resequenced += waited - waiting_.size();
+    return;
+  }
+  insert(pose, arrival_ns);
+  if (waiting_.size() > kResequenceFrames) release_first();
+}
+
+void LivePolicy::insert(const LivePose& pose, int64_t arrival_ns) {
+  const auto comes_before = [](const LivePose& a, const LivePose& b) {
+    if (a.frame && b.frame) return static_cast<int32_t>(*a.frame - *b.frame) < 0;
+    return a.source_time_ns.value_or(0) < b.source_time_ns.value_or(0);
+  };
+  auto place = waiting_.begin();
+  while (place != waiting_.end() && comes_before(place->pose, pose)) ++place;
+  if (place != waiting_.end() && !comes_before(pose, place->pose)) {
+    ++counters_.late;  // twice
+    return;
+  }
+  waiting_.insert(place, {pose, arrival_ns});
+}
+
+/// Those that waited for what has just come.
+void LivePolicy::release_ready() {
+  while (!waiting_.empty() && places_ahead(waiting_.front().pose).value_or(0) <= 0) {
+    const Waiting next = std::move(waiting_.front());
+    waiting_.pop_front();
+    release(next.pose, next.arrival_ns);
+  }
+}
+
+/// The first that waits goes on without those that it waited for.
+void LivePolicy::release_first() {
+  const Waiting next = std::move(waiting_.front());
+  waiting_.pop_front();
+  counters_.lost += static_cast<uint64_t>(std::max<int64_t>(places_ahead(next.pose).value_or(0), 0));
+  release(next.pose, next.arrival_ns);
+  release_ready();
+}
+
+/// Learns by which steps numbers or times go on.
+void LivePolicy::note_order(const LivePose& pose) {
+  late_in_a_row_ = 0;
+  if (pose.frame && last_frame_) {
+    const auto gap = static_cast<int64_t>(static_cast<int32_t>(*pose.frame - *last_frame_));
+    equal_gaps_ = gap == last_gap_ ? equal_gaps_ + 1 : 0;
+    last_gap_ = gap;
+    if (gap > 0 && (gap < stride_ || equal_gaps_ >= kSteadyCount)) stride_ = gap;
+  }
+  if (pose.source_time_ns && last_source_ns_) {
+    const double gap_ns = static_cast<double>(*pose.source_time_ns) - static_cast<double>(*last_source_ns_);
+    const bool is_steady = std::abs(gap_ns - period_ns_) <= kSteadyShare * period_ns_;
+    // A gap of a steady source says nothing of its period.
+    if (is_steady || steady_periods_ < kSteadyCount) period_ns_ = gap_ns;
+    steady_periods_ = is_steady                        ? steady_periods_ + 1
+                      : steady_periods_ < kSteadyCount ? 0
+                                                       : steady_periods_ - 1;
+  }
+  last_frame_ = pose.frame;
+  last_source_ns_ = pose.source_time_ns;
+}
+
+// ---- what is believed
+
+/// A pose in its order.
+void LivePolicy::release(const LivePose& pose, int64_t arrival_ns) {
+  note_order(pose);
+  const int64_t time_ns = time_of(pose, arrival_ns);
+  if (!is_believed(pose, arrival_ns)) {
+    ++counters_.gated;
+    return;
+  }
+  Pose seen = pose.world_from_subject;
+  if (seen_ && glm::dot(seen.rotation, seen_->rotation) < 0.0) seen.rotation = -seen.rotation;
+  seen_ = seen;
+  seen_ns_ = arrival_ns;
+  LiveHead head;
+  head.time_ns = time_ns;
+  head.world_from_head = head_of(pose);
+  add_joints(pose, head);
+  if (last_ && jumps_) {
+    // Hair is carried through what the hub takes for a jump.
+    LiveHead before = *last_;
+    before.time_ns = std::max(time_ns - kBetweenJumpsNs, last_->time_ns + kShortestStepNs);
+    head.time_ns = std::max(time_ns, before.time_ns + kShortestStepNs);
+    due_.push_back(before);
+    velocity_mps_ = turn_rad_per_s_ = glm::dvec3(0.0);
+    last_.reset();
+  }
+  if (last_) head.world_from_head = clamped(head.world_from_head, head.time_ns);
+  jumps_ = false;
+  put(std::move(head));
+  held_ = last_->world_from_head;
+}
+
+/// False while a body that is elsewhere at once has not stayed there.
+bool LivePolicy::is_believed(const LivePose& pose, int64_t arrival_ns) {
+  if (turns_only_ || !pose.has_position) return true;
+  const glm::dvec3 place_m = pose.world_from_subject.position_m;
+  const bool is_near = !seen_ || jumps_ || glm::distance(place_m, seen_->position_m) <= kGateJumpM;
+  if (!is_near && is_stale(arrival_ns)) jumps_ = true;
+  if (is_near || jumps_) {
+    doubted_m_.reset();
+    return true;
+  }
+  if (!doubted_m_ || glm::distance(place_m, *doubted_m_) > kGateJumpM) {
+    doubted_since_ns_ = arrival_ns;
+    doubted_poses_ = 0;
+  }
+  doubted_m_ = place_m;
+  if (++doubted_poses_ < kGatePoses || arrival_ns - doubted_since_ns_ < kGateNs) return false;
+  doubted_m_.reset();
+  jumps_ = true;
+  return true;
+}
+
+/// On the server's clock, after what was given out before.
+int64_t LivePolicy::time_of(const LivePose& pose, int64_t arrival_ns) {
+  int64_t time_ns = arrival_ns;
+  const bool has_time = pose.source_time_ns && std::abs(*pose.source_time_ns) <= kMaxSampleTimeNs;
+  if (has_time) {
+    clock_.add(*pose.source_time_ns, arrival_ns);
+    time_ns = std::min(*pose.source_time_ns + clock_.offset_ns(), arrival_ns);
+    // The source's clock was set: a new mapping.
+    if (arrival_ns - time_ns > kClockJumpNs) {
+      clock_ = {};
+      clock_.add(*pose.source_time_ns, arrival_ns);
+      time_ns = arrival_ns;
+    }
+  }
+  if (last_ && time_ns <= last_->time_ns) time_ns = std::max(arrival_ns, last_->time_ns + kShortestStepNs);
+  return time_ns;
+}
+
+Pose LivePolicy::head_of(const LivePose& pose) const {
+  Pose head = pose.world_from_subject;
+  if (calibration_) {
+    head.rotation = glm::normalize(calibration_->from_stage * head.rotation * calibration_->from_mount);
+    head.position_m = calibration_->from_stage * (head.position_m - calibration_->origin_m);
+  }
+  if (turns_only_ || !pose.has_position) head.position_m = glm::dvec3(0.0);
+  return head;
+}
+
+/// Joints are told in the world of the source, and belong to the head.
+void LivePolicy::add_joints(const LivePose& pose, LiveHead& head) const {
+  if (pose.joint_m.size() != pose.joint_names.size()) return;
+  glm::dquat rotation = pose.world_from_subject.rotation;
+  if (calibration_) rotation = rotation * calibration_->from_mount;
+  const glm::dquat head_from_world = glm::conjugate(rotation);
+  for (size_t i = 0; i < pose.joint_m.size() && head.joint_m.size() < kMaxMotionJoints; ++i) {
+    const std::string& name = pose.joint_names[i];
+    const glm::dvec3 place_m = head_from_world * (pose.joint_m[i] - pose.world_from_subject.position_m);
+    const bool is_new =
+        std::find(head.joint_names.begin(), head.joint_names.end(), name) == head.joint_names.end();
+    // The negation is true for what is no number.
+    if (name.empty() || name.size() > kMaxJointNameBytes || !is_new ||
+        !(glm::length(place_m) <= kMaxJointDistanceM))
+      continue;
+    head.joint_names.push_back(name);
+    head.joint_m.emplace_back(place_m);
+  }
+}
+
+// ---- what the head does
+
+/// As far towards the target as a head gets by then.
+Pose LivePolicy::clamped(const Pose& target, int64_t time_ns) {
+  const Pose& from = last_->world_from_head;
+  const double window_s = static_cast<double>(kClampWindowNs) * kSecondsPerNs;
+  const double passed_s = static_cast<double>(time_ns - last_->time_ns) * kSecondsPerNs;
+  move_allowance_m_ = std::min(move_allowance_m_ + kMaxLiveSpeedMps * passed_s, kMaxLiveSpeedMps * window_s);
+  turn_allowance_rad_ =
+      std::min(turn_allowance_rad_ + kMaxLiveTurnRadPerS * passed_s, kMaxLiveTurnRadPerS * window_s);
+  Pose reached = target;
+  const double way_m = glm::distance(from.position_m, target.position_m);
+  const double turn_rad = angle_between_rad(from.rotation, target.rotation);
+  const bool is_too_far = way_m > move_allowance_m_;
+  const bool is_too_turned = turn_rad > turn_allowance_rad_;
+  if (is_too_far)
+    reached.position_m = glm::mix(from.position_m, target.position_m, move_allowance_m_ / way_m);
+  if (is_too_turned) reached.rotation = interpolate(from, target, turn_allowance_rad_ / turn_rad).rotation;
+  if (is_too_far || is_too_turned) ++counters_.clamped;
+  move_allowance_m_ -= std::min(way_m, move_allowance_m_);
+  turn_allowance_rad_ -= std::min(turn_rad, turn_allowance_rad_);
+  return reached;
+}
+
+void LivePolicy::put(LiveHead head) {
+  if (last_) {
+    const double passed_s = static_cast<double>(head.time_ns - last_->time_ns) * kSecondsPerNs;
+    if (glm::dot(head.world_from_head.rotation, last_->world_from_head.rotation) < 0.0)
+      head.world_from_head.rotation = -head.world_from_head.rotation;
+    const Pose& before = last_->world_from_head;
+    const double share = std::min(passed_s / kVelocityMemoryS, 1.0);
+    // Over the memory, not over a step that may be short by jitter.
+    const double over_s = std::max(passed_s, kVelocityMemoryS);
+    const glm::dvec3 moved_m = head.world_from_head.position_m - before.position_m;
+    const glm::dvec3 turned_rad = turn_of(head.world_from_head.rotation * glm::conjugate(before.rotation));
+    velocity_mps_ = velocity_mps_ * (1.0 - share) + moved_m / over_s;
+    turn_rad_per_s_ = turn_rad_per_s_ * (1.0 - share) + turned_rad / over_s;
+  }
+  last_ = head;
+  due_.push_back(std::move(head));
+}
+
+/// Says where the head is while nothing comes.
+void LivePolicy::rest(int64_t now_ns) {
+  if (!held_ || !last_ || is_stale(now_ns)) return;
+  const int64_t age_ns = now_ns - seen_ns_;
+  if (age_ns < kHoldNs || now_ns - last_->time_ns < kRestingPoseNs) return;
+  last_->time_ns = now_ns;
+  last_->world_from_head = resting_pose(age_ns);
+  const double passed_s = static_cast<double>(kRestingPoseNs) * kSecondsPerNs;
+  move_allowance_m_ = kMaxLiveSpeedMps * passed_s;
+  turn_allowance_rad_ = kMaxLiveTurnRadPerS * passed_s;
+  due_.push_back(*last_);
+}
+
+/// Where a head is that was seen last `age_ns` ago.
+Pose LivePolicy::resting_pose(int64_t age_ns) const {
+  const double share = static_cast<double>(age_ns - kHoldNs) / static_cast<double>(kEaseNs);
+  const double on_s = static_cast<double>(kExtrapolateNs) * kSecondsPerNs * eased(share);
+  Pose pose = *held_;
+  pose.position_m += velocity_mps_ * on_s;
+  pose.rotation = glm::normalize(rotation_by(turn_rad_per_s_ * on_s) * pose.rotation);
+  return pose;
+}
+
+}  // namespace strandcast
