@@ -18,6 +18,7 @@
 #include "common/math/pose.h"
 #include "common/math/sphere_collider.h"
 #include "common/scene/body_desc.h"
+#include "common/scene/live_desc.h"
 #include "common/scene/render_methods.h"
 
 namespace strandcast {
@@ -229,6 +230,7 @@ struct SceneDesc {
   BendLimitDesc bend_limit;
   DetailDesc detail;
   BodyDesc body;
+  std::vector<LiveDesc> live;  // at most kMaxLiveInputs; none: no socket of it is opened
   WindDesc wind;
   LookDesc look;
   CameraDesc camera;

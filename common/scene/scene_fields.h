@@ -94,6 +94,10 @@ inline constexpr Range kFrameHeight{kMinPictureSide, kMaxPictureHeight, "pixels"
 inline constexpr Range kJpegQuality{1, 100, ""};
 inline constexpr Range kFrameRate{0.1, 240.0, "Hz"};
 inline constexpr Range kStrandRate{0.0, 1000.0, "Hz"};  // 0 = every step
+inline constexpr Range kUdpPort{0, 65'535, ""};         // 0 = the protocol's own
+inline constexpr Range kLiveDelay{0.0, 200.0, "ms"};
+inline constexpr Range kDatagramSize{64, 65'507, "bytes"};
+inline constexpr size_t kMaxHostBytes = 253;  // of a name in the DNS
 
 template <class Visitor>
 void visit_groom(Visitor& v, GroomDesc& groom) {
@@ -278,6 +282,24 @@ void visit_body(Visitor& v, BodyDesc& body) {
   v.vector("joint_offset_m", body.joint_offset_m, kJointOffset);
 }
 
+template <class Visitor>
+void visit_live(Visitor& v, LiveDesc& live) {
+  v.text("protocol", live.protocol, kMaxNameBytes);
+  v.require("protocol", !live.protocol.empty(), "is empty, it must name a protocol, such as vmc");
+  const auto text = [&](const char* name, std::string& value, size_t limit) {
+    if (v.chooses(name, !value.empty())) v.text(name, value, limit);
+  };
+  text("host", live.host, kMaxHostBytes);
+  v.number("port", live.port, kUdpPort);
+  text("subject", live.subject, kMaxNameBytes);
+  text("axes", live.axes, kMaxNameBytes);
+  text("version", live.version, kMaxNameBytes);
+  v.flag("takes_zero_positions", live.takes_zero_positions);
+  v.flag("turns_only", live.turns_only);
+  v.number("delay_ms", live.delay_ms, kLiveDelay);
+  v.number("max_datagram_bytes", live.max_datagram_bytes, kDatagramSize);
+}
+
 /// Shows every field of `scene` to the visitor, in the order of scene.proto.
 template <class Visitor>
 void visit_scene(Visitor& v, SceneDesc& scene) {
@@ -367,6 +389,7 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
   if (!has_target) scene.target_groom.reset();
   if (has_target && !scene.target_groom) scene.target_groom.emplace();
   if (has_target) v.group("target_groom", [&] { visit_groom(v, *scene.target_groom); });
+  v.repeated("live", scene.live, kMaxLiveInputs, [&](LiveDesc& live) { visit_live(v, live); });
 }
 
 }  // namespace strandcast::scene_fields

@@ -160,6 +160,14 @@ inline constexpr const char* kKind<SceneRequest> = "scene_request";
 template <class Visitor>
 void visit(Visitor&, SceneRequest&) {}
 
+template <>
+inline constexpr const char* kKind<LiveCommand> = "live_command";
+template <class Visitor>
+void visit(Visitor& v, LiveCommand& m) {
+  v.choice("action", m.action, LiveAction::Reset, kBehindNone);
+  v.text("subject", m.subject, kMaxNameChars);
+}
+
 // ---- server to client ----
 
 static_assert(kSessionIdChars == 16, "as the sentence below says");
@@ -202,6 +210,32 @@ void visit(Visitor& v, Pong& m) {
   v.value("server_send_ns", m.server_send_ns);
 }
 
+template <class Visitor>
+void visit_live_input(Visitor& v, LiveInputStatus& m) {
+  v.text("input", m.input, kMaxLiveInputChars);
+  v.text("sender", m.sender, kMaxAddressChars);
+  v.text("subject", m.subject, kMaxNameChars);
+  v.text("subjects", m.subjects, kMaxLiveSubjectsChars);
+  v.value("is_stale", m.is_stale);
+  v.value("is_calibrated", m.is_calibrated);
+  v.measure("rate_hz", m.rate_hz);
+  v.measure("jitter_ms", m.jitter_ms);
+  v.measure("age_ms", m.age_ms);
+  v.value("packets", m.packets);
+  v.value("received_bytes", m.received_bytes);
+  v.value("malformed", m.malformed);
+  v.value("refused", m.refused);
+  v.value("over_rate", m.over_rate);
+  v.value("impossible", m.impossible);
+  v.value("clamped", m.clamped);
+  v.value("gated", m.gated);
+  v.value("resequenced", m.resequenced);
+  v.value("late", m.late);
+  v.value("lost", m.lost);
+  v.repeated("values", m.values, kMaxLiveValues,
+             [&](LiveValue& line) { v.text("text", line.text, kMaxLiveValueChars); });
+}
+
 template <>
 inline constexpr const char* kKind<ServerStatus> = "status";
 template <class Visitor>
@@ -225,6 +259,8 @@ void visit(Visitor& v, ServerStatus& m) {
     v.value("motion_time_ns", motion.motion_time_ns);
   });
   v.text("detail", m.detail, kMaxTextChars);
+  v.repeated("live_inputs", m.live_inputs, kMaxLiveInputs,
+             [&](LiveInputStatus& input) { visit_live_input(v, input); });
 }
 
 template <>

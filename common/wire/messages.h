@@ -38,6 +38,11 @@ inline constexpr double kMaxReportedMs = 60'000.0;  // ViewerReport
 inline constexpr double kMaxReportedPx = 100'000.0;
 inline constexpr double kMaxReportedHz = 1'000.0;
 inline constexpr double kMaxStepNs = 1e6;  // Hello
+// A ServerStatus with kMaxLiveInputs full inputs stays below kMaxControlBytes.
+inline constexpr size_t kMaxLiveInputChars = 128;
+inline constexpr size_t kMaxLiveSubjectsChars = 512;
+inline constexpr size_t kMaxLiveValues = 16;
+inline constexpr size_t kMaxLiveValueChars = 120;
 
 enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
@@ -132,9 +137,15 @@ struct ModeRequest {  // answered by a ModeChange
 struct SceneRequest {  // from a Controller; answered by a SceneText or a Notice
   bool operator==(const SceneRequest&) const = default;
 };
-using ClientMessage =
-    std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
-                 ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand, SceneRequest>;
+enum class LiveAction { ChooseSubject, Calibrate, Reset };
+struct LiveCommand {  // from a Controller, about live motion capture; answered by a Notice
+  LiveAction action = LiveAction::ChooseSubject;
+  std::string subject = {};  // of ChooseSubject; empty = one named head, else the first one seen
+  bool operator==(const LiveCommand&) const = default;
+};
+using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck,
+                                   Ping, ControlCommand, SetParameter, ViewerReport, ModeRequest,
+                                   AdminCommand, SceneRequest, LiveCommand>;
 
 // ---- server to client ----
 struct Welcome {
@@ -162,6 +173,34 @@ struct Pong {
   int64_t server_send_ns = 0;
   bool operator==(const Pong&) const = default;
 };
+struct LiveValue {
+  std::string text;
+  bool operator==(const LiveValue&) const = default;
+};
+struct LiveInputStatus {  // a live input: what its sender says, and how well it comes
+  std::string input;      // for a person
+  std::string sender;     // address and port; empty = nobody sends
+  std::string subject;    // that drives the head; empty = none yet
+  std::string subjects;   // all that were seen lately, for a person
+  bool is_stale = true;   // nothing of the subject for kMotionStaleNs
+  bool is_calibrated = false;
+  double rate_hz = 0.0;    // packets
+  double jitter_ms = 0.0;  // of their arrival
+  double age_ms = 0.0;     // of the newest
+  uint64_t packets = 0;
+  uint64_t received_bytes = 0;
+  uint64_t malformed = 0;
+  uint64_t refused = 0;                // of senders that may not, or while another one is heard
+  uint64_t over_rate = 0;              // more than a source may send
+  uint64_t impossible = 0;             // poses that are no numbers, or no rotation
+  uint64_t clamped = 0;                // poses that were faster than a head
+  uint64_t gated = 0;                  // poses not believed: the body was somewhere else at once
+  uint64_t resequenced = 0;            // put back into their order
+  uint64_t late = 0;                   // came twice, or too late to be used
+  uint64_t lost = 0;                   // numbers of frames that never came
+  std::vector<LiveValue> values = {};  // of the last packet, as it was sent, at most kMaxLiveValues
+  bool operator==(const LiveInputStatus&) const = default;
+};
 struct ServerStatus {  // about twice a second to every viewer
   uint64_t tick = 0;
   double sim_ms = 0.0;  // median per step
@@ -181,6 +220,7 @@ struct ServerStatus {  // about twice a second to every viewer
   // Who gets pictures: of those drawn since the last status, at most kMaxPictureMotions, oldest first.
   std::vector<PictureMotion> picture_motions = {};
   std::string detail = {};  // for a person: how much is simulated, and why not all; empty = all of it
+  std::vector<LiveInputStatus> live_inputs = {};  // at most kMaxLiveInputs
   bool operator==(const ServerStatus&) const = default;
 };
 struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on

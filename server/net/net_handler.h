@@ -72,6 +72,7 @@ class NetHandler {
   virtual void on_command(SessionId session, const ControlCommand& command) = 0;
   virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
   virtual void on_scene_request(SessionId) {}
+  virtual void on_live_command(SessionId, const LiveCommand&) {}
   /// May change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   /// An admin wants the server to end.

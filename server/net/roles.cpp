@@ -30,7 +30,8 @@ bool may_send(Role role, const ClientMessage& message) {
                  [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
                  [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
                  [&](const SetParameter&) { return steers; }, [&](const SceneRequest&) { return steers; },
-                 [&](const ViewerReport&) { return watches; }, [&](const ModeRequest&) { return watches; },
+                 [&](const LiveCommand&) { return steers; }, [&](const ViewerReport&) { return watches; },
+                 [&](const ModeRequest&) { return watches; },
                  [&](const AdminCommand&) { return role == Role::Admin; }},
       message);
 }

@@ -28,7 +28,7 @@ const char* message_name(const ClientMessage& message) {
   constexpr const char* kNames[] = {"Hello",           "MotionSamples", "WindSamples", "CameraChange",
                                     "KeyframeRequest", "FrameAck",      "Ping",        "ControlCommand",
                                     "SetParameter",    "ViewerReport",  "ModeRequest", "AdminCommand",
-                                    "SceneRequest"};
+                                    "SceneRequest",    "LiveCommand"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
 }
@@ -128,7 +128,8 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                           report_link(arrival_ns);
                         },
                         [&](const AdminCommand& command) { obey(command, arrival_ns); },
-                        [&](const SceneRequest&) { handler.on_scene_request(id_); }},
+                        [&](const SceneRequest&) { handler.on_scene_request(id_); },
+                        [&](const LiveCommand& command) { handler.on_live_command(id_, command); }},
              message);
 }
 

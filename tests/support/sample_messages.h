@@ -34,7 +34,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
           ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5},
           ModeRequest{StreamMode::Auto},
           AdminCommand{AdminAction::Kick, 1ull << 40},
-          SceneRequest{}};
+          SceneRequest{},
+          LiveCommand{LiveAction::Reset, "Zoë's head"}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {
@@ -73,6 +74,29 @@ inline std::vector<ServerMessage> sample_server_messages() {
   status.picture_motions = {{2'000'000'000, -5}, {INT64_MAX, INT64_MIN}};
   status.slow_motion = "half of real time; substeps=1 takes a third of the work away";
   status.detail = "half rate: the hair is 50 pixels high on the largest screen: all from 240 on";
+  LiveInputStatus live;
+  live.input = "vmc, port 39539";
+  live.sender = "127.0.0.1:50123";
+  live.subject = "Head";
+  live.subjects = "Head, Hips";
+  live.is_stale = true;
+  live.is_calibrated = true;
+  live.rate_hz = 59.5;
+  live.jitter_ms = 0.75;
+  live.age_ms = 12.25;
+  live.packets = 1ull << 33;
+  live.received_bytes = 1ull << 41;
+  live.malformed = 2;
+  live.refused = 3;
+  live.over_rate = 4;
+  live.impossible = 5;
+  live.clamped = 6;
+  live.gated = 7;
+  live.resequenced = 8;
+  live.late = 9;
+  live.lost = 10;
+  live.values = {{"/VMC/Ext/Bone/Pos Head 0 1.5 0"}, {"/VMC/Ext/OK 1"}};
+  status.live_inputs = {live, LiveInputStatus{}};
   return {
       welcome,
       Pong{1, -2, INT64_MAX},

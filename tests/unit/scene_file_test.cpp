@@ -153,6 +153,17 @@ SceneDesc unusual_scene() {
             .tip_clearance_m = 0.006,
             .force_per_s2 = 900.0,
             .joint_offset_m = {0.01, 0.02, 0.03}};
+  s.live = {{.protocol = "natnet",
+             .host = "stage-7",
+             .port = 1511,
+             .subject = "Hut",
+             .axes = "z_up",
+             .version = "4.1",
+             .takes_zero_positions = true,
+             .turns_only = true,
+             .delay_ms = 16.5,
+             .max_datagram_bytes = 9'000},
+            {.protocol = "vmc"}};
   return s;
 }
 

@@ -66,12 +66,13 @@ const ViewerReport = {
   device: [5, 'enum'], hair_px: [6, 'double'],
 } as const;
 const ModeRequest = { mode: [1, 'enum'] } as const;
+const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
 const Empty = {} as const;
 /** Motion and wind are not sent from a page. */
 export const ClientMessage = {
   hello: [1, Hello], camera: [4, CameraChange], keyframe_request: [5, Empty], frame_ack: [6, FrameAck],
   ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], viewer_report: [10, ViewerReport],
-  mode_request: [11, ModeRequest], admin: [12, AdminCommand], scene_request: [13, Empty],
+  mode_request: [11, ModeRequest], admin: [12, AdminCommand], scene_request: [13, Empty], live_command: [18, LiveCommand],
 } as const;
 
 export const Welcome = {
@@ -83,12 +84,21 @@ export const Welcome = {
 } as const;
 const Pong = { client_time_ns: [1, 'sfixed64'], server_receive_ns: [2, 'sfixed64'], server_send_ns: [3, 'sfixed64'] } as const;
 const PictureMotion = { sim_time_ns: [1, 'sfixed64'], motion_time_ns: [2, 'sfixed64'] } as const;
+const LiveValue = { text: [1, 'string'] } as const;
+const LiveInput = {
+  input: [1, 'string'], sender: [2, 'string'], subject: [3, 'string'], subjects: [4, 'string'], is_stale: [5, 'bool'],
+  is_calibrated: [6, 'bool'], rate_hz: [7, 'double'], jitter_ms: [8, 'double'], age_ms: [9, 'double'],
+  packets: [10, 'uint64'], received_bytes: [11, 'uint64'], malformed: [12, 'uint64'], refused: [13, 'uint64'],
+  over_rate: [14, 'uint64'], impossible: [15, 'uint64'], clamped: [16, 'uint64'], gated: [17, 'uint64'],
+  resequenced: [18, 'uint64'], late: [19, 'uint64'], lost: [20, 'uint64'], values: [21, LiveValue, 'repeated'],
+} as const;
 export const ServerStatus = {
   tick: [1, 'uint64'], sim_ms: [2, 'double'], encode_ms: [3, 'double'], render_ms: [4, 'double'],
   realtime_factor: [5, 'double'], is_paused: [6, 'bool'], is_motion_stale: [7, 'bool'], viewer_count: [8, 'uint32'],
   dropped_frames: [9, 'uint64'], rejected_samples: [10, 'uint64'], quarantined_strands: [11, 'uint64'],
   overstretched_strands: [12, 'uint64'], queue_delay_ms: [13, 'double'], slow_motion: [14, 'string'],
   picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'],
+  live_inputs: [24, LiveInput, 'repeated'],
 } as const;
 export const StreamQuality = {
   stream_id: [1, 'uint32'], rate_divisor: [2, 'uint32'], strand_share: [3, 'float'], bound_m: [4, 'float'],
@@ -117,8 +127,8 @@ export const ServerMessage = {
 /** By the names of the .proto files, for the test. */
 export const schemas: { readonly [name: string]: Schema } = {
   Vec3, Color, StrandStyle, HairShading, RenderMethods, Look, Camera, Hello, CameraChange, FrameAck, Ping,
-  ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, ClientMessage, Welcome, Pong, PictureMotion,
-  ServerStatus, StreamQuality, ModeChange, FrameQuality, Goodbye, Notice, SessionInfo, SessionList, LookChange,
+  ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, LiveCommand, ClientMessage, Welcome, Pong,
+  PictureMotion, LiveValue, LiveInput, ServerStatus, StreamQuality, ModeChange, FrameQuality, Goodbye, Notice, SessionInfo, SessionList, LookChange,
   SceneText, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
 };
 
