@@ -4,6 +4,7 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <iostream>
@@ -15,10 +16,12 @@
 
 #include "client/app/feed.h"
 #include "client/app/line_budget.h"
+#include "client/app/mocap_packet.h"
 #include "client/app/save_scene.h"
 #include "client/app/step_speed.h"
 #include "client/app/stream_check.h"
 #include "client/app/view_options.h"
+#include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
 #include "common/base/text.h"
 #include "common/motion/wind_csv.h"
@@ -32,6 +35,8 @@ using std::chrono::milliseconds;
 constexpr milliseconds kAnswerTimeout{5000};
 constexpr milliseconds kHealthTimeout{3000};
 constexpr float kGustLengthM = 9.0f;
+constexpr int64_t kInputsIntervalNs = 2'000'000'000;
+constexpr size_t kMaxShownValues = 6;  // of one input, so that the lines of two fit into their budget
 
 int fail(const Error& error, int exit_code = kBadInputExit) {
   std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
@@ -146,6 +151,31 @@ std::string to_line(const ServerStatus& status) {
       some(status.overstretched_strands, "strands over-stretched"));
 }
 
+/// A live input in a few lines: how it comes, what went wrong, and the newest packet as it was sent.
+std::vector<std::string> to_lines(const LiveInputStatus& input) {
+  std::vector<std::string> lines;
+  const std::string sender = input.sender.empty() ? "nobody sends" : "from " + input.sender;
+  const std::string subject = input.subject.empty() ? "" : fmt::format(" | head: {}", input.subject);
+  const std::string others = input.subjects.empty() || input.subjects == input.subject
+                                 ? ""
+                                 : fmt::format(" (seen: {})", input.subjects);
+  lines.push_back(fmt::format("  {} | {}{}{}{}{} | {:.1f} packets/s, jitter {:.1f} ms, age {:.0f} ms",
+                              input.input, sender, subject, others, input.is_stale ? " | stale" : "",
+                              input.is_calibrated ? " | calibrated" : "", input.rate_hz, input.jitter_ms,
+                              input.age_ms));
+  const std::string counts = some(input.malformed, "malformed") + some(input.refused, "refused") +
+                             some(input.over_rate, "too many") + some(input.impossible, "impossible") +
+                             some(input.clamped, "clamped") + some(input.gated, "not believed") +
+                             some(input.resequenced, "put in order") + some(input.late, "late or twice") +
+                             some(input.lost, "lost");
+  lines.push_back(fmt::format("    {} packets, {} bytes{}", input.packets, input.received_bytes, counts));
+  for (size_t i = 0; i < std::min(input.values.size(), kMaxShownValues); ++i)
+    lines.push_back("    " + one_line(input.values[i].text, kMaxLiveValueChars));
+  if (input.values.size() > kMaxShownValues)
+    lines.push_back(fmt::format("    and {} more", input.values.size() - kMaxShownValues));
+  return lines;
+}
+
 /// A foreign text, fit for a terminal.
 void print_lines(const std::string& text) {
   constexpr int kMaxShownLines = 100;
@@ -183,17 +213,50 @@ Result<ClientConfig> client_config_for(const CtlTarget& target, Role role) {
   return config;
 }
 
+namespace {
+
+FeedListener progress_listener() {
+  return isatty(STDERR_FILENO) != 0 ? FeedListener(print_progress) : FeedListener();
+}
+
+/// As a program of motion capture would.
+int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
+  const auto encoding = find_mocap_encoding(options.as);
+  if (!encoding) return fail(encoding.error());
+  // What names no port gets the protocol's own.
+  auto to = parse_address(options.to);
+  if (!to) return fail(to.error());
+  if (to->to_string() != options.to) to->port = encoding->port;
+  auto sender = DatagramSender::open(*to);
+  if (!sender) return fail(sender.error());
+  std::cerr << fmt::format("sending {} to {}: motion {}, {} packets per second\n", encoding->name,
+                           to->to_string(), options.motion, options.rate_hz);
+  const auto send = [&](double time_s, const Pose& pose, const std::optional<glm::vec3>& wind_mps) {
+    return (*sender)->send(encoding->encode({time_s, pose, wind_mps}));
+  };
+  const FeedProgress done = feed_moments(send, plan, stop, progress_listener());
+  std::cout << fmt::format("sent {:.1f} s: {} packets, at most {:.1f} ms late, {} skipped, {} unsent\n",
+                           done.elapsed_s, done.motion_samples, done.worst_lateness_ms, done.skipped_samples,
+                           done.unsent_samples);
+  return kDoneExit;
+}
+
+}  // namespace
+
 int run_feed(const CtlTarget& target, const FeedOptions& options, const std::atomic<bool>& stop) {
   // Files first: a typing error must not need a server to be found.
   const auto plan = make_feed_plan(options);
   if (!plan) return fail(plan.error());
+  if (!options.as.empty()) return run_mocap_feed(options, *plan, stop);
+  if (options.rate_hz > kMaxFeedRateHz)
+    return fail(make_error(ErrorCode::BadInput, "--rate {:g} is more than a server takes: {:g} at most",
+                           options.rate_hz, kMaxFeedRateHz));
   auto client = connect(target, Role::Source);
   if (!client) return fail(client.error());
   std::cerr << fmt::format("feeding {}: motion {}, wind {}, {} samples per second\n", target.connect,
                            options.motion, options.wind, options.rate_hz);
-  const bool is_terminal = isatty(STDERR_FILENO) != 0;
-  const auto done = feed(**client, *plan, stop, is_terminal ? FeedListener(print_progress) : FeedListener());
-  if (is_terminal) std::cerr << '\n';
+  const auto done = feed(**client, *plan, stop, progress_listener());
+  if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
   if (!done) return fail(done.error(), kRefusedExit);
   if (done->motion_s < 0.99 * done->elapsed_s * plan->speed)
     std::cout << fmt::format(
@@ -227,11 +290,18 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
     return seconds > 0.0 && static_cast<double>(now_ns() - begin_ns) * 1e-9 >= seconds;
   };
   bool was_slow = false;
+  int64_t next_inputs_ns = 0;
   std::string told_detail;
   while (!stop && std::cout && !is_over()) {
     for (const ClientEvent& event : (*client)->wait(milliseconds(100))) {
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
         print(to_line(*status));
+        // As often as a person reads.
+        if (!status->live_inputs.empty() && now_ns() >= next_inputs_ns) {
+          next_inputs_ns = now_ns() + kInputsIntervalNs;
+          for (const LiveInputStatus& input : status->live_inputs)
+            for (const std::string& text : to_lines(input)) print(text);
+        }
         const bool is_slow = !status->slow_motion.empty();
         if (is_slow && !std::exchange(was_slow, is_slow)) print(status->slow_motion);
         was_slow = is_slow;

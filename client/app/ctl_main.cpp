@@ -22,6 +22,7 @@ struct CommandLine {
   std::vector<float> wind_mps;
   double monitor_s = 0.0;
   std::string assignment;
+  std::string subject;
   uint64_t check_frames = 120;
   double check_timeout_s = 60.0;
   uint64_t session = 0;
@@ -55,7 +56,7 @@ void declare_feed(CLI::App& app, CommandLine& line) {
   app.add_option("--seconds", feed.seconds, "Stop after this long (default: the length of the motion file)")
       ->check(CLI::Range(0.0, 1e6));
   app.add_option("--rate", feed.rate_hz, "Samples per second")
-      ->check(CLI::Range(kMinFeedRateHz, kMaxFeedRateHz))
+      ->check(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz))
       ->capture_default_str();
   app.add_option("--wind-mean", line.wind_mps, "Mean of the gusts, x y z in m/s")->expected(3);
   app.add_option("--gust-intensity", feed.gust_intensity,
@@ -63,6 +64,9 @@ void declare_feed(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(0.0f, 2.0f))
       ->capture_default_str();
   app.add_option("--seed", feed.seed, "Seed of the gusts")->capture_default_str();
+  auto* as = app.add_option(
+      "--as", feed.as, "Send packets of motion capture instead, as a stage would: vmc, opentrack or freed");
+  app.add_option("--to", feed.to, "Who gets them, as HOST or HOST:PORT")->needs(as)->capture_default_str();
 }
 
 /// What to say when no command was understood but there are words left; empty otherwise.
@@ -104,6 +108,14 @@ int run(int argc, char** argv) {
          "path=value, for example solver.name=dftl, look.hair_color=red, look.shading.wetness=0.5 or "
          "\"camera.offset_m={ x: 0 y: 0.1 z: 0.7 }\"; a wrong path is answered with those that can change")
       ->required();
+  CLI::App* mocap = app.add_subcommand("mocap", "Live motion capture: who drives the head, and what is rest");
+  mocap->require_subcommand(1);
+  CLI::App* mocap_subject = mocap->add_subcommand("subject", "Choose who drives the head");
+  mocap_subject->add_option("name", line.subject,
+                            "As monitor lists them; empty: one called head, else the first one seen");
+  CLI::App* mocap_calibrate =
+      mocap->add_subcommand("calibrate", "What is seen now is the head at rest: look straight ahead");
+  CLI::App* mocap_reset = mocap->add_subcommand("reset", "Undo calibrate");
   CLI::App* save = app.add_subcommand("save", "Keep the scene as it runs, look and all, as a scene file");
   save->add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
   CLI::App* exported = app.add_subcommand("export", "Write the strands as curves for other programs");
@@ -147,6 +159,9 @@ int run(int argc, char** argv) {
   if (*step) return run_command(line.target, ControlCommand{Command::StepOnce});
   if (*reset) return run_command(line.target, ControlCommand{Command::Reset});
   if (*set) return run_command(line.target, SetParameter{line.assignment});
+  if (*mocap_subject) return run_command(line.target, LiveCommand{LiveAction::ChooseSubject, line.subject});
+  if (*mocap_calibrate) return run_command(line.target, LiveCommand{LiveAction::Calibrate, {}});
+  if (*mocap_reset) return run_command(line.target, LiveCommand{LiveAction::Reset, {}});
   if (*save) return run_save(line.target, line.scene_path);
   if (*exported) return run_export(line.target, line.exported, stop);
   if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);

@@ -29,9 +29,11 @@ bool sleep_until_ns(int64_t time_ns, const std::atomic<bool>& stop) {
   return false;
 }
 
+/// Plays a plan; who is fed is told by `Way`: send(), read_events() and flush().
+template <class Way>
 class Feeder {
  public:
-  Feeder(ViewerClient& client, const FeedPlan& plan) : client_(client), plan_(plan) {}
+  Feeder(Way& way, const FeedPlan& plan) : way_(way), plan_(plan) {}
 
   Result<FeedProgress> run(const std::atomic<bool>& stop, const FeedListener& listener) {
     const auto period_ns = static_cast<int64_t>(static_cast<double>(kSecondNs) / plan_.rate_hz);
@@ -53,42 +55,54 @@ class Feeder {
       if (!sleep_until_ns(sample_ns, stop)) break;
       const double lateness_ms = static_cast<double>(now_ns() - sample_ns) * 1e-6;
       progress_.worst_lateness_ms = std::max(progress_.worst_lateness_ms, lateness_ms);
-      send_sample(sample_ns);
-      RETURN_IF_ERROR(read_events());
+      way_.send(plan_, sample_ns, progress_);
+      RETURN_IF_ERROR(way_.read_events(plan_, progress_));
       if (now_ns() < next_report_ns) continue;
       next_report_ns += kSecondNs;
       if (listener) listener(progress_);
     }
-    flush();
+    way_.flush();
     return std::move(progress_);
   }
 
  private:
-  void send_sample(int64_t sample_ns) {
-    if (plan_.motion) {
-      MotionSamples message{{{sample_ns, plan_.motion(progress_.motion_s)}}, 1.0 - progress_.pace};
-      if (plan_.joints) {
-        message.joint_names = plan_.joint_names;
-        const std::vector<glm::dvec3> places = plan_.joints(progress_.motion_s);
+  Way& way_;
+  const FeedPlan& plan_;
+  FeedProgress progress_;
+};
+
+void count(bool is_sent, uint64_t& counter, FeedProgress& progress) {
+  ++(is_sent ? counter : progress.unsent_samples);
+}
+
+/// To a server, as a source of its own.
+class SessionWay {
+ public:
+  explicit SessionWay(ViewerClient& client) : client_(client) {}
+
+  void send(const FeedPlan& plan, int64_t sample_ns, FeedProgress& progress) {
+    if (plan.motion) {
+      MotionSamples message{{{sample_ns, plan.motion(progress.motion_s)}}, 1.0 - progress.pace};
+      if (plan.joints) {
+        message.joint_names = plan.joint_names;
+        const std::vector<glm::dvec3> places = plan.joints(progress.motion_s);
         message.samples.front().joint_m.assign(places.begin(), places.end());
       }
-      count(client_.send(message), progress_.motion_samples);
+      count(client_.send(message).ok(), progress.motion_samples, progress);
     }
-    if (plan_.wind) {
-      const WindSamples message{{{sample_ns, plan_.wind(progress_.motion_s)}}};
-      count(client_.send(message), progress_.wind_samples);
+    if (plan.wind) {
+      const WindSamples message{{{sample_ns, plan.wind(progress.motion_s)}}};
+      count(client_.send(message).ok(), progress.wind_samples, progress);
     }
   }
 
-  void count(const Status& sent, uint64_t& counter) { ++(sent ? counter : progress_.unsent_samples); }
-
-  Status read_events() {
+  Status read_events(const FeedPlan& plan, FeedProgress& progress) {
     for (ClientEvent& event : client_.poll()) {
       if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
-      if (auto* notice = std::get_if<Notice>(&event)) progress_.last_notice = std::move(notice->text);
+      if (auto* notice = std::get_if<Notice>(&event)) progress.last_notice = std::move(notice->text);
       if (const auto* status = std::get_if<ServerStatus>(&event)) {
-        progress_.rejected_samples = status->rejected_samples;
-        if (!plan_.is_live) progress_.pace = follow_pace(progress_.pace, *status);
+        progress.rejected_samples = status->rejected_samples;
+        if (!plan.is_live) progress.pace = follow_pace(progress.pace, *status);
       }
     }
     return {};
@@ -99,9 +113,25 @@ class Feeder {
     while (client_.queued_messages() > 0 && now_ns() < end_ns) std::this_thread::sleep_for(milliseconds(1));
   }
 
+ private:
   ViewerClient& client_;
-  const FeedPlan& plan_;
-  FeedProgress progress_;
+};
+
+/// To who says nothing back.
+class MomentWay {
+ public:
+  explicit MomentWay(const SendMoment& send) : send_(send) {}
+
+  void send(const FeedPlan& plan, int64_t, FeedProgress& progress) {
+    const auto wind_mps = plan.wind ? std::optional(plan.wind(progress.motion_s)) : std::nullopt;
+    const Pose pose = plan.motion ? plan.motion(progress.motion_s) : Pose{};
+    count(send_(progress.elapsed_s, pose, wind_mps), progress.motion_samples, progress);
+  }
+  Status read_events(const FeedPlan&, FeedProgress&) { return {}; }
+  void flush() {}
+
+ private:
+  const SendMoment& send_;
 };
 
 }  // namespace
@@ -115,7 +145,14 @@ double follow_pace(double present, const ServerStatus& status) {
 
 Result<FeedProgress> feed(ViewerClient& client, const FeedPlan& plan, const std::atomic<bool>& stop,
                           const FeedListener& listener) {
-  return Feeder(client, plan).run(stop, listener);
+  SessionWay way(client);
+  return Feeder(way, plan).run(stop, listener);
+}
+
+FeedProgress feed_moments(const SendMoment& send, const FeedPlan& plan, const std::atomic<bool>& stop,
+                          const FeedListener& listener) {
+  MomentWay way(send);
+  return Feeder(way, plan).run(stop, listener).value();
 }
 
 }  // namespace strandcast

@@ -38,6 +38,7 @@ double follow_pace(double present, const ServerStatus& status);
 
 inline constexpr double kMinFeedRateHz = 1.0;
 inline constexpr double kMaxFeedRateHz = 400.0;
+inline constexpr double kMaxDatagramRateHz = 1000.0;  // of packets of motion capture
 
 struct FeedProgress {
   double elapsed_s = 0.0;  // real time
@@ -52,11 +53,18 @@ struct FeedProgress {
   std::string last_notice;         // from the server
 };
 
+/// Sends one moment of a plan where there is no server to talk to.
+using SendMoment = std::function<bool(double time_s, const Pose&, const std::optional<glm::vec3>& wind_mps)>;
+
 /// Called about once a second.
 using FeedListener = std::function<void(const FeedProgress&)>;
 
 /// Runs until the plan's duration is over, `stop` is set or the connection ends (an error).
 Result<FeedProgress> feed(ViewerClient& client, const FeedPlan& plan, const std::atomic<bool>& stop,
+                          const FeedListener& listener);
+
+/// Likewise in real time to who says nothing back.
+FeedProgress feed_moments(const SendMoment& send, const FeedPlan& plan, const std::atomic<bool>& stop,
                           const FeedListener& listener);
 
 }  // namespace strandcast

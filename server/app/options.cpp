@@ -1,11 +1,14 @@
 #include "server/app/options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iterator>
 #include <variant>
 
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
+#include "server/app/live_desk.h"
 #include "server/source/scene_change.h"
 
 namespace strandcast {
@@ -133,7 +136,35 @@ struct RawRunOptions {
   bool is_tls_only = false;
   std::vector<std::string> trusted_proxies;
   bool has_proxy_protocol = false;
+  std::vector<std::string> mocap_allowed;
 };
+
+void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
+  constexpr const char* kGroup = "Live motion capture";
+  std::string protocols;
+  for (const LiveProtocol& protocol : live_protocols())
+    protocols += fmt::format("{}{}", protocols.empty() ? "" : ", ", protocol.name);
+  auto* inputs =
+      app.add_option("--mocap", options.mocap.inputs,
+                     "head motion as a stage sends it, instead of the scene's live inputs: PROTOCOL, "
+                     "PROTOCOL:PORT or PROTOCOL://HOST (" +
+                         protocols + "); repeatable");
+  inputs->expected(1)->take_all()->group(kGroup);
+  app.add_option("--mocap-subject", options.mocap.subject,
+                 "who of those that it tells of drives the head; default: one called head, else the first")
+      ->needs(inputs)
+      ->group(kGroup);
+  app.add_option(
+         "--mocap-axes", options.mocap.axes,
+         "how its numbers are meant, where senders disagree; a wrong name is answered with those there are")
+      ->needs(inputs)
+      ->group(kGroup);
+  app.add_option("--mocap-allow", raw.mocap_allowed,
+                 "ADDRESS or ADDRESS/BITS that may send besides this machine; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->group(kGroup);
+}
 
 void add_proxy_options(CLI::App& app, RawRunOptions& raw) {
   auto* proxies = app.add_option("--trusted-proxy", raw.trusted_proxies,
@@ -192,6 +223,7 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
       ->capture_default_str();
   app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));
   add_proxy_options(app, raw);
+  add_mocap_options(app, options, raw);
   add_limit_options(app, net.limits);
 }
 
@@ -223,6 +255,11 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     ASSIGN_OR_RETURN(const AddressRange range, parse_address_range(text));
     options.config.net.trusted_proxies.push_back(range);
   }
+  for (const std::string& text : raw.mocap_allowed) {
+    const auto range = parse_address_range(text);
+    if (!range) return at("--mocap-allow", range.error());
+    options.config.live_allowed.push_back(*range);
+  }
   if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;
   options.is_explaining = app.count("--explain") > 0;
   if (!named.explained.empty()) {
@@ -252,8 +289,16 @@ Result<ServerConfig> load_config(const ServerOptions& options) {
                                       : load_scene(options.scene_path, overrides);
   };
   ServerConfig config = options.config;
-  ASSIGN_OR_RETURN(const SceneDesc scene, load(options.overrides));
-  std::vector<std::string> others = options.overrides;
+  // What is set of live inputs is set of those that the command line names.
+  std::vector<std::string> overrides = options.overrides, live_overrides;
+  if (!options.mocap.inputs.empty()) {
+    std::copy_if(overrides.begin(), overrides.end(), std::back_inserter(live_overrides), is_live_override);
+    std::erase_if(overrides, is_live_override);
+  }
+  ASSIGN_OR_RETURN(const SceneDesc loaded, load(overrides));
+  ASSIGN_OR_RETURN(const SceneDesc scene, with_mocap(loaded, options.mocap, live_overrides));
+  RETURN_IF_ERROR(check_live(scene.live));
+  std::vector<std::string> others = overrides;
   std::erase_if(others, [](const std::string& assignment) { return assignment.starts_with("solver"); });
   ASSIGN_OR_RETURN(const SceneDesc own, load(others));
   ASSIGN_OR_RETURN(config.scene, choose_solver(scene, own.solver, options.overrides));

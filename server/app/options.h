@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "server/app/mocap_option.h"
 #include "server/app/server.h"
 
 namespace strandcast {
@@ -15,6 +16,7 @@ namespace strandcast {
 struct ServerOptions {
   std::filesystem::path scene_path;  // empty: the built-in scene
   std::vector<std::string> overrides;
+  MocapOptions mocap;
   std::filesystem::path token_path;  // empty: no tokens
   std::filesystem::path port_path;   // the chosen port is written here
   std::string log_level = "info";

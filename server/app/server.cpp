@@ -15,6 +15,7 @@
 #include "common/log/log.h"
 #include "common/strands/scene_asset.h"
 #include "server/app/codec_choice.h"
+#include "server/app/live_desk.h"
 #include "server/app/server_metrics.h"
 #include "server/app/server_passes.h"
 #include "server/app/session_desk.h"
@@ -65,6 +66,7 @@ class Server::State {
   Status choose_stream(const SceneAsset& asset);
   Status choose_codecs();
   void count_strands(ServerCounters& counters) const;
+  Status open_live();
   Status connect(EncodedFramePtr asset_frame);
   void run_status();
   void watch_speed(const ServerCounters& now);
@@ -78,6 +80,7 @@ class Server::State {
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
   std::unique_ptr<StateSource> source_;
+  std::unique_ptr<LiveDesk> live_;  // null where the scene asks for none
   std::unique_ptr<SessionDesk> desk_;
   std::unique_ptr<NetServer> net_;
 
@@ -101,6 +104,7 @@ Status Server::State::start() {
   SceneDesc& scene = config_.scene;
   // A wrong codec is told before anything is loaded.
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
+  RETURN_IF_ERROR(check_live(scene.live));
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   RETURN_IF_ERROR(choose_stream(*asset));
@@ -120,11 +124,13 @@ Status Server::State::start() {
                    plan_picture_passes(*asset, scene.look, likely_renderer(config_.renderer, scene.look), 0));
   idle_look_ = scene.look;
   // The port first: a port in use is told at once, not after compiling shaders.
+  RETURN_IF_ERROR(open_live());
   RETURN_IF_ERROR(connect(std::move(asset_frame)));
   RETURN_IF_ERROR(source_->start(*hub_, scene.stream));
   hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   net_->start();
+  if (live_ != nullptr) live_->start();
   status_thread_ = std::thread([this] { run_status(); });
   log_info("app", "serving scene '{}' on {} port {}", scene.name, config_.net.address, net_->port());
   return {};
@@ -155,9 +161,24 @@ Status Server::State::choose_codecs() {
   return {};
 }
 
+/// The sockets of live motion capture, where any is asked for.
+Status Server::State::open_live() {
+  if (config_.scene.live.empty()) return {};
+  StreamHub* hub = hub_.get();
+  const LiveDesk::Listener listener{[hub](uint64_t id, const MotionSamples& samples, int64_t arrival_ns) {
+                                      hub->tell_motion(id, samples, arrival_ns);
+                                    },
+                                    [hub](uint64_t id, const WindSamples& samples, int64_t arrival_ns) {
+                                      hub->tell_wind(id, samples, arrival_ns);
+                                    }};
+  ASSIGN_OR_RETURN(live_, LiveDesk::open(config_.scene.live, config_.live_allowed, inputs_, listener));
+  return {};
+}
+
 Status Server::State::connect(EncodedFramePtr asset_frame) {
   desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, codecs_,
-                                                           std::move(asset_frame), is_drawn_by_processors_});
+                                                           std::move(asset_frame), is_drawn_by_processors_,
+                                                           live_.get()});
   desk_->set_metrics([this] { return metrics(); });
   NetConfig net = config_.net;
   net.page = built_in_page();
@@ -178,6 +199,7 @@ void Server::State::stop() {
   if (status_thread_.joinable()) status_thread_.join();
   // Viewers first, so that they hear of it; then whoever feeds the next in line.
   if (net_ != nullptr) net_->stop();
+  if (live_ != nullptr) live_->stop();
   if (source_ != nullptr) source_->stop();
   if (hub_ != nullptr) hub_->stop();
 }
@@ -210,6 +232,7 @@ void Server::State::run_status() {
     if (now.sim.detail != DetailLevel::Full)
       status.detail = fmt::format("{}: {}", to_string(now.sim.detail), now.sim.detail_reason);
     status.picture_motions = hub_->take_picture_motions();
+    status.live_inputs = now.live_inputs;
     net_->broadcast(status);
     lock.lock();
   }
@@ -247,6 +270,7 @@ ServerCounters Server::State::counters() const {
   counters.sim = source_->stats();
   count_strands(counters);
   counters.frames = hub_->frame_counters();
+  if (live_ != nullptr) counters.live_inputs = live_->status();
   return counters;
 }
 

@@ -42,6 +42,8 @@ struct ServerConfig {
       simulation_source;
   /// For viewers that cannot decode the scene's codec, instead of what that names itself.
   std::optional<std::string> fallback_codec;
+  /// Who may send to the scene's live inputs besides this machine.
+  std::vector<AddressRange> live_allowed;
 };
 
 struct ServerCounters {
@@ -58,6 +60,7 @@ struct ServerCounters {
   uint32_t strand_classes_in_use = 0;
   bool is_slow = false;       // slow motion, now
   uint64_t slow_motions = 0;  // times that it began
+  std::vector<LiveInputStatus> live_inputs;
 };
 
 class Server {

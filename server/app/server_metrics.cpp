@@ -100,6 +100,58 @@ std::string format_codecs(const std::map<std::string, uint32_t>& viewers_of) {
   return viewers_of.empty() ? std::string() : text;
 }
 
+/// Of live inputs; a counter when its name says so.
+struct LiveRow {
+  std::string_view name;
+  const char* help;
+  double (*value)(const LiveInputStatus&);
+};
+
+constexpr LiveRow kLiveRows[] = {
+    {"live_stale", "1 while nothing of the subject that drives the head has come for a second.",
+     [](const LiveInputStatus& input) { return input.is_stale ? 1.0 : 0.0; }},
+    {"live_rate_hz", "Packets a second.", [](const LiveInputStatus& input) { return input.rate_hz; }},
+    {"live_jitter_ms", "How unevenly packets come.",
+     [](const LiveInputStatus& input) { return input.jitter_ms; }},
+    {"live_age_ms", "Since the newest packet; 0 before the first.",
+     [](const LiveInputStatus& input) { return input.age_ms; }},
+    {"live_packets_total", "Packets that could be read.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.packets); }},
+    {"live_received_bytes_total", "Bytes of them.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.received_bytes); }},
+    {"live_malformed_total", "Packets that could not be read.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.malformed); }},
+    {"live_refused_total", "Packets of senders that may not send, or while another one is heard.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.refused); }},
+    {"live_over_rate_total", "Packets left out because more came than one source may send.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.over_rate); }},
+    {"live_impossible_total", "Poses that were no numbers, no rotation or out of the world.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.impossible); }},
+    {"live_clamped_total", "Poses that were faster than a head moves.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.clamped); }},
+    {"live_gated_total", "Poses not believed, because the body was somewhere else at once.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.gated); }},
+    {"live_resequenced_total", "Poses put back into their order.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.resequenced); }},
+    {"live_late_total", "Poses that came twice, or too late to be used.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.late); }},
+    {"live_lost_total", "Numbers of frames that never came.",
+     [](const LiveInputStatus& input) { return static_cast<double>(input.lost); }}};
+
+/// Nothing where there are no live inputs.
+std::string format_live(const std::vector<LiveInputStatus>& inputs) {
+  std::string text;
+  if (inputs.empty()) return text;
+  for (const LiveRow& row : kLiveRows) {
+    text += fmt::format("# HELP strandcast_{0} {1}\n# TYPE strandcast_{0} {2}\n", row.name, row.help,
+                        row.name.ends_with("_total") ? "counter" : "gauge");
+    for (size_t i = 0; i < inputs.size(); ++i)
+      text += fmt::format("strandcast_{}{{input=\"{}\",protocol=\"{}\"}} {}\n", row.name, i,
+                          inputs[i].input.substr(0, inputs[i].input.find(' ')), row.value(inputs[i]));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string format_server_metrics(const ServerCounters& counters, const char* version) {
@@ -115,6 +167,7 @@ std::string format_server_metrics(const ServerCounters& counters, const char* ve
     text += format_metric(row.name, row.name.ends_with("_total") ? "counter" : "gauge", row.help,
                           row.value(counters));
   text += format_codecs(counters.strand_viewers_of);
+  text += format_live(counters.live_inputs);
   return text + format_histogram("sim_step_ms", "Time of the solver for one step.", counters.sim.step_times);
 }
 

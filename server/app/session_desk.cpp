@@ -23,6 +23,11 @@ const char* name_of(Command command) {
   return kNames[static_cast<size_t>(command)];
 }
 
+const char* name_of(LiveAction action) {
+  constexpr const char* kNames[] = {"subject", "calibrate", "reset"};
+  return kNames[static_cast<size_t>(action)];
+}
+
 std::string make_session_id() {
   std::random_device random;
   return fmt::format("{:08x}{:08x}", random(), random());
@@ -140,7 +145,8 @@ void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter)
 
 void SessionDesk::on_scene_request(SessionId session) {
   if (!may_control(session, "save the scene")) return;
-  const std::optional<SceneDesc> scene = parts_.source.scene();
+  std::optional<SceneDesc> scene = parts_.source.scene();
+  if (scene && parts_.live != nullptr) scene->live = parts_.live->live();
   SceneText answer{scene ? to_line(*scene) : std::string()};
   if (!scene)
     net_->send(session, Notice{true, "What is shown here is no scene that could be saved."});
@@ -151,6 +157,15 @@ void SessionDesk::on_scene_request(SessionId session) {
                                         answer.text.size(), kMaxSceneTextBytes)});
   else
     net_->send(session, std::move(answer));
+}
+
+void SessionDesk::on_live_command(SessionId session, const LiveCommand& command) {
+  if (!may_control(session,
+                   fmt::format("live motion capture: {} {}", name_of(command.action), command.subject)))
+    return;
+  net_->send(session, parts_.live != nullptr
+                          ? parts_.live->obey(command)
+                          : Notice{true, "This server has no live inputs: start it with --mocap PROTOCOL."});
 }
 
 StateSource::Reply SessionDesk::reply_to(SessionId session) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/app/control_budget.h"
+#include "server/app/live_desk.h"
 #include "server/app/network_reader.h"
 #include "server/app/viewer_codec.h"
 #include "server/app/viewers.h"
@@ -33,6 +34,7 @@ class SessionDesk : public NetHandler {
     std::vector<StrandCodecInfo> codecs;  // that strands are served by, as served_codecs()
     EncodedFramePtr asset;
     bool is_drawn_by_processors = true;  // pictures
+    LiveDesk* live = nullptr;            // null: no live inputs
   };
   explicit SessionDesk(Parts parts);
 
@@ -51,6 +53,7 @@ class SessionDesk : public NetHandler {
   void on_command(SessionId session, const ControlCommand& command) override;
   void on_parameter(SessionId session, const SetParameter& parameter) override;
   void on_scene_request(SessionId session) override;
+  void on_live_command(SessionId session, const LiveCommand& command) override;
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }

@@ -17,6 +17,7 @@
 #include "server/app/explain.h"
 #include "server/app/server_passes.h"
 #include "tests/support/server_fixture.h"
+#include "tests/support/udp_socket.h"
 
 namespace strandcast {
 namespace {
@@ -65,7 +66,7 @@ class ServerCost : public test::ServerFixture {
   uint64_t added(ObjectKind kind) const { return gl::object_counts().of(kind) - before_.of(kind); }
   /// Names of threads that were not there before, sorted, without the driver's and the shared workers.
   std::vector<std::string> added_threads() const {
-    const std::set<std::string> own = {"simulation", "network", "status", "frames", "encode"};
+    const std::set<std::string> own = {"simulation", "network", "status", "frames", "encode", "mocap"};
     std::vector<std::string> names;
     for (const auto& [number, name] : all_threads())
       if (!threads_before_.contains(number) && own.contains(name)) names.push_back(name);
@@ -119,6 +120,16 @@ TEST_F(ServerCost, ASceneThatNeedsNothingHasItsStrandsAndNothingElse) {
   const std::vector<std::string> needed = {"frames", "network", "simulation", "status"};
   EXPECT_TRUE(eventually([&] { return added_threads() == needed; }))
       << testing::PrintToString(added_threads());
+}
+
+TEST_F(ServerCost, LiveInputsTakeOneThreadForAllWhereTheyAreAskedFor) {
+  SceneDesc scene = barest_scene();
+  for (int i = 0; i < 2; ++i) scene.live.push_back({.protocol = "vmc", .port = test::free_udp_port()});
+  ASSERT_TRUE(start(on_gl(scene)));
+  const std::vector<std::string> needed = {"frames", "mocap", "network", "simulation", "status"};
+  EXPECT_TRUE(eventually([&] { return added_threads() == needed; }))
+      << testing::PrintToString(added_threads());
+  EXPECT_EQ(decisions(server_->passes()), decisions(planned(barest_scene(), {})));
 }
 
 TEST_F(ServerCost, EachFactOfTheSceneCostsItsOwnVariants) {

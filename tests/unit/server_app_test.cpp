@@ -506,6 +506,63 @@ TEST(ServerOptions, ParametersThatWereTypedAreNotLeftOut) {
   EXPECT_THAT(outside.error().to_string(), HasSubstr("17"));
 }
 
+/// The live inputs of a command line, or what it says that is wrong.
+Result<std::vector<LiveDesc>> live_of(const std::vector<const char*>& arguments) {
+  ASSIGN_OR_RETURN(const ServerOptions options, parse(arguments));
+  ASSIGN_OR_RETURN(const ServerConfig config, load_config(options));
+  return config.scene.live;
+}
+
+TEST(MocapOptions, AreInputsOfTheScene) {
+  using Inputs = std::vector<LiveDesc>;
+  EXPECT_EQ(live_of({}).value(), Inputs{});
+  EXPECT_EQ(live_of({"--mocap", "vmc"}).value(), Inputs{{.protocol = "vmc"}});
+  EXPECT_EQ(
+      live_of({"--mocap", "opentrack:5000", "--mocap-axes", "ypr-xyz", "--mocap-subject", "Zoe"}).value(),
+      (Inputs{{.protocol = "opentrack", .port = 5000, .subject = "Zoe", .axes = "ypr-xyz"}}));
+  EXPECT_EQ(live_of({"--mocap", "vmc", "--mocap", "freed:40001", "--set", "live.1.delay_ms=20"}).value(),
+            (Inputs{{.protocol = "vmc"}, {.protocol = "freed", .port = 40001, .delay_ms = 20}}));
+  EXPECT_EQ(live_of({"--set", "live.0.protocol=vmc", "--set", "live.0.turns_only=true"}).value(),
+            (Inputs{{.protocol = "vmc", .turns_only = true}}));
+  // Those of the command line are instead of the scene's, and what is set is set of them.
+  EXPECT_EQ(live_of({"--set", "live.0.turns_only=true", "--mocap", "opentrack"}).value(),
+            (Inputs{{.protocol = "opentrack", .turns_only = true}}));
+  EXPECT_EQ(parse_mocap("natnet://10.0.0.5").value(), (LiveDesc{.protocol = "natnet", .host = "10.0.0.5"}));
+  EXPECT_EQ(parse_mocap("vrpn://[fd00::2]:3884").value(),
+            (LiveDesc{.protocol = "vrpn", .host = "fd00::2", .port = 3884}));
+  EXPECT_EQ(parse_mocap("vrpn://[fd00::2]").value(), (LiveDesc{.protocol = "vrpn", .host = "fd00::2"}));
+}
+
+TEST(MocapOptions, WhatIsWrongIsOneSentence) {
+  const auto sentence = [](const std::vector<const char*>& arguments) {
+    const auto live = live_of(arguments);
+    return live ? std::string("no error") : live.error().to_string();
+  };
+  EXPECT_THAT(sentence({"--mocap", "smoke"}), testing::AllOf(HasSubstr("smoke"), HasSubstr("opentrack")));
+  for (const char* port : {"vmc:", "vmc:0", "vmc:65536", "vmc:12x", "vmc:-1"})
+    EXPECT_THAT(sentence({"--mocap", port}), HasSubstr("1 .. 65535")) << port;
+  EXPECT_THAT(sentence({"--mocap", ""}), HasSubstr("no protocol"));
+  EXPECT_THAT(sentence({"--mocap", "vrpn://"}), HasSubstr("no host"));
+  EXPECT_THAT(sentence({"--mocap", "opentrack", "--mocap-axes", "sideways"}), HasSubstr("xyz-ypr"));
+  EXPECT_THAT(sentence({"--mocap-subject", "Zoe"}), HasSubstr("--mocap"));
+  EXPECT_THAT(sentence({"--mocap", "vmc", "--mocap-allow", "10.0.0.0/33"}), HasSubstr("--mocap-allow"));
+  EXPECT_THAT(sentence({"--set", "live.0.delay_ms=5"}), HasSubstr("live.0.protocol"));
+  EXPECT_THAT(sentence({"--mocap", "vmc", "--set", "live.0.delay_ms=500"}), HasSubstr("0 .. 200"));
+  const std::vector<const char*> many = {"--mocap", "vmc",     "--mocap", "vmc:1",   "--mocap",
+                                         "vmc:2",   "--mocap", "vmc:3",   "--mocap", "vmc:4"};
+  EXPECT_THAT(sentence(many), HasSubstr("the limit is 4"));
+}
+
+TEST(MocapOptions, WhoMaySendIsAListOfRanges) {
+  const auto options = parse({"--mocap", "vmc", "--mocap-allow", "10.0.0.0/8", "--mocap-allow", "192.0.2.7"});
+  ASSERT_TRUE(options) << options.error().to_string();
+  const auto& allowed = options->config.live_allowed;
+  ASSERT_EQ(allowed.size(), 2u);
+  EXPECT_TRUE(is_in(allowed, *IpAddress::parse("10.9.8.7")));
+  EXPECT_TRUE(is_in(allowed, *IpAddress::parse("192.0.2.7")));
+  EXPECT_FALSE(is_in(allowed, *IpAddress::parse("192.0.2.8")));
+}
+
 using Change = SlowMotionWatch::Change;
 
 TEST(SlowMotion, IsWhatLastsTwoSeconds) {

@@ -1,0 +1,142 @@
+#include "client/app/mocap_packet.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+
+namespace strandcast {
+namespace {
+
+constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
+
+/// A rotation as a turn about +Y (to the left), then about the head's own +X (nod down), then about its own
+/// +Z (tilt to the right).
+struct HeadAngles {
+  double left_deg = 0.0;
+  double down_deg = 0.0;
+  double tilt_right_deg = 0.0;
+};
+
+HeadAngles angles_of(const glm::dquat& rotation) {
+  const glm::dmat3 m = glm::mat3_cast(rotation);  // by columns
+  return {kDegreesPerRad * std::atan2(m[2][0], m[2][2]),
+          kDegreesPerRad * std::asin(std::clamp(-m[2][1], -1.0, 1.0)),
+          kDegreesPerRad * std::atan2(m[0][1], m[1][1])};
+}
+
+class Packet {
+ public:
+  template <class T>
+  void put(T number, std::endian order) {
+    auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(number);
+    if (order != std::endian::native) std::reverse(bytes.begin(), bytes.end());
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
+  /// Two's complement in three bytes, the highest first; numbers beyond it stop at its ends.
+  void put_three(double number) {
+    constexpr double kMost = (1 << 23) - 1;
+    const auto bits =
+        static_cast<uint32_t>(static_cast<int32_t>(std::lround(std::clamp(number, -kMost, kMost))));
+    for (const int shift : {16, 8, 0}) put(static_cast<uint8_t>(bits >> shift), std::endian::big);
+  }
+  /// A text of OSC: a zero behind it, and more to a multiple of four.
+  void put_text(std::string_view text) {
+    for (const char letter : text) bytes_.push_back(static_cast<std::byte>(letter));
+    do bytes_.push_back(std::byte{0});
+    while (bytes_.size() % 4 != 0);
+  }
+  void append(const std::vector<std::byte>& bytes) {
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
+  const std::vector<std::byte>& bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+// ---- opentrack: six doubles, cm and degrees; +X to the head's left, +Z behind it
+
+std::vector<std::byte> encode_opentrack(const MocapMoment& moment) {
+  constexpr double kCmPerM = 100.0;
+  const glm::dvec3 p = kCmPerM * moment.world_from_head.position_m;
+  const HeadAngles angles = angles_of(moment.world_from_head.rotation);
+  Packet packet;
+  for (const double number : {p.x, p.y, -p.z, -angles.left_deg, -angles.down_deg, -angles.tilt_right_deg})
+    packet.put(number, std::endian::little);
+  return packet.bytes();
+}
+
+// ---- FreeD D1: a camera; +Z up, it looks along +Y
+
+std::vector<std::byte> encode_freed(const MocapMoment& moment) {
+  constexpr double kUnitsPerDegree = 32768.0, kUnitsPerM = 64'000.0;
+  constexpr uint8_t kType = 0xD1, kCamera = 1, kChecksumBegin = 0x40;
+  constexpr int kZoomFocusSpare = 8;
+  const glm::dvec3& p = moment.world_from_head.position_m;
+  const HeadAngles angles = angles_of(moment.world_from_head.rotation);
+  Packet packet;
+  packet.put(kType, std::endian::big);
+  packet.put(kCamera, std::endian::big);
+  for (const double degrees : {-angles.left_deg, -angles.down_deg, angles.tilt_right_deg})
+    packet.put_three(kUnitsPerDegree * degrees);
+  for (const double metres : {-p.x, p.z, p.y}) packet.put_three(kUnitsPerM * metres);
+  for (int i = 0; i < kZoomFocusSpare; ++i) packet.put(uint8_t{0}, std::endian::big);
+  uint8_t sum = kChecksumBegin;
+  for (const std::byte byte : packet.bytes())
+    sum = static_cast<uint8_t>(sum - std::to_integer<uint8_t>(byte));
+  packet.put(sum, std::endian::big);
+  return packet.bytes();
+}
+
+// ---- VMC: OSC; Unity's axes, left-handed
+
+std::vector<std::byte> osc_message(std::string_view address, std::string_view name,
+                                   const std::vector<double>& numbers) {
+  Packet packet;
+  packet.put_text(address);
+  packet.put_text("," + std::string(name.empty() ? 0 : 1, 's') + std::string(numbers.size(), 'f'));
+  if (!name.empty()) packet.put_text(name);
+  for (const double number : numbers) packet.put(static_cast<float>(number), std::endian::big);
+  return packet.bytes();
+}
+
+std::vector<std::byte> encode_vmc(const MocapMoment& moment) {
+  constexpr double kHeadAboveRootM = 0.25;  // a bone at 0 would be one whose place is not told
+  const glm::dvec3& p = moment.world_from_head.position_m;
+  const glm::dquat& r = moment.world_from_head.rotation;
+  std::vector<std::vector<std::byte>> messages = {
+      osc_message("/VMC/Ext/T", "", {moment.time_s}),
+      osc_message("/VMC/Ext/Root/Pos", "root", {-p.x, p.y - kHeadAboveRootM, p.z, 0.0, 0.0, 0.0, 1.0}),
+      osc_message("/VMC/Ext/Bone/Pos", "Head", {0.0, kHeadAboveRootM, 0.0, r.x, -r.y, -r.z, r.w})};
+  if (moment.wind_mps)
+    messages.push_back(
+        osc_message("/strandcast/wind", "", {moment.wind_mps->x, moment.wind_mps->y, moment.wind_mps->z}));
+  constexpr uint64_t kImmediately = 1;
+  Packet bundle;
+  bundle.put_text("#bundle");
+  bundle.put(kImmediately, std::endian::big);
+  for (const auto& message : messages) {
+    bundle.put(static_cast<uint32_t>(message.size()), std::endian::big);
+    bundle.append(message);
+  }
+  return bundle.bytes();
+}
+
+constexpr MocapEncoding kEncodings[] = {
+    {"vmc", 39539, encode_vmc}, {"opentrack", 4242, encode_opentrack}, {"freed", 40000, encode_freed}};
+
+}  // namespace
+
+Result<MocapEncoding> find_mocap_encoding(const std::string& name) {
+  std::string known;
+  for (const MocapEncoding& encoding : kEncodings) {
+    if (name == encoding.name) return encoding;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", encoding.name);
+  }
+  return make_error(ErrorCode::BadInput, "--as {} is not known (known: {})", name, known);
+}
+
+}  // namespace strandcast

@@ -1,0 +1,309 @@
+#include "server/input/live/live_source.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "common/base/text.h"
+#include "server/input/input_hub.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kMsPerNs = 1e-6;
+constexpr double kSecondsPerNs = 1e-9;
+constexpr double kJitterShare = 1.0 / 16.0;  // of the newest packet, as in RFC 3550
+constexpr size_t kMaxNotes = 32;             // until they are taken
+constexpr size_t kMaxNoteChars = 200;
+
+bool is_head(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name == "head";
+}
+
+const LiveProtocol* find_protocol(const std::string& name) {
+  for (const LiveProtocol& protocol : live_protocols())
+    if (name == protocol.name) return &protocol;
+  return nullptr;
+}
+
+LiveParserConfig parser_config(const LiveDesc& live) {
+  LiveParserConfig config;
+  config.protocol = live.protocol;
+  config.axis_order = live.axes;
+  config.protocol_version = live.version;
+  config.ignores_zero_positions = !live.takes_zero_positions;
+  config.max_datagram_bytes = live.max_datagram_bytes;
+  return config;
+}
+
+/// For people: protocols of one subject give it no name.
+std::string shown(const std::string& name) {
+  return name.empty() ? "(the only one)" : name;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LiveSource>> LiveSource::make(const LiveDesc& live, size_t index) {
+  const std::string field = fmt::format("live.{}", index);
+  const LiveParserConfig config = parser_config(live);
+  const auto tried = make_live_parser(config);
+  if (!tried) return at(field, tried.error());
+  const LiveProtocol* protocol = find_protocol(live.protocol);
+  CHECK(protocol != nullptr);
+  const bool can_ask = protocol->transport == LiveTransport::Tcp || protocol->request_port != 0;
+  if (protocol->transport == LiveTransport::Tcp && live.host.empty())
+    return make_error(ErrorCode::BadInput,
+                      "{}.host: {} is asked for, not waited for: name its server (--mocap {}://HOST)", field,
+                      protocol->name, protocol->name);
+  if (!can_ask && !live.host.empty())
+    return make_error(
+        ErrorCode::BadInput,
+        "{}.host: senders of {} are waited for: let '{}' send to port {} here, and leave host out", field,
+        protocol->name, excerpt(live.host, kMaxNoteChars), protocol->default_port);
+  return std::unique_ptr<LiveSource>(new LiveSource(live, *protocol, config));
+}
+
+LiveSource::LiveSource(const LiveDesc& live, const LiveProtocol& protocol, LiveParserConfig parser)
+    : live_(live),
+      protocol_(protocol),
+      port_(live.port != 0 ? static_cast<uint16_t>(live.port) : protocol.default_port),
+      parser_config_(std::move(parser)),
+      policy_(live.turns_only),
+      packet_allowance_(kMaxSampleBurst),
+      byte_allowance_(kMaxLiveBytesPerS) {
+  begin_connection();
+}
+
+std::string LiveSource::describe() const {
+  const std::string host = excerpt(live_.host, kMaxAddressChars);
+  if (protocol_.transport == LiveTransport::Tcp)
+    return fmt::format("{} of {}:{}", protocol_.name, host, port_);
+  return host.empty() ? fmt::format("{} on port {}", protocol_.name, port_)
+                      : fmt::format("{} of {} on port {}", protocol_.name, host, port_);
+}
+
+// ---- who is heard
+
+void LiveSource::begin_connection() {
+  auto parser = make_live_parser(parser_config_);
+  CHECK(parser.ok());  // it could be made before
+  parser_ = std::move(*parser);
+}
+
+bool LiveSource::is_heard(int64_t now_ns) const {
+  return is_locked_ && now_ns - packet_ns_ <= kMotionStaleNs;
+}
+
+bool LiveSource::take_allowance(size_t bytes, int64_t arrival_ns) {
+  const double passed_s =
+      static_cast<double>(std::max<int64_t>(arrival_ns - allowance_ns_, 0)) * kSecondsPerNs;
+  if (allowance_ns_ != 0) {
+    packet_allowance_ = std::min(packet_allowance_ + passed_s * kMaxSampleRateHz, kMaxSampleBurst);
+    byte_allowance_ = std::min(byte_allowance_ + passed_s * kMaxLiveBytesPerS, kMaxLiveBytesPerS);
+  }
+  allowance_ns_ = arrival_ns;
+  const auto size = static_cast<double>(bytes);
+  if (packet_allowance_ < 1.0 || byte_allowance_ < size) return false;
+  packet_allowance_ -= 1.0;
+  byte_allowance_ -= size;
+  return true;
+}
+
+Status LiveSource::take(const std::string& sender, std::span<const std::byte> bytes, int64_t arrival_ns) {
+  if (is_heard(arrival_ns) && sender != sender_) {
+    ++counters_.refused;
+    if (sender != other_sender_ && notes_.size() < kMaxNotes)
+      notes_.push_back({true, fmt::format("{}: {} sends too, and is not heard before {} has stopped",
+                                          describe(), sender, sender_)});
+    other_sender_ = sender;
+    return {};
+  }
+  // Who was heard is forgotten, with what it said.
+  if (is_locked_ && !is_heard(arrival_ns)) {
+    is_locked_ = false;
+    if (protocol_.transport == LiveTransport::Udp) begin_connection();
+  }
+  if (!take_allowance(bytes.size(), arrival_ns)) {
+    ++counters_.over_rate;
+    return {};
+  }
+  const Result<LivePacket> packet = parser_->parse(bytes, arrival_ns);
+  if (!packet) {
+    ++counters_.malformed;
+    if (notes_.size() < kMaxNotes)
+      notes_.push_back({true, fmt::format("{}: a malformed packet from {}: {}", describe(), sender,
+                                          one_line(packet.error().to_string(), kMaxNoteChars))});
+    return packet.error();
+  }
+  ++counters_.packets;
+  counters_.received_bytes += bytes.size();
+  if (!is_locked_ && (!packet->poses.empty() || packet->wind_mps)) hear(sender, arrival_ns);
+  if (is_locked_) measure(arrival_ns);
+  use(*packet, arrival_ns);
+  return {};
+}
+
+void LiveSource::hear(const std::string& sender, int64_t arrival_ns) {
+  is_locked_ = true;
+  was_heard_ = true;
+  packet_ns_ = arrival_ns;
+  window_begin_ns_ = arrival_ns;
+  window_packets_ = 0;
+  rate_hz_ = jitter_ms_ = interval_ms_ = 0.0;
+  if (sender != sender_) {
+    subjects_.clear();
+    subject_.reset();
+    policy_.begin_another();
+  }
+  sender_ = sender;
+  notes_.push_back({false, fmt::format("{}: {} sends", describe(), sender)});
+}
+
+/// How often, and how evenly, packets come.
+void LiveSource::measure(int64_t arrival_ns) {
+  const double interval_ms = static_cast<double>(arrival_ns - packet_ns_) * kMsPerNs;
+  packet_ns_ = arrival_ns;
+  ++window_packets_;
+  if (window_packets_ > 1) {
+    if (interval_ms_ == 0.0) interval_ms_ = interval_ms;
+    jitter_ms_ += (std::abs(interval_ms - interval_ms_) - jitter_ms_) * kJitterShare;
+    interval_ms_ += (interval_ms - interval_ms_) * kJitterShare;
+  }
+  const int64_t passed_ns = arrival_ns - window_begin_ns_;
+  if (passed_ns < kRateWindowNs) return;
+  rate_hz_ = static_cast<double>(window_packets_ - 1) / (static_cast<double>(passed_ns) * kSecondsPerNs);
+  window_begin_ns_ = arrival_ns;
+  window_packets_ = 1;
+}
+
+// ---- subjects
+
+void LiveSource::note_subject(const std::string& name, int64_t arrival_ns) {
+  const auto found = std::find_if(subjects_.begin(), subjects_.end(),
+                                  [&](const Subject& subject) { return subject.name == name; });
+  if (found != subjects_.end()) {
+    found->seen_ns = arrival_ns;
+    return;
+  }
+  if (subjects_.size() >= kMaxLiveSubjects) {
+    std::erase_if(subjects_, [&](const Subject& s) { return arrival_ns - s.seen_ns > kMotionStaleNs; });
+    if (subjects_.size() >= kMaxLiveSubjects) return;
+  }
+  subjects_.push_back({name, arrival_ns});
+  if (!name.empty() && notes_.size() < kMaxNotes)
+    notes_.push_back({false, fmt::format("{}: sees {}", describe(), shown(name))});
+}
+
+/// Chooses who drives the head.
+void LiveSource::follow_subject(int64_t now_ns) {
+  std::optional<std::string> wanted;
+  if (!live_.subject.empty()) {
+    if (has_seen(live_.subject)) wanted = live_.subject;
+  } else {
+    const auto lives = [&](const Subject& subject) { return now_ns - subject.seen_ns <= kMotionStaleNs; };
+    const auto is_of = [&](const Subject& subject) { return subject_ && subject.name == *subject_; };
+    auto chosen = std::find_if(subjects_.begin(), subjects_.end(),
+                               [&](const Subject& s) { return lives(s) && is_head(s.name); });
+    if (chosen == subjects_.end())
+      chosen = std::find_if(subjects_.begin(), subjects_.end(),
+                            [&](const Subject& s) { return lives(s) && is_of(s); });
+    if (chosen == subjects_.end()) chosen = std::find_if(subjects_.begin(), subjects_.end(), lives);
+    wanted = chosen != subjects_.end() ? std::optional(chosen->name) : subject_;
+  }
+  if (wanted == subject_) return;
+  subject_ = wanted;
+  policy_.begin_another();
+  if (subject_ && subject_->empty()) return;  // there is nobody else
+  notes_.push_back({false, subject_ ? fmt::format("{}: {} drives the head", describe(), shown(*subject_))
+                                    : fmt::format("{}: waits for {}", describe(), live_.subject)});
+}
+
+void LiveSource::choose_subject(const std::string& subject) {
+  live_.subject = subject;
+}
+
+bool LiveSource::has_seen(const std::string& subject) const {
+  return std::any_of(subjects_.begin(), subjects_.end(), [&](const Subject& s) { return s.name == subject; });
+}
+
+void LiveSource::use(const LivePacket& packet, int64_t arrival_ns) {
+  std::vector<std::string> names;
+  for (const LivePose& pose : packet.poses) {
+    names.push_back(printable(pose.subject, kMaxNameChars));
+    note_subject(names.back(), arrival_ns);
+  }
+  follow_subject(arrival_ns);
+  for (size_t i = 0; i < names.size(); ++i)
+    if (subject_ && names[i] == *subject_) policy_.take(packet.poses[i], arrival_ns);
+  if (packet.wind_mps) wind_.push_back({{{arrival_ns, glm::vec3(*packet.wind_mps)}}});
+}
+
+// ---- what comes of it
+
+LiveSource::Due LiveSource::advance(int64_t now_ns) {
+  Due due;
+  for (LiveHead& head : policy_.advance(now_ns)) {
+    MotionSamples samples;
+    samples.samples.push_back({head.time_ns, head.world_from_head, std::move(head.joint_m)});
+    samples.joint_names = std::move(head.joint_names);
+    due.motion.push_back(std::move(samples));
+  }
+  due.wind = std::exchange(wind_, {});
+  const bool is_stale_now = policy_.is_stale(now_ns);
+  if (is_stale_now && !was_stale_) {
+    due.has_ended = true;
+    if (subject_ && is_heard(now_ns))
+      notes_.push_back(
+          {true, fmt::format("{}: nothing of {} for {:g} s: the head rests", describe(), shown(*subject_),
+                             static_cast<double>(kMotionStaleNs) * kSecondsPerNs)});
+    if (live_.subject.empty()) follow_subject(now_ns);
+  }
+  was_stale_ = is_stale_now;
+  if (was_heard_ && !is_heard(now_ns)) {
+    was_heard_ = false;
+    rate_hz_ = 0.0;
+    notes_.push_back({true, fmt::format("{}: {} has stopped sending: the head rests", describe(), sender_)});
+  }
+  return due;
+}
+
+LiveInputStatus LiveSource::status(int64_t now_ns) const {
+  LiveInputStatus status;
+  status.input = describe();
+  if (is_heard(now_ns)) status.sender = sender_;
+  if (subject_) status.subject = shown(*subject_);
+  for (const Subject& subject : subjects_)
+    if (now_ns - subject.seen_ns <= kMotionStaleNs)
+      status.subjects += (status.subjects.empty() ? "" : ", ") + shown(subject.name);
+  status.is_stale = policy_.is_stale(now_ns);
+  status.is_calibrated = policy_.is_calibrated();
+  status.rate_hz = rate_hz_;
+  status.jitter_ms = jitter_ms_;
+  status.age_ms =
+      packet_ns_ == 0 ? 0.0 : static_cast<double>(std::max<int64_t>(now_ns - packet_ns_, 0)) * kMsPerNs;
+  status.packets = counters_.packets;
+  status.received_bytes = counters_.received_bytes;
+  status.malformed = counters_.malformed;
+  status.refused = counters_.refused;
+  status.over_rate = counters_.over_rate;
+  const LivePolicyCounters& policy = policy_.counters();
+  status.impossible = policy.impossible;
+  status.clamped = policy.clamped;
+  status.gated = policy.gated;
+  status.resequenced = policy.resequenced;
+  status.late = policy.late;
+  status.lost = policy.lost;
+  const std::vector<std::string> lines = parser_->describe();
+  for (const std::string& line : lines) {
+    if (status.values.size() + 1 == kMaxLiveValues && lines.size() > kMaxLiveValues) {
+      status.values.push_back({fmt::format("and {} more", lines.size() - status.values.size())});
+      break;
+    }
+    status.values.push_back({one_line(line, kMaxLiveValueChars)});
+  }
+  return status;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,127 @@
+// LiveSource: one live input without its socket: whom it hears, what its parser makes of the bytes, which
+// subject drives the head, what the policy makes of it, and counts of all that. No clock, no I/O; one thread
+// at a time.
+//
+// * The first address and port whose packet has a pose or wind is heard until nothing that can be read came
+//   from it for kMotionStaleNs; packets of others are refused meanwhile, unread.
+// * At most kMaxSampleRateHz packets (input_hub.h) and kMaxLiveBytesPerS are read.
+// * The subject that drives the head: the one that was named; else one called head, in whatever case; else
+// the
+//   first that was seen, as long as it is.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/scene/live_desc.h"
+#include "common/wire/messages.h"
+#include "server/input/live/live_parser.h"
+#include "server/input/live/live_policy.h"
+
+namespace strandcast {
+
+inline constexpr double kMaxLiveBytesPerS = 2e6;
+inline constexpr size_t kMaxLiveSubjects = 32;
+inline constexpr int64_t kRateWindowNs = 1'000'000'000;
+
+struct LiveSourceCounters {
+  uint64_t packets = 0;  // that could be read
+  uint64_t received_bytes = 0;
+  uint64_t malformed = 0;
+  uint64_t refused = 0;  // of others, while one is heard, or of who may not send
+  uint64_t over_rate = 0;
+};
+
+/// What a person should read of, once.
+struct LiveNote {
+  bool is_warning = false;
+  std::string text;
+};
+
+class LiveSource {
+ public:
+  /// NotFound or BadInput name the field of `live.N`.
+  static Result<std::unique_ptr<LiveSource>> make(const LiveDesc& live, size_t index);
+
+  const LiveProtocol& protocol() const { return protocol_; }
+  const LiveDesc& live() const { return live_; }
+  uint16_t port() const { return port_; }
+  /// "vmc, port 39539" or "vrpn, HOST:3883".
+  std::string describe() const;
+
+  /// Bytes of one datagram, or as read from a connection. An error ends the connection that they came by.
+  Status take(const std::string& sender, std::span<const std::byte> bytes, int64_t arrival_ns);
+  /// Somebody sent who may not.
+  void refuse() { ++counters_.refused; }
+  /// A connection begins, or ended: the other end knows nothing of what was said before.
+  void begin_connection();
+  std::vector<std::byte> greeting() const { return parser_->greeting(); }
+  std::vector<std::byte> request() const { return parser_->request(); }
+
+  /// After take() and every few milliseconds.
+  struct Due {
+    std::vector<MotionSamples> motion;  // at most one sample each; times are the server's
+    std::vector<WindSamples> wind;
+    bool has_ended = false;  // the head has become stale: who drives it may be another one
+  };
+  Due advance(int64_t now_ns);
+  /// Whether advance() does anything while nothing comes.
+  bool is_active() const { return was_heard_ || !was_stale_; }
+
+  void choose_subject(const std::string& subject);
+  bool has_seen(const std::string& subject) const;
+  /// False when the subject is not seen.
+  bool calibrate(int64_t now_ns) { return policy_.calibrate(now_ns); }
+  void reset_calibration() { policy_.reset_calibration(); }
+  bool is_stale(int64_t now_ns) const { return policy_.is_stale(now_ns); }
+
+  LiveInputStatus status(int64_t now_ns) const;
+  std::vector<LiveNote> take_notes() { return std::exchange(notes_, {}); }
+
+ private:
+  struct Subject {
+    std::string name;
+    int64_t seen_ns = 0;
+  };
+
+  LiveSource(const LiveDesc& live, const LiveProtocol& protocol, LiveParserConfig parser);
+  bool is_heard(int64_t now_ns) const;
+  bool take_allowance(size_t bytes, int64_t arrival_ns);
+  void hear(const std::string& sender, int64_t arrival_ns);
+  void measure(int64_t arrival_ns);
+  void note_subject(const std::string& name, int64_t arrival_ns);
+  void follow_subject(int64_t now_ns);
+  void use(const LivePacket& packet, int64_t arrival_ns);
+
+  LiveDesc live_;
+  const LiveProtocol& protocol_;
+  const uint16_t port_;
+  const LiveParserConfig parser_config_;
+  std::unique_ptr<LiveParser> parser_;
+  LivePolicy policy_;
+  LiveSourceCounters counters_;
+  std::vector<LiveNote> notes_;
+
+  std::string sender_;        // that is heard, or was
+  std::string other_sender_;  // refused last
+  bool is_locked_ = false;    // to it
+  bool was_heard_ = false;    // when last looked at
+  bool was_stale_ = true;
+  int64_t packet_ns_ = 0;  // arrival of the newest that could be read
+  double packet_allowance_ = 0.0, byte_allowance_ = 0.0;
+  int64_t allowance_ns_ = 0;
+
+  std::vector<Subject> subjects_;       // in the order in which they were seen
+  std::optional<std::string> subject_;  // that drives the head
+  std::vector<WindSamples> wind_;       // not given out yet
+
+  int64_t window_begin_ns_ = 0;  // of the rate
+  uint32_t window_packets_ = 0;
+  double rate_hz_ = 0.0, jitter_ms_ = 0.0, interval_ms_ = 0.0;
+};
+
+}  // namespace strandcast

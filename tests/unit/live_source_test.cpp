@@ -1,0 +1,220 @@
+// Whom a live input hears, who drives the head, and what it says of all that. Time is virtual; packets are
+// those of real protocols.
+#include "server/input/live/live_source.h"
+
+#include "server/input/input_hub.h"
+#include "tests/support/live_packets.h"
+
+namespace strandcast {
+namespace {
+
+using testing::Contains;
+using testing::Field;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr int64_t kMs = 1'000'000;
+constexpr int64_t kStart = 1'000 * kMs;
+const std::string kFirst = "127.0.0.1:50001";
+const std::string kSecond = "127.0.0.1:50002";
+
+std::unique_ptr<LiveSource> make(const LiveDesc& live) {
+  auto source = LiveSource::make(live, 0);
+  EXPECT_TRUE(source) << source.error().to_string();
+  return source ? std::move(*source) : nullptr;
+}
+
+test::PacketBytes at_x(double x_cm) {
+  return test::opentrack({x_cm, 0, 0, 0, 0, 0});
+}
+test::PacketBytes camera(uint8_t number, double height_mm) {
+  test::FreedPacket packet;
+  packet.camera = number;
+  packet.position_mm = {0, 0, height_mm};
+  return test::freed(packet);
+}
+/// A device of VMC: a subject with a name, at this height.
+test::PacketBytes tracker(const std::string& name, float height_m) {
+  return test::osc_bundle({test::vmc_pose("/VMC/Ext/Tra/Pos", name, {0, height_m, 0}, {0, 0, 0, 1})});
+}
+
+/// The places of the head that come of what was sent.
+std::vector<glm::dvec3> places(const LiveSource::Due& due) {
+  std::vector<glm::dvec3> places;
+  for (const MotionSamples& samples : due.motion)
+    places.push_back(samples.samples.front().world_from_head.position_m);
+  return places;
+}
+
+std::vector<std::string> texts(std::vector<LiveNote> notes) {
+  std::vector<std::string> texts;
+  for (LiveNote& note : notes) texts.push_back(std::move(note.text));
+  return texts;
+}
+
+TEST(LiveSource, TheFirstWhoSendsIsHeardUntilNothingComes) {
+  const auto source = make({.protocol = "opentrack"});
+  for (int i = 0; i <= 100; ++i) {
+    EXPECT_TRUE(source->take(kFirst, at_x(10), kStart + i * 10 * kMs));
+    EXPECT_TRUE(source->take(kSecond, at_x(50), kStart + i * 10 * kMs + kMs));
+    for (const glm::dvec3& place : places(source->advance(kStart + i * 10 * kMs + kMs)))
+      EXPECT_NEAR(place.x, 0.1, 1e-12);
+  }
+  LiveInputStatus status = source->status(kStart + 1'000 * kMs);
+  EXPECT_EQ(status.sender, kFirst);
+  EXPECT_EQ(status.packets, 101u);
+  EXPECT_EQ(status.received_bytes, 101u * 48u);
+  EXPECT_EQ(status.refused, 101u);
+  EXPECT_NEAR(status.rate_hz, 100.0, 1.0);
+  EXPECT_LT(status.jitter_ms, 1e-6);
+  EXPECT_NEAR(status.age_ms, 0.0, 1e-9);
+  EXPECT_FALSE(status.is_stale);
+  // The first stops; the second is heard a second later, not before.
+  const int64_t last_ns = kStart + 1'000 * kMs;
+  ASSERT_TRUE(source->take(kSecond, at_x(50), last_ns + kMotionStaleNs));
+  EXPECT_EQ(source->status(last_ns + kMotionStaleNs).sender, kFirst);
+  const LiveSource::Due ended = source->advance(last_ns + kMotionStaleNs + kMs);
+  EXPECT_TRUE(ended.has_ended);
+  EXPECT_TRUE(source->status(last_ns + kMotionStaleNs + kMs).is_stale);
+  EXPECT_TRUE(source->status(last_ns + kMotionStaleNs + kMs).sender.empty());
+  EXPECT_FALSE(source->advance(last_ns + kMotionStaleNs + 2 * kMs).has_ended) << "once";
+  ASSERT_TRUE(source->take(kSecond, at_x(50), last_ns + kMotionStaleNs + 2 * kMs));
+  status = source->status(last_ns + kMotionStaleNs + 2 * kMs);
+  EXPECT_EQ(status.sender, kSecond);
+  EXPECT_FALSE(status.is_stale);
+  const auto notes = texts(source->take_notes());
+  EXPECT_THAT(notes, Contains(HasSubstr("127.0.0.1:50001 sends")));
+  EXPECT_THAT(notes, Contains(HasSubstr("127.0.0.1:50001 has stopped sending")));
+  EXPECT_THAT(notes, Contains(HasSubstr("127.0.0.1:50002 sends")));
+  EXPECT_THAT(notes, Contains(HasSubstr("127.0.0.1:50002 sends too")));
+}
+
+TEST(LiveSource, MalformedPacketsAreCountedAndHearNobody) {
+  const auto source = make({.protocol = "opentrack"});
+  for (size_t size : {0u, 1u, 47u, 49u, 1'500u})
+    EXPECT_FALSE(source->take(kFirst, test::PacketBytes(size), kStart));
+  EXPECT_EQ(source->status(kStart).malformed, 5u);
+  EXPECT_EQ(source->status(kStart).packets, 0u);
+  EXPECT_TRUE(source->status(kStart).sender.empty());
+  EXPECT_THAT(texts(source->take_notes()), Contains(HasSubstr("malformed packet from 127.0.0.1:50001")));
+  EXPECT_TRUE(source->take(kSecond, at_x(1), kStart + kMs));
+  EXPECT_EQ(source->status(kStart + kMs).sender, kSecond);
+  // A flood of them fills no memory.
+  for (int i = 0; i < 10'000; ++i) (void)source->take(kSecond, test::PacketBytes(3), kStart + kMs);
+  EXPECT_LE(source->take_notes().size(), 64u);
+}
+
+TEST(LiveSource, AThousandPacketsASecondAreTakenAndNoMore) {
+  const auto source = make({.protocol = "opentrack"});
+  int64_t time_ns = kStart;
+  for (int i = 0; i < 10'000; ++i) ASSERT_TRUE(source->take(kFirst, at_x(1), time_ns += kMs));
+  EXPECT_EQ(source->status(time_ns).over_rate, 0u);
+  // Ten times as many: what is beyond goes, and the next second is served again.
+  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(source->take(kFirst, at_x(1), time_ns += kMs / 10));
+  const LiveInputStatus status = source->status(time_ns);
+  EXPECT_EQ(status.packets + status.over_rate, 110'000u);
+  EXPECT_NEAR(static_cast<double>(status.packets), 10'000 + 10'000 + kMaxSampleBurst, 20);
+}
+
+TEST(LiveSource, BytesAreBoundedToo) {
+  const auto source = make({.protocol = "vmc", .max_datagram_bytes = 65'507});
+  test::PacketBytes large = test::osc("/VMC/Ext/Opt", {std::string(60'000, 'x')});
+  for (int i = 0; i < 1'000; ++i) (void)source->take(kFirst, large, kStart + i * kMs);
+  const LiveInputStatus status = source->status(kStart + 1'000 * kMs);
+  EXPECT_LE(static_cast<double>(status.received_bytes), 2 * kMaxLiveBytesPerS);
+  EXPECT_GT(status.over_rate, 900u);
+}
+
+TEST(LiveSource, AHeadIsChosenElseTheFirst) {
+  const auto source = make({.protocol = "vmc"});
+  int64_t time_ns = kStart;
+  const auto show = [&](const std::string& name, float height_m) {
+    (void)source->take(kFirst, tracker(name, height_m), time_ns += 10 * kMs);
+    return source->advance(time_ns);
+  };
+  EXPECT_EQ(places(show("waist", 1.0f)).size(), 1u);
+  EXPECT_THAT(places(show("left foot", 0.1f)), IsEmpty());
+  EXPECT_EQ(source->status(time_ns).subject, "waist");
+  EXPECT_EQ(source->status(time_ns).subjects, "waist, left foot");
+  const auto head = places(show("HEAD", 1.7f));
+  ASSERT_FALSE(head.empty());
+  EXPECT_NEAR(head.back().y, 1.7, 1e-6) << "believed at once: it is another one";
+  EXPECT_EQ(source->status(time_ns).subject, "HEAD");
+  EXPECT_THAT(places(show("waist", 1.0f)), IsEmpty());
+  // Without the head, whoever else is seen.
+  for (int i = 0; i < 120; ++i) (void)show("waist", 1.0f);
+  EXPECT_EQ(source->status(time_ns).subject, "waist");
+}
+
+TEST(LiveSource, ANamedSubjectIsWaitedFor) {
+  const auto source = make({.protocol = "freed", .subject = "2"});
+  int64_t time_ns = kStart;
+  EXPECT_TRUE(source->take(kFirst, camera(1, 1'000), time_ns));
+  EXPECT_THAT(places(source->advance(time_ns)), IsEmpty());
+  EXPECT_TRUE(source->status(time_ns).is_stale);
+  EXPECT_TRUE(source->take(kFirst, camera(2, 1'500), time_ns += kMs));
+  ASSERT_EQ(places(source->advance(time_ns)).size(), 1u);
+  // Another one by command, which jumps there.
+  source->choose_subject("1");
+  EXPECT_TRUE(source->take(kFirst, camera(2, 1'500), time_ns += kMs));
+  EXPECT_TRUE(source->take(kFirst, camera(1, 1'000), time_ns += kMs));
+  const auto seen = places(source->advance(time_ns));
+  ASSERT_FALSE(seen.empty());
+  EXPECT_NEAR(seen.back().y, 1.0, 1e-9);
+  EXPECT_EQ(source->status(time_ns).subject, "1");
+  EXPECT_EQ(source->live().subject, "1");
+}
+
+TEST(LiveSource, NamesOfStrangersAreFewAndPrintable) {
+  const auto source = make({.protocol = "vmc"});
+  (void)source->take(kFirst, tracker("a\x1b[2J\nb", 1.0f), kStart);
+  for (int i = 0; i < 1'000; ++i)
+    (void)source->take(kFirst, tracker("t" + std::to_string(i), 1.0f), kStart + i * kMs / 10);
+  const LiveInputStatus status = source->status(kStart + 100 * kMs);
+  EXPECT_EQ(status.subjects.find('\x1b'), std::string::npos);
+  EXPECT_EQ(status.subjects.find('\n'), std::string::npos);
+  EXPECT_LE(std::count(status.subjects.begin(), status.subjects.end(), ','),
+            static_cast<std::ptrdiff_t>(kMaxLiveSubjects));
+  EXPECT_LE(source->take_notes().size(), 64u);
+  ServerStatus whole;
+  whole.live_inputs.assign(kMaxLiveInputs, status);
+  EXPECT_LE(encode(ServerMessage(whole)).size(), kMaxControlBytes);
+  EXPECT_TRUE(decode_server_message(encode(ServerMessage(whole))).ok());
+}
+
+TEST(LiveSource, ValuesAreShownAsTheyWereSent) {
+  const auto source = make({.protocol = "opentrack"});
+  EXPECT_TRUE(source->take(kFirst, test::opentrack({1.5, -2, 3, 40, 5, -6}), kStart));
+  const LiveInputStatus status = source->status(kStart);
+  ASSERT_FALSE(status.values.empty());
+  std::string all;
+  for (const LiveValue& value : status.values) all += value.text + "\n";
+  EXPECT_THAT(all, HasSubstr("1.5"));
+  EXPECT_THAT(all, HasSubstr("40"));
+}
+
+TEST(LiveSource, WindComesAlong) {
+  const auto source = make({.protocol = "vmc"});
+  EXPECT_TRUE(source->take(kFirst, test::osc_wind({1, 2, -3}), kStart));
+  const LiveSource::Due due = source->advance(kStart);
+  ASSERT_EQ(due.wind.size(), 1u);
+  EXPECT_EQ(due.wind[0].samples.front().velocity_mps, glm::vec3(1, 2, -3));
+  EXPECT_THAT(source->advance(kStart + kMs).wind, IsEmpty());
+}
+
+TEST(LiveSource, WrongInputsAreToldWithTheirField) {
+  const auto sentence = [](const LiveDesc& live) {
+    const auto source = LiveSource::make(live, 1);
+    return source ? std::string("no error") : source.error().to_string();
+  };
+  EXPECT_THAT(sentence({.protocol = "vcm"}),
+              testing::AllOf(HasSubstr("live.1"), HasSubstr("vcm"), HasSubstr("vmc")));
+  EXPECT_THAT(sentence({.protocol = "opentrack", .axes = "upside"}),
+              testing::AllOf(HasSubstr("live.1"), HasSubstr("upside"), HasSubstr("xyz-ypr")));
+  EXPECT_THAT(sentence({.protocol = "opentrack", .host = "10.0.0.1"}),
+              testing::AllOf(HasSubstr("live.1.host"), HasSubstr("4242")));
+  EXPECT_EQ(sentence({.protocol = "vmc"}), "no error");
+}
+
+}  // namespace
+}  // namespace strandcast
