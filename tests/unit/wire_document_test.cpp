@@ -46,6 +46,8 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxReportedHz", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxReportedHz)))},
       {"kMaxStepNs", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxStepNs)))},
       {"kStreamsPerCodec", fmt::format("from {} (", kStreamsPerCodec)},
+      {"kMaxLiveInputs", fmt::format("at most {} (", kMaxLiveInputs)},
+      {"kMaxLiveValues", fmt::format("at most {} (", kMaxLiveValues)},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
       {"kFrameHeaderBytes", with_commas(kFrameHeaderBytes)},
       {"kMaxMediaPayloadBytes", with_commas(kMaxMediaPayloadBytes)},
