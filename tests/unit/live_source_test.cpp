@@ -125,6 +125,28 @@ TEST(LiveSource, BytesAreBoundedToo) {
   EXPECT_GT(status.over_rate, 900u);
 }
 
+/// From the source to the simulation no more than a step: what was taken before a step is in it.
+TEST(LiveSource, WhatCameBeforeAStepIsInIt) {
+  const auto source = make({.protocol = "opentrack"});
+  InputHub hub;
+  const int64_t step = 16'666'667;
+  int64_t next_step_ns = kStart + step;
+  double newest_m = 0.0;
+  for (int i = 0; i < 2'000; ++i) {
+    // 1,000 a second, the head at 0.5 m/s.
+    const int64_t time_ns = kStart + i * kMs;
+    for (; next_step_ns <= time_ns; next_step_ns += step) {
+      const InputFrame frame = hub.sample(next_step_ns);
+      EXPECT_NEAR(frame.world_from_head.position_m.x, newest_m, 1e-9) << i;
+      EXPECT_LE(next_step_ns - frame.motion_time_ns, kMs) << i;
+    }
+    newest_m = 5e-4 * i;
+    ASSERT_TRUE(source->take(kFirst, at_x(100.0 * newest_m), time_ns));
+    for (const MotionSamples& samples : source->advance(time_ns).motion) hub.push(7, samples, time_ns);
+  }
+  EXPECT_EQ(hub.counters().rejected(), 0u);
+}
+
 TEST(LiveSource, AHeadIsChosenElseTheFirst) {
   const auto source = make({.protocol = "vmc"});
   int64_t time_ns = kStart;
