@@ -67,6 +67,36 @@ class SeedFolder {
   std::filesystem::path folder_;
 };
 
+/// Steps of live_policy_fuzz: poses of a head that moves along x, a period apart each.
+void add_live_poses(const SeedFolder& seeds) {
+  constexpr uint8_t kTake = 3, kNumbered = 4, kTimed = 16, kAnyNumbers = 1;
+  constexpr uint16_t kPeriod = 500;  // in 20 microseconds: 10 ms
+  constexpr int16_t kOne = 1 << 13;
+  const auto pose = [](int i, double x_m) {
+    return packed(kPeriod, kTake, static_cast<uint8_t>(kNumbered | kTimed), static_cast<int16_t>(kOne * x_m),
+                  int16_t{kOne}, int16_t{0}, kOne, int16_t{0}, int16_t{0}, int16_t{0},
+                  static_cast<uint8_t>(i), static_cast<uint16_t>(10 * i));
+  };
+  const auto command = [](uint8_t step) { return packed(kPeriod, step); };
+  Bytes order, jump, commands, numbers;
+  for (int i = 0; i < 60; ++i) {
+    const int sent = i % 10 == 4 ? i + 1 : i % 10 == 5 ? i - 1 : i;  // two change places
+    if (i % 10 != 8) order = joined({order, pose(sent, 0.01 * sent)});
+    jump = joined({jump, pose(i, i >= 20 && i < 40 ? 2.0 : 0.0)});
+    commands =
+        joined({commands, pose(i, 0.01 * i), i % 20 == 7 ? command(static_cast<uint8_t>(i / 20)) : Bytes{}});
+  }
+  for (const double number :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e308})
+    numbers = joined({numbers, pose(0, 0.0),
+                      packed(kPeriod, kTake, kAnyNumbers, number, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+                      packed(kPeriod, kTake, kAnyNumbers, 0.0, 0.0, 0.0, number, 0.0, 0.0, 0.0)});
+  seeds.add("live_policy", "order", order);
+  seeds.add("live_policy", "jump", jump);
+  seeds.add("live_policy", "commands", commands);
+  seeds.add("live_policy", "numbers", numbers);
+}
+
 void add_messages(const SeedFolder& seeds) {
   int i = 0;
   for (const ClientMessage& message : sample_client_messages())
@@ -378,6 +408,7 @@ int main(int argument_count, char** arguments) {
   }
   const SeedFolder seeds(arguments[1]);
   add_messages(seeds);
+  add_live_poses(seeds);
   add_blocks(seeds);
   add_chains(seeds);
   add_pictures(seeds);
