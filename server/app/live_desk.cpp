@@ -11,6 +11,7 @@ namespace strandcast {
 namespace {
 
 constexpr LogLimits kLiveLines{20, 120, 60'000'000'000};
+constexpr LogLimits kRefusalLines{1, 30, 60'000'000'000};
 constexpr size_t kMaxShownChars = 100;
 
 LivePort port_of(const LiveSource& source, size_t index) {
@@ -46,6 +47,7 @@ LiveDesk::LiveDesk(Sources sources, InputHub& inputs, Listener listener)
       inputs_(inputs),
       listener_(std::move(listener)),
       lines_(kLiveLines),
+      refusal_lines_(kRefusalLines),
       troubles_(sources_.size()) {}
 
 LiveDesk::~LiveDesk() {
@@ -140,15 +142,12 @@ bool LiveDesk::on_bytes(size_t input, const std::string& sender, std::span<const
   return taken.ok();
 }
 
-void LiveDesk::on_refused(size_t input, const std::string& sender) {
+void LiveDesk::on_refused(size_t input, const std::string& sender, const std::string& remedy) {
   const std::lock_guard lock(mutex_);
   LiveSource& source = *sources_[input];
   source.refuse();
-  const std::string address = address_of(sender);
-  write(address,
-        {true,
-         fmt::format("{}: {} may not send: --mocap-allow {} lets it", source.describe(), sender, address)},
-        now_ns());
+  write(refusal_lines_, address_of(sender),
+        {true, fmt::format("{}: {} may not send: {}", source.describe(), sender, remedy)}, now_ns());
 }
 
 void LiveDesk::on_connection(size_t input) {
@@ -162,7 +161,7 @@ void LiveDesk::on_no_connection(size_t input, const std::string& why) {
   const std::lock_guard lock(mutex_);
   // Tried every few seconds, told once.
   if (std::exchange(troubles_[input], why) == why) return;
-  write(sources_[input]->describe(),
+  write(lines_, sources_[input]->describe(),
         {true, fmt::format("{}: {}; tried again every {:g} s", sources_[input]->describe(),
                            one_line(why, kMaxShownChars), static_cast<double>(kLiveRetryMs) * 1e-3)},
         now_ns());
@@ -206,11 +205,11 @@ void LiveDesk::pass_on(size_t input, int64_t now_ns) {
 }
 
 void LiveDesk::write_notes(LiveSource& source, int64_t now_ns) {
-  for (const LiveNote& note : source.take_notes()) write(source.describe(), note, now_ns);
+  for (const LiveNote& note : source.take_notes()) write(lines_, source.describe(), note, now_ns);
 }
 
-void LiveDesk::write(const std::string& key, const LiveNote& note, int64_t now_ns) {
-  const LogBudget::Verdict verdict = lines_.take(key, now_ns);
+void LiveDesk::write(LogBudget& budget, const std::string& key, const LiveNote& note, int64_t now_ns) {
+  const LogBudget::Verdict verdict = budget.take(key, now_ns);
   if (verdict.left_out > 0) log_warn("mocap", "{} lines were left out", verdict.left_out);
   if (!verdict.is_written) return;
   if (note.is_warning)

@@ -51,7 +51,7 @@ class LiveDesk : public LiveHandler {
 
   bool on_bytes(size_t input, const std::string& sender, std::span<const std::byte> bytes,
                 int64_t arrival_ns) override;
-  void on_refused(size_t input, const std::string& sender) override;
+  void on_refused(size_t input, const std::string& sender, const std::string& remedy) override;
   void on_connection(size_t input) override;
   void on_no_connection(size_t input, const std::string& why) override;
   std::vector<std::byte> greeting(size_t input) override;
@@ -63,7 +63,7 @@ class LiveDesk : public LiveHandler {
   LiveDesk(Sources sources, InputHub& inputs, Listener listener);
   void pass_on(size_t input, int64_t now_ns);
   void write_notes(LiveSource& source, int64_t now_ns);
-  void write(const std::string& key, const LiveNote& note, int64_t now_ns);
+  void write(LogBudget& budget, const std::string& key, const LiveNote& note, int64_t now_ns);
   Notice choose_subject(const std::string& subject);
 
   mutable std::mutex mutex_;  // guards what is in the sources
@@ -71,6 +71,7 @@ class LiveDesk : public LiveHandler {
   InputHub& inputs_;
   const Listener listener_;
   LogBudget lines_;
+  LogBudget refusal_lines_;
   std::vector<std::string> troubles_;  // of connections, as told last
   std::unique_ptr<LiveReceiver> receiver_;
 };

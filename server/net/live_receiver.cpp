@@ -152,7 +152,10 @@ void DatagramInput::receive() {
 void DatagramInput::on_receive(size_t size) {
   const int64_t arrival_ns = now_ns();
   const std::string sender = to_text(sender_.address(), sender_.port());
-  if (!may_send(to_address(sender_.address()))) return handler_.on_refused(index_, sender);
+  if (const IpAddress address = to_address(sender_.address()); !may_send(address))
+    return handler_.on_refused(index_, sender,
+                               asked_ ? fmt::format("{} alone was asked", to_address(*asked_).to_string())
+                                      : fmt::format("--mocap-allow {} lets it", address.to_string()));
   heard_ = sender_.address();
   (void)handler_.on_bytes(index_, sender, std::span(bytes_).first(size), arrival_ns);
 }

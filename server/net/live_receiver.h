@@ -16,7 +16,7 @@
 namespace strandcast {
 
 /// Until a server that was asked is tried again.
-inline constexpr int64_t kLiveRetryMs = 2'000;
+inline constexpr int64_t kLiveRetryMs = 500;
 /// Between two requests, where a protocol has any.
 inline constexpr int64_t kLiveRequestMs = 1'000;
 /// Between two ticks, of inputs that are active and of none.
@@ -41,8 +41,8 @@ class LiveHandler {
   /// False: the connection is of no use any more. `sender` is an address with its port.
   virtual bool on_bytes(size_t input, const std::string& sender, std::span<const std::byte> bytes,
                         int64_t arrival_ns) = 0;
-  /// A datagram came from an address that may not send.
-  virtual void on_refused(size_t input, const std::string& sender) = 0;
+  /// A datagram came from an address that may not send; what would let it.
+  virtual void on_refused(size_t input, const std::string& sender, const std::string& remedy) = 0;
   /// A connection begins.
   virtual void on_connection(size_t input) = 0;
   /// A connection cannot be had, or ended.

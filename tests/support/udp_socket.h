@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -17,9 +19,10 @@ namespace strandcast::test {
 
 class UdpSocket {
  public:
-  /// On any free port of this address.
-  explicit UdpSocket(const char* address = "127.0.0.1") : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
-    sockaddr_in own = place(address, 0);
+  /// On this port of this address, 0 = any free one.
+  explicit UdpSocket(const char* address = "127.0.0.1", uint16_t port = 0)
+      : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    sockaddr_in own = place(address, port);
     EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)), 0) << address;
     socklen_t size = sizeof(own);
     EXPECT_EQ(getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size), 0);
@@ -35,6 +38,12 @@ class UdpSocket {
     EXPECT_EQ(
         sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof(to)),
         static_cast<ssize_t>(bytes.size()));
+  }
+  /// Waits for a datagram; false when none comes.
+  bool is_sent_something() const {
+    constexpr int kMostMs = 20'000;
+    pollfd waiting{socket_, POLLIN, 0};
+    return poll(&waiting, 1, kMostMs) == 1;
   }
   uint16_t port() const { return port_; }
   /// As a receiver names it.
@@ -57,6 +66,22 @@ class UdpSocket {
 /// A port that nobody listens on now.
 inline uint16_t free_udp_port() {
   return UdpSocket().port();
+}
+
+/// An address of IPv4 of this machine that is not loopback's; empty where there is none.
+inline std::string own_network_address() {
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return {};
+  std::string found;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    const auto* place = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
+    char text[INET_ADDRSTRLEN] = {};
+    const bool is_loopback = (ntohl(place->sin_addr.s_addr) >> 24) == 127;
+    if (!is_loopback && inet_ntop(AF_INET, &place->sin_addr, text, sizeof(text)) != nullptr) found = text;
+  }
+  freeifaddrs(all);
+  return found;
 }
 
 }  // namespace strandcast::test
