@@ -36,6 +36,7 @@ constexpr milliseconds kAnswerTimeout{5000};
 constexpr milliseconds kHealthTimeout{3000};
 constexpr float kGustLengthM = 9.0f;
 constexpr int64_t kInputsIntervalNs = 2'000'000'000;
+constexpr size_t kMaxInputLineChars = 1'000;
 constexpr size_t kMaxShownValues = 6;  // of one input, so that the lines of two fit into their budget
 
 int fail(const Error& error, int exit_code = kBadInputExit) {
@@ -170,7 +171,7 @@ std::vector<std::string> to_lines(const LiveInputStatus& input) {
                              some(input.lost, "lost");
   lines.push_back(fmt::format("    {} packets, {} bytes{}", input.packets, input.received_bytes, counts));
   for (size_t i = 0; i < std::min(input.values.size(), kMaxShownValues); ++i)
-    lines.push_back("    " + one_line(input.values[i].text, kMaxLiveValueChars));
+    lines.push_back("    " + input.values[i].text);
   if (input.values.size() > kMaxShownValues)
     lines.push_back(fmt::format("    and {} more", input.values.size() - kMaxShownValues));
   return lines;
@@ -300,7 +301,7 @@ int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>
         if (!status->live_inputs.empty() && now_ns() >= next_inputs_ns) {
           next_inputs_ns = now_ns() + kInputsIntervalNs;
           for (const LiveInputStatus& input : status->live_inputs)
-            for (const std::string& text : to_lines(input)) print(text);
+            for (const std::string& text : to_lines(input)) print(one_line(text, kMaxInputLineChars));
         }
         const bool is_slow = !status->slow_motion.empty();
         if (is_slow && !std::exchange(was_slow, is_slow)) print(status->slow_motion);

@@ -59,8 +59,9 @@ bool is_live_override(const std::string& assignment) {
 
 Result<SceneDesc> with_mocap(const SceneDesc& scene, const MocapOptions& options,
                              const std::vector<std::string>& overrides) {
+  if (options.inputs.empty()) return scene;
   SceneDesc changed = scene;
-  if (!options.inputs.empty()) changed.live.clear();
+  changed.live.clear();
   for (const std::string& input : options.inputs) {
     ASSIGN_OR_RETURN(LiveDesc live, parse_mocap(input));
     live.subject = options.subject;

@@ -274,6 +274,29 @@ TEST(WireMessages, ALookThatCannotBeIsNamed) {
   }
 }
 
+TEST(WireMessages, TheLongestStatusFits) {
+  const auto wide = [](size_t count) {
+    std::string text;
+    for (size_t i = 0; i < count; ++i) text += "\U0001f488";  // four bytes of UTF-8
+    return text;
+  };
+  LiveInputStatus input;
+  input.input = wide(kMaxLiveInputChars);
+  input.sender = wide(kMaxAddressChars);
+  input.subject = wide(kMaxNameChars);
+  input.subjects = wide(kMaxLiveSubjectsChars);
+  input.packets = input.received_bytes = input.refused = input.lost = UINT64_MAX;
+  input.values.assign(kMaxLiveValues, LiveValue{wide(kMaxLiveValueChars)});
+  ServerStatus status;
+  status.slow_motion = status.detail = wide(kMaxTextChars);
+  status.picture_motions.assign(kMaxPictureMotions, PictureMotion{INT64_MAX, INT64_MAX});
+  status.live_inputs.assign(kMaxLiveInputs, input);
+  EXPECT_LE(encode(ServerMessage(status)).size(), kMaxControlBytes);
+  EXPECT_EQ(round_trip(status), status);
+  status.live_inputs.push_back(input);
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(status))));
+}
+
 TEST(WireMessages, ASceneIsOneLineOfLimitedLength) {
   const SceneText longest{std::string(kMaxSceneTextBytes, 'x')};
   EXPECT_LE(encode(ServerMessage(longest)).size(), kMaxControlBytes);
