@@ -27,8 +27,7 @@ class PacketWriter {
   PacketWriter& put(T number) {
     auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(number);
     if (order_ != std::endian::native) std::reverse(bytes.begin(), bytes.end());
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-    return *this;
+    return append(bytes);
   }
   template <class T, size_t kCount>
   PacketWriter& put(const std::array<T, kCount>& numbers) {
@@ -40,8 +39,10 @@ class PacketWriter {
     return *this;
   }
   PacketWriter& text_with_nul(const std::string& letters) { return text(letters).put(uint8_t{0}); }
-  PacketWriter& append(const PacketBytes& more) {
-    bytes_.insert(bytes_.end(), more.begin(), more.end());
+  PacketWriter& append(std::span<const std::byte> more) {
+    const size_t size = bytes_.size();
+    bytes_.resize(size + more.size());
+    std::copy(more.begin(), more.end(), bytes_.begin() + static_cast<ptrdiff_t>(size));
     return *this;
   }
   PacketWriter& fill_to_multiple_of(size_t count) {

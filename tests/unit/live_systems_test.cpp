@@ -9,7 +9,9 @@
 namespace strandcast {
 namespace {
 
+using test::live_parser_of;
 using test::PacketBytes;
+using test::parsed;
 using testing::Each;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -17,23 +19,6 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 const std::vector<std::string> kVersions = {"3.0", "3.1", "4.0", "4.1"};
-
-std::unique_ptr<LiveParser> parser_of(const std::string& protocol, const std::string& axis_order = "",
-                                      const std::string& version = "") {
-  LiveParserConfig config;
-  config.protocol = protocol;
-  config.axis_order = axis_order;
-  config.protocol_version = version;
-  auto parser = make_live_parser(config);
-  EXPECT_TRUE(parser) << parser.error().to_string();
-  return std::move(*parser);
-}
-
-LivePacket parsed(LiveParser& parser, const PacketBytes& bytes) {
-  auto packet = parser.parse(bytes, 0);
-  EXPECT_TRUE(packet) << packet.error().to_string();
-  return packet ? *packet : LivePacket{};
-}
 
 std::vector<std::string> subjects(const LivePacket& packet) {
   std::vector<std::string> names;
@@ -60,7 +45,7 @@ TEST(NatnetParser, ReadsBodiesOfEveryVersion) {
   for (const std::string& version : kVersions)
     for (const bool is_told : {false, true})
       for (const bool has_all_kinds : {false, true}) {
-        const auto parser = parser_of("natnet", "", is_told ? version : "");
+        const auto parser = live_parser_of("natnet", "", is_told ? version : "");
         test::NatnetPacket values = recorded_values(version);
         values.has_all_kinds = has_all_kinds;
         const LivePacket packet = parsed(*parser, test::natnet(values));
@@ -81,13 +66,13 @@ TEST(NatnetParser, ReadsBodiesOfEveryVersion) {
 TEST(NatnetParser, LaysTheWorldOnItsSide) {
   test::NatnetPacket values;
   values.bodies = {{1, {1, 2, 3}, kThird, true}};
-  const LivePose standing = parsed(*parser_of("natnet"), test::natnet(values)).poses.at(0);
+  const LivePose standing = parsed(*live_parser_of("natnet"), test::natnet(values)).poses.at(0);
   EXPECT_TRUE(test::is_near(standing.world_from_subject.position_m, {1, 2, 3}));
   EXPECT_TRUE(test::looks_along(standing, {1, 0, 0}));
   EXPECT_TRUE(test::has_crown_along(standing, {0, 0, 1}));
   // Its own Z, ahead of a face here, is -Y there; the body takes that to -Z, which is -Y here. Y here is Z
   // there, which goes to X.
-  const LivePose laid = parsed(*parser_of("natnet", "z-up"), test::natnet(values)).poses.at(0);
+  const LivePose laid = parsed(*live_parser_of("natnet", "z-up"), test::natnet(values)).poses.at(0);
   EXPECT_TRUE(test::is_near(laid.world_from_subject.position_m, {1, 3, -2}));
   EXPECT_TRUE(test::looks_along(laid, {0, -1, 0}));
   EXPECT_TRUE(test::has_crown_along(laid, {1, 0, 0}));
@@ -96,7 +81,7 @@ TEST(NatnetParser, LaysTheWorldOnItsSide) {
 TEST(NatnetParser, LeavesOutBodiesThatAreNotTracked) {
   test::NatnetPacket values;
   values.bodies = {{1, {1, 1, 1}, {}, false}, {2, {2, 2, 2}, kThird, true}, {3, {NAN, 3, 3}, {}, true}};
-  const auto parser = parser_of("natnet");
+  const auto parser = live_parser_of("natnet");
   const LivePacket packet = parsed(*parser, test::natnet(values));
   EXPECT_THAT(subjects(packet), ElementsAre("2", "3"));
   EXPECT_FALSE(is_finite(packet.poses.at(1).world_from_subject)) << "left to whoever takes it";
@@ -106,7 +91,7 @@ TEST(NatnetParser, LeavesOutBodiesThatAreNotTracked) {
 
 TEST(NatnetParser, CallsBodiesAndBonesByTheirNames) {
   for (const std::string& version : kVersions) {
-    const auto parser = parser_of("natnet");
+    const auto parser = live_parser_of("natnet");
     test::NatnetPacket values;
     values.version = version;
     values.bodies = {{2, {}, kThird, true}, {3, {}, kThird, true}};
@@ -126,7 +111,7 @@ int message_id(const std::vector<std::byte>& bytes) {
 }
 
 TEST(NatnetParser, AsksForWhatItDoesNotKnow) {
-  const auto parser = parser_of("natnet");
+  const auto parser = live_parser_of("natnet");
   constexpr int kConnect = 0, kRequestModels = 4, kKeepAlive = 10;
   const auto greeting = parser->greeting();
   ASSERT_EQ(greeting.size(), 4u + 270u);
@@ -147,7 +132,7 @@ TEST(NatnetParser, AsksForWhatItDoesNotKnow) {
 }
 
 TEST(NatnetParser, HoldsToTheVersionThatWasSet) {
-  const auto parser = parser_of("natnet", "", "3.1");
+  const auto parser = live_parser_of("natnet", "", "3.1");
   EXPECT_TRUE(parser->parse(test::natnet(recorded_values("3.0")), 0)) << "the same layout";
   const auto other = parser->parse(test::natnet(recorded_values("4.1")), 0);
   ASSERT_FALSE(other);
@@ -157,7 +142,7 @@ TEST(NatnetParser, HoldsToTheVersionThatWasSet) {
   config.protocol_version = "2.9";
   EXPECT_THAT(make_live_parser(config).error().message, HasSubstr("4.1, 4.0, 3.1, 3.0"));
   // What a server says is tried first only: its bitstream may be set to another version.
-  const auto open = parser_of("natnet");
+  const auto open = live_parser_of("natnet");
   (void)parsed(*open, test::natnet_server(4, 1));
   EXPECT_EQ(parsed(*open, test::natnet(recorded_values("3.1"))).poses.size(), 1u);
 }
@@ -167,7 +152,7 @@ TEST(NatnetParser, RefusesWhatIsCutOrCountsTooMuch) {
     test::NatnetPacket values = recorded_values(version);
     values.has_all_kinds = true;
     values.bones = {{1, {}, kThird, true}};
-    const auto parser = parser_of("natnet");
+    const auto parser = live_parser_of("natnet");
     for (const PacketBytes& whole :
          {test::natnet(values), test::natnet_names(version, {{2, "Head"}}, {{1, "Hips"}})}) {
       ASSERT_TRUE(parser->parse(whole, 0));
@@ -188,15 +173,13 @@ TEST(NatnetParser, RefusesWhatIsCutOrCountsTooMuch) {
     const PacketBytes server = test::natnet_server(4, 1);
     EXPECT_FALSE(parser->parse(std::span(server).first(200), 0));
   }
-  const auto parser = parser_of("natnet");
+  const auto parser = live_parser_of("natnet");
   EXPECT_THAT(parsed(*parser, test::natnet_message(8, PacketBytes(4))).poses, IsEmpty());
   EXPECT_EQ(parser->ignored(), 1u) << "a message string";
 }
 
-// ---------------------------------------------------------------------------------------------------------------
-
 TEST(VrpnParser, ReadsTrackersOfAServer) {
-  const auto parser = parser_of("vrpn");
+  const auto parser = live_parser_of("vrpn");
   EXPECT_EQ(parser->greeting(), test::vrpn_cookie());
   test::PacketWriter stream(std::endian::big);
   stream.append(test::vrpn_begin("Head"));
@@ -211,7 +194,7 @@ TEST(VrpnParser, ReadsTrackersOfAServer) {
   EXPECT_TRUE(test::has_crown_along(packet.poses[0], {0, 0, 1}));
   EXPECT_THAT(parser->describe(),
               ElementsAre(HasSubstr("Head: x 1.0000 y 2.0000 z 3.0000"), HasSubstr("Head/2")));
-  const auto laid = parser_of("vrpn", "z-up");
+  const auto laid = live_parser_of("vrpn", "z-up");
   EXPECT_TRUE(
       test::is_near(parsed(*laid, stream.bytes()).poses.at(0).world_from_subject.position_m, {1, 3, -2}));
 }
@@ -224,7 +207,7 @@ TEST(VrpnParser, TakesAStreamInAnyPieces) {
     stream.append(test::vrpn_pose(i, 0, 3, 0, {static_cast<double>(i), 0, 0}, {0, 0, 0, 1}));
   }
   for (const size_t piece : {1, 7, 24, 100, 10'000}) {
-    const auto parser = parser_of("vrpn");
+    const auto parser = live_parser_of("vrpn");
     std::vector<double> found;
     std::span<const std::byte> rest = stream.bytes();
     while (!rest.empty()) {
@@ -240,7 +223,7 @@ TEST(VrpnParser, TakesAStreamInAnyPieces) {
 }
 
 TEST(VrpnParser, RefusesStrangersAndWrongLengths) {
-  const auto stranger = parser_of("vrpn");
+  const auto stranger = live_parser_of("vrpn");
   const PacketBytes http = test::PacketWriter(std::endian::big).text("HTTP/1.1 400").bytes();
   EXPECT_THAT(stranger->parse(http, 0).error().message, HasSubstr("no server of VRPN 7"));
   PacketBytes older = test::vrpn_cookie();
@@ -248,7 +231,7 @@ TEST(VrpnParser, RefusesStrangersAndWrongLengths) {
   EXPECT_FALSE(stranger->parse(older, 0));
   EXPECT_EQ(parsed(*stranger, test::vrpn_begin("Head")).poses.size(), 0u) << "as it was";
 
-  const auto parser = parser_of("vrpn");
+  const auto parser = live_parser_of("vrpn");
   (void)parsed(*parser, test::vrpn_begin("Head"));
   const PacketBytes pose = test::vrpn_pose(1, 0, 3, 0, {1, 2, 3}, {0, 0, 0, 1});
   for (const uint32_t length : {0u, 23u, 64'001u, 0x7fffffffu, 0xffffffffu}) {
@@ -265,6 +248,23 @@ TEST(VrpnParser, RefusesStrangersAndWrongLengths) {
   EXPECT_THAT(parsed(*parser, test::vrpn_message(0, 0, 3, PacketBytes(63))).poses, IsEmpty());
   EXPECT_THAT(parsed(*parser, test::vrpn_pose(1, 0, 9, 0, {1, 2, 3}, {0, 0, 0, 1})).poses, IsEmpty());
   EXPECT_EQ(parser->ignored(), 2u);
+}
+
+TEST(VrpnParser, HoldsItsLimits) {
+  const auto parser = live_parser_of("vrpn");
+  (void)parsed(*parser, test::vrpn_begin("Head"));
+  constexpr size_t kMostBodyBytes = 64'000 - 24;
+  EXPECT_TRUE(parser->parse(test::vrpn_message(0, 0, 2, PacketBytes(kMostBodyBytes)), 0));
+  EXPECT_THAT(parser->parse(test::vrpn_message(0, 0, 2, PacketBytes(kMostBodyBytes + 1)), 0).error().message,
+              HasSubstr("of 64001 bytes; 24 to 64000 are allowed"));
+  EXPECT_TRUE(parser->parse(test::vrpn_description(-1, 1023, "last"), 0));
+  EXPECT_THAT(parser->parse(test::vrpn_description(-1, 1024, "beyond"), 0).error().message,
+              HasSubstr("describes number 1024; 0 to 1023 are allowed"));
+  EXPECT_TRUE(parser->parse(test::vrpn_description(-1, 1, std::string(511, 'n')), 0)) << "with its NUL 512";
+  EXPECT_FALSE(parser->parse(test::vrpn_description(-1, 1, std::string(512, 'n')), 0));
+  EXPECT_EQ(subjects(parsed(*parser, test::vrpn_pose(1, 1, 3, 0, {1, 2, 3}, {0, 0, 0, 1}))).at(0),
+            std::string(64, 'n'))
+      << "cut to what a subject may have";
 }
 
 }  // namespace

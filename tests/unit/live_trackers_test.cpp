@@ -10,25 +10,16 @@
 namespace strandcast {
 namespace {
 
+using test::live_parser_of;
 using test::PacketBytes;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-std::unique_ptr<LiveParser> parser_of(const std::string& protocol, const std::string& axis_order = "") {
-  LiveParserConfig config;
-  config.protocol = protocol;
-  config.axis_order = axis_order;
-  auto parser = make_live_parser(config);
-  EXPECT_TRUE(parser) << parser.error().to_string();
-  return std::move(*parser);
-}
-
 LivePose only_pose(LiveParser& parser, const PacketBytes& bytes) {
-  const auto packet = parser.parse(bytes, 0);
-  EXPECT_TRUE(packet) << packet.error().to_string();
-  EXPECT_TRUE(packet && packet->poses.size() == 1);
-  return packet && packet->poses.size() == 1 ? packet->poses[0] : LivePose{};
+  LivePacket packet = test::parsed(parser, bytes);
+  EXPECT_EQ(packet.poses.size(), 1u);
+  return packet.poses.size() == 1 ? packet.poses[0] : LivePose{};
 }
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -86,7 +77,7 @@ TEST(LiveParsers, AreFoundByName) {
 // opentrack's neural tracker makes the six numbers from a pose whose axes it names (ahead, up, right): +x to
 // the head's left, y up, +z away from the camera; yaw to the right, pitch up, roll to the left.
 TEST(OpentrackParser, TurnsAHeadAsItsTrackersDo) {
-  const auto parser = parser_of("opentrack");
+  const auto parser = live_parser_of("opentrack");
   const LivePose pose = only_pose(*parser, test::opentrack({10, 20, 30, 40, 15, -25}));
   EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {0.10, 0.20, -0.30}));
   EXPECT_TRUE(pose.has_position);
@@ -100,14 +91,14 @@ TEST(OpentrackParser, TurnsAHeadAsItsTrackersDo) {
 }
 
 TEST(OpentrackParser, TakesAnglesFirstWhereTold) {
-  const auto parser = parser_of("opentrack", "ypr-xyz");
+  const auto parser = live_parser_of("opentrack", "ypr-xyz");
   const LivePose pose = only_pose(*parser, test::opentrack({40, 15, -25, 10, 20, 30}));
   EXPECT_TRUE(test::is_near(pose.world_from_subject.position_m, {0.10, 0.20, -0.30}));
   expect_turned(pose, {-40 * kDegree, 15 * kDegree, 25 * kDegree});
 }
 
 TEST(OpentrackParser, TakesWholePacketsOnly) {
-  const auto parser = parser_of("opentrack");
+  const auto parser = live_parser_of("opentrack");
   const PacketBytes packet = test::opentrack({1, 2, 3, 4, 5, 6});
   for (size_t size = 0; size < packet.size(); ++size)
     EXPECT_FALSE(parser->parse(std::span(packet).first(size), 0)) << size;
@@ -121,7 +112,7 @@ TEST(OpentrackParser, TakesWholePacketsOnly) {
 // By the manual's appendix B: a camera at rest looks along +Y with +Z up, so +X is to its right. Pan to the
 // right, tilt up, roll clockwise as seen from behind, to the right.
 TEST(FreedParser, TurnsACameraAsTheManualSays) {
-  const auto parser = parser_of("freed");
+  const auto parser = live_parser_of("freed");
   test::FreedPacket packet;
   packet.camera = 7;
   packet.angle_deg = {40, 15, -25};
@@ -132,7 +123,7 @@ TEST(FreedParser, TurnsACameraAsTheManualSays) {
   expect_turned(pose, {-40 * kDegree, 15 * kDegree, -25 * kDegree});
   EXPECT_THAT(parser->describe(), ElementsAre("camera 7", "pan 40.000 tilt 15.000 roll -25.000 degrees",
                                               "x 1000.00 y 2000.00 height 1500.00 mm", "zoom 0 focus 0"));
-  const auto swapped = parser_of("freed", "tilt-pan-roll");
+  const auto swapped = live_parser_of("freed", "tilt-pan-roll");
   packet.angle_deg = {15, 40, -25};
   expect_turned(only_pose(*swapped, test::freed(packet)), {-40 * kDegree, 15 * kDegree, -25 * kDegree});
 }
@@ -146,7 +137,7 @@ TEST(FreedParser, ReadsTheNumbersOfTheManual) {
     writer.put(static_cast<uint8_t>(byte));
   int sum = 0x40;
   for (const std::byte byte : writer.bytes()) sum -= std::to_integer<int>(byte);
-  const auto parser = parser_of("freed");
+  const auto parser = live_parser_of("freed");
   (void)only_pose(*parser, writer.put(static_cast<uint8_t>(sum)).bytes());
   EXPECT_THAT(parser->describe(),
               ElementsAre("camera 2", "pan -180.000 tilt 90.000 roll -1.000 degrees",
@@ -154,7 +145,7 @@ TEST(FreedParser, ReadsTheNumbersOfTheManual) {
 }
 
 TEST(FreedParser, RefusesWrongChecksumsAndOtherSizes) {
-  const auto parser = parser_of("freed");
+  const auto parser = live_parser_of("freed");
   const PacketBytes right = test::freed({});
   for (size_t i = 1; i < right.size(); ++i) {
     PacketBytes wrong = right;
@@ -176,7 +167,7 @@ TEST(FreedParser, RefusesWrongChecksumsAndOtherSizes) {
 // The app maps turns of -180 to 180 degrees to -1 to 1, about the axes of ARKit's face: left, down, tilt to
 // the right.
 TEST(LiveLinkFaceParser, TurnsAHeadAsArKitDoes) {
-  const auto parser = parser_of("livelinkface");
+  const auto parser = live_parser_of("livelinkface");
   test::FacePacketFields fields;
   fields.yaw = 40.0f / 180;
   fields.pitch = -15.0f / 180;
@@ -194,7 +185,7 @@ TEST(LiveLinkFaceParser, TurnsAHeadAsArKitDoes) {
   EXPECT_EQ(only_pose(*parser, sized.bytes()).world_from_subject, pose.world_from_subject)
       << "its size in front";
 
-  const auto in_radians = parser_of("livelinkface", "radians");
+  const auto in_radians = live_parser_of("livelinkface", "radians");
   fields.yaw = static_cast<float>(40 * kDegree);
   fields.pitch = static_cast<float>(-15 * kDegree);
   fields.roll = static_cast<float>(-25 * kDegree);
@@ -214,7 +205,7 @@ TEST(LiveLinkFaceParser, HasTheSizeOfRealPackets) {
 }
 
 TEST(LiveLinkFaceParser, TakesPacketsWithoutAFaceAndRefusesBrokenOnes) {
-  const auto parser = parser_of("livelinkface");
+  const auto parser = live_parser_of("livelinkface");
   const PacketBytes packet = test::live_link_face({});
   const size_t names_end = 1 + 4 + 32 + 4 + 6;
   const size_t times_end = names_end + 16;

@@ -174,20 +174,19 @@ bool OscArguments::next_is(char tag) {
   return ok_;
 }
 
-std::optional<int32_t> OscArguments::take_int() {
-  if (!next_is('i')) return std::nullopt;
+template <class T>
+std::optional<T> OscArguments::take_number(char tag) {
+  if (!next_is(tag)) return std::nullopt;
   BigEndianReader reader(bytes_);
-  const auto value = reader.take<int32_t>();
+  const auto value = reader.take<T>();
   bytes_ = reader.rest();
   return value;
 }
-
+std::optional<int32_t> OscArguments::take_int() {
+  return take_number<int32_t>('i');
+}
 std::optional<float> OscArguments::take_float() {
-  if (!next_is('f')) return std::nullopt;
-  BigEndianReader reader(bytes_);
-  const auto value = reader.take<float>();
-  bytes_ = reader.rest();
-  return value;
+  return take_number<float>('f');
 }
 
 std::optional<std::string_view> OscArguments::take_string() {

@@ -50,6 +50,9 @@ class OscArguments {
 
  private:
   bool next_is(char tag);
+  template <class T>
+  std::optional<T> take_number(char tag);
+
   std::string_view tags_;
   std::span<const std::byte> bytes_;
   bool ok_ = true;

@@ -1,0 +1,48 @@
+// libFuzzer entry: packets of the live protocols that are not OSC; over TCP the stream in pieces of any size
+// too.
+#include "tests/fuzz/fuzz_input.h"
+#include "tests/fuzz/live_checks.h"
+
+namespace {
+
+using namespace strandcast;
+
+constexpr const char* kProtocols[] = {"opentrack", "freed", "natnet", "vrpn", "livelinkface"};
+constexpr const char* kVersions[] = {"", "3.0", "4.0", "4.1"};
+
+/// A stream says the same however it is cut, unless a piece was refused.
+void check_cuts(const LiveParserConfig& config, std::span<const std::byte> stream, size_t piece) {
+  const auto whole = make_live_parser(config).value();
+  const auto in_pieces = make_live_parser(config).value();
+  const auto packet = whole->parse(stream, 0);
+  std::vector<LivePose> poses;
+  bool is_taken = true;
+  for (size_t begin = 0; is_taken && begin < stream.size(); begin += piece) {
+    const auto part = in_pieces->parse(stream.subspan(begin, std::min(piece, stream.size() - begin)), 0);
+    is_taken = part.ok();
+    if (part) poses.insert(poses.end(), part->poses.begin(), part->poses.end());
+  }
+  CHECK(is_taken == packet.ok());
+  if (!packet) return;
+  CHECK(poses.size() == packet->poses.size());
+  for (size_t i = 0; i < poses.size(); ++i) CHECK(is_same(poses[i], packet->poses[i]));
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  FuzzInput input(data, size);
+  LiveParserConfig config;
+  config.protocol = kProtocols[input.take<uint8_t>() % std::size(kProtocols)];
+  const auto settings = input.take<uint8_t>();
+  for (const LiveProtocol& protocol : live_protocols())
+    if (protocol.name == config.protocol) config.axis_order = protocol.axis_orders[settings & 1];
+  config.protocol_version = kVersions[(settings >> 1) % std::size(kVersions)];
+  LiveParserPair parsers(config);
+  while (!input.is_empty()) {
+    const auto piece = input.take_piece();
+    parsers.parse(piece);
+    if (config.protocol == "vrpn") check_cuts(config, piece, 1 + (settings >> 3));
+  }
+  return 0;
+}
