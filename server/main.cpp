@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
@@ -20,6 +21,7 @@
 #include "server/app/server_passes.h"
 #include "server/app/viewer_codec.h"
 #include "server/net/token_file.h"
+#include "server/record/replay.h"
 
 namespace strandcast {
 namespace {
@@ -90,6 +92,31 @@ int check_command(const ServerOptions& options, const ServerConfig& config) {
   return 0;
 }
 
+std::atomic<bool> is_replay_stopped{false};
+
+int replay_command(const ServerOptions& options) {
+  const ServerConfig& server = options.config;
+  ReplayConfig config;
+  config.recording = options.replay_path;
+  config.device = {server.sim_device, server.gl_device, server.shader_folder};
+  config.pace = options.replay_pace;
+  config.on_note = [](const std::string& sentence) { tell(sentence); };
+  config.on_progress = [](const ReplayProgress& progress) {
+    tell(progress.recorded > 0
+             ? fmt::format("step {}: {} of {} states compared", progress.tick, progress.compared,
+                           progress.recorded)
+             : fmt::format("step {}: {} states compared", progress.tick, progress.compared));
+  };
+  config.stop = &is_replay_stopped;
+  const auto stop = [](int) { is_replay_stopped = true; };
+  std::signal(SIGINT, stop);
+  std::signal(SIGTERM, stop);
+  const auto result = replay_recording(config);
+  if (!result) return fail(result.error());
+  fmt::print("{}: {} ({:.1f} s)\n", options.replay_path.string(), to_sentence(*result), result->seconds);
+  return result->is_equal() ? 0 : kExitFailure;
+}
+
 Status write_port(const std::filesystem::path& path, uint16_t port) {
   if (path.empty()) return {};
   const std::string text = fmt::format("{}\n", port);
@@ -121,6 +148,7 @@ int serve(const ServerOptions& options, ServerConfig config) {
   if (!tokens) return fail(tokens.error());
   config.net.tokens = std::move(tokens).value();
   const sigset_t signals = handled_signals();
+  std::signal(SIGXFSZ, SIG_IGN);  // a recording that may not grow any more ends, and the server goes on
   auto server = Server::start(config);
   if (!server) return fail(server.error());
   if (const Status status = write_port(options.port_path, (*server)->port()); !status)
@@ -156,6 +184,7 @@ int run(int argc, const char* const* argv) {
   if (options->is_listing_solvers) return fmt::print("{}", list_solvers()), 0;
   init_log(options->log_level);
   // Before anything takes time: a reload of the service may come right after its start.
+  if (!options->replay_path.empty()) return replay_command(*options);
   const bool is_serving = !options->is_printing_scene && !options->is_explaining && !options->is_checking;
   const sigset_t signals = handled_signals();
   if (is_serving) pthread_sigmask(SIG_BLOCK, &signals, nullptr);

@@ -6,6 +6,7 @@
 #include "client/app/ctl_commands.h"
 #include "client/app/export_command.h"
 #include "client/app/feed.h"
+#include "client/app/recording_commands.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
 #include "common/base/version.h"
@@ -28,6 +29,8 @@ struct CommandLine {
   uint64_t session = 0;
   std::string scene_path;
   ExportCommand exported;
+  std::string recording;
+  std::string other_recording;
 };
 
 void declare_feed(CLI::App& app, CommandLine& line) {
@@ -120,7 +123,10 @@ int run(int argc, char** argv) {
   save->add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
   CLI::App* exported = app.add_subcommand("export", "Write the strands as curves for other programs");
   declare_export(*exported, line.exported);
-  CLI::App* check = app.add_subcommand("check", "Decode frames with two viewers and compare their states");
+  CLI::App* check = app.add_subcommand(
+      "check",
+      "Decode frames with two viewers and compare their states; or look whether a recording is sound");
+  check->add_option("recording", line.recording, "Recording to look at, instead of a server");
   check->add_option("--frames", line.check_frames, "Frames to decode")
       ->check(CLI::Range(uint64_t{2}, uint64_t{1'000'000}))
       ->capture_default_str();
@@ -131,6 +137,15 @@ int run(int argc, char** argv) {
   CLI::App* kick = app.add_subcommand("kick", "End one session (needs an admin's token)");
   kick->add_option("session", line.session, "Its number, as listed by sessions")->required();
   CLI::App* shutdown = app.add_subcommand("shutdown", "End the server (needs an admin's token)");
+  CLI::App* info = app.add_subcommand("info", "Say what a recording holds");
+  info->add_option("recording", line.recording, "File of strandcast-server --record")->required();
+  CLI::App* recover =
+      app.add_subcommand("recover", "Make a whole recording of one that was cut off or damaged");
+  recover->add_option("recording", line.recording, "What is left")->required();
+  recover->add_option("out", line.other_recording, "The new file (default: NAME.recovered.mcap)");
+  CLI::App* compare = app.add_subcommand("compare", "Say where two recordings first differ, and by how much");
+  compare->add_option("recording", line.recording, "One")->required();
+  compare->add_option("other", line.other_recording, "And another")->required();
   CLI::App* health = app.add_subcommand("health", "Ask /healthz");
 
   try {
@@ -164,10 +179,14 @@ int run(int argc, char** argv) {
   if (*mocap_reset) return run_command(line.target, LiveCommand{LiveAction::Reset, {}});
   if (*save) return run_save(line.target, line.scene_path);
   if (*exported) return run_export(line.target, line.exported, stop);
+  if (*check && !line.recording.empty()) return run_recording_check(line.recording);
   if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);
   if (*sessions) return run_admin(line.target, {AdminAction::ListSessions, 0});
   if (*kick) return run_admin(line.target, {AdminAction::Kick, line.session});
   if (*shutdown) return run_admin(line.target, {AdminAction::ShutDown, 0});
+  if (*info) return run_recording_info(line.recording);
+  if (*recover) return run_recover(line.recording, line.other_recording);
+  if (*compare) return run_compare(line.recording, line.other_recording);
   if (*health) return run_health(line.target);
   return kBadInputExit;
 }

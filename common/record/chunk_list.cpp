@@ -214,6 +214,7 @@ Result<LoadedChunk> load_chunk(ByteSource& source, const ChunkPlace& place) {
     return make_error(ErrorCode::LimitExceeded, "the chunk at {} has {} bytes uncompressed, the limit is {}",
                       place.offset, chunk.uncompressed_size, kMaxChunkBytes);
   LoadedChunk loaded;
+  loaded.compression = chunk.compression;
   if (chunk.compression.empty()) {
     loaded.records.assign(chunk.records.begin(), chunk.records.end());
   } else if (chunk.compression == "zstd") {
@@ -225,6 +226,7 @@ Result<LoadedChunk> load_chunk(ByteSource& source, const ChunkPlace& place) {
     loaded.records.resize(bytes);
     ZstdDecompressor decompressor;
     RETURN_IF_ERROR(decompressor.fill(chunk.records, loaded.records));
+    loaded.stored.assign(chunk.records.begin(), chunk.records.end());
   } else {
     return make_error(ErrorCode::Unsupported, "the chunk at {} is compressed by '{}'", place.offset,
                       chunk.compression);
@@ -233,6 +235,28 @@ Result<LoadedChunk> load_chunk(ByteSource& source, const ChunkPlace& place) {
     return make_error(ErrorCode::BadInput, "the CRC of the chunk at {} is {:08x}, and {:08x} was written",
                       place.offset, crc32(loaded.records), chunk.uncompressed_crc);
   return loaded;
+}
+
+Result<mcap::ChunkBody> chunk_body_of(mcap::Bytes records) {
+  mcap::ChunkBody body;
+  for (size_t offset = 0; offset < records.size();) {
+    ASSIGN_OR_RETURN(const mcap::Record record,
+                     mcap::read_record(std::span<const std::byte>(records).subspan(offset)));
+    if (record.opcode == mcap::Opcode::Message) {
+      ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record.content));
+      if (message.channel_id == 0 || message.channel_id > kDeltaChannel)
+        return make_error(ErrorCode::BadInput, "a message is on channel {}, which is none",
+                          message.channel_id);
+      body.message_start_time =
+          body.is_empty() ? message.log_time : std::min(body.message_start_time, message.log_time);
+      body.message_end_time = std::max(body.message_end_time, message.log_time);
+      body.index[message.channel_id].push_back({message.log_time, offset});
+    }
+    offset += record.size_bytes;
+  }
+  if (body.is_empty()) return make_error(ErrorCode::BadInput, "a chunk has no message");
+  body.records = std::move(records);
+  return body;
 }
 
 }  // namespace strandcast

@@ -9,7 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/record/byte_source.h"
-#include "common/record/mcap_records.h"
+#include "common/record/mcap_writer.h"
 
 namespace strandcast {
 
@@ -37,10 +37,15 @@ Result<ChunkList> list_chunks(ByteSource& source);
 /// Likewise, never by the index.
 Result<ChunkList> walk_chunks(ByteSource& source);
 
-/// A chunk in memory, its CRC checked, decompressed.
+/// A chunk in memory, its CRC checked.
 struct LoadedChunk {
-  mcap::Bytes records;
+  mcap::Bytes records;      // decompressed
+  std::string compression;  // of the file: "" or "zstd"
+  mcap::Bytes stored;       // as they are there; empty where they are not compressed
 };
 Result<LoadedChunk> load_chunk(ByteSource& source, const ChunkPlace& place);
+/// Where the messages of such records begin, so that they can be written again. BadInput for records without
+/// any, or on a channel that recordings do not have.
+Result<mcap::ChunkBody> chunk_body_of(mcap::Bytes records);
 
 }  // namespace strandcast

@@ -137,6 +137,9 @@ struct RawRunOptions {
   std::vector<std::string> trusted_proxies;
   bool has_proxy_protocol = false;
   std::vector<std::string> mocap_allowed;
+  std::string record_path;
+  bool replaces_recording = false;
+  bool is_replayed_in_real_time = false;
 };
 
 void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
@@ -164,6 +167,21 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
       ->expected(1)
       ->take_all()
       ->group(kGroup);
+}
+
+void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
+  auto* path = app.add_option("--record", raw.record_path,
+                              "record inputs, states and strands into this MCAP file, a new one");
+  app.add_flag("--record-replace", raw.replaces_recording, "the file of --record may be there: replace it")
+      ->needs(path);
+  auto* replay =
+      app.add_option("--replay", options.replay_path,
+                     "simulate this recording again, compare the hash of every state, and leave: exit "
+                     "code 0 when all are equal, 1 when not");
+  replay->excludes(path);
+  app.add_flag("--replay-realtime", raw.is_replayed_in_real_time,
+               "with --replay: no faster than it was recorded")
+      ->needs(replay);
 }
 
 void add_proxy_options(CLI::App& app, RawRunOptions& raw) {
@@ -224,6 +242,7 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));
   add_proxy_options(app, raw);
   add_mocap_options(app, options, raw);
+  add_record_options(app, options, raw);
   add_limit_options(app, net.limits);
 }
 
@@ -261,6 +280,14 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     options.config.live_allowed.push_back(*range);
   }
   if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;
+  if (!raw.record_path.empty())
+    options.config.record =
+        RecordConfig{raw.record_path, raw.replaces_recording ? IfPresent::Replace : IfPresent::Refuse};
+  if (raw.is_replayed_in_real_time) options.replay_pace = ReplayPace::RealTime;
+  if (!options.replay_path.empty() && app.count("--scene") + app.count("--set") + app.count("--groom") > 0)
+    return make_error(
+        ErrorCode::BadInput,
+        "--replay takes scene and hair from the recording: leave out --scene, --set and --groom");
   options.is_explaining = app.count("--explain") > 0;
   if (!named.explained.empty()) {
     if (!options.scene_path.empty())

@@ -10,6 +10,7 @@
 #include "common/base/result.h"
 #include "server/app/mocap_option.h"
 #include "server/app/server.h"
+#include "server/record/replay.h"
 
 namespace strandcast {
 
@@ -27,6 +28,8 @@ struct ServerOptions {
   bool is_printing_scene = false;
   bool is_checking = false;                      // --check: draw the scene as loaded and leave
   std::filesystem::path check_folder = "check";  // for its pictures
+  std::filesystem::path replay_path;             // a recording to simulate again; empty: none
+  ReplayPace replay_pace = ReplayPace::AsFastAsItGoes;
   std::string help;                              // not empty: print and leave
   ServerConfig config;                           // all but scene and tokens
 };

@@ -13,6 +13,7 @@
 #include "common/base/version.h"
 #include "common/base/worker_pool.h"
 #include "common/log/log.h"
+#include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "server/app/codec_choice.h"
 #include "server/app/live_desk.h"
@@ -42,8 +43,11 @@ Result<EncodedFramePtr> encode_asset(const SceneAsset& asset) {
 }  // namespace
 
 Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& config, InputHub& inputs) {
-  return make_simulation(
-      {config.scene, {config.sim_device, config.gl_device, config.shader_folder}, config.on_publish}, inputs);
+  return make_simulation({config.scene,
+                          {config.sim_device, config.gl_device, config.shader_folder},
+                          config.on_publish,
+                          config.tap},
+                         inputs);
 }
 
 class Server::State {
@@ -68,6 +72,7 @@ class Server::State {
   void count_strands(ServerCounters& counters) const;
   Status open_live();
   Status connect(EncodedFramePtr asset_frame);
+  void begin_recording(EncodedFramePtr asset_frame);
   void run_status();
   void watch_speed(const ServerCounters& now);
   std::string metrics() const;
@@ -76,6 +81,7 @@ class Server::State {
   ServerConfig config_;
   bool is_drawn_by_processors_ = true;  // pictures, whatever simulates
   InputHub inputs_;
+  std::unique_ptr<Recorder> recorder_;   // null: nothing is recorded
   std::vector<StrandCodecInfo> codecs_;  // that strands are served by, the scene's first
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
@@ -102,9 +108,13 @@ class Server::State {
 Status Server::State::start() {
   shared_workers();  // no nicer than this thread, as the one that draws is
   SceneDesc& scene = config_.scene;
-  // A wrong codec is told before anything is loaded.
+  // A wrong codec, or a file that cannot be written, is told before anything is loaded.
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
   RETURN_IF_ERROR(check_live(scene.live));
+  if (config_.record) {
+    ASSIGN_OR_RETURN(recorder_, Recorder::make(*config_.record));
+    config_.tap = recorder_.get();
+  }
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
   RETURN_IF_ERROR(choose_stream(*asset));
@@ -125,8 +135,10 @@ Status Server::State::start() {
   idle_look_ = scene.look;
   // The port first: a port in use is told at once, not after compiling shaders.
   RETURN_IF_ERROR(open_live());
-  RETURN_IF_ERROR(connect(std::move(asset_frame)));
+  RETURN_IF_ERROR(connect(asset_frame));
+  if (recorder_ != nullptr) RETURN_IF_ERROR(recorder_->attach(*hub_));
   RETURN_IF_ERROR(source_->start(*hub_, scene.stream));
+  if (recorder_ != nullptr) begin_recording(std::move(asset_frame));
   hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   net_->start();
@@ -190,6 +202,18 @@ Status Server::State::connect(EncodedFramePtr asset_frame) {
   return {};
 }
 
+/// What the file says first.
+void Server::State::begin_recording(EncodedFramePtr asset_frame) {
+  const SimStats simulated = source_->stats();
+  RecordingStart start;
+  start.server_version = version();
+  start.sim_device = simulated.sim_device;
+  start.sim_device_name = simulated.sim_device_name;
+  SceneDesc scene = with_absolute_paths(config_.scene);
+  start.scene_text = to_line(scene);
+  recorder_->begin(std::move(start), std::move(asset_frame));
+}
+
 void Server::State::stop() {
   {
     const std::lock_guard lock(mutex_);
@@ -202,6 +226,7 @@ void Server::State::stop() {
   if (live_ != nullptr) live_->stop();
   if (source_ != nullptr) source_->stop();
   if (hub_ != nullptr) hub_->stop();
+  if (recorder_ != nullptr) recorder_->stop();
 }
 
 void Server::State::wait() {
@@ -233,6 +258,7 @@ void Server::State::run_status() {
       status.detail = fmt::format("{}: {}", to_string(now.sim.detail), now.sim.detail_reason);
     status.picture_motions = hub_->take_picture_motions();
     status.live_inputs = now.live_inputs;
+    if (recorder_ != nullptr) recorder_->add(status);
     net_->broadcast(status);
     lock.lock();
   }
@@ -271,6 +297,7 @@ ServerCounters Server::State::counters() const {
   count_strands(counters);
   counters.frames = hub_->frame_counters();
   if (live_ != nullptr) counters.live_inputs = live_->status();
+  if (recorder_ != nullptr) counters.record = recorder_->counters();
   return counters;
 }
 

@@ -15,6 +15,7 @@
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
+#include "server/record/recorder.h"
 #include "server/source/simulation_source.h"
 #include "server/stream/stream_hub.h"
 
@@ -44,6 +45,8 @@ struct ServerConfig {
   std::optional<std::string> fallback_codec;
   /// Who may send to the scene's live inputs besides this machine.
   std::vector<AddressRange> live_allowed;
+  std::optional<RecordConfig> record;  // from the first state on
+  StepTap* tap = nullptr;              // of the simulation; set by the server where it records
 };
 
 struct ServerCounters {
@@ -61,6 +64,7 @@ struct ServerCounters {
   bool is_slow = false;       // slow motion, now
   uint64_t slow_motions = 0;  // times that it began
   std::vector<LiveInputStatus> live_inputs;
+  std::optional<RecordCounters> record;
 };
 
 class Server {

@@ -152,6 +152,25 @@ std::string format_live(const std::vector<LiveInputStatus>& inputs) {
   return text;
 }
 
+std::string format_recording(const RecordCounters& record) {
+  const auto row = [](std::string_view name, const char* help, double value) {
+    return format_metric(name, name.ends_with("_total") ? "counter" : "gauge", help, value);
+  };
+  return row("record_active", "1 while a recording is written.", record.has_failed ? 0.0 : 1.0) +
+         row("record_bytes_total", "Bytes of the recording.", static_cast<double>(record.written_bytes)) +
+         row("record_strand_bytes_total", "Bytes of strands in it, as they were encoded.",
+             static_cast<double>(record.frame_bytes)) +
+         row("record_frames_total", "Strand frames in it.", static_cast<double>(record.frames)) +
+         row("record_states_total", "States whose hash is in it.", static_cast<double>(record.states)) +
+         row("record_lost_frames_total", "Strand frames that the disk was too slow for.",
+             static_cast<double>(record.lost_frames)) +
+         row("record_lost_messages_total", "Inputs, steps and states that it was too slow for.",
+             static_cast<double>(record.lost_messages)) +
+         row("record_waiting_bytes", "Bytes that wait for the disk.",
+             static_cast<double>(record.waiting_bytes)) +
+         row("record_lag_ms", "Age of the newest that the recorder has taken.", record.lag_ms);
+}
+
 }  // namespace
 
 std::string format_server_metrics(const ServerCounters& counters, const char* version) {
@@ -168,6 +187,7 @@ std::string format_server_metrics(const ServerCounters& counters, const char* ve
                           row.value(counters));
   text += format_codecs(counters.strand_viewers_of);
   text += format_live(counters.live_inputs);
+  if (counters.record) text += format_recording(*counters.record);
   return text + format_histogram("sim_step_ms", "Time of the solver for one step.", counters.sim.step_times);
 }
 

@@ -136,11 +136,13 @@ void SessionDesk::on_wind(SessionId session, const WindSamples& samples, int64_t
 }
 
 void SessionDesk::on_command(SessionId session, const ControlCommand& command) {
-  if (may_control(session, name_of(command.command))) parts_.source.post(command, reply_to(session));
+  if (may_control(session, name_of(command.command)))
+    parts_.source.post(command, reply_to(session), viewers_.describe(session));
 }
 
 void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter) {
-  if (may_control(session, parameter.assignment)) parts_.source.post(parameter, reply_to(session));
+  if (may_control(session, parameter.assignment))
+    parts_.source.post(parameter, reply_to(session), viewers_.describe(session));
 }
 
 void SessionDesk::on_scene_request(SessionId session) {
@@ -210,6 +212,8 @@ bool SessionDesk::on_picture_step(SessionId session, size_t step, const std::str
 void SessionDesk::on_camera(SessionId session, const CameraChange& camera) {
   if (const Status status = viewers_.set_camera(session, camera.camera); !status)
     net_->send(session, Notice{true, status.error().to_string()});
+  else
+    parts_.hub.tell_camera(session, camera.camera);
 }
 
 /// Looks whether this session should change between strands and frames.

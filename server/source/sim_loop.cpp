@@ -89,7 +89,10 @@ void SimLoop::run(std::function<void(Status)> on_ready) {
     const Status status = begin();
     is_ready = true;
     on_ready(status);
-    if (status) loop();
+    if (status && config_.script != nullptr)
+      follow_script();
+    else if (status)
+      loop();
   } catch (const std::exception& exception) {
     const Error error = make_error(ErrorCode::Internal, "the simulation failed: {}", exception.what());
     log_error("sim", "{}", error.message);
@@ -147,6 +150,24 @@ void SimLoop::loop() {
     const bool is_old = now_ns() - stats_ns_ >= kStatsNs;
     const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0 || is_old);
     if (has_news) update_stats();
+  }
+}
+
+/// As fast as it goes. What is posted meanwhile is never taken.
+void SimLoop::follow_script() {
+  while (!is_stopping_) {
+    const StepScript::Next next = config_.script->next();
+    if (std::holds_alternative<StepScript::End>(next)) return;
+    if (const auto* taken = std::get_if<TakenStep>(&next)) {
+      scripted_ = taken;
+      step(taken->time_ns);
+      scripted_ = nullptr;
+    } else if (const auto* change = std::get_if<PostedChange>(&next)) {
+      std::visit([&](const auto& what) { carry_out({what, {}, change->who}); }, change->what);
+    } else {
+      begin_stream();
+    }
+    follow_look();
   }
 }
 
@@ -248,21 +269,28 @@ void SimLoop::push(Job job) {
     job.reply({true, fmt::format("{} commands are waiting already: try again later.", kMaxPendingJobs)});
 }
 
-void SimLoop::post(const ControlCommand& command, Reply reply) {
-  push({command, std::move(reply)});
+void SimLoop::post(const ControlCommand& command, Reply reply, const std::string& who) {
+  push({command, std::move(reply), who});
 }
-void SimLoop::post(const SetParameter& parameter, Reply reply) {
-  push({parameter, std::move(reply)});
+void SimLoop::post(const SetParameter& parameter, Reply reply, const std::string& who) {
+  push({parameter, std::move(reply), who});
 }
 void SimLoop::set_demand(const SourceDemand& demand) {
-  push({demand, {}});
+  push({demand, {}, {}});
 }
 
 void SimLoop::carry_out(const Job& job) {
   if (const auto* demand = std::get_if<SourceDemand>(&job.what)) return apply_demand(*demand);
   const auto* control = std::get_if<ControlCommand>(&job.what);
-  const Notice notice =
-      control != nullptr ? command(control->command) : change(std::get<SetParameter>(job.what).assignment);
+  const auto* parameter = std::get_if<SetParameter>(&job.what);
+  PostedChange posted{tick_, {}, job.who};
+  if (control != nullptr)
+    posted.what = *control;
+  else
+    posted.what = *parameter;
+  if (config_.tap != nullptr) config_.tap->on_change(posted);
+  const Notice notice = control != nullptr ? command(control->command) : change(parameter->assignment);
+  if (config_.tap != nullptr) config_.tap->on_answer(notice);
   update_stats();  // whoever reads the answer may count on it
   if (job.reply) job.reply(notice);
 }
@@ -323,10 +351,15 @@ Notice SimLoop::change(const std::string& assignment) {
 /// that come in a short time only the last is ever published.
 void SimLoop::follow_stream_settings() {
   const int64_t time_ns = now_ns();
-  if (!has_other_stream() || (stream_changed_ns_ != 0 && time_ns - stream_changed_ns_ < kStreamChangeNs))
-    return;
-  stream_ = config_.scene.stream;
+  const bool is_soon = stream_changed_ns_ != 0 && time_ns - stream_changed_ns_ < kStreamChangeNs;
+  if (config_.script != nullptr || !has_other_stream() || is_soon) return;
   stream_changed_ns_ = time_ns;
+  begin_stream();
+}
+
+void SimLoop::begin_stream() {
+  stream_ = config_.scene.stream;
+  if (config_.tap != nullptr) config_.tap->on_lattice({tick_, stream_});
   const Result<float> quantum_m = lattice_step_m(stream_.codec, stream_.bound_m);
   CHECK(quantum_m.ok());  // the codec cannot change while running
   publisher_->set_quantum_m(*quantum_m);
@@ -441,7 +474,7 @@ SceneDesc SimLoop::stepped_scene(const SceneDesc& scene, const SceneFeatures& fe
 /// How much is simulated follows who reads, between two steps. A pause costs nothing and changes nothing, and
 /// whoever observes sees all of it.
 void SimLoop::follow_detail() {
-  const bool is_observed = static_cast<bool>(config_.on_publish) || clock_->is_paused();
+  const bool is_observed = static_cast<bool>(config_.on_publish) || is_recorded() || clock_->is_paused();
   ReaderSight sight{is_watched(), hair_px_};
   if (is_observed) sight = {.has_readers = true};
   const int64_t time_ns = now_ns();
@@ -507,9 +540,16 @@ void SimLoop::wake() {
 }
 
 void SimLoop::take_input(int64_t time_ns) {
-  // A pause is not caught up.
-  if (clock_->is_paused()) input_clock_->restart();
-  input_ = hub_.sample(input_clock_->next(time_ns));
+  if (scripted_ != nullptr) {
+    input_ = scripted_->input;
+    input_rate_ = scripted_->input_rate;
+  } else {
+    // A pause is not caught up.
+    if (clock_->is_paused()) input_clock_->restart();
+    input_ = hub_.sample(input_clock_->next(time_ns));
+    input_rate_ = input_clock_->rate();
+  }
+  if (config_.tap != nullptr) config_.tap->on_step({tick_ + 1, time_ns, input_rate_, input_});
   if (input_.has_wind_stream == facts_.has_wind_stream) return;
   RuntimeFacts facts = facts_;
   facts.has_wind_stream = input_.has_wind_stream;
@@ -521,7 +561,7 @@ void SimLoop::carry_step() {
   if (input_.has_teleported) head_path_.clear();
   head_path_.push_back(input_.world_from_head);
   if (head_path_.size() > kHeadPathSteps + 1) head_path_.pop_front();
-  builder_->begin(input_, static_cast<double>(tick_) / config_.scene.step_rate_hz, input_clock_->rate());
+  builder_->begin(input_, static_cast<double>(tick_) / config_.scene.step_rate_hz, input_rate_);
   is_behind_ = true;
   last_step_ns_ = head_seen_ns_ = now_ns();
   if (carried_ == nullptr) return publish();
@@ -542,7 +582,7 @@ void SimLoop::step(int64_t time_ns) {
   StageTurn turn(*builder_, *solver_, *publisher_);
   turn.input = input_;
   turn.end_time_s = end_time_s;
-  turn.input_rate = input_clock_->rate();
+  turn.input_rate = input_rate_;
   turn.is_stopping = &is_stopping_;
   CHECK(stages_->step(turn, executor_->timer()).ok());  // stages of a step cannot fail
   if (is_stopping_) return;
@@ -550,7 +590,7 @@ void SimLoop::step(int64_t time_ns) {
   if (solver_features_.has_body) report_body();
   step_log_.add(builder_->step_tick(tick_));
   last_step_ns_ = now_ns();
-  if (is_watched() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
+  if (is_watched() || is_recorded() || clock_->is_paused() || tick_ % kIdlePublishSteps == 0) publish();
 }
 
 PublishInput SimLoop::publish_input() const {

@@ -34,6 +34,7 @@
 #include "server/sim/strand_state.h"
 #include "server/source/sim_detail.h"
 #include "server/source/sim_stages.h"
+#include "server/source/step_tap.h"
 #include "server/stream/state_source.h"
 
 namespace strandcast {
@@ -46,6 +47,9 @@ struct SimLoopConfig {
   std::shared_ptr<const SceneContent> content;
   ExecutorConfig device;        // what simulates
   SnapshotObserver on_publish;  // may be empty; on the simulation thread
+  // Both outlive the loop. With either every step is published, and nothing is left out for want of readers.
+  StepTap* tap = nullptr;
+  StepScript* script = nullptr;
 };
 
 /// Commands that may wait for the simulation thread; each can cost a new solver.
@@ -77,8 +81,8 @@ class SimLoop {
   SimLoop& operator=(const SimLoop&) = delete;
 
   // From any thread; return at once.
-  void post(const ControlCommand& command, Reply reply);
-  void post(const SetParameter& parameter, Reply reply);
+  void post(const ControlCommand& command, Reply reply, const std::string& who = {});
+  void post(const SetParameter& parameter, Reply reply, const std::string& who = {});
   /// What is wanted; has_wind_stream is found by the loop itself.
   void set_demand(const SourceDemand& demand);
   SimStats stats() const;
@@ -93,6 +97,7 @@ class SimLoop {
   struct Job {
     std::variant<ControlCommand, SetParameter, SourceDemand> what;
     Reply reply;
+    std::string who = {};      // asked for it
     bool is_prepared = false;  // what takes long of it is done
   };
 
@@ -100,6 +105,7 @@ class SimLoop {
   void run(std::function<void(Status)> on_ready);
   Status begin();
   void loop();
+  void follow_script();
   void push(Job job);
   std::deque<Job> wait_for_jobs();
   std::deque<Job> take_jobs();
@@ -109,6 +115,7 @@ class SimLoop {
   Notice command(Command command);
   Notice change(const std::string& assignment);
   void follow_stream_settings();
+  void begin_stream();
   bool has_other_stream() const { return config_.scene.stream != stream_; }
   void follow_look();
   LookChange wanted_look() const { return {config_.scene.look, config_.scene.camera}; }
@@ -116,6 +123,7 @@ class SimLoop {
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_demand(const SourceDemand& demand);
   void apply_facts(const RuntimeFacts& facts);
+  bool is_recorded() const { return config_.tap != nullptr || config_.script != nullptr; }
   bool is_watched() const { return SourceDemand{facts_, has_state_readers_, hair_px_}.is_watched(); }
   void follow_detail();
   void set_detail(int64_t time_ns);
@@ -163,6 +171,8 @@ class SimLoop {
   double hair_px_ = 0.0;
   Histogram step_times_;
   InputFrame input_;
+  double input_rate_ = 1.0;              // of the newest step, as InputClock has it
+  const TakenStep* scripted_ = nullptr;  // the step that a script has taken
   uint64_t next_quarantine_report_ = 1;  // at so many broken strands since start
   std::vector<std::string> told_missing_joints_;
   size_t told_capsule_count_ = 0;

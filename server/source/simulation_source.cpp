@@ -20,7 +20,8 @@ class SimulationSource : public StateSource {
 
   std::shared_ptr<const SceneAsset> asset() const override { return asset_; }
   Status start(StateSink& sink, const StreamDesc& stream) override {
-    SimLoopConfig config{config_.scene, content_, config_.device, config_.on_publish};
+    SimLoopConfig config{config_.scene,      content_,    config_.device,
+                         config_.on_publish, config_.tap, config_.script};
     config.scene.stream = stream;
     ASSIGN_OR_RETURN(loop_, SimLoop::start(std::move(config), inputs_, sink));
     return {};
@@ -29,8 +30,12 @@ class SimulationSource : public StateSource {
     if (loop_ != nullptr) loop_->stop();
   }
   void set_demand(const SourceDemand& demand) override { loop_->set_demand(demand); }
-  void post(const ControlCommand& command, Reply reply) override { loop_->post(command, std::move(reply)); }
-  void post(const SetParameter& parameter, Reply reply) override { loop_->post(parameter, std::move(reply)); }
+  void post(const ControlCommand& command, Reply reply, const std::string& who) override {
+    loop_->post(command, std::move(reply), who);
+  }
+  void post(const SetParameter& parameter, Reply reply, const std::string& who) override {
+    loop_->post(parameter, std::move(reply), who);
+  }
   SimStats stats() const override { return loop_ != nullptr ? loop_->stats() : SimStats{}; }
   std::optional<SceneDesc> scene() const override {
     if (loop_ == nullptr) return std::nullopt;

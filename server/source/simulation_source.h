@@ -15,6 +15,9 @@ struct SimulationConfig {
   SceneDesc scene;
   ExecutorConfig device;        // what simulates
   SnapshotObserver on_publish;  // may be empty
+  // As SimLoopConfig has them.
+  StepTap* tap = nullptr;
+  StepScript* script = nullptr;
 };
 
 /// Checks and loads the scene; the executor is opened by start(). `inputs` outlives the source.

@@ -78,8 +78,9 @@ class StateSource {
 
   // From any thread; return at once and do not call the sink.
   virtual void set_demand(const SourceDemand& demand) = 0;
-  virtual void post(const ControlCommand& command, Reply reply) = 0;
-  virtual void post(const SetParameter& parameter, Reply reply) = 0;
+  // `who` asked for it, for people who look at a recording.
+  virtual void post(const ControlCommand& command, Reply reply, const std::string& who) = 0;
+  virtual void post(const SetParameter& parameter, Reply reply, const std::string& who) = 0;
   virtual SimStats stats() const = 0;
   /// The scene as it runs, to be run again elsewhere on this machine; nothing where there is none.
   virtual std::optional<SceneDesc> scene() const { return std::nullopt; }

@@ -267,6 +267,11 @@ void StreamHub::tell_wind(uint64_t source, const WindSamples& samples, int64_t a
        [&](StreamReader& reader) { reader.on_wind(source, samples, arrival_ns); });
 }
 
+void StreamHub::tell_camera(uint64_t viewer, const CameraDesc& camera) {
+  give([](const Entry& entry) { return entry.demand.has_inputs; },
+       [&](StreamReader& reader) { reader.on_camera(viewer, camera); });
+}
+
 StreamDesc StreamHub::stream() const {
   const std::lock_guard lock(mutex_);
   return stream_;

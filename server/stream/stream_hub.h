@@ -64,6 +64,7 @@ class StreamHub : public StateSink, public DemandDesk {
   // What comes in, for readers that want inputs.
   void tell_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns);
   void tell_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns);
+  void tell_camera(uint64_t viewer, const CameraDesc& camera);
 
   StreamDesc stream() const;
   /// What strands are served by: the scene's codec, and the one for who cannot decode it. Of each there are

@@ -32,6 +32,8 @@ class StreamReader {
   virtual void on_state(const std::shared_ptr<const Snapshot>&) {}
   virtual void on_motion(uint64_t /*source*/, const MotionSamples&, int64_t /*arrival_ns*/) {}
   virtual void on_wind(uint64_t /*source*/, const WindSamples&, int64_t /*arrival_ns*/) {}
+  /// What a viewer of pictures looks through from now on; comes with the inputs.
+  virtual void on_camera(uint64_t /*viewer*/, const CameraDesc&) {}
   /// Pictures of this class go on with the look of before: the new one cannot be drawn.
   virtual void on_look_refused(PictureClass, const Error&) {}
   /// The scene looks so from now on. Told to all.

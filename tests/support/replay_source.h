@@ -27,8 +27,8 @@ class ReplaySource : public StateSource {
   }
   void stop() override {}
   void set_demand(const SourceDemand& demand) override { is_watched_ = demand.is_watched(); }
-  void post(const ControlCommand&, Reply reply) override { refuse(reply); }
-  void post(const SetParameter&, Reply reply) override { refuse(reply); }
+  void post(const ControlCommand&, Reply reply, const std::string&) override { refuse(reply); }
+  void post(const SetParameter&, Reply reply, const std::string&) override { refuse(reply); }
   SimStats stats() const override {
     SimStats stats;
     stats.tick = stats.published = next_;

@@ -1,0 +1,146 @@
+#include "client/app/recording_commands.h"
+
+#include <algorithm>
+#include <ctime>
+#include <iostream>
+
+#include "client/app/ctl_commands.h"
+#include "common/record/recording_check.h"
+#include "common/record/recording_reader.h"
+#include "common/scene/scene_file.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kNsPerS = 1e9;
+constexpr double kBytesPerMb = 1e6;
+constexpr double kMmPerM = 1e3;
+
+int fail(const Error& error) {
+  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
+  return kBadInputExit;
+}
+
+std::string date_text(int64_t unix_time_ns) {
+  const auto seconds = static_cast<std::time_t>(unix_time_ns / 1'000'000'000);
+  std::tm parts{};
+  char text[32] = "?";
+  if (::gmtime_r(&seconds, &parts) != nullptr)
+    std::strftime(text, sizeof(text), "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+std::string state_text(const RecordingInfo& info) {
+  if (!info.index_trouble.empty())
+    return fmt::format("damaged index ({}); strandcast-ctl recover makes it whole", info.index_trouble);
+  if (info.is_indexed) return "whole, with its index";
+  return fmt::format("cut off{}; strandcast-ctl recover makes it whole",
+                     info.cut_bytes > 0 ? fmt::format(" with {} bytes of a chunk that is not", info.cut_bytes)
+                                        : std::string());
+}
+
+std::string hair_text(const RecordingReader& reader) {
+  const auto asset = reader.asset();
+  if (!asset) return asset.error().to_string();
+  return fmt::format("{} strands x {} vertices, by {}", asset->strand_count, asset->vertex_count,
+                     reader.start().codec);
+}
+
+std::string keyframe_text(const std::vector<int64_t>& times_ns) {
+  int64_t longest_ns = 0;
+  for (size_t i = 1; i < times_ns.size(); ++i)
+    longest_ns = std::max(longest_ns, times_ns[i] - times_ns[i - 1]);
+  return fmt::format("{} keyframes, at most {:.1f} s apart", times_ns.size(),
+                     static_cast<double>(longest_ns) / kNsPerS);
+}
+
+std::string check_text(const RecordingCheck& check) {
+  std::string text = fmt::format("{} chunks, {} states, {} frames of which {} decode with their hash",
+                                 check.chunks, check.states, check.frames, check.decoded_frames);
+  if (check.equal_states > 0)
+    text += fmt::format(", {} of them equal to what was published bit for bit", check.equal_states);
+  if (check.lost_frames + check.lost_messages > 0)
+    text += fmt::format("; {} frames and {} messages found no room when it was recorded", check.lost_frames,
+                        check.lost_messages);
+  return text;
+}
+
+void print_problems(const RecordingCheck& check) {
+  for (const std::string& problem : check.problems) std::cout << "  " << problem << '\n';
+  if (check.problem_count > check.problems.size())
+    std::cout << fmt::format("  and {} more\n", check.problem_count - check.problems.size());
+}
+
+void print_line(const char* name, const std::string& text) {
+  std::cout << fmt::format("  {:<10} {}\n", name, text);
+}
+
+}  // namespace
+
+int run_recording_info(const std::filesystem::path& path) {
+  const auto reader = RecordingReader::open(path, RecordedPart::Messages);
+  if (!reader) return fail(reader.error());
+  const RecordingStart& start = (*reader)->start();
+  const RecordingInfo& info = (*reader)->info();
+  const auto scene = parse_scene(start.scene_text, "the recording's scene", {});
+  std::cout << fmt::format("{}: a recording of scene '{}'\n", path.string(),
+                           scene ? scene->name : scene.error().to_string());
+  print_line("recorded", fmt::format("{} by {} {}, {:.1f} s of simulation", date_text(start.unix_time_ns),
+                                     "strandcast-server", start.server_version,
+                                     static_cast<double>(info.last_sim_time_ns) / kNsPerS));
+  print_line("simulated", start.sim_device_name);
+  if (scene)
+    print_line("scene", fmt::format("solver {}, {:g} steps/s of {} substeps, within {:g} mm",
+                                    scene->solver.name, scene->step_rate_hz, scene->substeps,
+                                    static_cast<double>(scene->stream.bound_m) * kMmPerM));
+  print_line("hair", hair_text(**reader));
+  print_line("strands", fmt::format("{} frames, {:.1f} MB; {}", info.frame_count,
+                                    static_cast<double>(info.frame_bytes) / kBytesPerMb,
+                                    keyframe_text(info.keyframe_sim_time_ns)));
+  std::string counts;
+  for (const auto& [topic, count] : info.message_counts)
+    counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", topic, count);
+  print_line("messages",
+             fmt::format("{:.1f} MB: {}", static_cast<double>(info.message_bytes) / kBytesPerMb, counts));
+  print_line("file",
+             fmt::format("{:.1f} MB, {} chunks: {}", static_cast<double>(info.file_bytes) / kBytesPerMb,
+                         info.chunk_count, state_text(info)));
+  return info.index_trouble.empty() ? kDoneExit : kRefusedExit;
+}
+
+int run_recording_check(const std::filesystem::path& path) {
+  const auto check = check_recording(path);
+  if (!check) return fail(check.error());
+  std::cout << fmt::format("{}: {}\n", path.string(), check_text(*check));
+  print_problems(*check);
+  std::cout << (check->is_sound() ? "sound\n" : "not sound; strandcast-ctl recover keeps what is\n");
+  return check->is_sound() ? kDoneExit : kRefusedExit;
+}
+
+int run_recover(const std::filesystem::path& from, std::filesystem::path to) {
+  if (to.empty()) to = std::filesystem::path(from).replace_extension(".recovered.mcap");
+  const auto recovery = recover_recording(from, to);
+  if (!recovery) return fail(recovery.error());
+  std::cout << fmt::format("{}: {} chunks kept, {} damaged ones left out, {} bytes cut off\n", to.string(),
+                           recovery->kept_chunks, recovery->left_out_chunks, recovery->cut_bytes);
+  std::cout << check_text(recovery->check) << '\n';
+  print_problems(recovery->check);
+  return recovery->check.is_sound() ? kDoneExit : kRefusedExit;
+}
+
+int run_compare(const std::filesystem::path& a, const std::filesystem::path& b) {
+  const auto compared = compare_recordings(a, b);
+  if (!compared) return fail(compared.error());
+  for (const std::string& note : compared->notes) std::cout << note << '\n';
+  std::cout << fmt::format("{} states have equal hashes\n", compared->equal_states);
+  if (compared->compared_frames > 0)
+    std::cout << fmt::format("strands of {} steps in both: at most {:g} mm apart (step {})\n",
+                             compared->compared_frames, compared->max_distance_m * kMmPerM,
+                             compared->max_distance_tick);
+  if (!compared->first_different_tick) return kDoneExit;
+  std::cout << fmt::format("step {} is the first that differs: {}\n", *compared->first_different_tick,
+                           compared->difference);
+  return kRefusedExit;
+}
+
+}  // namespace strandcast

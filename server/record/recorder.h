@@ -1,0 +1,133 @@
+// Recorder: a reader of the stream, and a tap of the simulation, that puts both into a recording. Whoever
+// calls it only hands over; a thread of its own makes chunks, and another one writes them (RecordFile).
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/record/record_file.h"
+#include "common/record/recording_writer.h"
+#include "server/source/step_tap.h"
+#include "server/stream/stream_hub.h"
+
+namespace strandcast {
+
+/// What may wait for the recorder's thread: states and frames by their bytes, all else by number.
+inline constexpr uint64_t kMaxRecorderBytes = 64u << 20;
+inline constexpr size_t kMaxRecorderItems = 1u << 16;
+inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
+/// A keyframe is recorded so often, in time of the simulation: what may have to be decoded to see a moment.
+inline constexpr int64_t kRecordKeyframeNs = 5'000'000'000;
+
+struct RecordConfig {
+  std::filesystem::path path;
+  IfPresent if_present = IfPresent::Refuse;
+};
+
+/// Totals since start.
+struct RecordCounters {
+  uint64_t written_bytes = 0;
+  uint64_t waiting_bytes = 0;  // for the disk, now
+  uint64_t frame_bytes = 0;    // of strands as they were encoded
+  uint64_t frames = 0;
+  uint64_t states = 0;
+  uint64_t lost_frames = 0;
+  uint64_t lost_messages = 0;
+  double lag_ms = 0.0;  // of the newest that became part of a chunk behind when it came
+  bool has_failed = false;
+};
+
+class Recorder : public StreamReader, public StepTap {
+ public:
+  /// Makes the file; errors as RecordFile::make().
+  static Result<std::unique_ptr<Recorder>> make(const RecordConfig& config);
+  /// stop(); without begin() nothing is left behind.
+  ~Recorder() override;
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// Reads all states, inputs and strands of the scene's codec from now on; what comes waits for begin().
+  /// The hub outlives it, or its stop().
+  Status attach(StreamHub& hub);
+  /// The start says what it is of; times and codec are filled in here.
+  void begin(RecordingStart start, EncodedFramePtr asset);
+  void add(const ServerStatus& status);
+  /// Closes the file and says what is in it. Call when nothing comes any more.
+  void stop();
+
+  RecordCounters counters() const;
+  const std::filesystem::path& path() const { return config_.path; }
+
+  void on_strands(const EncodedFramePtr& frame) override;
+  void on_state(const std::shared_ptr<const Snapshot>& state) override;
+  void on_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns) override;
+  void on_wind(uint64_t source, const WindSamples& samples, int64_t arrival_ns) override;
+  void on_camera(uint64_t viewer, const CameraDesc& camera) override;
+  void on_look_change(const LookChange& look) override;
+  void on_step(const TakenStep& step) override;
+  void on_change(const PostedChange& change) override;
+  void on_answer(const Notice& answer) override;
+  void on_lattice(const LatticeChange& change) override;
+
+ private:
+  using StatePtr = std::shared_ptr<const Snapshot>;
+  struct Item {
+    int64_t time_ns = 0;
+    std::variant<StatePtr, EncodedFramePtr, RecordedMessage> what;
+  };
+
+  Recorder(RecordConfig config, std::unique_ptr<RecordFile> file);
+  void push_of_simulation(Item item);
+  void push(Item item);
+  void run();
+  void write(const Item& item);
+  void write_frame(int64_t time_ns, const EncodedFramePtr& frame);
+  void write_held_frame();
+  void watch_losses();
+  void end_early();
+  std::string summary() const;
+
+  const RecordConfig config_;
+  std::unique_ptr<RecordFile> file_;
+  StreamHub* hub_ = nullptr;
+  ReaderId reader_ = 0;
+  uint16_t stream_id_ = 0;
+  EncodedFramePtr asset_;
+  RecordingStart start_;
+
+  // Of the simulation thread: a change that has no answer yet, and what came of it.
+  std::optional<RecordedChange> open_change_;
+  std::vector<Item> held_;
+
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable changed_;
+  std::deque<Item> waiting_;
+  uint64_t waiting_bytes_ = 0;
+  RecordedLoss refused_;  // that found no place there
+  bool is_stopping_ = false;
+  bool is_ended_ = false;  // the file takes nothing any more
+  RecordCounters counters_;
+
+  // Of the recorder's thread.
+  std::unique_ptr<RecordingWriter> writer_;
+  std::optional<Item> held_frame_;  // the newest delta: a keyframe of the same state takes its place
+  uint64_t known_lost_frames_ = 0;
+  bool is_chain_broken_ = true;
+  int64_t keyframe_sim_ns_ = 0;
+  int64_t sim_time_ns_ = 0;
+  uint64_t last_tick_ = 0;
+
+  std::thread thread_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,57 @@
+// Replay: simulates a recording's scene again, with the inputs and changes of each step as they were taken,
+// and compares every state's hash. Its simulation has no readers and goes by no clock.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/source/simulation_source.h"
+
+namespace strandcast {
+
+enum class ReplayPace { AsFastAsItGoes, RealTime };
+
+struct ReplayProgress {
+  uint64_t compared = 0;
+  uint64_t recorded = 0;  // states in the file, as far as its index knows; else 0
+  uint64_t tick = 0;
+};
+
+struct ReplayConfig {
+  std::filesystem::path recording;
+  ExecutorConfig device;  // sim_device "auto": what the recording was made on
+  ReplayPace pace = ReplayPace::AsFastAsItGoes;
+  std::function<void(const ReplayProgress&)> on_progress = {};  // now and then, on a thread of the replay
+  std::function<void(const std::string&)> on_note = {};         // what a person should know; likewise
+  const std::atomic<bool>* stop = nullptr;                      // set: it ends
+};
+
+/// The first state that is not what was recorded.
+struct ReplayDifference {
+  uint64_t tick = 0;
+  std::string what;  // a sentence without its end
+};
+
+struct ReplayResult {
+  uint64_t compared = 0;  // states
+  uint64_t equal = 0;
+  double seconds = 0.0;  // that it took
+  std::optional<ReplayDifference> difference;
+  std::string early_end;  // why it did not come to the end of the recording; empty = it did
+
+  bool is_equal() const { return compared > 0 && equal == compared && !difference && early_end.empty(); }
+};
+
+/// NotFound, BadInput or Unsupported where the recording, its scene or its hair cannot be had.
+Result<ReplayResult> replay_recording(const ReplayConfig& config);
+
+/// "3600 of 3600 state hashes are equal", or where they first differ.
+std::string to_sentence(const ReplayResult& result);
+
+}  // namespace strandcast
