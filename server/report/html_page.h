@@ -8,10 +8,9 @@
 #include <string_view>
 #include <vector>
 
-namespace strandcast {
+#include "common/plot/html_text.h"
 
-/// The text with the five characters that mean something in HTML and SVG replaced.
-std::string html_escaped(std::string_view text);
+namespace strandcast {
 
 std::string base64_of(std::span<const std::byte> bytes);
 

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/html_page.h"
 #include "server/report/rendering.h"
-#include "server/report/svg_plot.h"
 
 namespace strandcast {
 namespace {

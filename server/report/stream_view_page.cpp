@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
-#include "server/report/svg_plot.h"
 
 namespace strandcast {
 namespace {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 #include "server/report/html_page.h"
 #include "server/report/peers/peer_codecs.h"
@@ -16,7 +17,6 @@
 #include "server/report/streaming_goals.h"
 #include "server/report/streaming_tables.h"
 #include "server/report/svg_bars.h"
-#include "server/report/svg_plot.h"
 
 namespace strandcast {
 namespace {

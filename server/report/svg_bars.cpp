@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/html_page.h"
-#include "server/report/svg_plot.h"
 
 namespace strandcast {
 namespace {

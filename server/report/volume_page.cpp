@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <map>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 #include "server/report/html_page.h"
 #include "server/report/report_folder.h"
-#include "server/report/svg_plot.h"
 
 namespace strandcast {
 namespace {

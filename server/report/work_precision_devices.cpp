@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "server/report/svg_plot.h"
+#include "common/plot/svg_plot.h"
 #include "server/report/work_precision_page.h"
 
 namespace strandcast {

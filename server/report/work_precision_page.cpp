@@ -7,11 +7,11 @@
 #include <limits>
 #include <optional>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 #include "server/report/exact_solutions.h"
 #include "server/report/html_page.h"
 #include "server/report/report_folder.h"
-#include "server/report/svg_plot.h"
 #include "server/report/work_precision_devices.h"
 
 namespace strandcast {

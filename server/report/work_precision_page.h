@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/plot/svg_plot.h"
 #include "server/report/pareto.h"
-#include "server/report/svg_plot.h"
 #include "server/report/work_precision.h"
 
 namespace strandcast {

@@ -1,5 +1,5 @@
 // The relay's link model on given times: what goes in comes out, when and how the plan says.
-#include "tests/tools/chaos_pipe.h"
+#include "common/chaos/chaos_pipe.h"
 
 #include <numeric>
 

@@ -1,5 +1,5 @@
 // The relay between two sockets: data arrives whole, faults reach both ends.
-#include "tests/tools/chaos_relay.h"
+#include "common/chaos/chaos_relay.h"
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ip/tcp.hpp>

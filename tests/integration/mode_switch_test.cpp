@@ -7,10 +7,10 @@
 #include <atomic>
 
 #include "common/base/profile.h"
+#include "common/chaos/chaos_relay.h"
 #include "common/strands/strand_codec.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/server_fixture.h"
-#include "tests/tools/chaos_relay.h"
 
 namespace strandcast {
 namespace {

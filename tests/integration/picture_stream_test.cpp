@@ -6,10 +6,10 @@
 #include <algorithm>
 
 #include "client/app/view_report.h"
+#include "common/chaos/chaos_relay.h"
 #include "tests/support/server_fixture.h"
 #include "tests/support/sim_devices.h"
 #include "tests/support/test_pictures.h"
-#include "tests/tools/chaos_relay.h"
 
 namespace strandcast {
 namespace {

@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "client/app/live_connection.h"
+#include "common/chaos/chaos_relay.h"
 #include "common/strands/strand_prefix.h"
 #include "tests/support/server_fixture.h"
-#include "tests/tools/chaos_relay.h"
 #include "tests/tools/load_viewers.h"
 
 namespace strandcast {

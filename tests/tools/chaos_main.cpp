@@ -9,7 +9,7 @@
 #include "client/app/stop_signal.h"
 #include "client/net/address.h"
 #include "common/base/profile.h"
-#include "tests/tools/chaos_relay.h"
+#include "common/chaos/chaos_relay.h"
 
 namespace {
 

@@ -34,11 +34,13 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
   static const std::set<std::string> kRender =
       with(with({"common/render", "common/simd", "shaders/lib"}, kGl), kStreams);
   static const std::set<std::string> kAll =
-      with(with(with(with(kRender, kWire), kReplay), kKernels), {"common/record"});
+      with(with(with(with(kRender, kWire), kReplay), kKernels), {"common/plot", "common/record"});
   static const std::map<std::string, std::set<std::string>> kAllowed = {
       {"common/base", {}},
       {"common/simd", kBase},
       {"common/log", kBase},
+      {"common/plot", kBase},
+      {"common/chaos", kBase},
       {"common/math", kBase},
       // The core: a viewer in a browser, a relay or a fuzzer links these and nothing else of ours.
       {"common/kernels", with({"common/simd", "shaders/shared", "shaders/lib"}, kMath)},
@@ -76,7 +78,8 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"client/web", with({"common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
       {"client/export", with({"common/replay", "common/log"}, kStrands)},
-      {"client/app", with({"client/net", "client/window", "client/export", "common/record"}, kAll)},
+      {"client/app",
+       with({"client/net", "client/window", "client/export", "common/chaos", "common/record"}, kAll)},
       {"client", with({"client/app"}, kAll)},
   };
   return kAllowed;
@@ -219,7 +222,7 @@ TEST(Layering, FindsEveryKindOfWrongInclude) {
       {"common/strands/delta.cpp", "#include \"common/gl/objects.h\""},
       {"common/render/renderer.cpp", "#include \"server/sim/solver.h\""},
       {"client/app/app.cpp", "#include \"server/net/access.h\""},
-      {"server/app/app.cpp", "#include \"server/report/svg_plot.h\""},
+      {"server/app/app.cpp", "#include \"server/report/html_page.h\""},
       {"server/net/server.cpp", "#include \"common/replay/strand_replay.h\""},
       {"server/sim/solver.cpp", "#include \"server/scene/stage.h\""},
       {"server/net/server.cpp", "#include \"server/sim/solver.h\""},

@@ -3,10 +3,10 @@
 #include <limits>
 
 #include "common/log/progress.h"
+#include "common/plot/svg_plot.h"
 #include "server/report/csv_file.h"
 #include "server/report/html_page.h"
 #include "server/report/report_folder.h"
-#include "server/report/svg_plot.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast {

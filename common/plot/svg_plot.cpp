@@ -1,4 +1,4 @@
-#include "server/report/svg_plot.h"
+#include "common/plot/svg_plot.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "server/report/html_page.h"
+#include "common/plot/html_text.h"
 
 namespace strandcast {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/tools/chaos_pipe.h"
+#include "common/chaos/chaos_pipe.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "tests/tools/chaos_relay.h"
+#include "common/chaos/chaos_relay.h"
 
 namespace strandcast::chaos {
 

@@ -1,4 +1,4 @@
-#include "tests/tools/chaos_relay.h"
+#include "common/chaos/chaos_relay.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -18,7 +18,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
-#include "tests/tools/chaos_pipe.h"
+#include "common/chaos/chaos_pipe.h"
 
 namespace strandcast::chaos {
 namespace {
