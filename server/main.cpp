@@ -135,11 +135,28 @@ Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
   return std::move(file.tokens);
 }
 
-void reload(Server& server, const NetConfig& net) {
-  if (!net.tls) return log_info("app", "SIGHUP: there is no certificate that could be read again");
+void reload_tokens(Server& server, const std::filesystem::path& path) {
+  std::error_code failure;
+  // Tokens that nobody saw would be made anew where the file is gone.
+  if (!std::filesystem::exists(path, failure))
+    return log_error("app", "the old tokens stay: there is no file {}", path.string());
+  auto file = open_token_file(path);
+  const Status status = file ? server.set_tokens(std::move(file->tokens)) : Status(file.error());
+  if (!status) return log_error("app", "the old tokens stay: {}", status.error().to_string());
+  log_info("app", "tokens read again: for whoever joins from now on");
+}
+
+void reload_certificate(Server& server) {
   if (const Status status = server.reload_tls(); !status)
     return log_error("app", "the old certificate stays: {}", status.error().to_string());
   log_info("app", "certificate read again");
+}
+
+void reload(Server& server, const ServerOptions& options, const NetConfig& net) {
+  if (!options.token_path.empty()) reload_tokens(server, options.token_path);
+  if (net.tls) reload_certificate(server);
+  if (!net.tls && options.token_path.empty())
+    log_info("app", "SIGHUP: there is no certificate and no token file that could be read again");
 }
 
 /// Serves until a signal, the end of the time or a failure. The signals are blocked in every thread.
@@ -159,7 +176,7 @@ int serve(const ServerOptions& options, ServerConfig config) {
   const timespec poll{0, kPollNs};
   while (!(*server)->failure() && !(*server)->is_shut_down_wanted()) {
     const int signal = sigtimedwait(&signals, nullptr, &poll);
-    if (signal == SIGHUP) reload(**server, config.net);
+    if (signal == SIGHUP) reload(**server, options, config.net);
     if (signal > 0 && signal != SIGHUP) break;
     if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
   }
@@ -182,7 +199,7 @@ int run(int argc, const char* const* argv) {
   if (!options) return fail(options.error());
   if (!options->help.empty()) return fmt::print("{}", options->help), 0;
   if (options->is_listing_solvers) return fmt::print("{}", list_solvers()), 0;
-  init_log(options->log_level);
+  init_log(options->log_level, options->has_json_log ? LogFormat::Json : LogFormat::Text);
   // Before anything takes time: a reload of the service may come right after its start.
   if (!options->replay_path.empty()) return replay_command(*options);
   const bool is_serving = !options->is_printing_scene && !options->is_explaining && !options->is_checking;

@@ -104,13 +104,22 @@ void Mailbox::push(const SceneText& scene) {
   keep_newest(scene);
 }
 
-void Mailbox::push(Notice notice) {
+template <class Event>
+void Mailbox::keep_some(Event event, size_t limit) {
   const std::lock_guard lock(mutex_);
   if (is_closed_) return;
-  const auto is_notice = [](const ClientEvent& event) { return std::holds_alternative<Notice>(event); };
-  if (static_cast<size_t>(std::count_if(events_.begin(), events_.end(), is_notice)) >= limits_.notices)
-    events_.erase(std::find_if(events_.begin(), events_.end(), is_notice));
-  append(std::move(notice));
+  const auto is_alike = [](const ClientEvent& other) { return std::holds_alternative<Event>(other); };
+  if (static_cast<size_t>(std::count_if(events_.begin(), events_.end(), is_alike)) >= limit)
+    events_.erase(std::find_if(events_.begin(), events_.end(), is_alike));
+  append(std::move(event));
+}
+
+void Mailbox::push(Notice notice) {
+  keep_some(std::move(notice), limits_.notices);
+}
+
+void Mailbox::push(ParameterList list) {
+  keep_some(std::move(list), limits_.parameter_lists);
 }
 
 void Mailbox::close(Error error) {

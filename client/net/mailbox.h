@@ -34,13 +34,14 @@ struct ClosedEvent {
 };
 
 using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, FrameQuality, ModeChange,
-                                 SessionList, LookChange, SceneText, ClosedEvent>;
+                                 SessionList, LookChange, SceneText, ParameterList, ClosedEvent>;
 
 struct MailboxLimits {
   // Of strand frames, and as much of pictures that build on each other.
   size_t chained_frames = 240;            // four seconds at 60 Hz
   uint64_t chained_bytes = 128ull << 20;  // at least one message of the largest size fits
   size_t notices = 64;
+  size_t parameter_lists = 16;
 };
 
 class Mailbox {
@@ -59,8 +60,9 @@ class Mailbox {
   void push(const FrameQuality& quality);
   void push(const LookChange& look);
   void push(const SceneText& scene);
-  /// The oldest notice gives way when there are too many.
+  /// The oldest gives way when there are too many.
   void push(Notice notice);
+  void push(ParameterList list);
   /// Adds the final event; later pushes are ignored.
   void close(Error error);
 
@@ -83,6 +85,8 @@ class Mailbox {
   size_t erase_media(Predicate predicate);
   template <class Event>
   void keep_newest(const Event& event);
+  template <class Event>
+  void keep_some(Event event, size_t limit);
   void append(ClientEvent event);
 
   const MailboxLimits limits_;

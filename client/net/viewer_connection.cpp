@@ -55,6 +55,12 @@ void clean(StreamQuality& quality) {
 void clean(Notice& notice) {
   notice.text = one_line(notice.text);
 }
+void clean(ParameterList& list) {
+  for (ParameterInfo& parameter : list.parameters)
+    for (std::string* text :
+         {&parameter.path, &parameter.value, &parameter.unset_value, &parameter.unit, &parameter.note})
+      *text = one_line(*text);
+}
 void clean(SessionList& list) {
   for (SessionInfo& session : list.sessions) {
     session.name = one_line(session.name);

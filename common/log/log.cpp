@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <mutex>
 
@@ -72,15 +73,32 @@ const std::shared_ptr<StandardError>& standard_error() {
   return sink;
 }
 
+std::atomic<LogFormat> format_of_lines{LogFormat::Text};
+
+/// One line without control characters, inside the quotes of JSON (RFC 8259, section 7).
+std::string in_quotes(const std::string& line) {
+  std::string quoted;
+  for (const char c : line) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted;
+}
+
 }  // namespace
 
-bool init_log(const std::string& level) {
+bool init_log(const std::string& level, LogFormat format) {
   const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
   if (parsed == spdlog::level::off && level != "off") return false;
   std::signal(SIGPIPE, SIG_IGN);
   auto logger = std::make_shared<spdlog::logger>("strandcast", standard_error());
   logger->set_level(parsed);
-  logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  format_of_lines = format;
+  if (format == LogFormat::Json)
+    logger->set_pattern("{\"time\":\"%Y-%m-%dT%H:%M:%S.%eZ\",\"level\":\"%l\",%v}",
+                        spdlog::pattern_time_type::utc);
+  else
+    logger->set_pattern("%H:%M:%S.%e %^%l%$ %v");
   spdlog::set_default_logger(std::move(logger));
   return true;
 }
@@ -91,7 +109,11 @@ bool is_logged(LogLevel level) {
 
 void log_line(LogLevel level, const char* tag, std::string_view message) {
   if (!is_logged(level)) return;
-  spdlog::log(spdlog_level(level), "[{}] {}", tag, one_line(message, kMaxLogMessageChars));
+  const std::string line = one_line(message, kMaxLogMessageChars);
+  if (format_of_lines == LogFormat::Json)
+    spdlog::log(spdlog_level(level), "\"tag\":\"{}\",\"message\":\"{}\"", tag, in_quotes(line));
+  else
+    spdlog::log(spdlog_level(level), "[{}] {}", tag, line);
 }
 
 uint64_t dropped_log_lines() {

@@ -17,9 +17,12 @@ enum class LogLevel { Debug, Info, Warn, Error };
 /// Longest message of one line; the rest is cut.
 inline constexpr size_t kMaxLogMessageChars = 2'000;
 
+/// How a line looks: for people, or one JSON object with time (UTC), level, tag and message, for programs.
+enum class LogFormat { Text, Json };
+
 /// Sends logs to standard error at `level` ("debug", "info", "warn", "error", "off"); false if unknown. A
 /// reader of the process's output that goes away no longer ends it (SIGPIPE is ignored from here on).
-bool init_log(const std::string& level);
+bool init_log(const std::string& level, LogFormat format = LogFormat::Text);
 
 bool is_logged(LogLevel level);
 /// One line; `message` is cleaned as by one_line().

@@ -29,6 +29,9 @@ inline constexpr Range kReportedRate{0.0, kMaxReportedHz, "Hz"};
 inline constexpr Range kReportedSize{0.0, kMaxReportedPx, "pixels"};
 inline constexpr Range kStepTime{0.0, kMaxStepNs, "ns"};
 inline constexpr Range kHeldBack{0.0, 1.0, ""};
+inline constexpr Range kStepCount{0, kMaxStepCount, "steps"};
+inline constexpr Range kBan{0.0, kMaxBanS, "s"};
+inline constexpr Range kParameterCount{0, 100'000, ""};
 inline constexpr int kBehindNone = 1;  // number of the first enumerator where 0 stands for none on the wire
 
 /// Name of a kind of message: its field in ClientMessage or ServerMessage.
@@ -119,6 +122,7 @@ inline constexpr const char* kKind<ControlCommand> = "command";
 template <class Visitor>
 void visit(Visitor& v, ControlCommand& m) {
   v.choice("command", m.command, Command::Reset, kBehindNone);
+  v.number("step_count", m.step_count, kStepCount);
 }
 
 template <>
@@ -134,6 +138,7 @@ template <class Visitor>
 void visit(Visitor& v, AdminCommand& m) {
   v.choice("action", m.action, AdminAction::ShutDown, kBehindNone);
   v.value("session", m.session);
+  v.number("ban_s", m.ban_s, kBan);
 }
 
 template <>
@@ -166,6 +171,15 @@ template <class Visitor>
 void visit(Visitor& v, LiveCommand& m) {
   v.choice("action", m.action, LiveAction::Reset, kBehindNone);
   v.text("subject", m.subject, kMaxNameChars);
+}
+
+template <>
+inline constexpr const char* kKind<ParameterRequest> = "parameter_request";
+template <class Visitor>
+void visit(Visitor& v, ParameterRequest& m) {
+  v.exact_text("prefix", m.prefix, kMaxParameterPathBytes);
+  v.number("first", m.first, kParameterCount);
+  v.value("is_watching", m.is_watching);
 }
 
 // ---- server to client ----
@@ -276,6 +290,8 @@ template <class Visitor>
 void visit(Visitor& v, Notice& m) {
   v.value("is_error", m.is_error);
   v.text("text", m.text, kMaxTextChars);
+  v.value("tick", m.tick);
+  v.value("state_hash", m.state_hash);
 }
 
 template <>
@@ -342,6 +358,25 @@ inline constexpr const char* kKind<SceneText> = "scene_text";
 template <class Visitor>
 void visit(Visitor& v, SceneText& m) {
   v.exact_text("text", m.text, kMaxSceneTextBytes);
+}
+
+template <>
+inline constexpr const char* kKind<ParameterList> = "parameter_list";
+template <class Visitor>
+void visit(Visitor& v, ParameterList& m) {
+  v.repeated("parameters", m.parameters, kMaxListedParameters, [&](ParameterInfo& parameter) {
+    v.exact_text("path", parameter.path, kMaxParameterPathBytes);
+    v.exact_text("value", parameter.value, kMaxParameterTextBytes);
+    v.exact_text("unset_value", parameter.unset_value, kMaxParameterTextBytes);
+    v.exact_text("unit", parameter.unit, kMaxNameChars);
+    v.value("has_range", parameter.has_range);
+    v.value("minimum", parameter.minimum);
+    v.value("maximum", parameter.maximum);
+    v.value("is_live", parameter.is_live);
+    v.exact_text("note", parameter.note, kMaxParameterTextBytes);
+  });
+  v.number("total", m.total, kParameterCount);
+  v.value("is_change", m.is_change);
 }
 
 }  // namespace strandcast::wire_fields

@@ -37,12 +37,18 @@ inline constexpr size_t kMaxAddressChars = 64;
 inline constexpr double kMaxReportedMs = 60'000.0;  // ViewerReport
 inline constexpr double kMaxReportedPx = 100'000.0;
 inline constexpr double kMaxReportedHz = 1'000.0;
-inline constexpr double kMaxStepNs = 1e6;  // Hello
 // A ServerStatus with kMaxLiveInputs full inputs stays below kMaxControlBytes.
 inline constexpr size_t kMaxLiveInputChars = 128;
 inline constexpr size_t kMaxLiveSubjectsChars = 512;
 inline constexpr size_t kMaxLiveValues = 16;
 inline constexpr size_t kMaxLiveValueChars = 120;
+inline constexpr double kMaxStepNs = 1e6;           // Hello
+inline constexpr uint32_t kMaxStepCount = 100'000;  // ControlCommand
+inline constexpr double kMaxBanS = 7.0 * 86'400.0;  // AdminCommand
+// A full ParameterList stays below kMaxControlBytes.
+inline constexpr uint32_t kMaxListedParameters = 64;
+inline constexpr size_t kMaxParameterPathBytes = 96;
+inline constexpr size_t kMaxParameterTextBytes = 160;
 
 enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
@@ -108,6 +114,9 @@ struct Ping {  // clock probe
 enum class Command { Pause, Resume, StepOnce, Reset };
 struct ControlCommand {  // from a Controller
   Command command = Command::Pause;
+  // Of StepOnce: so many steps, answered when they are done and their last state is published; 0 = one,
+  // answered at once.
+  uint32_t step_count = 0;
   bool operator==(const ControlCommand&) const = default;
 };
 struct SetParameter {  // from a Controller: scene field path, value as text ("solver.name=dftl")
@@ -118,6 +127,7 @@ enum class AdminAction { ListSessions, Kick, ShutDown };
 struct AdminCommand {  // from an Admin; answered by a SessionList or a Notice
   AdminAction action = AdminAction::ListSessions;
   uint64_t session = 0;  // whom to kick
+  double ban_s = 0.0;    // how long nobody of that address is let in again, at most kMaxBanS
   bool operator==(const AdminCommand&) const = default;
 };
 enum class DrawingDevice { Unknown, None, Software, Hardware };
@@ -143,9 +153,15 @@ struct LiveCommand {  // from a Controller, about live motion capture; answered 
   std::string subject = {};  // of ChooseSubject; empty = one named head, else the first one seen
   bool operator==(const LiveCommand&) const = default;
 };
+struct ParameterRequest {    // from who watches; answered by a ParameterList
+  std::string prefix;        // of the paths to list: "look.", "solver"; empty = all
+  uint32_t first = 0;        // so many of them are left out: a list has kMaxListedParameters at most
+  bool is_watching = false;  // and again, with what is other, whenever something changes
+  bool operator==(const ParameterRequest&) const = default;
+};
 using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck,
                                    Ping, ControlCommand, SetParameter, ViewerReport, ModeRequest,
-                                   AdminCommand, SceneRequest, LiveCommand>;
+                                   AdminCommand, SceneRequest, LiveCommand, ParameterRequest>;
 
 // ---- server to client ----
 struct Welcome {
@@ -254,6 +270,9 @@ struct Goodbye {       // the server closes right after it
 struct Notice {  // answer to SetParameter and ControlCommand, or a warning
   bool is_error = false;
   std::string text;
+  // Of the answer to steps that were counted: where the simulation is now, and the hash of that state.
+  uint64_t tick = 0;
+  uint64_t state_hash = 0;
   bool operator==(const Notice&) const = default;
 };
 struct SessionInfo {
@@ -280,8 +299,25 @@ struct SceneText {   // the scene as it runs
   std::string text;  // as in a scene file, in one line
   bool operator==(const SceneText&) const = default;
 };
+struct ParameterInfo {
+  std::string path;         // as in an assignment
+  std::string value;        // as in a scene file
+  std::string unset_value;  // where the scene does not say; empty = none
+  std::string unit;         // empty = no dimension, or no number
+  bool has_range = false;
+  double minimum = 0.0, maximum = 0.0;
+  bool is_live = false;   // can be changed while the server runs
+  std::string note = {};  // for a person
+  bool operator==(const ParameterInfo&) const = default;
+};
+struct ParameterList {                    // answer to a ParameterRequest
+  std::vector<ParameterInfo> parameters;  // at most kMaxListedParameters
+  uint32_t total = 0;                     // with that prefix
+  bool is_change = false;                 // no answer: these have other values now
+  bool operator==(const ParameterList&) const = default;
+};
 using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange,
-                                   SessionList, FrameQuality, LookChange, SceneText>;
+                                   SessionList, FrameQuality, LookChange, SceneText, ParameterList>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

@@ -5,6 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "common/base/profile.h"
+#include "server/app/frame_stages.h"
 #include "server/net/net_server.h"
 #include "server/stream/stream_reader.h"
 
@@ -12,9 +14,12 @@ namespace strandcast {
 
 class NetworkReader : public StreamReader {
  public:
-  explicit NetworkReader(NetServer& net) : net_(net) {}
+  NetworkReader(NetServer& net, FrameStages& stages) : net_(net), stages_(stages) {}
 
-  void on_strands(const EncodedFramePtr& frame) override { net_.publish_strands(frame); }
+  void on_strands(const EncodedFramePtr& frame) override {
+    stages_.note_encoded(frame->header.sim_time_ns, now_ns());
+    net_.publish_strands(frame);
+  }
   void on_picture(PictureClass picture_class, const PicturePtr& picture) override {
     net_.publish_picture(picture_class, picture);
   }
@@ -38,6 +43,7 @@ class NetworkReader : public StreamReader {
 
  private:
   NetServer& net_;
+  FrameStages& stages_;
 };
 
 }  // namespace strandcast

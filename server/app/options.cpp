@@ -140,6 +140,7 @@ struct RawRunOptions {
   std::string record_path;
   bool replaces_recording = false;
   bool is_replayed_in_real_time = false;
+  std::string log_format = "text";
 };
 
 void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
@@ -239,6 +240,15 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   app.add_option("--log-level", options.log_level, "debug, info, warn, error or off")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  app.add_option("--log-format", raw.log_format,
+                 "text, or json: one object a line, with time, level, tag and message")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  app.add_option(
+      "--trace", options.config.trace_path,
+      "write a line per state to this file: when its motion came, when it was published and encoded");
+  app.add_flag("--lockstep", options.config.is_lockstep,
+               "simulated time goes on by strandcast-ctl step N only, and inputs are for simulated times");
   app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));
   add_proxy_options(app, raw);
   add_mocap_options(app, options, raw);
@@ -288,6 +298,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     return make_error(
         ErrorCode::BadInput,
         "--replay takes scene and hair from the recording: leave out --scene, --set and --groom");
+  options.has_json_log = raw.log_format == "json";
   options.is_explaining = app.count("--explain") > 0;
   if (!named.explained.empty()) {
     if (!options.scene_path.empty())

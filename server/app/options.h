@@ -21,6 +21,7 @@ struct ServerOptions {
   std::filesystem::path token_path;  // empty: no tokens
   std::filesystem::path port_path;   // the chosen port is written here
   std::string log_level = "info";
+  bool has_json_log = false;
   double run_s = 0.0;  // 0 = until a signal
   uint32_t explained_frame_viewers = 0;
   bool is_listing_solvers = false;
@@ -30,8 +31,8 @@ struct ServerOptions {
   std::filesystem::path check_folder = "check";  // for its pictures
   std::filesystem::path replay_path;             // a recording to simulate again; empty: none
   ReplayPace replay_pace = ReplayPace::AsFastAsItGoes;
-  std::string help;                              // not empty: print and leave
-  ServerConfig config;                           // all but scene and tokens
+  std::string help;     // not empty: print and leave
+  ServerConfig config;  // all but scene and tokens
 };
 
 /// BadInput names the option; `help` is set for --help and --version.

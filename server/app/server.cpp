@@ -16,7 +16,9 @@
 #include "common/scene/scene_file.h"
 #include "common/strands/scene_asset.h"
 #include "server/app/codec_choice.h"
+#include "server/app/frame_stages.h"
 #include "server/app/live_desk.h"
+#include "server/app/process_metrics.h"
 #include "server/app/server_metrics.h"
 #include "server/app/server_passes.h"
 #include "server/app/session_desk.h"
@@ -46,7 +48,9 @@ Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& confi
   return make_simulation({config.scene,
                           {config.sim_device, config.gl_device, config.shader_folder},
                           config.on_publish,
-                          config.tap},
+                          config.tap,
+                          nullptr,
+                          config.is_lockstep},
                          inputs);
 }
 
@@ -64,6 +68,7 @@ class Server::State {
   StreamHub& hub() { return *hub_; }
   std::optional<Error> failure() const { return source_->failure(); }
   Status reload_tls() { return net_->reload_tls(); }
+  Status set_tokens(std::vector<AccessToken> tokens) { return net_->set_tokens(std::move(tokens)); }
   bool is_shut_down_wanted() const { return desk_->is_shut_down_wanted(); }
 
  private:
@@ -81,10 +86,12 @@ class Server::State {
   ServerConfig config_;
   bool is_drawn_by_processors_ = true;  // pictures, whatever simulates
   InputHub inputs_;
-  std::unique_ptr<Recorder> recorder_;   // null: nothing is recorded
+  std::unique_ptr<Recorder> recorder_;  // null: nothing is recorded
+  FrameStages stages_;
   std::vector<StrandCodecInfo> codecs_;  // that strands are served by, the scene's first
   // In the order in which each is used by those below it.
   std::unique_ptr<StreamHub> hub_;
+  std::optional<StageSink> stage_sink_;
   std::unique_ptr<StateSource> source_;
   std::unique_ptr<LiveDesk> live_;  // null where the scene asks for none
   std::unique_ptr<SessionDesk> desk_;
@@ -108,6 +115,9 @@ class Server::State {
 Status Server::State::start() {
   shared_workers();  // no nicer than this thread, as the one that draws is
   SceneDesc& scene = config_.scene;
+  // What is measured here is no reason for other numbers, and inputs are for simulated times.
+  if (config_.is_lockstep) scene.stream.has_codec = true;
+  if (config_.is_lockstep) inputs_.hold_samples();
   // A wrong codec, or a file that cannot be written, is told before anything is loaded.
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
   RETURN_IF_ERROR(check_live(scene.live));
@@ -137,7 +147,9 @@ Status Server::State::start() {
   RETURN_IF_ERROR(open_live());
   RETURN_IF_ERROR(connect(asset_frame));
   if (recorder_ != nullptr) RETURN_IF_ERROR(recorder_->attach(*hub_));
-  RETURN_IF_ERROR(source_->start(*hub_, scene.stream));
+  if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
+  stage_sink_.emplace(*hub_, stages_);
+  RETURN_IF_ERROR(source_->start(*stage_sink_, scene.stream));
   if (recorder_ != nullptr) begin_recording(std::move(asset_frame));
   hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
@@ -188,9 +200,9 @@ Status Server::State::open_live() {
 }
 
 Status Server::State::connect(EncodedFramePtr asset_frame) {
-  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, codecs_,
-                                                           std::move(asset_frame), is_drawn_by_processors_,
-                                                           live_.get()});
+  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, stages_,
+                                                           codecs_, std::move(asset_frame),
+                                                           is_drawn_by_processors_, live_.get()});
   desk_->set_metrics([this] { return metrics(); });
   NetConfig net = config_.net;
   net.page = built_in_page();
@@ -341,7 +353,8 @@ gl::PassReports Server::State::idle_picture_passes() const {
 }
 
 std::string Server::State::metrics() const {
-  return format_server_metrics(counters(), version()) + format_passes(passes(), gl::object_counts());
+  return format_server_metrics(counters(), version()) + format_process_metrics() + stages_.metrics() +
+         format_passes(passes(), gl::object_counts());
 }
 
 Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -367,6 +380,9 @@ gl::PassReports Server::passes() const {
 }
 Status Server::reload_tls() {
   return state_->reload_tls();
+}
+Status Server::set_tokens(std::vector<AccessToken> tokens) {
+  return state_->set_tokens(std::move(tokens));
 }
 bool Server::is_shut_down_wanted() const {
   return state_->is_shut_down_wanted();

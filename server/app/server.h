@@ -33,6 +33,8 @@ struct ServerConfig {
   std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
   SnapshotObserver on_publish;                         // may be empty
+  bool is_lockstep = false;                            // simulated time goes on by commands only
+  std::filesystem::path trace_path;                    // CSV of what each state took; empty = none
   std::function<MakePicturePainter(PainterConfig)> make_painter =
       device_picture_painter;  // of the frame thread
   /// Whether that painter takes processor cores: how large pictures may be, and what they are guessed to
@@ -84,6 +86,8 @@ class Server {
   gl::PassReports passes() const;
   /// As NetServer::reload_tls().
   Status reload_tls();
+  /// As NetServer::set_tokens().
+  Status set_tokens(std::vector<AccessToken> tokens);
   /// True once an admin has asked for the end: the owner calls stop().
   bool is_shut_down_wanted() const;
   /// Why the simulation ended by itself; nothing while all is well.

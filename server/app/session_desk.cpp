@@ -40,7 +40,7 @@ SessionDesk::SessionDesk(Parts parts)
 
 void SessionDesk::connect(NetServer& net) {
   net_ = &net;
-  reader_ = std::make_unique<NetworkReader>(net);
+  reader_ = std::make_unique<NetworkReader>(net, parts_.stages);
   // It hears of changes of the stream while no session is there, too.
   (void)parts_.hub.add(*reader_);
 }
@@ -61,6 +61,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     parts_.hub.remove(reader);
     return place.error();
   }
+  viewers_.note_address(visitor.session, visitor.address);
   if (parts_.codecs.size() > 1 && !visitor.subscription.is_empty())
     codec_watches_.insert_or_assign(visitor.session, ViewerCodecWatch(facts, codec.codec));
   Admission admission;
@@ -136,13 +137,34 @@ void SessionDesk::on_wind(SessionId session, const WindSamples& samples, int64_t
 }
 
 void SessionDesk::on_command(SessionId session, const ControlCommand& command) {
-  if (may_control(session, name_of(command.command)))
-    parts_.source.post(command, reply_to(session), viewers_.describe(session));
+  // Each of these waits for the one before, and a test makes many.
+  const bool is_counted = command.command == Command::StepOnce && command.step_count > 0;
+  if (is_counted || may_control(session, name_of(command.command)))
+    parts_.source.post(command, reply_to(session, name_of(command.command)), viewers_.describe(session));
 }
 
 void SessionDesk::on_parameter(SessionId session, const SetParameter& parameter) {
   if (may_control(session, parameter.assignment))
-    parts_.source.post(parameter, reply_to(session), viewers_.describe(session));
+    parts_.source.post(parameter, reply_to(session, parameter.assignment), viewers_.describe(session));
+}
+
+void SessionDesk::on_parameter_request(SessionId session, const ParameterRequest& request) {
+  if (!parameter_budget_.take(session, now_ns()))
+    return net_->send(session, Notice{true, "Too many requests for parameters: this one was left out."});
+  const std::optional<SceneDesc> scene = parts_.source.scene();
+  if (!scene) return net_->send(session, Notice{true, "What is shown here has no parameters."});
+  const std::vector<ParameterInfo> parameters = list_parameters(*scene);
+  if (request.is_watching) parameter_watch_.add(session, request.prefix, parameters);
+  net_->send(session, list_of(parameters, request));
+}
+
+/// Whoever wants to hear of changes hears of what is other now. Any thread.
+void SessionDesk::tell_parameters() {
+  if (parameter_watch_.is_empty()) return;
+  const std::optional<SceneDesc> scene = parts_.source.scene();
+  if (!scene) return;
+  for (auto& [session, list] : parameter_watch_.news(list_parameters(*scene)))
+    net_->send(session, std::move(list));
 }
 
 void SessionDesk::on_scene_request(SessionId session) {
@@ -170,8 +192,15 @@ void SessionDesk::on_live_command(SessionId session, const LiveCommand& command)
                           : Notice{true, "This server has no live inputs: start it with --mocap PROTOCOL."});
 }
 
-StateSource::Reply SessionDesk::reply_to(SessionId session) {
-  return [net = net_, session](Notice notice) { net->send(session, std::move(notice)); };
+/// What was refused is on record, too.
+StateSource::Reply SessionDesk::reply_to(SessionId session, const std::string& what) {
+  return [this, session, who = viewers_.describe(session),
+          what = one_line(what, kMaxLoggedCharacters)](Notice notice) {
+    if (notice.is_error) log_info("app", "{}: {} was refused: {}", who, what, notice.text);
+    const bool is_done = !notice.is_error;
+    net_->send(session, std::move(notice));
+    if (is_done) tell_parameters();
+  };
 }
 
 /// Within the controller's budget, and on record.
@@ -258,6 +287,8 @@ Status SessionDesk::readiness() {
 
 void SessionDesk::on_left(SessionId session) {
   control_budget_.remove(session);
+  parameter_budget_.remove(session);
+  parameter_watch_.remove(session);
   codec_watches_.erase(session);
   parts_.inputs.remove_source(session);
   parts_.hub.remove(viewers_.remove(session));

@@ -14,6 +14,7 @@
 #include "server/app/control_budget.h"
 #include "server/app/live_desk.h"
 #include "server/app/network_reader.h"
+#include "server/app/parameter_watch.h"
 #include "server/app/viewer_codec.h"
 #include "server/app/viewers.h"
 #include "server/input/input_hub.h"
@@ -31,6 +32,7 @@ class SessionDesk : public NetHandler {
     StreamHub& hub;
     StateSource& source;
     InputHub& inputs;
+    FrameStages& stages;
     std::vector<StrandCodecInfo> codecs;  // that strands are served by, as served_codecs()
     EncodedFramePtr asset;
     bool is_drawn_by_processors = true;  // pictures
@@ -54,6 +56,7 @@ class SessionDesk : public NetHandler {
   void on_parameter(SessionId session, const SetParameter& parameter) override;
   void on_scene_request(SessionId session) override;
   void on_live_command(SessionId session, const LiveCommand& command) override;
+  void on_parameter_request(SessionId session, const ParameterRequest& request) override;
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }
@@ -79,7 +82,8 @@ class SessionDesk : public NetHandler {
   std::optional<CodecAnswer> consider_codec(SessionId session, const LinkState& link, int64_t time_ns);
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
-  StateSource::Reply reply_to(SessionId session);
+  StateSource::Reply reply_to(SessionId session, const std::string& what);
+  void tell_parameters();
   void tell_quality(SessionId session, const Viewers::Pictures& pictures, const std::string& reason);
 
   const Parts parts_;
@@ -87,6 +91,8 @@ class SessionDesk : public NetHandler {
   Viewers viewers_;
   std::map<SessionId, ViewerCodecWatch> codec_watches_;  // of who may get another
   ControlBudget control_budget_;
+  ControlBudget parameter_budget_;  // of requests for parameters
+  ParameterWatch parameter_watch_;
   NetServer* net_ = nullptr;
   std::unique_ptr<NetworkReader> reader_;  // of all sessions
   std::function<std::string()> metrics_;

@@ -117,8 +117,14 @@ ReaderId Viewers::remove(SessionId session) {
 std::string Viewers::describe(SessionId session) const {
   const auto found = viewers_.find(session);
   if (found == viewers_.end()) return fmt::format("session {}", session);
-  return fmt::format("session {} ({} '{}')", session, to_string(found->second.role),
-                     one_line(found->second.name, kMaxNameChars));
+  const Viewer& viewer = found->second;
+  return fmt::format("session {} ({} '{}'{}{})", session, to_string(viewer.role),
+                     one_line(viewer.name, kMaxNameChars), viewer.address.empty() ? "" : " from ",
+                     viewer.address);
+}
+
+void Viewers::note_address(SessionId session, const std::string& address) {
+  if (const auto found = viewers_.find(session); found != viewers_.end()) found->second.address = address;
 }
 
 Status Viewers::set_camera(SessionId session, const CameraDesc& camera) {

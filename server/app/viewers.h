@@ -51,7 +51,9 @@ class Viewers {
   Result<Place> add(SessionId session, ReaderId reader, Subscription& subscription, const Hello& hello);
   /// Its reader is the caller's to remove; 0 for an unknown session.
   ReaderId remove(SessionId session);
-  /// For the log: number, role and name.
+  /// Where a session comes from, for describe().
+  void note_address(SessionId session, const std::string& address);
+  /// For the log: number, role, name and address.
   std::string describe(SessionId session) const;
   /// Of a viewer of strands it is kept for later. NotFound for a session that views nothing.
   Status set_camera(SessionId session, const CameraDesc& camera);
@@ -85,6 +87,7 @@ class Viewers {
   struct Viewer {
     Role role = Role::Viewer;
     std::string name;
+    std::string address;
     ReaderId reader = 0;
     Subscription* subscription = nullptr;     // the session's
     StreamMode wanted = StreamMode::Strands;  // may be Auto

@@ -118,8 +118,25 @@ void InputHub::accept(Stream<Value>& stream, uint64_t source_id, const TimedSamp
   ++counters_.accepted;
 }
 
+void InputHub::hold_samples() {
+  const std::lock_guard lock(mutex_);
+  held_.emplace();
+}
+
 void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
+  if (!held_) return take(source_id, samples, arrival_ns);
+  counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
+}
+
+void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
+  const std::lock_guard lock(mutex_);
+  if (!held_) return take(source_id, samples, arrival_ns);
+  counters_.over_rate += held_->hold(source_id, samples, last_frame_ns_.value_or(0));
+}
+
+/// mutex_ is held.
+void InputHub::take(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns) {
   newest_arrival_ns_ = std::max(newest_arrival_ns_, bounded(arrival_ns));
   const auto names = samples.joint_names.empty()
                          ? nullptr
@@ -141,8 +158,8 @@ void InputHub::push(uint64_t source_id, const MotionSamples& samples, int64_t ar
   if (motion_.owner == source_id) motion_speed_ = 1.0 - std::clamp(samples.held_back, 0.0, 1.0);
 }
 
-void InputHub::push(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
-  const std::lock_guard lock(mutex_);
+/// mutex_ is held.
+void InputHub::take(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns) {
   newest_arrival_ns_ = std::max(newest_arrival_ns_, bounded(arrival_ns));
   for (const WindSamples::Sample& sample : samples.samples) {
     const glm::dvec3 velocity_mps = sample.velocity_mps;
@@ -172,6 +189,7 @@ void InputHub::forget(Stream<Value>& stream, uint64_t source_id) {
 
 void InputHub::remove_source(uint64_t source_id) {
   const std::lock_guard lock(mutex_);
+  if (held_) return held_->leave(source_id);
   forget(motion_, source_id);
   forget(wind_, source_id);
 }
@@ -221,9 +239,22 @@ void InputHub::finish_teleport_check(const Pose& before, int64_t server_time_ns,
   if (frame_.has_teleported) ++counters_.teleports;
 }
 
+/// What is due by now, and of sources that have left the last there was.
+void InputHub::take_held(int64_t time_ns) {
+  for (const HeldInputs::Due& due : held_->take_due(time_ns)) {
+    if (due.motion) take(due.source_id, *due.motion, due.arrival_ns);
+    if (due.wind) take(due.source_id, *due.wind, due.arrival_ns);
+  }
+  for (const uint64_t source_id : held_->take_left()) {
+    forget(motion_, source_id);
+    forget(wind_, source_id);
+  }
+}
+
 InputFrame InputHub::sample(int64_t server_time_ns) {
   const std::lock_guard lock(mutex_);
   const int64_t now_ns = bounded(server_time_ns);
+  if (held_) take_held(now_ns);
   const Pose before = frame_.world_from_head;
   const bool is_first = !frame_.has_motion && !motion_.track.samples().empty();
   const bool has_jumped = update_pose(now_ns);

@@ -31,6 +31,7 @@
 
 #include "common/wire/messages.h"
 #include "server/input/clock_map.h"
+#include "server/input/held_inputs.h"
 #include "server/input/input_frame.h"
 #include "server/input/sample_track.h"
 
@@ -75,6 +76,10 @@ struct HeadSample {
 
 class InputHub {
  public:
+  /// From now on each sample waits for the simulated time that it is for (held_inputs.h), and times given to
+  /// sample() are simulated ones. Before anything else.
+  void hold_samples();
+
   /// Takes samples of one message; `source_id` is the session's, `arrival_ns` the server clock when it was
   /// read.
   void push(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
@@ -119,7 +124,12 @@ class InputHub {
   bool update_pose(int64_t server_time_ns);
   void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
 
+  void take(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
+  void take(uint64_t source_id, const WindSamples& samples, int64_t arrival_ns);
+  void take_held(int64_t time_ns);
+
   mutable std::mutex mutex_;
+  std::optional<HeldInputs> held_;  // none: samples are for the time when they arrive
   Stream<HeadSample> motion_;
   Stream<glm::dvec3> wind_;
   std::map<uint64_t, int64_t> delays_ns_;  // of motion, by source; those that are not 0

@@ -26,6 +26,16 @@ void AddressGuard::on_wrong_token(const std::string& address, int64_t time_ns) {
   one.blocked_until_ns = time_ns + limits_.block_ns;
 }
 
+void AddressGuard::ban(const std::string& address, int64_t time_ns, int64_t until_ns) {
+  Entry& one = entry(address, time_ns);
+  one.banned_until_ns = std::max(one.banned_until_ns, until_ns);
+}
+
+bool AddressGuard::is_banned(const std::string& address, int64_t time_ns) const {
+  const auto found = entries_.find(address);
+  return found != entries_.end() && time_ns < found->second.banned_until_ns;
+}
+
 AddressGuard::Entry& AddressGuard::entry(const std::string& address, int64_t time_ns) {
   auto found = entries_.find(address);
   if (found == entries_.end()) {
@@ -36,12 +46,13 @@ AddressGuard::Entry& AddressGuard::entry(const std::string& address, int64_t tim
   return found->second;
 }
 
-/// Forgets the address that matters least: unblocked before blocked, then without wrong tokens, then the one
-/// not seen for longest.
+/// Forgets the address that matters least: first those that are not banned, unblocked before blocked, then
+/// without wrong tokens, then the one not seen for longest.
 void AddressGuard::make_room(int64_t time_ns) {
   const auto worth = [&](const auto& item) {
     const Entry& one = item.second;
-    return std::tuple(std::max(one.blocked_until_ns, time_ns), !one.wrong_ns.empty(), one.seen_ns);
+    return std::tuple(std::max(one.banned_until_ns, time_ns), std::max(one.blocked_until_ns, time_ns),
+                      !one.wrong_ns.empty(), one.seen_ns);
   };
   const auto least = std::min_element(entries_.begin(), entries_.end(),
                                       [&](const auto& a, const auto& b) { return worth(a) < worth(b); });

@@ -32,6 +32,9 @@ class AddressGuard {
   /// True while no token of this address is looked at.
   bool is_blocked(const std::string& address, int64_t time_ns) const;
   void on_wrong_token(const std::string& address, int64_t time_ns);
+  /// An admin's word: nobody of this address gets in before.
+  void ban(const std::string& address, int64_t time_ns, int64_t until_ns);
+  bool is_banned(const std::string& address, int64_t time_ns) const;
 
   size_t size() const { return entries_.size(); }
 
@@ -43,6 +46,7 @@ class AddressGuard {
     RateLimit requests;
     std::vector<int64_t> wrong_ns;  // times of wrong tokens, oldest first; limits_.wrong_tokens at most
     int64_t blocked_until_ns = 0;
+    int64_t banned_until_ns = 0;
     int64_t seen_ns = 0;
   };
   Entry& entry(const std::string& address, int64_t time_ns);

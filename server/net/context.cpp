@@ -57,6 +57,7 @@ bool end_idle(const std::vector<Waiting>& waiting, const std::string* peer_key) 
 
 Context::Context(const NetConfig& net_config, NetHandler& net_handler)
     : config(net_config),
+      tokens(net_config.tokens),
       handler(net_handler),
       strands(net_config.strand_classes, net_config.strand_codecs),
       guard({net_config.limits.connections_per_s, net_config.limits.requests_per_s,
@@ -123,6 +124,11 @@ bool Context::kick(SessionId id) {
   if (found == sessions.end() || found->second->state() != Session::State::Joined) return false;
   std::shared_ptr(found->second)->close(CloseCode::Kicked, "An admin ended this session.");
   return true;
+}
+
+std::optional<std::string> Context::key_of(SessionId id) const {
+  const auto found = sessions.find(id);
+  return found == sessions.end() ? std::nullopt : std::optional(found->second->peer().key);
 }
 
 void Context::update_session_counts() {

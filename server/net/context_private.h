@@ -90,10 +90,13 @@ struct Context {
   SessionList list_sessions(int64_t time_ns) const;
   /// Ends a session; false when there is none of this number.
   bool kick(SessionId id);
+  /// What counts as the address of a session; none when there is none of this number.
+  std::optional<std::string> key_of(SessionId id) const;
   /// Publishes the number of open and joined sessions.
   void update_session_counts();
 
   const NetConfig config;
+  std::vector<AccessToken> tokens;  // of now
   NetHandler& handler;
   StrandCosts strands;
   PictureCosts pictures;

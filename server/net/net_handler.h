@@ -19,6 +19,7 @@ namespace strandcast {
 struct Visitor {
   SessionId session = 0;
   std::string peer;            // what counts as one address, for shares
+  std::string address;         // for the log
   Subscription& subscription;  // the session's; valid until on_left()
 };
 
@@ -73,6 +74,7 @@ class NetHandler {
   virtual void on_parameter(SessionId session, const SetParameter& parameter) = 0;
   virtual void on_scene_request(SessionId) {}
   virtual void on_live_command(SessionId, const LiveCommand&) {}
+  virtual void on_parameter_request(SessionId, const ParameterRequest&) {}
   /// May change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   /// An admin wants the server to end.

@@ -224,6 +224,16 @@ Status NetServer::reload_tls() {
   return {};
 }
 
+Status NetServer::set_tokens(std::vector<AccessToken> tokens) {
+  if (tokens.empty() != state_->context.config.tokens.empty())
+    return make_error(ErrorCode::BadInput,
+                      "a server that began with tokens cannot go on without, nor the reverse");
+  net::asio::post(state_->context.io, [state = state_.get(), tokens = std::move(tokens)]() mutable {
+    state->context.tokens = std::move(tokens);
+  });
+  return {};
+}
+
 uint16_t NetServer::port() const {
   return state_->port;
 }

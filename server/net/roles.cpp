@@ -1,5 +1,7 @@
 #include "server/net/roles.h"
 
+#include <chrono>
+
 #include "server/net/overloaded_private.h"
 
 namespace strandcast {
@@ -29,9 +31,10 @@ bool may_send(Role role, const ClientMessage& message) {
                  [&](const WindSamples&) { return feeds; }, [&](const CameraChange&) { return watches; },
                  [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
                  [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
-                 [&](const SetParameter&) { return steers; }, [&](const SceneRequest&) { return steers; },
-                 [&](const LiveCommand&) { return steers; }, [&](const ViewerReport&) { return watches; },
-                 [&](const ModeRequest&) { return watches; },
+                 [&](const SetParameter&) { return steers; },
+                 [&](const ParameterRequest&) { return watches; },
+                 [&](const SceneRequest&) { return steers; }, [&](const LiveCommand&) { return steers; },
+                 [&](const ViewerReport&) { return watches; }, [&](const ModeRequest&) { return watches; },
                  [&](const AdminCommand&) { return role == Role::Admin; }},
       message);
 }
@@ -46,28 +49,49 @@ bool is_token_equal(std::string_view expected, std::string_view given) {
   return difference == 0;
 }
 
-std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::string_view given) {
+namespace {
+
+const AccessToken* find_token(const std::vector<AccessToken>& tokens, std::string_view given) {
   // Every token costs the same, whether it is the one or not.
   volatile size_t found = 0;  // index + 1
   for (size_t i = 0; i < tokens.size(); ++i) {
     const size_t mask = size_t{0} - static_cast<size_t>(is_token_equal(tokens[i].secret, given));
     found = (found & ~mask) | ((i + 1) & mask);
   }
-  if (found == 0) return std::nullopt;
-  return tokens[found - 1].grant;
+  return found == 0 ? nullptr : &tokens[found - 1];
 }
 
-Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello) {
+bool has_expired(const AccessToken& token, int64_t unix_s) {
+  return token.expires_unix_s != 0 && unix_s >= token.expires_unix_s;
+}
+
+}  // namespace
+
+int64_t unix_time_s() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::string_view given,
+                                int64_t unix_s) {
+  const AccessToken* token = find_token(tokens, given);
+  if (token == nullptr || has_expired(*token, unix_s)) return std::nullopt;
+  return token->grant;
+}
+
+Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s) {
   if (tokens.empty()) {
     if (hello.role != Role::Admin) return {};
     return make_error(ErrorCode::BadInput,
                       "An admin needs an admin's token, and this server has none (--token-file).");
   }
-  const std::optional<Grant> grant = find_grant(tokens, hello.token);
-  if (!grant) return make_error(ErrorCode::Unauthorized, "The token is wrong or missing.");
-  if (!may_be(*grant, hello.role))
-    return make_error(ErrorCode::BadInput, "This token is good for {}, not for {} {}.", to_string(*grant),
-                      hello.role == Role::Admin ? "an" : "a", to_string(hello.role));
+  const AccessToken* token = find_token(tokens, hello.token);
+  if (token == nullptr) return make_error(ErrorCode::Unauthorized, "The token is wrong or missing.");
+  if (has_expired(*token, unix_s))
+    return make_error(ErrorCode::Unauthorized, "This token has expired: ask for a new one.");
+  if (!may_be(token->grant, hello.role))
+    return make_error(ErrorCode::BadInput, "This token is good for {}, not for {} {}.",
+                      to_string(token->grant), hello.role == Role::Admin ? "an" : "a", to_string(hello.role));
   return {};
 }
 

@@ -1,6 +1,7 @@
 // Roles: what a token lets its bearer be, and which messages a role may send. Pure functions, any thread.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,7 +20,11 @@ enum class Grant { Viewer, Controller, Source, AllButAdmin, Admin };
 struct AccessToken {
   std::string secret;  // never logged, never sent
   Grant grant = Grant::Viewer;
+  int64_t expires_unix_s = 0;  // good before this second of the system's clock; 0 = for ever
 };
+
+/// Seconds since 1970 by the system's clock.
+int64_t unix_time_s();
 
 /// A controller's token is good for a viewer too, an admin's for everything.
 bool may_be(Grant grant, Role role);
@@ -31,12 +36,13 @@ bool may_send(Role role, const ClientMessage& message);
 bool is_token_equal(std::string_view expected, std::string_view given);
 
 /// What `given` is good for; nothing when it is none of the tokens. Looks at all of them, wherever the match
-/// is.
-std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::string_view given);
+/// is. An expired one is good for nothing.
+std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::string_view given,
+                                int64_t unix_s = unix_time_s());
 
-/// Lets a client in as the role that it asks for. Unauthorized for a wrong token, BadInput for a role beyond
-/// it. Without tokens every role but Admin is free.
-Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello);
+/// Lets a client in as the role that it asks for. Unauthorized for a wrong or expired token, BadInput for a
+/// role beyond it. Without tokens every role but Admin is free.
+Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s = unix_time_s());
 
 const char* to_string(Grant grant);
 

@@ -25,10 +25,10 @@ CloseCode close_code_for(const Error& error) {
 }
 
 const char* message_name(const ClientMessage& message) {
-  constexpr const char* kNames[] = {"Hello",           "MotionSamples", "WindSamples", "CameraChange",
-                                    "KeyframeRequest", "FrameAck",      "Ping",        "ControlCommand",
-                                    "SetParameter",    "ViewerReport",  "ModeRequest", "AdminCommand",
-                                    "SceneRequest",    "LiveCommand"};
+  constexpr const char* kNames[] = {
+      "Hello",       "MotionSamples", "WindSamples",    "CameraChange", "KeyframeRequest",
+      "FrameAck",    "Ping",          "ControlCommand", "SetParameter", "ViewerReport",
+      "ModeRequest", "AdminCommand",  "SceneRequest",   "LiveCommand",  "ParameterRequest"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
 }
@@ -57,14 +57,19 @@ void Session::on_message(std::span<const std::byte> bytes, int64_t arrival_ns) {
 
 /// Whether this client may have the role that it asks for; else the session ends.
 bool Session::check_token(const Hello& hello) {
-  const bool is_guessing = !peer_.is_trusted && !context_.config.tokens.empty();
+  if (context_.guard.is_banned(peer_.key, now_ns())) {
+    context_.refuse(Refusal::Blocked, peer_, "an admin has banned this address");
+    close(CloseCode::Policy, "An admin has banned this address for a time.");
+    return false;
+  }
+  const bool is_guessing = !peer_.is_trusted && !context_.tokens.empty();
   // Not even a right one, or it would show that the others were wrong.
   if (is_guessing && context_.guard.is_blocked(peer_.key, now_ns())) {
     context_.refuse(Refusal::Blocked, peer_, "tries a token too soon after too many wrong ones");
     close(CloseCode::TryLater, kBlockedSentence);
     return false;
   }
-  const Status allowed = check_role(context_.config.tokens, hello);
+  const Status allowed = check_role(context_.tokens, hello);
   if (allowed) return true;
   const std::string sentence = allowed.error().to_string();
   const bool is_wrong = allowed.error().code == ErrorCode::Unauthorized;
@@ -78,7 +83,8 @@ void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
   subscription_.begin(hello);
-  Result<Admission> admission = context_.handler.on_hello({id_, peer_.key, subscription_}, hello);
+  Result<Admission> admission =
+      context_.handler.on_hello({id_, peer_.key, peer_.address, subscription_}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   hello_.token.clear();
@@ -129,22 +135,33 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                         },
                         [&](const AdminCommand& command) { obey(command, arrival_ns); },
                         [&](const SceneRequest&) { handler.on_scene_request(id_); },
-                        [&](const LiveCommand& command) { handler.on_live_command(id_, command); }},
+                        [&](const LiveCommand& command) { handler.on_live_command(id_, command); },
+                        [&](const ParameterRequest& request) { handler.on_parameter_request(id_, request); }},
              message);
 }
 
 void Session::obey(const AdminCommand& command, int64_t time_ns) {
   if (command.action == AdminAction::ListSessions) return queue_control(context_.list_sessions(time_ns));
   log_info("net", "session {} from {}: an admin {}", id_, peer_.address,
-           command.action == AdminAction::Kick ? fmt::format("ends session {}", command.session)
-                                               : "ends the server");
+           command.action == AdminAction::Kick
+               ? fmt::format("ends session {}{}", command.session,
+                             command.ban_s > 0.0 ? " and bans its address" : "")
+               : "ends the server");
   if (command.action == AdminAction::ShutDown) {
     queue_control(Notice{false, "The server is stopping."});
     return context_.handler.on_shut_down(id_);
   }
+  const std::optional<std::string> key = context_.key_of(command.session);
+  const bool is_own = key == peer_.key;
+  if (command.ban_s > 0.0 && key && !is_own)
+    context_.guard.ban(*key, time_ns, time_ns + static_cast<int64_t>(command.ban_s * 1e9));
   const bool is_known = context_.kick(command.session);
   if (state_ != State::Joined) return;  // it was this one
-  queue_control(is_known ? Notice{false, fmt::format("Session {} was ended.", command.session)}
+  const std::string ban = command.ban_s <= 0.0 ? ""
+                          : is_own
+                              ? " It is not banned: your own address is the same."
+                              : fmt::format(" Nobody of its address is let in for {:g} s.", command.ban_s);
+  queue_control(is_known ? Notice{false, fmt::format("Session {} was ended.{}", command.session, ban)}
                          : Notice{true, fmt::format("There is no session {}.", command.session)});
 }
 

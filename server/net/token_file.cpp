@@ -7,8 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <optional>
 #include <sstream>
+#include <string_view>
 
 namespace strandcast {
 namespace {
@@ -90,6 +93,43 @@ Result<std::string> read_private(int descriptor) {
   return text;
 }
 
+constexpr std::string_view kExpires = "expires=";
+
+/// Seconds since 1970 of "2027-01-31" or "2027-01-31T18:00:00Z"; nothing for other text.
+std::optional<int64_t> parse_time(std::string_view text) {
+  int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0;
+  const auto digits = [&](size_t at, size_t count, int& value) {
+    for (size_t i = at; i < at + count; ++i) {
+      if (text[i] < '0' || text[i] > '9') return false;
+      value = 10 * value + (text[i] - '0');
+    }
+    return true;
+  };
+  constexpr size_t kDayChars = 10, kTimeChars = 20;
+  const bool has_time = text.size() == kTimeChars;
+  if (text.size() != kDayChars && !has_time) return std::nullopt;
+  if (!digits(0, 4, year) || text[4] != '-' || !digits(5, 2, month) || text[7] != '-' || !digits(8, 2, day))
+    return std::nullopt;
+  if (has_time && (text[10] != 'T' || !digits(11, 2, hour) || text[13] != ':' || !digits(14, 2, minute) ||
+                   text[16] != ':' || !digits(17, 2, second) || text[19] != 'Z'))
+    return std::nullopt;
+  const std::chrono::year_month_day date{std::chrono::year(year),
+                                         std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!date.ok() || year < 1970 || hour > 23 || minute > 59 || second > 59) return std::nullopt;
+  const auto days = std::chrono::sys_days(date).time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::seconds>(days).count() + (hour * 60 + minute) * 60 + second;
+}
+
+std::string time_text(int64_t unix_s) {
+  const std::chrono::sys_seconds time{std::chrono::seconds(unix_s)};
+  const auto day = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::year_month_day date(day);
+  const auto rest_s = (time - day).count();
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", int(date.year()), unsigned(date.month()),
+                     unsigned(date.day()), rest_s / 3600, rest_s / 60 % 60, rest_s % 60);
+}
+
 }  // namespace
 
 Result<std::vector<AccessToken>> parse_tokens(const std::string& text) {
@@ -98,10 +138,18 @@ Result<std::vector<AccessToken>> parse_tokens(const std::string& text) {
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
     std::istringstream words(line);
-    std::string first, second, third;
-    words >> first >> second >> third;
+    std::string first, second, third, fourth;
+    words >> first >> second >> third >> fourth;
     if (first.empty() || first.starts_with('#')) continue;
     AccessToken token{second, Grant::AllButAdmin};
+    if (third.starts_with(kExpires)) {
+      const auto expires_s = parse_time(std::string_view(third).substr(kExpires.size()));
+      if (!expires_s)
+        return make_error(ErrorCode::BadInput,
+                          "line {} has no time behind expires= (2027-01-31 or 2027-01-31T18:00:00Z)", number);
+      token.expires_unix_s = std::max<int64_t>(*expires_s, 1);  // 0 means for ever
+      third = fourth;
+    }
     const auto named = std::find_if(kNamedGrants.begin(), kNamedGrants.end(),
                                     [&](Grant grant) { return first == to_string(grant); });
     if (second.empty() && named != kNamedGrants.end())
@@ -112,9 +160,11 @@ Result<std::vector<AccessToken>> parse_tokens(const std::string& text) {
     } else if (named != kNamedGrants.end() && third.empty()) {
       token.grant = *named;
     } else {
-      return make_error(ErrorCode::BadInput,
-                        "line {} is not 'role token' with a role of viewer, controller, source and admin",
-                        number);
+      return make_error(
+          ErrorCode::BadInput,
+          "line {} is not 'role token' with a role of viewer, controller, source and admin, and "
+          "expires=DATE behind it where it ends",
+          number);
     }
     if (token.secret.size() > kMaxTokenBytes)
       return make_error(ErrorCode::LimitExceeded, "the token in line {} has more than {} bytes", number,
@@ -139,9 +189,15 @@ Result<std::vector<AccessToken>> parse_tokens(const std::string& text) {
 
 std::string to_text(const std::vector<AccessToken>& tokens) {
   std::string text;
-  for (const AccessToken& token : tokens)
-    text += token.grant == Grant::AllButAdmin ? token.secret + "\n"
-                                              : fmt::format("{} {}\n", to_string(token.grant), token.secret);
+  for (const AccessToken& token : tokens) {
+    if (token.grant == Grant::AllButAdmin) {
+      text += token.secret + "\n";
+      continue;
+    }
+    text += fmt::format("{} {}", to_string(token.grant), token.secret);
+    if (token.expires_unix_s != 0) text += fmt::format(" {}{}", kExpires, time_text(token.expires_unix_s));
+    text += '\n';
+  }
   return text;
 }
 

@@ -20,8 +20,9 @@ struct TokenFile {
 /// error names the file and never what is in it.
 Result<TokenFile> open_token_file(const std::filesystem::path& path);
 
-/// Lines "viewer TOKEN", "controller TOKEN", "source TOKEN", "admin TOKEN" in any order and number, empty
-/// lines and # comments; or a single token without a role, good for all but admin.
+/// Lines "viewer TOKEN", "controller TOKEN", "source TOKEN", "admin TOKEN" in any order and number, each with
+/// "expires=2027-01-31" or "expires=2027-01-31T18:00:00Z" behind it where it ends (UTC), empty lines and #
+/// comments; or a single token without a role, good for all but admin.
 Result<std::vector<AccessToken>> parse_tokens(const std::string& text);
 
 /// Inverse of parse_tokens().

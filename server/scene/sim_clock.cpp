@@ -68,9 +68,9 @@ void SimClock::resume(int64_t time_ns) {
   taken_ns_.clear();
 }
 
-bool SimClock::step_once() {
+bool SimClock::add_single_steps(uint32_t count) {
   if (!is_paused_) return false;
-  ++single_steps_;
+  single_steps_ += count;
   return true;
 }
 

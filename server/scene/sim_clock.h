@@ -17,7 +17,7 @@ class SimClock {
   SimClock(double step_s, int64_t time_ns);
 
   /// Takes the next step if it is due by `time_ns`: the server time that its end stands for. While paused
-  /// only steps asked for by step_once().
+  /// only steps asked for by add_single_steps().
   std::optional<int64_t> take_step(int64_t time_ns);
   /// Leaves out all steps that are due by `time_ns`, which nobody needs: they are taken as far as the pace
   /// goes. Gives how many; none while paused.
@@ -29,9 +29,9 @@ class SimClock {
   /// Goes on from `time_ns`: the pause is not caught up.
   void resume(int64_t time_ns);
   bool is_paused() const { return is_paused_; }
-  /// One more step while paused; false when running.
-  bool step_once();
-  /// Steps asked for by step_once() are waiting.
+  /// So many more steps while paused; false when running.
+  bool add_single_steps(uint32_t count);
+  /// Steps asked for by add_single_steps() are waiting.
   bool has_single_steps() const { return single_steps_ > 0; }
 
   /// Steps taken over steps that real time asked for, within the last second; 0 while paused.

@@ -124,6 +124,7 @@ Status SimLoop::begin() {
   RETURN_IF_ERROR(rebuild_solver(config_.scene, analyse(config_.scene, facts_)));
   publish();
   clock_.emplace(1.0 / config_.scene.step_rate_hz, now_ns());
+  if (config_.is_lockstep) clock_->pause();
   input_clock_.emplace(1.0 / config_.scene.step_rate_hz);
   {
     const std::lock_guard lock(mutex_);
@@ -146,9 +147,11 @@ void SimLoop::loop() {
       continue;
     }
     const auto time_ns = clock_->take_step(now_ns());
-    if (time_ns) step(*time_ns);
+    if (time_ns) step(next_step_ns(*time_ns));
+    if (is_counting() && !clock_->has_single_steps() && !is_stopping_) finish_steps();
     const bool is_old = now_ns() - stats_ns_ >= kStatsNs;
-    const bool has_news = time_ns && (clock_->is_paused() || tick_ % kStatsInterval == 0 || is_old);
+    const bool is_single = clock_->is_paused() && !clock_->has_single_steps();
+    const bool has_news = time_ns && (is_single || tick_ % kStatsInterval == 0 || is_old);
     if (has_news) update_stats();
   }
 }
@@ -177,7 +180,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   std::unique_lock lock(mutex_);
   const auto is_awake = [this] {
     const auto is_demand = [](const Job& job) { return std::holds_alternative<SourceDemand>(job.what); };
-    const bool has_turn = !jobs_.empty() && !is_preparing_ && now_ns() >= jobs_rest_ns_;
+    const bool has_turn = !jobs_.empty() && !is_preparing_ && !is_counting() && now_ns() >= jobs_rest_ns_;
     return is_stopping_ || has_turn || clock_->has_single_steps() ||
            std::any_of(jobs_.begin(), jobs_.end(), is_demand);
   };
@@ -199,7 +202,7 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
 /// All news of viewers, and the next command when it has its turn. mutex_ is held.
 std::deque<SimLoop::Job> SimLoop::take_jobs() {
   std::deque<Job> taken;
-  bool has_command = is_preparing_ || now_ns() < jobs_rest_ns_;
+  bool has_command = is_preparing_ || is_counting() || now_ns() < jobs_rest_ns_;
   for (auto job = jobs_.begin(); job != jobs_.end();) {
     const bool is_command = !std::holds_alternative<SourceDemand>(job->what);
     if (is_command && std::exchange(has_command, true)) {
@@ -217,7 +220,8 @@ void SimLoop::carry_out_in_turn(const Job& job) {
   if (starts_to_prepare(job)) return;
   const int64_t begin_ns = now_ns();
   carry_out(job);
-  if (std::holds_alternative<SourceDemand>(job.what)) return;
+  // On demand there is no hair that would have to go on meanwhile.
+  if (std::holds_alternative<SourceDemand>(job.what) || config_.is_lockstep) return;
   const int64_t end_ns = now_ns();
   const double rest_ns = static_cast<double>(end_ns - begin_ns) * (1.0 / kJobShare - 1.0);
   jobs_rest_ns_ = end_ns + static_cast<int64_t>(rest_ns);
@@ -289,32 +293,54 @@ void SimLoop::carry_out(const Job& job) {
   else
     posted.what = *parameter;
   if (config_.tap != nullptr) config_.tap->on_change(posted);
-  const Notice notice = control != nullptr ? command(control->command) : change(parameter->assignment);
-  if (config_.tap != nullptr) config_.tap->on_answer(notice);
+  const std::optional<Notice> notice =
+      control != nullptr ? command(*control, job.reply) : change(parameter->assignment);
+  if (config_.tap != nullptr) config_.tap->on_answer(notice.value_or(Notice{false, "Steps follow."}));
   update_stats();  // whoever reads the answer may count on it
-  if (job.reply) job.reply(notice);
+  if (job.reply && notice) job.reply(*notice);
 }
 
-Notice SimLoop::command(Command command) {
-  switch (command) {
+std::optional<Notice> SimLoop::command(const ControlCommand& command, const Reply& reply) {
+  switch (command.command) {
     case Command::Pause:
       clock_->pause();
-      return {false, fmt::format("Paused at step {}.", tick_)};
+      return Notice{false, fmt::format("Paused at step {}.", tick_)};
     case Command::Resume:
+      if (config_.is_lockstep)
+        return Notice{true, "This server runs in lockstep: simulated time goes on by steps (step N) only."};
       clock_->resume(now_ns());
       input_clock_->restart();
-      return {false, fmt::format("Running from step {}.", tick_)};
+      return Notice{false, fmt::format("Running from step {}.", tick_)};
     case Command::StepOnce:
-      if (!clock_->step_once()) return {true, "StepOnce needs a paused simulation: send Pause first."};
-      return {false, fmt::format("Step {} follows.", tick_ + 1)};
+      if (!clock_->add_single_steps(std::max<uint32_t>(command.step_count, 1)))
+        return Notice{true, "StepOnce needs a paused simulation: send Pause first."};
+      if (command.step_count == 0) return Notice{false, fmt::format("Step {} follows.", tick_ + 1)};
+      counted_steps_ = command.step_count;
+      steps_reply_ = reply ? reply : [](const Notice&) {};
+      return std::nullopt;
     case Command::Reset:
       if (const Status status = solver_->load(config_.content->groom, builder_->world_from_head().rotation);
           !status)
-        return {true, status.error().to_string()};
+        return Notice{true, status.error().to_string()};
       publish();
-      return {false, fmt::format("All strands are at rest at step {}.", tick_)};
+      return Notice{false, fmt::format("All strands are at rest at step {}.", tick_)};
   }
-  return {true, "Unknown command."};
+  return Notice{true, "Unknown command."};
+}
+
+/// All steps that were asked for are done, and the last one is published.
+void SimLoop::finish_steps() {
+  update_stats();
+  const std::shared_ptr<const Snapshot> state = std::exchange(counted_state_, nullptr);
+  Notice notice{false, fmt::format("{} steps done: at step {}.", counted_steps_, tick_), tick_};
+  if (state != nullptr) notice.state_hash = state_hash(*state);
+  std::exchange(steps_reply_, nullptr)(notice);
+}
+
+/// The server time that the end of a step stands for; on demand it is the simulated one.
+int64_t SimLoop::next_step_ns(int64_t time_ns) const {
+  if (!config_.is_lockstep) return time_ns;
+  return std::llround(static_cast<double>(tick_ + 1) / config_.scene.step_rate_hz * kNsPerS);
 }
 
 Notice SimLoop::change(const std::string& assignment) {
@@ -597,7 +623,8 @@ PublishInput SimLoop::publish_input() const {
   PublishInput input;
   input.tick = tick_;
   input.sim_time_ns = std::llround(static_cast<double>(tick_) / config_.scene.step_rate_hz * kNsPerS);
-  input.motion_time_ns = input_.motion_time_ns;
+  // On demand, inputs have simulated times, which say nothing of delays.
+  input.motion_time_ns = config_.is_lockstep ? 0 : input_.motion_time_ns;
   input.world_from_head = builder_->world_from_head();
   return input;
 }
@@ -627,6 +654,7 @@ void SimLoop::publish() {
   CHECK(stages_->publish(turn).ok());  // likewise
   std::shared_ptr<const Snapshot> snapshot = std::move(turn.snapshot);
   if (solver_features_.is_carried) carried_ = snapshot;
+  if (is_counting()) counted_state_ = snapshot;
   if (config_.on_publish) config_.on_publish(snapshot);
   sink_.put(std::move(snapshot));
   published_tick_ = tick_;

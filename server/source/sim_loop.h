@@ -50,6 +50,7 @@ struct SimLoopConfig {
   // Both outlive the loop. With either every step is published, and nothing is left out for want of readers.
   StepTap* tap = nullptr;
   StepScript* script = nullptr;
+  bool is_lockstep = false;  // simulated time goes on by commands only
 };
 
 /// Commands that may wait for the simulation thread; each can cost a new solver.
@@ -112,7 +113,9 @@ class SimLoop {
   void carry_out_in_turn(const Job& job);
   bool starts_to_prepare(const Job& job);
   void carry_out(const Job& job);
-  Notice command(Command command);
+  /// Nothing: the answer comes later.
+  std::optional<Notice> command(const ControlCommand& command, const Reply& reply);
+  void finish_steps();
   Notice change(const std::string& assignment);
   void follow_stream_settings();
   void begin_stream();
@@ -131,6 +134,8 @@ class SimLoop {
   static SceneDesc stepped_scene(const SceneDesc& scene, const SceneFeatures& features);
   bool is_asleep() const { return solver_features_.is_carried && !is_watched() && !clock_->is_paused(); }
   void sleep_through();
+  bool is_counting() const { return static_cast<bool>(steps_reply_); }
+  int64_t next_step_ns(int64_t time_ns) const;
   void take_input(int64_t time_ns);
   void carry_step();
   void catch_up();
@@ -188,6 +193,9 @@ class SimLoop {
   int64_t look_changed_ns_ = 0;    // 0 = never
   int64_t head_seen_ns_ = 0;       // when hair that is carried went along with it last
   int64_t jobs_rest_ns_ = 0;       // no command is carried out before
+  Reply steps_reply_;              // of the steps under way; no command is carried out before they are done
+  uint32_t counted_steps_ = 0;     // as they were asked for
+  std::shared_ptr<const Snapshot> counted_state_;  // published last while steps are counted
   std::atomic<int64_t> last_step_ns_{0};
 
   mutable std::mutex mutex_;  // guards the block below

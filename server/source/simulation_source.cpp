@@ -20,8 +20,8 @@ class SimulationSource : public StateSource {
 
   std::shared_ptr<const SceneAsset> asset() const override { return asset_; }
   Status start(StateSink& sink, const StreamDesc& stream) override {
-    SimLoopConfig config{config_.scene,      content_,    config_.device,
-                         config_.on_publish, config_.tap, config_.script};
+    SimLoopConfig config{config_.scene, content_,       config_.device,     config_.on_publish,
+                         config_.tap,   config_.script, config_.is_lockstep};
     config.scene.stream = stream;
     ASSIGN_OR_RETURN(loop_, SimLoop::start(std::move(config), inputs_, sink));
     return {};

@@ -18,6 +18,7 @@ struct SimulationConfig {
   // As SimLoopConfig has them.
   StepTap* tap = nullptr;
   StepScript* script = nullptr;
+  bool is_lockstep = false;  // simulated time goes on by commands only
 };
 
 /// Checks and loads the scene; the executor is opened by start(). `inputs` outlives the source.

@@ -29,13 +29,14 @@ inline std::vector<ClientMessage> sample_client_messages() {
           KeyframeRequest{},
           FrameAck{4'000'000'000u, -5, 1234, 65'535},
           Ping{INT64_MIN},
-          ControlCommand{Command::Reset},
+          ControlCommand{Command::Reset, 240},
           SetParameter{"solver.name=dftl"},
           ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5},
           ModeRequest{StreamMode::Auto},
-          AdminCommand{AdminAction::Kick, 1ull << 40},
+          AdminCommand{AdminAction::Kick, 1ull << 40, 600.5},
           SceneRequest{},
-          LiveCommand{LiveAction::Reset, "Zoë's head"}};
+          LiveCommand{LiveAction::Reset, "Zoë's head"},
+          ParameterRequest{"look.shading", 128, true}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {
@@ -102,14 +103,18 @@ inline std::vector<ServerMessage> sample_server_messages() {
       Pong{1, -2, INT64_MAX},
       status,
       Goodbye{"the server is shutting down"},
-      Notice{true, "unknown field 'x'"},
+      Notice{true, "unknown field 'x'", 1ull << 41, (1ull << 52) + 5},
       StreamQuality{3, 4, 0.5f, 5e-4f, "a slow link", "delta"},
       ModeChange{StreamMode::Frames, "the viewer draws 3 pictures per second", 640, 360},
       SessionList{{{7, "Zoë", "2001:db8::1", Role::Controller, StreamMode::Frames, 1ull << 40, 12.5, 0.25},
                    {8, "", "127.0.0.1", Role::Admin, StreamMode::Strands, 0, 0.0, 0.0}}},
       FrameQuality{0x8003, 640, 360, 7.5, 50, PictureCodec::JpegTiles, "a slow link"},
       LookChange{sample_look(), sample_camera()},
-      SceneText{"name: \"walk\" step_rate_hz: 120"}};
+      SceneText{"name: \"walk\" step_rate_hz: 120"},
+      ParameterList{{{"look.ambient", "0.25", "0.5", "", true, 0.0, 10.0, true, "light from all around"},
+                     {"stream.bound_m", "0.0001", "0.0002", "m", true, 2e-5, 5e-4, true, ""}},
+                    345,
+                    true}};
 }
 
 }  // namespace strandcast

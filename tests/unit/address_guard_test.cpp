@@ -67,5 +67,19 @@ TEST(AddressGuard, TheTableIsBoundedAndKeepsThoseThatAreBlocked) {
   EXPECT_EQ(guard.size(), 8u);
 }
 
+TEST(AddressGuard, ABanLastsAsLongAsItWasSaidAndOutlivesTheOthersOfAFullTable) {
+  GuardLimits limits;
+  limits.addresses = 4;
+  AddressGuard guard(limits);
+  guard.ban("bad", kStartNs, kStartNs + 60 * kSecondNs);
+  guard.ban("bad", kStartNs, kStartNs + 1 * kSecondNs);  // no shorter for that
+  EXPECT_TRUE(guard.is_banned("bad", kStartNs + 59 * kSecondNs));
+  EXPECT_FALSE(guard.is_banned("bad", kStartNs + 60 * kSecondNs));
+  EXPECT_FALSE(guard.is_banned("good", kStartNs));
+  for (int address = 0; address < 20; ++address)
+    for (int i = 0; i < 6; ++i) guard.on_wrong_token(std::to_string(address), kStartNs + 2);
+  EXPECT_TRUE(guard.is_banned("bad", kStartNs + 3));
+}
+
 }  // namespace
 }  // namespace strandcast

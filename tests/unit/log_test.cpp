@@ -112,5 +112,18 @@ TEST(Log, TextsOfStrangersStayOnOneLineAndShowThemselves) {
   EXPECT_LE(capture.lines()[1].size(), kMaxLogMessageChars + 20);
 }
 
+// One object a line (RFC 8259): quotes and backslashes of strangers do not end its texts.
+TEST(Log, AsJsonEveryLineIsOneObject) {
+  EXPECT_EXIT(
+      {
+        init_log("info", LogFormat::Json);
+        log_warn("net", "a \"name\" and a \\ from {}", "x\ny");
+        _exit(0);
+      },
+      testing::ExitedWithCode(0),
+      "^\\{\"time\":\"20[0-9-]*T[0-9:.]*Z\",\"level\":\"warning\",\"tag\":\"net\","
+      "\"message\":\"a \\\\\"name\\\\\" and a \\\\\\\\ from x y\"\\}\n$");
+}
+
 }  // namespace
 }  // namespace strandcast

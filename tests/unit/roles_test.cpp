@@ -31,7 +31,7 @@ TEST(Roles, EveryMessageAndRole) {
   const std::vector<std::string> expected = {
       "no no no no",    "no no yes yes",   "no no yes yes", "yes yes no yes", "yes yes no yes",
       "yes yes no yes", "yes yes yes yes", "no yes no yes", "no yes no yes",  "yes yes no yes",
-      "yes yes no yes", "no no no yes",    "no yes no yes", "no yes no yes"};
+      "yes yes no yes", "no no no yes",    "no yes no yes", "no yes no yes",  "yes yes no yes"};
   const auto messages = sample_client_messages();
   ASSERT_EQ(messages.size(), expected.size());
   for (size_t i = 0; i < messages.size(); ++i) {
@@ -84,6 +84,20 @@ TEST(Roles, RefusalsSayWhatIsMissingAndNoToken) {
   EXPECT_NE(beyond.error().message.find("good for viewer, not for a controller"), std::string::npos);
   for (const Status& status : {wrong, beyond})
     EXPECT_EQ(status.error().to_string().find("0123"), std::string::npos);
+}
+
+TEST(Roles, ATokenEndsWithItsTime) {
+  constexpr int64_t kEndS = 1'900'000'000;
+  const std::vector<AccessToken> tokens = {{"0123456789abcdef", Grant::Viewer, kEndS}};
+  Hello hello;
+  hello.token = tokens[0].secret;
+  EXPECT_TRUE(check_role(tokens, hello, kEndS - 1));
+  EXPECT_EQ(find_grant(tokens, hello.token, kEndS - 1), Grant::Viewer);
+  EXPECT_EQ(find_grant(tokens, hello.token, kEndS), std::nullopt);
+  const Status late = check_role(tokens, hello, kEndS);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, ErrorCode::Unauthorized);
+  EXPECT_EQ(late.error().message, "This token has expired: ask for a new one.");
 }
 
 }  // namespace

@@ -123,5 +123,25 @@ TEST_F(TokenFiles, ShortTokensAreRefusedWithTheirLength) {
   }
 }
 
+// Seconds since 1970 by `date -u -d TIME +%s`.
+TEST_F(TokenFiles, ALineMayEnd) {
+  const auto opened = open_with(
+      "viewer 0123456789abcdef expires=2027-01-31\nadmin fedcba9876543210 expires=2028-02-29T18:30:05Z\n"
+      "source 00112233445566778\n");
+  ASSERT_TRUE(opened) << opened.error().to_string();
+  EXPECT_EQ(opened->tokens[0].expires_unix_s, 1'801'353'600);
+  EXPECT_EQ(opened->tokens[1].expires_unix_s, 1'835'461'805);
+  EXPECT_EQ(opened->tokens[2].expires_unix_s, 0);
+  EXPECT_THAT(to_text(opened->tokens), HasSubstr("viewer 0123456789abcdef expires=2027-01-31T00:00:00Z\n"));
+  for (const char* wrong :
+       {"", "tomorrow", "2027-02-29", "2027-13-01", "2027-01-31T24:00:00Z", "2027-01-31 18:00",
+        "2027-01-31T18:00:00", "20270131", "-2027-01-3", "1969-12-31"}) {
+    const auto refused = open_with(fmt::format("viewer 0123456789abcdef expires={}\n", wrong));
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_THAT(refused.error().to_string(), HasSubstr("line 1 ")) << wrong;
+  }
+  EXPECT_FALSE(open_with("viewer 0123456789abcdef expires=2027-01-31 more\n"));
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -58,21 +58,23 @@ const FrameAck = {
   sequence: [1, 'fixed32'], receive_time_ns: [2, 'sfixed64'], decode_us: [3, 'uint32'], stream_id: [4, 'uint32'],
 } as const;
 const Ping = { client_time_ns: [1, 'sfixed64'] } as const;
-const ControlCommand = { command: [1, 'enum'] } as const;
+const ControlCommand = { command: [1, 'enum'], step_count: [2, 'uint32'] } as const;
 const SetParameter = { assignment: [1, 'string'] } as const;
-const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'] } as const;
+const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'], ban_s: [3, 'double'] } as const;
 const ViewerReport = {
   decode_ms: [1, 'double'], draw_ms: [2, 'double'], picture_decode_ms: [3, 'double'], shown_hz: [4, 'double'],
   device: [5, 'enum'], hair_px: [6, 'double'],
 } as const;
 const ModeRequest = { mode: [1, 'enum'] } as const;
 const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
+const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], is_watching: [3, 'bool'] } as const;
 const Empty = {} as const;
 /** Motion and wind are not sent from a page. */
 export const ClientMessage = {
   hello: [1, Hello], camera: [4, CameraChange], keyframe_request: [5, Empty], frame_ack: [6, FrameAck],
   ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], viewer_report: [10, ViewerReport],
   mode_request: [11, ModeRequest], admin: [12, AdminCommand], scene_request: [13, Empty], live_command: [18, LiveCommand],
+  parameter_request: [16, ParameterRequest],
 } as const;
 
 export const Welcome = {
@@ -110,7 +112,7 @@ export const FrameQuality = {
   codec: [6, 'enum'], reason: [7, 'string'],
 } as const;
 const Goodbye = { reason: [1, 'string'] } as const;
-const Notice = { is_error: [1, 'bool'], text: [2, 'string'] } as const;
+const Notice = { is_error: [1, 'bool'], text: [2, 'string'], tick: [3, 'uint64'], state_hash: [4, 'uint64'] } as const;
 const SessionInfo = {
   id: [1, 'uint64'], name: [2, 'string'], address: [3, 'string'], role: [4, 'enum'], mode: [5, 'enum'],
   sent_bytes: [6, 'uint64'], queue_delay_ms: [7, 'double'], connected_s: [8, 'double'],
@@ -118,10 +120,16 @@ const SessionInfo = {
 const SessionList = { sessions: [1, SessionInfo, 'repeated'] } as const;
 const LookChange = { look: [1, Look], camera: [2, Camera] } as const;
 const SceneText = { text: [1, 'string'] } as const;
+const ParameterInfo = {
+  path: [1, 'string'], value: [2, 'string'], unset_value: [3, 'string'], unit: [4, 'string'], has_range: [5, 'bool'],
+  minimum: [6, 'double'], maximum: [7, 'double'], is_live: [8, 'bool'], note: [9, 'string'],
+} as const;
+const ParameterList = { parameters: [1, ParameterInfo, 'repeated'], total: [2, 'uint32'], is_change: [3, 'bool'] } as const;
 export const ServerMessage = {
   welcome: [1, Welcome], pong: [2, Pong], status: [3, ServerStatus], goodbye: [4, Goodbye], notice: [5, Notice],
   quality: [6, StreamQuality], frame_quality: [8, FrameQuality], mode_change: [9, ModeChange],
   sessions: [12, SessionList], look_change: [13, LookChange], scene_text: [14, SceneText],
+  parameter_list: [16, ParameterList],
 } as const;
 
 /** By the names of the .proto files, for the test. */
@@ -129,7 +137,7 @@ export const schemas: { readonly [name: string]: Schema } = {
   Vec3, Color, StrandStyle, HairShading, RenderMethods, Look, Camera, Hello, CameraChange, FrameAck, Ping,
   ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, LiveCommand, ClientMessage, Welcome, Pong,
   PictureMotion, LiveValue, LiveInput, ServerStatus, StreamQuality, ModeChange, FrameQuality, Goodbye, Notice, SessionInfo, SessionList, LookChange,
-  SceneText, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
+  SceneText, ParameterRequest, ParameterInfo, ParameterList, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
 };
 
 export type LookMessage = Message<typeof Look>;
