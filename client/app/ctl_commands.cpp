@@ -14,7 +14,6 @@
 #include <utility>
 #include <variant>
 
-#include "client/app/feed.h"
 #include "client/app/line_budget.h"
 #include "client/app/mocap_packet.h"
 #include "client/app/save_scene.h"
@@ -111,6 +110,8 @@ Status add_wind(const FeedOptions& options, FeedPlan& plan) {
   return {};
 }
 
+}  // namespace
+
 Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   FeedPlan plan;
   plan.rate_hz = options.rate_hz;
@@ -125,6 +126,8 @@ Result<FeedPlan> make_feed_plan(const FeedOptions& options) {
   if (plan.duration_s == 0.0 && !options.is_looped) plan.motion_s = length_s;
   return plan;
 }
+
+namespace {
 
 void print_progress(const FeedProgress& progress) {
   const std::string pace =

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "client/app/feed.h"
 #include "client/net/viewer_client.h"
 #include "common/motion/motion_file.h"
 #include "common/wire/messages.h"
@@ -43,6 +44,8 @@ struct FeedOptions {
   std::string to = "127.0.0.1";  // HOST or HOST:PORT that gets it
 };
 
+/// Loads its files, and says on standard error what was found in them.
+Result<FeedPlan> make_feed_plan(const FeedOptions& options);
 /// How to join the server in this role, as a viewer of strands.
 Result<ClientConfig> client_config_for(const CtlTarget& target, Role role);
 

@@ -6,7 +6,10 @@
 #include "client/app/ctl_commands.h"
 #include "client/app/export_command.h"
 #include "client/app/feed.h"
+#include "client/app/latency_command.h"
+#include "client/app/parameter_command.h"
 #include "client/app/recording_commands.h"
+#include "client/app/scenario/test_command.h"
 #include "client/app/stop_signal.h"
 #include "client/app/view_options.h"
 #include "common/base/version.h"
@@ -27,10 +30,15 @@ struct CommandLine {
   uint64_t check_frames = 120;
   double check_timeout_s = 60.0;
   uint64_t session = 0;
+  double ban_s = 0.0;
   std::string scene_path;
   ExportCommand exported;
   std::string recording;
   std::string other_recording;
+  uint32_t step_count = 0;
+  TestOptions test;
+  ParameterOptions params;
+  LatencyOptions latency;
 };
 
 void declare_feed(CLI::App& app, CommandLine& line) {
@@ -72,6 +80,40 @@ void declare_feed(CLI::App& app, CommandLine& line) {
   app.add_option("--to", feed.to, "Who gets them, as HOST or HOST:PORT")->needs(as)->capture_default_str();
 }
 
+void declare_latency(CLI::App& app, CommandLine& line) {
+  LatencyOptions& latency = line.latency;
+  app.add_option("--seconds", latency.seconds, "For so long")
+      ->check(CLI::Range(0.1, 1e6))
+      ->capture_default_str();
+  app.add_option("--mode", latency.mode, "strands or frames")
+      ->check(CLI::IsMember({"strands", "frames"}))
+      ->capture_default_str();
+  app.add_option("--out", latency.out,
+                 "Folder for latency.csv (percentiles) and frames.csv (times of every frame)");
+}
+
+void declare_params(CLI::App& app, CommandLine& line) {
+  ParameterOptions& params = line.params;
+  app.add_option("prefix", params.prefix, "Those whose path begins so: look.shading, solver (default: all)");
+  app.add_flag("--watch", params.is_watching, "Stay, and print what changes, until stopped");
+  app.add_flag("--live", params.is_live_only, "Those alone that can be set while the server runs");
+}
+
+void declare_test(CLI::App& app, CommandLine& line) {
+  TestOptions& test = line.test;
+  app.add_option("--scenario", test.scenarios, "Scenario file (protobuf text); repeatable")
+      ->expected(1)
+      ->take_all()
+      ->required();
+  app.add_option("--junit", test.junit, "Write the results to this file as JUnit XML");
+  app.add_option("--out", test.out, "Folder for pictures, plot and log of what failed")
+      ->capture_default_str();
+  app.add_option(
+      "--server", test.server,
+      "Server program (default: strandcast-server beside this one); with --connect none is started");
+  app.add_flag("--renew", test.renews_goldens, "Write the golden pictures instead of comparing with them");
+}
+
 /// What to say when no command was understood but there are words left; empty otherwise.
 std::string unknown_command(const CLI::App& app) {
   const std::vector<std::string> words = app.remaining();
@@ -103,7 +145,10 @@ int run(int argc, char** argv) {
   monitor->add_option("--seconds", line.monitor_s, "Stop after this long")->check(CLI::Range(0.0, 1e6));
   CLI::App* pause = app.add_subcommand("pause", "Halt the simulation");
   CLI::App* resume = app.add_subcommand("resume", "Let the simulation run");
-  CLI::App* step = app.add_subcommand("step", "One simulation step while paused");
+  CLI::App* step = app.add_subcommand("step", "Simulation steps while paused, or in lockstep");
+  step->add_option("count", line.step_count,
+                   "So many steps; the answer comes when they are done (default: one, answered at once)")
+      ->check(CLI::Range(1u, kMaxStepCount));
   CLI::App* reset = app.add_subcommand("reset", "Set every strand to rest");
   CLI::App* set = app.add_subcommand("set", "Change a scene parameter");
   set->add_option(
@@ -119,6 +164,9 @@ int run(int argc, char** argv) {
   CLI::App* mocap_calibrate =
       mocap->add_subcommand("calibrate", "What is seen now is the head at rest: look straight ahead");
   CLI::App* mocap_reset = mocap->add_subcommand("reset", "Undo calibrate");
+  CLI::App* params = app.add_subcommand(
+      "params", "List the scene's parameters: value, unit, range, default, and what can be set");
+  declare_params(*params, line);
   CLI::App* save = app.add_subcommand("save", "Keep the scene as it runs, look and all, as a scene file");
   save->add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
   CLI::App* exported = app.add_subcommand("export", "Write the strands as curves for other programs");
@@ -136,6 +184,8 @@ int run(int argc, char** argv) {
   CLI::App* sessions = app.add_subcommand("sessions", "List who is connected (needs an admin's token)");
   CLI::App* kick = app.add_subcommand("kick", "End one session (needs an admin's token)");
   kick->add_option("session", line.session, "Its number, as listed by sessions")->required();
+  kick->add_option("--ban", line.ban_s, "And let nobody of its address in for so many seconds")
+      ->check(CLI::Range(0.0, kMaxBanS));
   CLI::App* shutdown = app.add_subcommand("shutdown", "End the server (needs an admin's token)");
   CLI::App* info = app.add_subcommand("info", "Say what a recording holds");
   info->add_option("recording", line.recording, "File of strandcast-server --record")->required();
@@ -146,6 +196,11 @@ int run(int argc, char** argv) {
   CLI::App* compare = app.add_subcommand("compare", "Say where two recordings first differ, and by how much");
   compare->add_option("recording", line.recording, "One")->required();
   compare->add_option("other", line.other_recording, "And another")->required();
+  CLI::App* latency =
+      app.add_subcommand("latency", "Watch for a while, and say how long each part of the way takes");
+  declare_latency(*latency, line);
+  CLI::App* test = app.add_subcommand("test", "Carry out scenarios and check what they expect of a server");
+  declare_test(*test, line);
   CLI::App* health = app.add_subcommand("health", "Ask /healthz");
 
   try {
@@ -171,22 +226,28 @@ int run(int argc, char** argv) {
   if (*monitor) return run_monitor(line.target, line.monitor_s, stop);
   if (*pause) return run_command(line.target, ControlCommand{Command::Pause});
   if (*resume) return run_command(line.target, ControlCommand{Command::Resume});
-  if (*step) return run_command(line.target, ControlCommand{Command::StepOnce});
+  if (*step) return run_command(line.target, ControlCommand{Command::StepOnce, line.step_count});
   if (*reset) return run_command(line.target, ControlCommand{Command::Reset});
   if (*set) return run_command(line.target, SetParameter{line.assignment});
   if (*mocap_subject) return run_command(line.target, LiveCommand{LiveAction::ChooseSubject, line.subject});
   if (*mocap_calibrate) return run_command(line.target, LiveCommand{LiveAction::Calibrate, {}});
   if (*mocap_reset) return run_command(line.target, LiveCommand{LiveAction::Reset, {}});
+  if (*params) return run_params(line.target, line.params, stop);
   if (*save) return run_save(line.target, line.scene_path);
   if (*exported) return run_export(line.target, line.exported, stop);
   if (*check && !line.recording.empty()) return run_recording_check(line.recording);
   if (*check) return run_check(line.target, line.check_frames, line.check_timeout_s);
   if (*sessions) return run_admin(line.target, {AdminAction::ListSessions, 0});
-  if (*kick) return run_admin(line.target, {AdminAction::Kick, line.session});
+  if (*kick) return run_admin(line.target, {AdminAction::Kick, line.session, line.ban_s});
   if (*shutdown) return run_admin(line.target, {AdminAction::ShutDown, 0});
   if (*info) return run_recording_info(line.recording);
   if (*recover) return run_recover(line.recording, line.other_recording);
   if (*compare) return run_compare(line.recording, line.other_recording);
+  if (*latency) return run_latency(line.target, line.latency, stop);
+  if (*test) {
+    line.test.uses_running = app.count("--connect") > 0;
+    return run_test(line.target, line.test, stop);
+  }
   if (*health) return run_health(line.target);
   return kBadInputExit;
 }

@@ -1,5 +1,7 @@
 #include "client/app/viewer_session.h"
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -146,6 +148,7 @@ Status ViewerSession::handle(const MediaEvent& event) {
       if (const auto snapshot = replay_->receive(event.message, event.receive_time_ns, client_->clock())) {
         if (asset_) show(StreamMode::Strands);
         acknowledge(event, begin_ns);
+        tell_times(event, snapshot.get());
         if (listener_) listener_(snapshot);
       } else if (log_lines_.take(now_ns())) {
         log_debug("replay", "frame {} not used: {}", event.header.sequence, replay_->stats().last_error);
@@ -200,7 +203,29 @@ void ViewerSession::take_picture(const MediaEvent& event) {
   image_ = std::make_shared<const Image>(*pictures_.image());
   if (is_blank(*image_)) ++blank_pictures_;
   ++image_count_;
+  tell_times(event, nullptr);
   acknowledge(event, begin_ns);
+}
+
+/// Of a state of strands, or of a picture, which knows its simulation time alone.
+void ViewerSession::tell_times(const MediaEvent& event, const Snapshot* snapshot) {
+  if (!frame_listener_) return;
+  const ClockOffset clock = client_->clock();
+  FrameTimes times;
+  times.mode = snapshot != nullptr ? StreamMode::Strands : StreamMode::Frames;
+  times.sim_time_ns = event.header.sim_time_ns;
+  times.tick = snapshot != nullptr
+                   ? snapshot->tick
+                   : static_cast<uint64_t>(std::llround(std::max(
+                         static_cast<double>(times.sim_time_ns) * 1e-9 * welcome_.step_rate_hz, 0.0)));
+  times.motion_ns = snapshot != nullptr ? snapshot->motion_time_ns : 0;
+  times.sent_ns = event.header.send_time_ns;
+  if (clock.has_value()) {
+    times.received_ns = clock.to_server_ns(event.receive_time_ns);
+    times.decoded_ns = clock.to_server_ns(now_ns());
+    times.clock_error_ns = clock.error_ns();
+  }
+  frame_listener_(times);
 }
 
 void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns) {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/app/frame_trace.h"
 #include "client/app/line_budget.h"
 #include "client/app/mode_control.h"
 #include "client/app/notice_list.h"
@@ -26,6 +27,8 @@ namespace strandcast {
 
 /// Called for every decoded snapshot, in order.
 using SnapshotListener = std::function<void(const std::shared_ptr<const Snapshot>&)>;
+/// Called for every decoded frame, strands and pictures, with its times.
+using FrameListener = std::function<void(const FrameTimes&)>;
 
 /// A call of pump() handles no further event after so long: between two calls others look at clocks and
 /// stops.
@@ -110,6 +113,7 @@ class ViewerSession {
   double connected_s() const;
 
   void set_snapshot_listener(SnapshotListener listener) { listener_ = std::move(listener); }
+  void set_frame_listener(FrameListener listener) { frame_listener_ = std::move(listener); }
 
  private:
   explicit ViewerSession(std::shared_ptr<ViewerClient> client);
@@ -119,6 +123,7 @@ class ViewerSession {
   void take_picture(const MediaEvent& event);
   Status take_quality(StreamQuality quality);
   void take_quality(FrameQuality quality);
+  void tell_times(const MediaEvent& event, const Snapshot* snapshot);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
   void take_look(const LookChange& look);
@@ -152,6 +157,7 @@ class ViewerSession {
   StageTimer picture_decode_timer_;
   PictureLatency picture_latency_;
   SnapshotListener listener_;
+  FrameListener frame_listener_;
   int64_t opened_ns_ = 0;
 };
 

@@ -1,7 +1,6 @@
 #include "common/scene/scene_file.h"
 
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include "common/base/text.h"
 #include "common/scene/scene_fields.h"
 #include "common/scene/scene_override.h"
+#include "common/scene/text_errors_private.h"
 #include "strandcast/v1/scene.pb.h"
 
 namespace strandcast {
@@ -28,10 +28,6 @@ const pb::FieldDescriptor& field_of(const pb::Message& message, const char* name
   const auto* field = message.GetDescriptor()->FindFieldByName(name);
   CHECK(field != nullptr);
   return *field;
-}
-
-std::string place_at(const std::string& place, int line, int column) {
-  return fmt::format("{}:{}:{}", place, line + 1, column + 1);
 }
 
 /// Where values came from, for error messages.
@@ -311,35 +307,6 @@ class Writer {
   pb::Message* message_;
 };
 
-/// Keeps the parser's first error, with line and column; an unknown field gets the list of known ones.
-class ParseErrors : public pb::io::ErrorCollector {
- public:
-  void AddError(int line, int column, const std::string& message) override {
-    if (has_error_) return;
-    has_error_ = true;
-    line_ = std::max(line, 0);
-    column_ = std::max(column, 0);
-    message_ = message;
-  }
-  Error error(const std::string& place) const {
-    return at(place_at(place, line_, column_), make_error(ErrorCode::BadInput, "{}{}", message_, known()));
-  }
-
- private:
-  std::string known() const {
-    constexpr std::string_view kBegin = "Message type \"";
-    const size_t end = message_.find("\" has no field");
-    if (!message_.starts_with(kBegin) || end == std::string::npos) return {};
-    const auto* type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(
-        message_.substr(kBegin.size(), end - kBegin.size()));
-    return type ? fmt::format(" ({})", known_fields(*type)) : std::string{};
-  }
-
-  bool has_error_ = false;
-  int line_ = 0, column_ = 0;
-  std::string message_ = "not protobuf text";
-};
-
 v1::Scene to_message(const SceneDesc& scene) {
   v1::Scene message;
   SceneDesc copy = scene;  // the visitor is shared with the reader, which writes
@@ -389,7 +356,7 @@ Result<SceneDesc> parse(const std::string& text, const std::string& place,
     return at(place, make_error(ErrorCode::LimitExceeded, "the scene has {} bytes, the limit is {}",
                                 text.size(), kMaxSceneFileBytes));
   v1::Scene message;
-  ParseErrors errors;
+  TextErrors errors;
   pb::TextFormat::ParseInfoTree tree;
   pb::TextFormat::Parser parser;
   parser.RecordErrorsTo(&errors);

@@ -467,6 +467,14 @@ void add_texts(const SeedFolder& seeds) {
             "name: \"a\" groom { file { path: \"hair.tfx\" unit_m: 0.63 up_axis: Z origin { y: 0.7 } "
             "vertex_count: 16 pinning: BOTH_ENDS } } colliders { radius_m: 0.08 } has_auto_collider: false "
             "solver { name: \"xpbd\" parameters { key: \"a\" value: 1e-3 } }");
+  seeds.add("scenario_text", "every_action",
+            "name: \"all\" about: \"a\" limit_s: 12.5 repeat: 2 "
+            "do { start { scene: \"a.textproto\" set: \"substeps=2\" lockstep: true option: \"--x\" } } "
+            "do { feed { motion: \"shake\" wind: \"steady\" wind_mps { x: 2 } } } do { step: 240 } "
+            "do { run_s: 0.5 } do { set: \"a=b\" } do { command: RESTART } do { view { mode: \"auto\" "
+            "link_mbit: 2 } } do { leave: \"v\" } do { refuse { input: OVERLONG says: \"no\" } } "
+            "do { remember: \"r\" } do { expect { stretch_below: 0.01 no_quarantine: true hash: \"ff\" "
+            "picture { golden: \"a.png\" } metric { name: \"m\" above: 1 } } }");
   seeds.add("scene_override", "numbers",
             "stream.bound_m=0.0002\nsolver.parameters.damping=0.9\nsubsteps=2\n");
   seeds.add("scene_override", "groups",

@@ -1,0 +1,63 @@
+#include "client/app/latency_command.h"
+
+#include <iostream>
+
+#include "client/app/frame_trace.h"
+#include "client/app/step_speed.h"
+#include "client/app/view_options.h"
+#include "client/app/viewer_session.h"
+#include "common/base/file.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+int fail(const Error& error, int exit_code) {
+  std::cerr << "strandcast-ctl: " << error.to_string() << '\n';
+  return exit_code;
+}
+
+Status save(const LatencyOptions& options, const FrameTrace& trace, const std::vector<StageTimes>& stages) {
+  std::error_code failure;
+  std::filesystem::create_directories(options.out, failure);
+  const std::string csv = to_csv(stages);
+  RETURN_IF_ERROR(save_file(options.out / "latency.csv", std::as_bytes(std::span(csv))));
+  return trace.save(options.out / "frames.csv");
+}
+
+}  // namespace
+
+int run_latency(const CtlTarget& target, const LatencyOptions& options, const std::atomic<bool>& stop) {
+  auto config = client_config(target, Role::Viewer);
+  if (!config) return fail(config.error(), kBadInputExit);
+  const auto mode = parse_mode(options.mode);
+  if (!mode) return fail(mode.error(), kBadInputExit);
+  config->hello.mode = *mode;
+  config->hello.step_ns = measured_step_ns();
+  auto session = ViewerSession::open(*config);
+  if (!session) return fail(session.error(), kBadInputExit);
+  FrameTrace trace;
+  (*session)->set_frame_listener([&](const FrameTimes& times) { trace.add(times); });
+  const int64_t end_ns = now_ns() + static_cast<int64_t>(options.seconds * 1e9);
+  while (!stop && now_ns() < end_ns)
+    if (const Status pumped = (*session)->pump(milliseconds(20)); !pumped)
+      return fail(pumped.error(), kRefusedExit);
+  const std::vector<StageTimes> stages = stage_times(trace.frames());
+  std::cout << to_table(stages);
+  const ClockOffset clock = (*session)->client().clock();
+  std::cout << fmt::format(
+      "clocks agree within {:.3f} ms; the server takes {:.2f} ms for a step and {:.2f} ms to encode\n",
+      static_cast<double>(clock.error_ns()) * 1e-6, (*session)->status().sim_ms,
+      (*session)->status().encode_ms);
+  if (!options.out.empty()) {
+    if (const Status saved = save(options, trace, stages); !saved) return fail(saved.error(), kBadInputExit);
+    std::cout << fmt::format("saved {} and {}\n", (options.out / "latency.csv").string(),
+                             (options.out / "frames.csv").string());
+  }
+  if (trace.frames().empty())
+    return fail(make_error(ErrorCode::Timeout, "no frame came in {:g} s", options.seconds), kRefusedExit);
+  return kDoneExit;
+}
+
+}  // namespace strandcast

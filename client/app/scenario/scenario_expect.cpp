@@ -1,0 +1,322 @@
+// The part of ScenarioRun that checks.
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <thread>
+
+#include "client/app/scenario/scenario_run.h"
+#include "common/base/file.h"
+#include "common/base/text.h"
+#include "common/log/log.h"
+#include "common/pictures/picture_error.h"
+#include "common/render/render_device.h"
+#include "common/replay/snapshot_timeline.h"
+#include "common/replay/strand_fill.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPoll{50};
+constexpr double kBitsPerByte = 8.0;
+constexpr size_t kMaxShownChars = 300;
+constexpr double kRefusalTimeoutS = 10.0;
+
+/// The value of a line of /metrics; none where there is no such line.
+std::vector<double> find_metric(const std::string& text, const std::string& name) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(name + " ")) continue;
+    double value = 0.0;
+    const char* begin = line.data() + name.size() + 1;
+    if (std::from_chars(begin, line.data() + line.size(), value).ec == std::errc()) return {value};
+  }
+  return {};
+}
+
+std::string wanted_text(const ScenarioMetric& metric) {
+  std::string text;
+  const auto add = [&](const char* word, const std::optional<double>& value) {
+    if (value) text += fmt::format("{}{} {:g}", text.empty() ? "" : " and ", word, *value);
+  };
+  add("below", metric.below);
+  add("above", metric.above);
+  add("equal to", metric.equals);
+  return metric.within_s > 0.0 ? text + fmt::format(" within {:g} s", metric.within_s) : text;
+}
+
+bool holds(const ScenarioMetric& metric, double value) {
+  return (!metric.below || value < *metric.below) && (!metric.above || value > *metric.above) &&
+         (!metric.equals || value == *metric.equals);
+}
+
+/// What was sent, for a person.
+const char* name_of(ScenarioInput input) {
+  constexpr const char* kNames[] = {"nothing",
+                                    "a wrong token",
+                                    "a controller with a viewer's token",
+                                    "a viewer that pauses",
+                                    "a camera that is not a number",
+                                    "an assignment beyond the limit"};
+  return kNames[static_cast<size_t>(input)];
+}
+
+}  // namespace
+
+Result<Image> draw(const ViewerPicture& picture, RenderSize size) {
+  if (picture.mode == StreamMode::Frames && picture.image != nullptr) return *picture.image;
+  if (picture.asset == nullptr || picture.state == nullptr)
+    return make_error(ErrorCode::Unavailable, "there is nothing to draw yet");
+  ASSIGN_OR_RETURN(const auto device, RenderDevice::open({}));
+  ASSIGN_OR_RETURN(const auto renderer, device->make_renderer(*picture.asset, picture.look.look));
+  StrandFill fill(picture.asset->rest_position_m, picture.asset->vertex_count);
+  RETURN_IF_ERROR(renderer->draw(posed_strands_of(*picture.state, fill), picture.look.camera, size));
+  return renderer->read_image();
+}
+
+void ScenarioRun::report(const std::string& what, const std::string& wanted, const std::string& measured,
+                         bool has_passed) {
+  const double time_s = elapsed_s();
+  const CheckResult check{line_, what, wanted, measured, has_passed, time_s - last_check_s_};
+  last_check_s_ = time_s;
+  result_.checks.push_back(check);
+  if (listener_) listener_(check);
+}
+
+Result<const ScenarioViewer*> ScenarioRun::viewer(const std::string& name) const {
+  if (viewer_order_.empty()) return make_error(ErrorCode::BadInput, "there is no viewer: view comes first");
+  const auto found = viewers_.find(name.empty() ? viewer_order_.front() : name);
+  if (found == viewers_.end()) return make_error(ErrorCode::BadInput, "there is no viewer '{}'", name);
+  return found->second.get();
+}
+
+Status ScenarioRun::carry_out(const ScenarioExpect& expect) {
+  const bool needs_viewer = expect.stretch_below || expect.picture || expect.kbit_below ||
+                            expect.bits_per_vertex_below || expect.hz_above || expect.back_within_s ||
+                            !expect.mode.empty();
+  if (needs_viewer) RETURN_IF_ERROR(viewer(expect.viewer));
+  const bool needs_span = expect.stretch_below || expect.kbit_below || expect.bits_per_vertex_below ||
+                          expect.hz_above || expect.realtime_above;
+  if (needs_span && !span_)
+    return make_error(ErrorCode::BadInput, "nothing was measured: a step or run_s comes first");
+  if (needs_span) expect_span(expect);
+  if (expect.has_no_quarantine) {
+    expect_metric({"strandcast_publish_quarantined_total", {}, {}, 0.0});
+    expect_metric({"strandcast_publish_overstretched_total", {}, {}, 0.0});
+  }
+  expect_state(expect);
+  if (expect.back_within_s) expect_back(expect);
+  if (!expect.mode.empty()) {
+    const ScenarioViewer* who = *viewer(expect.viewer);
+    const ViewerLook look = who->look();
+    report("mode of " + who->view().name, expect.mode,
+           fmt::format("it sees {} ({})", to_string(look.mode), look.mode_reason),
+           expect.mode == to_string(look.mode));
+  }
+  if (expect.picture) expect_picture(expect);
+  if (expect.metric) expect_metric(*expect.metric);
+  return {};
+}
+
+void ScenarioRun::expect_span(const ScenarioExpect& expect) {
+  if (expect.realtime_above)
+    report("simulated over real time", fmt::format("above {:g}", *expect.realtime_above),
+           span_->realtime < 0.0 ? "measured nothing: run for two seconds at least"
+                                 : fmt::format("measured {:.3f}", span_->realtime),
+           span_->realtime > *expect.realtime_above);
+  if (viewer_order_.empty()) return;
+  const std::string name = expect.viewer.empty() ? viewer_order_.front() : expect.viewer;
+  const MeasuredSpan::Seen& seen = span_->viewers[name];
+  const ViewerCounts& now = seen.after.counts;
+  const double seconds = std::max(span_->seconds, 1e-6);
+  const auto frames = static_cast<double>(now.frames - seen.before.frames);
+  if (expect.stretch_below) expect_stretch(name, seen, *expect.stretch_below);
+  if (expect.hz_above)
+    report("frames per second of " + name, fmt::format("above {:g}", *expect.hz_above),
+           fmt::format("measured {:.1f}", frames / seconds), frames / seconds > *expect.hz_above);
+  if (expect.kbit_below) {
+    const double kbit =
+        static_cast<double>(now.received_bytes - seen.before.received_bytes) * kBitsPerByte * 1e-3 / seconds;
+    report("kbit/s to " + name, fmt::format("below {:g}", *expect.kbit_below),
+           fmt::format("measured {:.1f}", kbit), kbit < *expect.kbit_below);
+  }
+  if (!expect.bits_per_vertex_below) return;
+  const auto vertices = static_cast<double>(now.strand_frames - seen.before.strand_frames) *
+                        static_cast<double>(seen.after.vertices);
+  const double bits = static_cast<double>(now.strand_bytes - seen.before.strand_bytes) * kBitsPerByte /
+                      std::max(vertices, 1.0);
+  report("bits per vertex to " + name, fmt::format("below {:g}", *expect.bits_per_vertex_below),
+         vertices > 0.0 ? fmt::format("measured {:.3f} by {}", bits, seen.after.codec)
+                        : std::string("no strands were decoded"),
+         vertices > 0.0 && bits < *expect.bits_per_vertex_below);
+}
+
+void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit) {
+  const bool has_seen = seen.after.counts.strand_frames > seen.before.strand_frames;
+  const bool is_too_fine = limit <= seen.after.stretch_grain;
+  const std::string measured =
+      !has_seen     ? std::string("no strands were decoded")
+      : is_too_fine ? fmt::format("the stream's bound shows no less than {:.2g}: set stream.bound_m finer",
+                                  seen.after.stretch_grain)
+                    : fmt::format("measured {:.2g} (seen within {:.2g})", seen.after.largest_stretch,
+                                  seen.after.stretch_grain);
+  report("stretch of " + name, fmt::format("below {:g}", limit), measured,
+         has_seen && !is_too_fine && seen.after.largest_stretch < limit);
+}
+
+void ScenarioRun::expect_state(const ScenarioExpect& expect) {
+  if (!expect.hash && expect.same_as.empty()) return;
+  const auto text = [](const std::optional<uint64_t>& hash) {
+    return hash ? fmt::format("{:016x}", *hash) : std::string("none");
+  };
+  std::optional<uint64_t> wanted = expect.hash;
+  if (const auto found = remembered_.find(expect.same_as); found != remembered_.end()) wanted = found->second;
+  const std::string from = expect.same_as.empty() ? std::string() : fmt::format(" of '{}'", expect.same_as);
+  report(fmt::format("state at step {}", tick_), text(wanted) + from, "is " + text(hash_),
+         wanted.has_value() && hash_ == wanted);
+}
+
+void ScenarioRun::expect_back(const ScenarioExpect& expect) {
+  const ScenarioViewer& who = **viewer(expect.viewer);
+  const std::string& name = who.view().name;
+  const double begin_s = elapsed_s();
+  const auto is_back = [&] {
+    const ViewerLook look = who.look();
+    return look.is_connected && look.counts.frames > frames_at_restart_[name];
+  };
+  while (!is_back() && elapsed_s() - begin_s < *expect.back_within_s && go_on())
+    std::this_thread::sleep_for(milliseconds(10));
+  const double since_s = restarted_ns_ == 0 ? 0.0 : static_cast<double>(now_ns() - restarted_ns_) * 1e-9;
+  const bool is_there = restarted_ns_ != 0 && is_back();
+  report(name + " comes back", fmt::format("within {:g} s", *expect.back_within_s),
+         restarted_ns_ == 0 ? std::string("the server was not restarted")
+         : is_there         ? fmt::format("was back {:.1f} s after the server", since_s)
+                            : fmt::format("is away: {}", who.look().trouble),
+         is_there);
+}
+
+void ScenarioRun::expect_picture(const ScenarioExpect& expect) {
+  const ScenarioViewer& who = **viewer(expect.viewer);
+  const std::string what = "picture of " + who.view().name;
+  const std::filesystem::path& golden_path = expect.picture->golden;
+  const std::string wanted =
+      fmt::format("within {:g} dB of {}", expect.picture->db_above, golden_path.filename().string());
+  const auto seen = draw(who.picture(), {who.view().width, who.view().height});
+  if (!seen) return report(what, wanted, seen.error().to_string(), false);
+  // Others that share it compare with what the first of them wrote.
+  if (options_.renews_goldens && renewed_.insert(golden_path).second) {
+    const Status saved = save_png(golden_path, *seen);
+    return report(what, "written anew", saved ? golden_path.string() : saved.error().to_string(), saved.ok());
+  }
+  const auto golden = load_png(golden_path);
+  if (!golden) return report(what, wanted, golden.error().to_string() + " (--renew writes it)", false);
+  const PictureMask all(size_t{golden->width} * golden->height, 1);
+  const auto error = picture_error(*seen, *golden, all);
+  const bool is_near = error && error->psnr_db > expect.picture->db_above;
+  report(what, wanted, error ? fmt::format("measured {:.1f} dB", error->psnr_db) : error.error().to_string(),
+         is_near);
+  if (is_near) return;
+  std::error_code ignored;
+  std::filesystem::create_directories(options_.out, ignored);
+  const std::string stem = fmt::format("{}_line{}", scenario_.name, line_);
+  (void)save_png(options_.out / (stem + "_seen.png"), *seen);
+  (void)save_png(options_.out / (stem + "_golden.png"), *golden);
+  if (seen->rgba.size() != golden->rgba.size()) return;
+  constexpr int kAmplified = 4;
+  Image difference = *seen;
+  for (size_t i = 0; i < difference.rgba.size(); ++i)
+    difference.rgba[i] = i % 4 == 3
+                             ? uint8_t{255}
+                             : static_cast<uint8_t>(std::min(
+                                   255, kAmplified * std::abs(int{seen->rgba[i]} - int{golden->rgba[i]})));
+  (void)save_png(options_.out / (stem + "_difference.png"), difference);
+}
+
+void ScenarioRun::expect_metric(const ScenarioMetric& metric) {
+  const double begin_s = elapsed_s();
+  std::string measured;
+  bool has_passed = false;
+  while (true) {
+    const auto text = metrics();
+    const std::vector<double> found = text ? find_metric(*text, metric.name) : std::vector<double>();
+    measured = !text           ? text.error().to_string()
+               : found.empty() ? std::string("there is no such line in /metrics")
+                               : fmt::format("is {:g}", found.front());
+    has_passed = !found.empty() && holds(metric, found.front());
+    if (has_passed || elapsed_s() - begin_s >= metric.within_s || !go_on()) break;
+    // What else comes meanwhile is not to pile up.
+    for (const ClientEvent& event : client_->wait(kPoll)) take(event);
+    trace();
+  }
+  report(metric.name, wanted_text(metric), measured, has_passed);
+}
+
+namespace {
+
+/// What the server says to whoever sends this after its Welcome.
+std::string answer_to(const ClientConfig& config, const ClientMessage& message) {
+  auto client = ViewerClient::connect(config);
+  if (!client) return client.error().to_string();
+  if (const Status sent = (*client)->send(message); !sent) return sent.error().to_string();
+  const int64_t end_ns = now_ns() + static_cast<int64_t>(kRefusalTimeoutS * 1e9);
+  while (now_ns() < end_ns)
+    for (const ClientEvent& event : (*client)->wait(milliseconds(20)))
+      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error.to_string();
+  return {};
+}
+
+ClientMessage wrong_message(ScenarioInput input) {
+  if (input == ScenarioInput::NotANumber) {
+    CameraChange camera;
+    camera.camera.offset_m.x = std::nanf("");
+    return camera;
+  }
+  if (input == ScenarioInput::Overlong) return SetParameter{std::string(kMaxAssignmentBytes + 1, 'x')};
+  return ControlCommand{Command::Pause};
+}
+
+}  // namespace
+
+Status ScenarioRun::carry_out(const ScenarioRefusal& refusal) {
+  std::string answer;
+  const bool is_assignment = !refusal.assignment.empty();
+  if (is_assignment) {
+    ASSIGN_OR_RETURN(const Notice notice, ask(SetParameter{refusal.assignment}));
+    if (notice.is_error) answer = notice.text;
+  } else {
+    const bool is_overlong = refusal.input == ScenarioInput::Overlong;
+    ASSIGN_OR_RETURN(ClientConfig config, config_for(is_overlong ? Role::Controller : Role::Viewer));
+    config.hello.name = "refused";
+    config.hello.gets_no_stream = true;
+    if (refusal.input == ScenarioInput::WrongToken) config.hello.token = "no-token-of-this-server";
+    if (refusal.input == ScenarioInput::WrongRole) config.hello.role = Role::Controller;
+    answer = answer_to(config, wrong_message(refusal.input));
+  }
+  const bool is_said = !answer.empty() && answer.find(refusal.says) != std::string::npos;
+  report(is_assignment ? "set " + excerpt(refusal.assignment, 80) : name_of(refusal.input),
+         refusal.says.empty() ? std::string("refused with a sentence")
+                              : fmt::format("refused: '{}'", refusal.says),
+         answer.empty() ? std::string("it was not refused")
+                        : "the server says: " + excerpt(answer, kMaxShownChars),
+         is_said);
+  // And goes on as if nothing had been.
+  const auto text = metrics();
+  if (!text) report("the server after it", "answers", text.error().to_string(), false);
+  return {};
+}
+
+void ScenarioRun::save_evidence() {
+  std::error_code failure;
+  std::filesystem::create_directories(options_.out, failure);
+  const std::string plot = to_plot(result_);
+  (void)save_file(options_.out / (scenario_.name + "_plot.svg"), std::as_bytes(std::span(plot)));
+  for (const auto& [name, viewer] : viewers_)
+    if (const auto seen = draw(viewer->picture(), {viewer->view().width, viewer->view().height}))
+      (void)save_png(options_.out / fmt::format("{}_{}.png", scenario_.name, name), *seen);
+  if (server_ == nullptr) return;
+  std::filesystem::copy_file(server_->log_file(), options_.out / (scenario_.name + "_server.log"),
+                             std::filesystem::copy_options::overwrite_existing, failure);
+}
+
+}  // namespace strandcast

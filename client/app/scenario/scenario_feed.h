@@ -1,0 +1,59 @@
+// What a scenario feeds: motion and wind as functions of time, sent in real time by a thread and a connection
+// of its own, or sample by sample for the steps of a server in lockstep.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "client/app/feed.h"
+#include "common/scene/scenario.h"
+
+namespace strandcast {
+
+/// The functions of a feed, from its `from_s` on. Loads its files; errors name them.
+Result<FeedPlan> plan_of(const ScenarioFeed& feed);
+
+/// Head of shake: to and fro along x with this peak acceleration, which a first period leads up to.
+Pose shake_motion(double t_s, double peak_mps2, double rate_hz);
+
+/// Feeds in real time until it goes, or the connection ends.
+class LiveFeed {
+ public:
+  static Result<std::unique_ptr<LiveFeed>> start(FeedPlan plan, const ClientConfig& config);
+  ~LiveFeed();
+  LiveFeed(const LiveFeed&) = delete;
+  LiveFeed& operator=(const LiveFeed&) = delete;
+
+ private:
+  LiveFeed(FeedPlan plan, std::unique_ptr<ViewerClient> client)
+      : plan_(std::move(plan)), client_(std::move(client)) {}
+
+  const FeedPlan plan_;
+  const std::unique_ptr<ViewerClient> client_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// Samples for the steps after `begin_tick`, and for that tick itself to begin with: what their times are
+/// counted from.
+class SteppedFeed {
+ public:
+  SteppedFeed(FeedPlan plan, uint64_t begin_tick, double step_rate_hz)
+      : plan_(std::move(plan)),
+        begin_tick_(begin_tick),
+        next_tick_(begin_tick),
+        step_rate_hz_(step_rate_hz) {}
+
+  /// What is to be sent before the simulation goes on to `tick`.
+  std::vector<ClientMessage> samples_up_to(uint64_t tick);
+
+ private:
+  const FeedPlan plan_;
+  const uint64_t begin_tick_;
+  uint64_t next_tick_;
+  const double step_rate_hz_;
+};
+
+}  // namespace strandcast

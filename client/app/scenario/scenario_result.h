@@ -1,0 +1,52 @@
+// What came of a scenario: a line per check for people, JUnit XML for build servers, a plot of what was
+// measured on the way. Pure text, any thread.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace strandcast {
+
+struct CheckResult {
+  int line = 0;      // of the scenario's file
+  std::string what;  // "stretch of viewer"
+  std::string wanted;
+  std::string measured;
+  bool has_passed = false;
+  double seconds = 0.0;  // since the one before
+};
+
+/// What was seen at one moment.
+struct TraceSample {
+  double time_s = 0.0;     // since the start of the scenario
+  std::string viewer;      // empty: of the server
+  double realtime = -1.0;  // -1 = not measured here
+  double stretch = -1.0;
+  double kbit = -1.0;  // per second
+  double hz = -1.0;
+};
+
+inline constexpr size_t kMaxTraceSamples = 20'000;
+
+struct ScenarioResult {
+  std::string name;
+  std::string about;
+  double seconds = 0.0;
+  std::vector<CheckResult> checks;
+  std::vector<TraceSample> trace;
+  std::vector<uint64_t> hashes;  // after each step, in order
+
+  size_t failed_count() const;
+};
+
+/// "  ok    12  stretch of viewer: wanted below 0.01, measured 0.002".
+std::string to_line(const CheckResult& check);
+
+/// One <testsuite> per scenario, one <testcase> per check.
+std::string to_junit(const std::vector<ScenarioResult>& results);
+
+/// Stretch, pace, kbit/s and frames per second over time, as SVG.
+std::string to_plot(const ScenarioResult& result);
+
+}  // namespace strandcast

@@ -1,0 +1,370 @@
+#include "client/app/scenario/scenario_run.h"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+#include <utility>
+
+#include "client/net/http_get.h"
+#include "common/base/text.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double kStartTimeoutS = 60.0;   // a large groom is loaded and its kernels are made
+constexpr double kAnswerTimeoutS = 30.0;  // a solver is made anew
+constexpr double kLastStateS = 2.0;       // for viewers, behind the last step
+constexpr double kStateS = 0.5;           // likewise behind the others
+constexpr int kMostMisses = 3;            // then a viewer is waited for no more
+constexpr double kSeenRateHz = 60.0;      // of the states that viewers see while it is stepped
+constexpr uint64_t kBlindChunk = 64;      // steps at once where nobody watches
+constexpr milliseconds kPoll{5};
+constexpr milliseconds kHttpTimeout{3'000};
+constexpr double kTraceS = 0.25;
+constexpr double kLifetimeMarginS = 30.0;
+constexpr double kBitsPerByte = 8.0;
+
+/// A folder that nobody else has.
+Result<std::filesystem::path> make_folder() {
+  std::error_code failure;
+  std::string path = (std::filesystem::temp_directory_path(failure) / "strandcast-test-XXXXXX").string();
+  if (failure || mkdtemp(path.data()) == nullptr)
+    return make_error(ErrorCode::Unavailable, "cannot make a folder for temporary files in {}", path);
+  return std::filesystem::path(path);
+}
+
+}  // namespace
+
+ScenarioRun::ScenarioRun(const Scenario& scenario, ScenarioOptions options, CheckListener listener)
+    : scenario_(scenario), options_(std::move(options)), listener_(std::move(listener)), begin_ns_(now_ns()) {
+  result_.name = scenario.name;
+  result_.about = scenario.about;
+}
+
+ScenarioRun::~ScenarioRun() {
+  live_feed_.reset();
+  viewers_.clear();
+  client_.reset();
+  server_.reset();
+  std::error_code ignored;
+  if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+}
+
+double ScenarioRun::elapsed_s() const {
+  return static_cast<double>(now_ns() - begin_ns_) * 1e-9;
+}
+
+Status ScenarioRun::go_on() const {
+  if (is_stopped()) return make_error(ErrorCode::Unavailable, "stopped");
+  if (left_s() <= 0.0)
+    return make_error(ErrorCode::Timeout, "the scenario's limit of {:g} s is over", scenario_.limit_s);
+  return {};
+}
+
+ScenarioResult ScenarioRun::run() {
+  Status status = options_.running ? connect() : Status();
+  if (!status) report("connect", "a server", status.error().to_string(), false);
+  for (const ScenarioAction& action : scenario_.actions) {
+    if (!status) break;
+    line_ = action.line;
+    status = go_on();
+    if (status) status = carry_out(action);
+    if (!status) report("to be done", "no trouble", status.error().to_string(), false);
+  }
+  if (result_.failed_count() > 0) save_evidence();
+  result_.seconds = elapsed_s();
+  return std::move(result_);
+}
+
+Status ScenarioRun::carry_out(const ScenarioAction& action) {
+  return std::visit([this](const auto& work) { return carry_out(work); }, action.work);
+}
+
+Status ScenarioRun::carry_out(const ScenarioStart& start) {
+  if (options_.running) return {};  // the one that runs is used
+  if (server_ != nullptr) return make_error(ErrorCode::BadInput, "a server was started already");
+  ASSIGN_OR_RETURN(folder_, make_folder());
+  ServerProcessConfig config{options_.server, {}, folder_, scenario_.limit_s + kLifetimeMarginS};
+  if (!start.scene.empty()) config.arguments = {"--scene", start.scene.string()};
+  for (const std::string& assignment : start.overrides)
+    config.arguments.insert(config.arguments.end(), {"--set", assignment});
+  if (start.is_lockstep) config.arguments.emplace_back("--lockstep");
+  config.arguments.insert(config.arguments.end(), start.options.begin(), start.options.end());
+  is_lockstep_ = start.is_lockstep;
+  server_ = std::make_unique<ServerProcess>(std::move(config));
+  RETURN_IF_ERROR(server_->start(std::min(left_s(), kStartTimeoutS), *options_.stop));
+  return connect();
+}
+
+Result<ClientConfig> ScenarioRun::config_for(Role role) const {
+  CtlTarget target = options_.running.value_or(CtlTarget{});
+  if (server_ != nullptr) {
+    target.connect = fmt::format("127.0.0.1:{}", server_->port());
+    target.token_file = server_->token_file();
+  } else if (!options_.running) {
+    return make_error(ErrorCode::BadInput, "there is no server yet: begin with start, or give --connect");
+  }
+  target.stop = options_.stop;
+  return client_config_for(target, role);
+}
+
+Status ScenarioRun::connect() {
+  lost_.reset();
+  status_ns_ = 0;
+  Error refused;
+  // Only an admin may steer and feed by one connection, so that the order of the two is kept.
+  for (const Role role : {Role::Admin, Role::Controller}) {
+    Result<ClientConfig> config = config_for(role);
+    if (config) config->hello.gets_no_stream = true;
+    auto client =
+        config ? ViewerClient::connect(*config) : Result<std::unique_ptr<ViewerClient>>(config.error());
+    if (client) {
+      client_ = std::move(client).value();
+      is_admin_ = role == Role::Admin;
+      return {};
+    }
+    refused = client.error();
+  }
+  return refused;
+}
+
+void ScenarioRun::take(const ClientEvent& event) {
+  if (const auto* closed = std::get_if<ClosedEvent>(&event)) lost_ = closed->error;
+  if (const auto* status = std::get_if<ServerStatus>(&event)) {
+    status_ = *status;
+    status_ns_ = now_ns();
+  }
+}
+
+/// The answer to a command. Notices that came before it are no answer.
+Result<Notice> ScenarioRun::ask(const ClientMessage& message) {
+  if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
+  for (const ClientEvent& event : client_->poll()) take(event);
+  if (lost_) return *lost_;
+  RETURN_IF_ERROR(client_->send(message));
+  const auto* command = std::get_if<ControlCommand>(&message);
+  const bool is_counted = command != nullptr && command->step_count > 0;
+  const double end_s = elapsed_s() + (is_counted ? left_s() : std::min(left_s(), kAnswerTimeoutS));
+  while (elapsed_s() < end_s) {
+    RETURN_IF_ERROR(go_on());
+    for (const ClientEvent& event : client_->wait(milliseconds(20))) {
+      take(event);
+      const auto* notice = std::get_if<Notice>(&event);
+      if (notice != nullptr && (notice->is_error || !is_counted || notice->tick > 0)) return *notice;
+    }
+    if (lost_) return *lost_;
+  }
+  return make_error(ErrorCode::Timeout, "the server did not answer in time");
+}
+
+Status ScenarioRun::carry_out(const ScenarioFeed& feed) {
+  ASSIGN_OR_RETURN(FeedPlan plan, plan_of(feed));
+  live_feed_.reset();
+  stepped_feed_.reset();
+  plan_.reset();
+  if (!plan.motion && !plan.wind) return {};
+  plan_ = std::move(plan);
+  if (!is_lockstep_) return start_live_feed();
+  if (!is_admin_)
+    return make_error(
+        ErrorCode::Unauthorized,
+        "to feed a server in lockstep takes an admin's token (--token-file), so that samples and "
+        "steps come in order");
+  stepped_feed_.emplace(*plan_, tick_, client_->welcome().step_rate_hz);
+  return {};
+}
+
+Status ScenarioRun::start_live_feed() {
+  live_feed_.reset();
+  if (!plan_ || is_lockstep_) return {};
+  ASSIGN_OR_RETURN(ClientConfig config, config_for(Role::Source));
+  ASSIGN_OR_RETURN(live_feed_, LiveFeed::start(*plan_, config));
+  return {};
+}
+
+Status ScenarioRun::step_chunk(uint64_t tick) {
+  if (stepped_feed_)
+    for (const ClientMessage& samples : stepped_feed_->samples_up_to(tick))
+      RETURN_IF_ERROR(client_->send(samples));
+  const auto count = static_cast<uint32_t>(tick - tick_);
+  ASSIGN_OR_RETURN(const Notice notice, ask(ControlCommand{Command::StepOnce, count}));
+  if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
+  tick_ = notice.tick;
+  hash_ = notice.state_hash;
+  return {};
+}
+
+/// Whoever has a good link sees each of these states: what is measured is then the same every time.
+void ScenarioRun::await_viewers(uint64_t tick, double patience_s) {
+  const double end_s = elapsed_s() + std::min(patience_s, left_s());
+  const auto has_seen = [&](const auto& viewer) {
+    const ViewerLook look = viewer.second->look();
+    const bool is_waited_for = viewer.second->view().link_mbit <= 0.0 && look.is_connected &&
+                               look.mode == StreamMode::Strands && viewer.second->view().mode != "frames";
+    return !is_waited_for || look.tick + look.rate_divisor > tick;
+  };
+  while (!std::all_of(viewers_.begin(), viewers_.end(), has_seen) && elapsed_s() < end_s && !is_stopped())
+    std::this_thread::sleep_for(milliseconds(1));
+}
+
+Status ScenarioRun::carry_out(const ScenarioSteps& steps) {
+  if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
+  const double rate_hz = client_->welcome().step_rate_hz;
+  const auto seen_chunk = static_cast<uint64_t>(std::max(1.0, std::round(rate_hz / kSeenRateHz)));
+  const uint64_t chunk = viewers_.empty() ? kBlindChunk : seen_chunk;
+  begin_span();
+  const double begin_s = elapsed_s();
+  int misses = 0;
+  for (uint64_t left = steps.count; left > 0;) {
+    const uint64_t count = std::min(left, chunk);
+    RETURN_IF_ERROR(step_chunk(tick_ + count));
+    left -= count;
+    const double waits_s = elapsed_s();
+    if (misses < kMostMisses) await_viewers(tick_, kStateS);
+    if (elapsed_s() - waits_s >= kStateS) ++misses;
+    trace();
+  }
+  await_viewers(tick_, kLastStateS);
+  const double seconds = static_cast<double>(steps.count) / rate_hz;
+  end_span(seconds, seconds / std::max(elapsed_s() - begin_s, 1e-6));
+  result_.hashes.push_back(*hash_);
+  return {};
+}
+
+Status ScenarioRun::carry_out(const ScenarioRunTime& run) {
+  if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
+  begin_span();
+  const double begin_s = elapsed_s();
+  uint64_t first_tick = 0;
+  int64_t first_ns = 0;
+  status_ns_ = 0;
+  while (elapsed_s() - begin_s < run.seconds) {
+    RETURN_IF_ERROR(go_on());
+    for (const ClientEvent& event : client_->wait(kPoll)) take(event);
+    if (lost_) return *lost_;
+    if (first_ns == 0 && status_ns_ != 0) {
+      first_tick = status_.tick;
+      first_ns = status_ns_;
+    }
+    trace();
+  }
+  double realtime = -1.0;
+  if (status_ns_ > first_ns && first_ns != 0)
+    realtime = static_cast<double>(status_.tick - first_tick) / client_->welcome().step_rate_hz /
+               (static_cast<double>(status_ns_ - first_ns) * 1e-9);
+  end_span(elapsed_s() - begin_s, realtime);
+  return {};
+}
+
+void ScenarioRun::begin_span() {
+  span_.emplace();
+  for (const auto& [name, viewer] : viewers_) {
+    viewer->begin_measure();
+    span_->viewers[name].before = viewer->look().counts;
+  }
+}
+
+void ScenarioRun::end_span(double seconds, double realtime) {
+  span_->seconds = seconds;
+  span_->realtime = realtime;
+  for (auto& [name, seen] : span_->viewers)
+    if (const auto found = viewers_.find(name); found != viewers_.end()) seen.after = found->second->look();
+}
+
+void ScenarioRun::trace() {
+  const double time_s = elapsed_s();
+  const double passed_s = time_s - traced_s_;
+  if (passed_s < kTraceS || result_.trace.size() >= kMaxTraceSamples) return;
+  traced_s_ = time_s;
+  for (const auto& [name, viewer] : viewers_) {
+    const ViewerLook look = viewer->look();
+    const ViewerCounts& before = traced_[name];
+    TraceSample sample{time_s, name};
+    sample.stretch = look.largest_stretch;
+    sample.hz = static_cast<double>(look.counts.frames - before.frames) / passed_s;
+    sample.kbit = static_cast<double>(look.counts.received_bytes - before.received_bytes) * kBitsPerByte *
+                  1e-3 / passed_s;
+    traced_[name] = look.counts;
+    result_.trace.push_back(sample);
+  }
+  if (status_ns_ == 0) return;
+  TraceSample sample{time_s, {}};
+  sample.realtime = status_.realtime_factor;
+  result_.trace.push_back(sample);
+}
+
+Status ScenarioRun::carry_out(const ScenarioSet& set) {
+  ASSIGN_OR_RETURN(const Notice notice, ask(SetParameter{set.assignment}));
+  if (notice.is_error)
+    return make_error(ErrorCode::BadInput, "the server refused {}: {}", excerpt(set.assignment, 100),
+                      notice.text);
+  return {};
+}
+
+Status ScenarioRun::carry_out(ScenarioCommand command) {
+  if (command != ScenarioCommand::Restart) {
+    const Command wanted = command == ScenarioCommand::Pause    ? Command::Pause
+                           : command == ScenarioCommand::Resume ? Command::Resume
+                                                                : Command::Reset;
+    ASSIGN_OR_RETURN(const Notice notice, ask(ControlCommand{wanted}));
+    if (notice.is_error) return make_error(ErrorCode::Unavailable, "the server says: {}", notice.text);
+    return {};
+  }
+  if (server_ == nullptr)
+    return make_error(ErrorCode::BadInput, "a server that was not started by the scenario is not killed");
+  live_feed_.reset();
+  client_.reset();
+  RETURN_IF_ERROR(server_->restart(std::min(left_s(), kStartTimeoutS), *options_.stop));
+  restarted_ns_ = now_ns();
+  for (const auto& [name, viewer] : viewers_) frames_at_restart_[name] = viewer->look().counts.frames;
+  tick_ = 0;
+  hash_.reset();
+  RETURN_IF_ERROR(connect());
+  if (stepped_feed_) stepped_feed_.emplace(*plan_, 0, client_->welcome().step_rate_hz);
+  return start_live_feed();
+}
+
+Status ScenarioRun::carry_out(const ScenarioView& view) {
+  if (viewers_.contains(view.name))
+    return make_error(ErrorCode::BadInput, "there is a viewer '{}' already", view.name);
+  ASSIGN_OR_RETURN(ClientConfig config, config_for(Role::Viewer));
+  ASSIGN_OR_RETURN(viewers_[view.name], ScenarioViewer::join(view, std::move(config)));
+  viewer_order_.push_back(view.name);
+  // Until it has something to show it has not arrived.
+  const ScenarioViewer& joined = *viewers_[view.name];
+  while (joined.look().counts.frames == 0) {
+    RETURN_IF_ERROR(go_on());
+    std::this_thread::sleep_for(kPoll);
+  }
+  return {};
+}
+
+Status ScenarioRun::carry_out(const ScenarioLeave& leave) {
+  if (viewers_.erase(leave.viewer) == 0)
+    return make_error(ErrorCode::BadInput, "there is no viewer '{}'", leave.viewer);
+  std::erase(viewer_order_, leave.viewer);
+  return {};
+}
+
+Status ScenarioRun::carry_out(const ScenarioRemember& remember) {
+  if (!hash_) return make_error(ErrorCode::BadInput, "only a state that step led to can be remembered");
+  remembered_[remember.name] = *hash_;
+  return {};
+}
+
+Result<std::string> ScenarioRun::metrics() {
+  const Role role = is_admin_ ? Role::Admin : Role::Controller;
+  ASSIGN_OR_RETURN(const ClientConfig config, config_for(role));
+  ASSIGN_OR_RETURN(const HttpAnswer answer, http_get(config.address, "/metrics", kHttpTimeout,
+                                                     {config.tls_authorities, config.hello.token}));
+  constexpr unsigned kHttpOk = 200;
+  if (answer.status != kHttpOk)
+    return make_error(ErrorCode::Unavailable, "/metrics was answered with status {}", answer.status);
+  return answer.body;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,139 @@
+// ScenarioRun: carries out a scenario against a server that it starts, or one that runs already, and checks
+// what is expected. Nothing waits without end: the scenario's limit ends everything. One thread, beside those
+// of its viewers and feeds.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "client/app/ctl_commands.h"
+#include "client/app/scenario/scenario_feed.h"
+#include "client/app/scenario/scenario_result.h"
+#include "client/app/scenario/scenario_viewer.h"
+#include "client/app/scenario/server_process.h"
+#include "common/scene/scenario.h"
+
+namespace strandcast {
+
+struct ScenarioOptions {
+  std::optional<CtlTarget> running;  // a server that runs already; none: one is started
+  std::filesystem::path server;      // the program that is started
+  std::filesystem::path out;         // folder for what failed
+  bool renews_goldens = false;       // pictures are written instead of compared
+  const std::atomic<bool>* stop = nullptr;
+};
+
+/// Told of every check as it is done.
+using CheckListener = std::function<void(const CheckResult&)>;
+
+/// Of a span of time that was stepped or run.
+struct MeasuredSpan {
+  double seconds = 0.0;    // simulated where it was stepped, else real
+  double realtime = -1.0;  // -1 = not measured
+  struct Seen {
+    ViewerCounts before;
+    ViewerLook after;
+  };
+  std::map<std::string, Seen> viewers;
+};
+
+class ScenarioRun {
+ public:
+  ScenarioRun(const Scenario& scenario, ScenarioOptions options, CheckListener listener);
+  ~ScenarioRun();
+
+  /// All actions in order, until one fails that the others need.
+  ScenarioResult run();
+
+ private:
+  struct State {  // of a check under way
+    std::string what, wanted, measured;
+    bool has_passed = false;
+  };
+  using Viewers = std::map<std::string, std::unique_ptr<ScenarioViewer>>;
+
+  Status carry_out(const ScenarioAction& action);
+  Status carry_out(const ScenarioStart& start);
+  Status carry_out(const ScenarioFeed& feed);
+  Status carry_out(const ScenarioSteps& steps);
+  Status carry_out(const ScenarioRunTime& run);
+  Status carry_out(const ScenarioSet& set);
+  Status carry_out(ScenarioCommand command);
+  Status carry_out(const ScenarioView& view);
+  Status carry_out(const ScenarioLeave& leave);
+  Status carry_out(const ScenarioRemember& remember);
+  Status carry_out(const ScenarioExpect& expect);
+  Status carry_out(const ScenarioRefusal& refusal);
+
+  // The connection that commands.
+  Status connect();
+  Result<ClientConfig> config_for(Role role) const;
+  Result<Notice> ask(const ClientMessage& message);
+  void take(const ClientEvent& event);
+  Result<std::string> metrics();
+  Status start_live_feed();
+
+  Status step_chunk(uint64_t tick);
+  void await_viewers(uint64_t tick, double patience_s);
+  void begin_span();
+  void end_span(double seconds, double realtime);
+  void trace();
+
+  Result<const ScenarioViewer*> viewer(const std::string& name) const;
+  void report(const std::string& what, const std::string& wanted, const std::string& measured,
+              bool has_passed);
+  void expect_span(const ScenarioExpect& expect);
+  void expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit);
+  void expect_picture(const ScenarioExpect& expect);
+  void expect_metric(const ScenarioMetric& metric);
+  void expect_back(const ScenarioExpect& expect);
+  void expect_state(const ScenarioExpect& expect);
+  void save_evidence();
+
+  double elapsed_s() const;
+  double left_s() const { return scenario_.limit_s - elapsed_s(); }
+  bool is_stopped() const { return options_.stop != nullptr && *options_.stop; }
+  /// An error when the time is over or somebody stops.
+  Status go_on() const;
+
+  const Scenario& scenario_;
+  const ScenarioOptions options_;
+  const CheckListener listener_;
+  const int64_t begin_ns_;
+  double last_check_s_ = 0.0;
+  int line_ = 0;  // of the action under way
+  ScenarioResult result_;
+
+  std::filesystem::path folder_;  // of the server's files; made, and removed at the end
+  std::unique_ptr<ServerProcess> server_;
+  bool is_lockstep_ = false;
+  std::unique_ptr<ViewerClient> client_;
+  bool is_admin_ = false;
+  std::optional<Error> lost_;  // why that connection is over
+  uint64_t tick_ = 0;          // of the last steps
+  std::optional<uint64_t> hash_;
+  std::map<std::string, uint64_t> remembered_;
+  ServerStatus status_;
+  int64_t status_ns_ = 0;  // of its arrival
+
+  Viewers viewers_;
+  std::vector<std::string> viewer_order_;
+  std::optional<FeedPlan> plan_;  // of now
+  std::optional<SteppedFeed> stepped_feed_;
+  std::unique_ptr<LiveFeed> live_feed_;
+  std::optional<MeasuredSpan> span_;
+  std::map<std::string, ViewerCounts> traced_;
+  double traced_s_ = 0.0;
+  int64_t restarted_ns_ = 0;
+  std::map<std::string, uint64_t> frames_at_restart_;
+  std::set<std::filesystem::path> renewed_;  // goldens
+};
+
+/// A picture of what a viewer has, as the viewer's window would draw it.
+Result<Image> draw(const ViewerPicture& picture, RenderSize size);
+
+}  // namespace strandcast

@@ -1,0 +1,163 @@
+#include "client/app/scenario/scenario_viewer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <utility>
+
+#include "client/app/step_speed.h"
+#include "client/app/view_options.h"
+#include "common/base/thread_name.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPumpWait{5};
+constexpr int64_t kReportNs = 1'000'000'000;
+constexpr double kBytesPerMbit = 125e3;
+constexpr double kUsPerMs = 1e3;
+
+Result<std::unique_ptr<chaos::ChaosRelay>> make_link(const ScenarioView& view, const Address& server) {
+  if (view.link_mbit <= 0.0 && view.delay_ms <= 0.0) return std::unique_ptr<chaos::ChaosRelay>();
+  chaos::RelayConfig config;
+  config.to_host = server.host;
+  config.to_port = server.port;
+  config.up.delay_us = config.down.delay_us = static_cast<int64_t>(view.delay_ms * kUsPerMs);
+  config.down.bytes_per_s = static_cast<uint64_t>(view.link_mbit * kBytesPerMbit);
+  return chaos::ChaosRelay::start(config);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ScenarioViewer>> ScenarioViewer::join(const ScenarioView& view, ClientConfig config) {
+  ASSIGN_OR_RETURN(auto relay, make_link(view, config.address));
+  if (relay != nullptr) config.address = {"127.0.0.1", relay->port(), config.address.is_tls};
+  ASSIGN_OR_RETURN(config.hello.mode, parse_mode(view.mode));
+  config.hello.name = "scenario " + view.name;
+  config.hello.frame_width = view.width;
+  config.hello.frame_height = view.height;
+  config.hello.codec_wish = view.codec;
+  config.hello.step_ns = measured_step_ns();
+  std::unique_ptr<ScenarioViewer> viewer(new ScenarioViewer(view, std::move(relay)));
+  auto joined = std::make_shared<std::promise<Status>>();
+  viewer->thread_ = std::thread([self = viewer.get(), config = std::move(config), joined] {
+    name_thread("viewer");
+    auto live = LiveConnection::open(config);
+    joined->set_value(live ? Status() : Status(live.error()));
+    if (live) self->run(**live);
+  });
+  const Status status = joined->get_future().get();
+  if (!status) return status.error();
+  return viewer;
+}
+
+ScenarioViewer::~ScenarioViewer() {
+  is_leaving_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+void ScenarioViewer::run(LiveConnection& live) {
+  watch(live.session());
+  int64_t reported_ns = 0;
+  while (!is_leaving_) {
+    const ViewerCounts before = counts_of(live.session());
+    if (live.pump(kPumpWait)) {
+      earlier_ = before;
+      watch(live.session());
+    }
+    note(live);
+    if (!live.is_connected() || now_ns() - reported_ns < kReportNs) continue;
+    reported_ns = now_ns();
+    ViewerReport report;
+    report.decode_ms = std::min(live.session().replay().decode_timer().median_ms(), kMaxReportedMs);
+    report.picture_decode_ms = std::min(live.session().picture_decode_timer().median_ms(), kMaxReportedMs);
+    // One that is lost is followed by the next.
+    (void)live.session().client().send(report);
+  }
+  live.session().set_snapshot_listener({});
+}
+
+void ScenarioViewer::watch(ViewerSession& session) {
+  measured_asset_.reset();
+  session.set_snapshot_listener([this, &session](const auto& state) { take(session, state); });
+}
+
+/// All sessions so far.
+ViewerCounts ScenarioViewer::counts_of(ViewerSession& session) const {
+  const ReplayStats& strands = session.replay().stats();
+  ViewerCounts counts = earlier_;
+  counts.frames += session.decoded_frames();
+  counts.strand_frames += strands.decoded_frames;
+  counts.strand_bytes += strands.received_bytes;
+  counts.received_bytes += session.client().counters().received_bytes;
+  counts.rejected_frames += strands.rejected_frames + session.picture_stats().rejected_frames;
+  return counts;
+}
+
+void ScenarioViewer::note(LiveConnection& live) {
+  ViewerSession& session = live.session();
+  const ViewerCounts counts = counts_of(session);
+  const std::string trouble = live.trouble();
+  const std::lock_guard lock(mutex_);
+  look_.counts = counts;
+  look_.is_connected = live.is_connected();
+  look_.trouble = trouble;
+  look_.mode = session.mode();
+  look_.mode_reason = session.mode_reason();
+  look_.rate_divisor = session.quality().rate_divisor;
+  look_.codec = session.welcome().codec;
+  picture_ = {session.shared_asset(), session.replay().newest(), session.shared_image(), session.look(),
+              session.mode()};
+}
+
+void ScenarioViewer::measure_rest(const std::shared_ptr<const SceneAsset>& asset) {
+  if (asset == measured_asset_ || asset == nullptr) return;
+  measured_asset_ = asset;
+  rest_length_m_.clear();
+  const size_t strands = asset->strand_count;
+  for (size_t i = 0; i + strands < asset->rest_position_m.size(); ++i)
+    rest_length_m_.push_back(glm::distance(asset->rest_position_m[i], asset->rest_position_m[i + strands]));
+}
+
+void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state) {
+  measure_rest(session.shared_asset());
+  double stretch = 0.0, grain = 0.0;
+  const std::vector<glm::vec3> position_m = positions_in_head(*state);
+  const size_t sent = state->strand_count;
+  const double bound_m = static_cast<double>(session.quality().bound_m);
+  for (uint32_t vertex = 0; measured_asset_ != nullptr && vertex + 1 < state->vertex_count; ++vertex) {
+    for (size_t strand = 0; strand < sent; ++strand) {
+      const double rest_m =
+          static_cast<double>(rest_length_m_[vertex * measured_asset_->strand_count + strand]);
+      if (rest_m <= 0.0) continue;
+      const size_t i = vertex * sent + strand;
+      const double length_m = static_cast<double>(glm::distance(position_m[i], position_m[i + sent]));
+      stretch = std::max(stretch, length_m / rest_m - 1.0);
+      grain = std::max(grain, 2.0 * bound_m / rest_m);
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  look_.tick = state->tick;
+  look_.vertices = state->strand_count * state->vertex_count;
+  look_.largest_stretch = std::max(look_.largest_stretch, stretch);
+  look_.stretch_grain = grain;
+}
+
+ViewerLook ScenarioViewer::look() const {
+  const std::lock_guard lock(mutex_);
+  return look_;
+}
+
+ViewerPicture ScenarioViewer::picture() const {
+  const std::lock_guard lock(mutex_);
+  return picture_;
+}
+
+void ScenarioViewer::begin_measure() {
+  const std::lock_guard lock(mutex_);
+  look_.largest_stretch = 0.0;
+}
+
+}  // namespace strandcast

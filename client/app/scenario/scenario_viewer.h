@@ -1,0 +1,94 @@
+// ScenarioViewer: a viewer of a scenario on a thread of its own: decodes all that it gets, comes back after
+// the server was away, and measures. Its link may be a slow one (common/chaos).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/app/live_connection.h"
+#include "client/app/viewer_session.h"
+#include "client/net/viewer_client.h"
+#include "common/chaos/chaos_relay.h"
+#include "common/scene/scenario.h"
+
+namespace strandcast {
+
+/// Totals since it joined; of two looks the difference counts.
+struct ViewerCounts {
+  uint64_t frames = 0;  // decoded, strands and pictures
+  uint64_t strand_frames = 0;
+  uint64_t strand_bytes = 0;
+  uint64_t received_bytes = 0;  // of all messages
+  uint64_t rejected_frames = 0;
+};
+
+/// What it has at one moment.
+struct ViewerLook {
+  ViewerCounts counts;
+  bool is_connected = false;
+  std::string trouble;  // why not
+  StreamMode mode = StreamMode::Strands;
+  std::string mode_reason;
+  uint64_t tick = 0;  // of the newest decoded state of strands
+  uint32_t rate_divisor = 1;
+  uint32_t vertices = 0;         // of a state of strands
+  double largest_stretch = 0.0;  // since begin_measure()
+  double stretch_grain = 0.0;    // no finer than this is seen, through the bound of the stream
+  std::string codec;
+};
+
+/// What a picture is drawn of.
+struct ViewerPicture {
+  std::shared_ptr<const SceneAsset> asset;
+  std::shared_ptr<const Snapshot> state;  // of strands
+  std::shared_ptr<const Image> image;     // of the server
+  LookChange look;
+  StreamMode mode = StreamMode::Strands;
+};
+
+class ScenarioViewer {
+ public:
+  /// Connects, through a relay where the link is limited; errors as ViewerSession::open.
+  static Result<std::unique_ptr<ScenarioViewer>> join(const ScenarioView& view, ClientConfig config);
+  ~ScenarioViewer();
+  ScenarioViewer(const ScenarioViewer&) = delete;
+  ScenarioViewer& operator=(const ScenarioViewer&) = delete;
+
+  // From any thread.
+  const ScenarioView& view() const { return view_; }
+  ViewerLook look() const;
+  ViewerPicture picture() const;
+  /// The largest stretch counts from now on.
+  void begin_measure();
+
+ private:
+  ScenarioViewer(ScenarioView view, std::unique_ptr<chaos::ChaosRelay> relay)
+      : view_(std::move(view)), relay_(std::move(relay)) {}
+  void run(LiveConnection& live);
+  void watch(ViewerSession& session);
+  ViewerCounts counts_of(ViewerSession& session) const;
+  void note(LiveConnection& live);
+  void take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state);
+  void measure_rest(const std::shared_ptr<const SceneAsset>& asset);
+
+  const ScenarioView view_;
+  const std::unique_ptr<chaos::ChaosRelay> relay_;  // null: straight to the server
+
+  // Of the thread.
+  ViewerCounts earlier_;  // of sessions that broke
+  std::shared_ptr<const SceneAsset> measured_asset_;
+  std::vector<float> rest_length_m_;  // (vertex_count - 1 x strand_count)
+
+  mutable std::mutex mutex_;  // guards the two below
+  ViewerLook look_;
+  ViewerPicture picture_;
+  std::atomic<bool> is_leaving_{false};
+  std::thread thread_;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,140 @@
+#include "client/app/scenario/server_process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <thread>
+#include <utility>
+
+#include "common/base/file.h"
+#include "common/base/profile.h"
+#include "common/base/text.h"
+
+extern char** environ;
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPoll{10};
+constexpr milliseconds kEndTimeout{8'000};  // from the wish to the kill
+constexpr int kRestarts = 20;               // the port may be taken for a moment
+constexpr milliseconds kRestartPause{100};
+constexpr uint64_t kMaxPortFileBytes = 64;
+constexpr size_t kMaxShownChars = 300;
+
+}  // namespace
+
+Status ServerProcess::spawn() {
+  std::error_code ignored;
+  std::filesystem::remove(config_.folder / "port", ignored);
+  std::vector<std::string> words{config_.program.string()};
+  words.insert(words.end(), config_.arguments.begin(), config_.arguments.end());
+  const std::vector<std::string> own{
+      "--port",       std::to_string(port_), "--port-file", (config_.folder / "port").string(),
+      "--token-file", token_file().string(), "--seconds",   fmt::format("{:.1f}", config_.lifetime_s)};
+  words.insert(words.end(), own.begin(), own.end());
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  constexpr mode_t kOwnerOnly = 0600;  // new tokens are shown on the standard output
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log_file().c_str(), O_WRONLY | O_CREAT | O_APPEND,
+                                   kOwnerOnly);
+  // A group of its own: Ctrl-C is for us, and we end it.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  const int failure =
+      posix_spawn(&process_, config_.program.c_str(), &actions, &attributes, pointers.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failure == 0) return {};
+  process_ = -1;
+  return make_error(ErrorCode::NotFound, "cannot start {}: {} (--server PATH names the program)",
+                    config_.program.string(), std::strerror(failure));
+}
+
+bool ServerProcess::has_ended() {
+  if (process_ < 0) return true;
+  if (waitpid(process_, nullptr, WNOHANG) != process_) return false;
+  process_ = -1;
+  return true;
+}
+
+/// What it said last, for a person.
+std::string ServerProcess::last_line() const {
+  std::ifstream log(log_file());
+  std::string last = "it said nothing";
+  for (std::string line; std::getline(log, line);)
+    if (!line.empty()) last = line;
+  return excerpt(last, kMaxShownChars);
+}
+
+Status ServerProcess::wait_for_port(double timeout_s, const std::atomic<bool>& stop) {
+  const int64_t end_ns = now_ns() + static_cast<int64_t>(timeout_s * 1e9);
+  while (true) {
+    if (const auto text = load_text(config_.folder / "port", kMaxPortFileBytes); text && !text->empty()) {
+      uint16_t port = 0;
+      if (std::from_chars(text->data(), text->data() + text->size(), port).ec == std::errc() && port != 0) {
+        port_ = port;
+        return {};
+      }
+    }
+    if (has_ended()) return make_error(ErrorCode::Unavailable, "the server did not start: {}", last_line());
+    if (stop) return make_error(ErrorCode::Unavailable, "stopped while the server started");
+    if (now_ns() >= end_ns)
+      return make_error(ErrorCode::Timeout, "the server did not serve within {:.0f} s: {}", timeout_s,
+                        last_line());
+    std::this_thread::sleep_for(kPoll);
+  }
+}
+
+Status ServerProcess::start(double timeout_s, const std::atomic<bool>& stop) {
+  RETURN_IF_ERROR(spawn());
+  Status served = wait_for_port(timeout_s, stop);
+  if (!served) this->stop();
+  return served;
+}
+
+Status ServerProcess::restart(double timeout_s, const std::atomic<bool>& stop) {
+  if (process_ >= 0) {
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+    process_ = -1;
+  }
+  Status started;
+  for (int i = 0; i < kRestarts && !stop; ++i) {
+    started = start(timeout_s, stop);
+    if (started || started.error().code == ErrorCode::Timeout) break;
+    std::this_thread::sleep_for(kRestartPause);
+  }
+  return started;
+}
+
+void ServerProcess::stop() {
+  if (has_ended()) return;
+  kill(process_, SIGTERM);
+  const int64_t end_ns = now_ns() + std::chrono::nanoseconds(kEndTimeout).count();
+  while (now_ns() < end_ns) {
+    if (has_ended()) return;
+    std::this_thread::sleep_for(kPoll);
+  }
+  kill(process_, SIGKILL);
+  waitpid(process_, nullptr, 0);
+  process_ = -1;
+}
+
+}  // namespace strandcast

@@ -1,0 +1,54 @@
+// ServerProcess: strandcast-server as a child, on a free port, with tokens of its own, its output in a file.
+// It always ends with its owner. One thread.
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace strandcast {
+
+struct ServerProcessConfig {
+  std::filesystem::path program;
+  std::vector<std::string> arguments;  // all but port, files and lifetime
+  std::filesystem::path folder;        // its port file, token file and output; exists
+  double lifetime_s = 3'600.0;         // it ends by itself after so long, whatever becomes of us
+};
+
+class ServerProcess {
+ public:
+  explicit ServerProcess(ServerProcessConfig config) : config_(std::move(config)) {}
+  ~ServerProcess() { stop(); }
+  ServerProcess(const ServerProcess&) = delete;
+  ServerProcess& operator=(const ServerProcess&) = delete;
+
+  /// Starts it and waits until it serves. Its own sentence when it ends instead, Timeout, or Unavailable
+  /// when `stop` is set.
+  Status start(double timeout_s, const std::atomic<bool>& stop);
+  /// Kills it and starts it again on the same port.
+  Status restart(double timeout_s, const std::atomic<bool>& stop);
+  /// Asks it to end, and kills it when it does not.
+  void stop();
+
+  bool has_ended();
+  uint16_t port() const { return port_; }
+  std::filesystem::path token_file() const { return config_.folder / "tokens"; }
+  std::filesystem::path log_file() const { return config_.folder / "server.log"; }
+
+ private:
+  Status spawn();
+  Status wait_for_port(double timeout_s, const std::atomic<bool>& stop);
+  std::string last_line() const;
+
+  const ServerProcessConfig config_;
+  pid_t process_ = -1;  // -1 = none
+  uint16_t port_ = 0;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,127 @@
+// strandcast-ctl test as a person meets it: exit codes, what it prints, what it leaves, and that no server is
+// left behind.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "tests/support/child_process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+class ScenarioProgram : public testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& name, const std::string& text) {
+    const std::filesystem::path path = folder_.path() / name;
+    std::ofstream(path) << text;
+    return path;
+  }
+  /// Its exit code.
+  int run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "test");
+    arguments.insert(arguments.end(),
+                     {"--server", STRANDCAST_SERVER_PROGRAM, "--out", (folder_.path() / "out").string(),
+                      "--junit", (folder_.path() / "results.xml").string()});
+    return test::ChildProcess(STRANDCAST_CTL_PROGRAM, arguments, folder_.path() / "said").wait();
+  }
+  std::string text_of(const std::string& name) const {
+    std::ifstream file(folder_.path() / name);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+
+  TemporaryFolder folder_;
+};
+
+constexpr const char* kStart = "do { start { set: \"groom.procedural.strand_count=20\" lockstep: true } }\n";
+
+TEST_F(ScenarioProgram, SaysWhatHoldsAndLeavesXml) {
+  const auto path =
+      write("good.textproto", std::string("name: \"good\" about: \"it <works>\" repeat: 2\n") + kStart +
+                                  "do { feed { motion: \"shake\" } }\n"
+                                  "do { view { name: \"a\" } }\n"
+                                  "do { step: 12 }\n"
+                                  "do { remember: \"here\" }\n"
+                                  "do { expect { same_as: \"here\" no_quarantine: true } }\n"
+                                  "do { expect { stretch_below: 0.5 hz_above: 1 } }\n"
+                                  "do { refuse { set: \"substeps=0\" says: \"must be within\" } }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 0) << text_of("said");
+  EXPECT_THAT(text_of("said"),
+              AllOf(HasSubstr("good: it <works>"), HasSubstr("ok    line 7"), HasSubstr("stretch of a"),
+                    HasSubstr("states of run 2: wanted those of the first run"), Not(HasSubstr("FAIL"))));
+  EXPECT_THAT(text_of("results.xml"), AllOf(HasSubstr("<testsuites tests=\"13\" failures=\"0\">"),
+                                            HasSubstr("<testsuite name=\"good\" tests=\"13\"")));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out")) << "nothing failed";
+}
+
+TEST_F(ScenarioProgram, AnExpectationThatFailsIsExitCodeOneWithEvidence) {
+  const auto path = write(
+      "bad.textproto", std::string("name: \"bad\"\n") + kStart +
+                           "do { view { name: \"a\" width: 64 height: 48 } }\n"
+                           "do { step: 6 }\n"
+                           "do { expect { hash: \"1\" hz_above: 1e6 } }\n"
+                           "do { expect { metric { name: \"no_such\" above: 0 } } }\n"
+                           "do { refuse { set: \"substeps=2\" } }\n"
+                           "do { expect { metric { name: \"strandcast_sim_steps_total\" equals: 6 } } }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 1) << text_of("said");
+  EXPECT_THAT(text_of("said"),
+              AllOf(HasSubstr("FAIL  line 5    state at step 6: wanted 0000000000000001"),
+                    HasSubstr("FAIL  line 5    frames per second of a: wanted above 1e+06"),
+                    HasSubstr("FAIL  line 6    no_such"), HasSubstr("FAIL  line 7    set substeps=2"),
+                    HasSubstr("ok    line 8"), HasSubstr("bad: 1 of 5 checks hold")));
+  EXPECT_THAT(text_of("results.xml"), HasSubstr("failures=\"4\""));
+  EXPECT_THAT(text_of("out/bad_plot.svg"), HasSubstr("largest stretch"));
+  EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/bad_a.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder_.path() / "out/bad_server.log"));
+}
+
+// What is needed for the rest is not there: the rest is not done, and the limit ends what would take for
+// ever.
+TEST_F(ScenarioProgram, TroubleEndsAScenarioAndIsAFailure) {
+  const auto refused = write("refused.textproto", std::string("name: \"refused\"\n") + kStart +
+                                                      "do { set: \"substeps=0\" }\ndo { step: 1 }\n");
+  EXPECT_EQ(run({"--scenario", refused.string()}), 1);
+  EXPECT_THAT(text_of("said"), AllOf(HasSubstr("FAIL  line 3"), HasSubstr("the server refused substeps=0"),
+                                     HasSubstr("refused: 0 of 1 checks hold")));
+  const auto endless = write("endless.textproto",
+                             std::string("name: \"endless\" limit_s: 2\n") + kStart + "do { run_s: 3000 }\n");
+  EXPECT_EQ(run({"--scenario", endless.string()}), 1);
+  EXPECT_THAT(text_of("said"), HasSubstr("the scenario's limit of 2 s is over"));
+  const auto broken =
+      write("broken.textproto",
+            "name: \"broken\"\ndo { start { set: \"solver.name=spaghetti\" } }\ndo { step: 1 }\n");
+  EXPECT_EQ(run({"--scenario", broken.string()}), 1);
+  EXPECT_THAT(text_of("said"), AllOf(HasSubstr("the server did not start"), HasSubstr("known: dftl")));
+}
+
+TEST_F(ScenarioProgram, AWrongFileIsExitCodeTwoAndOneSentence) {
+  const auto path = write("typo.textproto", "name: \"typo\"\ndo { stepp: 1 }\n");
+  EXPECT_EQ(run({"--scenario", path.string()}), 2);
+  EXPECT_THAT(text_of("said"), AllOf(HasSubstr("typo.textproto:2:6"), HasSubstr("known: start, feed, step")));
+  EXPECT_EQ(run({"--scenario", "/no/such/file"}), 2);
+  EXPECT_THAT(text_of("said"), HasSubstr("/no/such/file"));
+}
+
+// What ships for people to begin with, as they run it.
+class ShippedScenario : public ScenarioProgram, public testing::WithParamInterface<const char*> {};
+
+TEST_P(ShippedScenario, Holds) {
+  const std::filesystem::path path = std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy/scenarios" /
+                                     (std::string(GetParam()) + ".textproto");
+  EXPECT_EQ(run({"--scenario", path.string()}), 0) << text_of("said");
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedScenario,
+                         testing::Values("calm_stream", "hostile", "look", "pace", "restart", "same_bits",
+                                         "shake", "thin_line"),
+                         [](const auto& one) { return std::string(one.param); });
+
+}  // namespace
+}  // namespace strandcast

@@ -1,0 +1,134 @@
+// Scenario files: what is read, and how wrong ones are told.
+#include <set>
+
+#include "common/scene/scenario_file.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+Result<Scenario> parse(const std::string& text) {
+  return parse_scenario(text, "test.textproto", "/folder");
+}
+
+TEST(ScenarioFile, ReadsActionsInOrderWithTheirLines) {
+  const auto scenario = parse(R"(name: "all"
+about: "a promise"
+limit_s: 12.5
+repeat: 2
+do { start { scene: "../scenes/minimal.textproto" set: "substeps=2" lockstep: true option: "--sim-device" } }
+do { feed { motion: "walk.bvh" wind: "steady" wind_mps { x: 2 } from_s: 1.5 } }
+do { step: 240 }
+do { run_s: 0.5 }
+do { set: "look.hair_color=red" }
+do { command: RESTART }
+do { view { name: "thin" mode: "auto" link_mbit: 2 delay_ms: 20 width: 64 height: 48 codec: "step" } }
+do { leave: "thin" }
+do { refuse { input: NOT_A_NUMBER says: "nan" } }
+do { remember: "here" }
+do { expect { viewer: "thin" stretch_below: 0.01 no_quarantine: true hash: "00ff" same_as: "here" kbit_below: 3
+  hz_above: 10 mode: "frames" back_within_s: 5 realtime_above: 0.95 bits_per_vertex_below: 2
+  picture { golden: "a.png" db_above: 30 } metric { name: "x" above: 1 within_s: 2 } } }
+)");
+  ASSERT_TRUE(scenario) << scenario.error().to_string();
+  EXPECT_EQ(scenario->name, "all");
+  EXPECT_EQ(scenario->about, "a promise");
+  EXPECT_EQ(scenario->limit_s, 12.5);
+  EXPECT_EQ(scenario->repeat, 2u);
+  ASSERT_EQ(scenario->actions.size(), 11u);
+  EXPECT_EQ(scenario->actions[0].line, 5);
+  EXPECT_EQ(scenario->actions[10].line, 15);
+  const auto& start = std::get<ScenarioStart>(scenario->actions[0].work);
+  EXPECT_EQ(start.scene, "/scenes/minimal.textproto") << "from the scenario's folder";
+  EXPECT_EQ(start.overrides, std::vector<std::string>{"substeps=2"});
+  EXPECT_TRUE(start.is_lockstep);
+  EXPECT_EQ(start.options, std::vector<std::string>{"--sim-device"});
+  const auto& feed = std::get<ScenarioFeed>(scenario->actions[1].work);
+  EXPECT_EQ(feed.motion, "/folder/walk.bvh");
+  EXPECT_EQ(feed.wind, "steady") << "a word is no file";
+  EXPECT_EQ(feed.wind_mps, glm::vec3(2.0f, 0.0f, 1.0f)) << "what is missing keeps its default";
+  EXPECT_EQ(feed.from_s, 1.5);
+  EXPECT_EQ(std::get<ScenarioSteps>(scenario->actions[2].work).count, 240u);
+  EXPECT_EQ(std::get<ScenarioRunTime>(scenario->actions[3].work).seconds, 0.5);
+  EXPECT_EQ(std::get<ScenarioSet>(scenario->actions[4].work).assignment, "look.hair_color=red");
+  EXPECT_EQ(std::get<ScenarioCommand>(scenario->actions[5].work), ScenarioCommand::Restart);
+  const auto& view = std::get<ScenarioView>(scenario->actions[6].work);
+  EXPECT_EQ(view.link_mbit, 2.0);
+  EXPECT_EQ(view.codec, "step");
+  EXPECT_EQ(view.height, 48u);
+  EXPECT_EQ(std::get<ScenarioLeave>(scenario->actions[7].work).viewer, "thin");
+  EXPECT_EQ(std::get<ScenarioRefusal>(scenario->actions[8].work).input, ScenarioInput::NotANumber);
+  EXPECT_EQ(std::get<ScenarioRemember>(scenario->actions[9].work).name, "here");
+  const auto& expect = std::get<ScenarioExpect>(scenario->actions[10].work);
+  EXPECT_EQ(expect.hash, 0xffu);
+  EXPECT_EQ(expect.stretch_below, 0.01);
+  EXPECT_EQ(expect.picture->golden, "/folder/a.png");
+  EXPECT_EQ(expect.metric->above, 1.0);
+  EXPECT_FALSE(expect.metric->below);
+  EXPECT_EQ(expect.mode, "frames");
+}
+
+TEST(ScenarioFile, SaysWhereItIsWrong) {
+  const std::string head = "name: \"x\"\n";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {head + "do { step: 0 }", "test.textproto:2:6: step is 0, it must be within 1 .. 100000 steps"},
+      {head + "do {\n  run_s: nan\n}", "test.textproto:3:3: run_s is nan"},
+      {head + "do { expect { stretch_under: 1 } }", "test.textproto:2:30: "},
+      {head + "do { expect { stretch_under: 1 } }", "known: viewer, stretch_below"},
+      {head + "do { view { mode: \"both\" } }", "must be one of strands, frames, auto"},
+      {head + "do { view { link_mbit: -2 } }", "link_mbit is -2"},
+      {head + "do { expect { hash: \"xyz\" } }", "16 hexadecimal digits"},
+      {head + "do { expect { metric { name: \"a\" } } }", "below, above or equals"},
+      {head + "do { expect { picture { db_above: 3 } } }", "golden"},
+      {head + "do { refuse { says: \"no\" } }", "either an input or a set"},
+      {head + "do { refuse { input: OVERLONG set: \"a=1\" } }", "either an input or a set"},
+      {head + "do { command: NONE }", "command is none of its values"},
+      {head + "do { }", "says nothing to do"},
+      {head + "do { step: 1 step: 2 }", "test.textproto:2:"},
+      {head + "do { set: \"a\\nb\" }", "printable"},
+      {head + "repeat: 11 do { step: 1 }", "repeat is 11"},
+      {head + "limit_s: 0 do { step: 1 }", "limit_s is 0"},
+      {head, "the scenario does nothing"},
+      {"do { step: 1 }", "the scenario has no name"},
+      {"name", "test.textproto:1:5"}};
+  for (const auto& [text, part] : cases) {
+    const auto scenario = parse(text);
+    ASSERT_FALSE(scenario) << text;
+    EXPECT_EQ(scenario.error().code, ErrorCode::BadInput) << text;
+    EXPECT_THAT(scenario.error().to_string(), HasSubstr(part)) << text;
+    EXPECT_THAT(scenario.error().to_string(), StartsWith("test.textproto")) << text;
+  }
+}
+
+TEST(ScenarioFile, IsBounded) {
+  std::string many = "name: \"x\"\n";
+  for (size_t i = 0; i <= kMaxScenarioActions; ++i) many += "do { step: 1 }\n";
+  EXPECT_THAT(parse(many).error().to_string(), HasSubstr("do has 1001 entries, the limit is 1000"));
+  const std::string long_text = "name: \"x\"\n" + std::string(kMaxScenarioFileBytes, '#');
+  EXPECT_EQ(parse(long_text).error().code, ErrorCode::LimitExceeded);
+}
+
+// One promise each, and none that a person could not run: every picture to compare with is there.
+TEST(ScenarioFile, EveryShippedScenarioParses) {
+  const std::filesystem::path folder = std::filesystem::path(STRANDCAST_SOURCE_DIR) / "deploy" / "scenarios";
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".textproto") continue;
+    const auto scenario = load_scenario(entry.path());
+    ASSERT_TRUE(scenario) << scenario.error().to_string();
+    EXPECT_EQ(scenario->name, entry.path().stem().string());
+    EXPECT_FALSE(scenario->about.empty()) << scenario->name;
+    EXPECT_TRUE(names.insert(scenario->name).second);
+    for (const ScenarioAction& action : scenario->actions) {
+      const auto* expect = std::get_if<ScenarioExpect>(&action.work);
+      if (expect == nullptr || !expect->picture) continue;
+      EXPECT_TRUE(std::filesystem::exists(expect->picture->golden)) << expect->picture->golden;
+    }
+  }
+  EXPECT_EQ(names.size(), 8u);
+}
+
+}  // namespace
+}  // namespace strandcast
