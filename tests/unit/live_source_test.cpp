@@ -168,6 +168,37 @@ TEST(LiveSource, AHeadIsChosenElseTheFirst) {
   EXPECT_EQ(source->status(time_ns).subject, "waist");
 }
 
+TEST(LiveSource, ThePerformersHeadGoesBeforeTrackers) {
+  const auto source = make({.protocol = "vmc"});
+  (void)source->take(kFirst, tracker("LHR-1", 1.0f), kStart);
+  EXPECT_EQ(source->status(kStart).subject, "LHR-1");
+  for (int i = 1; i < 5; ++i) {
+    (void)source->take(kFirst, test::vmc_head({0, 1.6f, 0}, {0, 0, 0, 1}, 0.01f * static_cast<float>(i)),
+                       kStart + i * 10 * kMs);
+    (void)source->take(kFirst, tracker("LHR-1", 1.0f), kStart + i * 10 * kMs + kMs);
+  }
+  EXPECT_EQ(source->status(kStart + 50 * kMs).subject, "(no name)");
+  const auto seen = places(source->advance(kStart + 50 * kMs));
+  ASSERT_FALSE(seen.empty());
+  EXPECT_NEAR(seen.back().y, 1.6, 1e-6);
+}
+
+TEST(LiveSource, ASkeletonsHeadIsAHead) {
+  const auto source = make({.protocol = "natnet"});
+  (void)source->take(kFirst, test::natnet_server(3, 1), kStart);
+  (void)source->take(kFirst, test::natnet_names("3.1", {{7, "Sword"}}, {{1, "Hips"}, {2, "Head"}}), kStart);
+  test::NatnetPacket packet;
+  packet.bodies = {{.id = 7, .position_m = {2, 1, 0}}};
+  packet.bones = {{.id = 1, .position_m = {0, 1, 0}}, {.id = 2, .position_m = {0, 1.7f, 0}}};
+  for (uint32_t i = 0; i < 3; ++i) {
+    packet.frame = 10 + i;
+    packet.time_s = 0.01 * i;
+    (void)source->take(kFirst, test::natnet(packet), kStart + i * 10 * kMs);
+  }
+  EXPECT_EQ(source->status(kStart + 30 * kMs).subject, "Actor/Head");
+  EXPECT_THAT(source->status(kStart + 30 * kMs).subjects, HasSubstr("Sword"));
+}
+
 TEST(LiveSource, ANamedSubjectIsWaitedFor) {
   const auto source = make({.protocol = "freed", .subject = "2"});
   int64_t time_ns = kStart;

@@ -17,9 +17,12 @@ constexpr double kJitterShare = 1.0 / 16.0;  // of the newest packet, as in RFC 
 constexpr size_t kMaxNotes = 32;             // until they are taken
 constexpr size_t kMaxNoteChars = 200;
 
+/// What a protocol gives no name is the head that it is about (VMC: the performer's, beside trackers by
+/// name); else "head" in whatever case, of a skeleton too ("Actor/Head").
 bool is_head(std::string name) {
+  name.erase(0, name.rfind('/') + 1);
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
-  return name == "head";
+  return name.empty() || name == "head";
 }
 
 const LiveProtocol* find_protocol(const std::string& name) {
@@ -38,9 +41,8 @@ LiveParserConfig parser_config(const LiveDesc& live) {
   return config;
 }
 
-/// For people: protocols of one subject give it no name.
 std::string shown(const std::string& name) {
-  return name.empty() ? "(the only one)" : name;
+  return name.empty() ? "(no name)" : name;
 }
 
 }  // namespace
@@ -215,7 +217,7 @@ void LiveSource::follow_subject(int64_t now_ns) {
   if (wanted == subject_) return;
   subject_ = wanted;
   policy_.begin_another();
-  if (subject_ && subject_->empty()) return;  // there is nobody else
+  if (subject_ && subject_->empty() && subjects_.size() == 1) return;  // there is nobody else
   notes_.push_back({false, subject_ ? fmt::format("{}: {} drives the head", describe(), shown(*subject_))
                                     : fmt::format("{}: waits for {}", describe(), live_.subject)});
 }

@@ -5,9 +5,8 @@
 // * The first address and port whose packet has a pose or wind is heard until nothing that can be read came
 //   from it for kMotionStaleNs; packets of others are refused meanwhile, unread.
 // * At most kMaxSampleRateHz packets (input_hub.h) and kMaxLiveBytesPerS are read.
-// * The subject that drives the head: the one that was named; else one called head, in whatever case; else
-// the
-//   first that was seen, as long as it is.
+// * The subject that drives the head: the one that was named; else one without a name or called head, in
+//   whatever case; else the first that was seen, as long as it is.
 #pragma once
 
 #include <memory>
