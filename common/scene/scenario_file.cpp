@@ -136,10 +136,11 @@ class Part {
     return tree_ ? tree_->GetLocation(&field(name), index).line + 1 : 0;
   }
 
-  void fail(const char* name, const std::string& sentence) const {
+  /// `index`: of an element of a list.
+  void fail(const char* name, const std::string& sentence, int index = 0) const {
     if (findings_.error) return;
     const auto& descriptor = field(name);
-    const auto location = tree_ ? tree_->GetLocation(&descriptor, descriptor.is_repeated() ? 0 : -1)
+    const auto location = tree_ ? tree_->GetLocation(&descriptor, descriptor.is_repeated() ? index : -1)
                                 : pb::TextFormat::ParseLocation();
     const std::string place =
         location.line < 0 ? findings_.place : place_at(findings_.place, location.line, location.column);
@@ -325,7 +326,7 @@ Scenario ScenarioReader::read(const Part& file) const {
     file.fail("do", fmt::format("has {} entries, the limit is {}", count, kMaxScenarioActions));
   for (int i = 0; i < std::min(count, static_cast<int>(kMaxScenarioActions)); ++i) {
     ScenarioAction action = read_action(file.element("do", i));
-    if (action.line < 0) file.fail("do", fmt::format("number {} says nothing to do", i + 1));
+    if (action.line < 0) file.fail("do", fmt::format("number {} says nothing to do", i + 1), i);
     action.line = file.line("do", i);
     scenario.actions.push_back(std::move(action));
   }

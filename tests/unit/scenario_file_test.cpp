@@ -75,7 +75,7 @@ TEST(ScenarioFile, SaysWhereItIsWrong) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {head + "do { step: 0 }", "test.textproto:2:6: step is 0, it must be within 1 .. 100000 steps"},
       {head + "do {\n  run_s: nan\n}", "test.textproto:3:3: run_s is nan"},
-      {head + "do { expect { stretch_under: 1 } }", "test.textproto:2:30: "},
+      {head + "do { expect { stretch_under: 1 } }", "test.textproto:2:28: "},
       {head + "do { expect { stretch_under: 1 } }", "known: viewer, stretch_below"},
       {head + "do { view { mode: \"both\" } }", "must be one of strands, frames, auto"},
       {head + "do { view { link_mbit: -2 } }", "link_mbit is -2"},

@@ -84,7 +84,7 @@ int run_test(const CtlTarget& target, const TestOptions& options, const std::ato
   size_t failed = 0;
   for (const Scenario& scenario : scenarios) {
     if (stop) break;
-    std::cout << fmt::format("{}: {}", scenario.name, scenario.about) << std::endl;
+    std::cout << scenario.name << (scenario.about.empty() ? "" : ": ") << scenario.about << std::endl;
     results.push_back(run_scenario(scenario, run));
     const ScenarioResult& result = results.back();
     failed += result.failed_count();

@@ -12,7 +12,7 @@ namespace strandcast {
 struct TestOptions {
   std::vector<std::filesystem::path> scenarios;
   std::filesystem::path junit;  // empty = none
-  std::filesystem::path out = "test-out";
+  std::filesystem::path out = "out/test";
   std::filesystem::path server;  // empty: strandcast-server beside this program
   bool uses_running = false;     // the target's server instead of one of its own
   bool renews_goldens = false;
