@@ -1,9 +1,8 @@
 // Makes the page's files what the server has of them (server/net/page.h): names with a hash of the content where the
 // browser may keep them for good, and everything compressed besides.
-//   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css APP.js WORKER.js KERNEL=CORE.wasm ...
-// Of the index, @ASSETS@ becomes {"worker", "core", "kernels": {KERNEL: ...}} with the names of these files, as JSON in an
-// attribute, and the names of the style and the script become theirs. "core" is the first one, which the page begins
-// with. Prints what each file takes.
+//   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm WHOLE.wasm
+// Of the index, @ASSETS@ becomes {"core", "wholeCore"} with the names of both modules, as JSON in an attribute, and the names
+// of the style, the script and the module that the page begins with become theirs. Prints what each file takes.
 import crypto from 'node:crypto';
 import fs from 'node:fs';
 import path from 'node:path';
@@ -18,9 +17,9 @@ const MEDIA_TYPES = {
   '.wasm': 'application/wasm',
 };
 
-const [out, index, style, app, worker, ...modules] = process.argv.slice(2);
-if (!modules.length) {
-  console.error('usage: node pack_page.mjs OUT.cpp INDEX.html STYLE.css APP.js WORKER.js KERNEL=CORE.wasm ...');
+const [out, index, style, script, first, whole] = process.argv.slice(2);
+if (!whole) {
+  console.error('usage: node pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm WHOLE.wasm');
   process.exit(2);
 }
 const files = [];
@@ -41,15 +40,11 @@ function replaceOnce(text, what, by) {
   return text.replace(what, () => by);
 }
 
-const assets = { worker: addHashed(worker), core: '', kernels: {} };
-for (const module of modules) {
-  const [kernel, file] = module.split('=');
-  assets.kernels[kernel] = addHashed(file);
-  assets.core ||= assets.kernels[kernel];
-}
+const assets = { core: addHashed(first), wholeCore: addHashed(whole) };
 let page = fs.readFileSync(index, 'utf8');
 page = replaceOnce(page, '@ASSETS@', attribute(JSON.stringify(assets)));
-page = replaceOnce(page, 'src="app.js"', `src="${addHashed(app)}"`);
+page = replaceOnce(page, 'src="main.js"', `src="${addHashed(script)}"`);
+page = replaceOnce(page, 'href="strand_page.wasm"', `href="${assets.core}"`);
 page = replaceOnce(page, 'href="style.css"', `href="${addHashed(style)}"`);
 add(index, Buffer.from(page), '/');
 

@@ -17,12 +17,14 @@ done
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-for module in "$build"/web/bin/strand_core*.wasm "$build"/web/page/*.js; do
+for module in "$build"/web/bin/strand_*.wasm "$build"/web/page/*.js; do
   echo "$(basename "$module"): $(stat -c %s "$module") bytes, $(gzip -9 -c "$module" | wc -c) compressed"
 done
 for stream in "dftl step 2000x16" "dftl step 10000x16" "direct_rod step 2000x16" "direct_rod step 10000x16" \
   "dftl tangent 2000x16" "dftl tangent 10000x16"; do
   # shellcheck disable=SC2086
   "$build/bin/record_tapes" stream "$work/tape" $stream "$frames"
-  node tests/web/play.mjs "$build/web/bin/strand_core_${stream%% *}.wasm" "$work/tape" | head -n 1
+  module=strand_core
+  [ "${stream%% *}" != dftl ] || module=strand_page
+  node tests/web/play.mjs "$build/web/bin/$module.wasm" "$work/tape" | head -n 1
 done

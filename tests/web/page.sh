@@ -10,6 +10,6 @@ done
 tsc --project "$here/../../client/web/page"
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
-esbuild "$here/page_parts.ts" --bundle --format=esm --target=es2022 --loader:.glsl=text --loader:.h=text \
+NODE_PATH="$here/../.." esbuild "$here/page_parts.ts" --bundle --format=esm --target=es2022 --loader:.glsl=text --loader:.h=text \
   --log-level=warning --outfile="$work/page.mjs"
 "$node" "$here/page.test.mjs" "$work/page.mjs"

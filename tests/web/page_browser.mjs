@@ -64,7 +64,7 @@ const all = {
     if (shots) await tab.screenshot(path.join(shots, 'strands.png'));
     assert.deepEqual(tab.errors, [], 'nothing is an error in the console');
     const files = new Set(tab.requests.map((one) => one.url).filter((url) => url.startsWith('http')));
-    assert.ok(files.size <= 5, `${files.size} files: ${[...files]}`);
+    assert.ok(files.size <= 4, `${files.size} files: ${[...files]}`);
     for (const one of tab.requests) assert.ok(new URL(one.url).host === new URL(server.url).host, one.url);
     await tab.close();
   },
@@ -197,9 +197,9 @@ const all = {
     const text = (await get(server.url)).body.toString();
     const assets = JSON.parse(/name="strandcast-assets" content="([^"]*)"/.exec(text)[1].replaceAll('&quot;', '"').replaceAll('&amp;', '&'));
     const linked = [...text.matchAll(/(?:src|href)="([^"]+\.(?:js|css))"/g)].map((one) => one[1]);
-    const begun = [assets.worker, assets.core, ...linked]; // what every page begins with
+    const begun = [assets.core, ...linked]; // what every page begins with
     let bytes = page.body.length;
-    for (const name of new Set([...begun, ...Object.values(assets.kernels)])) {
+    for (const name of new Set([...begun, assets.wholeCore])) {
       const file = await get(server.url + name, { 'accept-encoding': 'gzip' });
       assert.equal(file.status, 200, name);
       assert.equal(file.headers['content-encoding'], 'gzip');

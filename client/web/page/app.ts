@@ -13,6 +13,7 @@ import {
 
 const MOST_PICTURE_SIDE = 1280; // of pictures that the server draws for this window
 const SAMPLES = 4;
+const FILLS_WITHIN = 0.05; // of a window's shape
 
 // The token leaves the address before anything is asked for.
 const wishes = readFragment(location.hash);
@@ -26,13 +27,12 @@ const hud = new Hud(at<HTMLButtonElement>('hud-line'), at('hud-table'));
 const warnings = new Warnings(at('warnings'), at('lasting'));
 
 interface Assets {
-  worker: string;
   core: string;
-  kernels: { [name: string]: string };
+  wholeCore: string; // steps strands by every kernel
 }
 function assets(): Assets {
   const content = document.querySelector<HTMLMetaElement>('meta[name=strandcast-assets]')?.content ?? '';
-  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { worker: 'worker.js', core: 'strand_core.wasm', kernels: {} };
+  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { core: 'strand_page.wasm', wholeCore: 'strand_core.wasm' };
 }
 
 const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: [number, number, number]): [number, number, number] =>
@@ -101,9 +101,9 @@ class Viewer {
       url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, pictures: wishes.pictures,
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: canDraw,
     };
-    const { worker, core, kernels } = assets();
+    const { core, wholeCore } = assets();
     const start = (name: string): Worker => {
-      const made = new Worker(worker, { type: 'module', name });
+      const made = new Worker(import.meta.url, { type: 'module', name });
       made.onerror = () => this.ended('this browser does not start the page’s workers');
       return made;
     };
@@ -123,11 +123,11 @@ class Viewer {
       this.device = Device.none;
       this.drawWhy = 'this browser cannot draw beside the page';
     }
+    this.toNet({ kind: 'start', wholeCore, asked: this.asked, states: states.port1, sockets: sockets.port1 }, [states.port1, sockets.port1]);
     compiled.then((module) => {
-      this.toNet({ kind: 'start', core: module, kernels, asked: this.asked, states: states.port1, sockets: sockets.port1 },
-        [states.port1, sockets.port1]);
+      this.toNet({ kind: 'core', core: module });
       this.toDraw({ kind: 'core', core: module, states: states.port2 }, [states.port2]);
-    }, (error: Error) => this.ended(error.message));
+    }, (error: Error) => this.toNet({ kind: 'noCore', reason: error.message }));
     if (wishes.camera) {
       this.camera = wishes.camera;
       this.isOwnCamera = true;
@@ -250,6 +250,9 @@ class Viewer {
   private showPicture(picture: VideoFrame | ImageBitmap, width: number, height: number): void {
     if (pictures.width !== width) pictures.width = width;
     if (pictures.height !== height) pictures.height = height;
+    // Sides are whole blocks: what differs from the window's by that much is cut off.
+    const shape = (width / height) / (stage.clientWidth / Math.max(stage.clientHeight, 1));
+    pictures.classList.toggle('fills', Math.abs(shape - 1) < FILLS_WITHIN);
     pictures.getContext('2d', { alpha: false })!.drawImage(picture as ImageBitmap, 0, 0, width, height);
     picture.close();
     this.pictureTimes.push(performance.now());
@@ -397,7 +400,7 @@ class Viewer {
     };
     followPointers(stage, moves);
     const view = at<HTMLSelectElement>('view');
-    view.append(new Option('your own', ''));
+    view.append(new Option('own', ''));
     presets.forEach((preset, i) => view.append(new Option(preset.name, String(i))));
     view.value = this.isOwnCamera ? '' : '0';
     view.addEventListener('change', () => view.value !== '' && this.usePreset(Number(view.value)));
@@ -465,22 +468,25 @@ class Viewer {
     const hz = isFrames ? this.pictureTimes.length / 2 : this.drawFigures?.shownHz ?? 0;
     this.toNet({ kind: 'drawn', drawMs: this.drawFigures?.drawMs ?? 0, shownHz: hz, device: this.device });
     this.showWarnings();
+    at('why').textContent = this.isConnected && this.shown >= 0 ? sentence(this.reason) : '';
     this.tellTests(hz);
     if (!this.welcome || !figures) return hud.show(this.isConnected ? 'Connected' : 'Connecting', []);
     hud.show(this.line(hz), this.rows(hz));
   }
-  /** What tests/web/page_browser.mjs reads; nothing here reads it. */
+  /** What tests/web/page_browser.mjs and tests/bench/page.mjs read; nothing here reads it. */
   private tellTests(hz: number): void {
     document.documentElement.dataset.strandcast = JSON.stringify({
       isConnected: this.isConnected, mode: ['strands', 'pictures'][this.shown] ?? '', hz, camera: this.camera.offset,
       states: this.figures?.decodedFrames ?? 0, pictures: this.pictureCount, codec: this.figures?.codec ?? '',
+      decodeMs: this.figures?.decodeMs ?? 0, wholeMs: this.drawFigures?.leastWholeMs ?? 0,
       hash_ok: !this.figures?.rejectedFrames, error: at('trouble').hidden ? '' : at('trouble-why').textContent,
     });
   }
   private showWarnings(): void {
     const all: string[] = [];
     if (this.status?.is_paused) all.push(this.isController ? 'Paused: Space resumes, N steps' : 'Paused');
-    if (this.isConnected && this.status?.is_motion_stale && !this.status.is_paused) all.push('No head motion arrives at the server');
+    if (this.isConnected && this.status?.is_motion_stale && !this.status.is_paused)
+      all.push(`No head motion arrives at the server${this.isController ? ': strandcast-ctl feed sends some' : ''}`);
     if (this.isConnected && this.status?.slow_motion) all.push(this.status.slow_motion);
     if (this.isConnected && this.status?.detail) all.push(this.status.detail);
     warnings.keep(all);
@@ -518,7 +524,8 @@ class Viewer {
       add('pictures by', figures.pictureCodec);
       if (quality) add('pictures', `${quality.width} x ${quality.height}, quality ${quality.quality}, at most ${quality.rate_hz.toFixed(0)} Hz: ${quality.reason}`);
     } else {
-      add('strands by', figures.codec + (figures.codecReason ? `: ${figures.codecReason}` : ''));
+      const why = figures.codecReason.replace(new RegExp(`^${figures.codec}: `), '');
+      add('strands by', figures.codec + (why && `: ${why}`));
       if (this.quality)
         add('stream of', `${(this.quality.strand_share * 100).toFixed(0)} % of the strands every ${this.quality.rate_divisor} steps within ${(this.quality.bound_m * 1000).toPrecision(2)} mm: ${this.quality.reason}`);
     }

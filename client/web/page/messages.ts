@@ -24,7 +24,9 @@ export interface Asked {
 }
 
 export type ToNet =
-  | { kind: 'start'; core: WebAssembly.Module; kernels: { [name: string]: string }; asked: Asked; states: MessagePort; sockets: MessagePort }
+  | { kind: 'start'; wholeCore: string; asked: Asked; states: MessagePort; sockets: MessagePort }
+  | { kind: 'core'; core: WebAssembly.Module }
+  | { kind: 'noCore'; reason: string }
   | { kind: 'reconnect'; asked: Asked }
   | { kind: 'mode'; mode: number }
   | { kind: 'camera'; camera: Camera }
@@ -86,6 +88,7 @@ export interface DrawFigures {
   stepMs: number; // of pictures as they are drawn now
   shownHz: number;
   share: number; // of the window's sides
+  leastWholeMs: number; // of pictures with all of them
   strands: number;
   segments: number;
 }

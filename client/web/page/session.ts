@@ -19,6 +19,7 @@ const KEYFRAME_REQUEST_MS = 1000;
 const CAMERA_MS = 33;
 const IDLE_MS = 15_000;
 const REPORT_MS = 1000;
+const MOST_WAITING = 256; // messages for the core, which has not come yet
 const PICTURE_BITS: { [wish: string]: number } = {
   jpeg: 0, tiles: 1 << PictureCodec.jpegTiles, vp8: 1 << PictureCodec.vp8, h264: 1 << PictureCodec.h264,
 };
@@ -34,8 +35,11 @@ const LEAST_STEP_NS = 5;
 
 /** What lasts over reconnections. */
 class Net {
-  private core!: Core;
-  private kernels: { [name: string]: string } = {};
+  private core?: Core;
+  private coreAnswered!: () => void;
+  private readonly coreAnswer = new Promise<void>((done) => (this.coreAnswered = done)); // it is there, or never comes
+  private noCore = '';
+  private wholeCore = '';
   private isLoading = false;
   stepNs = 0; // of one vertex in a solver's step here
   private asked!: Asked;
@@ -60,21 +64,34 @@ class Net {
       this.wantsState = true;
       this.offerState();
     };
-    const [core, codecs] = await Promise.all([Core.load(message.core), decodablePictures()]);
-    this.core = core;
-    this.kernels = message.kernels;
-    this.stepNs = Math.max(core.call.strand_core_step_ns(), LEAST_STEP_NS);
-    this.pictureCodecs = codecs;
+    this.wholeCore = message.wholeCore;
+    const codecs = decodablePictures();
+    // Whoever wants pictures waits for nothing else.
+    if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
+    this.pictureCodecs = await codecs;
     this.connect();
     setInterval(() => this.connection?.report(), 500);
   }
-  /** True when the stream is stepped by a kernel that stands in another module: it comes with that one again. */
+  async setCore(module: WebAssembly.Module): Promise<void> {
+    const core = await Core.load(module);
+    this.stepNs = Math.max(core.call.strand_core_step_ns(), LEAST_STEP_NS);
+    this.core = core;
+    this.connection?.setCore(core);
+    this.coreAnswered();
+  }
+  /** There are the server's pictures then. */
+  withoutCore(reason: string): void {
+    this.noCore = reason;
+    this.asked = { ...this.asked, drawsStrands: false };
+    this.coreAnswered();
+    post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${reason}. The server’s pictures are shown.` });
+  }
+  /** True when the stream is stepped by a kernel that stands in the other module alone: it comes with that one again. */
   changesCore(error: Error): boolean {
     if (this.isLoading) return true;
-    const name = /this build has no sim\/(\w+)\.comp/.exec(error.message)?.[1] ?? '';
-    const file = this.kernels[name];
-    if (!file) return false;
-    delete this.kernels[name]; // once
+    if (!this.wholeCore || !/this build has no sim\/\w+\.comp/.test(error.message)) return false;
+    const file = this.wholeCore;
+    this.wholeCore = ''; // once
     this.isLoading = true;
     void compileCore(new URL(file, self.location.href).href).then(Core.load)
       .then((core) => (this.core = core), () => undefined)
@@ -103,7 +120,7 @@ class Net {
     socket.onopen = () => {
       wasOpen = true;
       this.openedMs = performance.now();
-      this.connection = new Connection(this, this.core, socket, this.asked);
+      this.connection = new Connection(this, socket, this.asked, this.core);
       this.connection.hello(this.pictureCodecs);
     };
     socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
@@ -128,6 +145,8 @@ class Net {
     const connection = this.connection;
     switch (message.kind) {
       case 'mode':
+        if (this.noCore && message.mode !== Mode.frames)
+          return post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${this.noCore}.` });
         this.asked.mode = message.mode;
         return connection?.send({ mode_request: { mode: message.mode } });
       case 'camera':
@@ -205,7 +224,27 @@ class Connection {
   private codecReason = '';
   private pictureCodec = '';
 
-  constructor(private readonly net: Net, private readonly core: Core, private readonly socket: DistantSocket, private readonly asked: Asked) {}
+  private waitingForCore: (() => void)[] = [];
+
+  constructor(private readonly net: Net, private readonly socket: DistantSocket, private readonly asked: Asked, private core?: Core) {}
+
+  /** What came before it is looked at now. */
+  setCore(core: Core): void {
+    this.core = core;
+    const waiting = this.waitingForCore;
+    this.waitingForCore = [];
+    this.guard(() => {
+      if (this.welcome) this.now = this.decoderOf(this.welcome.codec);
+      for (const take of waiting) take();
+    });
+  }
+  private withCore(take: () => void): void {
+    if (this.core) return take();
+    if (this.waitingForCore.push(take) > MOST_WAITING) throw new Error('strands came before there was anything to decode them');
+  }
+  private decoderOf(codec: string): StrandDecoder {
+    return new StrandDecoder(this.core!, codec, this.welcome!.strand_count, this.welcome!.vertex_count);
+  }
 
   send(message: Partly<typeof ClientMessage>): void {
     this.socket.send(encodeClientMessage(message));
@@ -233,13 +272,18 @@ class Connection {
   /** Whatever a server sends: it may end this connection, never this page. */
   receive(data: unknown, receivedNs: number): void {
     this.lastReceivedMs = performance.now();
-    try {
+    this.guard(() => {
       if (!(data instanceof ArrayBuffer) || data.byteLength === 0) throw new Error('the server sent no message of bytes');
       const message = new Uint8Array(data);
       this.figures.receivedBytes += message.length;
       if (message[0] === kControl) this.control(message, receivedNs);
       else if (!this.welcome) throw new Error('the server sent media before its Welcome');
       else this.media(message, receivedNs);
+    });
+  }
+  private guard(take: () => void): void {
+    try {
+      take();
     } catch (error) {
       this.goodbye ||= `the server sent what cannot be read: ${(error as Error).message}`;
       this.socket.close(4000);
@@ -259,7 +303,8 @@ class Connection {
     }
     if (message.notice && this.welcome) post({ kind: 'notice', isError: message.notice.is_error, text: message.notice.text });
     if (message.quality) {
-      this.followCodec(message.quality.codec, message.quality.reason);
+      const { codec, reason } = message.quality;
+      this.withCore(() => this.followCodec(codec, reason));
       post({ kind: 'quality', quality: message.quality });
     }
     if (message.frame_quality) {
@@ -276,8 +321,8 @@ class Connection {
 
   private begin(welcome: WelcomeMessage): void {
     if (this.welcome) throw new Error('the server sent a second Welcome');
-    this.now = new StrandDecoder(this.core, welcome.codec, welcome.strand_count, welcome.vertex_count);
     this.welcome = welcome;
+    if (this.core) this.now = this.decoderOf(welcome.codec);
     this.hasWelcome = true;
     this.reason = welcome.mode_reason;
     this.codec = welcome.codec;
@@ -315,10 +360,10 @@ class Connection {
     const header = readFrameHeader(message);
     switch (header.opcode) {
       case Opcode.asset:
-        return this.takeAsset(header, message, received);
+        return this.withCore(() => this.takeAsset(header, message, received));
       case Opcode.strandKeyframe:
       case Opcode.strandDelta:
-        return this.takeStrands(header, message, received);
+        return this.withCore(() => this.takeStrands(header, message, received));
       case Opcode.jpegFrame:
       case Opcode.jpegTiles:
       case Opcode.vp8Frame:
@@ -360,8 +405,7 @@ class Connection {
     this.next = undefined;
     this.codecReason = reason;
     if (codec === this.now!.codec) return;
-    const welcome = this.welcome!;
-    this.next = new StrandDecoder(this.core, codec, welcome.strand_count, welcome.vertex_count);
+    this.next = this.decoderOf(codec);
     if (this.assetPayload) this.next.setAsset(this.assetPayload);
     if (!this.hasState) this.beginNext();
   }
@@ -504,7 +548,10 @@ export function runNet(): void {
     if (message.kind === 'start') {
       net.start(message).catch((error: Error) =>
         post({ kind: 'state', state: 'ended', reason: error.message, retryMs: 0 }));
-    } else if (message.kind === 'reconnect') net.reconnect(message.asked);
+    } else if (message.kind === 'core') {
+      net.setCore(message.core).catch((error: Error) => net.withoutCore(error.message));
+    } else if (message.kind === 'noCore') net.withoutCore(message.reason);
+    else if (message.kind === 'reconnect') net.reconnect(message.asked);
     else net.command(message);
   };
 }

@@ -112,27 +112,36 @@ STRANDCAST_LANES void read_slices(const SymbolReading& of, std::index_sequence<k
     std::array<SymbolCursor, kAtOnce> cursors = {slices[k].reader.begin_run(3 * slices[k].count)...};
     for (size_t i = 0; i < common; ++i)
       (read_vertex(slices[k], cursors[k], rows[0], codes, slices[k].begin + i), ...);
-    const auto read_rest = [&](const SliceReader& slice, SymbolCursor cursor) STRANDCAST_LANES_LAMBDA {
-      for (size_t i = common; i < slice.count; ++i)
-        read_vertex(slice, cursor, rows[0], codes, slice.begin + i);
-      slice.reader.end_run(cursor);
-    };
-    (read_rest(slices[k], cursors[k]), ...);
+    // Few: one copy of the code does. In an array of their own, so that those above stay in registers.
+    std::array<SymbolCursor, kAtOnce> rest = cursors;
+    for (size_t slice = 0; slice < kAtOnce; ++slice) {
+      for (size_t i = common; i < slices[slice].count; ++i)
+        read_vertex(slices[slice], rest[slice], rows[0], codes, slices[slice].begin + i);
+      slices[slice].reader.end_run(rest[slice]);
+    }
   }
 }
 
 STRANDCAST_LANES void read_symbols_lanes(const SymbolReading& of) {
+  if (of.slices.size() == kMostSlicesAtOnce)
+    return read_slices(of, std::make_index_sequence<kMostSlicesAtOnce>());
+#ifdef __EMSCRIPTEN__  // each number of slices is code that a browser loads
+  for (size_t k = 0; k < of.slices.size(); ++k) {
+    SymbolReading one = of;
+    one.slices = of.slices.subspan(k, 1);
+    read_slices(one, std::make_index_sequence<1>());
+  }
+#else
   switch (of.slices.size()) {
     case 1:
       return read_slices(of, std::make_index_sequence<1>());
     case 2:
       return read_slices(of, std::make_index_sequence<2>());
-    case 3:
-      return read_slices(of, std::make_index_sequence<3>());
     default:
-      CHECK(of.slices.size() == kMostSlicesAtOnce);
-      return read_slices(of, std::make_index_sequence<kMostSlicesAtOnce>());
+      CHECK(of.slices.size() == 3);
+      return read_slices(of, std::make_index_sequence<3>());
   }
+#endif
 }
 
 /// code(difference to the class before, table, shift) -> that difference, for all weights.

@@ -1,17 +1,17 @@
 // The project's shader files as WebGL2 takes them: includes joined, each once, behind a prologue of GLSL ES 3.00;
 // without binding numbers, which it does not have.
-import coverage from '../../../../shaders/lib/coverage.glsl';
-import hairLight from '../../../../shaders/lib/hair_light.glsl';
-import hash from '../../../../shaders/lib/hash.glsl';
-import hermite from '../../../../shaders/lib/hermite.glsl';
-import select from '../../../../shaders/lib/select.glsl';
-import skin from '../../../../shaders/lib/skin.glsl';
-import tone from '../../../../shaders/lib/tone.glsl';
-import tileFrame from '../../../../shaders/render/tile_frame.glsl';
-import tileLight from '../../../../shaders/render/tile_light.glsl';
-import bindings from '../../../../shaders/shared/bindings.h';
-import limits from '../../../../shaders/shared/limits.h';
-import tiles from '../../../../shaders/shared/tiles.h';
+import coverage from 'shaders/lib/coverage.glsl';
+import hairLight from 'shaders/lib/hair_light.glsl';
+import hash from 'shaders/lib/hash.glsl';
+import hermite from 'shaders/lib/hermite.glsl';
+import select from 'shaders/lib/select.glsl';
+import skin from 'shaders/lib/skin.glsl';
+import tone from 'shaders/lib/tone.glsl';
+import tileFrame from 'shaders/render/tile_frame.glsl';
+import tileLight from 'shaders/render/tile_light.glsl';
+import bindings from 'shaders/shared/bindings.h';
+import limits from 'shaders/shared/limits.h';
+import tiles from 'shaders/shared/tiles.h';
 
 const files: { readonly [path: string]: string } = {
   'lib/coverage.glsl': coverage, 'lib/hair_light.glsl': hairLight, 'lib/hash.glsl': hash, 'lib/hermite.glsl': hermite,

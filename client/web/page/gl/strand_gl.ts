@@ -1,15 +1,15 @@
 // Strands by WebGL2: points are shaded once each by transform feedback, then drawn as triangles in the order that the
 // core found, from back to front, over the head; all in linear light, then tone curve and sRGB.
 import type { PictureParts, StrandPicture } from '../picture';
-import headFrag from './head.frag.glsl';
-import headVert from './head.vert.glsl';
-import nothingFrag from './nothing.frag.glsl';
-import pointsVert from './points.vert.glsl';
+import headFrag from 'client/web/page/gl/head.frag.glsl';
+import headVert from 'client/web/page/gl/head.vert.glsl';
+import nothingFrag from 'client/web/page/gl/nothing.frag.glsl';
+import pointsVert from 'client/web/page/gl/points.vert.glsl';
 import { Program } from './program';
-import resolveFrag from './resolve.frag.glsl';
-import resolveVert from './resolve.vert.glsl';
-import strandFrag from './strand.frag.glsl';
-import strandVert from './strand.vert.glsl';
+import resolveFrag from 'client/web/page/gl/resolve.frag.glsl';
+import resolveVert from 'client/web/page/gl/resolve.vert.glsl';
+import strandFrag from 'client/web/page/gl/strand.frag.glsl';
+import strandVert from 'client/web/page/gl/strand.vert.glsl';
 
 const STRANDS_PER_ROW = 1024;
 const CORNER_BYTES = 48;

@@ -48,7 +48,7 @@ const around = (yaw: number, pitch: number) => (home: Camera): Camera => {
   return { ...home, offset: scaled([level * Math.sin(yaw), Math.sin(pitch), level * Math.cos(yaw)], length(home.offset)) };
 };
 export const presets: readonly Preset[] = [
-  { name: "the scene's", from: (home) => home },
+  { name: 'scene', from: (home) => home },
   { name: 'front', from: around(0, 0.08) },
   { name: 'left', from: around(-Math.PI / 2, 0.08) },
   { name: 'right', from: around(Math.PI / 2, 0.08) },
