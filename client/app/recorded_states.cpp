@@ -1,5 +1,6 @@
 #include "client/app/recorded_states.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -9,26 +10,68 @@ namespace strandcast {
 namespace {
 
 constexpr double kNsPerS = 1e9;
+constexpr uint32_t kMostDamagedInARow = 1'000;  // then nothing more is to be had of the file
+
+/// What holds at this time: the last that began no later, or the first.
+template <class Items>
+const auto& at_time(const Items& items, int64_t time_ns) {
+  const auto later = std::find_if(items.begin() + 1, items.end(),
+                                  [time_ns](const auto& item) { return item.time_ns > time_ns; });
+  return std::prev(later)->what;
+}
 
 }  // namespace
 
 Result<std::unique_ptr<RecordedStates>> RecordedStates::open(const std::filesystem::path& path) {
-  ASSIGN_OR_RETURN(auto reader, RecordingReader::open(path));
+  ASSIGN_OR_RETURN(auto reader, RecordingReader::open(path, RecordedPart::Frames));
   ASSIGN_OR_RETURN(SceneAsset asset, reader->asset());
   const auto scene = parse_scene(reader->start().scene_text, path.string() + ", its scene", {});
   if (!scene) return scene.error();
-  auto replay = StrandReplay::make(reader->start().codec, {asset.strand_count, asset.vertex_count}, {});
-  if (!replay) return at(path.string(), replay.error());
-  (*replay)->set_rest_shape(asset.rest_position_m);
-  std::unique_ptr<RecordedStates> states(new RecordedStates(std::move(reader), std::move(replay).value()));
+  std::unique_ptr<RecordedStates> states(new RecordedStates(std::move(reader)));
   states->scene_ = {std::make_shared<const SceneAsset>(std::move(asset)), scene->look.strand_radius_m,
                     scene->look.tip_scale};
-  states->look_ = {scene->look, scene->camera};
+  const RecordingStart& start = states->reader_->start();
+  states->looks_.push_back({start.server_time_ns, {scene->look, scene->camera}});
+  states->codecs_.push_back({start.server_time_ns, start.codec});
+  RETURN_IF_ERROR(states->read_changes(path));
+  if (const Status can = states->follow(start.server_time_ns); !can) return at(path.string(), can.error());
   return states;
 }
 
-RecordedStates::RecordedStates(std::unique_ptr<RecordingReader> reader, std::unique_ptr<StrandReplay> replay)
-    : reader_(std::move(reader)), replay_(std::move(replay)) {}
+/// Looks, codecs and what was lost, of all of the recording: whoever jumps in it has to know them.
+Status RecordedStates::read_changes(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const auto messages, RecordingReader::open(path, RecordedPart::Messages));
+  uint32_t damaged_in_a_row = 0;
+  while (damaged_in_a_row < kMostDamagedInARow) {
+    const auto item = messages->next();
+    if (!item) {
+      ++damaged_;
+      ++damaged_in_a_row;
+      continue;
+    }
+    damaged_in_a_row = 0;
+    if (!*item) break;
+    const auto* message = std::get_if<RecordedMessage>(&(*item)->what);
+    if (message == nullptr) continue;
+    if (const auto* look = std::get_if<LookChange>(message)) looks_.push_back({(*item)->time_ns, *look});
+    if (const auto* stream = std::get_if<RecordedStream>(message))
+      codecs_.push_back({(*item)->time_ns, stream->codec});
+    if (const auto* loss = std::get_if<RecordedLoss>(message)) lost_ += loss->frames;
+  }
+  return {};
+}
+
+/// Takes the look of this time, and the decoder of its codec.
+Status RecordedStates::follow(int64_t time_ns) {
+  look_ = at_time(looks_, time_ns);
+  const std::string& codec = at_time(codecs_, time_ns);
+  if (replay_ != nullptr && codec == codec_) return {};
+  const SceneAsset& asset = *scene_.asset;
+  ASSIGN_OR_RETURN(replay_, StrandReplay::make(codec, {asset.strand_count, asset.vertex_count}, {}));
+  replay_->set_rest_shape(asset.rest_position_m);
+  codec_ = codec;
+  return {};
+}
 
 Status RecordedStates::seek(int64_t sim_time_ns) {
   replay_->forget_sequence();
@@ -41,28 +84,23 @@ Result<std::optional<int64_t>> RecordedStates::skip_to(double from_s) {
   return std::optional(first_ns());
 }
 
-void RecordedStates::take(const RecordedMessage& message) {
-  if (const auto* look = std::get_if<LookChange>(&message)) look_ = *look;
-  if (const auto* loss = std::get_if<RecordedLoss>(&message)) lost_ += loss->frames;
-  if (const auto* stream = std::get_if<RecordedStream>(&message))
-    if (!replay_->follow_codec(stream->codec, scene_.asset->rest_position_m)) ++damaged_;
-}
-
 Result<std::shared_ptr<const Snapshot>> RecordedStates::next() {
+  uint32_t damaged_in_a_row = 0;
   while (true) {
     const auto item = reader_->next();
     if (!item) {
       ++damaged_;
+      if (++damaged_in_a_row == kMostDamagedInARow) return item.error();
       continue;
     }
+    damaged_in_a_row = 0;
     if (!*item) return std::shared_ptr<const Snapshot>();
-    if (const auto* message = std::get_if<RecordedMessage>(&(*item)->what)) {
-      take(*message);
-      continue;
-    }
-    const RecordedFrame& frame = std::get<RecordedFrame>((*item)->what);
+    const auto* frame = std::get_if<RecordedFrame>(&(*item)->what);
+    if (frame == nullptr) continue;
+    RETURN_IF_ERROR(follow((*item)->time_ns));
     // Nothing was sent here: there is no clock to compare with.
-    if (auto state = replay_->receive(frame.frame->message, (*item)->time_ns, ClockOffset())) return state;
+    if (auto state = replay_->receive(frame->frame->message, (*item)->time_ns, ClockOffset())) return state;
+    ++rejected_;
   }
 }
 
@@ -73,7 +111,7 @@ std::vector<std::string> RecordedStates::remarks() const {
   };
   add(lost_, "states were not recorded, for want of room; the frames between are interpolated");
   add(damaged_, "parts of the recording are damaged and left out");
-  add(replay_->stats().rejected_frames, "recorded frames could not be decoded");
+  add(rejected_, "recorded frames could not be decoded");
   add(reader_->info().cut_bytes, "bytes at its end are of a part that was not written whole");
   return remarks;
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/export/export_source.h"
@@ -33,15 +34,26 @@ class RecordedStates : public ExportSource {
   const LookChange& look() const { return look_; }
 
  private:
-  RecordedStates(std::unique_ptr<RecordingReader> reader, std::unique_ptr<StrandReplay> replay);
-  void take(const RecordedMessage& message);
+  template <class What>
+  struct Timed {
+    int64_t time_ns = 0;  // server clock
+    What what;
+  };
 
-  std::unique_ptr<RecordingReader> reader_;
+  explicit RecordedStates(std::unique_ptr<RecordingReader> reader) : reader_(std::move(reader)) {}
+  Status read_changes(const std::filesystem::path& path);
+  Status follow(int64_t time_ns);
+
+  std::unique_ptr<RecordingReader> reader_;  // of frames
   std::unique_ptr<StrandReplay> replay_;
+  std::string codec_;  // of replay_
   ExportScene scene_;
   LookChange look_;
-  uint64_t damaged_ = 0;  // parts that could not be read
-  uint64_t lost_ = 0;     // frames that the recorder had no room for
+  std::vector<Timed<LookChange>> looks_;    // in the order of time, the first from the start on
+  std::vector<Timed<std::string>> codecs_;  // likewise
+  uint64_t damaged_ = 0;                    // parts that could not be read
+  uint64_t rejected_ = 0;                   // frames that could not be decoded
+  uint64_t lost_ = 0;                       // frames that the recorder had no room for
 };
 
 }  // namespace strandcast

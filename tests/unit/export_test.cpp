@@ -62,6 +62,7 @@ class MadeStates : public ExportSource {
   }
   const ExportScene& scene() const override { return scene_; }
   Result<std::shared_ptr<const Snapshot>> next() override {
+    if (next_ == stop_at_) stop_ = true;
     if (next_ < states_.size()) return states_[next_++];
     if (end_) return *end_;
     return std::shared_ptr<const Snapshot>();
@@ -71,6 +72,8 @@ class MadeStates : public ExportSource {
   ExportScene scene_;
   std::vector<std::shared_ptr<const Snapshot>> states_;
   std::optional<Error> end_;
+  size_t stop_at_ = ~size_t{0};  // whoever exports is stopped with this state
+  std::atomic<bool> stop_{false};
   size_t next_ = 0;
 };
 
@@ -364,6 +367,20 @@ TEST(Export, WhatWasWrittenWhenTheSourceFailsIsWhole) {
   EXPECT_THAT(export_strands(none, options, kNeverStopped).error().to_string(),
               HasSubstr("the server has gone"));
   EXPECT_FALSE(std::filesystem::exists(options.path));
+}
+
+TEST(Export, WhatWasWrittenWhenItIsStoppedIsWhole) {
+  const TemporaryFolder folder;
+  MadeStates states(200);
+  states.stop_at_ = 30;
+  ExportOptions options;
+  options.path = folder.path() / "hair.usda";
+  options.is_quiet = true;
+  const auto report = export_strands(states, options, states.stop_);
+  ASSERT_TRUE(report) << report.error().to_string();
+  EXPECT_EQ(report->frame_count, 16u) << "half a second";
+  EXPECT_EQ(imported(options.path).strand_count(), kStrands);
+  EXPECT_THAT(*load_text(options.path, 1 << 24), HasSubstr("endTimeCode = 16 "));
 }
 
 TEST(Export, WhatCannotBeWrittenIsToldTheWayOut) {

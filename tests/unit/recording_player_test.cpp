@@ -135,6 +135,15 @@ TEST_F(Recorded, AMomentIsTheSameHoweverOneCameThere) {
     EXPECT_EQ(scrubbed->strands_at(times[i])->position_m, played[i].position_m);
 }
 
+TEST_F(Recorded, LooksGoBackWithTheMoment) {
+  const auto scrubbed = player();
+  const float before = built_in_scene().look.exposure;
+  for (const auto& [time_s, exposure] : {std::pair(2.0, 2.0f), {0.5, before}, {1.5, 2.0f}, {0.0, before}}) {
+    ASSERT_TRUE(scrubbed->strands_at(time_s));
+    EXPECT_EQ(scrubbed->look().look.exposure, exposure) << time_s;
+  }
+}
+
 TEST_F(Recorded, ArrowKeysGoFromStateToState) {
   const auto states = player();
   double t_s = 1.0;
