@@ -29,7 +29,7 @@ Status save(const LatencyOptions& options, const FrameTrace& trace, const std::v
 }  // namespace
 
 int run_latency(const CtlTarget& target, const LatencyOptions& options, const std::atomic<bool>& stop) {
-  auto config = client_config(target, Role::Viewer);
+  auto config = client_config_for(target, Role::Viewer);
   if (!config) return fail(config.error(), kBadInputExit);
   const auto mode = parse_mode(options.mode);
   if (!mode) return fail(mode.error(), kBadInputExit);

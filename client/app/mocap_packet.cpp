@@ -33,7 +33,7 @@ class Packet {
   void put(T number, std::endian order) {
     auto bytes = std::bit_cast<std::array<std::byte, sizeof(T)>>(number);
     if (order != std::endian::native) std::reverse(bytes.begin(), bytes.end());
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+    for (const std::byte byte : bytes) bytes_.push_back(byte);
   }
   /// Two's complement in three bytes, the highest first; numbers beyond it stop at its ends.
   void put_three(double number) {
@@ -97,7 +97,10 @@ std::vector<std::byte> osc_message(std::string_view address, std::string_view na
                                    const std::vector<double>& numbers) {
   Packet packet;
   packet.put_text(address);
-  packet.put_text("," + std::string(name.empty() ? 0 : 1, 's') + std::string(numbers.size(), 'f'));
+  std::string tags = ",";
+  if (!name.empty()) tags += 's';
+  tags.append(numbers.size(), 'f');
+  packet.put_text(tags);
   if (!name.empty()) packet.put_text(name);
   for (const double number : numbers) packet.put(static_cast<float>(number), std::endian::big);
   return packet.bytes();
