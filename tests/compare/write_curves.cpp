@@ -17,7 +17,8 @@ std::vector<glm::vec3> positions_at(double t_s) {
   for (uint32_t vertex = 0; vertex < kVertices; ++vertex) {
     for (uint32_t strand = 0; strand < kStrands; ++strand) {
       const double angle = 2.4 * strand, swing = 0.004 * vertex * std::sin(5.0 * t_s + strand);
-      positions.emplace_back(0.1 * std::cos(angle) + swing, 0.1 - 0.02 * vertex, 0.1 * std::sin(angle) - swing);
+      positions.emplace_back(0.1 * std::cos(angle) + swing, 0.1 - 0.02 * vertex,
+                             0.1 * std::sin(angle) - swing);
     }
   }
   return positions;
