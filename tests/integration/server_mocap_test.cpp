@@ -253,12 +253,18 @@ TEST_F(LiveMocap, SendersThatMayNotAreRefused) {
   EXPECT_GE(log.count(stranger.name() + " may not send"), 1u);
 }
 
+Result<std::unique_ptr<LiveParser>> parser_of(const std::string& protocol) {
+  LiveParserConfig config;
+  config.protocol = protocol;
+  return make_live_parser(config);
+}
+
 TEST(MocapPackets, SayWhatTheirParsersRead) {
   for (const char* name : {"vmc", "opentrack", "freed"}) {
     SCOPED_TRACE(name);
     const auto encoding = find_mocap_encoding(name);
     ASSERT_TRUE(encoding);
-    auto parser = make_live_parser({.protocol = name});
+    auto parser = parser_of(name);
     ASSERT_TRUE(parser) << parser.error().to_string();
     for (const LiveProtocol& protocol : live_protocols())
       if (protocol.name == std::string(name)) {
@@ -283,7 +289,7 @@ TEST(MocapPackets, SayWhatTheirParsersRead) {
 
 TEST(MocapPackets, WindGoesWithVmc) {
   const auto encoding = find_mocap_encoding("vmc");
-  auto parser = make_live_parser({.protocol = "vmc"});
+  auto parser = parser_of("vmc");
   const auto packet = (*parser)->parse(encoding->encode({0.0, {}, glm::vec3(1, -2, 3)}), 0);
   ASSERT_TRUE(packet && packet->wind_mps);
   EXPECT_EQ(*packet->wind_mps, glm::dvec3(1, -2, 3));
