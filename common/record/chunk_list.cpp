@@ -171,7 +171,9 @@ Status walk(ByteSource& source, uint64_t data_begin, ChunkList& list) {
   const uint64_t end = source.size_bytes();
   while (offset < end && !list.has_end) {
     const auto head = head_at(source, offset, end);
-    if (!head) {
+    const bool is_wrong_end =
+        head && head->opcode == mcap::Opcode::DataEnd && head->content_bytes != sizeof(uint32_t);
+    if (!head || is_wrong_end) {
       list.cut_bytes = end - offset;
       break;
     }

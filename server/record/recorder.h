@@ -27,7 +27,7 @@ inline constexpr uint64_t kMaxRecorderBytes = 64u << 20;
 inline constexpr size_t kMaxRecorderItems = 1u << 16;
 inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
 /// A keyframe is recorded so often, in time of the simulation: what may have to be decoded to see a moment.
-inline constexpr int64_t kRecordKeyframeNs = 5'000'000'000;
+inline constexpr int64_t kRecordKeyframeNs = 2'000'000'000;
 
 struct RecordConfig {
   std::filesystem::path path;

@@ -22,6 +22,7 @@
 #include "tests/support/proxy_header.h"
 #include "tests/support/sample_asset.h"
 #include "tests/support/sample_messages.h"
+#include "tests/support/sample_recording.h"
 #include "tests/support/test_pictures.h"
 
 namespace strandcast {
@@ -498,6 +499,14 @@ void add_texts(const SeedFolder& seeds) {
   seeds.add("proxy", "local", "10.0.0.7\n10.0.0.7\n" + test::proxy_header(0x20, 0, {}));
 }
 
+void add_recordings(const SeedFolder& seeds) {
+  const Bytes moving = test::without_schemas(test::moving_recording(12));
+  seeds.add("recording", "moving", moving);
+  seeds.add("recording", "cut",
+            Bytes(moving.begin(), moving.begin() + static_cast<ptrdiff_t>(moving.size() / 2)));
+  seeds.add("recording", "every_kind", test::without_schemas(test::sample_recording()));
+}
+
 }  // namespace
 }  // namespace strandcast
 
@@ -518,5 +527,6 @@ int main(int argument_count, char** arguments) {
   add_live_osc(seeds);
   add_live_packets(seeds);
   add_texts(seeds);
+  add_recordings(seeds);
   return 0;
 }

@@ -1,0 +1,478 @@
+// Recordings: the bytes of the file, its reader in a whole, a cut and a damaged one, and the file on disk.
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstring>
+
+#include "common/base/file.h"
+#include "common/record/chunk_list.h"
+#include "common/record/crc32.h"
+#include "common/record/record_file.h"
+#include "common/record/recording_check.h"
+#include "common/record/recording_reader.h"
+#include "tests/support/sample_recording.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using test::sample_asset_frame;
+using test::sample_recorded_messages;
+using test::sample_recording;
+using test::sample_start;
+using testing::HasSubstr;
+
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span(text));
+}
+
+Result<std::unique_ptr<RecordingReader>> open_bytes(mcap::Bytes bytes,
+                                                    RecordedPart part = RecordedPart::All) {
+  return RecordingReader::open(memory_byte_source(std::move(bytes)), part);
+}
+
+/// What can be read, as sequences of frames and encoded messages, in order.
+std::vector<std::string> read_all(RecordingReader& reader) {
+  std::vector<std::string> items;
+  while (true) {
+    const auto item = reader.next();
+    if (!item) {
+      items.push_back(item.error().to_string());
+      continue;
+    }
+    if (!*item) return items;
+    if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
+      items.push_back(fmt::format("frame {}", frame->frame->header.sequence));
+    } else {
+      const auto bytes = encode(std::get<RecordedMessage>((*item)->what));
+      items.push_back(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    }
+  }
+}
+
+std::vector<std::string> read_all(mcap::Bytes bytes) {
+  const auto reader = open_bytes(std::move(bytes));
+  EXPECT_TRUE(reader) << reader.error().to_string();
+  return reader ? read_all(**reader) : std::vector<std::string>();
+}
+
+/// Of the n-th chunk of the sample.
+ChunkPlace chunk_of(const mcap::Bytes& bytes, size_t n) {
+  const auto source = memory_byte_source(bytes);
+  const auto list = list_chunks(*source);
+  EXPECT_TRUE(list && list->chunks.size() > n);
+  return list->chunks.at(n);
+}
+
+template <class T>
+void put_at(mcap::Bytes& bytes, uint64_t offset, T value) {
+  ASSERT_LE(offset + sizeof(T), bytes.size());
+  std::memcpy(bytes.data() + offset, &value, sizeof(T));
+}
+
+TEST(Crc32, IsThatOfZlib) {
+  // The check value of CRC-32/ISO-HDLC in the catalogue of parametrised CRC algorithms.
+  EXPECT_EQ(crc32(bytes_of("123456789")), 0xCBF43926u);
+  EXPECT_EQ(crc32({}), 0u);
+  const std::string text = "The quick brown fox jumps over the lazy dog";
+  EXPECT_EQ(crc32(bytes_of(text)), 0x414FA339u);
+  for (size_t cut = 0; cut <= text.size(); ++cut)
+    EXPECT_EQ(crc32(bytes_of(text).subspan(cut), crc32(bytes_of(text).first(cut))), 0x414FA339u);
+}
+
+TEST(RecordedMessages, ComeBackAsTheyWere) {
+  std::vector<RecordedMessage> messages = sample_recorded_messages();
+  messages.push_back(sample_start());
+  std::set<size_t> kinds;
+  for (const RecordedMessage& message : messages) {
+    const auto decoded = decode_recorded(message.index(), encode(message));
+    ASSERT_TRUE(decoded) << decoded.error().to_string();
+    EXPECT_TRUE(*decoded == message) << recorded_kinds()[message.index()].topic;
+    kinds.insert(message.index());
+  }
+  EXPECT_EQ(kinds.size(), recorded_kinds().size()) << "a kind has no sample";
+}
+
+TEST(RecordedMessages, AreRefusedWithTheirTopicWhereAFieldIsWrong) {
+  RecordedStep step;
+  step.joints = {{"neck", "chest"}, {{0.0, 0.0, 0.0}}};  // two names, one place
+  const RecordedMessage message = step;
+  const auto decoded = decode_recorded(message.index(), encode(message));
+  ASSERT_FALSE(decoded);
+  EXPECT_THAT(decoded.error().to_string(), HasSubstr("/steps, joint_m: does not go with the names"));
+  const auto garbage = decode_recorded(message.index(), bytes_of("\xff\xff\xff"));
+  ASSERT_FALSE(garbage);
+  EXPECT_THAT(garbage.error().to_string(), HasSubstr("/steps is not valid protobuf"));
+}
+
+TEST(MediaMessages, AreProtobufOfOneFieldAtEveryLength) {
+  for (const size_t size : {0, 1, 127, 128, 16'383, 16'384, 2'097'152}) {
+    const std::vector<std::byte> message(size, std::byte{7});
+    const auto encoded = encode_media(message);
+    const auto decoded = decode_media(encoded);
+    ASSERT_TRUE(decoded) << size;
+    EXPECT_TRUE(std::equal(decoded->begin(), decoded->end(), message.begin(), message.end()));
+    EXPECT_FALSE(decode_media(std::span(encoded).first(encoded.size() - 1)));
+  }
+  EXPECT_FALSE(decode_media({}));
+}
+
+TEST(RecordingReader, GivesAllInTheOrderOfTime) {
+  const auto reader = open_bytes(sample_recording());
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_EQ((*reader)->start(), sample_start());
+  const auto asset = (*reader)->asset();
+  ASSERT_TRUE(asset) << asset.error().to_string();
+  EXPECT_EQ(asset->rest_position_m, sample_asset(4, 3).rest_position_m);
+  const RecordingInfo& info = (*reader)->info();
+  EXPECT_TRUE(info.is_indexed);
+  EXPECT_EQ(info.frame_count, 20u);
+  EXPECT_EQ(info.last_sim_time_ns, 1'900'000'000);
+  EXPECT_EQ(info.keyframe_sim_time_ns, (std::vector<int64_t>{0, 1'000'000'000}));
+  EXPECT_EQ(info.message_counts.at("/states"), 21u);  // one of the samples is a state
+  int64_t newest_ns = 0;
+  uint32_t sequence = 0;
+  size_t messages = 0;
+  for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+    EXPECT_GE((*item)->time_ns, newest_ns);
+    newest_ns = (*item)->time_ns;
+    if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
+      EXPECT_EQ(frame->frame->header.sequence, ++sequence);
+      EXPECT_EQ(frame->frame->message,
+                test::sample_frame(sequence, sequence % 10 == 1, (sequence - 1) * 100'000'000).message);
+      EXPECT_EQ((*item)->time_ns, sample_start().server_time_ns + (sequence - 1) * 100'000'000 + 1);
+    } else {
+      ++messages;
+    }
+  }
+  EXPECT_EQ(sequence, 20u);
+  EXPECT_EQ(messages, sample_recorded_messages().size() + 20);
+}
+
+TEST(RecordingReader, GivesTheSameWithoutTheIndex) {
+  const mcap::Bytes bytes = sample_recording();
+  const auto source = memory_byte_source(bytes);
+  const auto walked = walk_chunks(*source);
+  ASSERT_TRUE(walked) << walked.error().to_string();
+  EXPECT_TRUE(walked->has_end);
+  mcap::Bytes cut = bytes;
+  cut.resize(walked->data_end);  // as a server leaves it that is killed
+  const auto reader = open_bytes(cut);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_FALSE((*reader)->info().is_indexed);
+  EXPECT_EQ((*reader)->info().cut_bytes, 0u);
+  EXPECT_EQ((*reader)->info().frame_count, 20u);
+  EXPECT_EQ(read_all(**reader), read_all(bytes));
+}
+
+/// The beginning of bytes that somebody else holds.
+class CutSource : public ByteSource {
+ public:
+  CutSource(const mcap::Bytes& bytes, size_t size) : bytes_(std::span(bytes).first(size)) {}
+  uint64_t size_bytes() const override { return bytes_.size(); }
+  Status read(uint64_t offset, std::span<std::byte> destination) override {
+    if (offset > bytes_.size() || destination.size() > bytes_.size() - offset)
+      return make_error(ErrorCode::BadInput, "past the end");
+    std::copy_n(bytes_.begin() + static_cast<ptrdiff_t>(offset), destination.size(), destination.begin());
+    return {};
+  }
+
+ private:
+  const std::span<const std::byte> bytes_;
+};
+
+TEST(RecordingReader, ReadsToTheCutWhereverItIs) {
+  const mcap::Bytes bytes = test::without_schemas(sample_recording());
+  const std::vector<std::string> all = read_all(bytes);
+  size_t most = 0;
+  for (size_t size = 0; size < bytes.size(); ++size) {
+    const auto reader = RecordingReader::open(std::make_unique<CutSource>(bytes, size));
+    if (!reader) {
+      EXPECT_EQ(most, 0u) << "cut to " << size << ": " << reader.error().to_string();
+      continue;
+    }
+    EXPECT_FALSE((*reader)->info().is_indexed);
+    const std::vector<std::string> items = read_all(**reader);
+    EXPECT_GE(items.size(), most) << "cut to " << size;
+    // What is there is there once, and unchanged.
+    for (const std::string& item : items)
+      ASSERT_EQ(std::count(all.begin(), all.end(), item), std::count(items.begin(), items.end(), item))
+          << "cut to " << size;
+    most = items.size();
+  }
+  EXPECT_EQ(most, all.size());
+}
+
+TEST(RecordingReader, SeeksTheLastKeyframeBefore) {
+  for (const bool is_cut : {false, true}) {
+    mcap::Bytes bytes = sample_recording();
+    if (is_cut) bytes.resize(bytes.size() - 1);
+    const auto reader = open_bytes(bytes);
+    ASSERT_TRUE(reader);
+    const auto first_after = [&](int64_t sim_time_ns) {
+      EXPECT_TRUE((*reader)->seek(sim_time_ns));
+      uint32_t sequence = 0;
+      std::optional<uint64_t> tick;
+      for (auto item = (*reader)->next(); item && *item && (sequence == 0 || !tick);
+           item = (*reader)->next()) {
+        if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what)) {
+          if (sequence == 0) sequence = frame->frame->header.sequence;
+        } else if (const auto* state =
+                       std::get_if<RecordedState>(&std::get<RecordedMessage>((*item)->what))) {
+          if (!tick && state->state_hash >= 1000 && state->state_hash < 2000) tick = state->tick;
+        }
+      }
+      return std::pair(sequence, tick.value_or(99));
+    };
+    EXPECT_EQ(first_after(1'500'000'000), std::pair(11u, uint64_t{11}));
+    EXPECT_EQ(first_after(999'999'999), std::pair(1u, uint64_t{0}));
+    EXPECT_EQ(first_after(1'000'000'000), std::pair(11u, uint64_t{11}));
+    EXPECT_EQ(first_after(-1), std::pair(1u, uint64_t{0}));
+    EXPECT_EQ(first_after(INT64_MAX), std::pair(11u, uint64_t{11}));
+  }
+}
+
+TEST(RecordingReader, TellsADamagedChunkAndGoesOnBehindIt) {
+  mcap::Bytes bytes = sample_recording();
+  const ChunkPlace second = chunk_of(bytes, 2);  // frames of the first second
+  put_at(bytes, second.offset + second.size_bytes - 5, uint8_t{0xEE});
+  const std::vector<std::string> items = read_all(bytes);
+  const auto damage = std::find_if(items.begin(), items.end(), [](const std::string& item) {
+    return item.find("the CRC of the chunk at") != std::string::npos;
+  });
+  ASSERT_NE(damage, items.end());
+  EXPECT_EQ(std::count(items.begin(), items.end(), "frame 5"), 0);
+  EXPECT_EQ(std::count(items.begin(), items.end(), "frame 15"), 1);
+}
+
+TEST(RecordingReader, WalksWhereTheIndexPointsOutside) {
+  const mcap::Bytes whole = sample_recording();
+  mcap::Bytes bytes = whole;
+  // The footer: opcode, length, start of the index, start of its offsets, CRC; then the magic.
+  const uint64_t footer = bytes.size() - mcap::kMagic.size() - mcap::kFooterBytes;
+  put_at(bytes, footer + mcap::kRecordHeadBytes, uint64_t{1} << 62);
+  auto reader = open_bytes(bytes);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_FALSE((*reader)->info().is_indexed);
+  EXPECT_THAT((*reader)->info().index_trouble, HasSubstr("outside"));
+  EXPECT_EQ(read_all(**reader), read_all(whole));
+
+  // A chunk that the index puts behind the end, its CRC made right again.
+  bytes = whole;
+  uint64_t summary_start = 0;
+  std::memcpy(&summary_start, bytes.data() + footer + mcap::kRecordHeadBytes, sizeof(summary_start));
+  uint64_t at = summary_start;
+  while (static_cast<mcap::Opcode>(bytes[at]) != mcap::Opcode::ChunkIndex)
+    at += mcap::read_record(std::span<const std::byte>(bytes).subspan(at))->size_bytes;
+  put_at(bytes, at + mcap::kRecordHeadBytes + 16, uint64_t{1} << 40);
+  const auto summary = std::span<const std::byte>(bytes).subspan(
+      summary_start, footer + mcap::kFooterBytes - sizeof(uint32_t) - summary_start);
+  put_at(bytes, footer + mcap::kFooterBytes - sizeof(uint32_t), crc32(summary));
+  reader = open_bytes(bytes);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_THAT((*reader)->info().index_trouble, HasSubstr("the index names a chunk"));
+  EXPECT_EQ(read_all(**reader), read_all(whole));
+
+  bytes = whole;
+  put_at(bytes, at + mcap::kRecordHeadBytes, uint8_t{0xEE});  // and not made right
+  reader = open_bytes(bytes);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_THAT((*reader)->info().index_trouble, HasSubstr("the CRC of the index"));
+}
+
+TEST(RecordingReader, RefusesWhatIsTooLargeBeforeItTakesMemory) {
+  mcap::Bytes bytes = sample_recording();
+  const ChunkPlace first = chunk_of(bytes, 1);
+  put_at(bytes, first.offset + mcap::kRecordHeadBytes + 16, uint64_t{1} << 50);  // uncompressed_size
+  const auto reader = open_bytes(bytes);
+  ASSERT_FALSE(reader);
+  EXPECT_THAT(reader.error().to_string(), HasSubstr("uncompressed, the limit is"));
+}
+
+TEST(RecordingReader, RefusesWhatIsNoRecordingOfOursInOneSentence) {
+  const auto sentence = [](mcap::Bytes bytes) {
+    const auto reader = open_bytes(std::move(bytes));
+    return reader ? std::string("opened") : reader.error().to_string();
+  };
+  EXPECT_THAT(sentence({}), HasSubstr("this is no MCAP file"));
+  const auto text = bytes_of("name: \"walk\" and so on, a scene");
+  EXPECT_THAT(sentence({text.begin(), text.end()}), HasSubstr("this is no MCAP file"));
+  mcap::Bytes other;
+  mcap::append_magic(other);
+  mcap::append(mcap::Header{"ros2", "somebody"}, other);
+  EXPECT_THAT(sentence(other), HasSubstr("the profile 'ros2'"));
+
+  test::MemorySink sink;
+  RecordingStart later = sample_start();
+  later.version = 2;
+  later.server_version = "9.0.0";
+  { const RecordingWriter writer(sink, later, *sample_asset_frame()); }
+  EXPECT_THAT(sentence(sink.all), HasSubstr("version 2 of the format, and this program reads 1"));
+
+  test::MemorySink other_hair;
+  RecordingStart wrong = sample_start();
+  wrong.asset_hash ^= 1;
+  { const RecordingWriter writer(other_hair, wrong, *sample_asset_frame()); }
+  EXPECT_THAT(sentence(other_hair.all), HasSubstr("is not what its beginning says"));
+}
+
+TEST(RecordingWriter, SaysInTheFileWhatFoundNoRoom) {
+  test::MemorySink sink;
+  RecordingWriter writer(sink, sample_start(), *sample_asset_frame());
+  sink.is_full = true;
+  writer.add(sample_start().server_time_ns, test::sample_frame(1, true, 0));
+  writer.add(sample_start().server_time_ns, test::sample_frame(2, false, 10));
+  writer.flush();
+  EXPECT_EQ(writer.lost().frames, 2u);
+  sink.is_full = false;
+  writer.add(sample_start().server_time_ns, test::sample_frame(3, true, 20));
+  writer.finish();
+  const auto reader = open_bytes(sink.all);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  std::optional<RecordedLoss> loss;
+  std::vector<uint32_t> sequences;
+  for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+    if (const auto* frame = std::get_if<RecordedFrame>(&(*item)->what))
+      sequences.push_back(frame->frame->header.sequence);
+    else if (const auto* lost = std::get_if<RecordedLoss>(&std::get<RecordedMessage>((*item)->what)))
+      loss = *lost;
+  }
+  ASSERT_TRUE(loss);
+  EXPECT_EQ(loss->frames, 2u);
+  EXPECT_EQ(sequences, std::vector<uint32_t>{3});
+}
+
+std::filesystem::path save(const TemporaryFolder& folder, const char* name, const mcap::Bytes& bytes) {
+  const std::filesystem::path path = folder.path() / name;
+  EXPECT_TRUE(save_file(path, bytes));
+  return path;
+}
+
+TEST(RecordingCheck, HoldsStrandsAgainstPublishedStates) {
+  const TemporaryFolder folder;
+  const auto check = check_recording(save(folder, "run.mcap", test::moving_recording(25)));
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_TRUE(check->is_sound()) << testing::PrintToString(check->problems);
+  EXPECT_TRUE(check->is_whole);
+  EXPECT_EQ(check->states, 25u);
+  EXPECT_EQ(check->decoded_frames, 25u);
+  EXPECT_EQ(check->equal_states, 25u) << "by delta nothing is rounded";
+}
+
+TEST(RecordingCheck, FindsEveryByteThatIsWrong) {
+  const mcap::Bytes whole = test::without_schemas(test::moving_recording(12));
+  // Lengths and times of an index that stands beside its chunk say nothing that is not said elsewhere; they
+  // are under the CRC of all data.
+  for (size_t i = 0; i < whole.size(); i += 7) {
+    mcap::Bytes bytes = whole;
+    bytes[i] ^= std::byte{0x20};
+    const auto source = memory_byte_source(bytes);
+    const auto check = check_recording(*source);
+    EXPECT_FALSE(check && check->is_sound()) << "byte " << i << " of " << whole.size();
+  }
+}
+
+TEST(RecordingRecover, MakesAWholeFileOfOneThatWasCutOff) {
+  const TemporaryFolder folder;
+  const mcap::Bytes whole = test::moving_recording(25);
+  const auto source = memory_byte_source(whole);
+  const auto walked = walk_chunks(*source);
+  ASSERT_TRUE(walked);
+  const uint64_t last = walked->chunks.back().offset;
+  const auto cut =
+      save(folder, "cut.mcap", mcap::Bytes(whole.begin(), whole.begin() + static_cast<ptrdiff_t>(last + 30)));
+  EXPECT_FALSE(check_recording(cut)->is_sound());
+  const auto recovery = recover_recording(cut, folder.path() / "whole.mcap");
+  ASSERT_TRUE(recovery) << recovery.error().to_string();
+  EXPECT_TRUE(recovery->check.is_sound()) << testing::PrintToString(recovery->check.problems);
+  EXPECT_TRUE(recovery->check.is_whole);
+  EXPECT_EQ(recovery->kept_chunks, walked->chunks.size() - 1);
+  EXPECT_EQ(recovery->cut_bytes, 30u);
+  const auto before = RecordingReader::open(cut);
+  const auto after = RecordingReader::open(folder.path() / "whole.mcap");
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(read_all(**before), read_all(**after));
+  EXPECT_FALSE(recover_recording(cut, folder.path() / "whole.mcap")) << "nothing is replaced";
+}
+
+TEST(RecordingRecover, LeavesOutWhatIsDamaged) {
+  const TemporaryFolder folder;
+  mcap::Bytes bytes = test::moving_recording(25);
+  const ChunkPlace damaged = chunk_of(bytes, 4);
+  put_at(bytes, damaged.offset + damaged.size_bytes - 3, uint8_t{0x5A});
+  const auto recovery = recover_recording(save(folder, "run.mcap", bytes), folder.path() / "out.mcap");
+  ASSERT_TRUE(recovery) << recovery.error().to_string();
+  EXPECT_EQ(recovery->left_out_chunks, 1u);
+  EXPECT_TRUE(recovery->check.is_whole);
+}
+
+TEST(RecordingCompare, NamesTheFirstStepThatDiffersAndHowFar) {
+  const TemporaryFolder folder;
+  const auto a = save(folder, "a.mcap", test::moving_recording(25));
+  const auto shorter = save(folder, "b.mcap", test::moving_recording(15));
+  const auto other = save(folder, "c.mcap", test::moving_recording(25, 3));
+  const auto equal = compare_recordings(a, a);
+  ASSERT_TRUE(equal) << equal.error().to_string();
+  EXPECT_EQ(equal->equal_states, 25u);
+  EXPECT_FALSE(equal->first_different_tick);
+  EXPECT_EQ(equal->compared_frames, 25u);
+  EXPECT_EQ(equal->max_distance_m, 0.0);
+  const auto part = compare_recordings(a, shorter);
+  ASSERT_TRUE(part);
+  EXPECT_EQ(part->equal_states, 15u);
+  EXPECT_FALSE(part->first_different_tick);
+  const auto different = compare_recordings(a, other);
+  ASSERT_TRUE(different);
+  EXPECT_EQ(different->first_different_tick, uint64_t{0});
+  // All vertices are three lattice steps along x from where they are in the other one.
+  const double shift_m = 3.0 * static_cast<double>(*lattice_step_m("delta", 1e-4f));
+  EXPECT_NEAR(different->max_distance_m, shift_m, 1e-6 * shift_m + 1e-7);
+}
+
+TEST(RecordFile, NeverReplacesAFileUnlessTold) {
+  const TemporaryFolder folder;
+  const auto path = folder.write("run.mcap", "precious");
+  const auto refused = RecordFile::make(path, IfPresent::Refuse);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().to_string(), HasSubstr("--record-replace"));
+  { const auto given_up = RecordFile::make(path, IfPresent::Replace); }
+  EXPECT_EQ(*load_text(path, 100), "precious") << "the server did not start, and the old file is gone";
+  {
+    const auto file = RecordFile::make(path, IfPresent::Replace);
+    ASSERT_TRUE(file) << file.error().to_string();
+    (*file)->keep();
+    EXPECT_TRUE((*file)->take({std::byte{'n'}, std::byte{'e'}, std::byte{'w'}}, true));
+    (*file)->finish();
+    EXPECT_EQ((*file)->written_bytes(), 3u);
+  }
+  EXPECT_EQ(*load_text(path, 100), "new");
+  const auto nowhere = RecordFile::make(folder.path() / "no" / "folder.mcap", IfPresent::Refuse);
+  ASSERT_FALSE(nowhere);
+  EXPECT_THAT(nowhere.error().to_string(), HasSubstr("cannot be written"));
+}
+
+TEST(RecordFile, EndsWholeWhereTheDiskIsFull) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "run.mcap";
+  const auto file = RecordFile::make(path, IfPresent::Refuse);
+  ASSERT_TRUE(file) << file.error().to_string();
+  (*file)->keep();
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small{1000, before.rlim_max};
+  const auto* const ignored = std::signal(SIGXFSZ, SIG_IGN) == SIG_ERR ? "" : nullptr;
+  ASSERT_EQ(ignored, nullptr);
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_TRUE((*file)->take(mcap::Bytes(600), true));
+  (*file)->take(mcap::Bytes(600), true);
+  (*file)->finish();
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, SIG_DFL);
+  ASSERT_TRUE((*file)->failure());
+  EXPECT_FALSE((*file)->take(mcap::Bytes(1), true));
+  EXPECT_EQ((*file)->written_bytes(), 600u);
+  EXPECT_EQ(std::filesystem::file_size(path), 600u) << "half of what did not fit is in the file";
+}
+
+}  // namespace
+}  // namespace strandcast
