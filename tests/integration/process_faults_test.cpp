@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "client/app/live_connection.h"
+#include "common/record/recording_reader.h"
 #include "tests/support/child_process.h"
 #include "tests/support/eventually.h"
 #include "tests/support/lacks_gl.h"
@@ -23,13 +24,15 @@ using test::ChildProcess;
 class ProcessFaults : public testing::Test {
  protected:
   /// A server with a small scene; null after a skip.
-  std::unique_ptr<ChildProcess> serve(uint16_t port = 0) {
+  std::unique_ptr<ChildProcess> serve(uint16_t port = 0, const std::vector<std::string>& more = {}) {
     std::filesystem::remove(port_path_);
-    auto server = std::make_unique<ChildProcess>(
-        STRANDCAST_SERVER_PROGRAM,
-        std::vector<std::string>{"--port", std::to_string(port), "--port-file", port_path_.string(), "--set",
-                                 "groom.procedural.strand_count=50", "--log-level", "info"},
-        folder_.path() / "server.txt");
+    std::vector<std::string> arguments = {"--port",      std::to_string(port),
+                                          "--port-file", port_path_.string(),
+                                          "--set",       "groom.procedural.strand_count=50",
+                                          "--log-level", "info"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    auto server =
+        std::make_unique<ChildProcess>(STRANDCAST_SERVER_PROGRAM, arguments, folder_.path() / "server.txt");
     EXPECT_TRUE(eventually([&] { return server->has_ended() || std::filesystem::exists(port_path_); }));
     if (server->has_ended()) return nullptr;
     std::ifstream(port_path_) >> port_;
@@ -78,6 +81,30 @@ TEST_F(ProcessFaults, TerminationSaysGoodbyeToSixtyFourViewers) {
   EXPECT_EQ(viewers.measures().close_codes, (std::map<uint16_t, uint64_t>{{1001, kViewers}}));
   EXPECT_THAT(viewers.measures().last_goodbye, testing::HasSubstr("stopping"));
   EXPECT_EQ(server->wait(), 0) << output();
+}
+
+TEST_F(ProcessFaults, AFullDiskEndsTheRecordingAndNothingElse) {
+  const std::filesystem::path recording = folder_.path() / "run.mcap";
+  const auto server = serve(0, {"--record", recording.string()});
+  if (server == nullptr && test::lacks_gl(output())) GTEST_SKIP() << "needs OpenGL 4.5: " << output();
+  ASSERT_NE(server, nullptr) << output();
+  // No file of the server's may grow beyond what is there now and a little more.
+  ASSERT_TRUE(eventually([&] { return RecordingReader::open(recording).ok(); }));
+  const rlimit limit{std::filesystem::file_size(recording) + 20'000,
+                     std::filesystem::file_size(recording) + 20'000};
+  ASSERT_EQ(prlimit(server->id(), RLIMIT_FSIZE, &limit, nullptr), 0);
+  EXPECT_TRUE(eventually([&] { return output().find("the recording ends here") != std::string::npos; }))
+      << output();
+  LoadViewers viewers({"127.0.0.1", port_, {}});
+  ASSERT_TRUE(viewers.join({}).ok());
+  EXPECT_TRUE(run_until(viewers, [&] { return viewers.watching_count() == 1; })) << "it does not go on";
+  server->send_signal(SIGTERM);
+  EXPECT_EQ(server->wait(), 0) << output();
+  const std::string said = output();
+  EXPECT_EQ(said.find("the recording ends here"), said.rfind("the recording ends here")) << "said once";
+  const auto reader = RecordingReader::open(recording);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  EXPECT_EQ((*reader)->info().cut_bytes, 0u) << "what was written is whole";
 }
 
 TEST_F(ProcessFaults, AKilledServerIsFoundAgain) {

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/record/chunk_list.h"
 #include "tests/support/child_process.h"
 #include "tests/support/lacks_gl.h"
 #include "tests/support/temporary_folder.h"
@@ -32,7 +33,8 @@ class Secrets : public testing::Test {
     auto server = std::make_unique<ChildProcess>(
         STRANDCAST_SERVER_PROGRAM,
         std::vector<std::string>{"--port", "0", "--port-file", port_path, "--token-file", token_path_,
-                                 "--set", "groom.procedural.strand_count=50", "--log-level", "debug"},
+                                 "--set", "groom.procedural.strand_count=50", "--log-level", "debug",
+                                 "--record", recording_path_, "--record-replace"},
         folder_.path() / "server.txt");
     EXPECT_TRUE(eventually([&] { return server->has_ended() || std::filesystem::exists(port_path); }));
     if (server->has_ended()) return nullptr;
@@ -50,8 +52,24 @@ class Secrets : public testing::Test {
     return code;
   }
 
+  /// All chunks of the recording, decompressed.
+  std::string recorded_text() const {
+    const auto source = open_byte_source(recording_path_);
+    const auto list = source ? list_chunks(**source) : Result<ChunkList>(source.error());
+    EXPECT_TRUE(list);
+    std::string text;
+    if (!list) return text;
+    for (const ChunkPlace& place : list->chunks) {
+      const auto chunk = load_chunk(**source, place);
+      EXPECT_TRUE(chunk);
+      if (chunk) text.append(reinterpret_cast<const char*>(chunk->records.data()), chunk->records.size());
+    }
+    return text;
+  }
+
   TemporaryFolder folder_;
   const std::string token_path_ = (folder_.path() / "tokens").string();
+  const std::string recording_path_ = (folder_.path() / "run.mcap").string();
   std::string connect_;
   std::string client_output_;
 };
@@ -73,14 +91,17 @@ TEST_F(Secrets, AreNeverWritten) {
   EXPECT_EQ(ctl({"--token", bad, "pause"}), 2);
   EXPECT_EQ(ctl({"--token", good[0], "monitor", "--seconds", "0.2"}), 0) << client_output_;
   EXPECT_EQ(ctl({"--token", good[1], "kick", "12345"}), 1);
+  EXPECT_EQ(ctl({"--token", good[1], "set", "substeps=2"}), 0) << client_output_;
   EXPECT_EQ(ctl({"--token-file", token_path_, "shutdown"}), 0) << client_output_;
   EXPECT_EQ(server->wait(), 0) << server_output();
 
+  const std::string recorded = recorded_text();
+  EXPECT_THAT(recorded, HasSubstr("substeps=2")) << "what the admin changed";
   EXPECT_THAT(server_output(), HasSubstr("joined: admin"));
   EXPECT_THAT(server_output(), HasSubstr("token is wrong"));
   for (const std::string& token : {good[0], good[1], bad})
     for (const std::string& part : {token.substr(0, token.size() / 2), token.substr(token.size() / 2)})
-      for (const std::string& text : {server_output(), client_output_})
+      for (const std::string& text : {server_output(), client_output_, recorded})
         EXPECT_THAT(text, Not(HasSubstr(part)));
 }
 

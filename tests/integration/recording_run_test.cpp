@@ -1,0 +1,189 @@
+// Runs of a whole server that are recorded, and simulated again from their recordings.
+#include <future>
+#include <thread>
+
+#include "client/app/feed.h"
+#include "common/record/recording_check.h"
+#include "common/record/recording_reader.h"
+#include "server/record/replay.h"
+#include "tests/support/server_fixture.h"
+#include "tests/support/temporary_folder.h"
+
+namespace strandcast {
+namespace {
+
+using testing::HasSubstr;
+
+class RecordedRun : public test::ServerFixture {
+ protected:
+  ServerConfig config() const {
+    ServerConfig config;
+    config.scene = test::bald_scene(40, 8);
+    config.sim_device = "lanes";
+    config.record = RecordConfig{path_, IfPresent::Refuse};
+    return config;
+  }
+  /// Steps until so many more states are published.
+  void run_steps(uint64_t count) {
+    const uint64_t until = server_->counters().sim.tick + count;
+    EXPECT_TRUE(eventually([&] { return server_->counters().sim.tick >= until; }));
+  }
+  int change(const std::string& assignment) { return run_command(ctl_target(), SetParameter{assignment}); }
+  int command(Command command) { return run_command(ctl_target(), ControlCommand{command}); }
+
+  /// A server that is fed, steered and stopped.
+  void record() {
+    ASSERT_TRUE(start(config()));
+    std::atomic<bool> is_fed{false};
+    FeedOptions live;
+    live.is_live = true;
+    std::thread feeder([&] { run_feed(ctl_target(), live, is_fed); });
+    run_steps(20);
+    EXPECT_EQ(change("substeps=2"), kDoneExit);
+    EXPECT_EQ(change("stream.bound_m=0.0002"), kDoneExit);
+    EXPECT_EQ(change("wind.mean_mps.x=400000"), kRefusedExit);
+    run_steps(20);
+    EXPECT_EQ(command(Command::Pause), kDoneExit);
+    EXPECT_EQ(command(Command::StepOnce), kDoneExit);
+    EXPECT_EQ(command(Command::Resume), kDoneExit);
+    run_steps(5);
+    EXPECT_EQ(command(Command::Reset), kDoneExit);
+    EXPECT_EQ(change("solver.name=pbd"), kDoneExit);
+    run_steps(20);
+    is_fed = true;
+    feeder.join();
+    server_->stop();
+    server_.reset();
+  }
+  std::vector<RecordedMessage> messages() const {
+    std::vector<RecordedMessage> all;
+    const auto reader = RecordingReader::open(path_, RecordedPart::Messages);
+    EXPECT_TRUE(reader) << reader.error().to_string();
+    if (!reader) return all;
+    for (auto item = (*reader)->next(); item && *item; item = (*reader)->next())
+      all.push_back(std::get<RecordedMessage>((*item)->what));
+    return all;
+  }
+  ReplayResult replay(const std::filesystem::path& path) {
+    ReplayConfig config;
+    config.recording = path;
+    config.on_note = [this](const std::string& sentence) { notes_.push_back(sentence); };
+    const auto result = replay_recording(config);
+    EXPECT_TRUE(result) << result.error().to_string();
+    return result ? *result : ReplayResult{};
+  }
+  /// The same recording with its messages changed.
+  template <class Change>
+  std::filesystem::path altered(const char* name, Change change_message) const {
+    const std::filesystem::path path = folder_.path() / name;
+    const auto reader = RecordingReader::open(path_, RecordedPart::Messages);
+    auto file = RecordFile::make(path, IfPresent::Refuse);
+    EXPECT_TRUE(reader && file);
+    (*file)->keep();
+    RecordingStart start = (*reader)->start();
+    change_message(start);
+    RecordingWriter writer(**file, start, *(*reader)->asset_frame());
+    for (auto item = (*reader)->next(); item && *item; item = (*reader)->next()) {
+      RecordedMessage message = std::get<RecordedMessage>((*item)->what);
+      std::visit([&](auto& one) { change_message(one); }, message);
+      writer.add((*item)->time_ns, 0, message);
+    }
+    writer.finish();
+    return path;
+  }
+
+  TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_.path() / "run.mcap";
+  std::vector<std::string> notes_;
+};
+
+TEST_F(RecordedRun, IsSimulatedAgainBitForBit) {
+  record();
+  if (IsSkipped()) return;
+  const auto check = check_recording(path_);
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_TRUE(check->is_sound()) << testing::PrintToString(check->problems);
+  EXPECT_GT(check->states, 60u);
+  EXPECT_GT(check->decoded_frames, 30u);
+  EXPECT_EQ(check->decoded_frames, check->frames);
+  for (int i = 0; i < 3; ++i) {
+    const ReplayResult result = replay(path_);
+    EXPECT_TRUE(result.is_equal()) << to_sentence(result);
+    EXPECT_EQ(result.compared, check->states);
+  }
+  EXPECT_TRUE(notes_.empty()) << testing::PrintToString(notes_);
+}
+
+TEST_F(RecordedRun, SaysWhoChangedWhatAndWhatCameIn) {
+  record();
+  if (IsSkipped()) return;
+  std::vector<std::string> changes;
+  size_t motion = 0, wind = 0, steps_with_motion = 0, lattices = 0;
+  for (const RecordedMessage& message : messages()) {
+    motion += std::holds_alternative<RecordedMotion>(message);
+    wind += std::holds_alternative<RecordedWind>(message);
+    lattices += std::holds_alternative<RecordedStream>(message);
+    if (const auto* step = std::get_if<RecordedStep>(&message)) steps_with_motion += step->has_motion;
+    const auto* change = std::get_if<RecordedChange>(&message);
+    if (change == nullptr) continue;
+    EXPECT_THAT(change->who, HasSubstr("controller"));
+    const auto* parameter = std::get_if<SetParameter>(&change->what);
+    changes.push_back((parameter != nullptr ? parameter->assignment : "command") +
+                      (change->answer.is_error ? ": refused" : ""));
+  }
+  EXPECT_EQ(changes, (std::vector<std::string>{"substeps=2", "stream.bound_m=0.0002",
+                                               "wind.mean_mps.x=400000: refused", "command", "command",
+                                               "command", "command", "solver.name=pbd"}));
+  EXPECT_GT(motion, 10u);
+  EXPECT_GT(wind, 10u);
+  EXPECT_GT(steps_with_motion, 30u);
+  EXPECT_EQ(lattices, 1u);
+}
+
+TEST_F(RecordedRun, TellsTheFirstStepThatIsNotAsItWas) {
+  record();
+  if (IsSkipped()) return;
+  constexpr uint64_t kTick = 30;
+  // A head that is a tenth of a millimetre elsewhere, in one step.
+  const auto moved = altered("moved.mcap", [](auto& message) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordedStep>)
+      if (message.tick == kTick) message.world_from_head.position_m.x += 1e-4;
+  });
+  const ReplayResult result = replay(moved);
+  EXPECT_FALSE(result.is_equal());
+  ASSERT_TRUE(result.difference) << to_sentence(result);
+  EXPECT_EQ(result.difference->tick, kTick);
+  EXPECT_EQ(result.equal + 1, result.compared);
+
+  const auto elsewhere = altered("elsewhere.mcap", [](auto& message) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordingStart>) {
+      message.sim_device = "gl";
+      message.server_version = "0.0.9";
+    }
+  });
+  ReplayConfig on_lanes;
+  on_lanes.recording = elsewhere;
+  on_lanes.device.sim_device = "lanes";
+  on_lanes.on_note = [this](const std::string& sentence) { notes_.push_back(sentence); };
+  const auto other = replay_recording(on_lanes);
+  ASSERT_TRUE(other) << other.error().to_string();
+  ASSERT_EQ(notes_.size(), 2u);
+  EXPECT_THAT(notes_[0], HasSubstr("recorded by strandcast-server 0.0.9"));
+  EXPECT_THAT(notes_[1], HasSubstr("recorded on gl"));
+
+  const auto bald = altered("bald.mcap", [](auto& message) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(message)>, RecordingStart>) {
+      auto scene = parse_scene(message.scene_text, "test", {"groom.procedural.strand_count=41"});
+      ASSERT_TRUE(scene);
+      message.scene_text = to_line(*scene);
+    }
+  });
+  ReplayConfig of_others;
+  of_others.recording = bald;
+  const auto refused = replay_recording(of_others);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().to_string(), HasSubstr("is not what was recorded"));
+}
+
+}  // namespace
+}  // namespace strandcast
