@@ -14,7 +14,10 @@ usage: bash deploy/run.sh [options]
   --motion-up y|z      up axis of the BVH                                       (default: guessed from the rest pose)
   --joint NAME         head joint of the BVH                                    (default: found by its name)
   --filter-glitches    take steps out of the BVH that are faster than any head moves
+  --mocap PROTOCOL     head motion from a stage instead: vmc, opentrack, freed, livelinkface (PROTOCOL:PORT),
+                       natnet://HOST, vrpn://HOST
   --wind FILE          wind to feed: CSV                                        (default: built-in gusts)
+  --record FILE        records the run as MCAP, into a new file: strandcast-view FILE plays it
   --scene FILE         scene as protobuf text, see deploy/scenes
   --set PATH=VALUE     overrides one field of the scene; may be repeated
   --seconds N          stop after N seconds; headless, what came is drawn then  (default: 6 headless, else never)
@@ -35,7 +38,7 @@ while [ $# -gt 0 ]; do
     --headless) headless=1; shift; continue ;;
     --web) web=1; shift; continue ;;
     --filter-glitches) motion_options+=(--filter-glitches); shift; continue ;;
-    --groom|--motion|--motion-unit|--motion-up|--joint|--wind|--scene|--set|--seconds|--out) ;;
+    --groom|--motion|--mocap|--motion-unit|--motion-up|--joint|--wind|--record|--scene|--set|--seconds|--out) ;;
     *) usage >&2; fail "unknown option: $1" ;;
   esac
   [ $# -ge 2 ] || fail "$1 needs a value"
@@ -46,6 +49,8 @@ while [ $# -gt 0 ]; do
     --scene) need_file "$1" "$2"; server_options+=(--scene "$(realpath "$2")") ;;
     --set) server_options+=(--set "$2") ;;
     --motion) need_file "$1" "$2"; motion=$(realpath "$2") ;;
+    --mocap) motion=none; server_options+=(--mocap "$2") ;;
+    --record) server_options+=(--record "$(realpath -m "$2")") ;;
     --motion-unit) motion_options+=(--unit "$2") ;;
     --motion-up) motion_options+=(--up "$2") ;;
     --joint) motion_options+=(--joint "$2") ;;
@@ -107,6 +112,7 @@ port=$(cat "$port_file")
 rm -f "$port_file"
 echo "Server on 127.0.0.1:$port (log: $out/server.log)"
 sed -n 's/^[^ ]* info \[scene\] //p' "$out/server.log"  # how files were read: turned, scaled, which head
+sed -n 's/^[^ ]* info \[mocap\] /Waiting for head motion: /p' "$out/server.log"
 grep -i ' warning ' "$out/server.log" >&2 || true
 
 "$bin/strandcast-ctl" feed --connect "127.0.0.1:$port" --motion "$motion" --wind "$wind" --loop "${motion_options[@]}" \

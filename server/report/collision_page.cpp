@@ -13,7 +13,7 @@ namespace strandcast {
 namespace {
 
 constexpr int kPictureQuality = 85;
-/// The issue of a field: no deeper than so against the mesh where hair has settled.
+/// What is deeper than so in the mesh, where hair has settled, is seen.
 constexpr double kSeenM = 0.0005;
 
 std::string mm(double metres) {
