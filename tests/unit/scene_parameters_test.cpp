@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <set>
 
 #include "common/scene/scene_file.h"
@@ -80,7 +81,13 @@ TEST(SceneParameters, ARefusedValueIsToldItsRange) {
     if (!info.is_live || !info.has_range || info.value.starts_with("{")) continue;
     const auto refused = change_scene(scene, fmt::format("{}={}", info.path, info.maximum + 1.0));
     ASSERT_FALSE(refused) << info.path;
-    EXPECT_THAT(refused.error().to_string(), HasSubstr(fmt::format("{:g}", info.maximum))) << info.path;
+    // What no 32 bits hold is refused before anybody asks for the field's own range.
+    const bool is_type_limit = info.maximum == std::numeric_limits<uint32_t>::max();
+    EXPECT_THAT(refused.error().to_string(),
+                is_type_limit ? testing::AnyOf(HasSubstr("out of range"), HasSubstr("Integer out"))
+                              : testing::AnyOf(HasSubstr(fmt::format("{:g}", info.maximum)),
+                                               HasSubstr(fmt::format("{}", info.maximum))))
+        << info.path;
   }
 }
 
