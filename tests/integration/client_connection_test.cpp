@@ -191,8 +191,8 @@ TEST(ClientHostile, ControlMessagesBeforeTheWelcomeAreRefused) {
     EXPECT_THAT(error.message, HasSubstr("before its Welcome"));
     ++refused;
   }
-  EXPECT_EQ(refused, 8u)
-      << "status, stream quality, mode change, frame quality, session list, notice, look change, scene text";
+  EXPECT_EQ(refused, 9u) << "status, stream quality, mode change, frame quality, session list, notice, look "
+                            "change, scene text, parameter list";
 }
 
 TEST(ClientHostile, MediaBeforeTheWelcomeIsRefused) {

@@ -124,6 +124,7 @@ Status LiveSource::take(const std::string& sender, std::span<const std::byte> by
   }
   // Who was heard is forgotten, with what it said.
   if (is_locked_ && !is_heard(arrival_ns)) {
+    note_silence();
     is_locked_ = false;
     if (protocol_.transport == LiveTransport::Udp) begin_connection();
   }
@@ -263,12 +264,15 @@ LiveSource::Due LiveSource::advance(int64_t now_ns) {
     if (live_.subject.empty()) follow_subject(now_ns);
   }
   was_stale_ = is_stale_now;
-  if (was_heard_ && !is_heard(now_ns)) {
-    was_heard_ = false;
-    rate_hz_ = 0.0;
-    notes_.push_back({true, fmt::format("{}: {} has stopped sending: the head rests", describe(), sender_)});
-  }
+  if (!is_heard(now_ns)) note_silence();
   return due;
+}
+
+/// Once for each time that a sender was heard.
+void LiveSource::note_silence() {
+  if (!std::exchange(was_heard_, false)) return;
+  rate_hz_ = 0.0;
+  notes_.push_back({true, fmt::format("{}: {} has stopped sending: the head rests", describe(), sender_)});
 }
 
 LiveInputStatus LiveSource::status(int64_t now_ns) const {

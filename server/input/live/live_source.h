@@ -91,6 +91,7 @@ class LiveSource {
   bool is_heard(int64_t now_ns) const;
   bool take_allowance(size_t bytes, int64_t arrival_ns);
   void hear(const std::string& sender, int64_t arrival_ns);
+  void note_silence();
   void measure(int64_t arrival_ns);
   void note_subject(const std::string& name, int64_t arrival_ns);
   void follow_subject(int64_t now_ns);
