@@ -80,7 +80,8 @@ async function printGl() {
   const report = path.join(work, 'report.txt');
   const renderMs = () => {
     execFileSync(viewProgram, ['--connect', address, '--headless', '--mode', 'strands', '--codec', 'tangent', '--renderer', 'gl',
-      '--size', `${SIZE.width}x${SIZE.height}`, '--seconds', '6', '--report', report], { stdio: 'ignore' });
+      '--size', `${SIZE.width}x${SIZE.height}`, '--seconds', '6', '--clip', path.join(work, 'clip.webp'), // without one it draws nothing
+      '--clip-size', `${SIZE.width}x${SIZE.height}`, '--report', report], { stdio: 'ignore' });
     return Number(/^render_ms_median=(.*)$/m.exec(fs.readFileSync(report, 'utf8'))[1]);
   };
   const desktop = Math.min(renderMs(), renderMs());
