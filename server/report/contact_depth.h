@@ -1,9 +1,9 @@
 // How deep hair gets in what it collides with, and whether it rests. Any thread.
 #pragma once
 
+#include <functional>
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <functional>
 #include <vector>
 
 #include "common/groom/groom.h"
