@@ -23,7 +23,7 @@ while [ $# -gt 0 ]; do
 done
 [ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm wasm)
 
-bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools spirv-tools
+bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools glslc spirv-tools
 log="$(mktemp)"
 trap 'rm -f "$log"' EXIT
 

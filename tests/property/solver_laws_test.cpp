@@ -368,7 +368,7 @@ TEST_F(SolverLaws, TheSettledShapeDoesNotDependOnTheSubstep) {
     if (kind.host.is_kernel() || !kind.row->comes_to_rest) continue;  // parity covers the kernels
     SCOPED_TRACE(kind.name());
     SolverState settled[2];
-    const double substeps_s[2] = {1.0 / 60.0, 1.0 / 240.0};
+    const double substeps_s[2] = {1.0 / 60.0, 1.0 / on_grid(120, 240)};
     for (int i = 0; i < 2; ++i) {
       // Limp enough to hang: a strand that stands has two shapes to settle to.
       auto solver = make(kind, groom, {{"air_drag_per_s", 4.0}, {"style_stiffness_per_s2", 60.0}});

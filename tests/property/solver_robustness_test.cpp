@@ -141,7 +141,7 @@ TEST_F(SolverRobustness, ExtremeInputsStayFiniteAndExact) {
 
 TEST_F(SolverRobustness, EveryParameterMayStandAtItsBounds) {
   const Groom groom = make_test_groom({});
-  for (const SolverKind& kind : all_kinds()) {
+  for (const SolverKind& kind : kinds_of_long_tests()) {
     for (const SolverParameterInfo& info : kind.row->parameters) {
       for (const double value : {info.minimum, info.maximum}) {
         SCOPED_TRACE(fmt::format("{}, {} = {}", kind.name(), info.name, value));
@@ -209,7 +209,7 @@ TEST_F(SolverRobustness, AVertexOnItsLeaderTakesTheGroomedDirection) {
 // that is announced is no movement; one that is not leaves strands that settle as if nothing had happened.
 TEST_F(SolverRobustness, AKilometreInOneStepSettlesToTheSameShape) {
   const Groom groom = make_test_groom({});
-  for (const SolverKind& kind : all_kinds()) {
+  for (const SolverKind& kind : kinds_of_long_tests()) {
     SCOPED_TRACE(kind.name());
     auto solver = make(kind, groom, {{"air_drag_per_s", 8.0}});
     auto calm = make(kind, groom, {{"air_drag_per_s", 8.0}});

@@ -9,6 +9,7 @@
 #include "server/sim/solver_registry.h"
 #include "tests/support/sim_devices.h"
 #include "tests/support/sim_scene.h"
+#include "tests/support/test_grid.h"
 
 namespace strandcast {
 
@@ -33,6 +34,15 @@ class SolverTest : public testing::Test {
     std::vector<SolverKind> kinds;
     for (const SolverRow& row : solver_table())
       for (const SolverKind& kind : kinds_of(row)) kinds.push_back(kind);
+    return kinds;
+  }
+
+  /// Those that a long test walks: on the small grid without OpenGL's software device, which takes most of
+  /// the time and is held to the reference by parity.
+  static std::vector<SolverKind> kinds_of_long_tests() {
+    std::vector<SolverKind> kinds = all_kinds();
+    if (test_grid() == TestGrid::Small)
+      std::erase_if(kinds, [](const SolverKind& kind) { return kind.host.device == SimDevice::Gl; });
     return kinds;
   }
 
