@@ -96,11 +96,13 @@ std::vector<WayOut> ways_out(const SceneDesc& scene, const StepWork& work) {
 }
 
 std::string slow_motion_text(double realtime_factor, const SceneDesc& scene, const StepWork& work) {
+  const std::string pace = realtime_factor < kSlowFactor
+                               ? fmt::format("the simulation runs at {:.2f} of real time", realtime_factor)
+                               : "the simulation was slower than real time until a moment ago";
   std::string text = fmt::format(
-      "Slow motion: the simulation runs at {:.2f} of real time; its work takes {:.1f} ms a step on all "
-      "threads, "
-      "a step has {:.1f} ms. Cheapest ways out: ",
-      realtime_factor, work.total_ms(), kMsPerS / scene.step_rate_hz);
+      "Slow motion: {}; its work takes {:.1f} ms a step on all threads, a step has {:.1f} ms. Cheapest ways "
+      "out: ",
+      pace, work.total_ms(), kMsPerS / scene.step_rate_hz);
   bool is_first = true;
   for (const WayOut& way : ways_out(scene, work)) {
     text += fmt::format("{}{} ({:.1f} ms less, {})", is_first ? "" : "; ", way.setting, way.saved_ms,

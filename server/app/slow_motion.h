@@ -61,7 +61,8 @@ inline constexpr double kCheapestSolverMsPerVertex = 4.5 / 320'000;
 /// in each those that are seen least first.
 std::vector<WayOut> ways_out(const SceneDesc& scene, const StepWork& work);
 
-/// "The simulation runs at 0.57 of real time: ...", for log and viewers.
+/// "Slow motion: the simulation runs at 0.57 of real time; ...", for log and viewers; without the factor
+/// where it is real time again and not yet for long.
 std::string slow_motion_text(double realtime_factor, const SceneDesc& scene, const StepWork& work);
 
 }  // namespace strandcast
