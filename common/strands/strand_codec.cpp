@@ -3,7 +3,6 @@
 #include <cstring>
 #include <utility>
 
-#include "common/base/check.h"
 #include "common/base/text.h"
 #include "common/strands/strand_limits.h"
 #include "common/strands/strand_payload.h"
@@ -61,15 +60,6 @@ const std::vector<Row>& rows() {
   return table;
 }
 
-/// Beside the table: who only decodes links no encoder.
-std::unique_ptr<StrandEncoder> make_encoder_of(const std::string& codec, WorkerPool& workers) {
-  if (codec == "delta") return make_delta_encoder();
-  if (codec == "raw") return make_raw_encoder();
-  if (codec == "tangent") return tangent::make_encoder(workers);
-  CHECK(codec == "step");
-  return tangent::make_step_encoder(workers);
-}
-
 Result<const Row*> find_row(const std::string& codec) {
   constexpr size_t kMaxShownChars = 64;
   std::string known;
@@ -80,36 +70,6 @@ Result<const Row*> find_row(const std::string& codec) {
   return make_error(ErrorCode::NotFound, "unknown strand codec '{}' (known: {})",
                     excerpt(codec, kMaxShownChars), known);
 }
-
-/// Gives the codec the rest shape of those strands that the snapshots have.
-class PrefixEncoder final : public StrandEncoder {
- public:
-  explicit PrefixEncoder(std::unique_ptr<StrandEncoder> encoder) : encoder_(std::move(encoder)) {}
-
-  void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
-    rest_in_head_m_.assign(rest_in_head_m.begin(), rest_in_head_m.end());
-    strand_count_ = 0;
-  }
-  EncodedFramePtr encode(const Snapshot& snapshot) override {
-    adopt(snapshot);
-    return encoder_->encode(snapshot);
-  }
-  JoinFrames encode_for_join(const Snapshot& snapshot) override {
-    adopt(snapshot);
-    return encoder_->encode_for_join(snapshot);
-  }
-
- private:
-  void adopt(const Snapshot& snapshot) {
-    if (snapshot.strand_count == strand_count_) return;
-    strand_count_ = snapshot.strand_count;
-    encoder_->set_rest_shape(prefix_of_shape(rest_in_head_m_, snapshot.vertex_count, strand_count_));
-  }
-
-  std::unique_ptr<StrandEncoder> encoder_;
-  std::vector<glm::vec3> rest_in_head_m_;
-  uint32_t strand_count_ = 0;  // of the newest snapshot; 0 = none since the rest shape was set
-};
 
 /// A decoder for as many strands as the newest keyframe has.
 class PrefixDecoder final : public StrandDecoder {
@@ -184,12 +144,6 @@ Result<StrandCodecInfo> strand_codec_info(const std::string& codec) {
 Result<float> lattice_step_m(const std::string& codec, float bound_m) {
   ASSIGN_OR_RETURN(const Row* row, find_row(codec));
   return row->lattice_step_m(bound_m);
-}
-
-Result<std::unique_ptr<StrandEncoder>> make_strand_encoder(const std::string& codec, WorkerPool& workers) {
-  ASSIGN_OR_RETURN(const Row* row, find_row(codec));
-  return std::unique_ptr<StrandEncoder>(
-      std::make_unique<PrefixEncoder>(make_encoder_of(row->info.name, workers)));
 }
 
 Result<std::unique_ptr<StrandDecoder>> make_strand_decoder(const std::string& codec,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "common/base/check.h"
@@ -312,22 +313,24 @@ void DecoderSteps::finish(const Moment& now, const tangent::Frame& frame, const 
   follow(now, frame, history);
 }
 
-Result<DecoderSteps::Joined> DecoderSteps::read_state(ByteReader& body, const Moment& now,
-                                                      const tangent::Layout& layout) {
-  Joined joined;
-  if (body.take<uint8_t>() == 0) return joined;
-  ASSIGN_OR_RETURN(joined.scene, read_scene(body));
-  ASSIGN_OR_RETURN(StepModel model,
-                   read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));
-  ASSIGN_OR_RETURN(joined.predictor, Predictor::make(std::move(model), ground(layout)));
-  RETURN_IF_ERROR(joined.predictor->read_state(body, now.world_from_head));
-  return joined;
+void DecoderSteps::settle(const tangent::History& history) {
+  Steps::settle(history);
 }
 
-void DecoderSteps::take_over(Joined joined, const Moment& now, const tangent::History& history) {
-  predictor_ = std::move(joined.predictor);
+Status DecoderSteps::read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) {
+  joined_ = {};
+  if (body.take<uint8_t>() == 0) return {};
+  ASSIGN_OR_RETURN(joined_.scene, read_scene(body));
+  ASSIGN_OR_RETURN(StepModel model,
+                   read_model(body, rest_in_head_m_, layout.strand_count, layout.vertex_count));
+  ASSIGN_OR_RETURN(joined_.predictor, Predictor::make(std::move(model), ground(layout)));
+  return joined_.predictor->read_state(body, now.world_from_head);
+}
+
+void DecoderSteps::take_over(const Moment& now, const tangent::History& history) {
+  predictor_ = std::move(joined_.predictor);
   next_predictor_.reset();
-  scene_ = std::move(joined.scene);
+  scene_ = std::move(joined_.scene);
   base_ = {};
   last_ = now;
   is_stepping_ = is_following_ = is_saved_ = false;

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,27 +13,11 @@
 #include "common/strands/byte_io.h"
 #include "common/strands/snapshot.h"
 #include "common/strands/step/predictor.h"
+#include "common/strands/step/step_reader.h"
 #include "common/strands/step/wire.h"
 #include "common/strands/tangent/motion.h"
 
 namespace strandcast::step {
-
-// Of a delta, beside that of anchors.
-inline constexpr uint8_t kStepFlag = 2;     // predicted by steps, whose ticks follow
-inline constexpr uint8_t kSceneFlag = 4;    // a scene follows
-inline constexpr uint8_t kModelFlag = 8;    // a model follows, from the next frame on; not with kStepFlag
-inline constexpr uint8_t kSparseFlag = 16;  // with kStepFlag: without weights, in sparse_symbols.h's order
-/// Predicted by motion; ticks follow, and steps are corrected by what is decoded. Not with kStepFlag.
-inline constexpr uint8_t kFollowFlag = 32;
-inline constexpr uint8_t kTellingFlags = kStepFlag | kSceneFlag | kModelFlag | kFollowFlag;  // bytes follow
-inline constexpr uint8_t kFlags = kTellingFlags | kSparseFlag;
-
-/// A frame of which something is predicted.
-struct Moment {
-  uint64_t tick = 0;
-  int64_t sim_time_ns = 0;
-  Pose world_from_head;
-};
 
 /// What both sides know.
 class Steps {
@@ -99,29 +82,26 @@ class EncoderSteps : public Steps {
   bool has_said_ = false;
 };
 
-class DecoderSteps : public Steps {
+class DecoderSteps final : public Steps, public StepReader {
  public:
   DecoderSteps(WorkerPool& workers, simd::InstructionSet set) : Steps(workers, set) {}
-  /// Forgets everything.
-  void restart(std::span<const glm::vec3> rest_in_head_m);
-  /// Reads what follows the flags of a delta and, for a frame of steps, takes them. Nothing has changed after
-  /// an error.
+  void restart(std::span<const glm::vec3> rest_in_head_m) override;
   Status begin(uint8_t flags, const Moment& now, const tangent::Layout& layout, ByteReader& body,
-               tangent::History& history);
-  /// The frame failed its checks: all is as before begin().
-  void abandon(tangent::History& history);
-  void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history);
+               tangent::History& history) override;
+  void abandon(tangent::History& history) override;
+  void finish(const Moment& now, const tangent::Frame& frame, const tangent::History& history) override;
+  void settle(const tangent::History& history) override;
+  Status read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout) override;
+  void take_over(const Moment& now, const tangent::History& history) override;
 
-  /// What a keyframe says of steps, all but where strands are.
+ private:
+  /// What a keyframe says of steps.
   struct Joined {
     std::unique_ptr<Predictor> predictor;  // nullptr: nothing is predicted by steps yet
     StepScene scene;
   };
-  Result<Joined> read_state(ByteReader& body, const Moment& now, const tangent::Layout& layout);
-  /// The keyframe has become history.
-  void take_over(Joined joined, const Moment& now, const tangent::History& history);
 
- private:
+  Joined joined_;  // until take_over()
   StepScene saved_scene_;
   TickBase saved_base_;
   bool is_saved_ = false;

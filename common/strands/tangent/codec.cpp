@@ -342,10 +342,12 @@ class Encoder final : public StrandEncoder {
 class Decoder final : public StrandDecoder {
  public:
   Decoder(const StrandStreamLimits& limits, WorkerPool& workers, simd::InstructionSet set,
-          Prediction prediction)
-      : set_(set), number_(codec_number(prediction)), limits_(limits), workers_(workers) {
-    if (prediction == Prediction::Steps) steps_.emplace(workers, set);
-  }
+          std::unique_ptr<step::StepReader> steps)
+      : set_(set),
+        number_(codec_number(steps ? Prediction::Steps : Prediction::Motion)),
+        steps_(std::move(steps)),
+        limits_(limits),
+        workers_(workers) {}
 
   void set_rest_shape(std::span<const glm::vec3> rest_in_head_m) override {
     const bool fits = rest_in_head_m.size() == size_t{limits_.strand_count} * limits_.vertex_count;
@@ -383,10 +385,7 @@ class Decoder final : public StrandDecoder {
     const auto table_bytes = body.take<uint32_t>();
     const auto packed = body.take_bytes(table_bytes);
     const step::Moment moment{snapshot.tick, snapshot.sim_time_ns, snapshot.world_from_head};
-    step::DecoderSteps::Joined joined;
-    if (steps_ && body.ok()) {
-      ASSIGN_OR_RETURN(joined, steps_->read_state(body, moment, layout_));
-    }
+    if (steps_ && body.ok()) RETURN_IF_ERROR(steps_->read_state(body, moment, layout_));
     take_into(body, frame_.shape_weights);
     if (!body.ok())
       return make_error(ErrorCode::BadInput, "keyframe of {} bytes is cut off in its tables or weights",
@@ -402,7 +401,7 @@ class Decoder final : public StrandDecoder {
     remember(chain.history, frame_);
     chain.forget_motion(layout_);
     chain_ = std::move(chain);
-    if (steps_) steps_->take_over(std::move(joined), moment, chain_.history);
+    if (steps_) steps_->take_over(moment, chain_.history);
     return {};
   }
 
@@ -577,7 +576,7 @@ class Decoder final : public StrandDecoder {
 
   simd::InstructionSet set_;
   const uint8_t number_;
-  std::optional<step::DecoderSteps> steps_;
+  const std::unique_ptr<step::StepReader> steps_;
   StrandStreamLimits limits_;
   WorkerPool& workers_;
   Layout layout_;
@@ -606,22 +605,20 @@ std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, Wo
 std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers) {
   return make_step_encoder(workers, simd::widest_set());
 }
-std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers) {
-  return make_step_decoder(limits, workers, simd::widest_set());
-}
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers, simd::InstructionSet set) {
   return std::make_unique<Encoder>(workers, set, Prediction::Motion);
 }
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                             simd::InstructionSet set) {
-  return std::make_unique<Decoder>(limits, workers, set, Prediction::Motion);
+  return make_decoder(limits, workers, set, nullptr);
+}
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
+                                            simd::InstructionSet set,
+                                            std::unique_ptr<step::StepReader> steps) {
+  return std::make_unique<Decoder>(limits, workers, set, std::move(steps));
 }
 std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers, simd::InstructionSet set) {
   return std::make_unique<Encoder>(workers, set, Prediction::Steps);
-}
-std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
-                                                 simd::InstructionSet set) {
-  return std::make_unique<Decoder>(limits, workers, set, Prediction::Steps);
 }
 
 }  // namespace strandcast::tangent

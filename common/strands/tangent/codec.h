@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "common/simd/variants.h"
+#include "common/strands/step/step_reader.h"
 #include "common/strands/strand_codec.h"
 
 namespace strandcast::tangent {
@@ -17,6 +18,10 @@ std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limit
 std::unique_ptr<StrandEncoder> make_encoder(WorkerPool& workers, simd::InstructionSet set);
 std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                             simd::InstructionSet set);
+/// Of "step" where there are `steps`, else of "tangent".
+std::unique_ptr<StrandDecoder> make_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
+                                            simd::InstructionSet set,
+                                            std::unique_ptr<step::StepReader> steps);
 std::unique_ptr<StrandEncoder> make_step_encoder(WorkerPool& workers, simd::InstructionSet set);
 std::unique_ptr<StrandDecoder> make_step_decoder(const StrandStreamLimits& limits, WorkerPool& workers,
                                                  simd::InstructionSet set);
