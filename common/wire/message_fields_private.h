@@ -151,6 +151,7 @@ void visit(Visitor& v, ViewerReport& m) {
   v.number("shown_hz", m.shown_hz, kReportedRate);
   v.choice("device", m.device, DrawingDevice::Hardware);
   v.number("hair_px", m.hair_px, kReportedSize);
+  v.number("step_ns", m.step_ns, kStepTime);
 }
 
 template <>

@@ -138,6 +138,7 @@ struct ViewerReport {      // about once a second: what this machine makes of wh
   double shown_hz = 0.0;           // different pictures shown per second
   DrawingDevice device = DrawingDevice::Unknown;
   double hair_px = 0.0;  // of strands: how high the hair is on the screen
+  double step_ns = 0.0;  // as in Hello, of who could not predict then; 0 = as in Hello
   bool operator==(const ViewerReport&) const = default;
 };
 struct ModeRequest {  // answered by a ModeChange

@@ -92,12 +92,14 @@ std::optional<CodecAnswer> SessionDesk::consider_codec(SessionId session, const 
   if (found == codec_watches_.end()) return std::nullopt;
   ViewerCodecWatch& watch = found->second;
   const SimStats simulated = parts_.source.stats();
+  const ViewerReport report = viewers_.report(session);
   DecodeLoad load;
-  load.decode_ms = viewers_.report(session).decode_ms;
+  load.decode_ms = report.decode_ms;
   const std::vector<StrandClass> classes = parts_.hub.strand_classes();
   if (link.mode == StreamMode::Strands && !simulated.is_paused && link.strand_class < classes.size())
     load.states_hz = classes[link.strand_class].frame_rate_hz * std::min(simulated.realtime_factor, 1.0);
-  const ViewerCodecFacts facts = codec_facts(watch.facts().wish, watch.facts().step_ns, simulated);
+  const double step_ns = report.step_ns > 0.0 ? report.step_ns : watch.facts().step_ns;
+  const ViewerCodecFacts facts = codec_facts(watch.facts().wish, step_ns, simulated);
   const std::optional<ViewerCodec> chosen = watch.look(parts_.codecs, facts, load, time_ns);
   if (!chosen) return std::nullopt;
   return CodecAnswer{chosen->codec, parts_.codecs[chosen->codec].name, chosen->reason};

@@ -31,7 +31,8 @@ bool is_link_wide(const ViewerCodecFacts& facts) {
 
 /// Why the codec that predicts is not for this viewer; empty when it is.
 std::string against_predicting(const StrandCodecInfo& codec, const ViewerCodecFacts& facts) {
-  if (facts.step_ns <= 0.0) return "this viewer cannot predict (an older one, or built without kernels)";
+  if (facts.step_ns <= 0.0)
+    return "this viewer cannot predict (not yet, or it is an older one, or built without kernels)";
   if (core_share(facts) > kPredictionShare)
     return fmt::format("{} would take {:.1f} ms a state on this machine, {:.0f} % of a core; {:.0f} % may be",
                        codec.name, state_ms(facts), core_share(facts) * 1e2, kPredictionShare * 1e2);
@@ -108,7 +109,8 @@ std::optional<ViewerCodec> ViewerCodecWatch::look(const std::vector<StrandCodecI
                                                   int64_t time_ns) {
   const bool is_other_model = facts.solver != facts_.solver || facts.substeps != facts_.substeps ||
                               facts.solver_cost != facts_.solver_cost;
-  if (is_other_model) {
+  const bool has_learnt = facts_.step_ns <= 0.0 && facts.step_ns > 0.0;
+  if (is_other_model || has_learnt) {
     facts_ = facts;
     slow_since_ns_.reset();
     settled_ns_ = time_ns + kSettledDecodeNs;

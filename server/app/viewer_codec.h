@@ -35,7 +35,7 @@ Result<std::vector<StrandCodecInfo>> served_codecs(const StrandCodecInfo& codec,
 /// What decides; what is 0 is unknown.
 struct ViewerCodecFacts {
   std::string wish;               // as in Hello
-  double step_ns = 0.0;           // as in Hello; 0 = it cannot predict
+  double step_ns = 0.0;           // as in Hello, or in a ViewerReport since; 0 = it cannot predict
   size_t vertices = 0;            // of all strands
   double states_hz = 60.0;        // steps of the simulation
   double substeps = 1.0;          // solver steps in each
@@ -63,7 +63,7 @@ std::string explain_viewer_codecs(const std::vector<StrandCodecInfo>& served);
 
 /// Follows one viewer: from a codec that predicts it goes to the fallback when it decodes too slowly, unless
 /// it asked for that codec. It comes back only after another solver, or another number of substeps, is
-/// simulated, when all is chosen anew.
+/// simulated, when all is chosen anew; so it is when it has learnt to predict.
 class ViewerCodecWatch {
  public:
   /// What was chosen when it joined, and by which facts.

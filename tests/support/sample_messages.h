@@ -31,7 +31,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
           Ping{INT64_MIN},
           ControlCommand{Command::Reset, 240},
           SetParameter{"solver.name=dftl"},
-          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5},
+          ViewerReport{3.5, 200.0, 1.25, 4.5, DrawingDevice::Software, 180.5, 12.5},
           ModeRequest{StreamMode::Auto},
           AdminCommand{AdminAction::Kick, 1ull << 40, 600.5},
           SceneRequest{},

@@ -211,6 +211,23 @@ TEST(ViewerCodecWatch, OtherStepsAreChosenForAnew) {
   EXPECT_EQ(again->codec, kPredicting);
 }
 
+// As a page does, which asks for its kernels with hair on the screen.
+TEST(ViewerCodecWatch, WhoLearnsToPredictIsChosenForAnewOnce) {
+  ViewerCodecFacts facts = able_viewer();
+  facts.step_ns = 0.0;
+  ViewerCodecWatch watch(facts, kFallback);
+  EXPECT_EQ(told_after(watch, facts, load_of(0.01), kS), std::nullopt);
+  const auto learnt = watch.look(predicting_and_plain(), able_viewer(), load_of(0.01), 100 * kS);
+  ASSERT_TRUE(learnt);
+  EXPECT_EQ(learnt->codec, kPredicting);
+  EXPECT_EQ(told_after(watch, able_viewer(), load_of(2.0), 100 * kS), kSettledDecodeNs + kSlowDecodeNs);
+  EXPECT_EQ(told_after(watch, able_viewer(), load_of(0.01), 200 * kS), std::nullopt) << "it was too slow";
+
+  ViewerCodecWatch slow(facts, kFallback);
+  facts.step_ns = kPredictionShare * 1e9;
+  EXPECT_EQ(told_after(slow, facts, load_of(0.01), kS), std::nullopt) << "it learnt that it cannot afford it";
+}
+
 // Reports are of the last states, and those may be of what was simulated before.
 TEST(ViewerCodecWatch, ReportsOfOtherStepsDoNotCount) {
   ViewerCodecFacts facts = able_viewer();

@@ -370,6 +370,7 @@ TEST(WireMessages, ViewerReportNumbersMustBeFiniteAndInRange) {
       {"viewer_report.draw_ms", &ViewerReport::draw_ms, kMaxReportedMs},
       {"viewer_report.picture_decode_ms", &ViewerReport::picture_decode_ms, kMaxReportedMs},
       {"viewer_report.hair_px", &ViewerReport::hair_px, kMaxReportedPx},
+      {"viewer_report.step_ns", &ViewerReport::step_ns, kMaxStepNs},
       {"viewer_report.shown_hz", &ViewerReport::shown_hz, kMaxReportedHz}};
   for (const auto& [name, field, limit] : fields) {
     ViewerReport report;

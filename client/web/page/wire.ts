@@ -63,7 +63,7 @@ const SetParameter = { assignment: [1, 'string'] } as const;
 const AdminCommand = { action: [1, 'enum'], session: [2, 'uint64'], ban_s: [3, 'double'] } as const;
 const ViewerReport = {
   decode_ms: [1, 'double'], draw_ms: [2, 'double'], picture_decode_ms: [3, 'double'], shown_hz: [4, 'double'],
-  device: [5, 'enum'], hair_px: [6, 'double'],
+  device: [5, 'enum'], hair_px: [6, 'double'], step_ns: [7, 'double'],
 } as const;
 const ModeRequest = { mode: [1, 'enum'] } as const;
 const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
