@@ -24,11 +24,17 @@ if (!whole) {
 }
 const files = [];
 
+const { BROTLI_PARAM_QUALITY, BROTLI_PARAM_LGWIN, BROTLI_PARAM_SIZE_HINT, BROTLI_MAX_QUALITY, BROTLI_MAX_WINDOW_BITS } = zlib.constants;
+const brotli = (content) => zlib.brotliCompressSync(content, { params: {
+  [BROTLI_PARAM_QUALITY]: BROTLI_MAX_QUALITY, [BROTLI_PARAM_LGWIN]: BROTLI_MAX_WINDOW_BITS, [BROTLI_PARAM_SIZE_HINT]: content.length,
+} });
+
 function add(filePath, content, name) {
   const version = crypto.createHash('sha256').update(content).digest('hex').slice(0, HASH_DIGITS);
   const { name: stem, ext } = path.parse(filePath);
   const file = { path: name ?? `/${stem}.${version}${ext}`, ext, version, content, isFixed: name !== undefined };
   file.gzip = zlib.gzipSync(content, { level: 9 });
+  file.brotli = brotli(content);
   files.push(file);
   return file.path.slice(1);
 }
@@ -65,7 +71,8 @@ function literal(bytes) {
 const rows = files.map((file) => `    {"${file.path}", "${MEDIA_TYPES[file.ext]}", "${file.version}",
     PageFileName::${file.isFixed ? 'Fixed' : 'Hashed'},
     ${literal(file.content)},
-    ${literal(file.gzip)}},
+    ${literal(file.gzip)},
+    ${literal(file.brotli)}},
 `);
 fs.writeFileSync(out, `// Made by client/web/pack_page.mjs.
 #include "server/net/page.h"
@@ -80,4 +87,4 @@ ${rows.join('')}  };
 
 }  // namespace strandcast
 `);
-for (const file of files) console.log(`${file.path} ${file.content.length} bytes, ${file.gzip.length} compressed`);
+for (const file of files) console.log(`${file.path} ${file.content.length} bytes, ${file.gzip.length} by gzip, ${file.brotli.length} by Brotli`);

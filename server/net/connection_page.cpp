@@ -38,9 +38,9 @@ bool Connection::answer_page(const Request& request) {
 }
 
 void Connection::send_page_file(const Request& request, const PageFile& file) {
-  const bool is_gzip = accepts_gzip(view(request[http::field::accept_encoding]));
-  const std::string_view content = is_gzip ? file.gzip : file.plain;
-  const std::string tag = fmt::format("\"{}-{}\"", file.version, is_gzip ? "gzip" : "plain");
+  const PageCoding coding = best_coding(view(request[http::field::accept_encoding]));
+  const std::string_view content = content_of(file, coding);
+  const std::string tag = fmt::format("\"{}-{}\"", file.version, name_of(coding));
   const bool is_known = names_tag(view(request[http::field::if_none_match]), tag);
   const bool has_content = !is_known && request.method() == http::verb::get;
 
@@ -60,7 +60,7 @@ void Connection::send_page_file(const Request& request, const PageFile& file) {
   page_response_.set("Cross-Origin-Resource-Policy", "same-origin");
   if (!is_known) {
     page_response_.set(http::field::content_type, file.media_type);
-    if (is_gzip) page_response_.set(http::field::content_encoding, "gzip");
+    if (coding != PageCoding::Plain) page_response_.set(http::field::content_encoding, name_of(coding));
     page_response_.content_length(content.size());
   }
   const bool is_last = ++answered_ >= kMaxRequestsOfConnection;

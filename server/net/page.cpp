@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 
 namespace strandcast {
 namespace {
@@ -47,16 +48,43 @@ const PageFile* find_page_file(PageFiles files, std::string_view path) {
   return found == files.end() ? nullptr : &*found;
 }
 
-bool accepts_gzip(std::string_view accept_encoding) {
+std::string_view name_of(PageCoding coding) {
+  switch (coding) {
+    case PageCoding::Gzip:
+      return "gzip";
+    case PageCoding::Brotli:
+      return "br";
+    case PageCoding::Plain:
+      break;
+  }
+  return "plain";
+}
+
+std::string_view content_of(const PageFile& file, PageCoding coding) {
+  switch (coding) {
+    case PageCoding::Gzip:
+      return file.gzip;
+    case PageCoding::Brotli:
+      return file.brotli;
+    case PageCoding::Plain:
+      break;
+  }
+  return file.plain;
+}
+
+PageCoding best_coding(std::string_view accept_encoding) {
   bool is_any_accepted = false;
+  std::optional<bool> is_brotli_accepted, is_gzip_accepted;  // where they are named
   while (!accept_encoding.empty()) {
     std::string_view entry = take_part(accept_encoding, ',');
     const std::string_view coding = take_part(entry, ';');
     const bool is_accepted = !is_zero_weight(trimmed(entry));
-    if (is_same(coding, "gzip")) return is_accepted;
+    if (is_same(coding, "br") && !is_brotli_accepted) is_brotli_accepted = is_accepted;
+    if (is_same(coding, "gzip") && !is_gzip_accepted) is_gzip_accepted = is_accepted;
     if (coding == "*") is_any_accepted = is_accepted;
   }
-  return is_any_accepted;
+  if (is_brotli_accepted.value_or(false)) return PageCoding::Brotli;
+  return is_gzip_accepted.value_or(is_any_accepted) ? PageCoding::Gzip : PageCoding::Plain;
 }
 
 bool names_tag(std::string_view if_none_match, std::string_view tag) {

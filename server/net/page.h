@@ -18,6 +18,7 @@ struct PageFile {
   PageFileName name = PageFileName::Fixed;
   std::string_view plain = {};
   std::string_view gzip = {};
+  std::string_view brotli = {};
 };
 using PageFiles = std::span<const PageFile>;  // without the page: none
 
@@ -30,8 +31,14 @@ std::string_view path_of_target(std::string_view target);
 /// nullptr when there is none at this path.
 const PageFile* find_page_file(PageFiles files, std::string_view path);
 
-/// True when an Accept-Encoding field names gzip, or everything, and not as unwanted.
-bool accepts_gzip(std::string_view accept_encoding);
+enum class PageCoding { Plain, Gzip, Brotli };
+/// "plain", "gzip", "br": as HTTP calls it.
+std::string_view name_of(PageCoding coding);
+std::string_view content_of(const PageFile& file, PageCoding coding);
+
+/// The smallest that an Accept-Encoding field allows: Brotli where it is named, gzip where it or everything
+/// is, and neither where it is unwanted.
+PageCoding best_coding(std::string_view accept_encoding);
 
 /// True when an If-None-Match field names this entity tag (weakly compared, RFC 9110, 13.1.2) or any.
 bool names_tag(std::string_view if_none_match, std::string_view tag);

@@ -40,8 +40,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::string coding = input.take_line();
   const std::string tags = input.take_line();
   const std::string target = input.take_line();
-  CHECK(!accepts_gzip(coding) || coding.find('*') != std::string::npos || coding.size() >= 4);
-  CHECK(accepts_gzip("gzip," + coding) && !accepts_gzip("gzip;q=0," + coding));
+  const PageCoding best = best_coding(coding);
+  CHECK(best != PageCoding::Gzip || coding.find('*') != std::string::npos || coding.size() >= 4);
+  CHECK(best != PageCoding::Brotli || coding.size() >= 2);
+  CHECK(best_coding("gzip," + coding) != PageCoding::Plain);
+  CHECK(best_coding("br," + coding) == PageCoding::Brotli);
+  CHECK(best_coding("gzip;q=0, br;q=0," + coding) == PageCoding::Plain);
   CHECK(names_tag("\"a\"," + tags, "\"a\""));
   CHECK(!names_tag(tags, "\"a\"") || tags.find('*') != std::string::npos ||
         tags.find("\"a\"") != std::string::npos);

@@ -21,6 +21,7 @@ using testing::StartsWith;
 
 constexpr std::string_view kPage = "<!doctype html>";
 constexpr std::string_view kPageGzip = "page in gzip";
+constexpr std::string_view kPageBrotli = "page in Brotli";
 /// Many times what the kernel holds between two ends.
 constexpr size_t kLargeBytes = 48u << 20;
 const std::string& large() {
@@ -32,15 +33,16 @@ std::string with_host(const std::string& line, const std::string& fields = {}) {
   return line + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + fields + "\r\n";
 }
 const std::string kGetPage = with_host("GET /");
-constexpr const char* kGzip = "Accept-Encoding: gzip, deflate, br\r\n";
+constexpr const char* kGzip = "Accept-Encoding: gzip, deflate\r\n";
 
 class ServerPage : public test::ServerNet {
  protected:
   static NetConfig with_page(NetConfig config = {}) {
     static const PageFile files[] = {
-        {"/", "text/html; charset=utf-8", "aa", PageFileName::Fixed, kPage, kPageGzip},
-        {"/core.bb.wasm", "application/wasm", "bb", PageFileName::Hashed, "wasm", "wasm in gzip"},
-        {"/large.cc.wasm", "application/wasm", "cc", PageFileName::Hashed, large(), large()}};
+        {"/", "text/html; charset=utf-8", "aa", PageFileName::Fixed, kPage, kPageGzip, kPageBrotli},
+        {"/core.bb.wasm", "application/wasm", "bb", PageFileName::Hashed, "wasm", "wasm in gzip",
+         "wasm in Brotli"},
+        {"/large.cc.wasm", "application/wasm", "cc", PageFileName::Hashed, large(), large(), large()}};
     config.page = files;
     return config;
   }
@@ -73,6 +75,16 @@ TEST_F(ServerPage, ThePageIsAskedForEachTimeAndComesWithItsPolicy) {
   EXPECT_THAT(plain, Not(HasSubstr("Content-Encoding")));
   EXPECT_THAT(plain, HasSubstr("ETag: \"aa-plain\"\r\n"));
   EXPECT_EQ(body_of(ask(with_host("GET /?utm=1"))), kPage);
+}
+
+// Browsers name Brotli over https and on localhost only: proxies on the way knew it not.
+TEST_F(ServerPage, WhoTakesBrotliGetsIt) {
+  start(with_page());
+  const std::string answer = ask(with_host("GET /", "Accept-Encoding: gzip, deflate, br\r\n"));
+  for (const char* field : {"Content-Encoding: br\r\n", "ETag: \"aa-br\"\r\n", "Vary: Accept-Encoding\r\n"})
+    EXPECT_THAT(answer, HasSubstr(field));
+  EXPECT_EQ(body_of(answer), kPageBrotli);
+  EXPECT_EQ(body_of(ask(with_host("GET /", "Accept-Encoding: br;q=0, gzip\r\n"))), kPageGzip);
 }
 
 TEST_F(ServerPage, HashedFilesAreKeptForGood) {

@@ -256,7 +256,7 @@ TEST_F(Tls, HttpGoesOverItToo) {
 // A file of many records, and another one on the same connection by whoever keeps it.
 TEST_F(Tls, ThePageGoesOverItToo) {
   static const std::string large(900'000, 'x');
-  static const PageFile page[] = {{"/", "text/html", "aa", PageFileName::Fixed, large, large}};
+  static const PageFile page[] = {{"/", "text/html", "aa", PageFileName::Fixed, large, large, large}};
   NetConfig config = far_away(with_certificate());
   config.page = page;
   start(config);

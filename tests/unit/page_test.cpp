@@ -26,13 +26,24 @@ TEST(PageFiles, APathEndsWhereAQuestionBegins) {
 }
 
 // RFC 9110, 12.5.3 with its examples.
-TEST(PageCoding, GzipIsGivenToWhoTakesIt) {
-  for (const char* field : {"gzip", "compress, gzip", "gzip;q=1.0, identity; q=0.5, *;q=0", "*", "GZip",
-                            "deflate,gzip,br", " gzip ; q=0.001", "*;q=0.5", "*;q=0, gzip"})
-    EXPECT_TRUE(accepts_gzip(field)) << field;
+TEST(PageCoding, IsTheSmallestThatIsTaken) {
+  for (const char* field :
+       {"gzip", "compress, gzip", "gzip;q=1.0, identity; q=0.5, *;q=0", "*", "GZip", "deflate,gzip,br;q=0",
+        " gzip ; q=0.001", "*;q=0.5", "*;q=0, gzip", "*, br;q=0", "brotli, gzip", "br; q=0.0 , gzip"})
+    EXPECT_EQ(name_of(best_coding(field)), "gzip") << field;
+  for (const char* field :
+       {"br", "gzip, deflate, br", "BR;q=0.5", "*;q=0, br", "gzip;q=0, br", "br, gzip, br;q=0"})
+    EXPECT_EQ(name_of(best_coding(field)), "br") << field;
   for (const char* field : {"", "identity", "gzip;q=0", "gzip; q=0.000", "*;q=0", "*, gzip;q=0", "xgzip",
-                            "gzipx", "br;gzip", ",", ";", ",;,", "gzip;Q=0"})
-    EXPECT_FALSE(accepts_gzip(field)) << field;
+                            "gzipx", "b r", "brr", ",", ";", ",;,", "gzip;Q=0", "br;q=0", "br;q=0, gzip;q=0"})
+    EXPECT_EQ(name_of(best_coding(field)), "plain") << field;
+}
+
+TEST(PageCoding, HasTheContentOfItsName) {
+  const PageFile file{.plain = "as it is", .gzip = "by gzip", .brotli = "by Brotli"};
+  EXPECT_EQ(content_of(file, PageCoding::Plain), "as it is");
+  EXPECT_EQ(content_of(file, PageCoding::Gzip), "by gzip");
+  EXPECT_EQ(content_of(file, PageCoding::Brotli), "by Brotli");
 }
 
 // RFC 9110, 13.1.2.
