@@ -44,6 +44,6 @@ function joined(text: string, seen: Set<string>): string {
 
 export function shaderText(text: string): string {
   return PROLOGUE + joined(text, new Set())
-    .replace(/layout\(binding = \w+\) /g, '')
-    .replace(/layout\(std140, binding = \w+\)/g, 'layout(std140)');
+    .replace(/layout\(binding ?= ?\w+\) ?/g, '')
+    .replace(/layout\(std140, ?binding ?= ?\w+\)/g, 'layout(std140)');
 }
