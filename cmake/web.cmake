@@ -18,7 +18,8 @@ foreach(language C CXX)
   string(REPLACE "<CMAKE_${language}_COMPILER>" "${clang_${language}} ${flags}" CMAKE_${language}_COMPILE_OBJECT
     "${CMAKE_${language}_COMPILE_OBJECT}")
 endforeach()
-add_compile_options(-msimd128 $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> -Wno-defaulted-function-deleted)  # its standard library compares less
+# Whatever has SIMD fills and copies memory by an instruction too.
+add_compile_options(-msimd128 -mbulk-memory -fmacro-prefix-map=${CMAKE_SOURCE_DIR}/= $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti> -Wno-defaulted-function-deleted)  # its standard library compares less
 
 set(headers ${CMAKE_BINARY_DIR}/headers)  # not all of /usr/include: its C library is another one
 file(MAKE_DIRECTORY ${headers})
@@ -67,11 +68,12 @@ strandcast_small(common/base base.cpp text.cpp worker_pool.cpp)
 strandcast_small(common/kernels head_path.cpp lane_program.cpp step_block.cpp step_input.cpp step_model.cpp step_speed.cpp
   strand_passes.cpp told_field.cpp)
 strandcast_small(common/strands delta_codec.cpp frame_header.cpp raw_codec.cpp scene_asset.cpp strand_codec.cpp
-  strand_payload.cpp strand_prefix.cpp zstd_block.cpp tangent/fit.cpp tangent/fit_shape.cpp tangent/head.cpp tangent/order.cpp
-  step/predictor_state.cpp step/rod_planes.cpp step/wire.cpp)
+  strand_payload.cpp strand_prefix.cpp zstd_block.cpp tangent/codec.cpp tangent/fit.cpp tangent/fit_shape.cpp tangent/head.cpp
+  tangent/layout.cpp tangent/order.cpp
+  step/predictor_state.cpp step/rod_planes.cpp step/steps.cpp step/wire.cpp)
 strandcast_small(. common/groom/mesh.cpp common/scene/hair_color.cpp common/render/head_occupancy.cpp common/render/look_lights.cpp
   common/render/rest_facts.cpp common/render/scalp_cover.cpp common/render/strand_detail.cpp common/render/strand_style.cpp
   common/render/view.cpp common/render/gl_tiles/tile_block.cpp client/web/fmt/format.cpp)
 add_subdirectory(client/web)
-strandcast_small(client/web core_export.cpp)
+strandcast_small(client/web core_export.cpp tangent_only.cpp)
 add_subdirectory(tests/web)

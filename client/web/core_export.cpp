@@ -17,6 +17,11 @@ ErrorCode last_error_code = ErrorCode::Internal;
 
 }  // namespace
 
+/// Of the standard library, whose own one prints, with all of printf, why the module ends.
+extern "C" void abort_message(const char*, ...) {
+  std::abort();
+}
+
 void remember_core_error(const Error& error) {
   last_error() = error.to_string();
   last_error_code = error.code;

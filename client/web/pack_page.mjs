@@ -1,8 +1,8 @@
 // Makes the page's files what the server has of them (server/net/page.h): names with a hash of the content where the
 // browser may keep them for good, and everything compressed besides.
-//   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm WHOLE.wasm
-// Of the index, @ASSETS@ becomes {"core", "wholeCore"} with the names of both modules, as JSON in an attribute, and the names
-// of the style, the script and the module that the page begins with become theirs. Prints what each file takes.
+//   node client/web/pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm STEP.wasm WHOLE.wasm
+// Of the index, @ASSETS@ becomes {"core", "stepCore", "wholeCore"} with the names of the modules, as JSON in an attribute, and
+// the names of the style, the script and the module that the page begins with become theirs. Prints what each file takes.
 import crypto from 'node:crypto';
 import fs from 'node:fs';
 import path from 'node:path';
@@ -17,9 +17,9 @@ const MEDIA_TYPES = {
   '.wasm': 'application/wasm',
 };
 
-const [out, index, style, script, first, whole] = process.argv.slice(2);
+const [out, index, style, script, first, step, whole] = process.argv.slice(2);
 if (!whole) {
-  console.error('usage: node pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm WHOLE.wasm');
+  console.error('usage: node pack_page.mjs OUT.cpp INDEX.html STYLE.css SCRIPT.js FIRST.wasm STEP.wasm WHOLE.wasm');
   process.exit(2);
 }
 const files = [];
@@ -46,7 +46,7 @@ function replaceOnce(text, what, by) {
   return text.replace(what, () => by);
 }
 
-const assets = { core: addHashed(first), wholeCore: addHashed(whole) };
+const assets = { core: addHashed(first), stepCore: addHashed(step), wholeCore: addHashed(whole) };
 let page = fs.readFileSync(index, 'utf8');
 page = replaceOnce(page, '@ASSETS@', attribute(JSON.stringify(assets)));
 page = replaceOnce(page, 'src="main.js"', `src="${addHashed(script)}"`);

@@ -6,7 +6,6 @@
 
 #include "client/web/core_export.h"
 #include "common/base/worker_pool.h"
-#include "common/kernels/step_speed.h"
 #include "common/replay/strand_fill.h"
 #include "common/strands/scene_asset.h"
 #include "common/strands/strand_codec.h"
@@ -103,9 +102,6 @@ STRAND_CORE_EXPORT const float* strand_core_all_positions(StrandCoreDecoder* dec
 }
 STRAND_CORE_EXPORT uint32_t strand_core_position_floats(const StrandCoreDecoder* decoder) {
   return static_cast<uint32_t>(3 * decoder->position_m.size());
-}
-STRAND_CORE_EXPORT double strand_core_step_ns() {
-  return measure_kernel_step_ns();
 }
 STRAND_CORE_EXPORT uint64_t strand_core_hash(const StrandCoreDecoder* decoder) {
   return decoder->newest == nullptr ? 0 : state_hash(*decoder->newest);

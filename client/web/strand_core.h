@@ -56,6 +56,7 @@ uint32_t strand_core_position_floats(const StrandCoreDecoder* decoder);
 uint64_t strand_core_hash(const StrandCoreDecoder* decoder);
 
 /// What a step of one vertex takes here, ns: for the Hello. 0 where this module has no kernel to try it with.
+/// Not in strand_page, which takes no steps.
 double strand_core_step_ns();
 
 /// Why the last call that failed did: UTF-8 that ends in 0.

@@ -37,7 +37,7 @@ const char* to_string(ErrorCode code) {
 }
 
 void check_failed(const char* condition, const char* file, int line) {
-  std::fprintf(stderr, "%s:%d: broken invariant: %s\n", file, line, condition);
+  std::fputs(fmt::format("{}:{}: broken invariant: {}\n", file, line, condition).c_str(), stderr);
   std::abort();
 }
 

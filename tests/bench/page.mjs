@@ -8,7 +8,6 @@ import fs from 'node:fs';
 import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
-import zlib from 'node:zlib';
 import { Browser, findChromium, sleep } from '../web/browser.mjs';
 
 const [serverProgram, viewProgram, ctlProgram] = process.argv.slice(2);
@@ -24,26 +23,29 @@ const server = spawn(serverProgram, ['--port', '0', '--port-file', portFile], { 
 for (let i = 0; i < 600 && !(fs.existsSync(portFile) && fs.readFileSync(portFile, 'utf8').trim()); ++i) await sleep(50);
 const address = `127.0.0.1:${fs.readFileSync(portFile, 'utf8').trim()}`;
 
-const get = (name) => new Promise((done, fail) => {
-  http.get(`http://${address}/${name}`, { headers: { 'accept-encoding': 'gzip' }, agent: false }, (answer) => {
+const get = (name, coding) => new Promise((done, fail) => {
+  http.get(`http://${address}/${name}`, { headers: { 'accept-encoding': coding }, agent: false }, (answer) => {
     const parts = [];
     answer.on('data', (part) => parts.push(part)).on('end', () => done(Buffer.concat(parts)));
   }).on('error', fail);
 });
 
 async function printFiles(browser) {
-  const tab = await browser.open(`http://${address}/#mode=strands`, SIZE);
-  await tab.until((now) => now.states > 10, 'strands');
-  const files = [...new Set(tab.requests.map((one) => one.url.split('#')[0]).filter((url) => url.startsWith('http')))];
+  const tab = await browser.open(`http://${address}/#mode=strands`, { ...SIZE, seesWorkers: true });
+  await tab.until((now) => now.codec === 'step' && now.states > 10, 'strands by steps');
+  const begunMs = await tab.evaluate('performance.timeOrigin + performance.getEntriesByName("first picture")[0].startTime');
+  const asked = tab.requests.filter((one) => one.url.startsWith('http'));
   await tab.close();
-  let [gzip, brotli] = [0, 0];
-  for (const file of files) {
-    const bytes = await get(new URL(file).pathname.slice(1));
-    gzip += bytes.length;
-    brotli += zlib.brotliCompressSync(zlib.gunzipSync(bytes), { params: { [zlib.constants.BROTLI_PARAM_QUALITY]: 11 } }).length;
+  for (const [what, isWanted] of [['with hair on the screen (at most 4, at most 180 kB)', (one) => 1e3 * one.at < begunMs],
+                                  ['behind that', (one) => 1e3 * one.at >= begunMs]]) {
+    const files = [...new Set(asked.filter(isWanted).map((one) => new URL(one.url).pathname.slice(1)))];
+    let [gzip, brotli] = [0, 0];
+    for (const file of files) {
+      gzip += (await get(file, 'gzip')).length;
+      brotli += (await get(file, 'br')).length;
+    }
+    console.log(`requests ${what}: ${files.length}, ${(gzip / 1e3).toFixed(1)} kB by gzip, ${(brotli / 1e3).toFixed(1)} by Brotli`);
   }
-  console.log(`requests: ${files.length} (at most 4); page, WebAssembly, shaders: ${(gzip / 1e3).toFixed(1)} kB by gzip (at most 180), ` +
-    `${(brotli / 1e3).toFixed(1)} by brotli`);
 }
 
 /** Milliseconds from navigation, nothing cached. */

@@ -25,6 +25,7 @@ for stream in "dftl step 2000x16" "dftl step 10000x16" "direct_rod step 2000x16"
   # shellcheck disable=SC2086
   "$build/bin/record_tapes" stream "$work/tape" $stream "$frames"
   module=strand_core
-  [ "${stream%% *}" != dftl ] || module=strand_page
+  [ "${stream% *}" != "dftl step" ] || module=strand_step
+  [ "${stream% *}" != "dftl tangent" ] || module=strand_page
   node tests/web/play.mjs "$build/web/bin/$module.wasm" "$work/tape" | head -n 1
 done

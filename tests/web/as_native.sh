@@ -30,7 +30,8 @@ for size in "${sizes[@]}"; do
 done
 "$node" "$here/play.mjs" "$modules/strand_core.wasm" "$work"/*.tape
 
-# What the page begins with.
+# What the page begins with, and what takes steps for it.
+"$node" "$here/play.mjs" "$modules/strand_page.wasm" --only "dftl tangent 2000 x 16" "$work"/*.tape
 for only in "tiny sim/dftl.comp" "dftl step 2000 x 16" "dftl tangent 2000 x 16"; do
-  "$node" "$here/play.mjs" "$modules/strand_page.wasm" --only "$only" "$work"/*.tape
+  "$node" "$here/play.mjs" "$modules/strand_step.wasm" --only "$only" "$work"/*.tape
 done

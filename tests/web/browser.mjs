@@ -65,12 +65,14 @@ export class Browser {
       this.child.stdio[3].write(`${JSON.stringify({ id, method, params, sessionId })}\0`);
     });
   }
-  async open(url, { width = 640, height = 360 } = {}) {
+  /** seesWorkers: `requests` has those of the page's workers too. */
+  async open(url, { width = 640, height = 360, seesWorkers = false } = {}) {
     const { targetId } = await this.send('Target.createTarget', { url: 'about:blank' });
     const { sessionId } = await this.send('Target.attachToTarget', { targetId, flatten: true });
     const tab = new Tab(this, targetId, sessionId);
     this.tabs.set(sessionId, tab);
     for (const domain of ['Page', 'Runtime', 'Network', 'Log']) await tab.send(`${domain}.enable`);
+    if (seesWorkers) await tab.send('Target.setAutoAttach', { autoAttach: true, waitForDebuggerOnStart: false, flatten: true });
     await tab.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false });
     await tab.go(url);
     return tab;
@@ -98,6 +100,10 @@ export class Tab {
     if (method === 'Runtime.consoleAPICalled' && params.type === 'error') this.errors.push(params.args.map((one) => one.value ?? one.description).join(' '));
     if (method === 'Log.entryAdded' && params.entry.level === 'error') this.errors.push(`${params.entry.text} ${params.entry.url ?? ''}`);
     if (method === 'Network.requestWillBeSent') this.requests.push({ url: params.request.url, headers: params.request.headers, at: params.wallTime });
+    if (method === 'Target.attachedToTarget') {
+      this.browser.tabs.set(params.sessionId, this);
+      void this.browser.send('Network.enable', {}, params.sessionId);
+    }
     if (method === 'Network.webSocketCreated') this.requests.push({ url: params.url, headers: {} });
   }
   go(url) {

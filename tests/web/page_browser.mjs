@@ -8,6 +8,7 @@ import fs from 'node:fs';
 import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
+import zlib from 'node:zlib';
 import { Browser, findChromium, sleep } from './browser.mjs';
 
 const [program, shots] = process.argv.slice(2);
@@ -57,14 +58,19 @@ let browser;
 let server;
 const all = {
   async 'strands come, and every state has its hash'() {
-    const tab = await browser.open(`${server.url}#mode=strands`);
-    const state = await tab.until((now) => now.mode === 'strands' && now.states > 30 && now.hz > 0, 'strands');
+    const tab = await browser.open(`${server.url}#mode=strands`, { seesWorkers: true });
+    // With hair on the screen come the solver's steps, for what it takes of the link.
+    const state = await tab.until((now) => now.mode === 'strands' && now.codec === 'step' && now.states > 60 && now.hz > 0, 'strands');
     assert.equal(state.hash_ok, true);
     assert.equal(state.error, '');
     if (shots) await tab.screenshot(path.join(shots, 'strands.png'));
     assert.deepEqual(tab.errors, [], 'nothing is an error in the console');
-    const files = new Set(tab.requests.map((one) => one.url).filter((url) => url.startsWith('http')));
+    const begun = await tab.evaluate('performance.timeOrigin + performance.getEntriesByName("first picture")[0].startTime');
+    const asked = tab.requests.filter((one) => one.url.startsWith('http'));
+    const files = new Set(asked.filter((one) => 1e3 * one.at < begun).map((one) => one.url));
+    const later = new Set(asked.filter((one) => 1e3 * one.at >= begun).map((one) => one.url));
     assert.ok(files.size <= 4, `${files.size} files: ${[...files]}`);
+    assert.ok(later.size === 1 && [...later][0].includes('strand_step'), `behind the first picture: ${[...later]}`);
     for (const one of tab.requests) assert.ok(new URL(one.url).host === new URL(server.url).host, one.url);
     await tab.close();
   },
@@ -199,8 +205,12 @@ const all = {
     const linked = [...text.matchAll(/(?:src|href)="([^"]+\.(?:js|css))"/g)].map((one) => one[1]);
     const begun = [assets.core, ...linked]; // what every page begins with
     let bytes = page.body.length;
-    for (const name of new Set([...begun, assets.wholeCore])) {
+    for (const name of new Set([...begun, assets.stepCore, assets.wholeCore])) {
       const file = await get(server.url + name, { 'accept-encoding': 'gzip' });
+      const smaller = await get(server.url + name, { 'accept-encoding': 'gzip, deflate, br' });
+      assert.equal(smaller.headers['content-encoding'], 'br', name);
+      assert.ok(zlib.brotliDecompressSync(smaller.body).equals(zlib.gunzipSync(file.body)), name);
+      assert.ok(smaller.body.length < file.body.length, name);
       assert.equal(file.status, 200, name);
       assert.equal(file.headers['content-encoding'], 'gzip');
       assert.match(file.headers['cache-control'], /immutable/);

@@ -28,11 +28,12 @@ const warnings = new Warnings(at('warnings'), at('lasting'));
 
 interface Assets {
   core: string;
-  wholeCore: string; // steps strands by every kernel
+  stepCore: string; // takes steps of the default solver
+  wholeCore: string; // of every solver
 }
 function assets(): Assets {
   const content = document.querySelector<HTMLMetaElement>('meta[name=strandcast-assets]')?.content ?? '';
-  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { core: 'strand_page.wasm', wholeCore: 'strand_core.wasm' };
+  return content.startsWith('{') ? (JSON.parse(content) as Assets) : { core: 'strand_page.wasm', stepCore: 'strand_step.wasm', wholeCore: 'strand_core.wasm' };
 }
 
 const toScene = (v: { x: number; y: number; z: number } | undefined, otherwise: [number, number, number]): [number, number, number] =>
@@ -66,7 +67,10 @@ function withValue(look: LookMessage, path: string, value: string): LookMessage 
 
 class Viewer {
   private readonly net: Worker;
-  private readonly draw?: Worker;
+  private draw?: Worker;
+  private readonly states = new MessageChannel(); // from the connection to what draws
+  private canDraw = false;
+  private isDrawingMade = false;
   private asked: Asked;
   private welcome?: WelcomeMessage;
   private status?: StatusMessage;
@@ -95,39 +99,21 @@ class Viewer {
 
   constructor() {
     const size = wishes.size ?? this.pictureSize();
-    const canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
+    this.canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
     const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
     this.asked = {
       url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, pictures: wishes.pictures,
-      role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: canDraw,
+      role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: this.canDraw,
     };
-    const { core, wholeCore } = assets();
-    const start = (name: string): Worker => {
-      const made = new Worker(import.meta.url, { type: 'module', name });
-      made.onerror = () => this.ended('this browser does not start the page’s workers');
-      return made;
-    };
-    const states = new MessageChannel();
     const sockets = new MessageChannel();
-    const compiled = compileCore(new URL(core, location.href).href);
-    start('socket').postMessage(sockets.port2, [sockets.port2]);
-    this.net = start('net');
+    const { stepCore, wholeCore } = assets();
+    this.startWorker('socket').postMessage(sockets.port2, [sockets.port2]);
+    this.net = this.startWorker('net');
     this.net.onmessage = (event: MessageEvent<FromNet>) => this.fromNet(event.data);
-    if (canDraw) {
-      this.draw = start('draw');
-      this.draw.onmessage = (event: MessageEvent<FromDraw>) => this.fromDraw(event.data);
-      // What draws is found while the core still comes.
-      const canvas = strands.transferControlToOffscreen();
-      this.toDraw({ kind: 'start', canvas, wish: wishes.draw, samples: SAMPLES }, [canvas as unknown as Transferable]);
-    } else {
-      this.device = Device.none;
-      this.drawWhy = 'this browser cannot draw beside the page';
-    }
-    this.toNet({ kind: 'start', wholeCore, asked: this.asked, states: states.port1, sockets: sockets.port1 }, [states.port1, sockets.port1]);
-    compiled.then((module) => {
-      this.toNet({ kind: 'core', core: module });
-      this.toDraw({ kind: 'core', core: module, states: states.port2 }, [states.port2]);
-    }, (error: Error) => this.toNet({ kind: 'noCore', reason: error.message }));
+    this.toNet({ kind: 'start', stepCore, wholeCore, asked: this.asked, states: this.states.port1, sockets: sockets.port1 },
+      [this.states.port1, sockets.port1]);
+    // Who asks for the server's pictures sees one before anything is made ready to draw here.
+    if (wishes.mode !== Mode.frames) this.makeDrawing();
     if (wishes.camera) {
       this.camera = wishes.camera;
       this.isOwnCamera = true;
@@ -142,6 +128,36 @@ class Viewer {
     if (!isSecureContext) {
       warnings.say('This page came without TLS: the browser then decodes no video. Over https pictures would take less of the link.');
     }
+  }
+
+  private startWorker(name: string): Worker {
+    const made = new Worker(import.meta.url, { type: 'module', name });
+    made.onerror = () => this.ended('this browser does not start the page’s workers');
+    return made;
+  }
+  /** What draws here, and what it draws and the connection decodes with. */
+  private makeDrawing(): void {
+    if (this.isDrawingMade) return;
+    this.isDrawingMade = true;
+    const compiled = compileCore(new URL(assets().core, location.href).href);
+    if (this.canDraw) {
+      this.draw = this.startWorker('draw');
+      this.draw.onmessage = (event: MessageEvent<FromDraw>) => this.fromDraw(event.data);
+      // What draws is found while the core still comes.
+      const canvas = strands.transferControlToOffscreen();
+      this.toDraw({ kind: 'start', canvas, wish: wishes.draw, samples: SAMPLES }, [canvas as unknown as Transferable]);
+      this.toDraw({ kind: 'visible', isVisible: this.shown !== Mode.frames });
+      this.toDraw({ kind: 'camera', camera: this.camera, isMoving: this.isHeld });
+      if (this.look) this.showLook();
+    } else {
+      this.device = Device.none;
+      this.drawWhy = 'this browser cannot draw beside the page';
+    }
+    const { port2 } = this.states;
+    compiled.then((module) => {
+      this.toNet({ kind: 'core', core: module });
+      this.toDraw({ kind: 'core', core: module, states: port2 }, [port2]);
+    }, (error: Error) => this.toNet({ kind: 'noCore', reason: error.message }));
   }
 
   private toNet(message: ToNet, transfer: Transferable[] = []): void {
@@ -258,6 +274,7 @@ class Viewer {
     this.pictureTimes.push(performance.now());
     this.notePicture(Mode.frames);
     requestAnimationFrame(() => this.toNet({ kind: 'pictureShown' }));
+    this.makeDrawing();
   }
   /** For who measures the page: what it shows, and how many pictures it has shown. */
   private notePicture(mode: number): void {
@@ -353,6 +370,7 @@ class Viewer {
   }
   private setMode(mode: number): void {
     this.asked.mode = mode;
+    if (mode !== Mode.frames) this.makeDrawing();
     at<HTMLSelectElement>('mode').value = String(mode);
     this.toNet({ kind: 'mode', mode });
   }

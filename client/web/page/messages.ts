@@ -24,7 +24,7 @@ export interface Asked {
 }
 
 export type ToNet =
-  | { kind: 'start'; wholeCore: string; asked: Asked; states: MessagePort; sockets: MessagePort }
+  | { kind: 'start'; stepCore: string; wholeCore: string; asked: Asked; states: MessagePort; sockets: MessagePort }
   | { kind: 'core'; core: WebAssembly.Module }
   | { kind: 'noCore'; reason: string }
   | { kind: 'reconnect'; asked: Asked }

@@ -39,12 +39,13 @@ class Net {
   private coreAnswered!: () => void;
   private readonly coreAnswer = new Promise<void>((done) => (this.coreAnswered = done)); // it is there, or never comes
   private noCore = '';
+  private stepCore = '';
   private wholeCore = '';
   private isLoading = false;
-  stepNs = 0; // of one vertex in a solver's step here
+  stepNs = 0; // of one vertex in a solver's step here; 0 until something here takes steps
   private asked!: Asked;
   private states!: MessagePort;
-  private pictureCodecs = 0;
+  private pictureCodecs!: Promise<number>;
   private sockets!: MessagePort;
   private socket?: DistantSocket;
   private connection?: Connection;
@@ -64,20 +65,23 @@ class Net {
       this.wantsState = true;
       this.offerState();
     };
+    this.stepCore = message.stepCore;
     this.wholeCore = message.wholeCore;
-    const codecs = decodablePictures();
+    this.pictureCodecs = decodablePictures();
     // Whoever wants pictures waits for nothing else.
     if (this.asked.drawsStrands && this.asked.mode !== Mode.frames) await this.coreAnswer;
-    this.pictureCodecs = await codecs;
+    if (this.asked.codec && this.asked.codec !== 'tangent') await this.learnSteps();
     this.connect();
     setInterval(() => this.connection?.report(), 500);
   }
   async setCore(module: WebAssembly.Module): Promise<void> {
-    const core = await Core.load(module);
-    this.stepNs = Math.max(core.call.strand_core_step_ns(), LEAST_STEP_NS);
+    this.use(await Core.load(module));
+    this.coreAnswered();
+  }
+  private use(core: Core): void {
+    if (core.call.strand_core_step_ns) this.stepNs = Math.max(core.call.strand_core_step_ns(), LEAST_STEP_NS);
     this.core = core;
     this.connection?.setCore(core);
-    this.coreAnswered();
   }
   /** There are the server's pictures then. */
   withoutCore(reason: string): void {
@@ -86,19 +90,32 @@ class Net {
     this.coreAnswered();
     post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${reason}. The server’s pictures are shown.` });
   }
-  /** True when the stream is stepped by a kernel that stands in the other module alone: it comes with that one again. */
+  private load(file: string): Promise<void> {
+    return compileCore(new URL(file, self.location.href).href).then(Core.load).then((core) => this.use(core), () => undefined);
+  }
+  /** With hair on the screen: streams of steps take a fraction of the link. */
+  private async learnSteps(): Promise<void> {
+    const file = this.stepCore;
+    this.stepCore = ''; // once
+    if (file) await this.load(file);
+  }
+  /** True when the stream needs another module: it comes with that one again. */
   changesCore(error: Error): boolean {
     if (this.isLoading) return true;
-    if (!this.wholeCore || !/this build has no sim\/\w+\.comp/.test(error.message)) return false;
-    const file = this.wholeCore;
-    this.wholeCore = ''; // once
+    let loaded: Promise<void>;
+    if (this.stepCore && error.message.includes('this module decodes tangent alone')) {
+      loaded = this.learnSteps();
+    } else if (this.wholeCore && /this build has no sim\/\w+\.comp/.test(error.message)) {
+      loaded = this.load(this.wholeCore);
+      this.wholeCore = ''; // once
+    } else {
+      return false;
+    }
     this.isLoading = true;
-    void compileCore(new URL(file, self.location.href).href).then(Core.load)
-      .then((core) => (this.core = core), () => undefined)
-      .then(() => {
-        this.isLoading = false;
-        this.reconnect(this.asked);
-      });
+    void loaded.then(() => {
+      this.isLoading = false;
+      this.reconnect(this.asked);
+    });
     return true;
   }
   reconnect(asked: Asked): void {
@@ -120,8 +137,8 @@ class Net {
     socket.onopen = () => {
       wasOpen = true;
       this.openedMs = performance.now();
-      this.connection = new Connection(this, socket, this.asked, this.core);
-      this.connection.hello(this.pictureCodecs);
+      const connection = (this.connection = new Connection(this, socket, this.asked, this.core));
+      void this.pictureCodecs.then((codecs) => connection.hello(codecs));
     };
     socket.onmessage = (data, receivedNs) => this.connection?.receive(data, receivedNs);
     socket.onclose = (code, said) => {
@@ -159,6 +176,7 @@ class Net {
         return connection?.send({ scene_request: {} });
       case 'drawn':
         this.drawn = message;
+        if (message.shownHz > 0 && connection?.showsStrands && !this.asked.codec) void this.learnSteps();
         return;
       case 'pictureShown':
         this.isPictureFree = true;
@@ -228,13 +246,13 @@ class Connection {
 
   constructor(private readonly net: Net, private readonly socket: DistantSocket, private readonly asked: Asked, private core?: Core) {}
 
-  /** What came before it is looked at now. */
+  /** For the next decoders. What came before the first one is looked at now. */
   setCore(core: Core): void {
     this.core = core;
     const waiting = this.waitingForCore;
     this.waitingForCore = [];
     this.guard(() => {
-      if (this.welcome) this.now = this.decoderOf(this.welcome.codec);
+      if (this.welcome && !this.now) this.now = this.decoderOf(this.welcome.codec);
       for (const take of waiting) take();
     });
   }
@@ -496,6 +514,9 @@ class Connection {
     post({ kind: 'picture', picture, ...this.pictureSize }, [picture as unknown as Transferable]);
   }
 
+  get showsStrands(): boolean {
+    return this.shown === Mode.strands;
+  }
   /** A frame of this mode was decoded. */
   private show(mode: number): void {
     if (this.shown === mode) return;
@@ -536,6 +557,7 @@ class Connection {
       viewer_report: {
         decode_ms: Math.min(this.strandMs.median, 60_000), draw_ms: Math.min(drawMs, 60_000),
         picture_decode_ms: Math.min(this.pictureMs.median, 60_000), shown_hz: Math.min(shownHz, 1000), device,
+        step_ns: this.net.stepNs,
       },
     });
   }
