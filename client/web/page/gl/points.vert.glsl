@@ -13,7 +13,7 @@ layout(location = 3) in uint in_strand;
 uniform usampler2D u_strands;   // first point, points, number among all, lock
 const int kStrandsPerRow = 1024;
 
-// Of both corners: where, and how far from the middle line; light and opacity; width and direction, in pixels.
+// Of both corners: where, and how far from the middle line; light and opacity; how cover falls with that distance.
 out vec4 v_place_0;
 out vec4 v_light_0;
 out vec4 v_line_0;
@@ -78,5 +78,5 @@ void main() {
   v_place_0 = vec4(middle + aside, depth, line.reach);
   v_place_1 = vec4(middle - aside, depth, -line.reach);
   v_light_0 = v_light_1 = vec4(min(light, vec3(60000.0)), opacity);
-  v_line_0 = v_line_1 = vec4(width, direction, 0.0);
+  v_line_0 = v_line_1 = vec4(line.base, line.slope, line.peak, 0.0);
 }

@@ -54,7 +54,7 @@ export class StrandGl {
   private readonly strandTexture: WebGLTexture;
   private layoutNumber = -1;
   private lightNumber = -1;
-  private target?: { width: number; height: number; drawn: WebGLFramebuffer; read: WebGLFramebuffer; texture: WebGLTexture; free: () => void };
+  private target?: { width: number; height: number; head: WebGLFramebuffer; scene: WebGLFramebuffer; texture: WebGLTexture; free: () => void };
 
   /** Throws where this browser's WebGL2 cannot. `samples`: of a pixel, for the head's edges. */
   constructor(private readonly gl: WebGL2RenderingContext, private readonly samples: number) {
@@ -122,35 +122,37 @@ export class StrandGl {
     if (this.target && this.target.width === width && this.target.height === height) return;
     this.target?.free();
     const gl = this.gl;
-    const color = gl.createRenderbuffer();
-    const depth = gl.createRenderbuffer();
-    const drawn = gl.createFramebuffer()!;
-    const read = gl.createFramebuffer()!;
+    const buffers: WebGLRenderbuffer[] = [];
+    const attach = (place: number, format: number, samples: number): void => {
+      const buffer = gl.createRenderbuffer()!;
+      buffers.push(buffer);
+      gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
+      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, samples, format, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffer);
+    };
+    const check = (): void => {
+      const status = gl.checkFramebufferStatus(gl.FRAMEBUFFER);
+      if (status !== gl.FRAMEBUFFER_COMPLETE) throw new Error(`WebGL2 here cannot draw into half floats (${status})`);
+    };
+    const scene = gl.createFramebuffer()!;
     const texture = this.makeTexture(4, gl.TEXTURE_2D, gl.NEAREST);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, read);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, scene);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, drawn);
-    if (this.samples > 1) {
-      gl.bindRenderbuffer(gl.RENDERBUFFER, color);
-      gl.renderbufferStorageMultisample(gl.RENDERBUFFER, this.samples, gl.RGBA16F, width, height);
-      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.RENDERBUFFER, color);
-    } else {
-      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    }
-    gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
-    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, this.samples > 1 ? this.samples : 0, gl.DEPTH_COMPONENT24, width, height);
-    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
-    const status = gl.checkFramebufferStatus(gl.FRAMEBUFFER);
-    if (status !== gl.FRAMEBUFFER_COMPLETE) throw new Error(`WebGL2 here cannot draw into half floats (${status})`);
+    attach(gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24, 0);
+    check();
+    const head = gl.createFramebuffer()!;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, head);
+    attach(gl.COLOR_ATTACHMENT0, gl.RGBA16F, this.samples);
+    attach(gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24, this.samples);
+    check();
     const free = (): void => {
       gl.deleteTexture(texture);
-      gl.deleteRenderbuffer(color);
-      gl.deleteRenderbuffer(depth);
-      gl.deleteFramebuffer(drawn);
-      gl.deleteFramebuffer(read);
+      for (const buffer of buffers) gl.deleteRenderbuffer(buffer);
+      gl.deleteFramebuffer(head);
+      gl.deleteFramebuffer(scene);
     };
-    this.target = { width, height, drawn, read, texture, free };
+    this.target = { width, height, head, scene, texture, free };
   }
 
   private upload(picture: StrandPicture, parts: PictureParts): void {
@@ -206,6 +208,17 @@ export class StrandGl {
     gl.bindVertexArray(null);
   }
 
+  /** Where colours are masked its depths alone. */
+  private drawHead(into: WebGLFramebuffer): void {
+    const gl = this.gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, into);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (!this.headIndices) return;
+    this.head.use();
+    gl.bindVertexArray(this.headArray);
+    gl.drawElements(gl.TRIANGLES, this.headIndices, gl.UNSIGNED_INT, 0);
+  }
+
   draw(picture: StrandPicture, parts: PictureParts, size: { width: number; height: number }, background: readonly number[]): void {
     const gl = this.gl;
     this.upload(picture, parts);
@@ -233,20 +246,19 @@ export class StrandGl {
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
 
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.drawn);
+    // Strands have smooth edges by themselves: only the head is drawn in samples.
     gl.viewport(0, 0, size.width, size.height);
-    gl.disable(gl.BLEND);
     gl.enable(gl.DEPTH_TEST);
-    gl.depthMask(true);
     gl.depthFunc(gl.LESS);
     gl.clearColor(0, 0, 0, 0);
     gl.clearDepth(1);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    if (this.headIndices) {
-      this.head.use();
-      gl.bindVertexArray(this.headArray);
-      gl.drawElements(gl.TRIANGLES, this.headIndices, gl.UNSIGNED_INT, 0);
-    }
+    this.drawHead(target.head);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, target.head);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target.scene);
+    gl.blitFramebuffer(0, 0, size.width, size.height, 0, 0, size.width, size.height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    gl.colorMask(false, false, false, false);
+    this.drawHead(target.scene);
+    gl.colorMask(true, true, true, true);
     this.strands.use();
     gl.bindVertexArray(this.strandsArray);
     gl.enable(gl.BLEND);
@@ -257,11 +269,6 @@ export class StrandGl {
     gl.disable(gl.BLEND);
     gl.disable(gl.DEPTH_TEST);
 
-    if (this.samples > 1) {
-      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, target.drawn);
-      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, target.read);
-      gl.blitFramebuffer(0, 0, size.width, size.height, 0, 0, size.width, size.height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
-    }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, size.width, size.height);
     this.resolve.use();
