@@ -19,6 +19,7 @@
 #include "server/app/groom_check.h"
 #include "server/app/options.h"
 #include "server/app/server_passes.h"
+#include "server/app/service_manager.h"
 #include "server/app/viewer_codec.h"
 #include "server/net/token_file.h"
 #include "server/record/replay.h"
@@ -30,6 +31,8 @@ constexpr int kExitBadInput = 2;
 constexpr int kExitFailure = 1;
 constexpr long kPollNs = 100'000'000;
 constexpr double kNsPerS = 1e9;
+/// Between two looks at what a service manager is told.
+constexpr int64_t kServiceNs = 500'000'000;
 
 /// Where nobody reads, the program ends all the same.
 void tell(std::string_view sentence) {
@@ -159,8 +162,36 @@ void reload(Server& server, const ServerOptions& options, const NetConfig& net) 
     log_info("app", "SIGHUP: there is no certificate and no token file that could be read again");
 }
 
+std::string service_status(const Server& server, const ServerConfig& config, uint32_t viewers) {
+  return fmt::format("Serving '{}' on {} port {}, {} viewer{}", config.scene.name, config.net.address,
+                     server.port(), viewers, viewers == 1 ? "" : "s");
+}
+
+/// Tells the service manager how it goes, now and again.
+void tell_service(ServiceManager& service, const Server& server, const ServerConfig& config,
+                  int64_t& told_ns) {
+  const int64_t time_ns = now_ns();
+  if (!service.is_there() || time_ns - told_ns < kServiceNs) return;
+  told_ns = time_ns;
+  const ServerCounters counters = server.counters();
+  service.tell_status(service_status(server, config, counters.viewers));
+  service.beat(time_ns, counters.sim.busy_ns);
+}
+
+/// A port that was opened for the server goes before the one of the command line.
+Status use_passed_socket(NetConfig& net) {
+  ASSIGN_OR_RETURN(const auto passed, take_passed_socket());
+  if (!passed) return {};
+  net.socket = passed->descriptor;
+  net.address = passed->address;
+  net.port = passed->port;
+  return {};
+}
+
 /// Serves until a signal, the end of the time or a failure. The signals are blocked in every thread.
 int serve(const ServerOptions& options, ServerConfig config) {
+  ServiceManager service = ServiceManager::of_environment();
+  if (const Status status = use_passed_socket(config.net); !status) return fail(status.error());
   auto tokens = load_tokens(options);
   if (!tokens) return fail(tokens.error());
   config.net.tokens = std::move(tokens).value();
@@ -172,11 +203,14 @@ int serve(const ServerOptions& options, ServerConfig config) {
     return fail(status.error());
   fmt::print("Serving '{}' on {} port {}\n", config.scene.name, config.net.address, (*server)->port());
   std::fflush(stdout);
+  service.tell_ready(service_status(**server, config, 0));
+  int64_t told_ns = 0;
   const int64_t begin_ns = now_ns();
   const timespec poll{0, kPollNs};
   while (!(*server)->failure() && !(*server)->is_shut_down_wanted()) {
     const int signal = sigtimedwait(&signals, nullptr, &poll);
     if (signal == SIGHUP) reload(**server, options, config.net);
+    tell_service(service, **server, config, told_ns);
     if (signal > 0 && signal != SIGHUP) break;
     if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
   }
@@ -186,6 +220,7 @@ int serve(const ServerOptions& options, ServerConfig config) {
   std::signal(SIGHUP, SIG_IGN);
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
   const std::optional<Error> failure = (*server)->failure();
+  service.tell_stopping();
   (*server)->stop();
   if (failure) {
     tell(failure->to_string());

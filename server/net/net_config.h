@@ -60,6 +60,7 @@ enum class ProxyProtocol { None, Version2 };
 struct NetConfig {
   std::string address = "127.0.0.1";  // numeric, or "localhost"
   uint16_t port = kDefaultPort;       // 0 = any free port
+  int socket = -1;                    // that listens already, instead of these two; -1 = none
   std::vector<AccessToken> tokens;    // needed beyond loopback
   LoopbackTrust loopback_trust = LoopbackTrust::Trusted;
   std::optional<TlsFiles> tls;  // none: no TLS

@@ -1,10 +1,12 @@
 #include "server/net/net_server.h"
 
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <future>
 #include <thread>
 #include <utility>
@@ -42,6 +44,8 @@ struct NetServer::State {
       : context(config, handler), acceptor(context.io), sweep_timer(context.io), accept_timer(context.io) {}
 
   Status open();
+  Result<net::tcp::endpoint> find_place();
+  void open_port(const net::tcp::endpoint& place, error_code& error);
   void accept();
   void on_accept(const error_code& error, net::tcp::socket socket);
   void sweep();
@@ -66,39 +70,60 @@ struct NetServer::State {
   std::thread thread;
 };
 
-Status NetServer::State::open() {
+/// Where the server is to listen, or does already.
+Result<net::tcp::endpoint> NetServer::State::find_place() {
   const NetConfig& config = context.config;
   error_code error;
+  if (config.socket >= 0) {
+    net::tcp::endpoint place;
+    auto size = static_cast<socklen_t>(place.capacity());
+    if (getsockname(config.socket, place.data(), &size) != 0)
+      error = error_code(errno, net::asio::error::get_system_category());
+    if (!error) place.resize(size);
+    if (!error) acceptor.assign(place.protocol(), config.socket, error);
+    if (!error) return place;
+    return make_error(ErrorCode::BadInput, "the socket that was passed to the server cannot be used: {}",
+                      error.message());
+  }
   const std::string numeric = config.address == "localhost" ? "127.0.0.1" : config.address;
   const auto address = net::asio::ip::make_address(numeric, error);
-  if (error)
-    return make_error(ErrorCode::BadInput,
-                      "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)",
-                      config.address);
-  const bool is_trusted = address.is_loopback() && config.loopback_trust == LoopbackTrust::Trusted &&
+  if (!error) return net::tcp::endpoint(address, config.port);
+  return make_error(ErrorCode::BadInput,
+                    "'{}' is no numeric address to listen on (such as 127.0.0.1 or 0.0.0.0)", config.address);
+}
+
+Status NetServer::State::open() {
+  const NetConfig& config = context.config;
+  ASSIGN_OR_RETURN(const net::tcp::endpoint place, find_place());
+  const std::string address = place.address().to_string();
+  const bool is_trusted = place.address().is_loopback() && config.loopback_trust == LoopbackTrust::Trusted &&
                           config.trusted_proxies.empty();
-  RETURN_IF_ERROR(check_listening(is_trusted, config.address, config.tokens));
+  RETURN_IF_ERROR(check_listening(is_trusted, address, config.tokens));
   if (config.tls) {
     ASSIGN_OR_RETURN(context.tls, make_server_tls(*config.tls));
   } else if (!is_trusted) {
     log_warn("net",
              "listening on {} without TLS: whoever is on the way can read tokens and frames (--tls-cert)",
-             config.address);
+             address);
   }
-  const net::tcp::endpoint endpoint(address, config.port);
-  acceptor.open(endpoint.protocol(), error);
-  if (!error) acceptor.set_option(net::asio::socket_base::reuse_address(true), error);
-  if (!error) acceptor.bind(endpoint, error);
-  if (!error) acceptor.listen(net::kListenBacklog, error);
+  error_code error;
+  if (config.socket < 0) open_port(place, error);
   if (error == net::asio::error::address_in_use)
     return make_error(ErrorCode::Unavailable,
-                      "port {} on {} is in use by another program (--port 0 takes a free one)", config.port,
-                      config.address);
+                      "port {} on {} is in use by another program (--port 0 takes a free one)", place.port(),
+                      address);
   if (error)
-    return make_error(ErrorCode::Unavailable, "cannot listen on {} port {}: {}", config.address, config.port,
+    return make_error(ErrorCode::Unavailable, "cannot listen on {} port {}: {}", address, place.port(),
                       error.message());
   port = acceptor.local_endpoint(error).port();
   return {};
+}
+
+void NetServer::State::open_port(const net::tcp::endpoint& place, error_code& error) {
+  acceptor.open(place.protocol(), error);
+  if (!error) acceptor.set_option(net::asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(place, error);
+  if (!error) acceptor.listen(net::kListenBacklog, error);
 }
 
 void NetServer::State::accept() {

@@ -136,7 +136,9 @@ Status SimLoop::begin() {
 
 void SimLoop::loop() {
   while (true) {
+    turn_begin_ns_ = 0;
     const std::deque<Job> jobs = wait_for_jobs();
+    turn_begin_ns_ = now_ns();
     if (is_stopping_) return;
     for (const Job& job : jobs) carry_out_in_turn(job);
     follow_stream_settings();
@@ -734,6 +736,7 @@ SimStats SimLoop::stats() const {
   const std::lock_guard lock(mutex_);
   SimStats stats = stats_;
   stats.last_step_ns = last_step_ns_;
+  if (const int64_t begin_ns = turn_begin_ns_; begin_ns != 0) stats.busy_ns = now_ns() - begin_ns;
   return stats;
 }
 

@@ -197,6 +197,7 @@ class SimLoop {
   uint32_t counted_steps_ = 0;     // as they were asked for
   std::shared_ptr<const Snapshot> counted_state_;  // published last while steps are counted
   std::atomic<int64_t> last_step_ns_{0};
+  std::atomic<int64_t> turn_begin_ns_{0};  // of the loop; 0 = it waits for what comes next
 
   mutable std::mutex mutex_;  // guards the block below
   std::condition_variable changed_;

@@ -48,6 +48,7 @@ struct SimStats {
   uint32_t substeps = 0;        // of now; 0 = nothing is simulated
   double strand_rate_hz = 0.0;  // of now; 0 = every step
   int64_t last_step_ns = 0;     // server clock at the end of the newest step; 0 = none yet
+  int64_t busy_ns = 0;          // that its thread has been at one turn of its loop; 0 = it waits
 };
 
 /// Takes what a source makes. Any thread; nothing waits for a reader.

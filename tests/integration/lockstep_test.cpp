@@ -2,6 +2,9 @@
 // the network leads to the same bits however it comes.
 #include <gmock/gmock.h>
 
+#include <atomic>
+#include <thread>
+
 #include "client/net/viewer_client.h"
 #include "tests/support/server_fixture.h"
 
@@ -159,6 +162,24 @@ TEST_F(Lockstep, AnyPausedServerCountsSteps) {
   EXPECT_EQ(done.tick, before + 5);
   EXPECT_FALSE(ask(*client, ControlCommand{Command::Resume}).is_error);
   EXPECT_TRUE(eventually([&] { return server_->counters().sim.tick > before + 5; }));
+}
+
+// What the heartbeat for a service manager goes by.
+TEST_F(Lockstep, ATurnOfTheLoopThatDoesNotEndIsSeenAndOneThatWaitsIsNone) {
+  constexpr int64_t kLongNs = 50'000'000;
+  std::atomic<bool> is_held{false};
+  ServerConfig config;
+  config.scene = test::small_scene();
+  config.on_publish = [&](const auto&) {
+    while (is_held) std::this_thread::sleep_for(milliseconds(1));
+  };
+  if (!start(std::move(config))) return;
+  const auto busy_ns = [&] { return server_->counters().sim.busy_ns; };
+  is_held = true;
+  EXPECT_TRUE(eventually([&] { return busy_ns() > kLongNs; }));
+  is_held = false;
+  EXPECT_TRUE(eventually([&] { return busy_ns() == 0; }));
+  server_->stop();  // before what it calls is gone
 }
 
 }  // namespace

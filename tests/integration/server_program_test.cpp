@@ -2,7 +2,9 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +18,7 @@
 
 #include "tests/support/eventually.h"
 #include "tests/support/lacks_gl.h"
+#include "tests/support/manager_socket.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/sim_devices.h"
 #include "tests/support/temporary_folder.h"
@@ -40,7 +43,7 @@ class ServerProgram : public testing::Test {
  protected:
   /// Standard error goes to this descriptor, or to a file.
   pid_t spawn(std::vector<std::string> arguments, int error_descriptor = -1) {
-    arguments.insert(arguments.begin(), STRANDCAST_SERVER_PROGRAM);
+    arguments.insert(arguments.begin(), program_);
     std::vector<char*> pointers;
     for (std::string& argument : arguments) pointers.push_back(argument.data());
     pointers.push_back(nullptr);
@@ -53,9 +56,9 @@ class ServerProgram : public testing::Test {
     redirect(1, folder_.path() / "out");
     redirect(2, folder_.path() / "err");
     if (error_descriptor >= 0) posix_spawn_file_actions_adddup2(&actions, error_descriptor, 2);
+    if (passed_ >= 0) posix_spawn_file_actions_adddup2(&actions, passed_, 3);
     pid_t process = -1;
-    const int failed =
-        posix_spawn(&process, STRANDCAST_SERVER_PROGRAM, &actions, nullptr, pointers.data(), environ);
+    const int failed = posix_spawn(&process, program_.c_str(), &actions, nullptr, pointers.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     EXPECT_EQ(failed, 0);
     return process;
@@ -83,6 +86,8 @@ class ServerProgram : public testing::Test {
   std::string err() const { return text_of(folder_.path() / "err"); }
 
   TemporaryFolder folder_;
+  std::string program_ = STRANDCAST_SERVER_PROGRAM;
+  int passed_ = -1;  // becomes file descriptor 3 of what is spawned
   pid_t process_ = -1;
 };
 
@@ -185,6 +190,41 @@ TEST_F(ServerProgram, SaysWhatSimulates) {
     EXPECT_EQ(wait(process_), 0) << err();
     std::filesystem::remove(folder_.path() / "port");
   }
+}
+
+// As systemd has it with Type=notify, WatchdogSec= and a .socket unit.
+TEST_F(ServerProgram, TellsItsManagerAndTakesItsSocket) {
+  test::ManagerSocket manager(folder_.path() / "manager");
+  const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(own);
+  ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&own), size), 0);
+  ASSERT_EQ(listen(listener, 8), 0);
+  ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&own), &size), 0);
+  // A shell stands for the manager: only the process itself can know its number beforehand.
+  program_ = "/bin/sh";
+  const std::string script = fmt::format(
+      "export LISTEN_PID=$$ LISTEN_FDS=1 LISTEN_FDNAMES=strandcast WATCHDOG_PID=$$ WATCHDOG_USEC=1000000 "
+      "NOTIFY_SOCKET={}; exec {} \"$@\"",
+      (folder_.path() / "manager").string(), STRANDCAST_SERVER_PROGRAM);
+  passed_ = listener;
+  const uint16_t port = serve({"-c", script, "sh", "--log-level", "off"});
+  if (port == 0 && test::lacks_gl(err())) GTEST_SKIP() << "needs OpenGL 4.5: " << err();
+  close(listener);
+  EXPECT_EQ(port, ntohs(own.sin_port)) << err();
+  EXPECT_TRUE(manager.hears("READY=1\nSTATUS=Serving 'default' on 127.0.0.1 port ")) << err();
+  EXPECT_TRUE(manager.hears("WATCHDOG=1"));
+  EXPECT_THAT(test::http_get(port, "/healthz"), HasSubstr("ok"));
+  test::RawClient client(port);
+  ASSERT_TRUE(client.handshake());
+  client.send(Hello{});
+  EXPECT_TRUE(manager.hears(", 1 viewer\n"));
+  EXPECT_TRUE(manager.hears("WATCHDOG=1"));
+  ASSERT_EQ(kill(process_, SIGTERM), 0);
+  EXPECT_TRUE(manager.hears("STOPPING=1"));
+  EXPECT_EQ(wait(process_), 0) << err();
 }
 
 // What `systemctl reload` sends, whether or not there is a certificate to read again.
