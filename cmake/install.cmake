@@ -12,11 +12,7 @@ install(DIRECTORY deploy/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast 
 install(DIRECTORY deploy/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools
   PATTERN README.md EXCLUDE)
 
-# The unit as it lies in the source tree is for a program in /usr/local/bin.
-file(READ deploy/strandcast-server.service unit)
-string(REPLACE "ExecStart=/usr/local/bin/" "ExecStart=${CMAKE_INSTALL_FULL_BINDIR}/" unit "${unit}")
-file(CONFIGURE OUTPUT ${made}/strandcast-server.service CONTENT "${unit}" @ONLY)
-install(FILES ${made}/strandcast-server.service deploy/strandcast-server.socket DESTINATION lib/systemd/system
+install(FILES deploy/strandcast-server.service deploy/strandcast-server.socket DESTINATION lib/systemd/system
   COMPONENT server)
 
 install(FILES ${packages}/strandcast-view.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT viewer)

@@ -43,7 +43,7 @@ completions() {
 [[ " $(completions strandcast-ctl feed --) " == *" --loop "*" --connect "* ]] || fail "bash completes no options of a command"
 zcat "$root/share/man/man1/strandcast-ctl.1.gz" | grep -q '^\.SS "strandcast\\-ctl feed' || fail "commands are not in the manual page"
 
-grep -q "^ExecStart=/.*bin/strandcast-server " "$root/lib/systemd/system/strandcast-server.service" || fail "the unit starts no server"
+grep -q "^ExecStart=strandcast-server " "$root/lib/systemd/system/strandcast-server.service" || fail "the unit starts no server"
 grep -q '^ListenStream=127.0.0.1:7878$' "$root/lib/systemd/system/strandcast-server.socket" || fail "the socket is another one"
 if command -v desktop-file-validate >/dev/null; then
   desktop-file-validate "$root/share/applications/strandcast-view.desktop"
