@@ -5,7 +5,8 @@
 #   bash tests/nightly.sh --seconds 5 fuzz     the short form: only the fuzzers, 5 s each
 # Parts: fuzz, grids (property and comparing tests), dev (address and undefined behaviour, all tests), tsan (threads, all
 # tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
-# kernels compile for NEON), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
+# kernels compile for NEON), packages (as root: do the Debian packages install, run and go in a clean Debian 12, and does the
+# container), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -17,11 +18,11 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | grids | dev | tsan | lto | arm | wasm) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, wasm)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto | arm | packages | wasm) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, wasm)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm wasm)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages wasm)
 
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools glslc spirv-tools
 log="$(mktemp)"
@@ -42,6 +43,12 @@ run_part() {
     tsan) build tsan && bash tests/run_preset.sh tsan build/tsan "$jobs" -LE 'property|compare' ;;
     lto) build lto && echo "all files agree" ;;
     arm) bash tests/tools/compile_for_arm.sh ;;
+    packages)
+      bash deploy/install_deps.sh debootstrap lintian desktop-file-utils dpkg-dev file buildah python3
+      build release -DBUILD_TESTING=OFF && (cd build/release && rm -f packages/*.deb && cpack -G DEB >/dev/null) &&
+        bash tests/packages/clean_root.sh build/release/packages build/packages &&
+        bash tests/packages/container.sh build/release/packages build/packages
+      ;;
     wasm)
       bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium
       build ci -DSTRANDCAST_WEB=ON && STRANDCAST_SOAK_S=600 STRANDCAST_TEST_GRID=whole bash tests/run_preset.sh ci build/ci 1 -R '^web\.' &&
@@ -61,7 +68,7 @@ for part in "${parts[@]}"; do
   run_part "$part" 2>&1 | tee "$log" || status=1
   word=passed
   [ "$status" -eq 0 ] || { word=FAILED; outcome=1; }
-  table+="$(printf '%-6s  %-6s  %6d s  %s' "$part" "$word" $((SECONDS - begun)) "$(tail -n 1 "$log")")"$'\n'
+  table+="$(printf '%-8s  %-6s  %6d s  %s' "$part" "$word" $((SECONDS - begun)) "$(tail -n 1 "$log")")"$'\n'
 done
 echo "== results"
 printf '%s' "$table"
