@@ -1,0 +1,232 @@
+#include "client/app/ctl_table.h"
+
+#include <CLI/CLI.hpp>
+#include <utility>
+
+#include "client/app/recording_commands.h"
+
+namespace strandcast {
+namespace {
+
+using Stop = std::atomic<bool>;
+using Line = CtlCommandLine;
+
+// ---- arguments ----
+
+void declare_feed(CLI::App& app, CtlCommandLine& line) {
+  constexpr double kMaxSpeed = 100.0;
+  FeedOptions& feed = line.feed;
+  app.add_option("--motion", feed.motion, "BVH file, builtin or none")->capture_default_str();
+  app.add_option("--wind", feed.wind, "CSV file, gusts or none")->capture_default_str();
+  app.add_option("--unit", feed.motion_file.unit_m,
+                 "Metres per unit of the BVH file, 0 = guessed from the length of the bones")
+      ->check(CLI::Range(0.0, 1e3))
+      ->capture_default_str();
+  app.add_option("--up", feed.motion_file.up, "Up axis of the BVH file (default: guessed from the rest pose)")
+      ->check(CLI::IsMember({"y", "z"}));
+  app.add_option("--joint", feed.motion_file.joint, "Head joint of the BVH file (default: found by name)");
+  app.add_option("--body-joint", feed.motion_file.body_joints,
+                 "Joints of the BVH file to send besides neck, chest, shoulders and elbows, by their names");
+  app.add_flag("--filter-glitches", feed.motion_file.is_filtering_glitches,
+               "Take steps out of the BVH file that are faster than any head moves");
+  app.add_flag("--loop", feed.is_looped, "Start over at the end of the files");
+  app.add_flag(
+      "--live", feed.is_live,
+      "Go on in real time when the simulation is slower, as a stage does (default: as slowly as it)");
+  app.add_option("--speed", feed.speed, "Playing speed")
+      ->check(CLI::Range(1e-3, kMaxSpeed))
+      ->capture_default_str();
+  app.add_option("--seconds", feed.seconds, "Stop after this long (default: the length of the motion file)")
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--rate", feed.rate_hz, "Samples per second")
+      ->check(CLI::Range(kMinFeedRateHz, kMaxDatagramRateHz))
+      ->capture_default_str();
+  app.add_option("--wind-mean", line.wind_mps, "Mean of the gusts, x y z in m/s")->expected(3);
+  app.add_option("--gust-intensity", feed.gust_intensity,
+                 "Standard deviation of the gusts over their mean speed")
+      ->check(CLI::Range(0.0f, 2.0f))
+      ->capture_default_str();
+  app.add_option("--seed", feed.seed, "Seed of the gusts")->capture_default_str();
+  auto* as = app.add_option(
+      "--as", feed.as, "Send packets of motion capture instead, as a stage would: vmc, opentrack or freed");
+  app.add_option("--to", feed.to, "Who gets them, as HOST or HOST:PORT")->needs(as)->capture_default_str();
+}
+
+void declare_latency(CLI::App& app, CtlCommandLine& line) {
+  LatencyOptions& latency = line.latency;
+  app.add_option("--seconds", latency.seconds, "For so long")
+      ->check(CLI::Range(0.1, 1e6))
+      ->capture_default_str();
+  app.add_option("--mode", latency.mode, "strands or frames")
+      ->check(CLI::IsMember({"strands", "frames"}))
+      ->capture_default_str();
+  app.add_option("--out", latency.out,
+                 "Folder for latency.csv (percentiles) and frames.csv (times of every frame)");
+}
+
+void declare_params(CLI::App& app, CtlCommandLine& line) {
+  ParameterOptions& params = line.params;
+  app.add_option("prefix", params.prefix, "Those whose path begins so: look.shading, solver (default: all)");
+  app.add_flag("--watch", params.is_watching, "Stay, and print what changes, until stopped");
+  app.add_flag("--live", params.is_live_only, "Those alone that can be set while the server runs");
+}
+
+void declare_test(CLI::App& app, CtlCommandLine& line) {
+  TestOptions& test = line.test;
+  app.add_option("--scenario", test.scenarios, "Scenario file (protobuf text); repeatable")
+      ->expected(1)
+      ->take_all()
+      ->required();
+  app.add_option("--junit", test.junit, "Write the results to this file as JUnit XML");
+  app.add_option("--out", test.out, "Folder for pictures, plot and log of what failed")
+      ->capture_default_str();
+  app.add_option(
+      "--server", test.server,
+      "Server program (default: strandcast-server beside this one); with --connect none is started");
+  app.add_flag("--renew", test.renews_goldens, "Write the golden pictures instead of comparing with them");
+}
+
+void declare_monitor(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("--seconds", line.monitor_s, "Stop after this long")->check(CLI::Range(0.0, 1e6));
+}
+
+void declare_step(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("count", line.step_count,
+                 "So many steps; the answer comes when they are done (default: one, answered at once)")
+      ->check(CLI::Range(1u, kMaxStepCount));
+}
+
+void declare_set(CLI::App& app, CtlCommandLine& line) {
+  app.add_option(
+         "assignment", line.assignment,
+         "path=value, for example solver.name=dftl, look.hair_color=red, look.shading.wetness=0.5 or "
+         "\"camera.offset_m={ x: 0 y: 0.1 z: 0.7 }\"; a wrong path is answered with those that can change")
+      ->required();
+}
+
+void declare_subject(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("name", line.subject,
+                 "As monitor lists them; empty: one called head, else the first one seen");
+}
+
+void declare_save(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
+}
+
+void declare_exported(CLI::App& app, CtlCommandLine& line) {
+  declare_export(app, line.exported);
+}
+
+void declare_check(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("recording", line.recording, "Recording to look at, instead of a server");
+  app.add_option("--frames", line.check_frames, "Frames to decode")
+      ->check(CLI::Range(uint64_t{2}, uint64_t{1'000'000}))
+      ->capture_default_str();
+  app.add_option("--timeout", line.check_timeout_s, "Seconds to wait for them")
+      ->check(CLI::Range(0.1, 1e6))
+      ->capture_default_str();
+}
+
+void declare_kick(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("session", line.session, "Its number, as listed by sessions")->required();
+  app.add_option("--ban", line.ban_s, "And let nobody of its address in for so many seconds")
+      ->check(CLI::Range(0.0, kMaxBanS));
+}
+
+void declare_info(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("recording", line.recording, "File of strandcast-server --record")->required();
+}
+
+void declare_recover(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("recording", line.recording, "What is left")->required();
+  app.add_option("out", line.other_recording, "The new file (default: NAME.recovered.mcap)");
+}
+
+void declare_compare(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("recording", line.recording, "One")->required();
+  app.add_option("other", line.other_recording, "And another")->required();
+}
+
+// ---- functions ----
+
+int start_feed(const Line& line, const Stop& stop) {
+  FeedOptions options = line.feed;
+  if (line.wind_mps.size() == 3)
+    options.wind_mps = glm::vec3(line.wind_mps[0], line.wind_mps[1], line.wind_mps[2]);
+  return run_feed(line.target, options, stop);
+}
+
+int start_check(const Line& line, const Stop&) {
+  return line.recording.empty() ? run_check(line.target, line.check_frames, line.check_timeout_s)
+                                : run_recording_check(line.recording);
+}
+
+int start_test(const Line& line, const Stop& stop) {
+  TestOptions options = line.test;
+  options.uses_running = line.names_server;
+  return run_test(line.target, options, stop);
+}
+
+template <Command kCommand>
+int control(const Line& line, const Stop&) {
+  return run_command(line.target, ControlCommand{kCommand, line.step_count});
+}
+
+template <LiveAction kAction>
+int live(const Line& line, const Stop&) {
+  return run_command(line.target, LiveCommand{kAction, line.subject});
+}
+
+template <AdminAction kAction>
+int admin(const Line& line, const Stop&) {
+  return run_admin(line.target, {kAction, line.session, line.ban_s});
+}
+
+// clang-format off
+constexpr CtlCommand kCommands[] = {
+    {"feed", "Send head motion and wind in real time", declare_feed, start_feed},
+    {"monitor", "Print the server's status twice a second", declare_monitor,
+     [](const Line& line, const Stop& stop) { return run_monitor(line.target, line.monitor_s, stop); }},
+    {"pause", "Halt the simulation", nullptr, control<Command::Pause>},
+    {"resume", "Let the simulation run", nullptr, control<Command::Resume>},
+    {"step", "Simulation steps while paused, or in lockstep", declare_step, control<Command::StepOnce>},
+    {"reset", "Set every strand to rest", nullptr, control<Command::Reset>},
+    {"set", "Change a scene parameter", declare_set,
+     [](const Line& line, const Stop&) { return run_command(line.target, SetParameter{line.assignment}); }},
+    {"mocap", "Live motion capture: who drives the head, and what is rest", nullptr, nullptr},
+    {"mocap subject", "Choose who drives the head", declare_subject, live<LiveAction::ChooseSubject>},
+    {"mocap calibrate", "What is seen now is the head at rest: look straight ahead", nullptr,
+     live<LiveAction::Calibrate>},
+    {"mocap reset", "Undo calibrate", nullptr, live<LiveAction::Reset>},
+    {"params", "List the scene's parameters: value, unit, range, default, and what can be set", declare_params,
+     [](const Line& line, const Stop& stop) { return run_params(line.target, line.params, stop); }},
+    {"save", "Keep the scene as it runs, look and all, as a scene file", declare_save,
+     [](const Line& line, const Stop&) { return run_save(line.target, line.scene_path); }},
+    {"export", "Write the strands as curves for other programs", declare_exported,
+     [](const Line& line, const Stop& stop) { return run_export(line.target, line.exported, stop); }},
+    {"check", "Decode frames with two viewers and compare their states; or look whether a recording is sound",
+     declare_check, start_check},
+    {"sessions", "List who is connected (needs an admin's token)", nullptr, admin<AdminAction::ListSessions>},
+    {"kick", "End one session (needs an admin's token)", declare_kick, admin<AdminAction::Kick>},
+    {"shutdown", "End the server (needs an admin's token)", nullptr, admin<AdminAction::ShutDown>},
+    {"info", "Say what a recording holds", declare_info,
+     [](const Line& line, const Stop&) { return run_recording_info(line.recording); }},
+    {"recover", "Make a whole recording of one that was cut off or damaged", declare_recover,
+     [](const Line& line, const Stop&) { return run_recover(line.recording, line.other_recording); }},
+    {"compare", "Say where two recordings first differ, and by how much", declare_compare,
+     [](const Line& line, const Stop&) { return run_compare(line.recording, line.other_recording); }},
+    {"latency", "Watch for a while, and say how long each part of the way takes", declare_latency,
+     [](const Line& line, const Stop& stop) { return run_latency(line.target, line.latency, stop); }},
+    {"test", "Carry out scenarios and check what they expect of a server", declare_test, start_test},
+    {"health", "Ask /healthz", nullptr,
+     [](const Line& line, const Stop&) { return run_health(line.target); }},
+};
+// clang-format on
+
+}  // namespace
+
+std::span<const CtlCommand> ctl_commands() {
+  return kCommands;
+}
+
+}  // namespace strandcast
