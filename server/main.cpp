@@ -146,7 +146,7 @@ void reload_tokens(Server& server, const std::filesystem::path& path) {
   auto file = open_token_file(path);
   const Status status = file ? server.set_tokens(std::move(file->tokens)) : Status(file.error());
   if (!status) return log_error("app", "the old tokens stay: {}", status.error().to_string());
-  log_info("app", "tokens read again: for whoever joins from now on");
+  log_info("app", "tokens read again: who joins needs one of them, and sessions without one end");
 }
 
 void reload_certificate(Server& server) {

@@ -255,6 +255,7 @@ Status NetServer::set_tokens(std::vector<AccessToken> tokens) {
                       "a server that began with tokens cannot go on without, nor the reverse");
   net::asio::post(state_->context.io, [state = state_.get(), tokens = std::move(tokens)]() mutable {
     state->context.tokens = std::move(tokens);
+    state->for_all([](net::Session& session) { session.check_stay(); });
   });
   return {};
 }

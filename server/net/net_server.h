@@ -63,8 +63,8 @@ class NetServer {
   uint16_t port() const;
   /// Reads the certificate and the key again; new connections get them. On an error the old ones stay.
   Status reload_tls();
-  /// Who joins from now on needs one of these; sessions that are there stay. BadInput for none where there
-  /// were some.
+  /// Who joins from now on needs one of these, and sessions whose token is not among them, or is good for
+  /// less now, end with a sentence. BadInput for none where there were some.
   Status set_tokens(std::vector<AccessToken> tokens);
 
   /// Strand frames of one stream (a class by a codec) in the order of their chain. A delta goes to sessions

@@ -61,6 +61,10 @@ const AccessToken* find_token(const std::vector<AccessToken>& tokens, std::strin
   return found == 0 ? nullptr : &tokens[found - 1];
 }
 
+const char* article_of(Role role) {
+  return role == Role::Admin ? "an" : "a";
+}
+
 bool has_expired(const AccessToken& token, int64_t unix_s) {
   return token.expires_unix_s != 0 && unix_s >= token.expires_unix_s;
 }
@@ -91,8 +95,26 @@ Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, in
     return make_error(ErrorCode::Unauthorized, "This token has expired: ask for a new one.");
   if (!may_be(token->grant, hello.role))
     return make_error(ErrorCode::BadInput, "This token is good for {}, not for {} {}.",
-                      to_string(token->grant), hello.role == Role::Admin ? "an" : "a", to_string(hello.role));
+                      to_string(token->grant), article_of(hello.role), to_string(hello.role));
   return {};
+}
+
+Status check_stay(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s) {
+  if (tokens.empty()) return {};
+  const AccessToken* token = find_token(tokens, hello.token);
+  if (token == nullptr)
+    return make_error(ErrorCode::Unauthorized, "This session's token was taken back: ask for a new one.");
+  if (has_expired(*token, unix_s))
+    return make_error(ErrorCode::Unauthorized, "This session's token has expired: ask for a new one.");
+  if (!may_be(token->grant, hello.role))
+    return make_error(ErrorCode::BadInput, "This session's token is good for {} now, no longer for {} {}.",
+                      to_string(token->grant), article_of(hello.role), to_string(hello.role));
+  return {};
+}
+
+int64_t expiry_of(const std::vector<AccessToken>& tokens, std::string_view given) {
+  const AccessToken* token = find_token(tokens, given);
+  return token != nullptr ? token->expires_unix_s : 0;
 }
 
 const char* to_string(Grant grant) {

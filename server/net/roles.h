@@ -44,6 +44,14 @@ std::optional<Grant> find_grant(const std::vector<AccessToken>& tokens, std::str
 /// role beyond it. Without tokens every role but Admin is free.
 Status check_role(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s = unix_time_s());
 
+/// Whether a session that was let in with this Hello may stay, the tokens being these now. The error ends it:
+/// Unauthorized where its token was taken back or has expired, BadInput where it is good for less than the
+/// role.
+Status check_stay(const std::vector<AccessToken>& tokens, const Hello& hello, int64_t unix_s = unix_time_s());
+
+/// When this token ends, as in AccessToken; 0 also for one that is not among them.
+int64_t expiry_of(const std::vector<AccessToken>& tokens, std::string_view given);
+
 const char* to_string(Grant grant);
 
 }  // namespace strandcast

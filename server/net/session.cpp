@@ -256,6 +256,7 @@ void Session::check_deadlines(int64_t time_ns) {
     return abort();
   }
   if (state_ != State::Joined) return;
+  if (token_expires_unix_s_ != 0 && unix_time_s() >= token_expires_unix_s_) return check_stay();
   guarded([&] {
     if (!subscription_.is_empty()) probe(time_ns);
     adapt(time_ns);

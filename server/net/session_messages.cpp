@@ -79,6 +79,16 @@ bool Session::check_token(const Hello& hello) {
   return false;
 }
 
+void Session::check_stay() {
+  if (state_ != State::Joined) return;
+  const Status may_stay = strandcast::check_stay(context_.tokens, hello_);
+  token_expires_unix_s_ = expiry_of(context_.tokens, hello_.token);
+  if (may_stay) return;
+  const std::string sentence = may_stay.error().to_string();
+  context_.note(fmt::format("session {} from {}: {}", id_, peer_.address, sentence), LogLevel::Warn);
+  close(close_code_for(may_stay.error()), sentence);
+}
+
 void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
@@ -87,7 +97,7 @@ void Session::join(const Hello& hello) {
       context_.handler.on_hello({id_, peer_.key, peer_.address, subscription_}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
-  hello_.token.clear();
+  token_expires_unix_s_ = expiry_of(context_.tokens, hello.token);
   codec_ = admission->welcome.codec;
   admission->welcome.role = hello.role;
   admission->welcome.mode = subscription_.mode();

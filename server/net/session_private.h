@@ -37,6 +37,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void send(ServerMessage message);
   /// Goodbye with one sentence, then the closing handshake.
   void close(CloseCode code, const std::string& reason);
+  /// Ends when its token no longer gives it its role.
+  void check_stay();
   /// Ends what takes too long.
   void check_deadlines(int64_t time_ns);
   /// Drops the connection at once.
@@ -94,7 +96,8 @@ class Session : public std::enable_shared_from_this<Session> {
   const Peer peer_;
   http::request<http::empty_body> request_;
   State state_ = State::Handshake;
-  Hello hello_;
+  Hello hello_;                       // its token stays: it may be taken back
+  int64_t token_expires_unix_s_ = 0;  // 0 = never
   Subscription subscription_;
   std::string codec_;                        // name of that of its strands
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode

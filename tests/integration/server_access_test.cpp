@@ -164,6 +164,54 @@ TEST_F(ServerAccess, AnAdminEndsTheServer) {
   EXPECT_TRUE(eventually([&] { return app_.shut_downs == 1; }));
 }
 
+// What a file of tokens that was read again says counts for who is there already, too.
+TEST_F(ServerAccess, SessionsGoWithTheirTokens) {
+  start_with_tokens();
+  auto viewer = join_as(Role::Viewer);
+  auto controller = join_as(Role::Controller);
+  auto watching = join(hello_as(Role::Viewer, kTokens[1].secret));  // by the controller's token
+  auto source = join_as(Role::Source);
+  auto admin = join_as(Role::Admin);
+  ASSERT_TRUE(server_->set_tokens({{kTokens[1].secret, Grant::Viewer},
+                                   {kTokens[2].secret, Grant::Source, 1},  // 1970
+                                   kTokens[3],
+                                   {"another-viewer-444", Grant::Viewer}}));
+  const RawClient::End gone = viewer->read_end();
+  EXPECT_EQ(gone.close_code, code(CloseCode::Unauthorized));
+  EXPECT_EQ(gone.reason, "This session's token was taken back: ask for a new one.");
+  const RawClient::End lowered = controller->read_end();
+  EXPECT_EQ(lowered.close_code, code(CloseCode::Policy));
+  EXPECT_EQ(lowered.reason, "This session's token is good for viewer now, no longer for a controller.");
+  const RawClient::End expired = source->read_end();
+  EXPECT_EQ(expired.close_code, code(CloseCode::Unauthorized));
+  EXPECT_EQ(expired.reason, "This session's token has expired: ask for a new one.");
+  for (RawClient* stays : {watching.get(), admin.get()}) {
+    stays->send(Ping{1});
+    EXPECT_TRUE(stays->read_control<Pong>());
+  }
+  EXPECT_EQ(app_.joined_count(), 2u);
+  EXPECT_EQ(server_->counters().refused_token, 0u) << "it is nobody's guess";
+}
+
+TEST_F(ServerAccess, ASessionEndsWhenItsTokenExpires) {
+  start_with_tokens();
+  std::unique_ptr<RawClient> client;
+  // On a machine that stands still for so long it expires before it was used.
+  const bool has_joined = eventually([&] {
+    std::vector<AccessToken> tokens = kTokens;
+    tokens[0].expires_unix_s = unix_time_s() + 2;
+    EXPECT_TRUE(server_->set_tokens(tokens));
+    client = std::make_unique<RawClient>(server_->port());
+    EXPECT_TRUE(client->handshake());
+    client->send(hello_as(Role::Viewer, kTokens[0].secret));
+    return client->read_control<Welcome>().has_value();
+  });
+  ASSERT_TRUE(has_joined);
+  const RawClient::End end = client->read_end();
+  EXPECT_EQ(end.close_code, code(CloseCode::Unauthorized));
+  EXPECT_EQ(end.reason, "This session's token has expired: ask for a new one.");
+}
+
 std::string metrics_with(uint16_t port, const std::string& header) {
   RawClient client(port);
   client.send_raw("GET /metrics HTTP/1.1\r\nHost: 127.0.0.1\r\n" + header + "\r\n");

@@ -100,5 +100,35 @@ TEST(Roles, ATokenEndsWithItsTime) {
   EXPECT_EQ(late.error().message, "This token has expired: ask for a new one.");
 }
 
+TEST(Roles, ASessionStaysAsLongAsItsTokenGivesItsRole) {
+  constexpr int64_t kEndS = 1'900'000'000;
+  const std::vector<AccessToken> tokens = {{"0123456789abcdef", Grant::Controller, kEndS},
+                                           {"fedcba9876543210", Grant::Admin}};
+  Hello hello;
+  hello.token = tokens[0].secret;
+  hello.role = Role::Controller;
+  EXPECT_TRUE(check_stay(tokens, hello, kEndS - 1));
+  EXPECT_TRUE(check_stay({}, hello, kEndS)) << "a server without tokens never had one";
+  EXPECT_EQ(expiry_of(tokens, hello.token), kEndS);
+  EXPECT_EQ(expiry_of(tokens, tokens[1].secret), 0);
+  EXPECT_EQ(expiry_of(tokens, "no token of these"), 0);
+  const auto why = [&](const std::vector<AccessToken>& now, int64_t unix_s) {
+    const Status stay = check_stay(now, hello, unix_s);
+    return stay ? std::pair(ErrorCode::Internal, std::string())
+                : std::pair(stay.error().code, stay.error().message);
+  };
+  EXPECT_EQ(why(tokens, kEndS),
+            std::pair(ErrorCode::Unauthorized,
+                      std::string("This session's token has expired: ask for a new one.")));
+  EXPECT_EQ(why({tokens[1]}, 0),
+            std::pair(ErrorCode::Unauthorized,
+                      std::string("This session's token was taken back: ask for a new one.")));
+  EXPECT_EQ(
+      why({{tokens[0].secret, Grant::Viewer}}, 0),
+      std::pair(ErrorCode::BadInput,
+                std::string("This session's token is good for viewer now, no longer for a controller.")));
+  EXPECT_TRUE(check_stay({{tokens[0].secret, Grant::Admin}}, hello, 0)) << "more than it needs";
+}
+
 }  // namespace
 }  // namespace strandcast
