@@ -195,4 +195,14 @@ class SteppedHair {
   uint64_t tick_ = 0;
 };
 
+inline constexpr uint32_t kWalkingStrands = 120;
+inline constexpr uint32_t kWalkingVertices = 12;
+
+/// Settled hair: nothing of what is tested hangs on how it falls at first.
+inline SteppedHair walking_hair(const std::string& solver = "dftl", uint32_t strands = kWalkingStrands) {
+  SteppedHair hair(stepped_scene(strands, kWalkingVertices, solver));
+  hair.settle(40);
+  return hair;
+}
+
 }  // namespace strandcast

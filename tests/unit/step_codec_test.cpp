@@ -16,8 +16,8 @@ namespace strandcast {
 namespace {
 
 constexpr float kBoundM = SteppedHair::kBoundM;
-constexpr uint32_t kStrands = 120;
-constexpr uint32_t kVertices = 12;
+constexpr uint32_t kStrands = kWalkingStrands;
+constexpr uint32_t kVertices = kWalkingVertices;
 // Of a delta's flags (proto/WIRE.md).
 constexpr int kStepFlag = 2;
 constexpr int kSceneFlag = 4;
@@ -70,13 +70,6 @@ struct Stream {
   bool is_step() const { return !is_keyframe(*frame) && (flags_of(*frame) & kStepFlag) != 0; }
   size_t bytes() const { return frame->message.size(); }
 };
-
-/// Settled hair: nothing of what is tested hangs on how it falls at first.
-SteppedHair walking_hair(const std::string& solver = "dftl", uint32_t strands = kStrands) {
-  SteppedHair hair(stepped_scene(strands, kVertices, solver));
-  hair.settle(40);
-  return hair;
-}
 
 const std::vector<std::string> kSolvers = {"dftl", "direct_rod"};
 

@@ -13,14 +13,8 @@
 namespace strandcast {
 namespace {
 
-constexpr uint32_t kStrands = 120;
-constexpr uint32_t kVertices = 12;
-
-SteppedHair walking_hair(const std::string& solver = "dftl", uint32_t strands = kStrands) {
-  SteppedHair hair(stepped_scene(strands, kVertices, solver));
-  hair.settle(40);
-  return hair;
-}
+constexpr uint32_t kStrands = kWalkingStrands;
+constexpr uint32_t kVertices = kWalkingVertices;
 
 /// What reading bytes gives after some of them were replaced from `at` on.
 template <class Read, class Value>
