@@ -327,11 +327,17 @@ using Answer = std::variant<SessionList, SceneText>;
 /// Gives the exit code.
 using TakeAnswer = std::function<int(const Answer&)>;
 
+MessageMaker always(const ClientMessage& message) {
+  return [message](const Welcome&) { return message; };
+}
+
 /// Sends one message and takes the answer; a notice is printed.
-int ask(const CtlTarget& target, Role role, const ClientMessage& message, const TakeAnswer& take) {
+int ask(const CtlTarget& target, Role role, const MessageMaker& make, const TakeAnswer& take) {
   auto client = connect(target, role);
   if (!client) return fail(client.error());
-  if (const auto sent = (*client)->send(message); !sent) return fail(sent.error(), kRefusedExit);
+  const auto message = make((*client)->welcome());
+  if (!message) return fail(message.error());
+  if (const auto sent = (*client)->send(*message); !sent) return fail(sent.error(), kRefusedExit);
   const int64_t begin_ns = now_ns();
   while (now_ns() - begin_ns < std::chrono::nanoseconds(kAnswerTimeout).count()) {
     if (const auto why = stopped(target)) return fail(*why, kRefusedExit);
@@ -352,19 +358,23 @@ int ask(const CtlTarget& target, Role role, const ClientMessage& message, const 
 
 }  // namespace
 
+int run_command(const CtlTarget& target, const MessageMaker& make) {
+  return ask(target, Role::Controller, make, [](const Answer&) { return kDoneExit; });
+}
+
 int run_command(const CtlTarget& target, const ClientMessage& message) {
-  return ask(target, Role::Controller, message, [](const Answer&) { return kDoneExit; });
+  return run_command(target, always(message));
 }
 
 int run_admin(const CtlTarget& target, const AdminCommand& command) {
-  return ask(target, Role::Admin, command, [](const Answer& answer) {
+  return ask(target, Role::Admin, always(command), [](const Answer& answer) {
     if (const auto* list = std::get_if<SessionList>(&answer)) std::cout << to_table(*list);
     return kDoneExit;
   });
 }
 
 int run_save(const CtlTarget& target, const std::filesystem::path& path) {
-  return ask(target, Role::Controller, SceneRequest{}, [&](const Answer& answer) {
+  return ask(target, Role::Controller, always(SceneRequest{}), [&](const Answer& answer) {
     const auto* text = std::get_if<SceneText>(&answer);
     if (text == nullptr) return kDoneExit;
     const auto scene = scene_of(*text);

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "client/app/feed.h"
@@ -54,6 +55,9 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
 int run_monitor(const CtlTarget& target, double seconds, const std::atomic<bool>& stop);
 /// Sends one command or assignment and prints the server's answer.
 int run_command(const CtlTarget& target, const ClientMessage& message);
+/// Likewise, with a message that depends on what the server is.
+using MessageMaker = std::function<Result<ClientMessage>(const Welcome&)>;
+int run_command(const CtlTarget& target, const MessageMaker& make);
 /// Needs an admin's token.
 int run_admin(const CtlTarget& target, const AdminCommand& command);
 /// Writes the scene as it runs to a scene file.

@@ -113,6 +113,10 @@ void declare_save(CLI::App& app, CtlCommandLine& line) {
   app.add_option("file", line.scene_path, "Where to; a file of this name is replaced")->required();
 }
 
+void declare_cameras(CLI::App& app, CtlCommandLine& line) {
+  declare_camera(app, line.camera);
+}
+
 void declare_exported(CLI::App& app, CtlCommandLine& line) {
   declare_export(app, line.exported);
 }
@@ -193,6 +197,8 @@ constexpr CtlCommand kCommands[] = {
     {"reset", "Set every strand to rest", nullptr, control<Command::Reset>},
     {"set", "Change a scene parameter", declare_set,
      [](const Line& line, const Stop&) { return run_command(line.target, SetParameter{line.assignment}); }},
+    {"camera", "Where viewers look from: all of them, or one; each can move on from there", declare_cameras,
+     [](const Line& line, const Stop&) { return run_camera(line.target, line.camera); }},
     {"mocap", "Live motion capture: who drives the head, and what is rest", nullptr, nullptr},
     {"mocap subject", "Choose who drives the head", declare_subject, live<LiveAction::ChooseSubject>},
     {"mocap calibrate", "What is seen now is the head at rest: look straight ahead", nullptr,

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "client/app/camera_command.h"
 #include "client/app/ctl_commands.h"
 #include "client/app/export_command.h"
 #include "client/app/latency_command.h"
@@ -34,6 +35,7 @@ struct CtlCommandLine {
   TestOptions test;
   ParameterOptions params;
   LatencyOptions latency;
+  CameraOptions camera;
 };
 
 struct CtlCommand {

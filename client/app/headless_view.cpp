@@ -28,7 +28,10 @@ struct Collected {
 struct Drawn {
   RenderDevice* device = nullptr;
   std::shared_ptr<const SceneAsset> asset;
-  LookChange look;  // of the end
+  LookDesc look;  // of the end
+  CameraDesc camera;
+  ClockOffset clock;
+  std::shared_ptr<FrameTrace> trace;
 };
 
 /// How long a run connects and receives; nothing = as long as it takes.
@@ -45,10 +48,11 @@ class TimeLimit {
 
 class Collector {
  public:
-  Collector(const ViewOptions& options, LiveConnection& live, const TimeLimit& limit,
+  Collector(const ViewOptions& options, LiveConnection& live, FrameTrace& trace, const TimeLimit& limit,
             const std::atomic<bool>& stop)
       : options_(options),
         live_(live),
+        trace_(trace),
         limit_(limit),
         stop_(stop),
         collected_{ClipStore(options.clip_fps, options.clip_s), {}, {}} {
@@ -109,7 +113,7 @@ class Collector {
 
   /// The server's pictures are taken from where this viewer says, once it has said so.
   void follow_camera() {
-    const CameraDesc& camera = session().look().camera;
+    const CameraDesc& camera = session().camera();
     if (camera == camera_ || !session().client().send(CameraChange{camera})) return;
     camera_ = camera;
   }
@@ -160,6 +164,8 @@ class Collector {
   void take_image() {
     if (session().image_count() == taken_images_ || session().image() == nullptr) return;
     taken_images_ = session().image_count();
+    if (const ClockOffset clock = session().client().clock(); clock.has_value())
+      trace_.note_presented(StreamMode::Frames, session().image_sim_time_ns(), clock.to_server_ns(now_ns()));
     if (!options_.clip.empty()) collected_.clip.add(*session().image(), now_ns());
     if (!collected_.screenshot_image && taken_images_ >= options_.after_frames)
       collected_.screenshot_image = *session().image();
@@ -167,6 +173,7 @@ class Collector {
 
   const ViewOptions& options_;
   LiveConnection& live_;
+  FrameTrace& trace_;
   const TimeLimit& limit_;
   const std::atomic<bool>& stop_;
   Collected collected_;
@@ -190,14 +197,18 @@ Status write_images(const ViewOptions& options, const Collected& collected) {
 /// After a stop nothing more is drawn, and a clip that has begun is not written.
 Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Collected& collected,
                         StageTimer& render_timer, const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto renderer, scene.device->make_renderer(*scene.asset, scene.look.look));
+  ASSIGN_OR_RETURN(auto renderer, scene.device->make_renderer(*scene.asset, scene.look));
   StrandFill fill(scene.asset->rest_position_m, scene.asset->vertex_count);
 
   const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
     const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(posed_strands_of(snapshot, fill), scene.look.camera, size));
+    RETURN_IF_ERROR(renderer->draw(posed_strands_of(snapshot, fill), scene.camera, size));
     Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
-    render_timer.add_ms(static_cast<double>(now_ns() - begin_ns) * 1e-6);
+    const int64_t end_ns = now_ns();
+    render_timer.add_ms(static_cast<double>(end_ns - begin_ns) * 1e-6);
+    if (scene.clock.has_value())
+      scene.trace->note_presented(StreamMode::Strands, snapshot.sim_time_ns,
+                                  scene.clock.to_server_ns(end_ns));
     return image;
   };
   if (!options.screenshot.empty() && collected.screenshot_snapshot) {
@@ -243,15 +254,22 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
     if (!limit.is_over()) return std::nullopt;
     return make_error(ErrorCode::Timeout, "the server did not answer within {} s", *options.seconds);
   };
+  const auto trace = std::make_shared<FrameTrace>();
+  if (!options.trace.empty()) RETURN_IF_ERROR(trace->open(options.trace));
   ASSIGN_OR_RETURN(auto live, LiveConnection::open(config));
-  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, limit, stop).run());
+  if (!options.trace.empty()) {
+    trace->want_states(true);
+    live->set_trace(trace);
+  }
+  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, *trace, limit, stop).run());
   ViewerSession* session = &live->session();
 
   StageTimer render_timer;
   ViewReport report = make_report(*session);
   if (!own_reason.empty()) set_mode_reason(report, own_reason);
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
-  const Drawn scene{device.get(), session->shared_asset(), session->look()};
+  const Drawn scene{device.get(),      session->shared_asset(),   session->look().look,
+                    session->camera(), session->client().clock(), trace};
   live.reset();  // the server need not serve a viewer that only draws now
   if (stop && wants_render) log_warn("render", "stopped: nothing is drawn");
   if (stop) return report;
@@ -261,6 +279,7 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   if (wants_render && mode == StreamMode::Strands && scene.asset && scene.device)
     RETURN_IF_ERROR(render_snapshots(options, scene, collected, render_timer, stop));
   set_render_times(report, render_timer);
+  RETURN_IF_ERROR(trace->close());
   return report;
 }
 

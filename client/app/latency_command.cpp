@@ -18,12 +18,18 @@ int fail(const Error& error, int exit_code) {
   return exit_code;
 }
 
-Status save(const LatencyOptions& options, const FrameTrace& trace, const std::vector<StageTimes>& stages) {
+/// A folder that cannot be written to is better known before than after.
+Status open_files(const LatencyOptions& options, FrameTrace& trace) {
+  if (options.out.empty()) return {};
   std::error_code failure;
   std::filesystem::create_directories(options.out, failure);
+  return trace.open(options.out / "frames.csv");
+}
+
+Status save(const LatencyOptions& options, FrameTrace& trace, const std::vector<StageTimes>& stages) {
   const std::string csv = to_csv(stages);
   RETURN_IF_ERROR(save_file(options.out / "latency.csv", std::as_bytes(std::span(csv))));
-  return trace.save(options.out / "frames.csv");
+  return trace.close();
 }
 
 }  // namespace
@@ -35,15 +41,17 @@ int run_latency(const CtlTarget& target, const LatencyOptions& options, const st
   if (!mode) return fail(mode.error(), kBadInputExit);
   config->hello.mode = *mode;
   config->hello.step_ns = measured_step_ns();
+  const auto trace = std::make_shared<FrameTrace>();
+  if (const Status opened = open_files(options, *trace); !opened) return fail(opened.error(), kBadInputExit);
   auto session = ViewerSession::open(*config);
   if (!session) return fail(session.error(), kBadInputExit);
-  FrameTrace trace;
-  (*session)->set_frame_listener([&](const FrameTimes& times) { trace.add(times); });
+  trace->want_states(true);
+  (*session)->set_trace(trace);
   const int64_t end_ns = now_ns() + static_cast<int64_t>(options.seconds * 1e9);
   while (!stop && now_ns() < end_ns)
     if (const Status pumped = (*session)->pump(milliseconds(20)); !pumped)
       return fail(pumped.error(), kRefusedExit);
-  const std::vector<StageTimes> stages = stage_times(trace.frames());
+  const std::vector<StageTimes> stages = stage_times(trace->frames());
   std::cout << to_table(stages);
   const ClockOffset clock = (*session)->client().clock();
   std::cout << fmt::format(
@@ -51,11 +59,11 @@ int run_latency(const CtlTarget& target, const LatencyOptions& options, const st
       static_cast<double>(clock.error_ns()) * 1e-6, (*session)->status().sim_ms,
       (*session)->status().encode_ms);
   if (!options.out.empty()) {
-    if (const Status saved = save(options, trace, stages); !saved) return fail(saved.error(), kBadInputExit);
+    if (const Status saved = save(options, *trace, stages); !saved) return fail(saved.error(), kBadInputExit);
     std::cout << fmt::format("saved {} and {}\n", (options.out / "latency.csv").string(),
                              (options.out / "frames.csv").string());
   }
-  if (trace.frames().empty())
+  if (trace->frames().empty())
     return fail(make_error(ErrorCode::Timeout, "no frame came in {:g} s", options.seconds), kRefusedExit);
   return kDoneExit;
 }

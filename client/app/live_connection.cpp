@@ -37,6 +37,11 @@ LiveConnection::~LiveConnection() {
   is_leaving_ = true;
 }
 
+void LiveConnection::set_trace(std::shared_ptr<FrameTrace> trace) {
+  trace_ = std::move(trace);
+  if (session_ != nullptr) session_->set_trace(trace_);
+}
+
 bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   if (is_connected_) {
     if (auto pumped = session_->pump(timeout); !pumped) lose(pumped.error());
@@ -57,6 +62,7 @@ bool LiveConnection::pump(std::chrono::milliseconds timeout) {
   is_connected_ = true;
   attempts_ = 0;
   session_->follow(modes_);
+  session_->set_trace(trace_);
   log_info("net", "connected to {}", config_.address.to_string());
   return true;
 }

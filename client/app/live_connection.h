@@ -30,6 +30,9 @@ class LiveConnection {
   /// pump().
   const std::shared_ptr<ModeControl>& modes() const { return modes_; }
 
+  /// Frames of all sessions go into it with their times.
+  void set_trace(std::shared_ptr<FrameTrace> trace);
+
   bool has_session() const { return session_ != nullptr; }
   /// The running session, or the last one: its snapshots stay readable while the server is away. There must
   /// have been one.
@@ -56,6 +59,7 @@ class LiveConnection {
   std::atomic<ConnectStep> step_{ConnectStep::FindHost};  // of the attempt that runs, or ran last
   ClientConfig config_;
   const std::shared_ptr<ModeControl> modes_;
+  std::shared_ptr<FrameTrace> trace_;  // null: none
   std::unique_ptr<ViewerSession> session_;
   ReconnectPolicy policy_;
   bool is_connected_;

@@ -247,6 +247,7 @@ Status StrandDrawer::draw(const Job& job, PosedStrands strands, size_t step) {
     const std::lock_guard lock(mutex_);
     newest_.image = std::move(image);
     newest_.step = step;
+    newest_.sim_time_ns = player_.sim_time_ns();
     newest_.profile = renderer_->profile();
     newest_.passes = renderer_->passes().report();
     newest_.renderer_bytes = renderer_->passes().live_bytes();

@@ -34,6 +34,7 @@ struct DrawnState {
   std::optional<Error> look_trouble;               // why the look of before is drawn, not the newest
   std::shared_ptr<const Image> image;              // null before the first
   size_t step = 0;                                 // of image
+  int64_t sim_time_ns = 0;                         // the simulated moment that it is of
   RenderProfile profile;                           // likewise
   gl::PassReports passes;                          // of the renderer
   uint64_t renderer_bytes = 0;

@@ -98,6 +98,7 @@ HudState HudWriter::write(const ViewerState& now, const ViewFacts& facts, int64_
       "{}: {}, {}", shortened(now.welcome.scene_name), shows_frames(now) ? "server's pictures" : "strands",
       rate > 0.0 ? fmt::format("{:.{}f} pictures/s", rate, rate < kFewPerS ? 1 : 0) : "nothing moves");
   hud.rows = rows(now, facts, time_ns);
+  for (const WayPart& part : facts.way) hud.way.push_back({part.name, part.median_ms});
   return hud;
 }
 

@@ -46,6 +46,7 @@ struct ViewFacts {
   DebugView debug_view = DebugView::None;
   double answer_ms = 0.0;    // median, from waking up to the picture on the display
   uint64_t shown_count = 0;  // different pictures
+  std::vector<WayPart> way;  // of what was shown in the last second
 };
 
 class HudWriter {

@@ -80,12 +80,14 @@ ClientConfig client_config(const ViewOptions& options) {
   config.hello.picture_codecs = options.picture_codecs;
   config.hello.step_ns = measured_step_ns();
   config.hello.codec_wish = options.codec_wish;
+  config.hello.keeps_camera = options.keeps_camera;
   return config;
 }
 
 namespace {
 
 constexpr const char* kAnyCodec = "auto";
+constexpr double kMostFilmS = 86'400.0;
 
 /// Values that need more than CLI11's own conversion.
 struct RawOptions {
@@ -110,6 +112,11 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--fps", options.film_fps, "Frames per second of --export")
       ->check(CLI::Range(1.0, kMaxClipFps))
       ->capture_default_str();
+  const auto seconds = CLI::Range(0.0, kMostFilmS);
+  app.add_option("--from", options.film_from_s, "Begin --export so many seconds after the first state")
+      ->check(seconds);
+  app.add_option("--to", options.film_to_s, "End --export so many seconds after the first state")
+      ->check(seconds);
   app.add_option("--connect", raw.connect, "Server as HOST:PORT")->capture_default_str();
   app.add_option(
       "--diagnose", raw.diagnose,
@@ -156,6 +163,12 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
   app.add_option("--seconds", raw.seconds, "Stop receiving after this long; what came is then drawn")
       ->check(CLI::Range(0.1, 1e6));
   app.add_option("--report", options.report, "Write what was measured: .json, else key=value lines");
+  app.add_option(
+      "--trace", options.trace,
+      "Write when each frame was where on its way from motion to picture, as CSV, a line per frame "
+      "by the ticks of the server's --trace");
+  app.add_flag("--own-camera", options.keeps_camera,
+               "Let nobody else move this view (strandcast-ctl camera)");
   app.add_option("--renderer", options.drawing.renderer,
                  "What draws strands: tiles (the processor), gl, or auto: gl where the device is hardware")
       ->check(CLI::IsMember({"auto", "tiles", "gl"}))
@@ -182,9 +195,18 @@ Status check_recording(const ViewOptions& options) {
       return make_error(ErrorCode::BadInput,
                         "--export draws a recording: name it (strandcast-view run.mcap --export {})",
                         options.film.string());
+    if (options.film_to_s && options.seconds)
+      return make_error(ErrorCode::BadInput, "--to and --seconds both say where it ends: give one of them");
+    if (options.film_to_s && *options.film_to_s < options.film_from_s)
+      return make_error(ErrorCode::BadInput, "--to {:g} is before --from {:g}", *options.film_to_s,
+                        options.film_from_s);
     return check_film_path(options.film);
   }
+  if (options.film_to_s || options.film_from_s > 0.0)
+    return make_error(ErrorCode::BadInput, "--from and --to say which part of a recording --export draws");
   if (options.recording.empty()) return {};
+  if (!options.trace.empty())
+    return make_error(ErrorCode::BadInput, "--trace is of frames that a server sends: a recording has none");
   if (options.is_headless || !options.screenshot.empty() || !options.clip.empty())
     return make_error(ErrorCode::BadInput, "a recording without a window is drawn by --export FILE");
   return {};
@@ -216,7 +238,7 @@ Result<ViewOptions> complete(const RawOptions& raw, ViewOptions options) {
   if (!options.is_headless && !(options.screenshot.empty() && options.clip.empty()))
     return make_error(ErrorCode::BadInput,
                       "--screenshot and --clip need --headless (in the window, S takes a picture)");
-  for (const auto* file : {&options.screenshot, &options.clip, &options.report})
+  for (const auto* file : {&options.screenshot, &options.clip, &options.report, &options.trace})
     RETURN_IF_ERROR(check_folder_of(*file));
   return options;
 }

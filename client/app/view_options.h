@@ -17,6 +17,8 @@ struct ViewOptions {
   std::filesystem::path recording;  // shown instead of a server; empty = none
   std::filesystem::path film;       // that a recording is drawn into, without a window; empty = none
   double film_fps = 30.0;
+  double film_from_s = 0.0;         // after the first state
+  std::optional<double> film_to_s;  // nothing: to the end
   StreamMode mode = StreamMode::Auto;
   Playout playout = Playout::LowLatency;
   std::filesystem::path tls_authorities;
@@ -26,6 +28,7 @@ struct ViewOptions {
   RenderSize size{960, 540};
   bool is_diagnosis = false;  // say what a session needs, and leave
   bool is_headless = false;
+  bool keeps_camera = false;         // nobody else moves it
   bool is_view_only = false;         // ask for a viewer's role only; headless never asks for more
   std::filesystem::path screenshot;  // empty = none
   uint64_t after_frames = 60;        // the screenshot shows the state after this many decoded frames
@@ -35,6 +38,7 @@ struct ViewOptions {
   RenderSize clip_size{960, 540};
   std::optional<double> seconds;  // stop after this long
   std::filesystem::path report;   // empty = none
+  std::filesystem::path trace;    // times of every frame; empty = none
   RenderDeviceConfig drawing;     // what draws strands
   std::string log_level = "warn";
 };

@@ -48,6 +48,7 @@ ViewerSession::ViewerSession(std::shared_ptr<ViewerClient> client)
 
 Status ViewerSession::pump(std::chrono::milliseconds timeout) {
   send_mode_request(*modes_, *client_);
+  ask_for_states();
   std::optional<int64_t> end_ns;
   while (auto event = client_->next(timeout)) {
     if (!end_ns) end_ns = now_ns() + std::chrono::nanoseconds(kPumpSlice).count();
@@ -80,8 +81,24 @@ Status ViewerSession::handle(ClientEvent& event) {
     take_look(*look);
   } else if (auto* scene = std::get_if<SceneText>(&event)) {
     scene_ = std::move(*scene);
+  } else if (const auto* camera = std::get_if<CameraChange>(&event)) {
+    moved_camera_ = camera->camera;
+    ++camera_moves_;
+  } else if (const auto* times = std::get_if<StateTimes>(&event)) {
+    if (trace_ != nullptr) trace_->note_states(times->states);
   }
   return {};
+}
+
+void ViewerSession::set_trace(std::shared_ptr<FrameTrace> trace) {
+  trace_ = std::move(trace);
+  if (trace_ != nullptr) trace_->begin_session();
+}
+
+/// Or to tell no more, as the trace wants it. A wish that does not go out does so with the next pump().
+void ViewerSession::ask_for_states() {
+  if (trace_ == nullptr || trace_->wants_states() == has_asked_states_) return;
+  if (client_->send(StateTimesRequest{!has_asked_states_})) has_asked_states_ = !has_asked_states_;
 }
 
 void ViewerSession::take_look(const LookChange& look) {
@@ -203,13 +220,14 @@ void ViewerSession::take_picture(const MediaEvent& event) {
   image_ = std::make_shared<const Image>(*pictures_.image());
   if (is_blank(*image_)) ++blank_pictures_;
   ++image_count_;
+  image_sim_time_ns_ = header.sim_time_ns;
   tell_times(event, nullptr);
   acknowledge(event, begin_ns);
 }
 
 /// Of a state of strands, or of a picture, which knows its simulation time alone.
 void ViewerSession::tell_times(const MediaEvent& event, const Snapshot* snapshot) {
-  if (!frame_listener_) return;
+  if (trace_ == nullptr) return;
   const ClockOffset clock = client_->clock();
   FrameTimes times;
   times.mode = snapshot != nullptr ? StreamMode::Strands : StreamMode::Frames;
@@ -225,7 +243,7 @@ void ViewerSession::tell_times(const MediaEvent& event, const Snapshot* snapshot
     times.decoded_ns = clock.to_server_ns(now_ns());
     times.clock_error_ns = clock.error_ns();
   }
-  frame_listener_(times);
+  trace_->add(times);
 }
 
 void ViewerSession::acknowledge(const MediaEvent& event, int64_t decode_begin_ns) {

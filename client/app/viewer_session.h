@@ -27,8 +27,6 @@ namespace strandcast {
 
 /// Called for every decoded snapshot, in order.
 using SnapshotListener = std::function<void(const std::shared_ptr<const Snapshot>&)>;
-/// Called for every decoded frame, strands and pictures, with its times.
-using FrameListener = std::function<void(const FrameTimes&)>;
 
 /// A call of pump() handles no further event after so long: between two calls others look at clocks and
 /// stops.
@@ -82,6 +80,8 @@ class ViewerSession {
   const Image* image() const { return image_.get(); }
   std::shared_ptr<const Image> shared_image() const { return image_; }
   uint64_t image_count() const { return image_count_; }
+  /// Of the newest picture.
+  int64_t image_sim_time_ns() const { return image_sim_time_ns_; }
 
   /// How the server codes strands for this viewer; changes with the link.
   const StreamQuality& quality() const { return quality_; }
@@ -90,6 +90,11 @@ class ViewerSession {
   /// What the scene looks like now, and its own camera: as the Welcome said, or a LookChange since.
   const LookChange& look() const { return look_; }
   uint64_t look_changes() const { return look_changes_; }
+  /// Where somebody who controls had this viewer look from last; nothing: nobody did.
+  const std::optional<CameraDesc>& moved_camera() const { return moved_camera_; }
+  uint64_t camera_moves() const { return camera_moves_; }
+  /// That, else the scene's own.
+  const CameraDesc& camera() const { return moved_camera_ ? *moved_camera_ : look_.camera; }
   /// The answer to the last SceneRequest, once.
   std::optional<SceneText> take_scene() { return std::exchange(scene_, std::nullopt); }
 
@@ -113,7 +118,8 @@ class ViewerSession {
   double connected_s() const;
 
   void set_snapshot_listener(SnapshotListener listener) { listener_ = std::move(listener); }
-  void set_frame_listener(FrameListener listener) { frame_listener_ = std::move(listener); }
+  /// Every decoded frame, strands and pictures, goes into it with its times, from now on.
+  void set_trace(std::shared_ptr<FrameTrace> trace);
 
  private:
   explicit ViewerSession(std::shared_ptr<ViewerClient> client);
@@ -123,6 +129,7 @@ class ViewerSession {
   void take_picture(const MediaEvent& event);
   Status take_quality(StreamQuality quality);
   void take_quality(FrameQuality quality);
+  void ask_for_states();
   void tell_times(const MediaEvent& event, const Snapshot* snapshot);
   void acknowledge(const MediaEvent& event, int64_t decode_begin_ns);
   void take_mode(ModeChange change);
@@ -140,6 +147,7 @@ class ViewerSession {
   bool was_shown_ = false;
   uint64_t blank_pictures_ = 0;
   uint64_t image_count_ = 0;
+  int64_t image_sim_time_ns_ = 0;
   uint32_t last_picture_sequence_ = 0;
   uint16_t last_picture_stream_ = 0;
   std::optional<FrameQuality> frame_quality_;
@@ -147,6 +155,8 @@ class ViewerSession {
   uint64_t quality_changes_ = 0;
   LookChange look_;
   uint64_t look_changes_ = 0;
+  std::optional<CameraDesc> moved_camera_;
+  uint64_t camera_moves_ = 0;
   std::optional<SceneText> scene_;
   ServerStatus status_;
   bool has_status_ = false;
@@ -157,7 +167,8 @@ class ViewerSession {
   StageTimer picture_decode_timer_;
   PictureLatency picture_latency_;
   SnapshotListener listener_;
-  FrameListener frame_listener_;
+  std::shared_ptr<FrameTrace> trace_;  // null: none
+  bool has_asked_states_ = false;      // the server is to tell of its states
   int64_t opened_ns_ = 0;
 };
 

@@ -91,10 +91,13 @@ void ViewerThread::describe(ViewerState& state) {
   state.timeline = session.replay().timeline();
   state.image = session.shared_image();
   state.image_count = session.image_count();
+  state.image_sim_time_ns = session.image_sim_time_ns();
   state.quality = session.quality();
   state.quality_changes = session.quality_changes();
   state.look = session.look();
   state.look_changes = session.look_changes();
+  state.moved_camera = session.moved_camera();
+  state.camera_moves = session.camera_moves();
   state.status = session.status();
   state.has_status = session.has_status();
   state.net = session.client().counters();
@@ -105,6 +108,7 @@ void ViewerThread::describe(ViewerState& state) {
   state.motion_to_decoded_ms = session.motion_latency_timer().median_ms();
   state.playout_delay_ms = session.replay().playout_delay_ms();
   state.round_trip_ms = clock.has_value() ? 2.0 * static_cast<double>(clock.error_ns()) * kMsPerNs : 0.0;
+  if (clock.has_value()) state.server_clock_offset_ns = clock.offset_ns();
   state.state_age_ms = session.replay().state_age_ms(time_ns, clock);
   state.made_ns = time_ns;
 }

@@ -31,10 +31,13 @@ struct ViewerState {
   SnapshotTimeline timeline;           // strands
   std::shared_ptr<const Image> image;  // the server's newest picture
   uint64_t image_count = 0;
+  int64_t image_sim_time_ns = 0;
   StreamQuality quality;
   uint64_t quality_changes = 0;
   LookChange look;  // of the scene
   uint64_t look_changes = 0;
+  std::optional<CameraDesc> moved_camera;  // by somebody who controls
+  uint64_t camera_moves = 0;
   ServerStatus status;
   bool has_status = false;
   ConnectionCounters net;
@@ -45,7 +48,8 @@ struct ViewerState {
   double motion_to_decoded_ms = 0.0;
   double playout_delay_ms = 0.0;
   double round_trip_ms = 0.0;
-  double state_age_ms = 0.0;  // when this was made
+  std::optional<int64_t> server_clock_offset_ns;  // less this machine's
+  double state_age_ms = 0.0;                      // when this was made
   int64_t made_ns = 0;
 };
 

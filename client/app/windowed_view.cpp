@@ -29,6 +29,7 @@ constexpr double kGrownHair = 1.1;
 constexpr double kLeastHairPx = 0.1;                  // 0 says nothing
 constexpr int64_t kDisplayNs = 1000 * kNsPerMs / 60;  // no display needs more
 constexpr int64_t kPanelNs = 250 * kNsPerMs;          // how often its numbers change
+constexpr int64_t kWayNs = 1000 * kNsPerMs;           // medians of so long
 constexpr int64_t kSceneWaitNs = 5000 * kNsPerMs;
 constexpr milliseconds kLongestWait{50};  // how late a stop is noticed
 constexpr const char* kDebugViewPath = "debug_view";
@@ -41,17 +42,20 @@ class WindowedView {
         config_(std::move(config)),
         window_(std::move(window)),
         playout_(options.playout),
+        trace_(std::make_shared<FrameTrace>(kRecentFrames)),
         state_(std::make_shared<const ViewerState>()),
         drawer_({options.drawing, [] { Window::wake(); }}) {}
 
   Result<ViewReport> run(const std::atomic<bool>& stop) {
     const int64_t begin_ns = now_ns();
+    if (!options_.trace.empty()) RETURN_IF_ERROR(trace_->open(options_.trace));
     while (!stop) {
       const WindowActions actions = window_->wait(time_to_wait());
       const int64_t woke_ns = now_ns();
       if (actions.wants_quit) break;
       RETURN_IF_ERROR(follow());
       act(actions);
+      trace_->want_states(!options_.trace.empty() || window_->is_unfolded());
       tell_drawer();
       report();
       if (is_picture_due(actions)) present(woke_ns);
@@ -84,6 +88,7 @@ class WindowedView {
     for (const Notice& notice : viewer_->take_notices())
       if (notice.is_error || !notice.text.starts_with(kLookAnswer)) show_message(notice.text);
     follow_look();
+    follow_camera();
     return {};
   }
 
@@ -118,7 +123,9 @@ class WindowedView {
       own_reason_ = "frames: strands cannot be drawn here: " + why.to_string();
       log_warn("render", "{}", own_reason_);
     }
-    viewer_ = std::make_unique<ViewerThread>(LiveConnection::begin(config_), [this](const auto& state) {
+    auto live = LiveConnection::begin(config_);
+    live->set_trace(trace_);
+    viewer_ = std::make_unique<ViewerThread>(std::move(live), [this](const auto& state) {
       drawer_.set_state(state);
       Window::wake();
     });
@@ -129,6 +136,16 @@ class WindowedView {
   void begin_session(bool is_first) {
     if (is_first) orbit_ = OrbitCamera(state_->look.camera);
     is_camera_sent_ = false;
+    camera_moves_ = 0;
+  }
+
+  /// Somebody who controls moved this view; from there on it is the person's again.
+  void follow_camera() {
+    if (state_->camera_moves == camera_moves_ || !state_->moved_camera) return;
+    camera_moves_ = state_->camera_moves;
+    orbit_.look_from(*state_->moved_camera);
+    is_camera_sent_ = true;  // the server knows
+    is_due_ = true;
   }
 
   /// This scene cannot be drawn here; somebody else can draw it.
@@ -182,6 +199,7 @@ class WindowedView {
     if (done.wants_undo) look_.undo();
     if (done.file) look_.set_file(*done.file);
     if (done.wants_save) save_scene_now();
+    if (done.wants_share) send(CameraCommand{0, orbit_.camera()});
     drawer_.set_own_look(look_.own_look());
     if (!state_->is_connected) return;
     if (auto assignment = look_.take_assignment(time_ns); assignment && !send(SetParameter{*assignment}))
@@ -264,6 +282,8 @@ class WindowedView {
     if (chosen == nullptr) return;
     if (chosen != image_) ++shown_count_;
     image_ = std::move(chosen);
+    image_mode_ = is_frames() ? StreamMode::Frames : StreamMode::Strands;
+    image_sim_time_ns_ = is_frames() ? state_->image_sim_time_ns : drawn_.sim_time_ns;
   }
 
   bool is_picture_due(const WindowActions& actions) {
@@ -287,6 +307,8 @@ class WindowedView {
     const bool has_form = window_->is_form_visible() && state_->session_number > 0;
     window_->present(image_, fit_, hud_.write(*state_, facts(time_ns), time_ns),
                      has_form ? std::optional(form(time_ns)) : std::nullopt);
+    if (image_ != nullptr && state_->server_clock_offset_ns)
+      trace_->note_presented(image_mode_, image_sim_time_ns_, now_ns() + *state_->server_clock_offset_ns);
     answer_timer_.add_ms(static_cast<double>(now_ns() - woke_ns) / kNsPerMs);
   }
 
@@ -303,6 +325,7 @@ class WindowedView {
     view.is_idle = is_frames();
     for (const DebugView choice : kDebugViews) view.choices.emplace_back(name_of(choice));
     form.fields.push_back(std::move(view));
+    if (look_.is_steering()) form.share = "Show everybody this view";
     return form;
   }
 
@@ -324,6 +347,8 @@ class WindowedView {
     facts.debug_view = debug_view_;
     facts.answer_ms = answer_timer_.median_ms();
     facts.shown_count = shown_count_;
+    if (window_->is_unfolded() && state_->server_clock_offset_ns)
+      facts.way = way_parts(trace_->decoded_since(time_ns + *state_->server_clock_offset_ns - kWayNs));
     return facts;
   }
 
@@ -353,6 +378,7 @@ class WindowedView {
 
   Result<ViewReport> finish() {
     const auto measured = viewer_ == nullptr ? std::nullopt : viewer_->stop_and_report();
+    RETURN_IF_ERROR(trace_->close());
     if (state_->final_error) return *state_->final_error;
     if (!measured)
       return make_error(ErrorCode::Unavailable, "left before the server had answered{}{}",
@@ -380,6 +406,7 @@ class WindowedView {
   StageTimer answer_timer_;
   bool is_camera_sent_ = false;
   int64_t camera_sent_ns_ = 0;
+  uint64_t camera_moves_ = 0;  // by others, that were followed
   int64_t reported_ns_ = 0;
   double reported_hair_px_ = 0.0;
   std::shared_ptr<const SceneAsset> measured_;  // what hair_ is of
@@ -387,6 +414,8 @@ class WindowedView {
   int64_t presented_ns_ = 0;
   bool is_due_ = true;                  // a picture
   std::shared_ptr<const Image> image_;  // that is shown
+  StreamMode image_mode_ = StreamMode::Strands;
+  int64_t image_sim_time_ns_ = 0;
   PictureFit fit_ = PictureFit::Stretched;
   uint64_t shown_count_ = 0;  // different pictures
   bool wants_whole_ = false;
@@ -394,6 +423,7 @@ class WindowedView {
   uint32_t screenshot_count_ = 0;
   std::string message_;
   int64_t message_ns_ = 0;
+  const std::shared_ptr<FrameTrace> trace_;
   DrawnState drawn_;                          // what this turn of the loop shows
   std::shared_ptr<const ViewerState> state_;  // likewise
   std::future<std::string> saving_;

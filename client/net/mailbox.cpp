@@ -104,6 +104,10 @@ void Mailbox::push(const SceneText& scene) {
   keep_newest(scene);
 }
 
+void Mailbox::push(const CameraChange& camera) {
+  keep_newest(camera);
+}
+
 template <class Event>
 void Mailbox::keep_some(Event event, size_t limit) {
   const std::lock_guard lock(mutex_);
@@ -120,6 +124,10 @@ void Mailbox::push(Notice notice) {
 
 void Mailbox::push(ParameterList list) {
   keep_some(std::move(list), limits_.parameter_lists);
+}
+
+void Mailbox::push(StateTimes times) {
+  keep_some(std::move(times), limits_.state_times);
 }
 
 void Mailbox::close(Error error) {

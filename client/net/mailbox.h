@@ -33,8 +33,9 @@ struct ClosedEvent {
   Error error;
 };
 
-using ClientEvent = std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, FrameQuality, ModeChange,
-                                 SessionList, LookChange, SceneText, ParameterList, ClosedEvent>;
+using ClientEvent =
+    std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, FrameQuality, ModeChange, SessionList,
+                 LookChange, SceneText, ParameterList, CameraChange, StateTimes, ClosedEvent>;
 
 struct MailboxLimits {
   // Of strand frames, and as much of pictures that build on each other.
@@ -42,6 +43,7 @@ struct MailboxLimits {
   uint64_t chained_bytes = 128ull << 20;  // at least one message of the largest size fits
   size_t notices = 64;
   size_t parameter_lists = 16;
+  size_t state_times = 4;  // two seconds
 };
 
 class Mailbox {
@@ -60,9 +62,11 @@ class Mailbox {
   void push(const FrameQuality& quality);
   void push(const LookChange& look);
   void push(const SceneText& scene);
+  void push(const CameraChange& camera);
   /// The oldest gives way when there are too many.
   void push(Notice notice);
   void push(ParameterList list);
+  void push(StateTimes times);
   /// Adds the final event; later pushes are ignored.
   void close(Error error);
 

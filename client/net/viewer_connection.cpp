@@ -43,6 +43,8 @@ websocket::close_code close_code_for(const Error& error) {
 void clean(ServerStatus&) {}
 void clean(LookChange&) {}
 void clean(SceneText&) {}  // whoever takes it parses it
+void clean(CameraChange&) {}
+void clean(StateTimes&) {}
 void clean(Welcome& welcome) {
   for (std::string* text : {&welcome.server_version, &welcome.scene_name, &welcome.mode_reason,
                             &welcome.codec, &welcome.codec_reason, &welcome.sim_device})

@@ -24,6 +24,7 @@ void FormActions::add(FormActions later) {
   if (later.file) file = std::move(later.file);
   wants_save = wants_save || later.wants_save;
   wants_undo = wants_undo || later.wants_undo;
+  wants_share = wants_share || later.wants_share;
 }
 
 DirectionAngles angles_of(const glm::vec3& direction) {

@@ -36,6 +36,7 @@ struct FormState {
   std::vector<std::string> notes;  // whom it concerns
   std::vector<FormField> fields;
   std::string undo;       // the name of a button that takes all changes back; empty: there is none
+  std::string share;      // of one that shows others this view; empty: there is none
   std::string file;       // to save as
   std::string save_note;  // what is saved
 };
@@ -53,8 +54,9 @@ struct FormActions {
   std::optional<std::string> file;  // another name
   bool wants_save = false;
   bool wants_undo = false;
+  bool wants_share = false;
 
-  bool is_empty() const { return edits.empty() && !file && !wants_save && !wants_undo; }
+  bool is_empty() const { return edits.empty() && !file && !wants_save && !wants_undo && !wants_share; }
   void add(FormActions later);
 };
 

@@ -154,6 +154,7 @@ void draw_saving(const FormState& form, FormActions& actions) {
     if (ImGui::Button(form.undo.c_str())) actions.wants_undo = true;
   }
   draw_note(kLabelColor, form.save_note);
+  if (!form.share.empty() && ImGui::Button(form.share.c_str())) actions.wants_share = true;
 }
 
 /// Sections in the order in which their first fields come; the first is open.

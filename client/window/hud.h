@@ -12,6 +12,12 @@ struct HudRow {
   std::string value;
 };
 
+/// One part of a bar that is made of several.
+struct HudPart {
+  std::string name;
+  double ms = 0.0;
+};
+
 /// In the middle of the window while there is no connection.
 struct HudBanner {
   std::string headline;  // "connecting to 127.0.0.1:7878"
@@ -42,6 +48,7 @@ struct HudState {
   std::string title;                  // what is seen, in one line
   std::vector<std::string> warnings;  // what a person should know now, and the newest notice
   std::vector<HudRow> rows;           // measurements, for the unfolded panel
+  std::vector<HudPart> way;           // from motion to picture, likewise; may be empty
   std::optional<HudBanner> banner;
   std::optional<TimelineState> timeline;  // with it, what is seen is a recording
 };

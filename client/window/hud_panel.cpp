@@ -27,6 +27,14 @@ const ImVec4 kTextColor(0.92f, 0.93f, 0.95f, 1.0f);
 const ImVec4 kLabelColor(0.62f, 0.66f, 0.72f, 1.0f);
 const ImVec4 kWarningColor(1.0f, 0.78f, 0.35f, 1.0f);
 const ImVec4 kHelpColor(0.62f, 0.85f, 1.0f, 1.0f);
+constexpr float kWayLetters = 22.0f;
+constexpr float kWayHeightLetters = 0.6f;
+/// Of parts of a bar; neighbours differ in brightness, too.
+const std::array<ImVec4, 5> kWayColors{{{0.95f, 0.62f, 0.30f, 1.0f},
+                                        {0.98f, 0.86f, 0.45f, 1.0f},
+                                        {0.45f, 0.72f, 0.98f, 1.0f},
+                                        {0.55f, 0.88f, 0.62f, 1.0f},
+                                        {0.80f, 0.62f, 0.95f, 1.0f}}};
 
 /// Usual on desktops, the first that is there; without any the small font of the library serves.
 constexpr std::array<const char*, 4> kFonts{
@@ -85,6 +93,37 @@ void row(const std::string& label, const std::string& value, float column) {
   text(kTextColor, value);
 }
 
+/// Each part as long as it takes, and below what it is, in its colour, and all of it.
+void draw_way(const std::vector<HudPart>& way, float max_width) {
+  if (way.empty()) return;
+  double total_ms = 0.0;
+  for (const HudPart& part : way) total_ms += part.ms;
+  const float padding = ImGui::GetStyle().WindowPadding.x;
+  const float width = std::min(letters(kWayLetters), max_width - 2.0f * padding);
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float height = letters(kWayHeightLetters);
+  float x = corner.x;
+  for (size_t i = 0; i < way.size(); ++i) {
+    const float part_width = total_ms > 0.0 ? width * static_cast<float>(way[i].ms / total_ms) : 0.0f;
+    ImGui::GetWindowDrawList()->AddRectFilled(
+        {x, corner.y}, {x + part_width, corner.y + height},
+        ImGui::ColorConvertFloat4ToU32(kWayColors[i % kWayColors.size()]));
+    x += part_width;
+  }
+  ImGui::Dummy({width, height});
+  const float right = corner.x + max_width - 2.0f * padding;
+  const auto word = [&](const ImVec4& color, const std::string& words, bool is_first) {
+    if (!is_first) ImGui::SameLine();
+    // What does not fit goes on in the next line.
+    if (!is_first && ImGui::GetCursorScreenPos().x + ImGui::CalcTextSize(words.c_str()).x > right)
+      ImGui::NewLine();
+    text(color, words);
+  };
+  for (size_t i = 0; i < way.size(); ++i)
+    word(kWayColors[i % kWayColors.size()], fmt::format("{} {:.1f}", way[i].name, way[i].ms), i == 0);
+  word(kTextColor, fmt::format("= {:.1f} ms from motion to picture", total_ms), false);
+}
+
 }  // namespace
 
 void set_panel_style(float content_scale) {
@@ -115,6 +154,7 @@ PanelSize draw_hud_panel(const HudState& hud, HudFold fold) {
     const std::string keys = hud.timeline ? "H help   " : "H help   L look   ";
     if (fold == HudFold::Small) return text(kLabelColor, keys + "U details");
     ImGui::Spacing();
+    draw_way(hud.way, max_width);
     for (const HudRow& entry : hud.rows) row(entry.label, entry.value, letters(kLabelLetters));
     text(kLabelColor, keys + "U hides this");
   });

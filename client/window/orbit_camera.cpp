@@ -3,26 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/polar.h"
+
 namespace strandcast {
 namespace {
-
-struct Polar {
-  float distance_m;
-  float yaw_rad;    // about +Y, 0 looks along -Z
-  float pitch_rad;  // above the horizon
-};
-
-Polar to_polar(const glm::vec3& offset_m) {
-  const float distance_m = glm::length(offset_m);
-  return {distance_m, std::atan2(offset_m.x, offset_m.z),
-          std::asin(std::clamp(offset_m.y / distance_m, -1.0f, 1.0f))};
-}
-
-glm::vec3 from_polar(const Polar& polar) {
-  const float level = std::cos(polar.pitch_rad);
-  return polar.distance_m * glm::vec3(level * std::sin(polar.yaw_rad), std::sin(polar.pitch_rad),
-                                      level * std::cos(polar.yaw_rad));
-}
 
 CameraDesc usable(CameraDesc home) {
   if (!(glm::length(home.offset_m) >= kMinOrbitDistanceM)) home.offset_m = CameraDesc().offset_m;
@@ -61,6 +45,10 @@ void OrbitCamera::zoom(float wheel_steps) {
 
 void OrbitCamera::reset() {
   camera_ = home_;
+}
+
+void OrbitCamera::look_from(const CameraDesc& camera) {
+  camera_ = usable(camera);
 }
 
 bool OrbitCamera::set_home(const CameraDesc& home) {

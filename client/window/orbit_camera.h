@@ -27,6 +27,8 @@ class OrbitCamera {
   /// Wheel steps, positive comes closer.
   void zoom(float wheel_steps);
   void reset();
+  /// From there at once; the view to return to stays.
+  void look_from(const CameraDesc& camera);
   /// Another view to return to; who looks from the old one looks from there at once. True then.
   bool set_home(const CameraDesc& home);
 

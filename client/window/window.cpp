@@ -284,6 +284,10 @@ void Window::State::add_picture(const Image& image, PictureFit fit) const {
                                            ImVec2(corner.x + shown.x, corner.y + shown.y));
 }
 
+bool Window::is_unfolded() const {
+  return state_->fold == HudFold::Unfolded;
+}
+
 bool Window::is_form_visible() const {
   return state_->is_form_visible;
 }

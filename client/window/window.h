@@ -58,10 +58,13 @@ class Window {
   static void wake();
   /// Size of the framebuffer, pixels; 0 x 0 while minimised.
   RenderSize framebuffer_size() const;
+  /// Whether the person has unfolded the measurements (U).
+  bool is_unfolded() const;
   /// Whether the person has opened the form (L).
   bool is_form_visible() const;
   /// Shows this picture (dark grey when there is none) with the panels over it, the form too when it is given
-  /// and open; waits for the display. What is done in the form comes with the next wait().
+  /// and open; waits for the display, and returns once it is handed to it. What is done in the form comes
+  /// with the next wait().
   void present(const std::shared_ptr<const Image>& image, PictureFit fit, const HudState& hud,
                const std::optional<FormState>& form);
 

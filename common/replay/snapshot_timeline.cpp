@@ -56,6 +56,7 @@ std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& t
   interpolation_ = Interpolation::None;
   if (std::exchange(restarts_, timeline.restarts()) != timeline.restarts()) cursor_ = {};
   if (snapshots.empty()) return std::nullopt;
+  sim_time_ns_ = snapshots.back()->sim_time_ns;
   if (timeline.playout() == Playout::LowLatency || snapshots.size() < 2 || !timeline.clock().has_value()) {
     blend_.leave();
     return blend_.at(*snapshots.back());
@@ -69,6 +70,7 @@ std::optional<PosedStrands> TimelinePlayer::strands_at(const SnapshotTimeline& t
     return snapshot->sim_time_ns > sim_time_ns;
   });
   if (later == snapshots.end()) return blend_.at(*snapshots.back());
+  sim_time_ns_ = later == snapshots.begin() ? (*later)->sim_time_ns : sim_time_ns;
   if (later == snapshots.begin()) return blend_.at(**later);
   PosedStrands strands =
       blend_.between(snapshots, static_cast<size_t>(later - snapshots.begin()), sim_time_ns);

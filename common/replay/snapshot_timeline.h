@@ -64,14 +64,16 @@ class TimelinePlayer {
   void set_fill(StrandFill fill) { blend_.set_fill(std::move(fill)); }
   /// What to draw at client time `client_time_ns`; nothing while the timeline is empty.
   std::optional<PosedStrands> strands_at(const SnapshotTimeline& timeline, int64_t client_time_ns);
-  /// How the newest strands were made.
+  /// How the newest strands were made, and the simulated moment that they are of.
   Interpolation interpolation() const { return interpolation_; }
+  int64_t sim_time_ns() const { return sim_time_ns_; }
 
  private:
   StateBlend blend_;
   PlayoutCursor cursor_;
   uint64_t restarts_ = 0;
   Interpolation interpolation_ = Interpolation::None;
+  int64_t sim_time_ns_ = 0;
 };
 
 }  // namespace strandcast

@@ -55,6 +55,7 @@ void visit(Visitor& v, Hello& m) {
   v.value("gets_no_stream", m.gets_no_stream);
   v.number("step_ns", m.step_ns, kStepTime);
   v.exact_text("codec_wish", m.codec_wish, kMaxNameChars);
+  v.value("keeps_camera", m.keeps_camera);
 }
 
 template <>
@@ -181,6 +182,21 @@ void visit(Visitor& v, ParameterRequest& m) {
   v.exact_text("prefix", m.prefix, kMaxParameterPathBytes);
   v.number("first", m.first, kParameterCount);
   v.value("is_watching", m.is_watching);
+}
+
+template <>
+inline constexpr const char* kKind<CameraCommand> = "camera_command";
+template <class Visitor>
+void visit(Visitor& v, CameraCommand& m) {
+  v.value("session", m.session);
+  v.group("camera", [&] { scene_fields::visit_camera(v, m.camera); });
+}
+
+template <>
+inline constexpr const char* kKind<StateTimesRequest> = "state_times_request";
+template <class Visitor>
+void visit(Visitor& v, StateTimesRequest& m) {
+  v.value("is_wanted", m.is_wanted);
 }
 
 // ---- server to client ----
@@ -378,6 +394,20 @@ void visit(Visitor& v, ParameterList& m) {
   });
   v.number("total", m.total, kParameterCount);
   v.value("is_change", m.is_change);
+}
+
+template <>
+inline constexpr const char* kKind<StateTimes> = "state_times";
+template <class Visitor>
+void visit(Visitor& v, StateTimes& m) {
+  v.repeated("states", m.states, kMaxStateTimes, [&](StateTime& state) {
+    v.value("tick", state.tick);
+    v.value("sim_time_ns", state.sim_time_ns);
+    v.value("source_ns", state.source_ns);
+    v.value("motion_ns", state.motion_ns);
+    v.value("published_ns", state.published_ns);
+    v.value("encoded_ns", state.encoded_ns);
+  });
 }
 
 }  // namespace strandcast::wire_fields

@@ -49,6 +49,8 @@ inline constexpr double kMaxBanS = 7.0 * 86'400.0;  // AdminCommand
 inline constexpr uint32_t kMaxListedParameters = 64;
 inline constexpr size_t kMaxParameterPathBytes = 96;
 inline constexpr size_t kMaxParameterTextBytes = 160;
+// Full StateTimes stay below kMaxControlBytes.
+inline constexpr uint32_t kMaxStateTimes = 512;
 
 enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
@@ -67,6 +69,7 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   // predict: an older viewer, a browser, a build without kernels.
   double step_ns = 0.0;
   std::string codec_wish = {};  // strand codec that it insists on; empty = the server chooses
+  bool keeps_camera = false;    // nobody else moves its camera
   bool operator==(const Hello&) const = default;
 };
 struct MotionSamples {  // from a Source
@@ -93,7 +96,7 @@ struct WindSamples {  // from a Source
   std::vector<Sample> samples;
   bool operator==(const WindSamples&) const = default;
 };
-struct CameraChange {  // frames mode: the viewer's camera
+struct CameraChange {  // to the server: where this viewer looks from; to a viewer: where it is to look from
   CameraDesc camera;
   bool operator==(const CameraChange&) const = default;
 };
@@ -160,9 +163,19 @@ struct ParameterRequest {    // from who watches; answered by a ParameterList
   bool is_watching = false;  // and again, with what is other, whenever something changes
   bool operator==(const ParameterRequest&) const = default;
 };
-using ClientMessage = std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck,
-                                   Ping, ControlCommand, SetParameter, ViewerReport, ModeRequest,
-                                   AdminCommand, SceneRequest, LiveCommand, ParameterRequest>;
+struct CameraCommand {   // from a Controller: where others look from; answered by a Notice
+  uint64_t session = 0;  // whose; 0 = of all that view, but of who says it
+  CameraDesc camera;
+  bool operator==(const CameraCommand&) const = default;
+};
+struct StateTimesRequest {  // from who watches: StateTimes with every status from now on, or no more
+  bool is_wanted = true;
+  bool operator==(const StateTimesRequest&) const = default;
+};
+using ClientMessage =
+    std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
+                 ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand, SceneRequest,
+                 LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest>;
 
 // ---- server to client ----
 struct Welcome {
@@ -317,8 +330,23 @@ struct ParameterList {                    // answer to a ParameterRequest
   bool is_change = false;                 // no answer: these have other values now
   bool operator==(const ParameterList&) const = default;
 };
-using ServerMessage = std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange,
-                                   SessionList, FrameQuality, LookChange, SceneText, ParameterList>;
+/// When a state was where on its way through the server; server clock, ns, 0 = not known.
+struct StateTime {
+  uint64_t tick = 0;
+  int64_t sim_time_ns = 0;   // simulation time
+  int64_t source_ns = 0;     // its newest motion sample was made
+  int64_t motion_ns = 0;     // and arrived
+  int64_t published_ns = 0;  // simulated
+  int64_t encoded_ns = 0;    // its first frame of strands
+  bool operator==(const StateTime&) const = default;
+};
+struct StateTimes {               // of states that were not told yet
+  std::vector<StateTime> states;  // at most kMaxStateTimes, oldest first
+  bool operator==(const StateTimes&) const = default;
+};
+using ServerMessage =
+    std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange, SessionList,
+                 FrameQuality, LookChange, SceneText, ParameterList, CameraChange, StateTimes>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

@@ -147,6 +147,7 @@ Status Server::State::start() {
   RETURN_IF_ERROR(open_live());
   RETURN_IF_ERROR(connect(asset_frame));
   if (recorder_ != nullptr) RETURN_IF_ERROR(recorder_->attach(*hub_));
+  stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
   stage_sink_.emplace(*hub_, stages_);
   RETURN_IF_ERROR(source_->start(*stage_sink_, scene.stream));
@@ -272,6 +273,7 @@ void Server::State::run_status() {
     status.live_inputs = now.live_inputs;
     if (recorder_ != nullptr) recorder_->add(status);
     net_->broadcast(status);
+    desk_->tell_state_times();
     lock.lock();
   }
 }

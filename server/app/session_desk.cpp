@@ -194,6 +194,41 @@ void SessionDesk::on_live_command(SessionId session, const LiveCommand& command)
                           : Notice{true, "This server has no live inputs: start it with --mocap PROTOCOL."});
 }
 
+void SessionDesk::on_camera_command(SessionId session, const CameraCommand& command) {
+  const std::string whose =
+      command.session == 0 ? std::string("all") : fmt::format("session {}", command.session);
+  if (!may_control(session, "camera of " + whose)) return;
+  const Result<Viewers::Aimed> aimed = viewers_.aimed_at(session, command.session);
+  if (!aimed) return net_->send(session, Notice{true, aimed.error().to_string()});
+  for (const SessionId one : aimed->movable) {
+    net_->send(one, CameraChange{command.camera});
+    net_->send(one, Notice{false, fmt::format("Session {} moved your view.", session)});
+  }
+  const auto sessions = [](size_t count) { return fmt::format("{} viewer{}", count, count == 1 ? "" : "s"); };
+  std::string said = sessions(aimed->movable.size()) +
+                     (aimed->movable.size() == 1 ? " looks from there." : " look from there.");
+  if (!aimed->own.empty())
+    said += fmt::format(" {} {} --own-camera.", sessions(aimed->own.size()),
+                        aimed->own.size() == 1 ? "was started with" : "were started with");
+  net_->send(session, Notice{aimed->movable.empty(), std::move(said)});
+}
+
+void SessionDesk::on_state_times_request(SessionId session, const StateTimesRequest& request) {
+  const std::lock_guard lock(times_mutex_);
+  if (request.is_wanted)
+    times_readers_.insert(session);
+  else
+    times_readers_.erase(session);
+}
+
+void SessionDesk::tell_state_times() {
+  const std::lock_guard lock(times_mutex_);
+  if (times_readers_.empty()) return;
+  const StateTimes times{parts_.stages.take_states(now_ns())};
+  if (times.states.empty()) return;
+  for (const SessionId session : times_readers_) net_->send(session, times);
+}
+
 /// What was refused is on record, too.
 StateSource::Reply SessionDesk::reply_to(SessionId session, const std::string& what) {
   return [this, session, who = viewers_.describe(session),
@@ -290,6 +325,7 @@ Status SessionDesk::readiness() {
 void SessionDesk::on_left(SessionId session) {
   control_budget_.remove(session);
   parameter_budget_.remove(session);
+  on_state_times_request(session, {false});
   parameter_watch_.remove(session);
   codec_watches_.erase(session);
   parts_.inputs.remove_source(session);

@@ -6,7 +6,9 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -48,6 +50,8 @@ class SessionDesk : public NetHandler {
   // From any thread.
   uint32_t viewer_count() const { return viewers_.viewer_count(); }
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
+  /// To those who asked for them; call about twice a second.
+  void tell_state_times();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
   void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override;
@@ -57,6 +61,8 @@ class SessionDesk : public NetHandler {
   void on_scene_request(SessionId session) override;
   void on_live_command(SessionId session, const LiveCommand& command) override;
   void on_parameter_request(SessionId session, const ParameterRequest& request) override;
+  void on_camera_command(SessionId session, const CameraCommand& command) override;
+  void on_state_times_request(SessionId session, const StateTimesRequest& request) override;
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }
@@ -96,6 +102,8 @@ class SessionDesk : public NetHandler {
   NetServer* net_ = nullptr;
   std::unique_ptr<NetworkReader> reader_;  // of all sessions
   std::function<std::string()> metrics_;
+  std::mutex times_mutex_;             // guards the one below
+  std::set<SessionId> times_readers_;  // who asked for StateTimes
   std::atomic<bool> is_shut_down_wanted_{false};
 };
 

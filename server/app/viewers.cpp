@@ -74,6 +74,7 @@ Result<Viewers::Place> Viewers::add(SessionId session, ReaderId reader, Subscrip
   Viewer viewer;
   viewer.role = hello.role;
   viewer.name = hello.name;
+  viewer.keeps_camera = hello.keeps_camera;
   viewer.reader = reader;
   viewer.subscription = &subscription;
   viewer.wanted = hello.mode;
@@ -134,6 +135,24 @@ Status Viewers::set_camera(SessionId session, const CameraDesc& camera) {
   PictureView view = found->second.view;
   view.camera = camera;
   return change(found->second, *found->second.subscription, view);
+}
+
+Result<Viewers::Aimed> Viewers::aimed_at(SessionId by, SessionId whose) const {
+  constexpr size_t kMaxNamed = 16;
+  Aimed aimed;
+  std::string others;
+  size_t named = 0;
+  for (const auto& [session, viewer] : viewers_) {
+    if (viewer.subscription->is_empty()) continue;
+    if (++named <= kMaxNamed) others += fmt::format("{}{}", others.empty() ? "" : ", ", session);
+    if (whose == 0 ? session == by : session != whose) continue;
+    (viewer.keeps_camera ? aimed.own : aimed.movable).push_back(session);
+  }
+  if (!aimed.movable.empty() || !aimed.own.empty()) return aimed;
+  if (whose == 0)
+    return make_error(ErrorCode::NotFound, "Nobody views this server{}.", named > 0 ? " but you" : "");
+  return make_error(ErrorCode::NotFound, "No session {} views this server; {}.", whose,
+                    others.empty() ? "nobody does" : "those that do: " + others);
 }
 
 void Viewers::set_report(SessionId session, const ViewerReport& report) {

@@ -57,6 +57,13 @@ class Viewers {
   std::string describe(SessionId session) const;
   /// Of a viewer of strands it is kept for later. NotFound for a session that views nothing.
   Status set_camera(SessionId session, const CameraDesc& camera);
+  /// Whom a command about cameras concerns.
+  struct Aimed {
+    std::vector<SessionId> movable;
+    std::vector<SessionId> own;  // keep their own
+  };
+  /// `whose` 0: all that view but `by`. NotFound names those that view.
+  Result<Aimed> aimed_at(SessionId by, SessionId whose) const;
 
   /// What the viewer says of itself; the newest counts.
   void set_report(SessionId session, const ViewerReport& report);
@@ -86,6 +93,7 @@ class Viewers {
  private:
   struct Viewer {
     Role role = Role::Viewer;
+    bool keeps_camera = false;
     std::string name;
     std::string address;
     ReaderId reader = 0;

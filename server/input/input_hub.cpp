@@ -226,8 +226,25 @@ bool InputHub::update_pose(int64_t server_time_ns) {
   if (glm::dot(pose.rotation, frame_.world_from_head.rotation) < 0.0) pose.rotation = -pose.rotation;
   frame_.world_from_head = pose;
   frame_.motion_time_ns = samples[newest].arrival_ns;
+  note_used(samples[newest].arrival_ns, samples[newest].time_ns + motion_.clock.offset_ns());
   motion_.track.use(index, newest);
   return has_jumped;
+}
+
+void InputHub::note_used(int64_t arrival_ns, int64_t made_ns) {
+  if (!used_samples_.empty() && used_samples_.back().arrival_ns == arrival_ns) {
+    used_samples_.back().made_ns = made_ns;
+    return;
+  }
+  used_samples_.push_back({arrival_ns, made_ns});
+  if (used_samples_.size() > kKeptSourceTimes) used_samples_.pop_front();
+}
+
+int64_t InputHub::source_time_ns(int64_t arrival_ns) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = std::find_if(used_samples_.rbegin(), used_samples_.rend(),
+                                  [&](const UsedSample& used) { return used.arrival_ns == arrival_ns; });
+  return found != used_samples_.rend() ? found->made_ns : 0;
 }
 
 void InputHub::finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped) {

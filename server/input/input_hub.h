@@ -24,6 +24,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -51,6 +52,7 @@ inline constexpr double kTeleportLongestS = 0.1;    // a pause between frames is
 inline constexpr double kMaxSampleRateHz = 1000.0;
 inline constexpr double kMaxSampleBurst = 1000.0;  // samples at once, after a second of silence
 inline constexpr size_t kMaxInputSources = 64;
+inline constexpr size_t kKeptSourceTimes = 1024;  // of the newest samples that were used
 
 /// What happened to samples since the start.
 struct InputCounters {
@@ -97,6 +99,10 @@ class InputHub {
   /// whole pipeline.
   InputFrame sample(int64_t server_time_ns);
 
+  /// When the sample was made that arrived then and was used, of several the newest: on the server's clock,
+  /// but for what the fastest of its source take on their way. 0 = not known, or long ago.
+  int64_t source_time_ns(int64_t arrival_ns) const;
+
   InputCounters counters() const;
 
  private:
@@ -122,6 +128,7 @@ class InputHub {
   template <class Value>
   void forget(Stream<Value>& stream, uint64_t source_id);
   bool update_pose(int64_t server_time_ns);
+  void note_used(int64_t arrival_ns, int64_t made_ns);
   void finish_teleport_check(const Pose& before, int64_t server_time_ns, bool has_jumped);
 
   void take(uint64_t source_id, const MotionSamples& samples, int64_t arrival_ns);
@@ -133,6 +140,11 @@ class InputHub {
   Stream<HeadSample> motion_;
   Stream<glm::dvec3> wind_;
   std::map<uint64_t, int64_t> delays_ns_;  // of motion, by source; those that are not 0
+  struct UsedSample {
+    int64_t arrival_ns = 0;
+    int64_t made_ns = 0;  // both of the server's clock
+  };
+  std::deque<UsedSample> used_samples_;  // of motion, oldest first
   int64_t newest_arrival_ns_ = 0;
   std::optional<int64_t> last_frame_ns_;
   double motion_speed_ = 1.0;  // as the owner said last

@@ -75,6 +75,9 @@ class NetHandler {
   virtual void on_scene_request(SessionId) {}
   virtual void on_live_command(SessionId, const LiveCommand&) {}
   virtual void on_parameter_request(SessionId, const ParameterRequest&) {}
+  /// Where others look from: a CameraChange sent to a session moves its pictures, too.
+  virtual void on_camera_command(SessionId, const CameraCommand&) {}
+  virtual void on_state_times_request(SessionId, const StateTimesRequest&) {}
   /// May change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   /// An admin wants the server to end.

@@ -27,15 +27,16 @@ bool may_send(Role role, const ClientMessage& message) {
   const bool steers = role == Role::Controller || role == Role::Admin;
   const bool feeds = role == Role::Source || role == Role::Admin;
   return std::visit(
-      Overloaded{[](const Hello&) { return false; }, [&](const MotionSamples&) { return feeds; },
-                 [&](const WindSamples&) { return feeds; }, [&](const CameraChange&) { return watches; },
-                 [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
-                 [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
-                 [&](const SetParameter&) { return steers; },
-                 [&](const ParameterRequest&) { return watches; },
-                 [&](const SceneRequest&) { return steers; }, [&](const LiveCommand&) { return steers; },
-                 [&](const ViewerReport&) { return watches; }, [&](const ModeRequest&) { return watches; },
-                 [&](const AdminCommand&) { return role == Role::Admin; }},
+      Overloaded{
+          [](const Hello&) { return false; }, [&](const MotionSamples&) { return feeds; },
+          [&](const WindSamples&) { return feeds; }, [&](const CameraChange&) { return watches; },
+          [&](const KeyframeRequest&) { return watches; }, [&](const FrameAck&) { return watches; },
+          [](const Ping&) { return true; }, [&](const ControlCommand&) { return steers; },
+          [&](const SetParameter&) { return steers; }, [&](const ParameterRequest&) { return watches; },
+          [&](const SceneRequest&) { return steers; }, [&](const LiveCommand&) { return steers; },
+          [&](const CameraCommand&) { return steers; }, [&](const StateTimesRequest&) { return watches; },
+          [&](const ViewerReport&) { return watches; }, [&](const ModeRequest&) { return watches; },
+          [&](const AdminCommand&) { return role == Role::Admin; }},
       message);
 }
 

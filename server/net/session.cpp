@@ -113,7 +113,10 @@ void Session::send(ServerMessage message) {
     if (subscription_.mode() != StreamMode::Frames) status->picture_motions.clear();
     status->queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   }
-  guarded([&] { queue_control(std::move(message)); });
+  guarded([&] {
+    if (const auto* camera = std::get_if<CameraChange>(&message)) move_camera(*camera);
+    queue_control(std::move(message));
+  });
 }
 
 void Session::queue_control(ServerMessage message) {

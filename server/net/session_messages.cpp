@@ -25,10 +25,12 @@ CloseCode close_code_for(const Error& error) {
 }
 
 const char* message_name(const ClientMessage& message) {
-  constexpr const char* kNames[] = {
-      "Hello",       "MotionSamples", "WindSamples",    "CameraChange", "KeyframeRequest",
-      "FrameAck",    "Ping",          "ControlCommand", "SetParameter", "ViewerReport",
-      "ModeRequest", "AdminCommand",  "SceneRequest",   "LiveCommand",  "ParameterRequest"};
+  constexpr const char* kNames[] = {"Hello",         "MotionSamples",    "WindSamples",
+                                    "CameraChange",  "KeyframeRequest",  "FrameAck",
+                                    "Ping",          "ControlCommand",   "SetParameter",
+                                    "ViewerReport",  "ModeRequest",      "AdminCommand",
+                                    "SceneRequest",  "LiveCommand",      "ParameterRequest",
+                                    "CameraCommand", "StateTimesRequest"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
 }
@@ -122,32 +124,38 @@ void Session::join(const Hello& hello) {
 
 void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
   NetHandler& handler = context_.handler;
-  std::visit(Overloaded{[](const Hello&) {},
-                        [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
-                        [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
-                        [&](const CameraChange& camera) {
-                          const PictureClass before = subscription_.pictures.picture_class;
-                          handler.on_camera(id_, camera);
-                          follow_picture_class(before);
-                        },
-                        [&](const KeyframeRequest&) { start_again(arrival_ns); },
-                        [&](const FrameAck& ack) { on_ack(ack, arrival_ns); },
-                        [&](const Ping& ping) {
-                          queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
-                        },
-                        [&](const ControlCommand& command) { handler.on_command(id_, command); },
-                        [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
-                        [&](const ViewerReport& report) { handler.on_report(id_, report); },
-                        [&](const ModeRequest& request) {
-                          handler.on_mode_request(id_, request);
-                          is_mode_request_waiting_ = true;
-                          report_link(arrival_ns);
-                        },
-                        [&](const AdminCommand& command) { obey(command, arrival_ns); },
-                        [&](const SceneRequest&) { handler.on_scene_request(id_); },
-                        [&](const LiveCommand& command) { handler.on_live_command(id_, command); },
-                        [&](const ParameterRequest& request) { handler.on_parameter_request(id_, request); }},
-             message);
+  std::visit(
+      Overloaded{[](const Hello&) {},
+                 [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
+                 [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
+                 [&](const CameraChange& camera) { move_camera(camera); },
+                 [&](const KeyframeRequest&) { start_again(arrival_ns); },
+                 [&](const FrameAck& ack) { on_ack(ack, arrival_ns); },
+                 [&](const Ping& ping) {
+                   queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
+                 },
+                 [&](const ControlCommand& command) { handler.on_command(id_, command); },
+                 [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },
+                 [&](const ViewerReport& report) { handler.on_report(id_, report); },
+                 [&](const ModeRequest& request) {
+                   handler.on_mode_request(id_, request);
+                   is_mode_request_waiting_ = true;
+                   report_link(arrival_ns);
+                 },
+                 [&](const AdminCommand& command) { obey(command, arrival_ns); },
+                 [&](const SceneRequest&) { handler.on_scene_request(id_); },
+                 [&](const LiveCommand& command) { handler.on_live_command(id_, command); },
+                 [&](const ParameterRequest& request) { handler.on_parameter_request(id_, request); },
+                 [&](const CameraCommand& command) { handler.on_camera_command(id_, command); },
+                 [&](const StateTimesRequest& request) { handler.on_state_times_request(id_, request); }},
+      message);
+}
+
+/// By its own word, or by that of somebody who controls.
+void Session::move_camera(const CameraChange& camera) {
+  const PictureClass before = subscription_.pictures.picture_class;
+  context_.handler.on_camera(id_, camera);
+  follow_picture_class(before);
 }
 
 void Session::obey(const AdminCommand& command, int64_t time_ns) {

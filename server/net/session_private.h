@@ -63,6 +63,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void start_again(int64_t time_ns);
   void dispatch(const ClientMessage& message, int64_t arrival_ns);
   void obey(const AdminCommand& command, int64_t time_ns);
+  void move_camera(const CameraChange& camera);
   void reject(CloseCode code, const std::string& reason);
   void queue_control(ServerMessage message);
   void pump();

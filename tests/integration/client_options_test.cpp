@@ -48,7 +48,7 @@ TEST(ViewOptions, EncryptWhenTheAddressOrAnOptionSaysSo) {
 }
 
 TEST(ViewOptions, AFolderThatIsNotThereIsNamedBeforeTheRun) {
-  for (const char* option : {"--screenshot", "--clip", "--report"}) {
+  for (const char* option : {"--screenshot", "--clip", "--report", "--trace"}) {
     const std::array<const char*, 4> arguments = {"strandcast-view", "--headless", option,
                                                   "/no/such/folder/file"};
     testing::internal::CaptureStderr();
@@ -58,6 +58,35 @@ TEST(ViewOptions, AFolderThatIsNotThereIsNamedBeforeTheRun) {
     EXPECT_EQ(line.exit_code, 2);
   }
   EXPECT_EQ(read({"--headless", "--report", "here.txt"}).report, "here.txt");
+}
+
+/// What it says to a command line that does not fit together.
+std::string refusal_of(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "strandcast-view");
+  testing::internal::CaptureStderr();
+  const auto line = read_view_command_line(static_cast<int>(arguments.size()), arguments.data());
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_FALSE(line.options.has_value());
+  EXPECT_EQ(line.exit_code, 2);
+  return said;
+}
+
+TEST(ViewOptions, APartOfARecordingIsExported) {
+  const ViewOptions part = read({"run.mcap", "--export", "out.webm", "--from", "1.5", "--to", "3"});
+  EXPECT_EQ(part.film_from_s, 1.5);
+  EXPECT_EQ(part.film_to_s, 3.0);
+  EXPECT_EQ(read({"run.mcap", "--export", "out.webm"}).film_to_s, std::nullopt);
+  EXPECT_THAT(refusal_of({"run.mcap", "--export", "out.webm", "--from", "3", "--to", "2"}),
+              HasSubstr("--to 2 is before --from 3"));
+  EXPECT_THAT(refusal_of({"run.mcap", "--export", "out.webm", "--to", "2", "--seconds", "2"}),
+              HasSubstr("give one of them"));
+  EXPECT_THAT(refusal_of({"run.mcap", "--from", "2"}), HasSubstr("which part of a recording --export draws"));
+  EXPECT_THAT(refusal_of({"run.mcap", "--trace", "t.csv"}), HasSubstr("a recording has none"));
+}
+
+TEST(ViewOptions, AViewIsKeptFromOthersWhereThatIsAskedFor) {
+  EXPECT_FALSE(client_config(read({})).hello.keeps_camera);
+  EXPECT_TRUE(client_config(read({"--own-camera"})).hello.keeps_camera);
 }
 
 class ClientTokenFile : public testing::Test {

@@ -22,7 +22,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
   return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,
-                12.5, "delta"},
+                12.5, "delta", true},
           motion,
           wind,
           camera,
@@ -36,7 +36,9 @@ inline std::vector<ClientMessage> sample_client_messages() {
           AdminCommand{AdminAction::Kick, 1ull << 40, 600.5},
           SceneRequest{},
           LiveCommand{LiveAction::Reset, "Zoë's head"},
-          ParameterRequest{"look.shading", 128, true}};
+          ParameterRequest{"look.shading", 128, true},
+          CameraCommand{1ull << 40, camera.camera},
+          StateTimesRequest{true}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {
@@ -114,7 +116,9 @@ inline std::vector<ServerMessage> sample_server_messages() {
       ParameterList{{{"look.ambient", "0.25", "0.5", "", true, 0.0, 10.0, true, "light from all around"},
                      {"stream.bound_m", "0.0001", "0.0002", "m", true, 2e-5, 5e-4, true, ""}},
                     345,
-                    true}};
+                    true},
+      CameraChange{sample_camera()},
+      StateTimes{{{1ull << 40, 1, 2, 3, 4, INT64_MAX}, {7, INT64_MIN, -1, -2, -3, -4}}}};
 }
 
 }  // namespace strandcast

@@ -26,6 +26,7 @@ TEST(FrameStages, TracesEachStateOnce) {
   TemporaryFolder folder;
   {
     FrameStages stages;
+    stages.set_source_times([](int64_t arrival_ns) { return arrival_ns - 2; });
     ASSERT_TRUE(stages.open_trace(folder.path() / "trace.csv"));
     stages.note_state(state(1, 5), 10);
     stages.note_state(state(1, 5), 11);  // published once more
@@ -35,9 +36,34 @@ TEST(FrameStages, TracesEachStateOnce) {
     stages.note_encoded(99, 31);  // of no state that is known
   }
   EXPECT_EQ(load_text(folder.path() / "trace.csv", 1'000).value(),
-            "tick,sim_time_ns,motion_ns,published_ns,encoded_ns\n1,16000000,5,10,20\n2,32000000,5,30,0\n");
+            "tick,sim_time_ns,source_ns,motion_ns,published_ns,encoded_ns\n1,16000000,3,5,10,20\n2,32000000,"
+            "3,5,30,0\n");
   FrameStages nowhere;
   EXPECT_FALSE(nowhere.open_trace(folder.path() / "no" / "such"));
+}
+
+// Once each, when all is known of it that will be.
+TEST(FrameStages, TellsStatesThatAreThroughOnce) {
+  FrameStages stages;
+  const auto ticks = [&](int64_t time_ns) {
+    std::vector<uint64_t> all;
+    for (const StateTime& taken : stages.take_states(time_ns)) all.push_back(taken.tick);
+    return all;
+  };
+  stages.note_state(state(1, 5), 10);
+  stages.note_state(state(2, 6), 20);
+  stages.note_state(state(3, 0), 30);
+  EXPECT_THAT(ticks(40), testing::IsEmpty()) << "their frames may still come";
+  stages.note_encoded(16 * kMs, 45);
+  const std::vector<StateTime> first = stages.take_states(50);
+  ASSERT_EQ(first.size(), 1u);
+  EXPECT_EQ(first[0], (StateTime{1, 16 * kMs, 0, 5, 10, 45}));
+  EXPECT_THAT(ticks(60), testing::IsEmpty());
+  stages.note_encoded(48 * kMs, 65);
+  EXPECT_THAT(ticks(70), testing::IsEmpty()) << "in their order";
+  EXPECT_THAT(ticks(20 + kFramePatienceNs), testing::ElementsAre(2, 3)) << "no frame comes of the second";
+  stages.note_state(state(4, 0), 100);
+  EXPECT_THAT(ticks(101 + kToldStateNs), testing::IsEmpty()) << "nobody asks for that any more";
 }
 
 TEST(FrameStages, HistogramsCountASampleOnce) {

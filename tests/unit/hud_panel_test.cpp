@@ -51,6 +51,8 @@ HudState talkative_hud() {
                   "no head motion arrives at the server and much more is to be said of it"};
   for (int i = 0; i < 16; ++i)
     hud.rows.push_back({"because", std::string(30, 'm') + " " + std::string(120, 'n')});
+  hud.way = {
+      {"simulated", 4.0}, {"encoded", 1234.5}, {"on its way", 0.0}, {"decoded", 2.0}, {"presented", 99999.0}};
   return hud;
 }
 
@@ -91,6 +93,23 @@ TEST(HudPanel, HelpAndBannerStayInsideASmallWindow) {
   const PanelSize wide = bench.lay_out({1280.0f, 720.0f}, [&] { return draw_banner(banner); });
   EXPECT_GT(shown.height, wide.height) << "what does not fit in a line goes on in the next";
   EXPECT_LE(bench.lay_out({320.0f, 240.0f}, [] { return draw_help_panel(HelpTopic::Server); }).width, 320.0f);
+}
+
+// Three lines at most, of a bar and of what its parts are; nothing where nothing was measured.
+TEST(HudPanel, TheWayIsABarWithItsParts) {
+  PanelBench bench(1.0f);
+  HudState hud;
+  hud.title = "default";
+  const auto height = [&] {
+    return bench.lay_out({1280.0f, 720.0f}, [&] { return draw_hud_panel(hud, HudFold::Unfolded); }).height;
+  };
+  const float without = height();
+  hud.way = {{"simulated", 0.0}, {"presented", 0.0}};
+  const float with = height();
+  EXPECT_GT(with, without + 15.0f);
+  EXPECT_LT(with, without + 4 * 19.0f);
+  hud.way.clear();
+  EXPECT_EQ(height(), without);
 }
 
 TEST(HudFold, GoesRound) {

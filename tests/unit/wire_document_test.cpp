@@ -48,6 +48,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxStepCount", fmt::format("0..{}", with_commas(kMaxStepCount))},
       {"kMaxBanS", fmt::format("0..{}", with_commas(static_cast<uint64_t>(kMaxBanS)))},
       {"kMaxListedParameters", with_commas(kMaxListedParameters)},
+      {"kMaxStateTimes", fmt::format("at most {} (", kMaxStateTimes)},
       {"kMaxParameterPathBytes", with_commas(kMaxParameterPathBytes)},
       {"kMaxParameterTextBytes", with_commas(kMaxParameterTextBytes)},
       {"kStreamsPerCodec", fmt::format("from {} (", kStreamsPerCodec)},

@@ -344,6 +344,18 @@ TEST(WireMessages, AStreamQualityOfBeforeNamesNoCodec) {
   EXPECT_EQ(std::get<StreamQuality>(decode_server_message(before).value()).codec, "");
 }
 
+TEST(WireMessages, AsManyStateTimesAsThereMayBeFitIntoOneMessage) {
+  StateTimes times{std::vector<StateTime>(
+      kMaxStateTimes, {UINT64_MAX, INT64_MIN, INT64_MIN, INT64_MIN, INT64_MIN, INT64_MIN})};
+  const auto bytes = encode(ServerMessage(times));
+  EXPECT_LE(bytes.size(), kMaxControlBytes);
+  EXPECT_EQ(std::get<StateTimes>(decode_server_message(bytes).value()), times);
+  times.states.push_back({});
+  const auto refused = decode_server_message(encode(ServerMessage(times)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+}
+
 TEST(WireMessages, TheLongestSessionListFitsIntoOneMessage) {
   SessionInfo longest;
   longest.id = longest.sent_bytes = UINT64_MAX;

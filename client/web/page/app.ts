@@ -187,6 +187,8 @@ class Viewer {
         return this.tick();
       case 'look':
         return this.sceneLook(message.look, message.camera);
+      case 'moved': // by somebody who controls
+        return this.change(() => fitted(cameraOf(message.camera)));
       case 'status':
         this.status = message.status;
         at('pause').classList.toggle('paused', message.status.is_paused);

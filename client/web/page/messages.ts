@@ -61,6 +61,7 @@ export type FromNet =
   | { kind: 'shown'; mode: number; reason: string }
   | { kind: 'modeReason'; reason: string }
   | { kind: 'look'; look?: LookMessage; camera?: CameraMessage }
+  | { kind: 'moved'; camera?: CameraMessage }
   | { kind: 'status'; status: StatusMessage }
   | { kind: 'quality'; quality: StreamQualityMessage }
   | { kind: 'frameQuality'; quality: FrameQualityMessage }

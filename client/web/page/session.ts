@@ -334,6 +334,7 @@ class Connection {
       post({ kind: 'modeReason', reason: this.reason });
     }
     if (message.look_change) post({ kind: 'look', look: message.look_change.look, camera: message.look_change.camera });
+    if (message.camera) post({ kind: 'moved', camera: message.camera.camera });
     if (message.scene_text) post({ kind: 'sceneText', text: message.scene_text.text });
   }
 

@@ -51,7 +51,7 @@ export const Camera = { offset_m: [1, Vec3], target_m: [2, Vec3], fov_y_rad: [3,
 export const Hello = {
   role: [1, 'enum'], mode: [2, 'enum'], name: [3, 'string'], token: [4, 'string'], frame_width: [5, 'uint32'],
   frame_height: [6, 'uint32'], acknowledges: [7, 'bool'], picture_codecs: [8, 'uint32'], gets_no_stream: [9, 'bool'],
-  step_ns: [10, 'double'], codec_wish: [11, 'string'],
+  step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'],
 } as const;
 const CameraChange = { camera: [1, Camera] } as const;
 const FrameAck = {
@@ -68,13 +68,15 @@ const ViewerReport = {
 const ModeRequest = { mode: [1, 'enum'] } as const;
 const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
 const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], is_watching: [3, 'bool'] } as const;
+const CameraCommand = { session: [1, 'uint64'], camera: [2, Camera] } as const;
+const StateTimesRequest = { is_wanted: [1, 'bool'] } as const;
 const Empty = {} as const;
 /** Motion and wind are not sent from a page. */
 export const ClientMessage = {
   hello: [1, Hello], camera: [4, CameraChange], keyframe_request: [5, Empty], frame_ack: [6, FrameAck],
   ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], viewer_report: [10, ViewerReport],
   mode_request: [11, ModeRequest], admin: [12, AdminCommand], scene_request: [13, Empty], live_command: [18, LiveCommand],
-  parameter_request: [16, ParameterRequest],
+  parameter_request: [16, ParameterRequest], camera_command: [24, CameraCommand], state_times_request: [25, StateTimesRequest],
 } as const;
 
 export const Welcome = {
@@ -125,11 +127,16 @@ const ParameterInfo = {
   minimum: [6, 'double'], maximum: [7, 'double'], is_live: [8, 'bool'], note: [9, 'string'],
 } as const;
 const ParameterList = { parameters: [1, ParameterInfo, 'repeated'], total: [2, 'uint32'], is_change: [3, 'bool'] } as const;
+const StateTime = {
+  tick: [1, 'uint64'], sim_time_ns: [2, 'sfixed64'], source_ns: [3, 'sfixed64'], motion_ns: [4, 'sfixed64'],
+  published_ns: [5, 'sfixed64'], encoded_ns: [6, 'sfixed64'],
+} as const;
+const StateTimes = { states: [1, StateTime, 'repeated'] } as const;
 export const ServerMessage = {
   welcome: [1, Welcome], pong: [2, Pong], status: [3, ServerStatus], goodbye: [4, Goodbye], notice: [5, Notice],
   quality: [6, StreamQuality], frame_quality: [8, FrameQuality], mode_change: [9, ModeChange],
   sessions: [12, SessionList], look_change: [13, LookChange], scene_text: [14, SceneText],
-  parameter_list: [16, ParameterList],
+  parameter_list: [16, ParameterList], camera: [24, CameraChange], state_times: [25, StateTimes],
 } as const;
 
 /** By the names of the .proto files, for the test. */
@@ -137,7 +144,7 @@ export const schemas: { readonly [name: string]: Schema } = {
   Vec3, Color, StrandStyle, HairShading, RenderMethods, Look, Camera, Hello, CameraChange, FrameAck, Ping,
   ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, LiveCommand, ClientMessage, Welcome, Pong,
   PictureMotion, LiveValue, LiveInput, ServerStatus, StreamQuality, ModeChange, FrameQuality, Goodbye, Notice, SessionInfo, SessionList, LookChange,
-  SceneText, ParameterRequest, ParameterInfo, ParameterList, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
+  SceneText, ParameterRequest, ParameterInfo, ParameterList, CameraCommand, StateTimesRequest, StateTime, StateTimes, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
 };
 
 export type LookMessage = Message<typeof Look>;
