@@ -17,6 +17,7 @@
 #include "server/app/codec_choice.h"
 #include "server/app/explain.h"
 #include "server/app/groom_check.h"
+#include "server/app/live_desk.h"
 #include "server/app/options.h"
 #include "server/app/server_passes.h"
 #include "server/app/service_manager.h"
@@ -83,6 +84,10 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
   const auto served = served_codecs(*codec, config.scene.stream.bound_m);
   if (!served) return fail(served.error());
   fmt::print("{}{}\n{}\n", *text, choice->reason, explain_viewer_codecs(*served));
+  const auto inputs = explain_live(config.scene.live, config.live_allowed);
+  if (!inputs) return fail(inputs.error());
+  if (!inputs->empty()) fmt::print("\nLive inputs\n");
+  for (const std::string& input : *inputs) fmt::print("  {}\n", input);
   if (unmeasured) fmt::print("Times were not measured: {}\n", unmeasured->to_string());
   return 0;
 }

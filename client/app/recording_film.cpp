@@ -85,7 +85,12 @@ Result<std::string> run_film(const ViewOptions& options, const std::atomic<bool>
   LookChange look = player->look();
   ASSIGN_OR_RETURN(auto renderer, device->make_renderer(*player->asset(), look.look));
   ASSIGN_OR_RETURN(const Film film, open_film(options.film, options));
-  const double length_s = std::min(player->length_s(), options.seconds.value_or(player->length_s()));
+  const double from_s = options.film_from_s;
+  if (from_s > player->length_s())
+    return make_error(ErrorCode::BadInput, "--from {:g}: the recording has {:.2f} s", from_s,
+                      player->length_s());
+  const double end_s = options.film_to_s.value_or(from_s + options.seconds.value_or(player->length_s()));
+  const double length_s = std::min(player->length_s(), end_s) - from_s;
   const uint64_t frame_count =
       std::min(kMostFilmFrames, static_cast<uint64_t>(length_s * options.film_fps + 1e-6) + 1);
   Progress progress({"drawing", false, "frame"});
@@ -94,7 +99,7 @@ Result<std::string> run_film(const ViewOptions& options, const std::atomic<bool>
   for (; drawn < frame_count && !stop; ++drawn) {
     progress.begin_run(options.film.string());
     ASSIGN_OR_RETURN(const PosedStrands strands,
-                     player->strands_at(static_cast<double>(drawn) / options.film_fps));
+                     player->strands_at(from_s + static_cast<double>(drawn) / options.film_fps));
     if (player->look().look != look.look) RETURN_IF_ERROR(renderer->set_look(player->look().look));
     look = player->look();
     RETURN_IF_ERROR(renderer->draw(strands, look.camera, options.size));

@@ -42,6 +42,28 @@ Status check_live(const std::vector<LiveDesc>& live) {
   return {};
 }
 
+Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
+                                              const std::vector<AddressRange>& allowed) {
+  std::vector<std::string> lines;
+  for (size_t i = 0; i < live.size(); ++i) {
+    const LiveDesc& input = live[i];
+    ASSIGN_OR_RETURN(const std::unique_ptr<LiveSource> source, LiveSource::make(input, i));
+    const std::vector<const char*>& orders = source->protocol().axis_orders;
+    std::string line = source->describe();
+    line += !input.host.empty() ? "; it alone is heard"
+            : allowed.empty()   ? "; this machine alone may send"
+                                : "; this machine and those of --mocap-allow may send";
+    line += input.subject.empty() ? "; the head follows one that is called head, else the first one seen"
+                                  : fmt::format("; the head follows {}", input.subject);
+    if (!orders.empty()) line += fmt::format("; axes {}", input.axes.empty() ? orders.front() : input.axes);
+    if (input.delay_ms > 0.0) line += fmt::format("; {:g} ms later", input.delay_ms);
+    if (input.turns_only) line += "; it turns and does not move";
+    if (input.takes_zero_positions) line += "; a bone at 0 is there";
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
 LiveDesk::LiveDesk(Sources sources, InputHub& inputs, Listener listener)
     : sources_(std::move(sources)),
       inputs_(inputs),

@@ -24,6 +24,9 @@ inline constexpr uint64_t kFirstLiveSourceId = uint64_t{1} << 63;
 
 /// Every input on its own: BadInput and NotFound name the field. Opens nothing.
 Status check_live(const std::vector<LiveDesc>& live);
+/// A line for each: who is heard, whom the head follows, and how its numbers are taken. Opens nothing.
+Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
+                                              const std::vector<AddressRange>& allowed);
 
 class LiveDesk : public LiveHandler {
  public:
