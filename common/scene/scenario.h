@@ -2,6 +2,7 @@
 // proto/strandcast/v1/scenario.proto has it; read by scenario_file.h, run by strandcast-ctl test.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
@@ -55,6 +56,16 @@ struct ScenarioRemember {
   std::string name;
 };
 
+/// Datagrams to a port of the server's machine.
+struct ScenarioSend {
+  uint16_t port = 0;
+  std::vector<std::vector<std::byte>> datagrams;
+  std::vector<std::filesystem::path> files;  // each a datagram
+  uint32_t random_bytes = 0;                 // of one more each time; 0 = none
+  uint32_t count = 1;
+  double rate_hz = 100.0;
+};
+
 struct ScenarioPicture {
   std::filesystem::path golden;
   double db_above = 40.0;
@@ -72,7 +83,10 @@ struct ScenarioExpect {
   std::string same_as;
   std::optional<ScenarioPicture> picture;
   std::optional<double> kbit_below, bits_per_vertex_below, realtime_above, hz_above, back_within_s;
+  std::optional<double> realtime_below, feed_pace_within, head_mps_below;
+  std::optional<bool> is_slow;
   std::string mode;
+  double within_s = 0.0;  // is_slow and mode are waited for so long
   std::optional<ScenarioMetric> metric;
 };
 
@@ -83,9 +97,9 @@ struct ScenarioRefusal {
   std::string says;
 };
 
-using ScenarioWork =
-    std::variant<ScenarioStart, ScenarioFeed, ScenarioSteps, ScenarioRunTime, ScenarioSet, ScenarioCommand,
-                 ScenarioView, ScenarioLeave, ScenarioExpect, ScenarioRefusal, ScenarioRemember>;
+using ScenarioWork = std::variant<ScenarioStart, ScenarioFeed, ScenarioSteps, ScenarioRunTime, ScenarioSet,
+                                  ScenarioCommand, ScenarioView, ScenarioLeave, ScenarioExpect,
+                                  ScenarioRefusal, ScenarioRemember, ScenarioSend>;
 
 struct ScenarioAction {
   ScenarioWork work;

@@ -3,8 +3,10 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/text_format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 
 #include "common/base/check.h"
 #include "common/base/file.h"
@@ -38,6 +40,10 @@ constexpr Range kSide{16, 4'096, "pixels"};
 constexpr Range kStretch{1e-6, 100.0, ""};
 constexpr Range kDecibel{1.0, 99.0, "dB"};
 constexpr Range kMeasure{0.0, 1e9, ""};
+constexpr Range kPort{1, 65'535, ""};
+constexpr Range kDatagramBytes{1, kMaxScenarioDatagramBytes, "bytes"};
+constexpr Range kDatagrams{1, 100'000, ""};
+constexpr Range kDatagramRate{1.0, 10'000.0, "Hz"};
 constexpr Range kAny{-1e300, 1e300, ""};
 
 /// The first thing that is wrong with the file.
@@ -177,6 +183,7 @@ class ScenarioReader {
   static ScenarioView read_view(const Part& part);
   ScenarioExpect read_expect(const Part& part) const;
   static ScenarioRefusal read_refusal(const Part& part);
+  ScenarioSend read_send(const Part& part) const;
   /// The words stay as they are, anything else is a file.
   std::string word_or_file(const Part& part, const char* name, const std::string& missing,
                            const std::vector<std::string>& words) const;
@@ -242,6 +249,11 @@ ScenarioExpect ScenarioReader::read_expect(const Part& part) const {
   expect.realtime_above = part.some("realtime_above", kMeasure);
   expect.hz_above = part.some("hz_above", kMeasure);
   expect.back_within_s = part.some("back_within_s", kSeconds);
+  expect.realtime_below = part.some("realtime_below", kMeasure);
+  expect.feed_pace_within = part.some("feed_pace_within", kMeasure);
+  expect.head_mps_below = part.some("head_mps_below", kMeasure);
+  expect.within_s = part.number("within_s", expect.within_s, kSeconds);
+  if (part.has("slow_motion")) expect.is_slow = part.flag("slow_motion");
   if (part.has("mode")) expect.mode = part.word("mode", "", {"strands", "frames"});
   if (part.has("hash")) {
     const std::string text = part.text("hash", "", kMaxWordBytes);
@@ -282,6 +294,41 @@ ScenarioRefusal ScenarioReader::read_refusal(const Part& part) {
   return refusal;
 }
 
+/// Pairs of hexadecimal digits; blanks stand for nothing. Nothing for all else.
+std::optional<std::vector<std::byte>> bytes_of(const std::string& hex) {
+  std::string digits;
+  std::copy_if(hex.begin(), hex.end(), std::back_inserter(digits), [](char c) { return c != ' '; });
+  std::vector<std::byte> bytes;
+  for (size_t i = 0; i + 1 < digits.size(); i += 2) {
+    uint8_t value = 0;
+    const char* const end = digits.data() + i + 2;
+    const auto [read_to, failure] = std::from_chars(digits.data() + i, end, value, 16);
+    if (failure != std::errc() || read_to != end) return std::nullopt;
+    bytes.push_back(std::byte{value});
+  }
+  if (bytes.empty() || digits.size() % 2 != 0) return std::nullopt;
+  return bytes;
+}
+
+ScenarioSend ScenarioReader::read_send(const Part& part) const {
+  constexpr size_t kMaxDatagrams = 64;
+  ScenarioSend send;
+  send.port = static_cast<uint16_t>(part.count("port", 1, kPort));
+  for (const std::string& hex : part.texts("hex", kMaxDatagrams)) {
+    const auto bytes = bytes_of(hex);
+    if (!bytes) part.fail("hex", "must be pairs of hexadecimal digits: \"2f 61 00\"");
+    if (bytes) send.datagrams.push_back(*bytes);
+  }
+  for (const std::string& name : part.texts("file", kMaxDatagrams))
+    send.files.push_back((folder_ / name).lexically_normal());
+  if (part.has("random_bytes")) send.random_bytes = part.count("random_bytes", 1, kDatagramBytes);
+  send.count = part.count("count", send.count, kDatagrams);
+  send.rate_hz = part.number("rate_hz", send.rate_hz, kDatagramRate);
+  if (send.datagrams.empty() && send.files.empty() && send.random_bytes == 0)
+    part.fail("port", "gets nothing: say what with hex, file or random_bytes");
+  return send;
+}
+
 ScenarioAction ScenarioReader::read_action(const Part& part) const {
   ScenarioAction action;
   if (part.has("start")) {
@@ -307,6 +354,9 @@ ScenarioAction ScenarioReader::read_action(const Part& part) const {
     if ((refusal.input == ScenarioInput::None) == refusal.assignment.empty())
       part.fail("refuse", "needs either an input or a set");
     action.work = refusal;
+  } else if (part.has("send")) {
+    if (!part.group("send").has("port")) part.fail("send", "needs the port that it sends to");
+    action.work = read_send(part.group("send"));
   } else if (part.has("remember")) {
     action.work = ScenarioRemember{part.text("remember", "", kMaxWordBytes)};
   } else {

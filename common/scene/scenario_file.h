@@ -11,6 +11,7 @@ inline constexpr uint64_t kMaxScenarioFileBytes = 256u << 10;
 inline constexpr size_t kMaxScenarioActions = 1'000;
 inline constexpr uint32_t kMaxScenarioRepeats = 10;
 inline constexpr double kMaxScenarioS = 3'600.0;
+inline constexpr uint32_t kMaxScenarioDatagramBytes = 65'507;  // of UDP over IPv4
 
 /// Loads a scenario; relative paths in it start at the file's folder.
 Result<Scenario> load_scenario(const std::filesystem::path& path);

@@ -120,8 +120,8 @@ TEST_P(ShippedScenario, Holds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedScenario,
-                         testing::Values("calm_stream", "hostile", "look", "pace", "restart", "same_bits",
-                                         "shake", "thin_line"),
+                         testing::Values("bad_input", "calm_stream", "hostile", "look", "pace", "restart",
+                                         "same_bits", "shake", "slow_motion", "thin_line"),
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace

@@ -30,14 +30,16 @@ do { refuse { input: NOT_A_NUMBER says: "nan" } }
 do { remember: "here" }
 do { expect { viewer: "thin" stretch_below: 0.01 no_quarantine: true hash: "00ff" same_as: "here" kbit_below: 3
   hz_above: 10 mode: "frames" back_within_s: 5 realtime_above: 0.95 bits_per_vertex_below: 2
-  picture { golden: "a.png" db_above: 30 } metric { name: "x" above: 1 within_s: 2 } } }
+  picture { golden: "a.png" db_above: 30 } metric { name: "x" above: 1 within_s: 2 }
+  slow_motion: false realtime_below: 0.5 feed_pace_within: 0.1 head_mps_below: 12 within_s: 3 } }
+do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 9 count: 3 rate_hz: 50 } }
 )");
   ASSERT_TRUE(scenario) << scenario.error().to_string();
   EXPECT_EQ(scenario->name, "all");
   EXPECT_EQ(scenario->about, "a promise");
   EXPECT_EQ(scenario->limit_s, 12.5);
   EXPECT_EQ(scenario->repeat, 2u);
-  ASSERT_EQ(scenario->actions.size(), 11u);
+  ASSERT_EQ(scenario->actions.size(), 12u);
   EXPECT_EQ(scenario->actions[0].line, 5);
   EXPECT_EQ(scenario->actions[10].line, 15);
   const auto& start = std::get<ScenarioStart>(scenario->actions[0].work);
@@ -68,6 +70,19 @@ do { expect { viewer: "thin" stretch_below: 0.01 no_quarantine: true hash: "00ff
   EXPECT_EQ(expect.metric->above, 1.0);
   EXPECT_FALSE(expect.metric->below);
   EXPECT_EQ(expect.mode, "frames");
+  EXPECT_EQ(expect.is_slow, std::optional(false));
+  EXPECT_EQ(expect.realtime_below, 0.5);
+  EXPECT_EQ(expect.feed_pace_within, 0.1);
+  EXPECT_EQ(expect.head_mps_below, 12.0);
+  EXPECT_EQ(expect.within_s, 3.0);
+  const auto& send = std::get<ScenarioSend>(scenario->actions[11].work);
+  EXPECT_EQ(send.port, 39'541);
+  EXPECT_EQ(send.datagrams,
+            (std::vector<std::vector<std::byte>>{{std::byte{0}, std::byte{255}}, {std::byte{127}}}));
+  EXPECT_EQ(send.files, std::vector<std::filesystem::path>{"/folder/packet.bin"});
+  EXPECT_EQ(send.random_bytes, 9u);
+  EXPECT_EQ(send.count, 3u);
+  EXPECT_EQ(send.rate_hz, 50.0);
 }
 
 TEST(ScenarioFile, SaysWhereItIsWrong) {
@@ -84,6 +99,12 @@ TEST(ScenarioFile, SaysWhereItIsWrong) {
       {head + "do { expect { picture { db_above: 3 } } }", "golden"},
       {head + "do { refuse { says: \"no\" } }", "either an input or a set"},
       {head + "do { refuse { input: OVERLONG set: \"a=1\" } }", "either an input or a set"},
+      {head + "do { send { hex: \"00\" } }", "needs the port"},
+      {head + "do { send { port: 0 hex: \"00\" } }", "port is 0"},
+      {head + "do { send { port: 7 hex: \"0\" } }", "pairs of hexadecimal digits"},
+      {head + "do { send { port: 7 hex: \"0g\" } }", "pairs of hexadecimal digits"},
+      {head + "do { send { port: 7 } }", "say what with hex, file or random_bytes"},
+      {head + "do { send { port: 7 random_bytes: 65508 } }", "random_bytes is 65508"},
       {head + "do { command: NONE }", "command is none of its values"},
       {head + "do { }", "says nothing to do"},
       {head + "do { step: 1 step: 2 }", "test.textproto:2:"},
@@ -127,7 +148,7 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
       EXPECT_TRUE(std::filesystem::exists(expect->picture->golden)) << expect->picture->golden;
     }
   }
-  EXPECT_EQ(names.size(), 8u);
+  EXPECT_EQ(names.size(), 10u);
 }
 
 }  // namespace

@@ -94,10 +94,11 @@ Result<const ScenarioViewer*> ScenarioRun::viewer(const std::string& name) const
 Status ScenarioRun::carry_out(const ScenarioExpect& expect) {
   const bool needs_viewer = expect.stretch_below || expect.picture || expect.kbit_below ||
                             expect.bits_per_vertex_below || expect.hz_above || expect.back_within_s ||
-                            !expect.mode.empty();
+                            expect.head_mps_below || !expect.mode.empty();
   if (needs_viewer) RETURN_IF_ERROR(viewer(expect.viewer));
   const bool needs_span = expect.stretch_below || expect.kbit_below || expect.bits_per_vertex_below ||
-                          expect.hz_above || expect.realtime_above;
+                          expect.hz_above || expect.realtime_above || expect.realtime_below ||
+                          expect.feed_pace_within || expect.head_mps_below;
   if (needs_span && !span_)
     return make_error(ErrorCode::BadInput, "nothing was measured: a step or run_s comes first");
   if (needs_span) expect_span(expect);
@@ -107,30 +108,28 @@ Status ScenarioRun::carry_out(const ScenarioExpect& expect) {
   }
   expect_state(expect);
   if (expect.back_within_s) expect_back(expect);
-  if (!expect.mode.empty()) {
-    const ScenarioViewer* who = *viewer(expect.viewer);
-    const ViewerLook look = who->look();
-    report("mode of " + who->view().name, expect.mode,
-           fmt::format("it sees {} ({})", to_string(look.mode), look.mode_reason),
-           expect.mode == to_string(look.mode));
-  }
+  if (expect.is_slow) expect_slow_motion(expect);
+  if (!expect.mode.empty()) expect_mode(expect);
   if (expect.picture) expect_picture(expect);
   if (expect.metric) expect_metric(*expect.metric);
   return {};
 }
 
 void ScenarioRun::expect_span(const ScenarioExpect& expect) {
-  if (expect.realtime_above)
-    report("simulated over real time", fmt::format("above {:g}", *expect.realtime_above),
-           span_->realtime < 0.0 ? "measured nothing: run for two seconds at least"
-                                 : fmt::format("measured {:.3f}", span_->realtime),
-           span_->realtime > *expect.realtime_above);
+  expect_pace(expect);
   if (viewer_order_.empty()) return;
   const std::string name = expect.viewer.empty() ? viewer_order_.front() : expect.viewer;
   const MeasuredSpan::Seen& seen = span_->viewers[name];
   const ViewerCounts& now = seen.after.counts;
   const double seconds = std::max(span_->seconds, 1e-6);
   const auto frames = static_cast<double>(now.frames - seen.before.frames);
+  if (expect.head_mps_below)
+    report("speed of the head seen by " + name, fmt::format("below {:g} m/s", *expect.head_mps_below),
+           now.strand_frames == seen.before.strand_frames
+               ? std::string("no strands were decoded")
+               : fmt::format("measured {:.2f} m/s", seen.after.largest_head_mps),
+           now.strand_frames > seen.before.strand_frames &&
+               seen.after.largest_head_mps < *expect.head_mps_below);
   if (expect.stretch_below) expect_stretch(name, seen, *expect.stretch_below);
   if (expect.hz_above)
     report("frames per second of " + name, fmt::format("above {:g}", *expect.hz_above),
@@ -150,6 +149,54 @@ void ScenarioRun::expect_span(const ScenarioExpect& expect) {
          vertices > 0.0 ? fmt::format("measured {:.3f} by {}", bits, seen.after.codec)
                         : std::string("no strands were decoded"),
          vertices > 0.0 && bits < *expect.bits_per_vertex_below);
+}
+
+/// How fast the simulation went, and with it what was fed.
+void ScenarioRun::expect_pace(const ScenarioExpect& expect) {
+  const std::string measured = span_->realtime < 0.0
+                                   ? std::string("measured nothing: run for two seconds at least")
+                                   : fmt::format("measured {:.3f}", span_->realtime);
+  if (expect.realtime_above)
+    report("simulated over real time", fmt::format("above {:g}", *expect.realtime_above), measured,
+           span_->realtime > *expect.realtime_above);
+  if (expect.realtime_below)
+    report("simulated over real time", fmt::format("below {:g}", *expect.realtime_below), measured,
+           span_->realtime >= 0.0 && span_->realtime < *expect.realtime_below);
+  if (!expect.feed_pace_within) return;
+  const bool is_measured = span_->feed_pace >= 0.0 && span_->realtime >= 0.0;
+  report("what is fed beside the simulation", fmt::format("within {:g}", *expect.feed_pace_within),
+         is_measured
+             ? fmt::format("measured {:.3f} beside {:.3f} of real time", span_->feed_pace, span_->realtime)
+             : std::string("measured nothing: feed in real time, and run for two seconds at least"),
+         is_measured && std::abs(span_->feed_pace - span_->realtime) <= *expect.feed_pace_within);
+}
+
+bool ScenarioRun::await(double seconds, const std::function<bool()>& condition) {
+  const double begin_s = elapsed_s();
+  while (!condition()) {
+    if (elapsed_s() - begin_s >= seconds || !go_on()) return false;
+    // What else comes meanwhile is not to pile up.
+    for (const ClientEvent& event : client_->wait(kPoll)) take(event);
+    trace();
+  }
+  return true;
+}
+
+void ScenarioRun::expect_slow_motion(const ScenarioExpect& expect) {
+  const auto says_slow = [this] { return status_ns_ != 0 && !status_.slow_motion.empty(); };
+  const bool is_so = await(expect.within_s, [&] { return says_slow() == *expect.is_slow; });
+  report("what the server says", *expect.is_slow ? "slow motion" : "real time",
+         says_slow() ? excerpt(status_.slow_motion, kMaxShownChars)
+                     : std::string("it does not say that it is slow"),
+         is_so);
+}
+
+void ScenarioRun::expect_mode(const ScenarioExpect& expect) {
+  const ScenarioViewer& who = **viewer(expect.viewer);
+  const bool is_so = await(expect.within_s, [&] { return expect.mode == to_string(who.look().mode); });
+  const ViewerLook look = who.look();
+  report("mode of " + who.view().name, expect.mode,
+         fmt::format("it sees {} ({})", to_string(look.mode), look.mode_reason), is_so);
 }
 
 void ScenarioRun::expect_stretch(const std::string& name, const MeasuredSpan::Seen& seen, double limit) {
@@ -234,21 +281,15 @@ void ScenarioRun::expect_picture(const ScenarioExpect& expect) {
 }
 
 void ScenarioRun::expect_metric(const ScenarioMetric& metric) {
-  const double begin_s = elapsed_s();
   std::string measured;
-  bool has_passed = false;
-  while (true) {
+  const bool has_passed = await(metric.within_s, [&] {
     const auto text = metrics();
     const std::vector<double> found = text ? find_metric(*text, metric.name) : std::vector<double>();
     measured = !text           ? text.error().to_string()
                : found.empty() ? std::string("there is no such line in /metrics")
                                : fmt::format("is {:g}", found.front());
-    has_passed = !found.empty() && holds(metric, found.front());
-    if (has_passed || elapsed_s() - begin_s >= metric.within_s || !go_on()) break;
-    // What else comes meanwhile is not to pile up.
-    for (const ClientEvent& event : client_->wait(kPoll)) take(event);
-    trace();
-  }
+    return !found.empty() && holds(metric, found.front());
+  });
   report(metric.name, wanted_text(metric), measured, has_passed);
 }
 

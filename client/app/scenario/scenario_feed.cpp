@@ -58,7 +58,10 @@ Result<std::unique_ptr<LiveFeed>> LiveFeed::start(FeedPlan plan, const ClientCon
   live->thread_ = std::thread([self = live.get()] {
     name_thread("feed");
     // The end of the connection shows in what is expected of the server.
-    (void)feed(*self->client_, self->plan_, self->stop_, {});
+    (void)feed(*self->client_, self->plan_, self->stop_, [self](const FeedProgress& progress) {
+      const std::lock_guard lock(self->mutex_);
+      self->progress_ = progress;
+    });
   });
   return live;
 }
@@ -66,6 +69,11 @@ Result<std::unique_ptr<LiveFeed>> LiveFeed::start(FeedPlan plan, const ClientCon
 LiveFeed::~LiveFeed() {
   stop_ = true;
   if (thread_.joinable()) thread_.join();
+}
+
+FeedProgress LiveFeed::progress() const {
+  const std::lock_guard lock(mutex_);
+  return progress_;
 }
 
 std::vector<ClientMessage> SteppedFeed::samples_up_to(uint64_t tick) {

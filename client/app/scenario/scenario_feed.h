@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -26,6 +27,9 @@ class LiveFeed {
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
+  /// As of the newest second.
+  FeedProgress progress() const;
+
  private:
   LiveFeed(FeedPlan plan, std::unique_ptr<ViewerClient> client)
       : plan_(std::move(plan)), client_(std::move(client)) {}
@@ -33,6 +37,8 @@ class LiveFeed {
   const FeedPlan plan_;
   const std::unique_ptr<ViewerClient> client_;
   std::atomic<bool> stop_{false};
+  mutable std::mutex mutex_;  // guards the one below
+  FeedProgress progress_;
   std::thread thread_;
 };
 

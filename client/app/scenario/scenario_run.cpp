@@ -7,8 +7,12 @@
 #include <thread>
 #include <utility>
 
+#include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
+#include "common/base/file.h"
+#include "common/base/hash.h"
 #include "common/base/text.h"
+#include "common/scene/scenario_file.h"
 
 namespace strandcast {
 namespace {
@@ -238,6 +242,7 @@ Status ScenarioRun::carry_out(const ScenarioSteps& steps) {
 Status ScenarioRun::carry_out(const ScenarioRunTime& run) {
   if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
   begin_span();
+  const FeedProgress fed = live_feed_ != nullptr ? live_feed_->progress() : FeedProgress{};
   const double begin_s = elapsed_s();
   uint64_t first_tick = 0;
   int64_t first_ns = 0;
@@ -257,6 +262,43 @@ Status ScenarioRun::carry_out(const ScenarioRunTime& run) {
     realtime = static_cast<double>(status_.tick - first_tick) / client_->welcome().step_rate_hz /
                (static_cast<double>(status_ns_ - first_ns) * 1e-9);
   end_span(elapsed_s() - begin_s, realtime);
+  const FeedProgress now = live_feed_ != nullptr ? live_feed_->progress() : FeedProgress{};
+  if (now.elapsed_s > fed.elapsed_s)
+    span_->feed_pace = (now.motion_s - fed.motion_s) / (now.elapsed_s - fed.elapsed_s);
+  return {};
+}
+
+/// Nobody answers: what came of it shows in /metrics and in what viewers see meanwhile.
+Status ScenarioRun::carry_out(const ScenarioSend& send) {
+  if (client_ == nullptr) return make_error(ErrorCode::BadInput, "there is no server yet: begin with start");
+  std::vector<std::vector<std::byte>> datagrams = send.datagrams;
+  for (const std::filesystem::path& file : send.files) {
+    ASSIGN_OR_RETURN(std::vector<std::byte> bytes, load_file(file, kMaxScenarioDatagramBytes));
+    datagrams.push_back(std::move(bytes));
+  }
+  if (send.random_bytes > 0) datagrams.emplace_back(send.random_bytes);
+  ASSIGN_OR_RETURN(const ClientConfig config, config_for(Role::Viewer));
+  ASSIGN_OR_RETURN(const auto sender, DatagramSender::open({config.address.host, send.port}));
+  begin_span();
+  const double begin_s = elapsed_s();
+  uint64_t sent = 0;
+  uint32_t random = 0;
+  for (uint32_t i = 0; i < send.count; ++i) {
+    if (send.random_bytes > 0)
+      for (std::byte& byte : datagrams.back()) byte = static_cast<std::byte>(mix_u32(++random));
+    for (const std::vector<std::byte>& datagram : datagrams) {
+      // One that is too large for the link is refused here already: it is for others to count.
+      (void)sender->send(datagram);
+      const double due_s = begin_s + static_cast<double>(++sent) / send.rate_hz;
+      while (elapsed_s() < due_s) {
+        RETURN_IF_ERROR(go_on());
+        for (const ClientEvent& event : client_->wait(milliseconds(1))) take(event);
+        if (lost_) return *lost_;
+      }
+      trace();
+    }
+  }
+  end_span(elapsed_s() - begin_s, -1.0);
   return {};
 }
 

@@ -32,8 +32,9 @@ using CheckListener = std::function<void(const CheckResult&)>;
 
 /// Of a span of time that was stepped or run.
 struct MeasuredSpan {
-  double seconds = 0.0;    // simulated where it was stepped, else real
-  double realtime = -1.0;  // -1 = not measured
+  double seconds = 0.0;     // simulated where it was stepped, else real
+  double realtime = -1.0;   // -1 = not measured
+  double feed_pace = -1.0;  // motion time per real time; likewise
   struct Seen {
     ViewerCounts before;
     ViewerLook after;
@@ -68,6 +69,7 @@ class ScenarioRun {
   Status carry_out(const ScenarioRemember& remember);
   Status carry_out(const ScenarioExpect& expect);
   Status carry_out(const ScenarioRefusal& refusal);
+  Status carry_out(const ScenarioSend& send);
 
   // The connection that commands.
   Status connect();
@@ -91,6 +93,11 @@ class ScenarioRun {
   void expect_picture(const ScenarioExpect& expect);
   void expect_metric(const ScenarioMetric& metric);
   void expect_back(const ScenarioExpect& expect);
+  void expect_pace(const ScenarioExpect& expect);
+  void expect_slow_motion(const ScenarioExpect& expect);
+  void expect_mode(const ScenarioExpect& expect);
+  /// Waits for what may come by itself; false when it does not within so long.
+  bool await(double seconds, const std::function<bool()>& condition);
   void expect_state(const ScenarioExpect& expect);
   void save_evidence();
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <future>
+#include <limits>
 #include <utility>
 
 #include "client/app/step_speed.h"
@@ -81,6 +82,7 @@ void ScenarioViewer::run(LiveConnection& live) {
 
 void ScenarioViewer::watch(ViewerSession& session) {
   measured_asset_.reset();
+  last_sim_time_ns_ = 0;
   session.set_snapshot_listener([this, &session](const auto& state) { take(session, state); });
 }
 
@@ -121,6 +123,17 @@ void ScenarioViewer::measure_rest(const std::shared_ptr<const SceneAsset>& asset
     rest_length_m_.push_back(glm::distance(asset->rest_position_m[i], asset->rest_position_m[i + strands]));
 }
 
+/// Since the state before; 0 for the first of a server.
+double ScenarioViewer::head_mps(const Snapshot& state) {
+  const int64_t passed_ns = state.sim_time_ns - last_sim_time_ns_;
+  const bool has_last = std::exchange(last_sim_time_ns_, state.sim_time_ns) != 0 && passed_ns > 0;
+  const Pose before = std::exchange(last_world_from_head_, state.world_from_head);
+  if (!has_last) return 0.0;
+  const double mps = glm::distance(before.position_m, state.world_from_head.position_m) /
+                     (static_cast<double>(passed_ns) * 1e-9);
+  return is_finite(state.world_from_head) ? mps : std::numeric_limits<double>::infinity();
+}
+
 void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state) {
   measure_rest(session.shared_asset());
   double stretch = 0.0, grain = 0.0;
@@ -138,7 +151,9 @@ void ScenarioViewer::take(ViewerSession& session, const std::shared_ptr<const Sn
       grain = std::max(grain, 2.0 * bound_m / rest_m);
     }
   }
+  const double mps = head_mps(*state);
   const std::lock_guard lock(mutex_);
+  look_.largest_head_mps = std::max(look_.largest_head_mps, mps);
   look_.tick = state->tick;
   look_.vertices = state->strand_count * state->vertex_count;
   look_.largest_stretch = std::max(look_.largest_stretch, stretch);
@@ -158,6 +173,7 @@ ViewerPicture ScenarioViewer::picture() const {
 void ScenarioViewer::begin_measure() {
   const std::lock_guard lock(mutex_);
   look_.largest_stretch = 0.0;
+  look_.largest_head_mps = 0.0;
 }
 
 }  // namespace strandcast

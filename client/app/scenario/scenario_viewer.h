@@ -36,9 +36,10 @@ struct ViewerLook {
   std::string mode_reason;
   uint64_t tick = 0;  // of the newest decoded state of strands
   uint32_t rate_divisor = 1;
-  uint32_t vertices = 0;         // of a state of strands
-  double largest_stretch = 0.0;  // since begin_measure()
-  double stretch_grain = 0.0;    // no finer than this is seen, through the bound of the stream
+  uint32_t vertices = 0;          // of a state of strands
+  double largest_stretch = 0.0;   // since begin_measure()
+  double stretch_grain = 0.0;     // no finer than this is seen, through the bound of the stream
+  double largest_head_mps = 0.0;  // likewise, between two states; infinite for what is no number
   std::string codec;
 };
 
@@ -63,7 +64,7 @@ class ScenarioViewer {
   const ScenarioView& view() const { return view_; }
   ViewerLook look() const;
   ViewerPicture picture() const;
-  /// The largest stretch counts from now on.
+  /// The largest stretch and speed count from now on.
   void begin_measure();
 
  private:
@@ -74,6 +75,7 @@ class ScenarioViewer {
   ViewerCounts counts_of(ViewerSession& session) const;
   void note(LiveConnection& live);
   void take(ViewerSession& session, const std::shared_ptr<const Snapshot>& state);
+  double head_mps(const Snapshot& state);
   void measure_rest(const std::shared_ptr<const SceneAsset>& asset);
 
   const ScenarioView view_;
@@ -83,6 +85,8 @@ class ScenarioViewer {
   ViewerCounts earlier_;  // of sessions that broke
   std::shared_ptr<const SceneAsset> measured_asset_;
   std::vector<float> rest_length_m_;  // (vertex_count - 1 x strand_count)
+  Pose last_world_from_head_;
+  int64_t last_sim_time_ns_ = 0;  // 0 = none
 
   mutable std::mutex mutex_;  // guards the two below
   ViewerLook look_;
