@@ -89,10 +89,11 @@ TEST(FrameTrace, IsALineForEachFrameWithWhatTheServerTellsLater) {
   trace.note_presented(StreamMode::Frames, 80 * kMs + kShownStateNs, 779);  // of a state that never came
   ASSERT_TRUE(trace.close());
   EXPECT_EQ(load_text(folder.path() / "trace.csv", 2'000).value(),
-            std::string(kColumns) +
-                "7,strands,70000000,0,100000000,0,0,110000000,117000000,119000000,0,0\n"
-                "8,frames,80000000,11,12,13,14,10000000,18000000,20000000,0,0\n"
-                "9,strands,90000000,0,100000000,0,0,110000000,119000000,121000000,777,0\n")
+            fmt::format("{}"
+                        "7,strands,70000000,0,100000000,0,0,110000000,117000000,119000000,0,0\n"
+                        "8,frames,80000000,11,12,13,14,10000000,18000000,20000000,0,0\n"
+                        "9,strands,90000000,0,100000000,0,0,110000000,119000000,121000000,777,0\n",
+                        kColumns))
       << "the first had gone when the server told of it";
   EXPECT_FALSE(FrameTrace().open(folder.path() / "no" / "such"));
   EXPECT_EQ(to_csv(stage_times({})).substr(0, 45), "stage,frames,median_ms,p90_ms,p99_ms,most_ms\n");
