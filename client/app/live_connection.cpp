@@ -25,7 +25,10 @@ LiveConnection::LiveConnection(const ClientConfig& config, std::unique_ptr<Viewe
       session_(std::move(session)),
       policy_(static_cast<uint32_t>(now_ns())),
       is_connected_(session_ != nullptr) {
-  if (session_ != nullptr) session_->follow(modes_);
+  if (session_ != nullptr) {
+    session_->follow(modes_);
+    step_ = ConnectStep::AwaitWelcome;  // it had all of them
+  }
   config_.on_step = [this](ConnectStep step) { step_ = step; };
   config_.cancel = [this, cancel = config.cancel]() -> std::optional<Error> {
     if (is_leaving_) return make_error(ErrorCode::Unavailable, "the viewer is leaving");
