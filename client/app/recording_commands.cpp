@@ -75,6 +75,21 @@ void print_line(const char* name, const std::string& text) {
   std::cout << fmt::format("  {:<10} {}\n", name, text);
 }
 
+/// What the bytes of the file are.
+void print_contents(const RecordingContents& contents, const RecordingInfo& info) {
+  std::vector<std::pair<std::string, RecordedTopic>> topics(contents.begin(), contents.end());
+  std::sort(topics.begin(), topics.end(),
+            [](const auto& a, const auto& b) { return a.second.bytes > b.second.bytes; });
+  uint64_t rest = info.file_bytes;
+  for (const auto& [topic, counted] : topics) {
+    std::cout << fmt::format("  {:>9.3f} MB {:<18} {}\n", static_cast<double>(counted.bytes) / kBytesPerMb,
+                             topic, counted.items);
+    rest -= std::min(rest, counted.bytes);
+  }
+  std::cout << fmt::format("  {:>9.3f} MB {}\n", static_cast<double>(rest) / kBytesPerMb,
+                           "schemas and indexes");
+}
+
 }  // namespace
 
 int run_recording_info(const std::filesystem::path& path) {
@@ -94,14 +109,8 @@ int run_recording_info(const std::filesystem::path& path) {
                                     scene->solver.name, scene->step_rate_hz, scene->substeps,
                                     static_cast<double>(scene->stream.bound_m) * kMmPerM));
   print_line("hair", hair_text(**reader));
-  print_line("strands", fmt::format("{} frames, {:.1f} MB; {}", info.frame_count,
-                                    static_cast<double>(info.frame_bytes) / kBytesPerMb,
-                                    keyframe_text(info.keyframe_sim_time_ns)));
-  std::string counts;
-  for (const auto& [topic, count] : info.message_counts)
-    counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", topic, count);
-  print_line("messages",
-             fmt::format("{:.1f} MB: {}", static_cast<double>(info.message_bytes) / kBytesPerMb, counts));
+  print_line("strands", keyframe_text(info.keyframe_sim_time_ns));
+  print_contents((*reader)->contents(), info);
   print_line("file",
              fmt::format("{:.1f} MB, {} chunks: {}", static_cast<double>(info.file_bytes) / kBytesPerMb,
                          info.chunk_count, state_text(info)));

@@ -106,7 +106,11 @@ Status add_indexed(ByteSource& source, const mcap::ChunkIndex& index, uint64_t d
   ASSIGN_OR_RETURN(const mcap::RecordHead head, head_at(source, offset, data_end));
   if (head.opcode != mcap::Opcode::Chunk || head.content_bytes + mcap::kRecordHeadBytes != index.chunk_length)
     return make_error(ErrorCode::BadInput, "the index names a chunk at {}, where there is none", offset);
-  return add_chunk({offset, index.chunk_length, index.message_start_time}, list);
+  const auto& channels = index.message_index_offsets;
+  const uint16_t channel = channels.empty()       ? kUnknownChannel
+                           : channels.size() == 1 ? channels.begin()->first
+                                                  : kSeveralChannels;
+  return add_chunk({offset, index.chunk_length, index.message_start_time, channel}, list);
 }
 
 /// By the index; NotFound where there is none.
@@ -143,7 +147,8 @@ Status walk_record(ByteSource& source, uint64_t offset, const mcap::RecordHead& 
   const uint64_t content_at = offset + mcap::kRecordHeadBytes;
   if (head.opcode == mcap::Opcode::Chunk) {
     ASSIGN_OR_RETURN(const mcap::Bytes time, read_some(source, content_at, sizeof(uint64_t)));
-    return add_chunk({offset, mcap::kRecordHeadBytes + head.content_bytes, ByteReader(time).take<uint64_t>()},
+    return add_chunk({offset, mcap::kRecordHeadBytes + head.content_bytes, ByteReader(time).take<uint64_t>(),
+                      kUnknownChannel},
                      list);
   }
   if (head.opcode == mcap::Opcode::Channel) {
@@ -154,9 +159,14 @@ Status walk_record(ByteSource& source, uint64_t offset, const mcap::RecordHead& 
     return add_channel(content, list);
   }
   if (head.opcode == mcap::Opcode::MessageIndex && head.content_bytes >= kMessageIndexHeadBytes) {
-    ASSIGN_OR_RETURN(const mcap::Bytes channel, read_some(source, content_at, sizeof(uint16_t)));
-    list.message_counts[ByteReader(channel).take<uint16_t>()] +=
-        (head.content_bytes - kMessageIndexHeadBytes) / sizeof(mcap::IndexEntry);
+    ASSIGN_OR_RETURN(const mcap::Bytes bytes, read_some(source, content_at, sizeof(uint16_t)));
+    const auto channel = ByteReader(bytes).take<uint16_t>();
+    list.message_counts[channel] += (head.content_bytes - kMessageIndexHeadBytes) / sizeof(mcap::IndexEntry);
+    // The indexes of a chunk stand behind it.
+    if (!list.chunks.empty()) {
+      uint16_t& known = list.chunks.back().channel;
+      known = known == kUnknownChannel || known == channel ? channel : kSeveralChannels;
+    }
   }
   if (head.opcode == mcap::Opcode::DataEnd) {
     ASSIGN_OR_RETURN(const mcap::Bytes crc, read_some(source, content_at, sizeof(uint32_t)));
@@ -227,7 +237,8 @@ Result<LoadedChunk> load_chunk(ByteSource& source, const ChunkPlace& place) {
                         bytes, chunk.uncompressed_size);
     loaded.records.resize(bytes);
     ZstdDecompressor decompressor;
-    RETURN_IF_ERROR(decompressor.fill(chunk.records, loaded.records));
+    if (const Status filled = decompressor.fill(chunk.records, loaded.records); !filled)
+      return at(fmt::format("the chunk at {}", place.offset), filled.error());
     loaded.stored.assign(chunk.records.begin(), chunk.records.end());
   } else {
     return make_error(ErrorCode::Unsupported, "the chunk at {} is compressed by '{}'", place.offset,

@@ -13,17 +13,21 @@
 
 namespace strandcast {
 
+inline constexpr uint16_t kUnknownChannel = 0;  // a file that was cut off behind the chunk does not say
+inline constexpr uint16_t kSeveralChannels = 0xffff;
+
 struct ChunkPlace {
-  uint64_t offset = 0;      // of its record
-  uint64_t size_bytes = 0;  // of the record with its head; all of it lies in the file
-  uint64_t start_time = 0;  // log_time of its first message
+  uint64_t offset = 0;                 // of its record
+  uint64_t size_bytes = 0;             // of the record with its head; all of it lies in the file
+  uint64_t start_time = 0;             // log_time of its first message
+  uint16_t channel = kUnknownChannel;  // of its messages
 };
 
 struct ChunkList {
   mcap::Header header;
   std::map<uint16_t, std::string> topics;       // of channels, by id
   std::vector<ChunkPlace> chunks;               // in the order of the file
-  std::map<uint16_t, uint64_t> message_counts;  // by channel
+  std::map<uint16_t, uint64_t> message_counts;  // by channel, of MCAP's messages
   bool is_indexed = false;
   std::string index_trouble;  // why an index that is there was not used
   uint64_t cut_bytes = 0;     // at the end, of a record that is not whole

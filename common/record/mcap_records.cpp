@@ -1,6 +1,7 @@
 #include "common/record/mcap_records.h"
 
 #include <algorithm>
+#include <concepts>
 #include <cstring>
 
 #include "common/base/check.h"
@@ -11,35 +12,146 @@ namespace {
 
 constexpr const char* kEncoding = "protobuf";
 
+// ---- the one list of the fields of each record, walked by Writer and Reader ----
+
+/// A record to be written, which stays as it is, or one to be read.
+template <class T, class Record>
+concept Is = std::same_as<std::remove_const_t<T>, Record>;
+
+template <class Visitor, Is<Header> Record>
+void visit(Visitor& v, Record& r) {
+  v.text(r.profile);
+  v.text(r.library);
+}
+
+template <class Visitor, Is<Schema> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.id);
+  v.text(r.name);
+  v.known_text(kEncoding);
+  v.bytes(r.data);
+}
+
+template <class Visitor, Is<Channel> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.id);
+  v.value(r.schema_id);
+  v.text(r.topic);
+  v.known_text(kEncoding);
+  v.template nothing<uint32_t>();  // metadata
+}
+
+template <class Visitor, Is<Message> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.channel_id);
+  v.value(r.sequence);
+  v.value(r.log_time);
+  v.value(r.publish_time);
+  v.rest(r.data);
+}
+
+/// All but the records themselves.
+template <class Visitor, Is<Chunk> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.message_start_time);
+  v.value(r.message_end_time);
+  v.value(r.uncompressed_size);
+  v.value(r.uncompressed_crc);
+  v.text(r.compression);
+  v.value(r.records_size);
+}
+
+template <class Visitor, Is<MessageIndex> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.channel_id);
+  v.entries(r.records);
+}
+
+template <class Visitor, Is<ChunkIndex> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.message_start_time);
+  v.value(r.message_end_time);
+  v.value(r.chunk_start_offset);
+  v.value(r.chunk_length);
+  v.map(r.message_index_offsets);
+  v.value(r.message_index_length);
+  v.text(r.compression);
+  v.value(r.compressed_size);
+  v.value(r.uncompressed_size);
+}
+
+template <class Visitor, Is<Statistics> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.message_count);
+  v.value(r.schema_count);
+  v.value(r.channel_count);
+  v.template nothing<uint32_t>();  // attachments
+  v.template nothing<uint32_t>();  // metadata
+  v.value(r.chunk_count);
+  v.value(r.message_start_time);
+  v.value(r.message_end_time);
+  v.map(r.channel_message_counts);
+}
+
+template <class Visitor, Is<SummaryOffset> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.group_opcode);
+  v.value(r.group_start);
+  v.value(r.group_length);
+}
+
+template <class Visitor, Is<Footer> Record>
+void visit(Visitor& v, Record& r) {
+  v.value(r.summary_start);
+  v.value(r.summary_offset_start);
+  v.value(r.summary_crc);
+}
+
 /// Appends one record; its length is known in the end.
-class RecordWriter {
+class Writer {
  public:
-  RecordWriter(Opcode opcode, Bytes& bytes) : bytes_(bytes), writer_(bytes) {
-    writer_.put(static_cast<uint8_t>(opcode));
+  Writer(Opcode opcode, Bytes& bytes) : bytes_(bytes), writer_(bytes) {
+    value(opcode);
     length_at_ = bytes_.size();
-    writer_.put(uint64_t{0});
+    value(uint64_t{0});
   }
-  ~RecordWriter() {
+  ~Writer() {
     const uint64_t length = bytes_.size() - length_at_ - sizeof(uint64_t);
     std::memcpy(bytes_.data() + length_at_, &length, sizeof(length));
   }
-  RecordWriter(const RecordWriter&) = delete;
-  RecordWriter& operator=(const RecordWriter&) = delete;
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
 
   template <class T>
-  void put(T value) {
-    writer_.put(value);
+  void value(T number) {
+    if constexpr (std::is_enum_v<T>)
+      writer_.put(static_cast<std::underlying_type_t<T>>(number));
+    else
+      writer_.put(number);
   }
-  void put_text(const std::string& text) {
-    put(static_cast<uint32_t>(text.size()));
-    put_bytes(std::as_bytes(std::span(text)));
+  template <class T>
+  void nothing() {
+    writer_.put(T{});
   }
-  void put_bytes(std::span<const std::byte> bytes) { writer_.put_bytes(bytes); }
-  void put_map(const std::map<uint16_t, uint64_t>& map) {
-    put(static_cast<uint32_t>(map.size() * (sizeof(uint16_t) + sizeof(uint64_t))));
-    for (const auto& [key, value] : map) {
-      put(key);
-      put(value);
+  void text(std::string_view text) { bytes(std::as_bytes(std::span(text))); }
+  void known_text(std::string_view known) { text(known); }
+  void bytes(std::span<const std::byte> bytes) {
+    value(static_cast<uint32_t>(bytes.size()));
+    rest(bytes);
+  }
+  void rest(std::span<const std::byte> bytes) { writer_.put_bytes(bytes); }
+  void map(const std::map<uint16_t, uint64_t>& map) {
+    value(static_cast<uint32_t>(map.size() * (sizeof(uint16_t) + sizeof(uint64_t))));
+    for (const auto& [key, number] : map) {
+      value(key);
+      value(number);
+    }
+  }
+  void entries(const std::vector<IndexEntry>& entries) {
+    value(static_cast<uint32_t>(entries.size() * sizeof(IndexEntry)));
+    for (const IndexEntry& entry : entries) {
+      value(entry.log_time);
+      value(entry.offset);
     }
   }
 
@@ -49,25 +161,51 @@ class RecordWriter {
   size_t length_at_ = 0;
 };
 
-std::string take_text(ByteReader& reader) {
-  const auto bytes = reader.take_bytes(reader.take<uint32_t>());
-  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-}
+/// Of the records that are read; those that are not have fields that it does not know.
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte> content) : reader_(content) {}
 
-std::map<uint16_t, uint64_t> take_map(ByteReader& reader) {
-  ByteReader entries(reader.take_bytes(reader.take<uint32_t>()));
-  std::map<uint16_t, uint64_t> map;
-  while (!entries.rest().empty() && entries.ok()) {
-    const auto key = entries.take<uint16_t>();
-    const auto value = entries.take<uint64_t>();
-    if (entries.ok()) map[key] = value;
+  template <class T>
+  void value(T& number) {
+    number = reader_.take<T>();
   }
-  return map;
+  template <class T>
+  void nothing() {
+    reader_.take<T>();
+  }
+  void text(std::string& text) {
+    const auto bytes = reader_.take_bytes(reader_.take<uint32_t>());
+    text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
+  void known_text(std::string_view) { reader_.take_bytes(reader_.take<uint32_t>()); }
+  void rest(std::span<const std::byte>& bytes) { bytes = reader_.rest(); }
+  void map(std::map<uint16_t, uint64_t>& map) {
+    ByteReader entries(reader_.take_bytes(reader_.take<uint32_t>()));
+    while (!entries.rest().empty() && entries.ok()) {
+      const auto key = entries.take<uint16_t>();
+      const auto number = entries.take<uint64_t>();
+      if (entries.ok()) map[key] = number;
+    }
+  }
+  const ByteReader& reader() const { return reader_; }
+
+ private:
+  ByteReader reader_;
+};
+
+template <class Record>
+void append_record(Opcode opcode, const Record& record, Bytes& bytes) {
+  Writer writer(opcode, bytes);
+  visit(writer, record);
 }
 
-template <class T>
-Result<T> checked(const ByteReader& reader, T record, const char* name) {
-  if (reader.ok()) return record;
+template <class Record>
+Result<Record> read(std::span<const std::byte> content, const char* name) {
+  Reader reader(content);
+  Record record;
+  visit(reader, record);
+  if (reader.reader().ok()) return record;
   return make_error(ErrorCode::BadInput, "a {} is too short for what it says it holds", name);
 }
 
@@ -79,102 +217,41 @@ void append_magic(Bytes& bytes) {
 }
 
 void append(const Header& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Header, bytes);
-  writer.put_text(record.profile);
-  writer.put_text(record.library);
+  append_record(Opcode::Header, record, bytes);
 }
-
 void append(const Schema& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Schema, bytes);
-  writer.put(record.id);
-  writer.put_text(record.name);
-  writer.put_text(kEncoding);
-  writer.put(static_cast<uint32_t>(record.data.size()));
-  writer.put_bytes(record.data);
+  append_record(Opcode::Schema, record, bytes);
 }
-
 void append(const Channel& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Channel, bytes);
-  writer.put(record.id);
-  writer.put(record.schema_id);
-  writer.put_text(record.topic);
-  writer.put_text(kEncoding);
-  writer.put(uint32_t{0});  // no metadata
+  append_record(Opcode::Channel, record, bytes);
 }
-
 void append(const Message& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Message, bytes);
-  writer.put(record.channel_id);
-  writer.put(record.sequence);
-  writer.put(record.log_time);
-  writer.put(record.publish_time);
-  writer.put_bytes(record.data);
+  append_record(Opcode::Message, record, bytes);
 }
-
 void append(const Chunk& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Chunk, bytes);
-  writer.put(record.message_start_time);
-  writer.put(record.message_end_time);
-  writer.put(record.uncompressed_size);
-  writer.put(record.uncompressed_crc);
-  writer.put_text(record.compression);
-  writer.put(static_cast<uint64_t>(record.records.size()));
-  writer.put_bytes(record.records);
+  Chunk head = record;
+  head.records_size = record.records.size();
+  Writer writer(Opcode::Chunk, bytes);
+  visit(writer, head);
+  writer.rest(record.records);
 }
-
 void append(const MessageIndex& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::MessageIndex, bytes);
-  writer.put(record.channel_id);
-  writer.put(static_cast<uint32_t>(record.records.size() * sizeof(IndexEntry)));
-  for (const IndexEntry& entry : record.records) {
-    writer.put(entry.log_time);
-    writer.put(entry.offset);
-  }
+  append_record(Opcode::MessageIndex, record, bytes);
 }
-
 void append(const ChunkIndex& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::ChunkIndex, bytes);
-  writer.put(record.message_start_time);
-  writer.put(record.message_end_time);
-  writer.put(record.chunk_start_offset);
-  writer.put(record.chunk_length);
-  writer.put_map(record.message_index_offsets);
-  writer.put(record.message_index_length);
-  writer.put_text(record.compression);
-  writer.put(record.compressed_size);
-  writer.put(record.uncompressed_size);
+  append_record(Opcode::ChunkIndex, record, bytes);
 }
-
 void append(const Statistics& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Statistics, bytes);
-  writer.put(record.message_count);
-  writer.put(record.schema_count);
-  writer.put(record.channel_count);
-  writer.put(uint32_t{0});  // attachments
-  writer.put(uint32_t{0});  // metadata
-  writer.put(record.chunk_count);
-  writer.put(record.message_start_time);
-  writer.put(record.message_end_time);
-  writer.put_map(record.channel_message_counts);
+  append_record(Opcode::Statistics, record, bytes);
 }
-
 void append(const SummaryOffset& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::SummaryOffset, bytes);
-  writer.put(static_cast<uint8_t>(record.group_opcode));
-  writer.put(record.group_start);
-  writer.put(record.group_length);
+  append_record(Opcode::SummaryOffset, record, bytes);
 }
-
 void append_data_end(uint32_t data_section_crc, Bytes& bytes) {
-  RecordWriter writer(Opcode::DataEnd, bytes);
-  writer.put(data_section_crc);
+  Writer(Opcode::DataEnd, bytes).value(data_section_crc);
 }
-
 void append(const Footer& record, Bytes& bytes) {
-  RecordWriter writer(Opcode::Footer, bytes);
-  writer.put(record.summary_start);
-  writer.put(record.summary_offset_start);
-  writer.put(record.summary_crc);
+  append_record(Opcode::Footer, record, bytes);
 }
 
 void put_footer_crc(uint32_t crc, Bytes& bytes) {
@@ -208,88 +285,36 @@ bool is_magic(std::span<const std::byte> bytes) {
 }
 
 Result<Header> read_header(std::span<const std::byte> content) {
-  ByteReader reader(content);
-  Header record;
-  record.profile = take_text(reader);
-  record.library = take_text(reader);
-  return checked(reader, std::move(record), "header");
+  return read<Header>(content, "header");
 }
-
 Result<Channel> read_channel(std::span<const std::byte> content) {
-  ByteReader reader(content);
-  Channel record;
-  record.id = reader.take<uint16_t>();
-  record.schema_id = reader.take<uint16_t>();
-  record.topic = take_text(reader);
-  return checked(reader, std::move(record), "channel");
+  return read<Channel>(content, "channel");
 }
-
 Result<Message> read_message(std::span<const std::byte> content) {
-  ByteReader reader(content);
-  Message record;
-  record.channel_id = reader.take<uint16_t>();
-  record.sequence = reader.take<uint32_t>();
-  record.log_time = reader.take<uint64_t>();
-  record.publish_time = reader.take<uint64_t>();
-  record.data = reader.rest();
-  return checked(reader, record, "message");
+  return read<Message>(content, "message");
 }
-
 Result<Chunk> read_chunk(std::span<const std::byte> content, uint64_t content_bytes) {
-  ByteReader reader(content);
+  Reader head(content);
   Chunk record;
-  record.message_start_time = reader.take<uint64_t>();
-  record.message_end_time = reader.take<uint64_t>();
-  record.uncompressed_size = reader.take<uint64_t>();
-  record.uncompressed_crc = reader.take<uint32_t>();
-  record.compression = take_text(reader);
-  record.records_size = reader.take<uint64_t>();
-  if (!reader.ok()) return make_error(ErrorCode::BadInput, "a chunk is too short for what it says it holds");
-  const uint64_t head_bytes = content.size() - reader.rest().size();
+  visit(head, record);
+  ByteReader records = head.reader();
+  if (!records.ok()) return make_error(ErrorCode::BadInput, "a chunk is too short for what it says it holds");
+  const uint64_t head_bytes = content.size() - records.rest().size();
   if (record.records_size != content_bytes - head_bytes)
     return make_error(ErrorCode::BadInput, "a chunk says that its records have {} bytes, and there are {}",
                       record.records_size, content_bytes - head_bytes);
-  if (reader.rest().size() >= record.records_size)
-    record.records = reader.take_bytes(static_cast<size_t>(record.records_size));
+  if (records.rest().size() >= record.records_size)
+    record.records = records.take_bytes(static_cast<size_t>(record.records_size));
   return record;
 }
-
 Result<ChunkIndex> read_chunk_index(std::span<const std::byte> content) {
-  ByteReader reader(content);
-  ChunkIndex record;
-  record.message_start_time = reader.take<uint64_t>();
-  record.message_end_time = reader.take<uint64_t>();
-  record.chunk_start_offset = reader.take<uint64_t>();
-  record.chunk_length = reader.take<uint64_t>();
-  record.message_index_offsets = take_map(reader);
-  record.message_index_length = reader.take<uint64_t>();
-  record.compression = take_text(reader);
-  record.compressed_size = reader.take<uint64_t>();
-  record.uncompressed_size = reader.take<uint64_t>();
-  return checked(reader, std::move(record), "chunk index");
+  return read<ChunkIndex>(content, "chunk index");
 }
-
 Result<Statistics> read_statistics(std::span<const std::byte> content) {
-  ByteReader reader(content);
-  Statistics record;
-  record.message_count = reader.take<uint64_t>();
-  record.schema_count = reader.take<uint16_t>();
-  record.channel_count = reader.take<uint32_t>();
-  reader.take_bytes(2 * sizeof(uint32_t));  // attachments, metadata
-  record.chunk_count = reader.take<uint32_t>();
-  record.message_start_time = reader.take<uint64_t>();
-  record.message_end_time = reader.take<uint64_t>();
-  record.channel_message_counts = take_map(reader);
-  return checked(reader, std::move(record), "record of statistics");
+  return read<Statistics>(content, "record of statistics");
 }
-
 Result<Footer> read_footer(std::span<const std::byte> content) {
-  ByteReader reader(content);
-  Footer record;
-  record.summary_start = reader.take<uint64_t>();
-  record.summary_offset_start = reader.take<uint64_t>();
-  record.summary_crc = reader.take<uint32_t>();
-  return checked(reader, record, "footer");
+  return read<Footer>(content, "footer");
 }
 
 }  // namespace strandcast::mcap

@@ -53,7 +53,8 @@ Status check_file(ByteSource& source, RecordingCheck& check) {
   if (walked.has_end && !listed.is_indexed && listed.index_trouble.empty())
     add_problem(check, "its end is damaged, and with it the index");
   const auto is_same = [](const ChunkPlace& a, const ChunkPlace& b) {
-    return a.offset == b.offset && a.size_bytes == b.size_bytes && a.start_time == b.start_time;
+    return a.offset == b.offset && a.size_bytes == b.size_bytes && a.start_time == b.start_time &&
+           a.channel == b.channel;
   };
   if (listed.is_indexed && !std::equal(walked.chunks.begin(), walked.chunks.end(), listed.chunks.begin(),
                                        listed.chunks.end(), is_same))

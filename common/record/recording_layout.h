@@ -20,6 +20,9 @@ inline constexpr const char* kAssetTopic = "/asset";
 inline constexpr const char* kKeyframeTopic = "/strands/keyframes";
 inline constexpr const char* kDeltaTopic = "/strands/deltas";
 
+/// Whether a message of this channel is a RecordBatch.
+bool has_many_in_one(uint16_t channel);
+
 /// A chunk is closed at this size, if it was not sooner.
 inline constexpr size_t kChunkBytes = 1u << 20;
 /// One chunk, compressed or not: the largest message of a stream, and what was before it.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/base/hash.h"
+#include "common/record/chunk_items.h"
 #include "common/record/chunk_list.h"
 #include "common/record/recording_layout.h"
 
@@ -13,33 +14,12 @@ namespace {
 /// More than the head of a message in front of its data.
 constexpr size_t kMessageHeadBytes = mcap::kRecordHeadBytes + 22;
 
-/// What a channel carries.
-enum class ChannelRole { Unknown, Asset, Keyframe, Delta, Message };
-struct ChannelUse {
-  ChannelRole role = ChannelRole::Unknown;
-  size_t kind = 0;  // of a message: index of RecordedMessage
-};
-
-ChannelUse use_of(const std::string& topic) {
-  if (topic == kAssetTopic) return {ChannelRole::Asset};
-  if (topic == kKeyframeTopic) return {ChannelRole::Keyframe};
-  if (topic == kDeltaTopic) return {ChannelRole::Delta};
-  const auto kinds = recorded_kinds();
-  const auto found =
-      std::find_if(kinds.begin(), kinds.end(), [&](const RecordedKind& kind) { return topic == kind.topic; });
-  if (found == kinds.end()) return {};
-  return {ChannelRole::Message, static_cast<size_t>(found - kinds.begin())};
-}
-
-bool is_media(ChannelRole role) {
-  return role == ChannelRole::Asset || role == ChannelRole::Keyframe || role == ChannelRole::Delta;
-}
-
-/// Where a keyframe begins a chunk.
+/// A chunk that is a keyframe.
 struct KeyframePlace {
   size_t chunk = 0;  // of the lane
   int64_t sim_time_ns = 0;
   uint64_t log_time = 0;
+  uint32_t order = 0;
 };
 
 /// Chunks of one sort, one after the other, and the one that is being read.
@@ -47,14 +27,15 @@ struct Lane {
   std::vector<ChunkPlace> chunks;
   size_t next_chunk = 0;
   mcap::Bytes records;
-  size_t offset = 0;  // in the records
+  ChunkItems found;  // in the records
+  size_t next_item = 0;
   std::optional<RecordedItem> item;
+  uint32_t order = 0;  // of the item
 
-  bool has_record() const { return offset < records.size(); }
   void go_to(size_t chunk) {
     next_chunk = chunk;
-    records.clear();
-    offset = 0;
+    found = {};
+    next_item = 0;
     item.reset();
   }
 };
@@ -68,6 +49,7 @@ class RecordingReader::State {
   Status open();
   Result<std::optional<RecordedItem>> next();
   Status seek(int64_t sim_time_ns);
+  RecordingContents contents() const;
 
   RecordingStart start;
   RecordingInfo info;
@@ -78,23 +60,24 @@ class RecordingReader::State {
   Status read_start();
   Status read_asset();
   void find_last_time();
+  Result<ChannelRole> find_role(const ChunkPlace& place);
+  Status add_keyframe(const ChunkPlace& place);
+  Result<std::optional<mcap::Message>> first_message(const ChunkPlace& place);
   Status fill(Lane& lane);
-  Result<std::optional<RecordedItem>> item_of(const mcap::Message& message) const;
-  ChannelUse use(uint16_t channel) const;
+  void count(const ChunkPlace& place, RecordingContents& contents) const;
+  Result<std::optional<RecordedItem>> item_of(const ChunkItem& item) const;
+  Result<RecordedFrame> frame_of(const ChunkItem& item) const;
   int64_t server_time(uint64_t log_time) const;
 
   const std::unique_ptr<ByteSource> source_;
   const RecordedPart part_;
-  std::map<uint16_t, ChannelUse> uses_;
+  ChannelUses uses_;
+  std::map<uint16_t, std::string> topics_;
+  mcap::Bytes first_bytes_;  // that first_message() looked at
   Lane frames_;
   Lane messages_;
   std::vector<KeyframePlace> keyframes_;
 };
-
-ChannelUse RecordingReader::State::use(uint16_t channel) const {
-  const auto found = uses_.find(channel);
-  return found != uses_.end() ? found->second : ChannelUse{};
-}
 
 /// Hostile times may wrap around, and do no harm.
 int64_t RecordingReader::State::server_time(uint64_t log_time) const {
@@ -109,12 +92,8 @@ Status RecordingReader::State::open() {
   info.index_trouble = list.index_trouble;
   info.cut_bytes = list.cut_bytes;
   info.chunk_count = list.chunks.size();
-  for (const auto& [id, topic] : list.topics) uses_[id] = use_of(topic);
-  for (const auto& [id, count] : list.message_counts) {
-    const ChannelRole role = use(id).role;
-    if (role == ChannelRole::Keyframe || role == ChannelRole::Delta) info.frame_count += count;
-    if (role == ChannelRole::Message) info.message_counts[list.topics.at(id)] += count;
-  }
+  topics_ = list.topics;
+  for (const auto& [id, topic] : topics_) uses_.add(id, topic);
   RETURN_IF_ERROR(sort_chunks(list));
   RETURN_IF_ERROR(read_start());
   RETURN_IF_ERROR(read_asset());
@@ -122,37 +101,53 @@ Status RecordingReader::State::open() {
   return seek(info.first_sim_time_ns);
 }
 
-/// By what the first message of each says; a chunk that is damaged there counts to the messages, where it is
-/// told.
+/// Of a chunk that can be read.
+Result<std::optional<mcap::Message>> RecordingReader::State::first_message(const ChunkPlace& place) {
+  ASSIGN_OR_RETURN(LoadedChunk chunk, load_chunk(*source_, place));
+  first_bytes_ = std::move(chunk.records);
+  ASSIGN_OR_RETURN(const mcap::Record record, mcap::read_record(first_bytes_));
+  if (record.opcode != mcap::Opcode::Message) return std::optional<mcap::Message>();
+  ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record.content));
+  return std::optional(message);
+}
+
+/// What a chunk is of; behind the last one of a file that was cut off nothing says so but itself.
+Result<ChannelRole> RecordingReader::State::find_role(const ChunkPlace& place) {
+  if (place.channel != kUnknownChannel) return uses_.of(place.channel).role;
+  ASSIGN_OR_RETURN(const auto first, first_message(place));
+  return first ? uses_.of(first->channel_id).role : ChannelRole::Unknown;
+}
+
+/// By its first bytes, where it is as it should be.
+Status RecordingReader::State::add_keyframe(const ChunkPlace& place) {
+  mcap::Bytes bytes(static_cast<size_t>(std::min<uint64_t>(
+      place.size_bytes, mcap::kRecordHeadBytes + mcap::kMostChunkHeadBytes + kMessageHeadBytes)));
+  RETURN_IF_ERROR(source_->read(place.offset, bytes));
+  const auto content = std::span<const std::byte>(bytes).subspan(mcap::kRecordHeadBytes);
+  const uint64_t content_bytes = place.size_bytes - mcap::kRecordHeadBytes;
+  const auto chunk = mcap::read_chunk(content, content_bytes);
+  if (!chunk || !chunk->compression.empty()) return {};
+  const size_t head_bytes = static_cast<size_t>(content_bytes - chunk->records_size);
+  const auto records = content.subspan(std::min(head_bytes, content.size()));
+  if (records.size() < kMessageHeadBytes) return {};
+  const auto first =
+      mcap::read_message(records.subspan(mcap::kRecordHeadBytes, kMessageHeadBytes - mcap::kRecordHeadBytes));
+  if (!first || uses_.of(first->channel_id).role != ChannelRole::Keyframe) return {};
+  keyframes_.push_back(
+      {frames_.chunks.size(), static_cast<int64_t>(first->publish_time), first->log_time, first->sequence});
+  info.keyframe_sim_time_ns.push_back(keyframes_.back().sim_time_ns);
+  return {};
+}
+
+/// A chunk that is damaged counts to the messages, where it is told.
 Status RecordingReader::State::sort_chunks(const ChunkList& list) {
   for (const ChunkPlace& place : list.chunks) {
-    mcap::Bytes bytes(static_cast<size_t>(std::min<uint64_t>(
-        place.size_bytes, mcap::kRecordHeadBytes + mcap::kMostChunkHeadBytes + kMessageHeadBytes)));
-    RETURN_IF_ERROR(source_->read(place.offset, bytes));
-    const auto content = std::span<const std::byte>(bytes).subspan(mcap::kRecordHeadBytes);
-    const uint64_t content_bytes = place.size_bytes - mcap::kRecordHeadBytes;
-    const auto chunk = mcap::read_chunk(content, content_bytes);
-    std::optional<mcap::Message> first;
-    if (chunk && chunk->compression.empty()) {
-      const size_t head_bytes = static_cast<size_t>(content_bytes - chunk->records_size);
-      const auto records = content.subspan(std::min(head_bytes, content.size()));
-      if (records.size() >= kMessageHeadBytes)
-        if (const auto message = mcap::read_message(
-                records.subspan(mcap::kRecordHeadBytes, kMessageHeadBytes - mcap::kRecordHeadBytes)))
-          first = *message;
-    }
-    const ChannelRole role = first ? use(first->channel_id).role : ChannelRole::Unknown;
-    if (!is_media(role)) {
-      info.message_bytes += place.size_bytes;
+    const auto role = find_role(place);
+    if (!role || !is_media(*role)) {
       messages_.chunks.push_back(place);
       continue;
     }
-    if (role == ChannelRole::Keyframe) {
-      keyframes_.push_back(
-          {frames_.chunks.size(), static_cast<int64_t>(first->publish_time), first->log_time});
-      info.keyframe_sim_time_ns.push_back(keyframes_.back().sim_time_ns);
-    }
-    info.frame_bytes += place.size_bytes;
+    if (*role == ChannelRole::Keyframe) RETURN_IF_ERROR(add_keyframe(place));
     frames_.chunks.push_back(place);
   }
   return {};
@@ -163,14 +158,12 @@ Status RecordingReader::State::read_start() {
   const Error missing =
       make_error(ErrorCode::BadInput, "the recording was cut off before anything was in it");
   if (messages_.chunks.empty()) return missing;
-  ASSIGN_OR_RETURN(const LoadedChunk chunk, load_chunk(*source_, messages_.chunks.front()));
-  ASSIGN_OR_RETURN(const mcap::Record record, mcap::read_record(chunk.records));
-  if (record.opcode != mcap::Opcode::Message) return missing;
-  ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record.content));
-  const ChannelUse found = use(message.channel_id);
+  ASSIGN_OR_RETURN(const auto message, first_message(messages_.chunks.front()));
+  if (!message) return missing;
+  const ChannelUse found = uses_.of(message->channel_id);
   if (found.role != ChannelRole::Message || found.kind != 0)
     return make_error(ErrorCode::BadInput, "the recording does not begin with what it is of");
-  ASSIGN_OR_RETURN(RecordedMessage first, decode_recorded(found.kind, message.data));
+  ASSIGN_OR_RETURN(RecordedMessage first, decode_recorded(found.kind, message->data));
   start = std::get<RecordingStart>(std::move(first));
   if (start.version != kRecordingVersion)
     return make_error(ErrorCode::Unsupported,
@@ -184,12 +177,9 @@ Status RecordingReader::State::read_asset() {
   const Error missing =
       make_error(ErrorCode::BadInput, "the recording was cut off before its hair was in it");
   if (frames_.chunks.empty()) return missing;
-  ASSIGN_OR_RETURN(const LoadedChunk chunk, load_chunk(*source_, frames_.chunks.front()));
-  ASSIGN_OR_RETURN(const mcap::Record record, mcap::read_record(chunk.records));
-  if (record.opcode != mcap::Opcode::Message) return missing;
-  ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record.content));
-  if (use(message.channel_id).role != ChannelRole::Asset) return missing;
-  ASSIGN_OR_RETURN(const auto media, decode_media(message.data));
+  ASSIGN_OR_RETURN(const auto message, first_message(frames_.chunks.front()));
+  if (!message || uses_.of(message->channel_id).role != ChannelRole::Asset) return missing;
+  ASSIGN_OR_RETURN(const auto media, decode_media(message->data));
   ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(media));
   if (header.opcode != strandcast::Opcode::Asset) return missing;
   if (hash_bytes(media.subspan(kFrameHeaderBytes)) != start.asset_hash)
@@ -199,6 +189,20 @@ Status RecordingReader::State::read_asset() {
   return {};
 }
 
+Result<RecordedFrame> RecordingReader::State::frame_of(const ChunkItem& item) const {
+  auto media = item.bytes;
+  if (!uses_.of(item.channel).has_many_in_one) {
+    ASSIGN_OR_RETURN(media, decode_media(item.bytes));
+  }
+  ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(media));
+  const bool is_keyframe = header.opcode == strandcast::Opcode::StrandKeyframe;
+  if (!is_keyframe && header.opcode != strandcast::Opcode::StrandDelta)
+    return make_error(ErrorCode::BadInput, "a frame has the opcode 0x{:02x}, it is none of strands",
+                      static_cast<int>(header.opcode));
+  return RecordedFrame{std::make_shared<const EncodedFrame>(
+      EncodedFrame{header, std::vector<std::byte>(media.begin(), media.end())})};
+}
+
 /// Of the last frame that can be read, as far as the last chunk says.
 void RecordingReader::State::find_last_time() {
   if (!keyframes_.empty()) info.first_sim_time_ns = keyframes_.front().sim_time_ns;
@@ -206,58 +210,69 @@ void RecordingReader::State::find_last_time() {
   if (frames_.chunks.size() < 2) return;
   const auto chunk = load_chunk(*source_, frames_.chunks.back());
   if (!chunk) return;
-  auto rest = std::span<const std::byte>(chunk->records);
-  while (!rest.empty()) {
-    const auto record = mcap::read_record(rest);
-    if (!record) return;
-    rest = rest.subspan(record->size_bytes);
-    const auto message = mcap::read_message(record->content);
-    if (record->opcode == mcap::Opcode::Message && message)
-      info.last_sim_time_ns = std::max(info.last_sim_time_ns, static_cast<int64_t>(message->publish_time));
+  const ChunkItems found = items_of(chunk->records, uses_);
+  for (const ChunkItem& item : found.items)
+    if (const auto last = frame_of(item))
+      info.last_sim_time_ns = std::max(info.last_sim_time_ns, last->frame->header.sim_time_ns);
+}
+
+void RecordingReader::State::count(const ChunkPlace& place, RecordingContents& contents) const {
+  const auto chunk = load_chunk(*source_, place);
+  if (!chunk) return;
+  const ChunkItems found = items_of(chunk->records, uses_);
+  double all_bytes = 0.0;
+  for (const ChunkItem& item : found.items) all_bytes += static_cast<double>(item.bytes.size());
+  std::map<uint16_t, RecordedTopic> plain;
+  for (const ChunkItem& item : found.items) {
+    ++plain[item.channel].items;
+    plain[item.channel].bytes += item.bytes.size();
+  }
+  for (const auto& [channel, part] : plain) {
+    const auto topic = topics_.find(channel);
+    RecordedTopic& counted = contents[topic != topics_.end() ? topic->second : "?"];
+    counted.items += part.items;
+    const double share = static_cast<double>(part.bytes) / std::max(1.0, all_bytes);
+    counted.bytes += static_cast<uint64_t>(share * static_cast<double>(place.size_bytes));
   }
 }
 
-Result<std::optional<RecordedItem>> RecordingReader::State::item_of(const mcap::Message& message) const {
-  const ChannelUse found = use(message.channel_id);
-  const int64_t time_ns = server_time(message.log_time);
+RecordingContents RecordingReader::State::contents() const {
+  RecordingContents contents;
+  for (const ChunkPlace& place : frames_.chunks) count(place, contents);
+  for (const ChunkPlace& place : messages_.chunks) count(place, contents);
+  return contents;
+}
+
+Result<std::optional<RecordedItem>> RecordingReader::State::item_of(const ChunkItem& item) const {
+  const ChannelUse found = uses_.of(item.channel);
+  const int64_t time_ns = server_time(item.log_time);
   if (found.role == ChannelRole::Message) {
     if (part_ == RecordedPart::Frames || found.kind == 0) return std::optional<RecordedItem>();
-    ASSIGN_OR_RETURN(RecordedMessage decoded, decode_recorded(found.kind, message.data));
+    ASSIGN_OR_RETURN(RecordedMessage decoded, decode_recorded(found.kind, item.bytes));
     return std::optional(RecordedItem{time_ns, std::move(decoded)});
   }
   if (part_ == RecordedPart::Messages || !is_media(found.role) || found.role == ChannelRole::Asset)
     return std::optional<RecordedItem>();
-  ASSIGN_OR_RETURN(const auto media, decode_media(message.data));
-  ASSIGN_OR_RETURN(const FrameHeader header, unpack_frame_header(media));
-  const bool is_keyframe = header.opcode == strandcast::Opcode::StrandKeyframe;
-  if (!is_keyframe && header.opcode != strandcast::Opcode::StrandDelta)
-    return make_error(ErrorCode::BadInput, "a frame has the opcode 0x{:02x}, it is none of strands",
-                      static_cast<int>(header.opcode));
-  return std::optional(
-      RecordedItem{time_ns, RecordedFrame{std::make_shared<const EncodedFrame>(
-                                EncodedFrame{header, std::vector<std::byte>(media.begin(), media.end())})}});
+  ASSIGN_OR_RETURN(RecordedFrame frame, frame_of(item));
+  return std::optional(RecordedItem{time_ns, std::move(frame)});
 }
 
 /// The next item of a lane, if one is left. After an error it goes on behind what is damaged.
 Status RecordingReader::State::fill(Lane& lane) {
   while (!lane.item) {
-    if (!lane.has_record()) {
-      if (lane.next_chunk >= lane.chunks.size()) return {};
-      lane.records.clear();
-      lane.offset = 0;
-      ASSIGN_OR_RETURN(LoadedChunk chunk, load_chunk(*source_, lane.chunks[lane.next_chunk++]));
-      lane.records = std::move(chunk.records);
+    if (lane.next_item < lane.found.items.size()) {
+      const ChunkItem& item = lane.found.items[lane.next_item++];
+      lane.order = item.order;
+      ASSIGN_OR_RETURN(lane.item, item_of(item));
       continue;
     }
-    const auto record = mcap::read_record(std::span<const std::byte>(lane.records).subspan(lane.offset));
-    if (!record) {
-      lane.offset = lane.records.size();
-      return record.error();
-    }
-    lane.offset += record->size_bytes;
-    if (record->opcode != mcap::Opcode::Message) continue;
-    ASSIGN_OR_RETURN(const mcap::Message message, mcap::read_message(record->content));
-    ASSIGN_OR_RETURN(lane.item, item_of(message));
+    if (lane.found.error) return *std::exchange(lane.found.error, std::nullopt);
+    if (lane.next_chunk >= lane.chunks.size()) return {};
+    lane.found = {};
+    lane.next_item = 0;
+    ASSIGN_OR_RETURN(LoadedChunk chunk, load_chunk(*source_, lane.chunks[lane.next_chunk++]));
+    lane.records = std::move(chunk.records);
+    lane.found = items_of(lane.records, uses_);
   }
   return {};
 }
@@ -266,8 +281,7 @@ Result<std::optional<RecordedItem>> RecordingReader::State::next() {
   if (part_ != RecordedPart::Messages) RETURN_IF_ERROR(fill(frames_));
   if (part_ != RecordedPart::Frames) RETURN_IF_ERROR(fill(messages_));
   if (!frames_.item && !messages_.item) return std::optional<RecordedItem>();
-  const bool is_message =
-      messages_.item && (!frames_.item || messages_.item->time_ns <= frames_.item->time_ns);
+  const bool is_message = messages_.item && (!frames_.item || is_before(messages_.order, frames_.order));
   return std::exchange((is_message ? messages_ : frames_).item, std::nullopt);
 }
 
@@ -291,7 +305,7 @@ Status RecordingReader::State::seek(int64_t sim_time_ns) {
   while (true) {
     // What is damaged is passed over.
     if (!fill(messages_) || !messages_.item) return {};
-    if (messages_.item->time_ns >= server_time(place->log_time)) return {};
+    if (!is_before(messages_.order, place->order)) return {};
     messages_.item.reset();
   }
 }
@@ -325,6 +339,9 @@ const EncodedFramePtr& RecordingReader::asset_frame() const {
 }
 Result<SceneAsset> RecordingReader::asset() const {
   return decode_scene_asset(std::span<const std::byte>(state_->asset->message).subspan(kFrameHeaderBytes));
+}
+RecordingContents RecordingReader::contents() const {
+  return state_->contents();
 }
 Result<std::optional<RecordedItem>> RecordingReader::next() {
   return state_->next();

@@ -28,7 +28,7 @@ struct RecordedFrame {
 };
 
 struct RecordedItem {
-  int64_t time_ns = 0;  // server clock when the recorder got it
+  int64_t time_ns = 0;  // server clock, about when the recorder got it
   std::variant<RecordedFrame, RecordedMessage> what;
 };
 
@@ -46,14 +46,17 @@ struct RecordingInfo {
   uint64_t cut_bytes = 0;     // at the end, of a chunk that was not written whole
   std::string index_trouble;  // why an index that is there was not used; empty = all is well
   uint64_t chunk_count = 0;
-  uint64_t frame_bytes = 0;    // of chunks with strands
-  uint64_t message_bytes = 0;  // of the others, compressed
   int64_t first_sim_time_ns = 0;
-  int64_t last_sim_time_ns = 0;                    // of the strands
-  uint64_t frame_count = 0;                        // where the index knows it, else 0
-  std::map<std::string, uint64_t> message_counts;  // by topic, likewise
+  int64_t last_sim_time_ns = 0;               // of the strands
   std::vector<int64_t> keyframe_sim_time_ns;  // in the order of the file; never decreasing in a sound one
 };
+
+/// What all chunks that can be read hold.
+struct RecordedTopic {
+  uint64_t items = 0;
+  uint64_t bytes = 0;  // of the file; of a chunk with several topics by their share before it was compressed
+};
+using RecordingContents = std::map<std::string, RecordedTopic>;
 
 class RecordingReader {
  public:
@@ -74,8 +77,11 @@ class RecordingReader {
   /// The same, decoded. Its payload's hash is checked against start().asset_hash.
   Result<SceneAsset> asset() const;
 
-  /// The next item, by the time when it was recorded; nothing at the end. RecordingStart and the asset are
-  /// not among them. An error is that of one damaged chunk, or one message in it; the call after goes on
+  /// Reads all of the file; next() goes on where it was.
+  RecordingContents contents() const;
+
+  /// The next item, in the order in which it was recorded; nothing at the end. RecordingStart and the asset
+  /// are not among them. An error is that of one damaged chunk, or one message in it; the call after goes on
   /// behind it.
   Result<std::optional<RecordedItem>> next();
 

@@ -17,28 +17,31 @@ std::string topic_of(uint16_t channel) {
   return recorded_kinds()[channel - 1].topic;
 }
 
-uint64_t count_messages(const mcap::ChunkBody& body) {
-  uint64_t count = 0;
-  for (const auto& [channel, entries] : body.index) count += entries.size();
-  return count;
-}
-
 }  // namespace
 
+bool has_many_in_one(uint16_t channel) {
+  if (channel == 0 || channel >= kAssetChannel) return channel == kDeltaChannel;
+  return recorded_kinds()[channel - 1].has_many_in_one;
+}
+
+/// Asset and keyframes share a schema, and deltas have one of their own.
 std::vector<mcap::Channel> recording_channels() {
   std::vector<mcap::Channel> channels;
-  for (uint16_t id = 1; id <= kDeltaChannel; ++id)
-    channels.push_back({id, std::min(id, kAssetChannel), topic_of(id)});
+  for (uint16_t id = 1; id <= kDeltaChannel; ++id) {
+    const uint16_t schema = id == kDeltaChannel ? kKeyframeChannel : std::min(id, kAssetChannel);
+    channels.push_back({id, schema, topic_of(id)});
+  }
   return channels;
 }
 
-/// One per kind of message, and one that asset, keyframes and deltas share.
 std::vector<mcap::Schema> recording_schemas() {
   std::vector<mcap::Schema> schemas;
-  for (const RecordedKind& kind : recorded_kinds())
-    schemas.push_back(
-        {static_cast<uint16_t>(schemas.size() + 1), kind.schema, message_descriptors(kind.schema)});
-  schemas.push_back({kAssetChannel, kMediaSchema, message_descriptors(kMediaSchema)});
+  const auto add = [&](const std::string& name) {
+    schemas.push_back({static_cast<uint16_t>(schemas.size() + 1), name, message_descriptors(name)});
+  };
+  for (const RecordedKind& kind : recorded_kinds()) add(kind.schema);
+  add(kMediaSchema);
+  add(kManyMediaSchema);
   return schemas;
 }
 
@@ -46,12 +49,10 @@ RecordingWriter::RecordingWriter(mcap::ByteSink& sink, RecordingStart start, con
     : start_(std::move(start)),
       file_(sink, {kRecordingProfile, fmt::format("strandcast {}", version())}, recording_schemas(),
             recording_channels()),
-      sequences_(kDeltaChannel + 1, 0),
       newest_ns_(start_.server_time_ns) {
   add(start_.server_time_ns, 0, start_);
   close_messages();
-  const mcap::Bytes media = encode_media(asset.message);
-  put(frames_, {kAssetChannel, 0, log_time(start_.server_time_ns), 0, media});
+  put(frames_, {kAssetChannel, start_.server_time_ns, 0}, encode_media(asset.message));
   close_frames();
 }
 
@@ -61,35 +62,56 @@ uint64_t RecordingWriter::log_time(int64_t time_ns) const {
          static_cast<uint64_t>(start_.unix_time_ns);
 }
 
-void RecordingWriter::put(mcap::ChunkBody& body, mcap::Message message) {
-  message.sequence = ++sequences_[message.channel_id];
-  body.add(message);
+void RecordingWriter::put(Part& part, const Item& item, const mcap::Bytes& message) {
+  newest_ns_ = std::max(newest_ns_, item.time_ns);
+  const uint64_t time_ns = log_time(newest_ns_);
+  ++part.item_count;
+  part.size_bytes += message.size();
+  ++order_;
+  if (!has_many_in_one(item.channel))
+    return part.body.add({item.channel, order_, time_ns, static_cast<uint64_t>(item.sim_time_ns), message});
+  if (part.batches.empty()) part.first_sim_ns = item.sim_time_ns;
+  part.batches[item.channel].add(message, order_, time_ns);
+}
+
+/// False when there was no room.
+bool RecordingWriter::close(Part& part, bool is_vital) {
+  mcap::ChunkBody& body = part.body;
+  for (const auto& [channel, batch] : part.batches) {
+    const mcap::Bytes bytes = batch.encode();
+    body.add({channel, batch.first_order(), batch.first_time_ns(), static_cast<uint64_t>(part.first_sim_ns),
+              bytes});
+  }
+  mcap::Bytes compressed;
+  // Asset and keyframes are as small as they get; of deltas it takes what all of them say alike.
+  const bool is_coded_already = part.batches.empty() && !is_vital;
+  if (!is_coded_already) compressor_.append(body.records, kCompressionLevel, compressed);
+  const bool is_smaller = !is_coded_already && compressed.size() < body.records.size();
+  return file_.write(body, is_smaller ? compressed : body.records, is_smaller ? "zstd" : "", is_vital);
 }
 
 void RecordingWriter::add(int64_t time_ns, int64_t sim_time_ns, const RecordedMessage& message) {
-  newest_ns_ = std::max(newest_ns_, time_ns);
   newest_sim_ns_ = std::max(newest_sim_ns_, sim_time_ns);
-  const mcap::Bytes bytes = encode(message);
-  put(messages_, {static_cast<uint16_t>(message.index() + 1), 0, log_time(newest_ns_),
-                  static_cast<uint64_t>(sim_time_ns), bytes});
-  if (messages_.records.size() >= kChunkBytes) close_messages();
+  put(messages_, {static_cast<uint16_t>(message.index() + 1), time_ns, sim_time_ns}, encode(message));
+  if (messages_.size_bytes >= kChunkBytes || messages_.item_count == kMaxBatchItems) close_messages();
 }
 
 void RecordingWriter::add(int64_t time_ns, const EncodedFrame& frame) {
-  newest_ns_ = std::max(newest_ns_, time_ns);
   const bool is_keyframe = frame.header.opcode == Opcode::StrandKeyframe;
-  if (is_keyframe) close_frames();
-  const mcap::Bytes media = encode_media(frame.message);
-  put(frames_, {is_keyframe ? kKeyframeChannel : kDeltaChannel, 0, log_time(newest_ns_),
-                static_cast<uint64_t>(frame.header.sim_time_ns), media});
-  if (frames_.records.size() >= kChunkBytes) close_frames();
+  if (is_keyframe) {
+    close_frames();
+    put(frames_, {kKeyframeChannel, time_ns, frame.header.sim_time_ns}, encode_media(frame.message));
+    return close_frames();
+  }
+  put(frames_, {kDeltaChannel, time_ns, frame.header.sim_time_ns}, frame.message);
+  if (frames_.size_bytes >= kChunkBytes || frames_.item_count == kMaxBatchItems) close_frames();
 }
 
 void RecordingWriter::close_frames() {
-  const mcap::ChunkBody body = std::exchange(frames_, {});
-  if (body.is_empty() || file_.write(body, body.records, "", false)) return;
-  lost_here_.frames += count_messages(body);
-  lost_here_.bytes += body.records.size();
+  Part part = std::exchange(frames_, {});
+  if (part.item_count == 0 || close(part, false)) return;
+  lost_here_.frames += part.item_count;
+  lost_here_.bytes += part.size_bytes;
 }
 
 void RecordingWriter::close_messages() {
@@ -99,16 +121,14 @@ void RecordingWriter::close_messages() {
     const RecordedLoss since{all.frames - told_.frames, all.messages - told_.messages,
                              all.bytes - told_.bytes};
     told_ = all;
-    add(newest_ns_, newest_sim_ns_, since);
+    const RecordedMessage message = since;
+    put(messages_, {static_cast<uint16_t>(message.index() + 1), newest_ns_, newest_sim_ns_}, encode(message));
   }
-  const mcap::ChunkBody body = std::exchange(messages_, {});
-  if (body.is_empty()) return;
-  mcap::Bytes compressed;
-  compressor_.append(body.records, kCompressionLevel, compressed);
-  if (file_.write(body, compressed, "zstd", true)) return;
+  Part part = std::exchange(messages_, {});
+  if (part.item_count == 0 || close(part, true)) return;
   told_ = told_before;
-  lost_here_.messages += count_messages(body);
-  lost_here_.bytes += body.records.size();
+  lost_here_.messages += part.item_count;
+  lost_here_.bytes += part.size_bytes;
 }
 
 RecordedLoss RecordingWriter::lost() const {

@@ -1,14 +1,17 @@
-// RecordingWriter: puts what happens on a server into the chunks of a recording: strands as they are, all
-// else compressed. A keyframe begins a chunk, so that whoever looks for one reads no other. One thread.
+// RecordingWriter: puts what happens on a server into the chunks of a recording: what comes often several in
+// one message, compressed where that takes fewer bytes. A keyframe is a chunk of its own, as it is, so that
+// whoever looks for one reads no other. One thread.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 
 #include "common/record/mcap_writer.h"
 #include "common/record/recording_layout.h"
 #include "common/strands/frame_header.h"
 #include "common/strands/zstd_block.h"
+#include "common/wire/record_batch.h"
 #include "common/wire/recording_messages.h"
 
 namespace strandcast {
@@ -34,20 +37,35 @@ class RecordingWriter {
   RecordedLoss lost() const;
 
  private:
+  /// What becomes a chunk.
+  struct Part {
+    mcap::ChunkBody body;
+    std::map<uint16_t, RecordBatch> batches;  // by channel: of what comes often
+    int64_t first_sim_ns = 0;                 // of what is in them
+    uint64_t item_count = 0;
+    size_t size_bytes = 0;
+  };
+  struct Item {
+    uint16_t channel = 0;
+    int64_t time_ns = 0;
+    int64_t sim_time_ns = 0;
+  };
+
   uint64_t log_time(int64_t time_ns) const;
-  void put(mcap::ChunkBody& body, mcap::Message message);
+  void put(Part& part, const Item& item, const mcap::Bytes& message);
+  bool close(Part& part, bool is_vital);
   void close_frames();
   void close_messages();
 
   const RecordingStart start_;
   mcap::McapWriter file_;
-  mcap::ChunkBody frames_;
-  mcap::ChunkBody messages_;
+  Part frames_;
+  Part messages_;
   ZstdCompressor compressor_;
   RecordedLoss lost_outside_;
   RecordedLoss lost_here_;
-  RecordedLoss told_;                // of what was lost, in the file
-  std::vector<uint32_t> sequences_;  // of the newest message, by channel
+  RecordedLoss told_;   // of what was lost, in the file
+  uint32_t order_ = 0;  // of the newest item
   int64_t newest_ns_ = 0;
   int64_t newest_sim_ns_ = 0;
 };

@@ -2,10 +2,12 @@
 
 #include <google/protobuf/descriptor.pb.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <set>
 #include <tuple>
+#include <vector>
 
 #include "common/wire/message_visitors_private.h"
 #include "common/wire/parse_message_private.h"
@@ -24,12 +26,12 @@ static_assert(std::tuple_size_v<Wires> == kKindCount);
 
 constexpr std::array<RecordedKind, kKindCount> kKinds{{
     {"/recording", "strandcast.v1.RecordingStart"},
-    {"/input/motion", "strandcast.v1.RecordedMotion"},
-    {"/input/wind", "strandcast.v1.RecordedWind"},
-    {"/steps", "strandcast.v1.RecordedStep"},
+    {"/input/motion", "strandcast.v1.RecordedMotions", true},
+    {"/input/wind", "strandcast.v1.RecordedWinds", true},
+    {"/steps", "strandcast.v1.RecordedSteps", true},
     {"/changes", "strandcast.v1.RecordedChange"},
     {"/stream", "strandcast.v1.RecordedStream"},
-    {"/states", "strandcast.v1.RecordedState"},
+    {"/states", "strandcast.v1.RecordedStates", true},
     {"/cameras", "strandcast.v1.RecordedCamera"},
     {"/losses", "strandcast.v1.RecordedLoss"},
     {"/look", "strandcast.v1.LookChange"},
@@ -75,11 +77,47 @@ Result<RecordedMessage> decode_one(size_t wanted, std::span<const std::byte> byt
   return kDecoders[wanted](bytes);
 }
 
-/// With those that it needs, each behind what it needs itself.
-void add_file(const pb::FileDescriptor& file, pb::FileDescriptorSet& set, std::set<std::string>& known) {
-  if (!known.insert(file.name()).second) return;
-  for (int i = 0; i < file.dependency_count(); ++i) add_file(*file.dependency(i), set, known);
-  file.CopyTo(set.add_file());
+/// The types at the top of their files that a message is made of.
+void add_types(const pb::Descriptor& type, std::set<const pb::Descriptor*>& types,
+               std::set<const pb::EnumDescriptor*>& enums) {
+  if (type.containing_type() != nullptr) return add_types(*type.containing_type(), types, enums);
+  if (!types.insert(&type).second) return;
+  std::vector<const pb::Descriptor*> open{&type};
+  while (!open.empty()) {
+    const pb::Descriptor& one = *open.back();
+    open.pop_back();
+    for (int i = 0; i < one.nested_type_count(); ++i) open.push_back(one.nested_type(i));
+    for (int i = 0; i < one.field_count(); ++i) {
+      if (const auto* message = one.field(i)->message_type()) add_types(*message, types, enums);
+      const auto* choice = one.field(i)->enum_type();
+      if (choice != nullptr && choice->containing_type() == nullptr) enums.insert(choice);
+      if (choice != nullptr && choice->containing_type() != nullptr)
+        add_types(*choice->containing_type(), types, enums);
+    }
+  }
+}
+
+/// A file with these types alone, behind those that it needs.
+void add_file(const pb::FileDescriptor& file, const std::set<const pb::Descriptor*>& types,
+              const std::set<const pb::EnumDescriptor*>& enums, pb::FileDescriptorSet& set) {
+  const auto is_known = [&](const pb::FileDescriptor& other) {
+    return std::any_of(set.file().begin(), set.file().end(),
+                       [&](const auto& known) { return known.name() == other.name(); });
+  };
+  if (is_known(file)) return;
+  for (int i = 0; i < file.dependency_count(); ++i) add_file(*file.dependency(i), types, enums, set);
+  pb::FileDescriptorProto part;
+  part.set_name(file.name());
+  part.set_package(file.package());
+  part.set_syntax("proto3");
+  for (int i = 0; i < file.message_type_count(); ++i)
+    if (types.count(file.message_type(i)) > 0) file.message_type(i)->CopyTo(part.add_message_type());
+  for (int i = 0; i < file.enum_type_count(); ++i)
+    if (enums.count(file.enum_type(i)) > 0) file.enum_type(i)->CopyTo(part.add_enum_type());
+  if (part.message_type_size() + part.enum_type_size() == 0) return;
+  for (int i = 0; i < file.dependency_count(); ++i)
+    if (is_known(*file.dependency(i))) part.add_dependency(file.dependency(i)->name());
+  *set.add_file() = std::move(part);
 }
 
 }  // namespace
@@ -92,9 +130,11 @@ std::vector<std::byte> message_descriptors(const std::string& schema) {
   v1::RecordingStart::descriptor();  // the file that knows all others is linked
   const auto* type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(schema);
   CHECK(type != nullptr);
+  std::set<const pb::Descriptor*> types;
+  std::set<const pb::EnumDescriptor*> enums;
+  add_types(*type, types, enums);
   pb::FileDescriptorSet set;
-  std::set<std::string> known;
-  add_file(*type->file(), set, known);
+  add_file(*type->file(), types, enums, set);
   return serialised(set);
 }
 

@@ -19,7 +19,7 @@
 
 namespace strandcast {
 
-inline constexpr uint32_t kRecordingVersion = 1;
+inline constexpr uint32_t kRecordingVersion = 2;
 inline constexpr size_t kMaxRecordedSceneBytes = kMaxSceneFileBytes;
 inline constexpr size_t kMaxRecordedMessageBytes = kMaxRecordedSceneBytes + (64u << 10);
 
@@ -116,15 +116,18 @@ using RecordedMessage =
 
 /// One kind of them, as its channel in the file says it.
 struct RecordedKind {
-  const char* topic;   // "/steps"
-  const char* schema;  // full name of the protobuf message
+  const char* topic;             // "/steps"
+  const char* schema;            // full name of the channel's protobuf message
+  bool has_many_in_one = false;  // that message is a RecordBatch of them
 };
 /// In the order of RecordedMessage.
 std::span<const RecordedKind> recorded_kinds();
-/// Of a protobuf message of ours by its full name: a FileDescriptorSet with all that it needs.
+/// Of a protobuf message of ours by its full name: a FileDescriptorSet with what it needs, and no more.
 std::vector<std::byte> message_descriptors(const std::string& schema);
 
 inline constexpr const char* kMediaSchema = "strandcast.v1.MediaMessage";
+/// A RecordBatch of what viewers get.
+inline constexpr const char* kManyMediaSchema = "strandcast.v1.MediaMessages";
 /// What a viewer gets (header and payload) as a MediaMessage, and out of one: a view into it.
 std::vector<std::byte> encode_media(std::span<const std::byte> message);
 Result<std::span<const std::byte>> decode_media(std::span<const std::byte> bytes);

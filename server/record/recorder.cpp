@@ -190,6 +190,7 @@ void Recorder::write(const Item& item) {
     const Snapshot& snapshot = **state;
     sim_time_ns_ = snapshot.sim_time_ns;
     last_tick_ = snapshot.tick;
+    vertex_count_ = snapshot.plane_size();
     writer_->add(item.time_ns, sim_time_ns_,
                  RecordedState{snapshot.tick, snapshot.sim_time_ns, state_hash(snapshot)});
     const std::lock_guard lock(mutex_);
@@ -211,14 +212,20 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
   if (is_keyframe) {
     is_chain_broken_ = false;
     keyframe_sim_ns_ = header.sim_time_ns;
+    vertices_since_keyframe_ = 0;
     // Whoever begins here knows how it looks.
     writer_->add(time_ns, header.sim_time_ns, hub_->look());
-  } else if (keyframe_sim_ns_ != kNever && header.sim_time_ns - keyframe_sim_ns_ >= kRecordKeyframeNs) {
+  } else if (vertices_since_keyframe_ += vertex_count_; is_keyframe_due(header)) {
     keyframe_sim_ns_ = kNever;
     hub_->request_keyframe(stream_id_);
   }
   if (is_chain_broken_) return;
   held_frame_ = Item{time_ns, frame};
+}
+
+bool Recorder::is_keyframe_due(const FrameHeader& delta) const {
+  if (keyframe_sim_ns_ == kNever || delta.sim_time_ns - keyframe_sim_ns_ < kRecordKeyframeNs) return false;
+  return static_cast<double>(vertices_since_keyframe_) * kRecordDecodeNsPerVertex * kMsPerNs >= kRecordSeekMs;
 }
 
 void Recorder::write_held_frame() {

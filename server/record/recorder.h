@@ -26,8 +26,12 @@ namespace strandcast {
 inline constexpr uint64_t kMaxRecorderBytes = 64u << 20;
 inline constexpr size_t kMaxRecorderItems = 1u << 16;
 inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
-/// A keyframe is recorded so often, in time of the simulation: what may have to be decoded to see a moment.
+/// Keyframes are so far apart at least, in time of the simulation, and no farther than that what may have to
+/// be decoded to see a moment takes about kRecordSeekMs: one takes as many bytes as many seconds of deltas.
 inline constexpr int64_t kRecordKeyframeNs = 2'000'000'000;
+inline constexpr double kRecordSeekMs = 150.0;
+/// Of processor time, by "step" with dftl, which is the dearest; scrub_bench says what it is.
+inline constexpr double kRecordDecodeNsPerVertex = 35.0;
 
 struct RecordConfig {
   std::filesystem::path path;
@@ -93,6 +97,7 @@ class Recorder : public StreamReader, public StepTap {
   void write(const Item& item);
   void write_frame(int64_t time_ns, const EncodedFramePtr& frame);
   void write_held_frame();
+  bool is_keyframe_due(const FrameHeader& delta) const;
   void watch_losses();
   void end_early();
   std::string summary() const;
@@ -124,6 +129,8 @@ class Recorder : public StreamReader, public StepTap {
   uint64_t known_lost_frames_ = 0;
   bool is_chain_broken_ = true;
   int64_t keyframe_sim_ns_ = 0;
+  uint64_t vertices_since_keyframe_ = 0;  // of all deltas
+  uint64_t vertex_count_ = 0;             // of the newest state
   int64_t sim_time_ns_ = 0;
   uint64_t last_tick_ = 0;
 

@@ -30,9 +30,9 @@ struct MadeState {
 class ReplayScript : public StepScript, public StateSink {
  public:
   ReplayScript(RecordingReader& reader, const ReplayConfig& config) : reader_(reader), config_(config) {
-    const auto& counts = reader.info().message_counts;
-    const auto states = counts.find(kStatesTopic);
-    progress_.recorded = states != counts.end() ? states->second : 0;
+    const RecordingContents contents = reader.contents();
+    const auto states = contents.find(kStatesTopic);
+    progress_.recorded = states != contents.end() ? states->second.items : 0;
   }
 
   // On the simulation thread.

@@ -19,7 +19,7 @@ enum class ReplayPace { AsFastAsItGoes, RealTime };
 
 struct ReplayProgress {
   uint64_t compared = 0;
-  uint64_t recorded = 0;  // states in the file, as far as its index knows; else 0
+  uint64_t recorded = 0;  // states in the file
   uint64_t tick = 0;
 };
 

@@ -46,7 +46,7 @@ said index "$work/whole.mcap" >"$work/index.json"
 said stream "$work/whole.mcap" >"$work/whole.json"
 holds "$work/whole.json" "the recovered file as a stream" "it.isDone && it.bytesLeft === 0"
 holds "$work/index.json" "the recovered file by its index" \
-  "it.profile === 'strandcast' && Object.entries(it.topics).every(([topic, count]) => it.counted[topic] === count)"
+  "it.profile === 'strandcast' && Object.entries(it.messages).every(([topic, count]) => it.counted[topic] === count)"
 cat "$work/stream.json" "$work/index.json" | "$node" -e "
   const [stream, index] = require('fs').readFileSync(0, 'utf8').trim().split('\n').map(JSON.parse);
   const same = JSON.stringify(Object.entries(stream.topics).sort()) === JSON.stringify(Object.entries(index.topics).sort());

@@ -12,7 +12,8 @@ const decompressHandlers = { zstd: (data, size) => decompress(data, new Uint8Arr
 class Contents {
   schemas = new Map();
   channels = new Map();
-  topics = {};
+  topics = {}; // items
+  messages = {};
   ticks = [];
   frames = [];
 
@@ -26,9 +27,14 @@ class Contents {
   addMessage(message) {
     const channel = this.channels.get(message.channelId);
     const decoded = this.schemas.get(channel.schemaId).decode(message.data);
-    this.topics[channel.topic] = (this.topics[channel.topic] ?? 0) + 1;
-    if (channel.topic === "/states") this.ticks.push(Number(decoded.tick));
-    if (channel.topic.startsWith("/strands/")) this.frames.push(decoded.message[0]);
+    const items = decoded.items ?? [decoded];
+    // Every item of a message has its place.
+    if (decoded.items && decoded.order_steps?.length !== items.length) throw new Error(`${channel.topic} lacks orders`);
+    this.messages[channel.topic] = (this.messages[channel.topic] ?? 0) + 1;
+    this.topics[channel.topic] = (this.topics[channel.topic] ?? 0) + items.length;
+    if (channel.topic === "/states") this.ticks.push(...items.map((state) => Number(state.tick)));
+    if (channel.topic === "/strands/keyframes") this.frames.push(decoded.message[0]);
+    if (channel.topic === "/strands/deltas") this.frames.push(...items.map((frame) => frame[0]));
   }
   add(record) {
     if (record.type === "Schema" && !this.schemas.has(record.id)) this.addSchema(record);
@@ -79,5 +85,5 @@ const read = await (way === "stream" ? readStream(path) : readIndex(path));
 const { contents, ...rest } = read;
 const isOrdered = contents.ticks.every((tick, i) => i === 0 || tick >= contents.ticks[i - 1]);
 console.log(
-  JSON.stringify({ ...rest, topics: contents.topics, states: contents.ticks.length, isOrdered, firstFrame: contents.frames[0] }),
+  JSON.stringify({ ...rest, topics: contents.topics, messages: contents.messages, states: contents.ticks.length, isOrdered, firstFrame: contents.frames[0], frames: contents.frames.length }),
 );
