@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "common/groom/groom.h"
 #include "common/strands/scene_asset.h"
 
 namespace strandcast {
