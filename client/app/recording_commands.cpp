@@ -34,7 +34,7 @@ std::string state_text(const RecordingInfo& info) {
   if (!info.index_trouble.empty())
     return fmt::format("damaged index ({}); strandcast-ctl recover makes it whole", info.index_trouble);
   if (info.is_indexed) return "whole, with its index";
-  return fmt::format("cut off{}; strandcast-ctl recover makes it whole",
+  return fmt::format("cut off{}, or still being written; strandcast-ctl recover makes it whole",
                      info.cut_bytes > 0 ? fmt::format(" with {} bytes of a chunk that is not", info.cut_bytes)
                                         : std::string());
 }
