@@ -213,6 +213,8 @@ struct StreamDesc {
 
 using GroomDesc = std::variant<ProceduralGroomDesc, FileGroomDesc>;
 
+inline constexpr size_t kMaxHeads = 8;  // of one scene, the scene's own among them
+
 struct SceneDesc {
   std::string name = "default";
   GroomDesc groom;
@@ -235,6 +237,9 @@ struct SceneDesc {
   LookDesc look;
   CameraDesc camera;
   StreamDesc stream;
+  glm::dvec3 place_m{0.0};  // of the head: added to where its source says that it is, world
+  // Further heads, at most kMaxHeads - 1: whole scenes with names of their own, without heads.
+  std::vector<SceneDesc> heads = {};
 
   bool operator==(const SceneDesc&) const = default;
 };

@@ -87,6 +87,7 @@ inline constexpr Range kCuticleSpread{0.0, 30.0, "degrees"};
 inline constexpr Range kExposure{0.0, 100.0, ""};
 inline constexpr Range kDirection{-1e3, 1e3, ""};
 inline constexpr Range kCameraOffset{-100.0, 100.0, "m"};
+inline constexpr Range kHeadPlace{-1000.0, 1000.0, "m"};
 inline constexpr Range kFieldOfView{0.02, 2.8, "rad"};
 inline constexpr Range kStreamBound{2e-5, 5e-4, "m"};
 inline constexpr Range kFrameWidth{kMinPictureSide, kMaxPictureWidth, "pixels"};
@@ -300,6 +301,14 @@ void visit_live(Visitor& v, LiveDesc& live) {
   v.number("max_datagram_bytes", live.max_datagram_bytes, kDatagramSize);
 }
 
+/// Whether each head of a scene is called otherwise than all others.
+inline bool have_own_names(const SceneDesc& scene) {
+  std::vector<std::string> names = {scene.name};
+  for (const SceneDesc& head : scene.heads) names.push_back(head.name);
+  std::sort(names.begin(), names.end());
+  return std::adjacent_find(names.begin(), names.end()) == names.end();
+}
+
 /// Shows every field of `scene` to the visitor, in the order of scene.proto.
 template <class Visitor>
 void visit_scene(Visitor& v, SceneDesc& scene) {
@@ -390,6 +399,10 @@ void visit_scene(Visitor& v, SceneDesc& scene) {
   if (has_target && !scene.target_groom) scene.target_groom.emplace();
   if (has_target) v.group("target_groom", [&] { visit_groom(v, *scene.target_groom); });
   v.repeated("live", scene.live, kMaxLiveInputs, [&](LiveDesc& live) { visit_live(v, live); });
+  if (v.chooses("place_m", scene.place_m != glm::dvec3(0.0))) v.vector("place_m", scene.place_m, kHeadPlace);
+  v.repeated("heads", scene.heads, kMaxHeads - 1, [&](SceneDesc& head) { visit_scene(v, head); });
+  v.require("heads", have_own_names(scene),
+            "need a name each that no other head of the scene has: heads { name: \"ben\" .. }");
 }
 
 }  // namespace strandcast::scene_fields

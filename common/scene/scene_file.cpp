@@ -317,21 +317,59 @@ v1::Scene to_message(const SceneDesc& scene) {
 
 /// A groom from a file comes with a style, and keeps it: its shape carries all of its weight, unless the
 /// scene of that file or an override says otherwise. What a scene says of grown hair is not said of a file's.
-void keep_style(v1::Scene& message, bool had_file, const std::vector<std::string>& overrides) {
+/// `place`: in front of the head's fields in overrides.
+void keep_style(v1::Scene& message, bool had_file, const std::vector<std::string>& overrides,
+                const std::string& place = {}) {
   constexpr const char* kSagFree = "sag_free";
   if (!message.groom().has_file()) return;
-  const bool is_told = std::any_of(overrides.begin(), overrides.end(), [](const std::string& given) {
-    return given.starts_with("solver.parameters.sag_free=");
+  const bool is_told = std::any_of(overrides.begin(), overrides.end(), [&](const std::string& given) {
+    return given.starts_with(place + "solver.parameters.sag_free=");
   });
   auto& parameters = *message.mutable_solver()->mutable_parameters();
   if (is_told || (had_file && parameters.contains(kSagFree))) return;
   parameters[kSagFree] = 1.0;
 }
 
+/// What a further head inherits of its scene: all but what is the scene's own head's. What holds of some hair
+/// or some mesh alone, and lists, a head states whole or not at all.
+v1::Scene inherited(const v1::Scene& scene, const v1::Scene& head) {
+  v1::Scene all = scene;
+  all.clear_heads();
+  all.clear_name();
+  all.clear_live();
+  all.clear_place_m();
+  if (head.has_groom()) all.clear_groom();
+  if (head.has_target_groom()) all.clear_target_groom();
+  if (head.has_head()) all.clear_head();
+  if (head.has_solver()) all.clear_solver();
+  if (head.has_body()) all.clear_body();
+  if (head.colliders_size() > 0) all.clear_colliders();
+  return all;
+}
+
+/// Makes a whole scene of each further head. `had_file`: the scene had a groom file before the overrides.
+Status complete_heads(v1::Scene& scene, bool had_file, const std::string& place,
+                      const std::vector<std::string>& overrides) {
+  if (scene.heads_size() >= static_cast<int>(kMaxHeads)) return {};  // the reader says so
+  for (int i = 0; i < scene.heads_size(); ++i) {
+    v1::Scene& head = *scene.mutable_heads(i);
+    if (head.heads_size() > 0)
+      return at(place, make_error(ErrorCode::BadInput,
+                                  "heads.{0}.heads: a further head has none itself, list all in heads", i));
+    const bool has_file = head.has_groom() ? head.groom().has_file() : had_file;
+    v1::Scene whole = inherited(scene, head);
+    whole.MergeFrom(head);
+    head = std::move(whole);
+    keep_style(head, has_file, overrides, fmt::format("heads.{}.", i));
+  }
+  return {};
+}
+
 Result<SceneDesc> from_message(v1::Scene& message, const pb::TextFormat::ParseInfoTree* tree,
                                const std::string& place, const std::vector<std::string>& overrides) {
   const bool had_file = message.groom().has_file();
   for (const std::string& assignment : overrides) RETURN_IF_ERROR(apply_override(message, assignment));
+  RETURN_IF_ERROR(complete_heads(message, had_file, place, overrides));
   keep_style(message, had_file, overrides);
   Reader reader(message, tree, {place, &overrides});
   SceneDesc scene;
@@ -350,6 +388,15 @@ void resolve(v1::Groom& groom, const std::filesystem::path& folder) {
   for (std::string& path : *groom.mutable_file()->mutable_more_paths()) resolve(path, folder);
 }
 
+void resolve(v1::Scene& scene, const std::filesystem::path& folder) {
+  if (scene.has_groom()) resolve(*scene.mutable_groom(), folder);
+  if (scene.has_target_groom()) resolve(*scene.mutable_target_groom(), folder);
+  if (scene.head().has_mesh_path()) resolve(*scene.mutable_head()->mutable_mesh_path(), folder);
+  if (scene.has_head())
+    for (std::string& path : *scene.mutable_head()->mutable_more_mesh_paths()) resolve(path, folder);
+  for (v1::Scene& head : *scene.mutable_heads()) resolve(head, folder);
+}
+
 Result<SceneDesc> parse(const std::string& text, const std::string& place,
                         const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
   if (text.size() > kMaxSceneFileBytes)
@@ -364,11 +411,7 @@ Result<SceneDesc> parse(const std::string& text, const std::string& place,
   parser.SetRecursionLimit(kMaxNesting);
   if (!parser.ParseFromString(text, &message)) return errors.error(place);
   // Before the overrides: a path typed on the command line starts at the current folder, as everywhere else.
-  if (message.has_groom()) resolve(*message.mutable_groom(), folder);
-  if (message.has_target_groom()) resolve(*message.mutable_target_groom(), folder);
-  if (message.head().has_mesh_path()) resolve(*message.mutable_head()->mutable_mesh_path(), folder);
-  if (message.has_head())
-    for (std::string& path : *message.mutable_head()->mutable_more_mesh_paths()) resolve(path, folder);
+  resolve(message, folder);
   return from_message(message, &tree, place, overrides);
 }
 
@@ -416,6 +459,7 @@ SceneDesc with_absolute_paths(SceneDesc scene) {
   };
   complete_groom(scene.groom);
   if (scene.target_groom) complete_groom(*scene.target_groom);
+  for (SceneDesc& head : scene.heads) head = with_absolute_paths(std::move(head));
   return scene;
 }
 

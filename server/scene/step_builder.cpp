@@ -71,6 +71,7 @@ double felt_share(double rate) {
 
 StepBuilder::StepBuilder(const SceneDesc& scene, std::vector<SphereCollider> colliders)
     : groom_gravity_in_head_mps2_(scene.gravity_mps2) {
+  world_from_head_.position_m = scene.place_m;
   change(scene, std::move(colliders));
 }
 
@@ -175,8 +176,9 @@ const SceneStep& StepBuilder::build(const InputFrame& input, const SceneFeatures
 
 void StepBuilder::begin(const InputFrame& input, double end_time_s, double input_rate) {
   input_ = input;
-  const Pose target = input.has_motion ? input.world_from_head : world_from_head_;
-  // The first pose is a jump too: until then the head stood at the origin.
+  Pose target = input.has_motion ? input.world_from_head : world_from_head_;
+  if (input.has_motion && scene_.place_m != glm::dvec3(0.0)) target.position_m += scene_.place_m;
+  // The first pose is a jump too: until then the head stood at its place.
   const bool has_jumped = input.has_motion && (input.has_teleported || !has_motion_);
   const double felt = has_jumped ? 0.0 : felt_share(input_rate * input.motion_speed);
   felt_ = felt;

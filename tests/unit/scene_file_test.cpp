@@ -14,6 +14,7 @@
 namespace strandcast {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -164,6 +165,15 @@ SceneDesc unusual_scene() {
              .delay_ms = 16.5,
              .max_datagram_bytes = 9'000},
             {.protocol = "vmc"}};
+  s.place_m = {0.25, -1.5, 3.0};
+  SceneDesc head = s;
+  head.name = "ben";
+  head.place_m = {-0.25, 0.0, 0.0};
+  head.groom = ProceduralGroomDesc{.strand_count = 19};
+  head.solver = {.name = "ftl", .parameters = {}};
+  head.look.tip_scale = 0.3f;
+  head.live = {{.protocol = "freed"}};
+  s.heads = {head};
   return s;
 }
 
@@ -228,8 +238,10 @@ TEST(SceneFile, EveryProtoFieldIsReadAndWritten) {
       [&](const google::protobuf::Descriptor& type) {
         if (type.options().map_entry()) return;
         for (int i = 0; i < type.field_count(); ++i) {
-          names.insert(type.field(i)->name());
-          if (type.field(i)->message_type()) walk(*type.field(i)->message_type());
+          const bool is_new = names.insert(type.field(i)->name()).second;
+          const auto* inner = type.field(i)->message_type();
+          // A further head is a scene again.
+          if (inner != nullptr && (is_new || inner != v1::Scene::descriptor())) walk(*inner);
         }
       };
   walk(*v1::Scene::descriptor());
@@ -460,6 +472,65 @@ TEST(SceneFile, AGroomFromAFileKeepsItsStyle) {
   const auto stated = parse_scene(text, "scene", {"groom.file.path=b.tfx"});
   ASSERT_TRUE(stated) << stated.error().to_string();
   EXPECT_EQ(stated->solver.parameters.at("sag_free"), 0.2);
+}
+
+TEST(SceneFile, AFurtherHeadIsAsTheSceneWhereItSaysNothing) {
+  const auto scene = parse_scene(
+      "name: 'anna' groom { procedural { strand_count: 70 vertex_count: 9 } } "
+      "solver { name: 'ftl' parameters { key: 'damping' value: 0.5 } } substeps: 3 "
+      "look { hair_color: 'red' ambient: 0.5 } live { protocol: 'vmc' } place_m { x: -1 } colliders { "
+      "radius_m: 0.2 } "
+      "heads { name: 'ben' place_m { x: 1 } look { hair_color: 'blond' } } "
+      "heads { name: 'cleo' groom { procedural { seed: 4 } } solver { name: 'dftl' } live { protocol: "
+      "'freed' } }",
+      "s", {"heads.1.look.ambient=0.125"});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  ASSERT_EQ(scene->heads.size(), 2u);
+  SceneDesc ben = *scene;
+  ben.heads.clear();
+  ben.live.clear();
+  ben.name = "ben";
+  ben.place_m = {1, 0, 0};
+  ben.look.hair_color = "blond";
+  EXPECT_EQ(scene->heads[0], ben);
+  SceneDesc cleo = ben;
+  cleo.name = "cleo";
+  cleo.place_m = glm::dvec3(0.0);
+  cleo.groom = ProceduralGroomDesc{.seed = 4};
+  cleo.solver = {.name = "dftl", .parameters = {}};
+  cleo.look.hair_color = "red";
+  cleo.look.ambient = 0.125f;
+  cleo.live = {{.protocol = "freed"}};
+  EXPECT_EQ(scene->heads[1], cleo);
+}
+
+TEST(SceneFile, WhatIsSetOfTheSceneItsFurtherHeadsHearToo) {
+  const std::string text = "name: 'anna' heads { name: 'ben' } heads { name: 'cleo' substeps: 2 }";
+  const auto scene = parse_scene(text, "s", {"substeps=5", "groom.file.path=x.tfx"});
+  ASSERT_TRUE(scene) << scene.error().to_string();
+  EXPECT_EQ(scene->heads[0].substeps, 5u);
+  EXPECT_EQ(scene->heads[1].substeps, 2u);
+  for (const SceneDesc& head : scene->heads) {
+    EXPECT_EQ(head.groom, scene->groom);
+    EXPECT_EQ(head.solver.parameters.at("sag_free"), 1.0) << "of a file";
+  }
+  // What has been completed stays as it is.
+  const auto later = with_overrides(*scene, {"substeps=7"});
+  ASSERT_TRUE(later) << later.error().to_string();
+  EXPECT_EQ(later->substeps, 7u);
+  EXPECT_EQ(later->heads, scene->heads);
+}
+
+TEST(SceneFile, WrongHeadsAreOneSentence) {
+  EXPECT_THAT(error_of("name: 'anna' heads { name: 'anna' }"), HasSubstr("heads need a name each"));
+  EXPECT_THAT(error_of("heads { } "), HasSubstr("heads need a name each"));
+  EXPECT_THAT(error_of("heads { name: 'b' heads { name: 'c' } }"),
+              HasSubstr("heads.0.heads: a further head"));
+  EXPECT_THAT(error_of("heads { name: 'b' place_m { z: 1e9 } }"),
+              AllOf(StartsWith("s.textproto:1:"), HasSubstr("heads.0.place_m.z is ")));
+  std::string many;
+  for (size_t i = 0; i < kMaxHeads; ++i) many += fmt::format("heads {{ name: '{}' }} ", i);
+  EXPECT_THAT(error_of(many), HasSubstr("heads has 8 entries, the limit is 7"));
 }
 
 TEST(SceneFile, BrokenTextNeverCrashesAndAlwaysHasAPlace) {

@@ -45,6 +45,24 @@ TEST(StepBuilder, SubstepsAddUpToTheHeadMovement) {
   EXPECT_NEAR(time_s, 1.0 / scene.step_rate_hz, 1e-12);
 }
 
+TEST(StepBuilder, TheHeadStandsAtItsPlaceAndMovesFromThere) {
+  SceneDesc scene = still_scene();
+  StepBuilder plain(scene, {});
+  scene.place_m = {-3.0, 0.5, 7.0};
+  StepBuilder builder(scene, {});
+  EXPECT_EQ(builder.world_from_head().position_m, scene.place_m) << "before anything is heard";
+  builder.build(InputFrame{}, {}, 0.0);
+  EXPECT_EQ(builder.world_from_head().position_m, scene.place_m);
+  plain.build(moved({1.0, 0.0, 0.0}, 0.2), {}, 0.0);
+  builder.build(moved({1.0, 0.0, 0.0}, 0.2), {}, 0.0);
+  const SceneStep there = builder.build(moved({1.125, 0.25, -0.5}, 0.4), {}, 1.0 / 60.0);
+  const SceneStep here = plain.build(moved({1.125, 0.25, -0.5}, 0.4), {}, 1.0 / 60.0);
+  EXPECT_EQ(there.world_from_head.position_m, here.world_from_head.position_m + scene.place_m);
+  EXPECT_EQ(there.world_from_head.rotation, here.world_from_head.rotation);
+  for (size_t i = 0; i < there.substeps.size(); ++i)
+    EXPECT_EQ(there.substeps[i].head_shift_m, here.substeps[i].head_shift_m) << "strands feel nothing of it";
+}
+
 TEST(StepBuilder, JumpsAndTheFirstPoseMoveStrandsRigidly) {
   StepBuilder builder(still_scene(), {});
   const SceneStep& first = builder.build(moved({5.0, 0.0, 0.0}, 1.0), {}, 0.0);
