@@ -14,6 +14,8 @@
 
 namespace strandcast {
 
+struct Image;
+
 struct RenderSetup {
   const gl::ShaderLibrary& shaders;
   const SceneAsset& asset;
@@ -28,6 +30,9 @@ struct DrawTerms {
   std::function<bool()> is_unwanted;
   /// Instead of hair; renderers that have none draw hair.
   DebugView debug_view = DebugView::None;
+  /// Seen where nothing is drawn, instead of the look's background: a picture of the same size, which
+  /// outlives the draw. Null: the background.
+  const Image* backdrop = nullptr;
 };
 
 struct RenderTurn : gl::PassTurn {

@@ -139,6 +139,10 @@ Status check_draw(const PosedStrands& strands, size_t position_count, RenderSize
   if (size.width > kMaxImageSide || size.height > kMaxImageSide)
     return make_error(ErrorCode::LimitExceeded, "a picture of {} x {} pixels exceeds {} per side", size.width,
                       size.height, kMaxImageSide);
+  if (terms.backdrop != nullptr &&
+      (terms.backdrop->width != size.width || terms.backdrop->height != size.height))
+    return make_error(ErrorCode::BadInput, "a backdrop of {} x {} pixels is not as large as the picture",
+                      terms.backdrop->width, terms.backdrop->height);
   if (!(terms.strand_share > 0.0f && terms.strand_share <= 1.0f))
     return make_error(ErrorCode::BadInput, "the share of strands to draw is {} but must lie in (0, 1]",
                       terms.strand_share);

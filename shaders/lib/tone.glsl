@@ -16,6 +16,12 @@ vec3 srgb_from_linear(vec3 linear) {
   return mix(high, low, lessThanEqual(linear, vec3(0.0031308)));
 }
 
+vec3 linear_from_srgb(vec3 shown) {
+  vec3 low = shown / 12.92;
+  vec3 high = pow((shown + 0.055) / 1.055, vec3(2.4));
+  return mix(high, low, lessThanEqual(shown, vec3(0.04045)));
+}
+
 // Of the background, linear: lighter at the top of the picture and darker at its bottom. `height`: 0 bottom .. 1 top.
 vec3 background_light(vec3 middle, float height) {
   const float kGradient = 0.35;

@@ -2,6 +2,8 @@
 // picture, so that it is read back without turning it over.
 #pragma variant HAS_LAYER 0 1
 #pragma variant IS_MULTISAMPLED 0 1
+#pragma variant HAS_BACKDROP 0 1
+#include "shared/backdrop.h"
 #include "lib/tone.glsl"
 
 #if IS_MULTISAMPLED == 1
@@ -13,7 +15,11 @@ uniform sampler2D u_scene;     // (samples per pixel side) times larger than the
 uniform sampler2D u_layer;     // of the target's size: what lies over the scene, colour times opacity and opacity
 uniform int u_samples;         // per pixel side
 uniform int u_target_height;
+#if HAS_BACKDROP == 1
+layout(binding = kUnitBackdrop) uniform sampler2D u_backdrop;  // sRGB, of the target's size and rows
+#else
 uniform vec3 u_background;     // linear, at middle height
+#endif
 
 layout(location = 0) out vec4 out_color;
 
@@ -35,6 +41,10 @@ void main() {
 #endif
   float drawn = sum.a * share;
   vec3 scene = drawn > 0.0 ? tone_map(sum.rgb / sum.a) : vec3(0.0);
-  float height = (float(from_bottom.y) + 0.5) / float(u_target_height);
-  out_color = vec4(srgb_from_linear(mix(background_light(u_background, height), scene, drawn)), 1.0);
+#if HAS_BACKDROP == 1
+  vec3 behind = linear_from_srgb(texelFetch(u_backdrop, pixel, 0).rgb);
+#else
+  vec3 behind = background_light(u_background, (float(from_bottom.y) + 0.5) / float(u_target_height));
+#endif
+  out_color = vec4(srgb_from_linear(mix(behind, scene, drawn)), 1.0);
 }

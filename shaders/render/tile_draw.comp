@@ -1,7 +1,9 @@
 // Strands over head and background, from front to back with exact coverage; one invocation per column of a tile, which
 // keeps its pixels in vectors of four. Row 0 of the picture is its top, of the head's target its bottom.
+#pragma variant HAS_BACKDROP 0 1
 #include "render/tile_frame.glsl"
 #include "render/tile_head.glsl"
+#include "shared/backdrop.h"
 #include "render/tile_light.glsl"
 #include "lib/coverage.glsl"
 #include "lib/hermite.glsl"
@@ -15,6 +17,9 @@ layout(binding = kUnitTileOrder) uniform usamplerBuffer u_order;   // depth, fir
 layout(binding = kUnitTileFirst) uniform usamplerBuffer u_first;   // (tiles + 1)
 layout(binding = kUnitTileHeadSkin) uniform sampler2D u_head_skin;    // kHeadSide x kHeadSide samples per pixel (tile_head.glsl)
 layout(binding = kUnitTileHeadDepth) uniform sampler2D u_head_depth;   // 1: nothing
+#if HAS_BACKDROP == 1
+layout(binding = kUnitBackdrop) uniform sampler2D u_backdrop;   // sRGB, of the picture's size, its top first
+#endif
 uniform float u_head_share;       // of a pixel that one sample is; 0: there is no head
 layout(rgba8, binding = kImageTilePicture) restrict writeonly uniform image2D u_picture;
 
@@ -181,8 +186,12 @@ void write_pixels(Pixels p, ivec2 top) {
     float seen = p.seen[i];
     vec3 scene = vec3(p.red[i], p.green[i], p.blue[i]) + (seen > 0.0 ? seen * head_light(head) : vec3(0.0));
     float drawn = 1.0 - p.passed[i] + seen;
-    float height = 1.0 - p.y[i] / u_frame.target.y;
-    vec3 color = mix(background_light(u_frame.background.rgb, height), tone_map(scene / max(drawn, 1e-5)), drawn);
+#if HAS_BACKDROP == 1
+    vec3 behind = linear_from_srgb(texelFetch(u_backdrop, pixel, 0).rgb);
+#else
+    vec3 behind = background_light(u_frame.background.rgb, 1.0 - p.y[i] / u_frame.target.y);
+#endif
+    vec3 color = mix(behind, tone_map(scene / max(drawn, 1e-5)), drawn);
     imageStore(u_picture, pixel, vec4(srgb_from_linear(clamp(color, 0.0, 1.0)), 1.0));
   }
 }

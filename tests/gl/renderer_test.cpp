@@ -104,6 +104,35 @@ TEST_F(RendererTest, AnEmptySceneShowsTheBackgroundLighterAtTheTop) {
   for (size_t i = 3; i < image.rgba.size(); i += 4) ASSERT_EQ(image.rgba[i], 255);
 }
 
+TEST_F(RendererTest, WhereNothingIsDrawnABackdropStaysAsItIs) {
+  SceneAsset asset = curtain(20, 8);
+  asset.head = octahedron(0.1f);
+  Image behind{kSmall.width, kSmall.height, {}};
+  for (uint32_t i = 0; i < kSmall.width * kSmall.height; ++i)
+    for (const uint32_t value : {i, i / 7, 255 - i, 255u}) behind.rgba.push_back(static_cast<uint8_t>(value));
+  DrawTerms over;
+  over.backdrop = &behind;
+  for (const RenderPath* path : {&segment_path(), &tile_path()}) {
+    const auto renderer = Renderer::make(gl::ShaderLibrary(), context_->info(), asset, {}, *path);
+    ASSERT_TRUE(renderer) << renderer.error().to_string();
+    const auto draw_over = [&](const DrawTerms& terms) {
+      EXPECT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, front_camera(), kSmall, terms));
+      return (*renderer)->read_image();
+    };
+    const Image plain = draw_over({});
+    const Image image = draw_over(over);
+    // 0.1 m are 20 px: hair and head are in the middle, and nothing beside them.
+    for (uint32_t y = 0; y < kSmall.height; ++y)
+      for (uint32_t x = 0; x < 50; ++x) {
+        const size_t at = 4 * (size_t{y} * kSmall.width + x);
+        ASSERT_TRUE(std::equal(&image.rgba[at], &image.rgba[at] + 4, &behind.rgba[at])) << path->name << x;
+      }
+    const size_t middle = 4 * (size_t{45} * kSmall.width + 80);
+    for (size_t i = middle; i < middle + 3; ++i) EXPECT_NEAR(image.rgba[i], plain.rgba[i], 2) << path->name;
+    EXPECT_EQ(differing_pixels(draw_over({}), plain), 0u) << "and leaves nothing behind";
+  }
+}
+
 TEST_F(RendererTest, ABaldHeadIsDrawnWhereItIs) {
   SceneAsset asset = empty_asset();
   asset.head = octahedron(0.1f);

@@ -10,6 +10,7 @@
 
 #include "common/base/hash.h"
 #include "common/pictures/picture_error.h"
+#include "common/render/draw_heads.h"
 #include "common/render/render_scene.h"
 #include "common/render/strand_detail.h"
 #include "common/render/tiles/half_float.h"
@@ -44,6 +45,123 @@ TEST(TileRenderer, TenPicturesAreOne) {
     // Another picture in between leaves nothing behind.
     ASSERT_TRUE((*renderer)->draw({{}, asset.rest_position_m}, {}, {64, 200}));
   }
+}
+
+/// Every value of every colour somewhere.
+Image some_picture(RenderSize size) {
+  Image image{size.width, size.height, {}};
+  for (uint32_t i = 0; i < size.width * size.height; ++i)
+    for (const uint32_t value : {i, i / 3, 255 - i, 255u}) image.rgba.push_back(static_cast<uint8_t>(value));
+  return image;
+}
+
+TEST(TileRenderer, WhereNothingIsDrawnABackdropStaysAsItIs) {
+  const SceneAsset asset = grown_hair();
+  const RenderSize size{150, 110};  // no whole tiles
+  const Image behind = some_picture(size);
+  DrawTerms over;
+  over.backdrop = &behind;
+  const auto picture = [&](const LookDesc& look, const DrawTerms& terms, simd::InstructionSet set) {
+    auto renderer = make_tile_renderer(asset, look, {own_workers(2), set});
+    EXPECT_TRUE(renderer && (*renderer)->draw({{}, asset.rest_position_m}, {}, size, terms));
+    return (*renderer)->read_image();
+  };
+  LookDesc dark, grey;
+  dark.background = glm::vec3(0.0f);
+  grey.background = glm::vec3(0.5f);
+  const auto set = simd::widest_set();
+  const Image on_dark = picture(dark, {}, set), on_grey = picture(grey, {}, set);
+  const Image drawn = picture(dark, over, set);
+  EXPECT_TRUE(picture(grey, over, set).rgba == drawn.rgba) << "nothing is seen of the background";
+  for (const simd::InstructionSet other : simd::instruction_sets())
+    EXPECT_TRUE(picture(dark, over, other).rgba == drawn.rgba) << to_string(other);
+  const auto at = [&](const Image& image, uint32_t x, uint32_t y) {
+    return &image.rgba[4 * (size_t{y} * image.width + x)];
+  };
+  const auto apart = [](const uint8_t* one, const uint8_t* other) {
+    return std::max({std::abs(one[0] - other[0]), std::abs(one[1] - other[1]), std::abs(one[2] - other[2])});
+  };
+  // Nothing there, nor beside it: the edge of a strand can be too faint to show.
+  const auto is_open = [&](uint32_t x, uint32_t y) {
+    for (uint32_t v = y - 2; v <= y + 2; ++v)
+      for (uint32_t u = x - 2; u <= x + 2; ++u)
+        if (apart(at(on_dark, u, v), at(on_dark, 0, v)) > 0 ||
+            apart(at(on_grey, u, v), at(on_grey, 0, v)) > 0)
+          return false;
+    return true;
+  };
+  size_t open = 0, covered = 0;
+  for (uint32_t y = 2; y + 2 < size.height; ++y)
+    for (uint32_t x = 2; x + 2 < size.width; ++x) {
+      if (is_open(x, y)) {
+        EXPECT_EQ(apart(at(drawn, x, y), at(behind, x, y)), 0) << x << ", " << y;
+        ++open;
+      } else if (apart(at(on_dark, x, y), at(on_grey, x, y)) == 0) {
+        // As good as opaque (tile_blend.h): a bright backdrop shines through by some steps of a dark colour.
+        EXPECT_LE(apart(at(drawn, x, y), at(on_dark, x, y)), 8) << x << ", " << y;
+        ++covered;
+      }
+    }
+  EXPECT_GT(open, 1'000u);
+  EXPECT_GT(covered, 1'000u);
+  const Image smaller = some_picture({64, 64});
+  over.backdrop = &smaller;
+  auto renderer = make_tile_renderer(asset, dark, {own_workers(1), set});
+  ASSERT_TRUE(renderer);
+  const Status refused = (*renderer)->draw({{}, asset.rest_position_m}, {}, size, over);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+}
+
+TEST(TileRenderer, OfSeveralHeadsTheNearerIsInFrontAndOneIsAsByItself) {
+  const SceneAsset asset = grown_hair();
+  const RenderSize size{160, 120};
+  LookDesc red, blond;
+  red.hair_color = "red";
+  blond.hair_color = "blond";
+  auto first = make_tile_renderer(asset, red, {own_workers(2), simd::widest_set()});
+  auto second = make_tile_renderer(asset, blond, {own_workers(2), simd::widest_set()});
+  ASSERT_TRUE(first && second);
+  const auto at = [&](const glm::dvec3& place_m) {
+    PosedStrands strands{{}, asset.rest_position_m};
+    strands.world_from_head.position_m = place_m;
+    return strands;
+  };
+  CameraDesc camera;
+  camera.offset_m = {0.0f, 0.0f, 1.0f};
+  camera.target_m = glm::vec3(0.0f);
+  const PosedStrands far = at({100.0, 0.0, -0.5}), near = at({100.0, 0.0, 0.25});
+  const auto picture = [&](const std::vector<PlacedHead>& heads, const CameraDesc& from) {
+    auto made = draw_heads(heads, from, size);
+    EXPECT_TRUE(made) << made.error().to_string();
+    return made ? std::move(made->image) : Image{};
+  };
+  // One head is what its renderer draws.
+  const Image alone = picture({{first->get(), &far}}, camera);
+  ASSERT_TRUE((*first)->draw(far, camera, size));
+  EXPECT_TRUE((*first)->read_image().rgba == alone.rgba);
+  // The order in which they are told says nothing.
+  const Image both = picture({{first->get(), &far}, {second->get(), &near}}, camera);
+  EXPECT_TRUE(picture({{second->get(), &near}, {first->get(), &far}}, camera).rgba == both.rgba);
+  // From the front the near one hides the other where it is opaque, from behind it is hidden.
+  const auto count_like = [&](const Image& image, const CameraDesc& from, const PlacedHead& head) {
+    const std::vector<PlacedHead> heads{{first->get(), &far}, {second->get(), &near}};
+    const CameraDesc own = camera_from_head(from, middle_of(heads), head.strands->world_from_head.position_m);
+    EXPECT_TRUE(head.renderer->draw(*head.strands, own, size));
+    const Image drawn = head.renderer->read_image();
+    size_t same = 0;
+    for (size_t i = 0; i < image.rgba.size(); i += 4)
+      same += std::equal(&image.rgba[i], &image.rgba[i] + 4, &drawn.rgba[i]) ? 1 : 0;
+    return same;
+  };
+  const size_t front_near = count_like(both, camera, {second->get(), &near});
+  const size_t front_far = count_like(both, camera, {first->get(), &far});
+  EXPECT_GT(front_near, front_far);
+  CameraDesc behind = camera;
+  behind.offset_m.z = -1.0f;
+  const Image reverse = picture({{first->get(), &far}, {second->get(), &near}}, behind);
+  EXPECT_GT(count_like(reverse, behind, {first->get(), &far}),
+            count_like(reverse, behind, {second->get(), &near}));
 }
 
 // What the codec's bound does to a picture: every vertex a tenth of a millimetre off.

@@ -11,6 +11,7 @@
 #include "common/render/gl_tiles/gpu_bins.h"
 #include "common/render/gl_tiles/gpu_lattice.h"
 #include "common/render/gl_tiles/tile_block.h"
+#include "common/render/passes/backdrop.h"
 #include "common/render/passes/head_mesh.h"
 #include "common/render/render_path.h"
 #include "shaders/shared/bindings.h"
@@ -281,8 +282,7 @@ class TileDrawPass final : public RenderPass {
         lattice_(lattice),
         bins_(bins) {}
   Status prepare(const RenderSetup& setup) override {
-    ASSIGN_OR_RETURN(program_, gl::Program::make(setup.shaders, {"render/tile_draw.comp"}, {}));
-    return {};
+    return backdrop_.prepare(setup.shaders, {"render/tile_draw.comp"}, {});
   }
   Status run(RenderTurn& turn) override {
     RETURN_IF_ERROR(scene_.picture.resize(turn.size_px));
@@ -293,9 +293,9 @@ class TileDrawPass final : public RenderPass {
     points_.bind();
     lattice_.bind();
     bins_.bind();
-    program_.use();
+    ASSIGN_OR_RETURN(const gl::Program* const program, backdrop_.use(turn.terms.backdrop));
     const bool has_head = scene_.features.has_head_mesh.value;
-    program_.set("u_head_share", has_head ? 1.0f / (kHeadSide * kHeadSide) : 0.0f);
+    program->set("u_head_share", has_head ? 1.0f / (kHeadSide * kHeadSide) : 0.0f);
     if (has_head) {
       scene_.scene.color().bind(shader::kUnitTileHeadSkin);
       scene_.scene.depth().bind(shader::kUnitTileHeadDepth);
@@ -314,7 +314,7 @@ class TileDrawPass final : public RenderPass {
   GpuPoints& points_;
   GpuLattice& lattice_;
   GpuBins& bins_;
-  gl::Program program_;
+  Backdrop backdrop_;
 };
 
 void add_tile_passes(RenderScene& scene, RenderPassList& passes) {

@@ -225,15 +225,32 @@ STRANDCAST_LANES void fill_background(const TileInput& in, uint32_t tile) {
   const uint32_t width = std::min(kTilePx, in.grid.size_px.x - left);
   const uint32_t height = std::min(kTilePx, in.grid.size_px.y - top);
   for (uint32_t y = 0; y < height; ++y) {
+    const size_t first = 4 * (size_t{top + y} * in.grid.size_px.x + left);
+    if (in.backdrop != nullptr) {
+      std::memcpy(in.rgba + first, in.backdrop + first, size_t{4} * width);
+      continue;
+    }
     const glm::vec3 color = in.background * background_gradient(in, static_cast<float>(top + y) + 0.5f).v[0];
     uint32_t packed = 0xff000000u;
     for (int c = 0; c < 3; ++c) {
       const auto step = static_cast<int>(std::clamp(color[c], 0.0f, 1.0f) * kSrgbSteps);
       packed |= uint32_t{in.srgb[step]} << (8 * c);
     }
-    uint8_t* const row = in.rgba + 4 * (size_t{top + y} * in.grid.size_px.x + left);
-    for (uint32_t x = 0; x < width; ++x) std::memcpy(row + 4 * x, &packed, sizeof packed);
+    for (uint32_t x = 0; x < width; ++x) std::memcpy(in.rgba + first + 4 * x, &packed, sizeof packed);
   }
+}
+
+/// What lies behind a block of pixels whose first is `left`, `top`. Those beyond the picture's edge, which
+/// nobody sees, are as its last ones.
+STRANDCAST_LANES void read_backdrop(const TileInput& in, uint32_t left, uint32_t top, Float color[3]) {
+  alignas(alignof(Float)) float value[3][kLanes];
+  for (uint32_t lane = 0; lane < kLanes; ++lane) {
+    const uint32_t x = std::min(left + lane % kBlockColumns, in.grid.size_px.x - 1);
+    const uint32_t y = std::min(top + lane / kBlockColumns, in.grid.size_px.y - 1);
+    const uint8_t* const pixel = in.backdrop + 4 * (size_t{y} * in.grid.size_px.x + x);
+    for (int c = 0; c < 3; ++c) value[c][lane] = in.linear[pixel[c]];
+  }
+  for (int c = 0; c < 3; ++c) color[c] = simd::load_lanes(value[c]);
 }
 
 /// The strands of a tile from front to back; `head`: null where there is none.
@@ -290,6 +307,9 @@ STRANDCAST_LANES void write_pixels(const TileInput& in, uint32_t tile, const Til
       const Float gradient = background_gradient(
           in, block_rows() + static_cast<float>(top + static_cast<uint32_t>(y) * kBlockRows));
       Float color[3] = {in.background.x * gradient, in.background.y * gradient, in.background.z * gradient};
+      if (in.backdrop != nullptr)
+        read_backdrop(in, left + static_cast<uint32_t>(x) * kBlockColumns,
+                      top + static_cast<uint32_t>(y) * kBlockRows, color);
       {
         Float scene[3] = {pixels.red[block], pixels.green[block], pixels.blue[block]};
         Float drawn = 1.0f - pixels.passed[block];
@@ -351,6 +371,21 @@ std::vector<uint8_t> make_srgb_table() {
     const double value = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
     table[i] = static_cast<uint8_t>(std::lround(255.0 * value));
   }
+  return table;
+}
+
+std::vector<float> make_linear_table(const std::vector<uint8_t>& srgb) {
+  constexpr size_t kValues = 256;
+  std::vector<uint32_t> sum(kValues), count(kValues);
+  for (uint32_t step = 0; step < srgb.size(); ++step) {
+    sum[srgb[step]] += step;
+    ++count[srgb[step]];
+  }
+  std::vector<float> table(kValues);
+  // A step holds what lies up to the next one.
+  for (size_t value = 0; value < kValues; ++value)
+    table[value] = (static_cast<float>(sum[value]) / static_cast<float>(std::max(count[value], 1u)) + 0.5f) /
+                   static_cast<float>(kSrgbSteps);
   return table;
 }
 

@@ -35,10 +35,16 @@ struct TileInput {
   glm::vec3 background;  // linear, at middle height
   const uint8_t* srgb;   // (kSrgbSteps + 1) of equal steps of 0 .. 1
   uint8_t* rgba;         // (height x width x 4), top row first
+  // Behind all instead of the background: sRGB, of the same shape; null: the background.
+  const uint8_t* backdrop = nullptr;
+  const float* linear = nullptr;  // of each value of sRGB, for the backdrop
 };
 inline constexpr uint32_t kSrgbSteps = 4096;
 /// A table for TileInput::srgb.
 std::vector<uint8_t> make_srgb_table();
+/// A table for TileInput::linear: what lies in the middle of the steps that become this value, so that what
+/// nothing covers stays as it is.
+std::vector<float> make_linear_table(const std::vector<uint8_t>& srgb);
 
 /// Of one worker, reused from tile to tile.
 struct TileScratch {

@@ -75,6 +75,7 @@ struct TileState {
   TileBins bins;
   std::vector<TileScratch> scratch;
   std::vector<uint8_t> srgb;
+  std::vector<float> linear;  // once there was a backdrop
   HeldImage picture;
 
   // Of the draw that is under way.
@@ -156,10 +157,14 @@ Status draw_tiles(TileState& state, RenderTurn& turn) {
   // Layers are counted over nothing.
   const bool is_bare = debug_view == DebugView::Overdraw;
   const HeadPicture no_head;
-  const TileInput input{
-      &state.points,     &state.bins,      is_bare ? &no_head : &state.head,
-      &state.shade,      {turn.size_px},   is_bare ? glm::vec3(0.0f) : state.look.background,
-      state.srgb.data(), image.rgba.data()};
+  TileInput input{&state.points,     &state.bins,      is_bare ? &no_head : &state.head,
+                  &state.shade,      {turn.size_px},   is_bare ? glm::vec3(0.0f) : state.look.background,
+                  state.srgb.data(), image.rgba.data()};
+  if (turn.terms.backdrop != nullptr && !is_bare) {
+    if (state.linear.empty()) state.linear = make_linear_table(state.srgb);
+    input.backdrop = turn.terms.backdrop->rgba.data();
+    input.linear = state.linear.data();
+  }
   std::atomic<bool> is_given_up{false};
   state.workers.at(Priority::Drawing)
       .for_ranges(input.grid.count(), 1, [&](size_t tile, size_t, uint32_t worker) {
