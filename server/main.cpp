@@ -55,7 +55,7 @@ sigset_t handled_signals() {
   return signals;
 }
 
-int explain_command(const ServerOptions& options, ServerConfig config) {
+int explain_head(const ServerOptions& options, ServerConfig config) {
   const Result<SceneContent> content = load_scene_content(config.scene);
   if (!content) return fail(content.error());
   RuntimeFacts facts;
@@ -92,7 +92,26 @@ int explain_command(const ServerOptions& options, ServerConfig config) {
   return 0;
 }
 
+int explain_command(const ServerOptions& options, const ServerConfig& config) {
+  if (config.scene.heads.empty()) return explain_head(options, config);
+  std::vector<SceneDesc> scenes = config.scene.heads;
+  scenes.insert(scenes.begin(), config.scene);
+  scenes.front().heads.clear();
+  for (const SceneDesc& scene : scenes) {
+    ServerConfig of_head = config;
+    of_head.scene = scene;
+    fmt::print("Head '{}':\n", scene.name);
+    if (const int code = explain_head(options, of_head); code != 0) return code;
+  }
+  return 0;
+}
+
 int check_command(const ServerOptions& options, const ServerConfig& config) {
+  if (!config.scene.heads.empty())
+    return fail(make_error(ErrorCode::Unsupported,
+                           "--check draws the hair of one head, and this scene has {}: name a hair file "
+                           "without it (--check FILE), or a scene of that head alone",
+                           config.scene.heads.size() + 1));
   const auto text = check_groom(config.scene, options.check_folder,
                                 {config.sim_device, config.gl_device, config.renderer, config.shader_folder});
   if (!text) return fail(text.error());
@@ -206,7 +225,8 @@ int serve(const ServerOptions& options, ServerConfig config) {
   if (!server) return fail(server.error());
   if (const Status status = write_port(options.port_path, (*server)->port()); !status)
     return fail(status.error());
-  fmt::print("Serving '{}' on {} port {}\n", config.scene.name, config.net.address, (*server)->port());
+  fmt::print("Serving '{}' on {} port {}\n", names_of_heads(config.scene), config.net.address,
+             (*server)->port());
   std::fflush(stdout);
   service.tell_ready(service_status(**server, config, 0));
   int64_t told_ns = 0;

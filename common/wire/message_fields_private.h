@@ -56,6 +56,7 @@ void visit(Visitor& v, Hello& m) {
   v.number("step_ns", m.step_ns, kStepTime);
   v.exact_text("codec_wish", m.codec_wish, kMaxNameChars);
   v.value("keeps_camera", m.keeps_camera);
+  v.exact_text("head", m.head, kMaxNameChars);
 }
 
 template <>
@@ -230,6 +231,7 @@ void visit(Visitor& v, Welcome& m) {
   v.side("frame_height", m.frame_height, scene_fields::kFrameHeight);
   v.text("sim_device", m.sim_device, kMaxTextChars);
   v.choice("role", m.role, Role::Admin);
+  v.names("heads", m.heads, kMaxHeads, kMaxNameChars);
 }
 
 template <>

@@ -70,6 +70,7 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   double step_ns = 0.0;
   std::string codec_wish = {};  // strand codec that it insists on; empty = the server chooses
   bool keeps_camera = false;    // nobody else moves its camera
+  std::string head = {};        // of those that the server has, by its name; empty = the first
   bool operator==(const Hello&) const = default;
 };
 struct MotionSamples {  // from a Source
@@ -195,6 +196,9 @@ struct Welcome {
   uint32_t frame_width = 0, frame_height = 0;
   std::string sim_device = {};  // for a person: what simulates; empty = nothing does
   Role role = Role::Viewer;     // as granted
+  // Names of all heads, the first first, at most kMaxHeads; none where there is one. scene_name is that of
+  // this session's.
+  std::vector<std::string> heads = {};
   bool operator==(const Welcome&) const = default;
 };
 struct Pong {

@@ -27,6 +27,10 @@ LivePort port_of(const LiveSource& source, size_t index) {
   return port;
 }
 
+bool is_same_place(const LivePort& a, const LivePort& b) {
+  return a.protocol == b.protocol && a.host == b.host && a.port == b.port;
+}
+
 /// Of a sender, its address: what lines are counted by.
 std::string address_of(const std::string& sender) {
   return sender.substr(0, sender.rfind(':'));
@@ -64,33 +68,40 @@ Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
   return lines;
 }
 
-LiveDesk::LiveDesk(Sources sources, InputHub& inputs, Listener listener)
-    : sources_(std::move(sources)),
-      inputs_(inputs),
-      listener_(std::move(listener)),
+LiveDesk::LiveDesk(std::vector<Target> targets, std::vector<Input> inputs)
+    : targets_(std::move(targets)),
+      inputs_(std::move(inputs)),
       lines_(kLiveLines),
       refusal_lines_(kRefusalLines),
-      troubles_(sources_.size()) {}
+      troubles_(inputs_.size()) {}
 
 LiveDesk::~LiveDesk() {
   stop();
 }
 
-Result<std::unique_ptr<LiveDesk>> LiveDesk::open(const std::vector<LiveDesc>& live,
-                                                 const std::vector<AddressRange>& allowed, InputHub& inputs,
-                                                 Listener listener) {
-  Sources sources;
+Result<std::unique_ptr<LiveDesk>> LiveDesk::open(std::vector<Target> targets,
+                                                 const std::vector<AddressRange>& allowed) {
+  std::vector<Input> inputs;
   std::vector<LivePort> ports;
-  for (size_t i = 0; i < live.size(); ++i) {
-    ASSIGN_OR_RETURN(std::unique_ptr<LiveSource> source, LiveSource::make(live[i], i));
-    ports.push_back(port_of(*source, i));
-    constexpr double kNsPerMs = 1e6;
-    inputs.set_delay(kFirstLiveSourceId + i, static_cast<int64_t>(live[i].delay_ms * kNsPerMs));
-    sources.push_back(std::move(source));
+  for (size_t head = 0; head < targets.size(); ++head) {
+    const size_t first = inputs.size();
+    for (size_t i = 0; i < targets[head].live.size(); ++i) {
+      const LiveDesc& live = targets[head].live[i];
+      ASSIGN_OR_RETURN(std::unique_ptr<LiveSource> source, LiveSource::make(live, i));
+      Input input{std::move(source), kFirstLiveSourceId + i, head, ports.size()};
+      const LivePort port = port_of(*input.source, i);
+      // Of its own head none: that would be the same input twice, and the port is in use.
+      for (size_t other = 0; other < first; ++other)
+        if (is_same_place(ports[inputs[other].socket], port)) input.socket = inputs[other].socket;
+      if (input.socket == ports.size()) ports.push_back(port);
+      constexpr double kNsPerMs = 1e6;
+      targets[head].inputs->set_delay(input.id, static_cast<int64_t>(live.delay_ms * kNsPerMs));
+      inputs.push_back(std::move(input));
+    }
   }
-  std::unique_ptr<LiveDesk> desk(new LiveDesk(std::move(sources), inputs, std::move(listener)));
+  std::unique_ptr<LiveDesk> desk(new LiveDesk(std::move(targets), std::move(inputs)));
   ASSIGN_OR_RETURN(desk->receiver_, LiveReceiver::open(ports, allowed, *desk));
-  for (const auto& source : desk->sources_) log_info("mocap", "{}", source->describe());
+  for (const Input& input : desk->inputs_) log_info("mocap", "{}", desk->name_of(input));
   if (!allowed.empty())
     log_warn("mocap",
              "more than this machine may send motion, and nothing says who it is: protocols of motion "
@@ -106,128 +117,157 @@ void LiveDesk::stop() {
   if (receiver_ != nullptr) receiver_->stop();
 }
 
+template <class Work>
+void LiveDesk::for_head(size_t head, Work work) const {
+  for (const Input& input : inputs_)
+    if (input.head == head) work(*input.source);
+}
+
+template <class Work>
+void LiveDesk::for_socket(size_t socket, Work work) const {
+  for (const Input& input : inputs_)
+    if (input.socket == socket) work(input);
+}
+
+/// All that hear a socket would ask its peer for the same.
+LiveSource& LiveDesk::first_of(size_t socket) const {
+  const auto first = std::find_if(inputs_.begin(), inputs_.end(),
+                                  [&](const Input& input) { return input.socket == socket; });
+  return *first->source;
+}
+
 // ---- from any thread
 
-std::vector<LiveInputStatus> LiveDesk::status() const {
+std::vector<LiveInputStatus> LiveDesk::status(size_t head) const {
   const std::lock_guard lock(mutex_);
   std::vector<LiveInputStatus> all;
-  for (const auto& source : sources_) all.push_back(source->status(now_ns()));
+  for_head(head, [&](LiveSource& source) { all.push_back(source.status(now_ns())); });
   return all;
 }
 
-std::vector<LiveDesc> LiveDesk::live() const {
+std::vector<LiveDesc> LiveDesk::live(size_t head) const {
   const std::lock_guard lock(mutex_);
   std::vector<LiveDesc> all;
-  for (const auto& source : sources_) all.push_back(source->live());
+  for_head(head, [&](LiveSource& source) { all.push_back(source.live()); });
   return all;
 }
 
-Notice LiveDesk::choose_subject(const std::string& subject) {
+Notice LiveDesk::choose_subject(const std::string& subject, size_t head) {
   bool is_seen = false;
-  for (const auto& source : sources_) is_seen = is_seen || source->has_seen(subject);
+  for_head(head, [&](LiveSource& source) { is_seen = is_seen || source.has_seen(subject); });
   // Of several inputs those that see it; where none does, all wait for it.
-  for (const auto& source : sources_)
-    if (subject.empty() || !is_seen || source->has_seen(subject)) source->choose_subject(subject);
+  for_head(head, [&](LiveSource& source) {
+    if (subject.empty() || !is_seen || source.has_seen(subject)) source.choose_subject(subject);
+  });
   if (subject.empty())
     return {false, "The head follows a subject that is called head, else the first one seen."};
   if (is_seen) return {false, fmt::format("The head follows {}.", subject)};
   std::string seen;
-  for (const auto& source : sources_) {
-    const std::string more = source->status(now_ns()).subjects;
+  for_head(head, [&](LiveSource& source) {
+    const std::string more = source.status(now_ns()).subjects;
     if (!more.empty()) seen += (seen.empty() ? "" : ", ") + more;
-  }
+  });
   return {false, fmt::format("Nobody called {} is seen: the head waits (seen: {}).", subject,
                              seen.empty() ? "nobody" : seen)};
 }
 
-Notice LiveDesk::obey(const LiveCommand& command) {
+Notice LiveDesk::obey(const LiveCommand& command, size_t head) {
   const std::lock_guard lock(mutex_);
-  if (command.action == LiveAction::ChooseSubject) return choose_subject(command.subject);
+  if (command.action == LiveAction::ChooseSubject) return choose_subject(command.subject, head);
   if (command.action == LiveAction::Reset) {
-    for (const auto& source : sources_) source->reset_calibration();
+    for_head(head, [](LiveSource& source) { source.reset_calibration(); });
     return {false, "The head is where its source says."};
   }
   std::string calibrated;
-  for (const auto& source : sources_)
-    if (source->calibrate(now_ns())) calibrated += (calibrated.empty() ? "" : ", ") + source->describe();
+  for_head(head, [&](LiveSource& source) {
+    if (source.calibrate(now_ns())) calibrated += (calibrated.empty() ? "" : ", ") + source.describe();
+  });
   if (calibrated.empty()) return {true, "There is nothing to calibrate by: no live input sees the head now."};
   return {false, fmt::format("The head at rest is as it is seen now ({}).", calibrated)};
 }
 
 // ---- the receiver's thread
 
-bool LiveDesk::on_bytes(size_t input, const std::string& sender, std::span<const std::byte> bytes,
+bool LiveDesk::on_bytes(size_t socket, const std::string& sender, std::span<const std::byte> bytes,
                         int64_t arrival_ns) {
   const std::lock_guard lock(mutex_);
-  const Status taken = sources_[input]->take(sender, bytes, arrival_ns);
-  pass_on(input, now_ns());
-  return taken.ok();
+  bool is_of_use = false;
+  for_socket(socket, [&](const Input& input) {
+    is_of_use = input.source->take(sender, bytes, arrival_ns).ok() || is_of_use;
+    pass_on(input, now_ns());
+  });
+  return is_of_use;
 }
 
-void LiveDesk::on_refused(size_t input, const std::string& sender, const std::string& remedy) {
+void LiveDesk::on_refused(size_t socket, const std::string& sender, const std::string& remedy) {
   const std::lock_guard lock(mutex_);
-  LiveSource& source = *sources_[input];
-  source.refuse();
+  for_socket(socket, [](const Input& input) { input.source->refuse(); });
   write(refusal_lines_, address_of(sender),
-        {true, fmt::format("{}: {} may not send: {}", source.describe(), sender, remedy)}, now_ns());
-}
-
-void LiveDesk::on_connection(size_t input) {
-  const std::lock_guard lock(mutex_);
-  sources_[input]->begin_connection();
-  troubles_[input].clear();
-  log_info("mocap", "{}: connected", sources_[input]->describe());
-}
-
-void LiveDesk::on_no_connection(size_t input, const std::string& why) {
-  const std::lock_guard lock(mutex_);
-  // Tried every few seconds, told once.
-  if (std::exchange(troubles_[input], why) == why) return;
-  write(lines_, sources_[input]->describe(),
-        {true, fmt::format("{}: {}; tried again every {:g} s", sources_[input]->describe(),
-                           one_line(why, kMaxShownChars), static_cast<double>(kLiveRetryMs) * 1e-3)},
+        {true, fmt::format("{}: {} may not send: {}", first_of(socket).describe(), sender, remedy)},
         now_ns());
 }
 
-std::vector<std::byte> LiveDesk::greeting(size_t input) {
+void LiveDesk::on_connection(size_t socket) {
   const std::lock_guard lock(mutex_);
-  return sources_[input]->greeting();
+  for_socket(socket, [](const Input& input) { input.source->begin_connection(); });
+  troubles_[socket].clear();
+  log_info("mocap", "{}: connected", first_of(socket).describe());
 }
 
-std::vector<std::byte> LiveDesk::request(size_t input) {
+void LiveDesk::on_no_connection(size_t socket, const std::string& why) {
   const std::lock_guard lock(mutex_);
-  return sources_[input]->request();
+  // Tried every few seconds, told once.
+  if (std::exchange(troubles_[socket], why) == why) return;
+  const std::string what = first_of(socket).describe();
+  write(lines_, what,
+        {true, fmt::format("{}: {}; tried again every {:g} s", what, one_line(why, kMaxShownChars),
+                           static_cast<double>(kLiveRetryMs) * 1e-3)},
+        now_ns());
+}
+
+std::vector<std::byte> LiveDesk::greeting(size_t socket) {
+  const std::lock_guard lock(mutex_);
+  return first_of(socket).greeting();
+}
+
+std::vector<std::byte> LiveDesk::request(size_t socket) {
+  const std::lock_guard lock(mutex_);
+  return first_of(socket).request();
 }
 
 bool LiveDesk::on_tick(int64_t now_ns) {
   const std::lock_guard lock(mutex_);
   bool is_active = false;
-  for (size_t i = 0; i < sources_.size(); ++i) {
-    pass_on(i, now_ns);
-    is_active = is_active || sources_[i]->is_active();
+  for (const Input& input : inputs_) {
+    pass_on(input, now_ns);
+    is_active = is_active || input.source->is_active();
   }
   return is_active;
 }
 
 /// What is due goes to the inputs, and to who listens to them.
-void LiveDesk::pass_on(size_t input, int64_t now_ns) {
-  LiveSource& source = *sources_[input];
-  const uint64_t id = kFirstLiveSourceId + input;
-  const LiveSource::Due due = source.advance(now_ns);
+void LiveDesk::pass_on(const Input& input, int64_t now_ns) {
+  const Target& target = targets_[input.head];
+  const LiveSource::Due due = input.source->advance(now_ns);
   for (const MotionSamples& samples : due.motion) {
-    inputs_.push(id, samples, now_ns);
-    if (listener_.on_motion) listener_.on_motion(id, samples, now_ns);
+    target.inputs->push(input.id, samples, now_ns);
+    if (target.listener.on_motion) target.listener.on_motion(input.id, samples, now_ns);
   }
   for (const WindSamples& samples : due.wind) {
-    inputs_.push(id, samples, now_ns);
-    if (listener_.on_wind) listener_.on_wind(id, samples, now_ns);
+    target.inputs->push(input.id, samples, now_ns);
+    if (target.listener.on_wind) target.listener.on_wind(input.id, samples, now_ns);
   }
-  if (due.has_ended) inputs_.remove_source(id);
-  write_notes(source, now_ns);
+  if (due.has_ended) target.inputs->remove_source(input.id);
+  for (LiveNote& note : input.source->take_notes()) {
+    if (!target.head.empty()) note.text = fmt::format("{}: {}", target.head, note.text);
+    write(lines_, name_of(input), note, now_ns);
+  }
 }
 
-void LiveDesk::write_notes(LiveSource& source, int64_t now_ns) {
-  for (const LiveNote& note : source.take_notes()) write(lines_, source.describe(), note, now_ns);
+/// Of an input, for people, with the head that it moves where there are several.
+std::string LiveDesk::name_of(const Input& input) const {
+  const std::string& head = targets_[input.head].head;
+  return head.empty() ? input.source->describe() : fmt::format("{}: {}", head, input.source->describe());
 }
 
 void LiveDesk::write(LogBudget& budget, const std::string& key, const LiveNote& note, int64_t now_ns) {

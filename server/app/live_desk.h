@@ -1,5 +1,6 @@
 // LiveDesk: what a server does with its live inputs: opens their sockets, hands what comes to each LiveSource
 // and what that makes of it to the inputs and to readers of inputs, writes the log, and answers commands.
+// Heads that ask for the same protocol, port and host share its socket: each follows a subject of its own.
 // Made only where a scene asks for live inputs. What is marked so from any thread, the rest on the
 // receiver's.
 #pragma once
@@ -36,46 +37,62 @@ class LiveDesk : public LiveHandler {
     std::function<void(uint64_t source_id, const WindSamples&, int64_t arrival_ns)> on_wind;
   };
 
-  /// Opens the sockets. `inputs` outlives the desk.
-  static Result<std::unique_ptr<LiveDesk>> open(const std::vector<LiveDesc>& live,
-                                                const std::vector<AddressRange>& allowed, InputHub& inputs,
-                                                Listener listener);
+  /// The live inputs of one head, and where they go.
+  struct Target {
+    std::vector<LiveDesc> live;
+    InputHub* inputs = nullptr;  // outlives the desk
+    Listener listener;
+    std::string head = {};  // its name, for the log and errors; empty where there is one
+  };
+
+  /// Opens the sockets.
+  static Result<std::unique_ptr<LiveDesk>> open(std::vector<Target> targets,
+                                                const std::vector<AddressRange>& allowed);
   ~LiveDesk() override;
 
   void start();
   void stop();
 
-  // From any thread.
-  std::vector<LiveInputStatus> status() const;
+  // From any thread; of one head, by its number among the targets.
+  std::vector<LiveInputStatus> status(size_t head = 0) const;
   /// As it runs: subjects as they were chosen.
-  std::vector<LiveDesc> live() const;
+  std::vector<LiveDesc> live(size_t head = 0) const;
   /// What became of it, in one sentence.
-  Notice obey(const LiveCommand& command);
+  Notice obey(const LiveCommand& command, size_t head = 0);
 
-  bool on_bytes(size_t input, const std::string& sender, std::span<const std::byte> bytes,
+  bool on_bytes(size_t socket, const std::string& sender, std::span<const std::byte> bytes,
                 int64_t arrival_ns) override;
-  void on_refused(size_t input, const std::string& sender, const std::string& remedy) override;
-  void on_connection(size_t input) override;
-  void on_no_connection(size_t input, const std::string& why) override;
-  std::vector<std::byte> greeting(size_t input) override;
-  std::vector<std::byte> request(size_t input) override;
+  void on_refused(size_t socket, const std::string& sender, const std::string& remedy) override;
+  void on_connection(size_t socket) override;
+  void on_no_connection(size_t socket, const std::string& why) override;
+  std::vector<std::byte> greeting(size_t socket) override;
+  std::vector<std::byte> request(size_t socket) override;
   bool on_tick(int64_t now_ns) override;
 
  private:
-  using Sources = std::vector<std::unique_ptr<LiveSource>>;
-  LiveDesk(Sources sources, InputHub& inputs, Listener listener);
-  void pass_on(size_t input, int64_t now_ns);
-  void write_notes(LiveSource& source, int64_t now_ns);
+  struct Input {
+    std::unique_ptr<LiveSource> source;
+    uint64_t id = 0;    // among the sources of motion of its head
+    size_t head = 0;    // that it moves
+    size_t socket = 0;  // that it hears
+  };
+  LiveDesk(std::vector<Target> targets, std::vector<Input> inputs);
+  template <class Work>
+  void for_head(size_t head, Work work) const;
+  template <class Work>
+  void for_socket(size_t socket, Work work) const;
+  LiveSource& first_of(size_t socket) const;
+  void pass_on(const Input& input, int64_t now_ns);
+  std::string name_of(const Input& input) const;
   void write(LogBudget& budget, const std::string& key, const LiveNote& note, int64_t now_ns);
-  Notice choose_subject(const std::string& subject);
+  Notice choose_subject(const std::string& subject, size_t head);
 
   mutable std::mutex mutex_;  // guards what is in the sources
-  const Sources sources_;
-  InputHub& inputs_;
-  const Listener listener_;
+  const std::vector<Target> targets_;
+  const std::vector<Input> inputs_;
   LogBudget lines_;
   LogBudget refusal_lines_;
-  std::vector<std::string> troubles_;  // of connections, as told last
+  std::vector<std::string> troubles_;  // of connections, as told last, by socket
   std::unique_ptr<LiveReceiver> receiver_;
 };
 

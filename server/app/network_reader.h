@@ -14,36 +14,40 @@ namespace strandcast {
 
 class NetworkReader : public StreamReader {
  public:
-  NetworkReader(NetServer& net, FrameStages& stages) : net_(net), stages_(stages) {}
+  /// `head`: of those of the network, that the stream is of.
+  NetworkReader(NetServer& net, FrameStages& stages, size_t head) : net_(net), stages_(stages), head_(head) {}
 
   void on_strands(const EncodedFramePtr& frame) override {
     stages_.note_encoded(frame->header.sim_time_ns, now_ns());
-    net_.publish_strands(frame);
+    net_.publish_strands(frame, head_);
   }
   void on_picture(PictureClass picture_class, const PicturePtr& picture) override {
-    net_.publish_picture(picture_class, picture);
+    net_.publish_picture(picture_class, picture, head_);
   }
   void on_picture_refused(PictureClass picture_class, const Error& error) override {
-    net_.send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()});
+    net_.send_to_class(picture_class, Notice{true, "This view cannot be drawn: " + error.to_string()}, head_);
   }
   void on_look_refused(PictureClass picture_class, const Error& error) override {
-    net_.send_to_class(picture_class, Notice{true,
-                                             "The server's pictures keep their look, this one cannot be "
-                                             "drawn there: " +
-                                                 error.to_string()});
+    net_.send_to_class(
+        picture_class,
+        Notice{true,
+               "The server's pictures keep their look, this one cannot be drawn there: " + error.to_string()},
+        head_);
   }
-  void on_look_change(const LookChange& look) override { net_.broadcast(look); }
+  void on_look_change(const LookChange& look) override { net_.broadcast(look, head_); }
   void on_pictures_failed(const Error& error) override {
-    net_.broadcast(Notice{true, "No frames can be drawn: " + error.to_string()});
+    net_.broadcast(Notice{true, "No frames can be drawn: " + error.to_string()}, head_);
   }
   /// The network thread tells every viewer first.
   void on_stream_change(const std::vector<StrandClass>& classes, std::shared_ptr<void> until_told) override {
-    net_.set_strand_classes(classes, "the stream was changed", [until_told] {});
+    net_.set_strand_classes(
+        classes, "the stream was changed", [until_told] {}, head_);
   }
 
  private:
   NetServer& net_;
   FrameStages& stages_;
+  const size_t head_;
 };
 
 }  // namespace strandcast

@@ -340,6 +340,11 @@ Result<ServerConfig> load_config(const ServerOptions& options) {
   std::erase_if(others, [](const std::string& assignment) { return assignment.starts_with("solver"); });
   ASSIGN_OR_RETURN(const SceneDesc own, load(others));
   ASSIGN_OR_RETURN(config.scene, choose_solver(scene, own.solver, options.overrides));
+  for (size_t i = 0; i < config.scene.heads.size(); ++i) {
+    RETURN_IF_ERROR(check_live(scene.heads[i].live));
+    ASSIGN_OR_RETURN(config.scene.heads[i],
+                     choose_solver(scene.heads[i], own.heads[i].solver, options.overrides));
+  }
   if (const std::string note = left_out_note(scene, config.scene); !note.empty()) log_warn("app", "{}", note);
   return config;
 }

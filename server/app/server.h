@@ -22,6 +22,8 @@
 namespace strandcast {
 
 struct ServerConfig;
+/// For people: "anna, ben".
+std::string names_of_heads(const SceneDesc& scene);
 /// The scene's simulation.
 Result<std::unique_ptr<StateSource>> simulation_source(const ServerConfig& config, InputHub& inputs);
 
@@ -32,15 +34,16 @@ struct ServerConfig {
   std::string gl_device = "auto";                      // as EglContext::make
   std::string renderer = "auto";                       // as RenderDeviceConfig
   std::optional<std::filesystem::path> shader_folder;  // none: the shaders in the binary
-  SnapshotObserver on_publish;                         // may be empty
+  SnapshotObserver on_publish;                         // may be empty; of every head
   bool is_lockstep = false;                            // simulated time goes on by commands only
   std::filesystem::path trace_path;                    // CSV of what each state took; empty = none
   std::function<MakePicturePainter(PainterConfig)> make_painter =
-      device_picture_painter;  // of the frame thread
+      device_picture_painter;  // of the frame thread, where the scene has one head
   /// Whether that painter takes processor cores: how large pictures may be, and what they are guessed to
   /// take.
   std::function<bool(const RenderDeviceConfig&)> is_drawn_by_processors = strandcast::is_drawn_by_processors;
-  /// What feeds the stream; its states have the scene's codec, bound and rate.
+  /// What feeds the stream of a head, whose scene alone it is given; its states have the scene's codec, bound
+  /// and rate.
   std::function<Result<std::unique_ptr<StateSource>>(const ServerConfig&, InputHub&)> make_source =
       simulation_source;
   /// For viewers that cannot decode the scene's codec, instead of what that names itself.
@@ -79,10 +82,11 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   uint16_t port() const;
+  // Of one head, by its number; the scene's own is the first.
   /// For readers besides the network's sessions: a recorder, a relay.
-  StreamHub& hub();
-  ServerCounters counters() const;
-  /// What all threads run now, and what they do not.
+  StreamHub& hub(size_t head = 0);
+  ServerCounters counters(size_t head = 0) const;
+  /// What all threads of the first head run now, and what they do not.
   gl::PassReports passes() const;
   /// As NetServer::reload_tls().
   Status reload_tls();

@@ -1,5 +1,9 @@
 #include "server/app/server_metrics.h"
 
+#include <algorithm>
+#include <map>
+#include <string_view>
+
 #include "common/log/log.h"
 #include "server/net/metrics.h"
 
@@ -171,7 +175,65 @@ std::string format_recording(const RecordCounters& record) {
          row("record_lag_ms", "Age of the newest that the recorder has taken.", record.lag_ms);
 }
 
+/// Of no head: of which the first text that has it tells.
+bool is_of_process(std::string_view family) {
+  return family == "strandcast_build_info" || family == "strandcast_log_dropped_lines_total" ||
+         family.starts_with("strandcast_gl_");
+}
+
+/// A line of a metric with one more label in front of its own.
+std::string with_label(std::string_view line, const std::string& label) {
+  const size_t end = line.find_first_of("{ ");
+  const bool has_labels = end != std::string_view::npos && line[end] == '{';
+  return fmt::format("{}{{{}{}{}", line.substr(0, end), label, has_labels ? "," : "}",
+                     line.substr(has_labels ? end + 1 : end));
+}
+
+/// Families of several texts, each once: its comments, and the lines of all.
+class FamilyJoiner {
+ public:
+  void add(std::string_view text, const std::string& head) {
+    const std::string label = fmt::format("head=\"{}\"", label_value(head));
+    Family* family = nullptr;
+    bool is_new = false;
+    while (!text.empty()) {
+      const std::string_view line = text.substr(0, text.find('\n'));
+      text.remove_prefix(std::min(line.size() + 1, text.size()));
+      if (line.starts_with(kHelp)) {
+        const std::string name(line.substr(kHelp.size(), line.find(' ', kHelp.size()) - kHelp.size()));
+        is_new = !place_of_.contains(name);
+        if (is_new) families_.push_back({is_of_process(name), {}});
+        family = &families_[place_of_.try_emplace(name, families_.size() - 1).first->second];
+      }
+      const bool is_comment = line.starts_with('#');
+      if (is_new && (is_comment || family->is_of_process)) family->text += fmt::format("{}\n", line);
+      if (!is_comment && !family->is_of_process) family->text += with_label(line, label) + '\n';
+    }
+  }
+  std::string text() const {
+    std::string all;
+    for (const Family& family : families_) all += family.text;
+    return all;
+  }
+
+ private:
+  static constexpr std::string_view kHelp = "# HELP ";
+  struct Family {
+    bool is_of_process = false;
+    std::string text;
+  };
+  std::vector<Family> families_;
+  std::map<std::string, size_t> place_of_;  // by name
+};
+
 }  // namespace
+
+std::string join_metrics(const std::vector<HeadMetrics>& heads, const std::string& process) {
+  if (heads.size() == 1) return heads.front().before + process + heads.front().after;
+  FamilyJoiner joined;
+  for (const HeadMetrics& one : heads) joined.add(one.before + one.after, one.head);
+  return joined.text() + process;
+}
 
 std::string format_server_metrics(const ServerCounters& counters, const char* version) {
   std::string text = format_build_info(version);

@@ -40,7 +40,7 @@ SessionDesk::SessionDesk(Parts parts)
 
 void SessionDesk::connect(NetServer& net) {
   net_ = &net;
-  reader_ = std::make_unique<NetworkReader>(net, parts_.stages);
+  reader_ = std::make_unique<NetworkReader>(net, parts_.stages, parts_.head);
   // It hears of changes of the stream while no session is there, too.
   (void)parts_.hub.add(*reader_);
 }
@@ -125,6 +125,7 @@ Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec
   welcome.frame_width = place.size.width;
   welcome.frame_height = place.size.height;
   welcome.sim_device = parts_.source.stats().sim_device_name;
+  welcome.heads = parts_.heads;
   return welcome;
 }
 
@@ -171,8 +172,7 @@ void SessionDesk::tell_parameters() {
 
 void SessionDesk::on_scene_request(SessionId session) {
   if (!may_control(session, "save the scene")) return;
-  std::optional<SceneDesc> scene = parts_.source.scene();
-  if (scene && parts_.live != nullptr) scene->live = parts_.live->live();
+  const std::optional<SceneDesc> scene = parts_.whole_scene();
   SceneText answer{scene ? to_line(*scene) : std::string()};
   if (!scene)
     net_->send(session, Notice{true, "What is shown here is no scene that could be saved."});
@@ -190,7 +190,7 @@ void SessionDesk::on_live_command(SessionId session, const LiveCommand& command)
                    fmt::format("live motion capture: {} {}", name_of(command.action), command.subject)))
     return;
   net_->send(session, parts_.live != nullptr
-                          ? parts_.live->obey(command)
+                          ? parts_.live->obey(command, parts_.head)
                           : Notice{true, "This server has no live inputs: start it with --mocap PROTOCOL."});
 }
 

@@ -37,8 +37,12 @@ class SessionDesk : public NetHandler {
     FrameStages& stages;
     std::vector<StrandCodecInfo> codecs;  // that strands are served by, as served_codecs()
     EncodedFramePtr asset;
-    bool is_drawn_by_processors = true;  // pictures
-    LiveDesk* live = nullptr;            // null: no live inputs
+    bool is_drawn_by_processors = true;   // pictures
+    LiveDesk* live = nullptr;             // null: no live inputs
+    size_t head = 0;                      // number of this one among those of the server
+    std::vector<std::string> heads = {};  // names of all where there are several
+    /// The scene with all heads, as it runs; nothing where it is none.
+    std::function<std::optional<SceneDesc>()> whole_scene = {};
   };
   explicit SessionDesk(Parts parts);
 

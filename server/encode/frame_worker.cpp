@@ -106,6 +106,15 @@ void FrameWorker::request_whole(uint32_t picture_class) {
   changed_.notify_all();
 }
 
+void FrameWorker::redraw() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!can_draw()) return;
+    is_redraw_wanted_ = true;
+  }
+  changed_.notify_all();
+}
+
 bool FrameWorker::has_views() const {
   const std::lock_guard lock(mutex_);
   return can_draw();
@@ -154,6 +163,7 @@ void FrameWorker::run() {
     if (!is_active_) begin();
     update_views(job.views);
     decode(job.strand_frames);
+    if (job.is_redrawn) ++decode_count_;
     for (const uint32_t picture_class : job.wholes)
       if (const auto drawn = drawn_.find(picture_class); drawn != drawn_.end())
         drawn->second.is_whole_wanted = drawn->second.encoder != nullptr;
@@ -167,7 +177,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
   std::unique_lock lock(mutex_);
   while (true) {
     const bool has_news = is_stopping_ || can_draw() != is_active_ || has_new_views_ || !pending_.empty() ||
-                          !wanted_wholes_.empty() || new_look_;
+                          !wanted_wholes_.empty() || new_look_ || is_redraw_wanted_;
     const auto due = is_active_ ? next_due() : std::nullopt;
     const int64_t wait_ns = due ? due->wait.due_ns - now_ns() : 1;
     if (has_news || wait_ns <= 0) break;
@@ -182,6 +192,7 @@ FrameWorker::Job FrameWorker::wait_for_job() {
           {},
           std::exchange(wanted_wholes_, {}),
           std::exchange(new_look_, std::nullopt),
+          std::exchange(is_redraw_wanted_, false),
           is_stopping_};
   if (can_draw()) job.views = views_;
   return job;

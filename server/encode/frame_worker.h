@@ -92,6 +92,8 @@ class FrameWorker {
   /// Gives the newest picture of a class again, for viewers that have none; video at the next keyframe that
   /// may be made. Ignored for unknown classes, and before the first picture.
   void request_whole(uint32_t picture_class);
+  /// Something else is to be seen, though no strand frame came: what stands is drawn again.
+  void redraw();
   /// True while strand frames must be offered.
   bool has_views() const;
 
@@ -126,6 +128,7 @@ class FrameWorker {
     std::map<uint32_t, PictureView> views;
     std::set<uint32_t> wholes;
     std::optional<LookDesc> look;
+    bool is_redrawn = false;
     bool is_stopping = false;
   };
   enum class Task { Paint, Whole, Still };
@@ -178,6 +181,7 @@ class FrameWorker {
   bool has_new_views_ = false;
   std::set<uint32_t> wanted_wholes_;
   std::optional<LookDesc> new_look_;
+  bool is_redraw_wanted_ = false;
   bool is_stopping_ = false;
   std::optional<Error> failure_;
   FrameCounters counters_;

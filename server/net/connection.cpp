@@ -261,7 +261,7 @@ void Connection::answer(const Request& request) {
 void Connection::answer_readiness() {
   const Status status = context_.is_stopping
                             ? Status(make_error(ErrorCode::Unavailable, "The server is stopping."))
-                            : context_.handler.readiness();
+                            : context_.readiness();
   if (status) return respond(http::status::ok, "ready\n");
   respond(http::status::service_unavailable, status.error().message + "\n");
 }
@@ -283,7 +283,7 @@ void Connection::answer_metrics(const Request& request) {
           format_metrics(context_.counters_now()) +
               format_histogram("net_queue_delay_ms", "How long data waits on its way to a viewer.",
                                context_.queue_delays) +
-              context_.handler.metrics(),
+              context_.heads.front().handler.metrics(),
           "text/plain; version=0.0.4");
 }
 

@@ -55,11 +55,10 @@ bool end_idle(const std::vector<Waiting>& waiting, const std::string* peer_key) 
 
 }  // namespace
 
-Context::Context(const NetConfig& net_config, NetHandler& net_handler)
+Context::Context(const NetConfig& net_config, const std::vector<NetHead>& net_heads)
     : config(net_config),
       tokens(net_config.tokens),
-      handler(net_handler),
-      strands(net_config.strand_classes, net_config.strand_codecs),
+      heads(net_heads.begin(), net_heads.end()),
       guard({net_config.limits.connections_per_s, net_config.limits.requests_per_s,
              net_config.limits.wrong_tokens, net_config.limits.wrong_token_window_ms * kNsPerMs,
              net_config.limits.wrong_token_block_ms * kNsPerMs, net_config.limits.guarded_addresses}),
@@ -129,6 +128,24 @@ bool Context::kick(SessionId id) {
 std::optional<std::string> Context::key_of(SessionId id) const {
   const auto found = sessions.find(id);
   return found == sessions.end() ? std::nullopt : std::optional(found->second->peer().key);
+}
+
+Result<size_t> Context::find_head(const std::string& name) const {
+  if (name.empty()) return size_t{0};
+  std::string known;
+  for (size_t i = 0; i < heads.size(); ++i) {
+    if (heads[i].name == name) return i;
+    known += (known.empty() ? "" : ", ") + heads[i].name;
+  }
+  return make_error(ErrorCode::NotFound, "There is no head called '{}' here (there are: {}).", name, known);
+}
+
+Status Context::readiness() {
+  for (Head& head : heads) {
+    const Status status = head.handler.readiness();
+    if (!status) return heads.size() == 1 ? status : Status(at(head.name, status.error()));
+  }
+  return {};
 }
 
 void Context::update_session_counts() {

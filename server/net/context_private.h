@@ -64,8 +64,23 @@ struct Peer {
   int64_t accepted_ns = 0;
 };
 
+/// What sessions of one head share.
+struct Head {
+  explicit Head(const NetHead& head)
+      : name(head.name),
+        handler(*head.handler),
+        codecs(head.strand_codecs),
+        strands(head.strand_classes, head.strand_codecs) {}
+
+  const std::string name;
+  NetHandler& handler;
+  const std::vector<StrandByteModel> codecs;
+  StrandCosts strands;
+  PictureCosts pictures;
+};
+
 struct Context {
-  Context(const NetConfig& net_config, NetHandler& net_handler);
+  Context(const NetConfig& net_config, const std::vector<NetHead>& net_heads);
 
   void count(uint64_t NetCounters::*field, uint64_t amount = 1) {
     const std::lock_guard lock(mutex);
@@ -92,14 +107,16 @@ struct Context {
   bool kick(SessionId id);
   /// What counts as the address of a session; none when there is none of this number.
   std::optional<std::string> key_of(SessionId id) const;
+  /// Number of the head of this name, or of the first where the name is empty; NotFound says which there are.
+  Result<size_t> find_head(const std::string& name) const;
+  /// All of them are stepping, or why not.
+  Status readiness();
   /// Publishes the number of open and joined sessions.
   void update_session_counts();
 
   const NetConfig config;
   std::vector<AccessToken> tokens;  // of now
-  NetHandler& handler;
-  StrandCosts strands;
-  PictureCosts pictures;
+  std::vector<Head> heads;
   boost::asio::io_context io{1};
   std::map<SessionId, std::shared_ptr<Session>> sessions;
   std::set<std::shared_ptr<Connection>> connections;

@@ -48,8 +48,9 @@ std::string head(std::string_view name, const char* type, const char* help) {
   return fmt::format("# HELP strandcast_{0} {2}\n# TYPE strandcast_{0} {1}\n", name, type, help);
 }
 
-/// As a label's value.
-std::string escaped(std::string_view text) {
+}  // namespace
+
+std::string label_value(std::string_view text) {
   std::string result;
   for (const char c : text) {
     if (c == '\\' || c == '"' || c == '\n') result += '\\';
@@ -57,8 +58,6 @@ std::string escaped(std::string_view text) {
   }
   return result;
 }
-
-}  // namespace
 
 std::string format_metric(std::string_view name, const char* type, const char* help, double value) {
   return head(name, type, help) + fmt::format("strandcast_{} {}\n", name, value);
@@ -82,7 +81,7 @@ std::string format_info(std::string_view name, const char* help,
                         std::initializer_list<std::pair<const char*, std::string>> labels) {
   std::string text;
   for (const auto& [label, value] : labels)
-    text += fmt::format("{}{}=\"{}\"", text.empty() ? "" : ",", label, escaped(value));
+    text += fmt::format("{}{}=\"{}\"", text.empty() ? "" : ",", label, label_value(value));
   return head(name, "gauge", help) + fmt::format("strandcast_{}{{{}}} 1\n", name, text);
 }
 

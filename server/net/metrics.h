@@ -21,6 +21,9 @@ std::string format_histogram(std::string_view name, const char* help, const Hist
 std::string format_info(std::string_view name, const char* help,
                         std::initializer_list<std::pair<const char*, std::string>> labels);
 
+/// Any text as it stands between the quotes of a label.
+std::string label_value(std::string_view text);
+
 /// What runs here: a gauge that is 1, with the version as a label.
 std::string format_build_info(const char* version);
 

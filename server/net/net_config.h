@@ -72,9 +72,7 @@ struct NetConfig {
   std::vector<AddressRange> trusted_proxies;
   ProxyProtocol proxy_protocol = ProxyProtocol::None;
   NetLimits limits;
-  PageFiles page;                                                    // of constants
-  std::vector<StrandClass> strand_classes = {StrandClass{}};         // at first; best first
-  std::vector<StrandByteModel> strand_codecs = {StrandByteModel{}};  // that each of them is served by
+  PageFiles page;  // of constants
 };
 
 }  // namespace strandcast

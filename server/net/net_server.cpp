@@ -40,8 +40,8 @@ std::string own_host_name() {
 using net::beast::error_code;
 
 struct NetServer::State {
-  State(const NetConfig& config, NetHandler& handler)
-      : context(config, handler), acceptor(context.io), sweep_timer(context.io), accept_timer(context.io) {}
+  State(const NetConfig& config, const std::vector<NetHead>& heads)
+      : context(config, heads), acceptor(context.io), sweep_timer(context.io), accept_timer(context.io) {}
 
   Status open();
   Result<net::tcp::endpoint> find_place();
@@ -55,7 +55,7 @@ struct NetServer::State {
   template <class Work>
   void for_all(Work work);
   template <class Work>
-  void post_to_all(Work work);
+  void for_head(size_t head, Work work);
   template <class Work>
   void post_to(SessionId session, Work work);
 
@@ -203,9 +203,12 @@ void NetServer::State::for_all(Work work) {
   for (const auto& [id, session] : sessions) work(*session);
 }
 
+/// Those who have joined for this head.
 template <class Work>
-void NetServer::State::post_to_all(Work work) {
-  net::asio::post(context.io, [this, work = std::move(work)] { for_all(work); });
+void NetServer::State::for_head(size_t head, Work work) {
+  for_all([&](net::Session& session) {
+    if (session.is_about(head)) work(session);
+  });
 }
 
 /// Nothing when the session is gone by then.
@@ -224,12 +227,17 @@ NetServer::~NetServer() {
   stop();
 }
 
-Result<std::unique_ptr<NetServer>> NetServer::listen(const NetConfig& config, NetHandler& handler) {
+Result<std::unique_ptr<NetServer>> NetServer::listen(const NetConfig& config, std::vector<NetHead> heads) {
+  CHECK(!heads.empty());
   NetConfig complete = config;
   complete.allowed_hosts.push_back(net::own_host_name());
-  auto state = std::make_unique<State>(complete, handler);
+  auto state = std::make_unique<State>(complete, heads);
   RETURN_IF_ERROR(state->open());
   return std::unique_ptr<NetServer>(new NetServer(std::move(state)));
+}
+
+Result<std::unique_ptr<NetServer>> NetServer::listen(const NetConfig& config, NetHandler& handler) {
+  return listen(config, std::vector<NetHead>{{.name = {}, .handler = &handler}});
 }
 
 void NetServer::start() {
@@ -264,40 +272,47 @@ uint16_t NetServer::port() const {
   return state_->port;
 }
 
-void NetServer::publish_strands(EncodedFramePtr frame) {
-  net::asio::post(state_->context.io, [state = state_.get(), frame = std::move(frame)] {
-    state->context.strands.note_frame(frame->header, frame->message.size(), now_ns());
-    state->for_all([&](net::Session& session) { session.deliver_strands(frame); });
+void NetServer::publish_strands(EncodedFramePtr frame, size_t head) {
+  net::asio::post(state_->context.io, [state = state_.get(), frame = std::move(frame), head] {
+    state->context.heads[head].strands.note_frame(frame->header, frame->message.size(), now_ns());
+    state->for_head(head, [&](net::Session& session) { session.deliver_strands(frame); });
   });
 }
 
-void NetServer::publish_picture(PictureClass picture_class, PicturePtr picture) {
-  net::asio::post(state_->context.io, [state = state_.get(), picture_class, picture = std::move(picture)] {
-    state->context.pictures.note_picture(picture_class, picture->message_bytes(), now_ns());
-    state->for_all([&](net::Session& session) { session.deliver_picture(picture_class, picture); });
+void NetServer::publish_picture(PictureClass picture_class, PicturePtr picture, size_t head) {
+  net::asio::post(state_->context.io, [state = state_.get(), picture_class, picture = std::move(picture),
+                                       head] {
+    state->context.heads[head].pictures.note_picture(picture_class, picture->message_bytes(), now_ns());
+    state->for_head(head, [&](net::Session& session) { session.deliver_picture(picture_class, picture); });
   });
 }
 
 void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string reason,
-                                   std::function<void()> then) {
+                                   std::function<void()> then, size_t head) {
   CHECK(!classes.empty());
   net::asio::post(state_->context.io, [state = state_.get(), classes = std::move(classes),
-                                       reason = std::move(reason), then = std::move(then)] {
+                                       reason = std::move(reason), then = std::move(then), head] {
+    net::Head& changed = state->context.heads[head];
     // What was measured of the old ones is forgotten.
-    state->context.strands = StrandCosts(classes, state->context.config.strand_codecs);
-    state->for_all([&](net::Session& session) { session.follow_strand_classes(reason); });
+    changed.strands = StrandCosts(classes, changed.codecs);
+    state->for_head(head, [&](net::Session& session) { session.follow_strand_classes(reason); });
     then();
   });
 }
 
-void NetServer::broadcast(ServerMessage message) {
-  state_->post_to_all([message = std::move(message)](net::Session& session) { session.send(message); });
+void NetServer::broadcast(ServerMessage message, size_t head) {
+  net::asio::post(state_->context.io, [state = state_.get(), message = std::move(message), head] {
+    state->for_head(head, [&](net::Session& session) { session.send(message); });
+  });
 }
 
-void NetServer::send_to_class(PictureClass picture_class, ServerMessage message) {
-  state_->post_to_all([picture_class, message = std::move(message)](net::Session& session) {
-    if (session.watches(picture_class)) session.send(message);
-  });
+void NetServer::send_to_class(PictureClass picture_class, ServerMessage message, size_t head) {
+  net::asio::post(state_->context.io,
+                  [state = state_.get(), picture_class, message = std::move(message), head] {
+                    state->for_head(head, [&](net::Session& session) {
+                      if (session.watches(picture_class)) session.send(message);
+                    });
+                  });
 }
 
 void NetServer::send(SessionId session, ServerMessage message) {

@@ -48,10 +48,22 @@ struct NetCounters {
   uint64_t bytes_sent = 0;     // WebSocket payload
 };
 
+/// One of the heads that a server has: what a session is about from its Hello on. Its strands and its classes
+/// of pictures are numbered by themselves.
+struct NetHead {
+  std::string name;                                                  // that a Hello asks for
+  NetHandler* handler = nullptr;                                     // outlives the server
+  std::vector<StrandClass> strand_classes = {StrandClass{}};         // at first; best first
+  std::vector<StrandByteModel> strand_codecs = {StrandByteModel{}};  // that each of them is served by
+};
+
 class NetServer {
  public:
-  /// Opens the port; connections wait until start(). `handler` must outlive the server. Unavailable when the
-  /// port is in use, BadInput for an address that is none, Unauthorized beyond loopback without a token.
+  /// Opens the port; connections wait until start(). `heads`: who names none in the Hello gets the first,
+  /// whose handler also answers for /metrics. Unavailable when the port is in use, BadInput for an address
+  /// that is none, Unauthorized beyond loopback without a token.
+  static Result<std::unique_ptr<NetServer>> listen(const NetConfig& config, std::vector<NetHead> heads);
+  /// With one head, which has no name.
   static Result<std::unique_ptr<NetServer>> listen(const NetConfig& config, NetHandler& handler);
   /// stop(), if it was not called.
   ~NetServer();
@@ -67,19 +79,21 @@ class NetServer {
   /// less now, end with a sentence. BadInput for none where there were some.
   Status set_tokens(std::vector<AccessToken> tokens);
 
+  // Each concerns the sessions of one head, by its number in `heads`.
   /// Strand frames of one stream (a class by a codec) in the order of their chain. A delta goes to sessions
   /// of the stream whose last frame it builds on, a keyframe to those that wait for one.
-  void publish_strands(EncodedFramePtr frame);
+  void publish_strands(EncodedFramePtr frame, size_t head = 0);
   /// The newest picture for the viewers of one class; replaces one not yet being sent. Each viewer gets what
   /// takes it there from the last one it was sent.
-  void publish_picture(PictureClass picture_class, PicturePtr picture);
+  void publish_picture(PictureClass picture_class, PicturePtr picture, size_t head = 0);
   /// Strands are coded otherwise from now on: tells every viewer of strands and moves those whose class is
   /// gone. `then` runs on the network thread after that, before any frame published later.
-  void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then);
+  void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then,
+                          size_t head = 0);
   /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
-  void broadcast(ServerMessage message);
+  void broadcast(ServerMessage message, size_t head = 0);
   /// To those who watch the pictures of one class.
-  void send_to_class(PictureClass picture_class, ServerMessage message);
+  void send_to_class(PictureClass picture_class, ServerMessage message, size_t head = 0);
   /// Ignored when the session is gone.
   void send(SessionId session, ServerMessage message);
 

@@ -276,7 +276,7 @@ void Session::abort() {
 void Session::leave() {
   if (!std::exchange(has_joined_, false)) return;
   context_.note(fmt::format("session {} left", id_));
-  context_.handler.on_left(id_);
+  head().handler.on_left(id_);
 }
 
 void Session::finish() {

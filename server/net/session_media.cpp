@@ -93,9 +93,9 @@ void Session::ask_for_keyframe(int64_t time_ns) {
   keyframe_asked_ns_ = time_ns;
   context_.count(&NetCounters::keyframe_requests);
   if (needs_picture)
-    context_.handler.on_picture_request(id_, subscription_.pictures.picture_class);
+    head().handler.on_picture_request(id_, subscription_.pictures.picture_class);
   else
-    context_.handler.on_keyframe_request(id_, stream_id_of(subscription_.strands));
+    head().handler.on_keyframe_request(id_, stream_id_of(subscription_.strands));
 }
 
 void Session::on_ack(const FrameAck& ack, int64_t time_ns) {
@@ -120,7 +120,7 @@ void Session::adapt_pictures(int64_t time_ns) {
   const PictureChoice& pictures = subscription_.pictures;
   const PictureClass before = pictures.picture_class;
   const size_t step = pictures.step;
-  const double present = context_.pictures.bytes_per_s(before);
+  const double present = head().pictures.bytes_per_s(before);
   if (present <= 0.0 || pictures.costs.empty()) return;
   std::vector<double> costs;
   for (const double cost : pictures.costs) costs.push_back(present * cost / pictures.costs[step]);
@@ -128,9 +128,9 @@ void Session::adapt_pictures(int64_t time_ns) {
   const size_t chosen = flow_.choose_class({step, costs, cap}, time_ns);
   if (chosen == step) return;
   const char* why = chosen < step ? "the link has room" : "the link or this viewer is too slow";
-  if (!context_.handler.on_picture_step(id_, chosen, fmt::format("{}: {}", why, describe_link(time_ns))))
+  if (!head().handler.on_picture_step(id_, chosen, fmt::format("{}: {}", why, describe_link(time_ns))))
     return;
-  context_.pictures.forget(before);
+  head().pictures.forget(before);
   context_.count(&NetCounters::class_changes);
   follow_picture_class(before);
 }
@@ -139,16 +139,16 @@ void Session::adapt_pictures(int64_t time_ns) {
 void Session::adapt(int64_t time_ns) {
   if (subscription_.mode() == StreamMode::Frames) return adapt_pictures(time_ns);
   if (state_ != State::Joined || subscription_.mode() != StreamMode::Strands || !flow_.expects_acks()) return;
-  const std::vector<double> costs = context_.strands.bytes_per_s(subscription_.strands.codec);
+  const std::vector<double> costs = head().strands.bytes_per_s(subscription_.strands.codec);
   if (costs.empty()) return;
   const double cap = context_.config.limits.viewer_bytes_per_s;
   const size_t present = subscription_.strands.strand_class;
-  const size_t chosen = flow_.choose_class({present, costs, cap, context_.strands.classes()}, time_ns);
+  const size_t chosen = flow_.choose_class({present, costs, cap, head().strands.classes()}, time_ns);
   if (chosen == present) return;
   change_strand_class(chosen);
   announce_quality(fmt::format("{}: {}; {}",
                                chosen < present ? "the link has room" : "the link or this viewer is too slow",
-                               to_string(context_.strands.classes()[chosen]), describe_link(time_ns)));
+                               to_string(head().strands.classes()[chosen]), describe_link(time_ns)));
   ask_for_keyframe(time_ns);
 }
 
@@ -156,7 +156,7 @@ void Session::change_strand_class(size_t chosen) {
   subscription_.strands.strand_class = chosen;
   context_.count(&NetCounters::class_changes);
   queue_.restart_strands();
-  context_.handler.on_strand_class(id_);
+  head().handler.on_strand_class(id_);
 }
 
 /// Strands go on by another codec, beginning with a keyframe.
@@ -167,14 +167,14 @@ void Session::change_codec(const CodecAnswer& answer) {
   context_.count(&NetCounters::codec_changes);
   const bool has_strands = subscription_.gets(StreamMode::Strands);
   if (has_strands) queue_.restart_strands();
-  context_.handler.on_strand_class(id_);
+  head().handler.on_strand_class(id_);
   announce_quality(answer.reason);
   if (has_strands) ask_for_keyframe(now_ns());
 }
 
 void Session::announce_quality(const std::string& reason) {
   context_.note(fmt::format("session {}: {}", id_, reason));
-  const StrandClass& now = context_.strands.classes()[subscription_.strands.strand_class];
+  const StrandClass& now = head().strands.classes()[subscription_.strands.strand_class];
   queue_control(StreamQuality{stream_id_of(subscription_.strands), now.rate_divisor, now.strand_share,
                               now.bound_m, reason, codec_});
 }
@@ -184,10 +184,10 @@ void Session::follow_strand_classes(const std::string& reason) {
       subscription_.mode() == StreamMode::Strands || subscription_.changes_to(StreamMode::Strands);
   if (state_ != State::Joined || !is_concerned || subscription_.is_empty()) return;
   guarded([&] {
-    const size_t last = context_.strands.classes().size() - 1;
+    const size_t last = head().strands.classes().size() - 1;
     if (subscription_.strands.strand_class > last) change_strand_class(last);
     announce_quality(fmt::format("{}: {}", reason,
-                                 to_string(context_.strands.classes()[subscription_.strands.strand_class])));
+                                 to_string(head().strands.classes()[subscription_.strands.strand_class])));
     ask_for_keyframe(now_ns());
   });
 }
@@ -203,8 +203,8 @@ void Session::report_link(int64_t time_ns) {
   link.queue_delay_ms = static_cast<double>(flow_.queue_delay_ns()) / kNsPerMs;
   context_.queue_delays.add_ms(link.queue_delay_ms);
   link.round_trip_ms = static_cast<double>(flow_.base_ns()) / kNsPerMs;
-  link.strand_bytes_per_s = context_.strands.bytes_per_s(subscription_.strands.codec);
-  const LinkAnswer answer = context_.handler.on_link(id_, link, time_ns);
+  link.strand_bytes_per_s = head().strands.bytes_per_s(subscription_.strands.codec);
+  const LinkAnswer answer = head().handler.on_link(id_, link, time_ns);
   is_mode_request_waiting_ = answer.is_request_waiting;
   if (answer.codec) change_codec(*answer.codec);
   if (answer.mode) answer_mode(*answer.mode);

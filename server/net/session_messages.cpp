@@ -94,9 +94,12 @@ void Session::check_stay() {
 void Session::join(const Hello& hello) {
   if (!check_token(hello)) return;
   if (!context_.has_room(peer_.key)) return close_as_full();
+  const Result<size_t> found = context_.find_head(hello.head);
+  if (!found) return close(CloseCode::Policy, found.error().message);
+  head_ = *found;
   subscription_.begin(hello);
   Result<Admission> admission =
-      context_.handler.on_hello({id_, peer_.key, peer_.address, subscription_}, hello);
+      head().handler.on_hello({id_, peer_.key, peer_.address, subscription_}, hello);
   if (!admission) return close(close_code_for(admission.error()), admission.error().to_string());
   hello_ = hello;
   token_expires_unix_s_ = expiry_of(context_.tokens, hello.token);
@@ -117,13 +120,13 @@ void Session::join(const Hello& hello) {
   queue_control(std::move(admission->welcome));
   // The Welcome says nothing about a rate below that of the simulation.
   if (subscription_.mode() == StreamMode::Strands && flow_.expects_acks() &&
-      context_.strands.classes()[0].rate_divisor > 1)
+      head().strands.classes()[0].rate_divisor > 1)
     announce_quality("the stream is set so");
   ask_for_keyframe(now_ns());
 }
 
 void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
-  NetHandler& handler = context_.handler;
+  NetHandler& handler = head().handler;
   std::visit(
       Overloaded{[](const Hello&) {},
                  [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
@@ -154,7 +157,7 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
 /// By its own word, or by that of somebody who controls.
 void Session::move_camera(const CameraChange& camera) {
   const PictureClass before = subscription_.pictures.picture_class;
-  context_.handler.on_camera(id_, camera);
+  head().handler.on_camera(id_, camera);
   follow_picture_class(before);
 }
 
@@ -167,7 +170,7 @@ void Session::obey(const AdminCommand& command, int64_t time_ns) {
                : "ends the server");
   if (command.action == AdminAction::ShutDown) {
     queue_control(Notice{false, "The server is stopping."});
-    return context_.handler.on_shut_down(id_);
+    return head().handler.on_shut_down(id_);
   }
   const std::optional<std::string> key = context_.key_of(command.session);
   const bool is_own = key == peer_.key;

@@ -45,11 +45,14 @@ class Session : public std::enable_shared_from_this<Session> {
   void abort();
 
   State state() const { return state_; }
+  /// Whether it has joined, and for this head.
+  bool is_about(size_t head) const { return state_ == State::Joined && head_ == head; }
   /// For an admin's list.
   SessionInfo info(int64_t time_ns) const;
   const Peer& peer() const { return peer_; }
 
  private:
+  Head& head() const { return context_.heads[head_]; }
   template <class Work>
   void guarded(Work&& work);
   void on_open(bool has_room);
@@ -99,6 +102,7 @@ class Session : public std::enable_shared_from_this<Session> {
   State state_ = State::Handshake;
   Hello hello_;                       // its token stays: it may be taken back
   int64_t token_expires_unix_s_ = 0;  // 0 = never
+  size_t head_ = 0;                   // that it is about
   Subscription subscription_;
   std::string codec_;                        // name of that of its strands
   std::optional<ModeChange> untold_change_;  // goes right before the first frame of the next mode

@@ -257,6 +257,11 @@ void StreamHub::request_whole(PictureClass picture_class) {
   if (frames_ != nullptr) frames_->request_whole(picture_class);
 }
 
+void StreamHub::redraw() {
+  const std::lock_guard lock(mutex_);
+  if (frames_ != nullptr) frames_->redraw();
+}
+
 void StreamHub::tell_motion(uint64_t source, const MotionSamples& samples, int64_t arrival_ns) {
   give([](const Entry& entry) { return entry.demand.has_inputs; },
        [&](StreamReader& reader) { reader.on_motion(source, samples, arrival_ns); });

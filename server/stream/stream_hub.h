@@ -57,6 +57,8 @@ class StreamHub : public StateSink, public DemandDesk {
   void request_keyframe(uint16_t stream_id);
   /// The newest picture of a class again, whole. From a reader's functions too.
   void request_whole(PictureClass picture_class);
+  /// What pictures show has changed beside this stream. From any reader's functions too.
+  void redraw();
 
   void put(std::shared_ptr<const Snapshot> state) override;
   void change_stream(const StreamDesc& stream) override;

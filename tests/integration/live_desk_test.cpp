@@ -25,8 +25,9 @@ using test::UdpSocket;
 class LiveDesks : public testing::Test {
  protected:
   [[nodiscard]] bool open(const LiveDesc& live, const std::vector<AddressRange>& allowed = {}) {
-    auto desk = LiveDesk::open({live}, allowed, hub_,
-                               {[this](uint64_t, const MotionSamples&, int64_t) { ++told_; }, nullptr});
+    std::vector<LiveDesk::Target> targets(1);
+    targets[0] = {{live}, &hub_, {[this](uint64_t, const MotionSamples&, int64_t) { ++told_; }, nullptr}};
+    auto desk = LiveDesk::open(std::move(targets), allowed);
     EXPECT_TRUE(desk) << desk.error().to_string();
     if (!desk) return false;
     desk_ = std::move(*desk);

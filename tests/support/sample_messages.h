@@ -22,7 +22,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
   return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,
-                12.5, "delta", true},
+                12.5, "delta", true, "ben"},
           motion,
           wind,
           camera,
@@ -60,6 +60,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   welcome.frame_height = 720;
   welcome.sim_device = "lanes (AVX-512, 2 threads)";
   welcome.role = Role::Admin;
+  welcome.heads = {"walk", "ben"};
   ServerStatus status;
   status.tick = 1ull << 40;
   status.sim_ms = 2.5;

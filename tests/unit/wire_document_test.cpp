@@ -52,6 +52,7 @@ TEST(WireDocument, NamesEveryLimitWithItsValue) {
       {"kMaxParameterPathBytes", with_commas(kMaxParameterPathBytes)},
       {"kMaxParameterTextBytes", with_commas(kMaxParameterTextBytes)},
       {"kStreamsPerCodec", fmt::format("from {} (", kStreamsPerCodec)},
+      {"kMaxHeads", fmt::format("at most {} (", kMaxHeads)},
       {"kMaxLiveInputs", fmt::format("at most {} (", kMaxLiveInputs)},
       {"kMaxLiveValues", fmt::format("at most {} (", kMaxLiveValues)},
       {"kMaxRateDivisor", fmt::format("1..{}", kMaxRateDivisor)},
