@@ -210,6 +210,7 @@ Result<ClientConfig> client_config_for(const CtlTarget& target, Role role) {
   config.hello.mode = StreamMode::Strands;
   config.hello.name = "strandcast-ctl";
   config.hello.token = target.token;
+  config.hello.head = target.head;
   config.cancel = [target] { return stopped(target); };
   if (!target.token_file.empty()) {
     ASSIGN_OR_RETURN(config.hello.token, load_token(target.token_file, role));

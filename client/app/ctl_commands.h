@@ -27,6 +27,7 @@ struct CtlTarget {
   bool is_tls = false;
   std::filesystem::path tls_authorities;    // means TLS when not empty
   const std::atomic<bool>* stop = nullptr;  // set: connecting and waiting for answers end
+  std::string head = {};                    // which one of the server's; empty: the first
 };
 
 struct FeedOptions {

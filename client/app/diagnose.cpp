@@ -137,6 +137,8 @@ class Examination {
     add(Finding::Ok, "role",
         fmt::format("{}{}", to_string(welcome.role),
                     options_.address.is_tls ? ", encrypted" : ", not encrypted"));
+    if (!welcome.heads.empty())
+      add(Finding::Ok, "heads", fmt::format("{} (--head NAME shows one)", fmt::join(welcome.heads, ", ")));
     if (!welcome.codec_reason.empty()) add(Finding::Ok, "codec", welcome.codec_reason);
     const auto end = Clock::now() + kDiagnosisTimeout;
     const auto enough = Clock::now() + kDiagnosisWatch;

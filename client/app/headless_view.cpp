@@ -7,6 +7,7 @@
 #include "client/app/live_connection.h"
 #include "common/log/log.h"
 #include "common/log/progress.h"
+#include "common/render/draw_heads.h"
 
 namespace strandcast {
 namespace {
@@ -17,18 +18,26 @@ constexpr milliseconds kPumpWait{20};
 constexpr double kFirstPictureTimeoutS = 15.0;
 constexpr double kStallTimeoutS = 15.0;  // no frame for this long although more are wanted
 
-/// What was received and is to be written.
+using SnapshotPtr = std::shared_ptr<const Snapshot>;
+using Connections = std::vector<std::unique_ptr<LiveConnection>>;
+
+/// What was received and is to be written. Of several heads the first gives the times.
 struct Collected {
   ClipStore clip;
-  std::shared_ptr<const Snapshot> screenshot_snapshot;
+  std::vector<std::vector<SnapshotPtr>> clip_others;  // of the further heads, by picture
+  SnapshotPtr screenshot_snapshot;
+  std::vector<SnapshotPtr> screenshot_others;
   std::optional<Image> screenshot_image;
 };
 
 /// What snapshots are drawn with, after the connection is gone.
-struct Drawn {
-  RenderDevice* device = nullptr;
+struct DrawnHead {
   std::shared_ptr<const SceneAsset> asset;
   LookDesc look;  // of the end
+};
+struct Drawn {
+  RenderDevice* device = nullptr;
+  std::vector<DrawnHead> heads;
   CameraDesc camera;
   ClockOffset clock;
   std::shared_ptr<FrameTrace> trace;
@@ -48,14 +57,20 @@ class TimeLimit {
 
 class Collector {
  public:
-  Collector(const ViewOptions& options, LiveConnection& live, FrameTrace& trace, const TimeLimit& limit,
-            const std::atomic<bool>& stop)
+  /// `others`: of the further heads.
+  Collector(const ViewOptions& options, LiveConnection& live, Connections& others, FrameTrace& trace,
+            const TimeLimit& limit, const std::atomic<bool>& stop)
       : options_(options),
         live_(live),
+        others_(others),
         trace_(trace),
         limit_(limit),
         stop_(stop),
-        collected_{ClipStore(options.clip_fps, options.clip_s), {}, {}} {
+        collected_{ClipStore(options.clip_fps, options.clip_s, kMaxClipBytes / (1 + others.size())),
+                   {},
+                   {},
+                   {},
+                   {}} {
     begin_session();
   }
   ~Collector() { session().set_snapshot_listener({}); }
@@ -77,7 +92,7 @@ class Collector {
                                 kStallTimeoutS)
                    : make_error(ErrorCode::Unavailable, "{}", live_.trouble());
     }
-    if (!collected_.screenshot_snapshot) collected_.screenshot_snapshot = session().replay().newest();
+    if (!collected_.screenshot_snapshot) take_screenshot(session().replay().newest());
     if (!collected_.screenshot_image && session().image()) collected_.screenshot_image = *session().image();
     return std::move(collected_);
   }
@@ -106,6 +121,10 @@ class Collector {
         return make_error(ErrorCode::Unavailable, "the server came back with another scene");
     }
     if (live_.final_error()) return *live_.final_error();
+    for (const auto& other : others_) {
+      if (other->pump(milliseconds(0))) other->session().replay().set_playout(options_.playout);
+      if (other->final_error()) return *other->final_error();
+    }
     follow_camera();
     report();
     return {};
@@ -132,9 +151,9 @@ class Collector {
 
   Status wait_for_first_picture() {
     const int64_t begin_ns = now_ns();
-    while (!stop_ && !session().has_picture()) {
+    while (!stop_ && !has_pictures()) {
       RETURN_IF_ERROR(pump());
-      if (session().has_picture()) break;
+      if (has_pictures()) break;
       if (limit_.is_over() || static_cast<double>(now_ns() - begin_ns) * 1e-9 > kFirstPictureTimeoutS)
         return make_error(ErrorCode::Timeout, "the server sent nothing to show for {} s{}",
                           std::min(kFirstPictureTimeoutS, options_.seconds.value_or(kFirstPictureTimeoutS)),
@@ -143,6 +162,13 @@ class Collector {
                               : "; last problem: " + session().replay().stats().last_error);
     }
     return {};
+  }
+
+  /// Of every head.
+  bool has_pictures() {
+    return session().has_picture() && std::all_of(others_.begin(), others_.end(), [](const auto& other) {
+             return other->session().has_picture();
+           });
   }
 
   bool is_complete() {
@@ -155,8 +181,21 @@ class Collector {
 
   void take(const std::shared_ptr<const Snapshot>& snapshot) {
     if (!options_.clip.empty()) collected_.clip.add(snapshot);
+    while (collected_.clip_others.size() < collected_.clip.snapshots().size())
+      collected_.clip_others.push_back(newest_of_others());
     if (!collected_.screenshot_snapshot && decoded_frames() >= options_.after_frames)
-      collected_.screenshot_snapshot = snapshot;
+      take_screenshot(snapshot);
+  }
+
+  void take_screenshot(const SnapshotPtr& snapshot) {
+    collected_.screenshot_snapshot = snapshot;
+    collected_.screenshot_others = newest_of_others();
+  }
+
+  std::vector<SnapshotPtr> newest_of_others() {
+    std::vector<SnapshotPtr> newest;
+    for (const auto& other : others_) newest.push_back(other->session().replay().newest());
+    return newest;
   }
 
   /// Pictures carry no simulation time to the listener, so the clip takes them as they come, on the wall
@@ -173,6 +212,7 @@ class Collector {
 
   const ViewOptions& options_;
   LiveConnection& live_;
+  Connections& others_;
   FrameTrace& trace_;
   const TimeLimit& limit_;
   const std::atomic<bool>& stop_;
@@ -193,26 +233,56 @@ Status write_images(const ViewOptions& options, const Collected& collected) {
   return clip.finish();
 }
 
-/// Draws the collected snapshots with the same renderer as the server and the window.
+/// Draws states of all heads with the same renderers as the server and the window.
+class SnapshotDrawer {
+ public:
+  SnapshotDrawer(const Drawn& scene, StageTimer& render_timer) : scene_(scene), timer_(render_timer) {}
+
+  Status begin() {
+    for (const DrawnHead& head : scene_.heads) {
+      ASSIGN_OR_RETURN(auto renderer, scene_.device->make_renderer(*head.asset, head.look));
+      renderers_.push_back(std::move(renderer));
+      fills_.emplace_back(head.asset->rest_position_m, head.asset->vertex_count);
+    }
+    return {};
+  }
+
+  /// A head of which nothing has come is left out.
+  Result<Image> draw(const SnapshotPtr& first, const std::vector<SnapshotPtr>& others, RenderSize size) {
+    const int64_t begin_ns = now_ns();
+    std::vector<PosedStrands> strands;
+    strands.reserve(1 + others.size());
+    std::vector<PlacedHead> heads;
+    for (size_t i = 0; i <= others.size() && i < renderers_.size(); ++i) {
+      const SnapshotPtr& snapshot = i == 0 ? first : others[i - 1];
+      if (snapshot == nullptr) continue;
+      strands.push_back(posed_strands_of(*snapshot, fills_[i]));
+      heads.push_back({renderers_[i].get(), &strands.back()});
+    }
+    ASSIGN_OR_RETURN(HeadsPicture picture, draw_heads(heads, scene_.camera, size));
+    // It was read back, which waits for the GPU, so the time is the whole picture's.
+    const int64_t end_ns = now_ns();
+    timer_.add_ms(static_cast<double>(end_ns - begin_ns) * 1e-6);
+    if (scene_.clock.has_value())
+      scene_.trace->note_presented(StreamMode::Strands, first->sim_time_ns, scene_.clock.to_server_ns(end_ns));
+    return std::move(picture.image);
+  }
+
+ private:
+  const Drawn& scene_;
+  StageTimer& timer_;
+  std::vector<std::unique_ptr<Renderer>> renderers_;
+  std::vector<StrandFill> fills_;
+};
+
 /// After a stop nothing more is drawn, and a clip that has begun is not written.
 Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Collected& collected,
                         StageTimer& render_timer, const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(auto renderer, scene.device->make_renderer(*scene.asset, scene.look));
-  StrandFill fill(scene.asset->rest_position_m, scene.asset->vertex_count);
-
-  const auto draw = [&](const Snapshot& snapshot, RenderSize size) -> Result<Image> {
-    const int64_t begin_ns = now_ns();
-    RETURN_IF_ERROR(renderer->draw(posed_strands_of(snapshot, fill), scene.camera, size));
-    Image image = renderer->read_image();  // waits for the GPU, so the time is the whole picture's
-    const int64_t end_ns = now_ns();
-    render_timer.add_ms(static_cast<double>(end_ns - begin_ns) * 1e-6);
-    if (scene.clock.has_value())
-      scene.trace->note_presented(StreamMode::Strands, snapshot.sim_time_ns,
-                                  scene.clock.to_server_ns(end_ns));
-    return image;
-  };
+  SnapshotDrawer drawer(scene, render_timer);
+  RETURN_IF_ERROR(drawer.begin());
   if (!options.screenshot.empty() && collected.screenshot_snapshot) {
-    ASSIGN_OR_RETURN(const Image image, draw(*collected.screenshot_snapshot, options.size));
+    ASSIGN_OR_RETURN(const Image image,
+                     drawer.draw(collected.screenshot_snapshot, collected.screenshot_others, options.size));
     RETURN_IF_ERROR(save_png(options.screenshot, image));
   }
   if (options.clip.empty()) return {};
@@ -220,15 +290,30 @@ Status render_snapshots(const ViewOptions& options, const Drawn& scene, const Co
   const auto& snapshots = collected.clip.snapshots();
   Progress progress({"drawing the clip"});
   progress.expect(static_cast<uint32_t>(snapshots.size()), static_cast<double>(snapshots.size()));
-  for (const auto& snapshot : snapshots) {
+  for (size_t i = 0; i < snapshots.size(); ++i) {
     if (stop) return {};
     progress.begin_run(options.clip.string());
-    ASSIGN_OR_RETURN(const Image image, draw(*snapshot, options.clip_size));
+    ASSIGN_OR_RETURN(const Image image,
+                     drawer.draw(snapshots[i], collected.clip_others[i], options.clip_size));
     RETURN_IF_ERROR(clip.add(image));
     progress.end_run(1.0);
   }
   if (stop) return {};
   return clip.finish();
+}
+
+/// Connections to the further heads of a server, whose strands are drawn beside the first's. None where one
+/// head was asked for, and where pictures were: they show all.
+Result<Connections> open_others(ClientConfig config, const Welcome& first) {
+  Connections others;
+  if (!config.hello.head.empty() || config.hello.mode == StreamMode::Frames) return others;
+  config.hello.mode = StreamMode::Strands;
+  for (size_t i = 1; i < first.heads.size(); ++i) {
+    config.hello.head = first.heads[i];
+    ASSIGN_OR_RETURN(auto other, LiveConnection::open(config));
+    others.push_back(std::move(other));
+  }
+  return others;
 }
 
 }  // namespace
@@ -261,22 +346,29 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
     trace->want_states(true);
     live->set_trace(trace);
   }
-  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, *trace, limit, stop).run());
+  ASSIGN_OR_RETURN(Connections others, open_others(config, live->session().welcome()));
+  ASSIGN_OR_RETURN(const Collected collected, Collector(options, *live, others, *trace, limit, stop).run());
   ViewerSession* session = &live->session();
 
   StageTimer render_timer;
   ViewReport report = make_report(*session);
   if (!own_reason.empty()) set_mode_reason(report, own_reason);
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
-  const Drawn scene{device.get(),      session->shared_asset(),   session->look().look,
-                    session->camera(), session->client().clock(), trace};
+  Drawn scene{device.get(),
+              {{session->shared_asset(), session->look().look}},
+              session->camera(),
+              session->client().clock(),
+              trace};
+  for (const auto& other : others)
+    scene.heads.push_back({other->session().shared_asset(), other->session().look().look});
+  others.clear();
   live.reset();  // the server need not serve a viewer that only draws now
   if (stop && wants_render) log_warn("render", "stopped: nothing is drawn");
   if (stop) return report;
   if (collected.clip.is_cut())
     log_warn("render", "the clip ends early: its states would take more than {} MiB", kMaxClipBytes >> 20);
   if (wants_render && mode == StreamMode::Frames) RETURN_IF_ERROR(write_images(options, collected));
-  if (wants_render && mode == StreamMode::Strands && scene.asset && scene.device)
+  if (wants_render && mode == StreamMode::Strands && scene.heads.front().asset && scene.device)
     RETURN_IF_ERROR(render_snapshots(options, scene, collected, render_timer, stop));
   set_render_times(report, render_timer);
   RETURN_IF_ERROR(trace->close());

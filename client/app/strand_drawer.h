@@ -1,6 +1,6 @@
-// StrandDrawer: draws strands with a device and a thread of its own, so that a window never waits for
-// hair. What it draws when and how finely, DrawPlan says. It keeps the newest picture in memory; what it is
-// told and what it tells are the newest only. All functions from any thread.
+// StrandDrawer: draws strands, of one or several heads, with a device and a thread of its own, so that a
+// window never waits for hair. What it draws when and how finely, DrawPlan says. It keeps the newest picture
+// in memory; what it is told and what it tells are the newest only. All functions from any thread.
 #pragma once
 
 #include <atomic>
@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "client/app/draw_plan.h"
 #include "client/app/viewer_thread.h"
@@ -59,11 +60,13 @@ class StrandDrawer {
   StrandDrawer(const StrandDrawer&) = delete;
   StrandDrawer& operator=(const StrandDrawer&) = delete;
 
-  /// What the server sent.
-  void set_state(std::shared_ptr<const ViewerState> state);
+  /// How many heads there are, at first one. What is told of others is left out.
+  void set_head_count(size_t count);
+  /// What the server sent about one head; the first gives what concerns all.
+  void set_state(std::shared_ptr<const ViewerState> state, size_t head = 0);
   /// Nothing: no picture is wanted.
   void set_view(const std::optional<DrawView>& view);
-  /// Drawn instead of the look of the server's scene; nothing: that one.
+  /// Of the first head, drawn instead of the look of the server's scene; nothing: that one.
   void set_own_look(const std::optional<LookDesc>& look);
   /// The next picture is to be the finest, whatever moves; DrawnState says when it is there.
   uint64_t ask_whole();
@@ -71,17 +74,32 @@ class StrandDrawer {
 
  private:
   struct Job {
-    std::shared_ptr<const ViewerState> state;
+    // By head; null: nothing is known of it.
+    std::vector<std::shared_ptr<const ViewerState>> states{1};
     std::optional<DrawView> view;
     std::optional<LookDesc> own_look;
     uint64_t view_number = 0;  // of the view and the look
     uint64_t asked_whole = 0;
 
-    const LookDesc& look() const { return own_look ? *own_look : state->look.look; }
+    const LookDesc& look(size_t head) const {
+      return head == 0 && own_look ? *own_look : states[head]->look.look;
+    }
+  };
+  /// What one head is drawn with.
+  struct Head {
+    std::shared_ptr<const SceneAsset> asset;  // that renderer is made for, or could not be
+    std::unique_ptr<Renderer> renderer;
+    LookDesc look;  // that was wanted of it last
+    TimelinePlayer player;
+  };
+  /// Of one head, as it is drawn.
+  struct HeadStrands {
+    size_t head = 0;
+    PosedStrands strands;
   };
   /// What decides the pixels of the newest picture.
   struct Drawn {
-    PosedStrands strands;
+    std::vector<HeadStrands> heads;
     DrawView view;
     size_t step = 0;
     uint64_t asked_whole = 0;
@@ -92,19 +110,19 @@ class StrandDrawer {
   void draw_until_stopped(RenderDevice& device);
   std::optional<Job> wait_for_job();
   bool prepare(RenderDevice& device, const Job& job);
-  void follow_look(const LookDesc& look);
+  bool prepare(RenderDevice& device, const Job& job, size_t index);
+  void follow_look(Head& head, const LookDesc& look);
   void turn(const Job& job);
-  Status draw(const Job& job, PosedStrands strands, size_t step);
+  static bool has_moved(const Drawn& from, const std::vector<HeadStrands>& to, const DrawView& view);
+  std::vector<HeadStrands> strands_at(const Job& job, int64_t time_ns);
+  Status draw(const Job& job, std::vector<HeadStrands> strands, size_t step);
   void fail(const Error& error);
 
   const Config config_;
 
   // Of the thread.
-  std::unique_ptr<Renderer> renderer_;
-  std::shared_ptr<const SceneAsset> asset_;  // that renderer_ is made for, or could not be
-  LookDesc look_;                            // that was wanted of renderer_ last
-  uint64_t look_count_ = 0;                  // of the looks that were
-  TimelinePlayer player_;
+  std::vector<Head> heads_;
+  uint64_t look_count_ = 0;  // of the looks that were
   DrawPlan plan_{0};
   std::optional<Drawn> drawn_;
   bool is_first_draw_ = true;      // it compiles and uploads

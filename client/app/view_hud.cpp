@@ -1,6 +1,7 @@
 #include "client/app/view_hud.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -69,6 +70,11 @@ std::string shortened(const std::string& name) {
   return name.size() <= kMaxSceneChars ? name : name.substr(0, kMaxSceneChars) + "...";
 }
 
+/// The heads that are drawn.
+std::string shown_name(const ViewerState& now, const ViewFacts& facts) {
+  return facts.heads.empty() ? now.welcome.scene_name : fmt::format("{}", fmt::join(facts.heads, ", "));
+}
+
 }  // namespace
 
 void Rate::update(uint64_t total, int64_t time_ns) {
@@ -95,7 +101,7 @@ HudState HudWriter::write(const ViewerState& now, const ViewFacts& facts, int64_
   }
   const double rate = shown_.per_s();
   hud.title = fmt::format(
-      "{}: {}, {}", shortened(now.welcome.scene_name), shows_frames(now) ? "server's pictures" : "strands",
+      "{}: {}, {}", shortened(shown_name(now, facts)), shows_frames(now) ? "server's pictures" : "strands",
       rate > 0.0 ? fmt::format("{:.{}f} pictures/s", rate, rate < kFewPerS ? 1 : 0) : "nothing moves");
   hud.rows = rows(now, facts, time_ns);
   for (const WayPart& part : facts.way) hud.way.push_back({part.name, part.median_ms});
@@ -110,7 +116,11 @@ std::vector<std::string> HudWriter::warnings(const ViewerState& now, const ViewF
       now.has_status && now.is_connected && !now.status.is_paused && factor > 0.0 && factor < kSlowMotion;
   if (!is_slow) real_time_ns_ = time_ns;
   if (now.has_status && now.status.is_paused) all.emplace_back("paused: Space resumes, N steps");
-  if (now.has_status && now.status.is_motion_stale) all.emplace_back("no head motion arrives at the server");
+  const std::string of_head = facts.heads.empty() ? std::string() : now.welcome.scene_name + ": ";
+  if (now.has_status && now.status.is_motion_stale)
+    all.push_back(of_head + "no head motion arrives at the server");
+  for (const std::string& head : facts.stale_heads)
+    all.push_back(head + ": no head motion arrives at the server");
   // The server knows what helps; older ones leave it at that.
   if (now.is_connected && !now.status.slow_motion.empty())
     all.push_back(now.status.slow_motion);
@@ -126,6 +136,7 @@ std::vector<HudRow> HudWriter::rows(const ViewerState& now, const ViewFacts& fac
   std::vector<HudRow> all;
   const auto add = [&](const char* label, std::string value) { all.push_back({label, std::move(value)}); };
   add("server", facts.address.to_string());
+  if (!facts.heads.empty()) add("heads", shown_name(now, facts));
   add("scene", fmt::format("{}, {} strands x {}", now.welcome.scene_name, now.welcome.strand_count,
                            now.welcome.vertex_count));
   add("look", look_text(now, facts));

@@ -47,6 +47,9 @@ struct ViewFacts {
   double answer_ms = 0.0;    // median, from waking up to the picture on the display
   uint64_t shown_count = 0;  // different pictures
   std::vector<WayPart> way;  // of what was shown in the last second
+  // Names of the heads that are drawn; none where there is one. What is said of the scene is of the first.
+  std::vector<std::string> heads;
+  std::vector<std::string> stale_heads;  // of those behind the first: nothing moves them
 };
 
 class HudWriter {

@@ -81,6 +81,7 @@ ClientConfig client_config(const ViewOptions& options) {
   config.hello.step_ns = measured_step_ns();
   config.hello.codec_wish = options.codec_wish;
   config.hello.keeps_camera = options.keeps_camera;
+  config.hello.head = options.head;
   return config;
 }
 
@@ -133,6 +134,8 @@ void declare(CLI::App& app, RawOptions& raw, ViewOptions& options) {
          "--codec", raw.codec,
          "Of strands: auto (the server chooses by what this machine can), or the name of one to insist on")
       ->capture_default_str();
+  app.add_option("--head", options.head,
+                 "Of a server with several heads show the one of this name alone (default: all)");
   app.add_option("--token-file", raw.token_file,
                  "File with the token: the token alone, or lines 'role token'");
   app.add_option("--token", options.token, kTokenHelp)->envname(kTokenVariable);

@@ -24,6 +24,7 @@ struct ViewOptions {
   std::filesystem::path tls_authorities;
   PictureCodecs picture_codecs = decodable_picture_codecs();  // in frames mode
   std::string codec_wish;                                     // of strands; empty = the server chooses
+  std::string head;                                           // that alone is shown; empty = all
   std::string token;
   RenderSize size{960, 540};
   bool is_diagnosis = false;  // say what a session needs, and leave

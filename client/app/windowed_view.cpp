@@ -35,6 +35,12 @@ constexpr milliseconds kLongestWait{50};  // how late a stop is noticed
 constexpr const char* kDebugViewPath = "debug_view";
 constexpr const char* kLookAnswer = "look={";  // the slider says it already
 
+/// A further head of the server.
+struct OtherHead {
+  std::unique_ptr<ViewerThread> viewer;
+  std::string trouble = {};  // as it was told
+};
+
 class WindowedView {
  public:
   WindowedView(const ViewOptions& options, ClientConfig config, std::unique_ptr<Window> window)
@@ -80,6 +86,7 @@ class WindowedView {
     const uint64_t session_number = state_->session_number;
     state_ = viewer_->look();
     if (state_->session_number != session_number) begin_session(session_number == 0);
+    follow_heads();
     if (drawn_.trouble && own_reason_.empty()) RETURN_IF_ERROR(leave_strands());
     if (wants_whole_ && drawn_.asked_whole >= asked_whole_) {
       wants_whole_ = false;
@@ -90,6 +97,35 @@ class WindowedView {
     follow_look();
     follow_camera();
     return {};
+  }
+
+  /// The further heads of a server have sessions of their own while strands are drawn here; the server's
+  /// pictures show all heads.
+  void follow_heads() {
+    std::vector<std::string> wanted;
+    if (options_.head.empty() && !is_frames() && state_->session_number > 0) wanted = state_->welcome.heads;
+    if (wanted != heads_) {
+      // To say goodbye takes a moment.
+      leaving_ = std::async(std::launch::async, [others = std::move(others_)]() mutable { others.clear(); });
+      others_.clear();
+      heads_ = std::move(wanted);
+      drawer_.set_head_count(std::max<size_t>(heads_.size(), 1));
+      for (size_t i = 1; i < heads_.size(); ++i) join_head(i);
+    }
+    for (size_t i = 0; i < others_.size(); ++i) {
+      const std::string trouble = others_[i].viewer->look()->trouble;
+      if (std::exchange(others_[i].trouble, trouble) != trouble && !trouble.empty())
+        show_message(fmt::format("{}: {}", heads_[i + 1], trouble));
+    }
+  }
+
+  void join_head(size_t head) {
+    ClientConfig config = config_;
+    config.hello.head = heads_[head];
+    config.hello.mode = StreamMode::Strands;
+    others_.push_back({std::make_unique<ViewerThread>(
+        LiveConnection::begin(config), [this, head](const auto& state) { drawer_.set_state(state, head); })});
+    others_.back().viewer->set_playout(playout_);
   }
 
   void follow_look() {
@@ -179,6 +215,7 @@ class WindowedView {
     if (actions.wants_playout_toggle) {
       playout_ = playout_ == Playout::Smooth ? Playout::LowLatency : Playout::Smooth;
       viewer_->set_playout(playout_);
+      for (const OtherHead& other : others_) other.viewer->set_playout(playout_);
     }
     // Also while strands are drawn here: the server's first picture then shows what the person sees.
     if (!is_camera_sent_ && now_ns() - camera_sent_ns_ > kCameraSendNs && state_->is_connected) {
@@ -349,6 +386,10 @@ class WindowedView {
     facts.shown_count = shown_count_;
     if (window_->is_unfolded() && state_->server_clock_offset_ns)
       facts.way = way_parts(trace_->decoded_since(time_ns + *state_->server_clock_offset_ns - kWayNs));
+    facts.heads = heads_;
+    for (size_t i = 0; i < others_.size(); ++i)
+      if (const auto other = others_[i].viewer->look(); other->has_status && other->status.is_motion_stale)
+        facts.stale_heads.push_back(heads_[i + 1]);
     return facts;
   }
 
@@ -428,7 +469,11 @@ class WindowedView {
   std::shared_ptr<const ViewerState> state_;  // likewise
   std::future<std::string> saving_;
   StrandDrawer drawer_;
-  std::unique_ptr<ViewerThread> viewer_;  // last: it tells the drawer
+  // Last: they tell the drawer.
+  std::unique_ptr<ViewerThread> viewer_;
+  std::vector<std::string> heads_;  // all that are drawn, by name; none where there is one
+  std::vector<OtherHead> others_;   // those behind the first
+  std::future<void> leaving_;       // of those that were
 };
 
 }  // namespace

@@ -29,6 +29,10 @@ Result<std::unique_ptr<ViewerClient>> ViewerClient::connect(const ClientConfig& 
   }
   auto connection = std::make_unique<Connection>(config, std::move(tls));
   RETURN_IF_ERROR(connection->open());
+  // A server that knows no names has one head.
+  if (!config.hello.head.empty() && connection->welcome().scene_name != config.hello.head)
+    return make_error(ErrorCode::Unsupported, "the server has one head and none called '{}'",
+                      config.hello.head);
   return std::unique_ptr<ViewerClient>(new ViewerClient(std::move(connection)));
 }
 

@@ -200,6 +200,8 @@ check('a token leaves the address', () => {
   assert.deepEqual(page.readFragment(new URL(link).hash).camera, wishes.camera);
   assert.ok(!link.includes('token'));
   assert.equal(page.readFragment('#view=0,0,0,0,0,0,1').camera, undefined);
+  assert.equal(page.readFragment('#head=Zo%C3%AB&mode=strands').head, 'Zoë');
+  assert.equal(page.readFragment('#mode=strands').head, '');
 });
 
 check('the camera turns about its target', () => {

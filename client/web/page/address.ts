@@ -7,6 +7,7 @@ export interface Wishes {
   mode: number; // of wire.ts; auto where nothing is said
   camera?: Camera;
   codec: string;
+  head: string; // which one of the server's; empty: the first
   draw: string; // "gl" or "tiles" insists
   pictures: string; // jpeg, tiles, vp8 or h264 insists on one of these
   isViewOnly: boolean;
@@ -20,7 +21,7 @@ export function readFragment(fragment: string): Wishes {
   const words = new URLSearchParams(fragment.replace(/^#/, ''));
   const wishes: Wishes = {
     token: words.get('token') ?? '', mode: MODES[words.get('mode') ?? 'auto'] ?? 2, codec: words.get('codec') ?? '',
-    draw: words.get('draw') ?? '', pictures: words.get('pictures') ?? '', isViewOnly: words.has('view-only'),
+    head: words.get('head') ?? '', draw: words.get('draw') ?? '', pictures: words.get('pictures') ?? '', isViewOnly: words.has('view-only'),
   };
   const numbers = (words.get('view') ?? '').split(',').map(Number);
   if (numbers.length === 7 && numbers.every(Number.isFinite) && Math.hypot(numbers[0]!, numbers[1]!, numbers[2]!) > 0.01 &&

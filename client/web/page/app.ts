@@ -102,7 +102,7 @@ class Viewer {
     this.canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
     const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
     this.asked = {
-      url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, pictures: wishes.pictures,
+      url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, head: wishes.head, pictures: wishes.pictures,
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: this.canDraw,
     };
     const sockets = new MessageChannel();
@@ -516,7 +516,10 @@ class Viewer {
     return this.figures!.motionMs ? this.figures!.motionMs + drawMs : 0;
   }
   private line(hz: number): string {
-    const what = this.shown === Mode.frames ? 'server’s pictures' : 'strands';
+    const heads = this.welcome?.heads ?? [];
+    // Of several heads strands are those of one; the server's pictures show all.
+    const of = heads.length > 1 ? ` of ${this.welcome!.scene_name} alone (${heads.join(', ')}: #head=NAME)` : '';
+    const what = this.shown === Mode.frames ? 'server’s pictures' : `strands${of}`;
     const parts = [hz > 0 ? `${hz >= 9.5 ? hz.toFixed(0) : hz.toFixed(1)} fps` : 'nothing moves', what, `${this.rate.kbits.toFixed(0)} kbit/s`];
     if (this.latencyMs()) parts.push(`${this.latencyMs().toFixed(0)} ms from motion`);
     return this.isConnected ? parts.join(' · ') : `not connected · ${what}`;

@@ -17,6 +17,7 @@ export interface Asked {
   mode: number;
   role: number;
   codec: string; // of strands, insisted on
+  head: string; // which one of the server's; empty: the first
   pictures: string; // of pictures, likewise
   width: number; // of pictures that the server draws
   height: number;

@@ -272,7 +272,7 @@ class Connection {
       hello: {
         role: this.asked.role, mode: this.asked.drawsStrands ? this.asked.mode : Mode.frames, name: 'browser', token: this.asked.token,
         frame_width: this.asked.width, frame_height: this.asked.height, acknowledges: true,
-        picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec, step_ns: this.net.stepNs,
+        picture_codecs: pictureCodecs & (PICTURE_BITS[this.asked.pictures] ?? ~0), codec_wish: this.asked.codec, head: this.asked.head, step_ns: this.net.stepNs,
       },
     });
   }

@@ -51,7 +51,7 @@ export const Camera = { offset_m: [1, Vec3], target_m: [2, Vec3], fov_y_rad: [3,
 export const Hello = {
   role: [1, 'enum'], mode: [2, 'enum'], name: [3, 'string'], token: [4, 'string'], frame_width: [5, 'uint32'],
   frame_height: [6, 'uint32'], acknowledges: [7, 'bool'], picture_codecs: [8, 'uint32'], gets_no_stream: [9, 'bool'],
-  step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'],
+  step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'], head: [17, 'string'],
 } as const;
 const CameraChange = { camera: [1, Camera] } as const;
 const FrameAck = {
@@ -84,7 +84,7 @@ export const Welcome = {
   mode_reason: [5, 'string'], codec: [6, 'string'], strand_count: [7, 'uint32'], vertex_count: [8, 'uint32'],
   bound_m: [9, 'float'], step_rate_hz: [10, 'double'], look: [11, Look], camera: [12, Camera],
   frame_width: [13, 'uint32'], frame_height: [14, 'uint32'], sim_device: [15, 'string'], role: [20, 'enum'],
-  codec_reason: [21, 'string'],
+  codec_reason: [21, 'string'], heads: [26, 'string', 'repeated'],
 } as const;
 const Pong = { client_time_ns: [1, 'sfixed64'], server_receive_ns: [2, 'sfixed64'], server_send_ns: [3, 'sfixed64'] } as const;
 const PictureMotion = { sim_time_ns: [1, 'sfixed64'], motion_time_ns: [2, 'sfixed64'] } as const;
