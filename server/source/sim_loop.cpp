@@ -528,13 +528,14 @@ void SimLoop::set_detail(int64_t time_ns) {
            facts.detail_reason.empty() ? "" : ": ", facts.detail_reason);
 }
 
-/// Nobody reads: time and inputs go on, and nothing else.
+/// Nobody reads: time and inputs go on, and nothing else. Whoever comes is served at once.
 void SimLoop::sleep_through() {
   const int64_t time_ns = now_ns();
   const uint64_t passed = clock_->skip(time_ns);
   if (passed == 0) return;
   tick_ += passed;
   input_ = hub_.sample(time_ns);
+  last_step_ns_ = time_ns;
   update_stats();
 }
 

@@ -148,6 +148,7 @@ TEST_F(DetailLoop, HairWakesWhereTheHeadHasCarriedIt) {
   ASSERT_TRUE(eventually([&] { return loop_->stats().tick > asleep.tick + 60; })) << "time goes on";
   EXPECT_EQ(loop_->stats().step_times.sum_ms(), asleep.step_times.sum_ms()) << "and nothing is simulated";
   EXPECT_EQ(loop_->stats().published, asleep.published);
+  EXPECT_GT(loop_->stats().last_step_ns, asleep.last_step_ns) << "it is ready for whoever comes";
   EXPECT_EQ(loop_->stats().simulated_strands, 0u);
   EXPECT_NEAR(loop_->stats().realtime_factor, 1.0, 0.2) << "that is no slow motion";
   (void)sink_.take();
