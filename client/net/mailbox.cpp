@@ -108,6 +108,10 @@ void Mailbox::push(const CameraChange& camera) {
   keep_newest(camera);
 }
 
+void Mailbox::push(const StreamList& streams) {
+  keep_newest(streams);
+}
+
 template <class Event>
 void Mailbox::keep_some(Event event, size_t limit) {
   const std::lock_guard lock(mutex_);

@@ -35,7 +35,7 @@ struct ClosedEvent {
 
 using ClientEvent =
     std::variant<MediaEvent, ServerStatus, Notice, StreamQuality, FrameQuality, ModeChange, SessionList,
-                 LookChange, SceneText, ParameterList, CameraChange, StateTimes, ClosedEvent>;
+                 LookChange, SceneText, ParameterList, CameraChange, StateTimes, StreamList, ClosedEvent>;
 
 struct MailboxLimits {
   // Of strand frames, and as much of pictures that build on each other.
@@ -63,6 +63,7 @@ class Mailbox {
   void push(const LookChange& look);
   void push(const SceneText& scene);
   void push(const CameraChange& camera);
+  void push(const StreamList& streams);
   /// The oldest gives way when there are too many.
   void push(Notice notice);
   void push(ParameterList list);

@@ -54,6 +54,11 @@ void clean(StreamQuality& quality) {
   quality.reason = one_line(quality.reason);
   quality.codec = one_line(quality.codec);
 }
+void clean(StreamList& streams) {
+  for (std::string& codec : streams.codecs) codec = one_line(codec);
+  streams.reason = one_line(streams.reason);
+  streams.solver = one_line(streams.solver);
+}
 void clean(Notice& notice) {
   notice.text = one_line(notice.text);
 }

@@ -10,6 +10,7 @@
 namespace strandcast {
 
 inline constexpr size_t kMaxLiveInputs = 4;
+inline constexpr double kMinLiveScale = 1e-3, kMaxLiveScale = 1e3;
 
 struct LiveDesc {
   std::string protocol = {};  // by its name, such as "vmc"
@@ -22,6 +23,7 @@ struct LiveDesc {
   bool turns_only = false;             // the head turns where it is and does not move
   double delay_ms = 0.0;               // the head is shown so much later, between samples, not at the newest
   uint32_t max_datagram_bytes = 1500;  // longer OSC is refused
+  double scale = 1.0;                  // places times this, for senders of another unit or size
 
   bool operator==(const LiveDesc&) const = default;
 };

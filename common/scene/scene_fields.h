@@ -97,6 +97,7 @@ inline constexpr Range kFrameRate{0.1, 240.0, "Hz"};
 inline constexpr Range kStrandRate{0.0, 1000.0, "Hz"};  // 0 = every step
 inline constexpr Range kUdpPort{0, 65'535, ""};         // 0 = the protocol's own
 inline constexpr Range kLiveDelay{0.0, 200.0, "ms"};
+inline constexpr Range kLiveScale{kMinLiveScale, kMaxLiveScale, ""};
 inline constexpr Range kDatagramSize{64, 65'507, "bytes"};
 inline constexpr size_t kMaxHostBytes = 253;  // of a name in the DNS
 
@@ -299,6 +300,7 @@ void visit_live(Visitor& v, LiveDesc& live) {
   v.flag("turns_only", live.turns_only);
   v.number("delay_ms", live.delay_ms, kLiveDelay);
   v.number("max_datagram_bytes", live.max_datagram_bytes, kDatagramSize);
+  v.number("scale", live.scale, kLiveScale);
 }
 
 /// Whether each head of a scene is called otherwise than all others.

@@ -32,6 +32,10 @@ inline constexpr Range kHeldBack{0.0, 1.0, ""};
 inline constexpr Range kStepCount{0, kMaxStepCount, "steps"};
 inline constexpr Range kBan{0.0, kMaxBanS, "s"};
 inline constexpr Range kParameterCount{0, 100'000, ""};
+inline constexpr Range kListedClass{0, kMaxListedClasses - 1, ""};
+inline constexpr Range kCoarsening{1, 1024, ""};
+inline constexpr Range kClassRate{0.0, 10'000.0, "Hz"};
+inline constexpr Range kSolverCost{0.0, kMaxSolverCost, ""};
 inline constexpr int kBehindNone = 1;  // number of the first enumerator where 0 stands for none on the wire
 
 /// Name of a kind of message: its field in ClientMessage or ServerMessage.
@@ -39,6 +43,13 @@ template <class Message>
 inline constexpr const char* kKind = nullptr;
 
 // ---- client to server ----
+
+static_assert(kSessionIdChars == 16, "as the sentence below says");
+inline bool is_session_id(const std::string& text) {
+  return text.size() == kSessionIdChars && std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
+}
 
 template <>
 inline constexpr const char* kKind<Hello> = "hello";
@@ -57,6 +68,9 @@ void visit(Visitor& v, Hello& m) {
   v.exact_text("codec_wish", m.codec_wish, kMaxNameChars);
   v.value("keeps_camera", m.keeps_camera);
   v.exact_text("head", m.head, kMaxNameChars);
+  v.exact_text("relay_id", m.relay_id, kSessionIdChars);
+  v.require("relay_id", m.relay_id.empty() || is_session_id(m.relay_id), "is not 16 hexadecimal digits");
+  v.number("strand_class", m.strand_class, kListedClass);
 }
 
 template <>
@@ -200,14 +214,15 @@ void visit(Visitor& v, StateTimesRequest& m) {
   v.value("is_wanted", m.is_wanted);
 }
 
-// ---- server to client ----
-
-static_assert(kSessionIdChars == 16, "as the sentence below says");
-inline bool is_session_id(const std::string& text) {
-  return text.size() == kSessionIdChars && std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-         });
+template <>
+inline constexpr const char* kKind<RecordCommand> = "record_command";
+template <class Visitor>
+void visit(Visitor& v, RecordCommand& m) {
+  v.value("is_wanted", m.is_wanted);
+  v.text("name", m.name, kMaxNameChars);
 }
+
+// ---- server to client ----
 
 template <>
 inline constexpr const char* kKind<Welcome> = "welcome";
@@ -232,6 +247,7 @@ void visit(Visitor& v, Welcome& m) {
   v.text("sim_device", m.sim_device, kMaxTextChars);
   v.choice("role", m.role, Role::Admin);
   v.names("heads", m.heads, kMaxHeads, kMaxNameChars);
+  v.names("relays", m.relays, kMaxRelays, kSessionIdChars);
 }
 
 template <>
@@ -294,6 +310,7 @@ void visit(Visitor& v, ServerStatus& m) {
   v.text("detail", m.detail, kMaxTextChars);
   v.repeated("live_inputs", m.live_inputs, kMaxLiveInputs,
              [&](LiveInputStatus& input) { visit_live_input(v, input); });
+  v.text("recording", m.recording, kMaxTextChars);
 }
 
 template <>
@@ -410,6 +427,24 @@ void visit(Visitor& v, StateTimes& m) {
     v.value("published_ns", state.published_ns);
     v.value("encoded_ns", state.encoded_ns);
   });
+}
+
+template <>
+inline constexpr const char* kKind<StreamList> = "stream_list";
+template <class Visitor>
+void visit(Visitor& v, StreamList& m) {
+  v.repeated("classes", m.classes, kMaxListedClasses, [&](StreamList::Class& row) {
+    v.number("rate_divisor", row.rate_divisor, kRateDivisor);
+    v.number("strand_share", row.strand_share, kStrandShare);
+    v.number("coarsening", row.coarsening, kCoarsening);
+    v.number("bound_m", row.bound_m, scene_fields::kStreamBound);
+    v.number("frame_rate_hz", row.frame_rate_hz, kClassRate);
+  });
+  v.names("codecs", m.codecs, kMaxListedCodecs, kMaxNameChars);
+  v.text("reason", m.reason, kMaxTextChars);
+  v.exact_text("solver", m.solver, kMaxNameChars);
+  v.number("solver_cost", m.solver_cost, kSolverCost);
+  v.number("substeps", m.substeps, scene_fields::kSubsteps);
 }
 
 }  // namespace strandcast::wire_fields

@@ -51,6 +51,10 @@ inline constexpr size_t kMaxParameterPathBytes = 96;
 inline constexpr size_t kMaxParameterTextBytes = 160;
 // Full StateTimes stay below kMaxControlBytes.
 inline constexpr uint32_t kMaxStateTimes = 512;
+inline constexpr size_t kMaxRelays = 8;  // one behind another
+inline constexpr uint32_t kMaxListedClasses = 64;
+inline constexpr size_t kMaxListedCodecs = 4;
+inline constexpr double kMaxSolverCost = 1e3;
 
 enum class Role { Viewer, Controller, Source, Admin };
 enum class StreamMode { Strands, Frames, Auto };
@@ -71,6 +75,10 @@ struct Hello {               // first message; answered by Welcome or Goodbye
   std::string codec_wish = {};  // strand codec that it insists on; empty = the server chooses
   bool keeps_camera = false;    // nobody else moves its camera
   std::string head = {};        // of those that the server has, by its name; empty = the first
+  // Of a relay, which passes on what it gets: its session_id. It is told the StreamList, and gets the strands
+  // of one class, whatever its link. Empty: a viewer.
+  std::string relay_id = {};
+  uint32_t strand_class = 0;  // that a relay wants, by its place in the StreamList
   bool operator==(const Hello&) const = default;
 };
 struct MotionSamples {  // from a Source
@@ -173,10 +181,16 @@ struct StateTimesRequest {  // from who watches: StateTimes with every status fr
   bool is_wanted = true;
   bool operator==(const StateTimesRequest&) const = default;
 };
+struct RecordCommand {    // from a Controller; answered by a Notice
+  bool is_wanted = true;  // to begin; false: to end the recording
+  std::string name =
+      {};  // of the file, in the folder of the server's recordings; empty = the server's choice
+  bool operator==(const RecordCommand&) const = default;
+};
 using ClientMessage =
     std::variant<Hello, MotionSamples, WindSamples, CameraChange, KeyframeRequest, FrameAck, Ping,
                  ControlCommand, SetParameter, ViewerReport, ModeRequest, AdminCommand, SceneRequest,
-                 LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest>;
+                 LiveCommand, ParameterRequest, CameraCommand, StateTimesRequest, RecordCommand>;
 
 // ---- server to client ----
 struct Welcome {
@@ -199,6 +213,9 @@ struct Welcome {
   // Names of all heads, the first first, at most kMaxHeads; none where there is one. scene_name is that of
   // this session's.
   std::vector<std::string> heads = {};
+  // The session_id of each relay on the way, from the one at the server that simulates, whose session_id is
+  // above, to the one that says this; at most kMaxRelays.
+  std::vector<std::string> relays = {};
   bool operator==(const Welcome&) const = default;
 };
 struct Pong {
@@ -255,6 +272,7 @@ struct ServerStatus {  // about twice a second to every viewer
   std::vector<PictureMotion> picture_motions = {};
   std::string detail = {};  // for a person: how much is simulated, and why not all; empty = all of it
   std::vector<LiveInputStatus> live_inputs = {};  // at most kMaxLiveInputs
+  std::string recording = {};  // for a person: the file that is written, and how long it is; empty = none
   bool operator==(const ServerStatus&) const = default;
 };
 struct StreamQuality {        // how strands are coded for this viewer from the next keyframe on
@@ -348,9 +366,27 @@ struct StateTimes {               // of states that were not told yet
   std::vector<StateTime> states;  // at most kMaxStateTimes, oldest first
   bool operator==(const StateTimes&) const = default;
 };
+struct StreamList {  // to a relay, after its Welcome and when it changes: the streams of strands there are
+  struct Class {
+    uint32_t rate_divisor = 1;  // every so many simulation steps
+    float strand_share = 1.0f;  // in (0, 1]: the first so many strands
+    uint32_t coarsening = 1;    // lattice steps per step of the published lattice
+    float bound_m = 1e-4f;      // announced Euclidean error
+    double frame_rate_hz = 60.0;
+    bool operator==(const Class&) const = default;
+  };
+  std::vector<Class> classes;       // best first, at most kMaxListedClasses
+  std::vector<std::string> codecs;  // that each is served by, at most kMaxListedCodecs
+  std::string reason = {};          // of a change, for a person
+  // What decides whether a viewer can predict.
+  std::string solver = {};
+  double solver_cost = 0.0;  // of its step, against the one that step_ns is measured with
+  uint32_t substeps = 1;
+  bool operator==(const StreamList&) const = default;
+};
 using ServerMessage =
     std::variant<Welcome, Pong, ServerStatus, Goodbye, Notice, StreamQuality, ModeChange, SessionList,
-                 FrameQuality, LookChange, SceneText, ParameterList, CameraChange, StateTimes>;
+                 FrameQuality, LookChange, SceneText, ParameterList, CameraChange, StateTimes, StreamList>;
 
 /// Message as sent: opcode byte Control, then protobuf; at most kMaxControlBytes for messages within their
 /// limits. Names, reasons and notices are shortened to theirs, and characters that cannot be printed become

@@ -63,6 +63,7 @@ Result<std::vector<std::string>> explain_live(const std::vector<LiveDesc>& live,
     if (input.delay_ms > 0.0) line += fmt::format("; {:g} ms later", input.delay_ms);
     if (input.turns_only) line += "; it turns and does not move";
     if (input.takes_zero_positions) line += "; a bone at 0 is there";
+    if (input.scale != 1.0) line += fmt::format("; places times {:g}", input.scale);
     lines.push_back(std::move(line));
   }
   return lines;

@@ -14,6 +14,7 @@ struct MocapOptions {
   std::vector<std::string> inputs;  // PROTOCOL, PROTOCOL:PORT or PROTOCOL://HOST[:PORT]
   std::string subject;              // of all of them
   std::string axes;
+  double scale = 1.0;  // LiveDesc::scale
 };
 
 /// BadInput says what is meant instead.

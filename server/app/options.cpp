@@ -163,6 +163,12 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
          "how its numbers are meant, where senders disagree; a wrong name is answered with those there are")
       ->needs(inputs)
       ->group(kGroup);
+  app.add_option("--mocap-scale", options.mocap.scale,
+                 "its places times this, for senders of another unit or size: 0.01 makes metres of centimetres")
+      ->check(in_range(kMinLiveScale, kMaxLiveScale))
+      ->capture_default_str()
+      ->needs(inputs)
+      ->group(kGroup);
   app.add_option("--mocap-allow", raw.mocap_allowed,
                  "ADDRESS or ADDRESS/BITS that may send besides this machine; repeatable")
       ->expected(1)

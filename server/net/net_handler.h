@@ -78,6 +78,7 @@ class NetHandler {
   /// Where others look from: a CameraChange sent to a session moves its pictures, too.
   virtual void on_camera_command(SessionId, const CameraCommand&) {}
   virtual void on_state_times_request(SessionId, const StateTimesRequest&) {}
+  virtual void on_record_command(SessionId, const RecordCommand&) {}
   /// May change the class of the subscription's pictures.
   virtual void on_camera(SessionId session, const CameraChange& camera) = 0;
   /// An admin wants the server to end.

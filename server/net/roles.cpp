@@ -35,7 +35,8 @@ bool may_send(Role role, const ClientMessage& message) {
           [&](const SetParameter&) { return steers; }, [&](const ParameterRequest&) { return watches; },
           [&](const SceneRequest&) { return steers; }, [&](const LiveCommand&) { return steers; },
           [&](const CameraCommand&) { return steers; }, [&](const StateTimesRequest&) { return watches; },
-          [&](const ViewerReport&) { return watches; }, [&](const ModeRequest&) { return watches; },
+          [&](const RecordCommand&) { return steers; }, [&](const ViewerReport&) { return watches; },
+          [&](const ModeRequest&) { return watches; },
           [&](const AdminCommand&) { return role == Role::Admin; }},
       message);
 }

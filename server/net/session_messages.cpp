@@ -25,12 +25,12 @@ CloseCode close_code_for(const Error& error) {
 }
 
 const char* message_name(const ClientMessage& message) {
-  constexpr const char* kNames[] = {"Hello",         "MotionSamples",    "WindSamples",
-                                    "CameraChange",  "KeyframeRequest",  "FrameAck",
-                                    "Ping",          "ControlCommand",   "SetParameter",
-                                    "ViewerReport",  "ModeRequest",      "AdminCommand",
-                                    "SceneRequest",  "LiveCommand",      "ParameterRequest",
-                                    "CameraCommand", "StateTimesRequest"};
+  constexpr const char* kNames[] = {"Hello",         "MotionSamples",     "WindSamples",
+                                    "CameraChange",  "KeyframeRequest",   "FrameAck",
+                                    "Ping",          "ControlCommand",    "SetParameter",
+                                    "ViewerReport",  "ModeRequest",       "AdminCommand",
+                                    "SceneRequest",  "LiveCommand",       "ParameterRequest",
+                                    "CameraCommand", "StateTimesRequest", "RecordCommand"};
   static_assert(std::size(kNames) == std::variant_size_v<ClientMessage>);
   return kNames[message.index()];
 }
@@ -150,7 +150,8 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                  [&](const LiveCommand& command) { handler.on_live_command(id_, command); },
                  [&](const ParameterRequest& request) { handler.on_parameter_request(id_, request); },
                  [&](const CameraCommand& command) { handler.on_camera_command(id_, command); },
-                 [&](const StateTimesRequest& request) { handler.on_state_times_request(id_, request); }},
+                 [&](const StateTimesRequest& request) { handler.on_state_times_request(id_, request); },
+                 [&](const RecordCommand& command) { handler.on_record_command(id_, command); }},
       message);
 }
 

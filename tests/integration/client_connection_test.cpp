@@ -191,8 +191,8 @@ TEST(ClientHostile, ControlMessagesBeforeTheWelcomeAreRefused) {
     EXPECT_THAT(error.message, HasSubstr("before its Welcome"));
     ++refused;
   }
-  EXPECT_EQ(refused, 11u) << "status, stream quality, mode change, frame quality, session list, notice, look "
-                             "change, scene text, parameter list, camera, state times";
+  EXPECT_EQ(refused, 12u) << "status, stream quality, mode change, frame quality, session list, notice, look "
+                             "change, scene text, parameter list, camera, state times, stream list";
 }
 
 TEST(ClientHostile, MediaBeforeTheWelcomeIsRefused) {

@@ -22,7 +22,7 @@ inline std::vector<ClientMessage> sample_client_messages() {
   CameraChange camera;
   camera.camera = {{1.0f, 2.0f, -3.0f}, {0.5f, 0.25f, 0.125f}, 1.25f};
   return {Hello{Role::Controller, StreamMode::Auto, "Zoë", "secret", 640, 360, true, kAllPictureCodecs, true,
-                12.5, "delta", true, "ben"},
+                12.5, "delta", true, "ben", "fedcba9876543210", 5},
           motion,
           wind,
           camera,
@@ -38,7 +38,8 @@ inline std::vector<ClientMessage> sample_client_messages() {
           LiveCommand{LiveAction::Reset, "Zoë's head"},
           ParameterRequest{"look.shading", 128, true},
           CameraCommand{1ull << 40, camera.camera},
-          StateTimesRequest{true}};
+          StateTimesRequest{true},
+          RecordCommand{true, "take 5"}};
 }
 
 inline std::vector<ServerMessage> sample_server_messages() {
@@ -61,6 +62,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   welcome.sim_device = "lanes (AVX-512, 2 threads)";
   welcome.role = Role::Admin;
   welcome.heads = {"walk", "ben"};
+  welcome.relays = {"fedcba9876543210", "0011223344556677"};
   ServerStatus status;
   status.tick = 1ull << 40;
   status.sim_ms = 2.5;
@@ -101,6 +103,7 @@ inline std::vector<ServerMessage> sample_server_messages() {
   live.lost = 10;
   live.values = {{"/VMC/Ext/Bone/Pos Head 0 1.5 0"}, {"/VMC/Ext/OK 1"}};
   status.live_inputs = {live, LiveInputStatus{}};
+  status.recording = "take 5.mcap: 12.5 s, 3.2 MB";
   return {
       welcome,
       Pong{1, -2, INT64_MAX},

@@ -52,6 +52,7 @@ export const Hello = {
   role: [1, 'enum'], mode: [2, 'enum'], name: [3, 'string'], token: [4, 'string'], frame_width: [5, 'uint32'],
   frame_height: [6, 'uint32'], acknowledges: [7, 'bool'], picture_codecs: [8, 'uint32'], gets_no_stream: [9, 'bool'],
   step_ns: [10, 'double'], codec_wish: [11, 'string'], keeps_camera: [16, 'bool'], head: [17, 'string'],
+  relay_id: [18, 'string'], strand_class: [19, 'uint32'],
 } as const;
 const CameraChange = { camera: [1, Camera] } as const;
 const FrameAck = {
@@ -70,6 +71,7 @@ const LiveCommand = { action: [1, 'enum'], subject: [2, 'string'] } as const;
 const ParameterRequest = { prefix: [1, 'string'], first: [2, 'uint32'], is_watching: [3, 'bool'] } as const;
 const CameraCommand = { session: [1, 'uint64'], camera: [2, Camera] } as const;
 const StateTimesRequest = { is_wanted: [1, 'bool'] } as const;
+const RecordCommand = { is_wanted: [1, 'bool'], name: [2, 'string'] } as const;
 const Empty = {} as const;
 /** Motion and wind are not sent from a page. */
 export const ClientMessage = {
@@ -77,6 +79,7 @@ export const ClientMessage = {
   ping: [7, Ping], command: [8, ControlCommand], set_parameter: [9, SetParameter], viewer_report: [10, ViewerReport],
   mode_request: [11, ModeRequest], admin: [12, AdminCommand], scene_request: [13, Empty], live_command: [18, LiveCommand],
   parameter_request: [16, ParameterRequest], camera_command: [24, CameraCommand], state_times_request: [25, StateTimesRequest],
+  record_command: [28, RecordCommand],
 } as const;
 
 export const Welcome = {
@@ -84,7 +87,7 @@ export const Welcome = {
   mode_reason: [5, 'string'], codec: [6, 'string'], strand_count: [7, 'uint32'], vertex_count: [8, 'uint32'],
   bound_m: [9, 'float'], step_rate_hz: [10, 'double'], look: [11, Look], camera: [12, Camera],
   frame_width: [13, 'uint32'], frame_height: [14, 'uint32'], sim_device: [15, 'string'], role: [20, 'enum'],
-  codec_reason: [21, 'string'], heads: [26, 'string', 'repeated'],
+  codec_reason: [21, 'string'], heads: [26, 'string', 'repeated'], relays: [27, 'string', 'repeated'],
 } as const;
 const Pong = { client_time_ns: [1, 'sfixed64'], server_receive_ns: [2, 'sfixed64'], server_send_ns: [3, 'sfixed64'] } as const;
 const PictureMotion = { sim_time_ns: [1, 'sfixed64'], motion_time_ns: [2, 'sfixed64'] } as const;
@@ -102,7 +105,7 @@ export const ServerStatus = {
   dropped_frames: [9, 'uint64'], rejected_samples: [10, 'uint64'], quarantined_strands: [11, 'uint64'],
   overstretched_strands: [12, 'uint64'], queue_delay_ms: [13, 'double'], slow_motion: [14, 'string'],
   picture_motions: [15, PictureMotion, 'repeated'], detail: [16, 'string'],
-  live_inputs: [24, LiveInput, 'repeated'],
+  live_inputs: [24, LiveInput, 'repeated'], recording: [28, 'string'],
 } as const;
 export const StreamQuality = {
   stream_id: [1, 'uint32'], rate_divisor: [2, 'uint32'], strand_share: [3, 'float'], bound_m: [4, 'float'],
@@ -132,11 +135,19 @@ const StateTime = {
   published_ns: [5, 'sfixed64'], encoded_ns: [6, 'sfixed64'],
 } as const;
 const StateTimes = { states: [1, StateTime, 'repeated'] } as const;
+const StreamClass = {
+  rate_divisor: [1, 'uint32'], strand_share: [2, 'float'], coarsening: [3, 'uint32'], bound_m: [4, 'float'], frame_rate_hz: [5, 'double'],
+} as const;
+const StreamList = {
+  classes: [1, StreamClass, 'repeated'], codecs: [2, 'string', 'repeated'], reason: [3, 'string'], solver: [4, 'string'],
+  solver_cost: [5, 'double'], substeps: [6, 'uint32'],
+} as const;
 export const ServerMessage = {
   welcome: [1, Welcome], pong: [2, Pong], status: [3, ServerStatus], goodbye: [4, Goodbye], notice: [5, Notice],
   quality: [6, StreamQuality], frame_quality: [8, FrameQuality], mode_change: [9, ModeChange],
   sessions: [12, SessionList], look_change: [13, LookChange], scene_text: [14, SceneText],
   parameter_list: [16, ParameterList], camera: [24, CameraChange], state_times: [25, StateTimes],
+  stream_list: [28, StreamList],
 } as const;
 
 /** By the names of the .proto files, for the test. */
@@ -144,7 +155,8 @@ export const schemas: { readonly [name: string]: Schema } = {
   Vec3, Color, StrandStyle, HairShading, RenderMethods, Look, Camera, Hello, CameraChange, FrameAck, Ping,
   ControlCommand, SetParameter, AdminCommand, ViewerReport, ModeRequest, LiveCommand, ClientMessage, Welcome, Pong,
   PictureMotion, LiveValue, LiveInput, ServerStatus, StreamQuality, ModeChange, FrameQuality, Goodbye, Notice, SessionInfo, SessionList, LookChange,
-  SceneText, ParameterRequest, ParameterInfo, ParameterList, CameraCommand, StateTimesRequest, StateTime, StateTimes, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
+  SceneText, ParameterRequest, ParameterInfo, ParameterList, CameraCommand, StateTimesRequest, StateTime, StateTimes, RecordCommand,
+  StreamClass, StreamList, ServerMessage, KeyframeRequest: Empty, SceneRequest: Empty,
 };
 
 export type LookMessage = Message<typeof Look>;

@@ -41,6 +41,14 @@ LiveParserConfig parser_config(const LiveDesc& live) {
   return config;
 }
 
+/// In metres, and of the size of this head, whatever its sender measures in.
+LivePose scaled(LivePose pose, double scale) {
+  if (scale == 1.0) return pose;
+  pose.world_from_subject.position_m *= scale;
+  for (glm::dvec3& place_m : pose.joint_m) place_m *= scale;
+  return pose;
+}
+
 std::string shown(const std::string& name) {
   return name.empty() ? "(no name)" : name;
 }
@@ -239,7 +247,7 @@ void LiveSource::use(const LivePacket& packet, int64_t arrival_ns) {
   }
   follow_subject(arrival_ns);
   for (size_t i = 0; i < names.size(); ++i)
-    if (subject_ && names[i] == *subject_) policy_.take(packet.poses[i], arrival_ns);
+    if (subject_ && names[i] == *subject_) policy_.take(scaled(packet.poses[i], live_.scale), arrival_ns);
   if (packet.wind_mps) wind_.push_back({{{arrival_ns, glm::vec3(*packet.wind_mps)}}});
 }
 
