@@ -16,7 +16,7 @@ namespace strandcast {
 
 /// What was given with any of them.
 struct CtlCommandLine {
-  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}, nullptr};
+  CtlTarget target{"127.0.0.1:" + std::to_string(kDefaultPort), {}, {}, false, {}, nullptr, {}};
   bool names_server = false;  // --connect was given
   FeedOptions feed;
   std::vector<float> wind_mps;

@@ -264,7 +264,8 @@ class SnapshotDrawer {
     const int64_t end_ns = now_ns();
     timer_.add_ms(static_cast<double>(end_ns - begin_ns) * 1e-6);
     if (scene_.clock.has_value())
-      scene_.trace->note_presented(StreamMode::Strands, first->sim_time_ns, scene_.clock.to_server_ns(end_ns));
+      scene_.trace->note_presented(StreamMode::Strands, first->sim_time_ns,
+                                   scene_.clock.to_server_ns(end_ns));
     return std::move(picture.image);
   }
 
