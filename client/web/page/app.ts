@@ -101,8 +101,9 @@ class Viewer {
     const size = wishes.size ?? this.pictureSize();
     this.canDraw = typeof OffscreenCanvas !== 'undefined' && 'transferControlToOffscreen' in strands;
     const scheme = location.protocol === 'https:' ? 'wss:' : 'ws:';
+    const beside = location.pathname.replace(/[^/]*$/, ''); // behind a proxy a session has a folder of its own
     this.asked = {
-      url: `${scheme}//${location.host}/v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, head: wishes.head, pictures: wishes.pictures,
+      url: `${scheme}//${location.host}${beside}v1`, token: wishes.token, mode: wishes.mode, codec: wishes.codec, head: wishes.head, pictures: wishes.pictures,
       role: wishes.isViewOnly ? Role.viewer : Role.controller, ...size, drawsStrands: this.canDraw,
     };
     const sockets = new MessageChannel();
