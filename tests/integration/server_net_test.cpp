@@ -436,10 +436,11 @@ TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
     NetConfig config;
     StrandClass cheaper;
     cheaper.strand_share = 0.25f;
-    config.strand_classes = {StrandClass{}, cheaper};
-    config.strand_codecs.resize(2);
+    NetHead head;
+    head.strand_classes = {StrandClass{}, cheaper};
+    head.strand_codecs.resize(2);
     config.limits.viewer_bytes_per_s = 0.5 * 1'000 * StrandClass{}.frame_rate_hz;
-    start(config);
+    start(config, head);
     app_.publish_next(stream_id);
     Hello viewer = hello();
     viewer.acknowledges = true;
@@ -467,9 +468,9 @@ TEST_F(ServerNet, AViewerThatCostsMoreThanTheCapGetsAClassThatFits) {
 }
 
 TEST_F(ServerNet, AViewerGetsFramesOfItsCodecOnly) {
-  NetConfig config;
-  config.strand_codecs.resize(2);
-  start(config);
+  NetHead head;
+  head.strand_codecs.resize(2);
+  start({}, head);
   app_.publish_next();
   const auto scenes = join();
   app_.strand_codec = 1;

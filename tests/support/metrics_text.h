@@ -67,29 +67,29 @@ inline void check_metrics(const std::map<std::string, MetricFamily>& families,
                           std::vector<std::string>& faults) {
   static const std::regex kBound(R"re((.*_bucket)\{(.*,)?le="([^"]*)"\})re");
   for (const auto& [name, family] : families) {
-  if (family.samples.empty()) faults.push_back("without a sample: " + name);
-  std::map<std::string, BucketCheck> histograms;  // by their other labels
-  for (const auto& [sample, value] : family.samples) {
-    if (!std::isfinite(value)) faults.push_back("not finite: " + sample);
-    if (family.type == "counter" && value < 0.0) faults.push_back("negative: " + sample);
-    if (family.type != "histogram") continue;
-    if (sample.starts_with(name + "_count")) {
-      const std::string labels = sample.substr(name.size() + std::string("_count").size());
-      histograms[labels.empty() ? labels : labels.substr(1, labels.size() - 2) + ","].count = value;
+    if (family.samples.empty()) faults.push_back("without a sample: " + name);
+    std::map<std::string, BucketCheck> histograms;  // by their other labels
+    for (const auto& [sample, value] : family.samples) {
+      if (!std::isfinite(value)) faults.push_back("not finite: " + sample);
+      if (family.type == "counter" && value < 0.0) faults.push_back("negative: " + sample);
+      if (family.type != "histogram") continue;
+      if (sample.starts_with(name + "_count")) {
+        const std::string labels = sample.substr(name.size() + std::string("_count").size());
+        histograms[labels.empty() ? labels : labels.substr(1, labels.size() - 2) + ","].count = value;
+      }
+      std::smatch part;
+      if (!std::regex_match(sample, part, kBound)) continue;
+      BucketCheck& check = histograms[part[2]];
+      const double bound = std::stod(part[3]);
+      if (bound <= check.last_bound || value < check.last) faults.push_back("out of order: " + sample);
+      check.last_bound = bound;
+      check.last = value;
     }
-    std::smatch part;
-    if (!std::regex_match(sample, part, kBound)) continue;
-    BucketCheck& check = histograms[part[2]];
-    const double bound = std::stod(part[3]);
-    if (bound <= check.last_bound || value < check.last) faults.push_back("out of order: " + sample);
-    check.last_bound = bound;
-    check.last = value;
+    for (const auto& [labels, check] : histograms)
+      if (!std::isinf(check.last_bound) || check.count != check.last)
+        faults.push_back("does not add up: " + name + "{" + labels + "}");
+    if (family.type == "histogram" && histograms.empty()) faults.push_back("no buckets: " + name);
   }
-  for (const auto& [labels, check] : histograms)
-    if (!std::isinf(check.last_bound) || check.count != check.last)
-      faults.push_back("does not add up: " + name + "{" + labels + "}");
-  if (family.type == "histogram" && histograms.empty()) faults.push_back("no buckets: " + name);
-}
 }
 
 /// What is wrong with this text; empty when nothing is.

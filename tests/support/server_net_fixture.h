@@ -121,9 +121,11 @@ class FakeApp : public NetHandler {
 
 class ServerNet : public testing::Test {
  protected:
-  void start(NetConfig config = {}) {
+  /// With one head, of the app's.
+  void start(NetConfig config = {}, NetHead head = {}) {
     config.port = 0;
-    auto server = NetServer::listen(config, app_);
+    head.handler = &app_;
+    auto server = NetServer::listen(config, std::vector<NetHead>{head});
     ASSERT_TRUE(server.ok()) << server.error().to_string();
     server_ = std::move(*server);
     app_.server = server_.get();
