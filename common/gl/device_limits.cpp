@@ -28,7 +28,7 @@ constexpr DeviceLimitRow kTable[] = {
     {DeviceLimit::BufferTexels, "texels in a buffer texture", GL_MAX_TEXTURE_BUFFER_SIZE, false, 65'536, 0,
      kByScene},
     {DeviceLimit::ComputeTextureUnits, "textures in the compute stage", GL_MAX_COMPUTE_TEXTURE_IMAGE_UNITS,
-     false, 16, 8, "sim/direct_rod.comp"},
+     false, 16, 9, "render/tile_draw.comp"},
     {DeviceLimit::VertexTextureUnits, "textures in the vertex stage", GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS,
      false, 16, 8, "render/shadow.glsl"},
     {DeviceLimit::FragmentTextureUnits, "textures in the fragment stage", GL_MAX_TEXTURE_IMAGE_UNITS, false,

@@ -122,7 +122,13 @@ inline std::vector<ServerMessage> sample_server_messages() {
                     345,
                     true},
       CameraChange{sample_camera()},
-      StateTimes{{{1ull << 40, 1, 2, 3, 4, INT64_MAX}, {7, INT64_MIN, -1, -2, -3, -4}}}};
+      StateTimes{{{1ull << 40, 1, 2, 3, 4, INT64_MAX}, {7, INT64_MIN, -1, -2, -3, -4}}},
+      StreamList{{{1, 1.0f, 1, 1e-4f, 60.0}, {4, 0.25f, 5, 5e-4f, 15.0}},
+                 {"step", "tangent"},
+                 "another bound",
+                 "direct_rod",
+                 1.5,
+                 2}};
 }
 
 }  // namespace strandcast
