@@ -38,7 +38,7 @@ struct DrawnHead {
 struct Drawn {
   RenderDevice* device = nullptr;
   std::vector<DrawnHead> heads;
-  CameraDesc camera;
+  HeadsCamera camera;
   ClockOffset clock;
   std::shared_ptr<FrameTrace> trace;
 };
@@ -357,7 +357,7 @@ Result<ViewReport> run_headless(const ViewOptions& options, const std::atomic<bo
   const StreamMode mode = session->mode();  // a clip holds what came in the mode that the run ended in
   Drawn scene{device.get(),
               {{session->shared_asset(), session->look().look}},
-              session->camera(),
+              {session->camera(), session->look().camera},
               session->client().clock(),
               trace};
   for (const auto& other : others)

@@ -293,7 +293,8 @@ Status StrandDrawer::draw(const Job& job, std::vector<HeadStrands> strands, size
   const int64_t begin_ns = now_ns();
   std::vector<PlacedHead> heads;
   for (const HeadStrands& one : strands) heads.push_back({heads_[one.head].renderer.get(), &one.strands});
-  ASSIGN_OR_RETURN(HeadsPicture picture, draw_heads(heads, view.camera, size_of_step(step, view.size),
+  const HeadsCamera camera{view.camera, job.states[strands.front().head]->look.camera};
+  ASSIGN_OR_RETURN(HeadsPicture picture, draw_heads(heads, camera, size_of_step(step, view.size),
                                                     {static_cast<float>(kDrawSteps[step].strand_share),
                                                      is_unwanted, view.debug_view}));
   if (!picture.profile.is_whole) return {};

@@ -62,8 +62,9 @@ struct DrawnHead {
 
 class HeadsPainter : public PicturePainter {
  public:
-  HeadsPainter(std::shared_ptr<const SceneAsset> asset, std::unique_ptr<RenderDevice> device)
-      : asset_(std::move(asset)), device_(std::move(device)) {}
+  HeadsPainter(std::shared_ptr<const SceneAsset> asset, const CameraDesc& scene_camera,
+               std::unique_ptr<RenderDevice> device)
+      : asset_(std::move(asset)), scene_camera_(scene_camera), device_(std::move(device)) {}
   ~HeadsPainter() override {
     others_.clear();
     if (device_->make_current()) drawn_.clear();  // from the context that made them
@@ -94,7 +95,7 @@ class HeadsPainter : public PicturePainter {
       heads.push_back({other.renderer.get(), &other.strands});
     }
     const ScopedStage stage(paint_timer_);
-    ASSIGN_OR_RETURN(HeadsPicture picture, draw_heads(heads, view.camera, view.size));
+    ASSIGN_OR_RETURN(HeadsPicture picture, draw_heads(heads, {view.camera, scene_camera_}, view.size));
     profile_ = picture.profile;
     return std::move(picture.image);
   }
@@ -121,6 +122,7 @@ class HeadsPainter : public PicturePainter {
   }
 
   const std::shared_ptr<const SceneAsset> asset_;
+  const CameraDesc scene_camera_;
   std::unique_ptr<RenderDevice> device_;  // outlives the renderers
   std::vector<DrawnHead> drawn_;          // of its own head, then of the others
   std::vector<LookDesc> looks_;           // of the others, as they were wanted last
@@ -131,16 +133,16 @@ class HeadsPainter : public PicturePainter {
 
 }  // namespace
 
-MakePicturePainter heads_picture_painter(PainterConfig config,
+MakePicturePainter heads_picture_painter(PainterConfig config, const CameraDesc& scene_camera,
                                          std::function<std::vector<PaintedHead>()> others,
                                          std::function<void()> on_news) {
   // As device_picture_painter().
   config.device.driver_threads = gl::DriverThreads::Own;
-  return [config = std::move(config), others = std::move(others),
+  return [config = std::move(config), scene_camera, others = std::move(others),
           on_news = std::move(on_news)]() -> Result<std::unique_ptr<PicturePainter>> {
     ASSIGN_OR_RETURN(auto device, RenderDevice::open(config.device));
     log_info("render", "frames of all heads are drawn by {}", device->info().name);
-    auto painter = std::make_unique<HeadsPainter>(config.asset, std::move(device));
+    auto painter = std::make_unique<HeadsPainter>(config.asset, scene_camera, std::move(device));
     RETURN_IF_ERROR(painter->begin(config.look, others(), on_news));
     return std::unique_ptr<PicturePainter>(std::move(painter));
   };

@@ -19,9 +19,10 @@ struct PaintedHead {
   std::shared_ptr<const SceneAsset> asset;
 };
 
-/// A maker of painters with a device of their own, for the head of `config`. `others`: asked when a painter
-/// is made. `on_news`: another head has moved; called by whoever publishes it.
-MakePicturePainter heads_picture_painter(PainterConfig config,
+/// A maker of painters with a device of their own, for the head of `config`. `scene_camera`: from which all
+/// heads are to be seen. `others`: asked when a painter is made. `on_news`: another head has moved; called by
+/// whoever publishes it.
+MakePicturePainter heads_picture_painter(PainterConfig config, const CameraDesc& scene_camera,
                                          std::function<std::vector<PaintedHead>()> others,
                                          std::function<void()> on_news);
 

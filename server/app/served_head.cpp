@@ -76,7 +76,7 @@ Status ServedHead::load(OtherHeads others) {
 MakePicturePainter ServedHead::make_painter(const PainterConfig& painter, OtherHeads others) {
   if (!others) return config_.make_painter(painter);
   // While this head moves, its own states say when there is something to draw.
-  return heads_picture_painter(painter, std::move(others), [this] {
+  return heads_picture_painter(painter, config_.scene.camera, std::move(others), [this] {
     if (source_->stats().is_paused) hub_->redraw();
   });
 }

@@ -132,7 +132,9 @@ TEST(TileRenderer, OfSeveralHeadsTheNearerIsInFrontAndOneIsAsByItself) {
   camera.target_m = glm::vec3(0.0f);
   const PosedStrands far = at({100.0, 0.0, -0.5}), near = at({100.0, 0.0, 0.25});
   const auto picture = [&](const std::vector<PlacedHead>& heads, const CameraDesc& from) {
-    auto made = draw_heads(heads, from, size);
+    CameraDesc far_away = from;
+    far_away.offset_m *= 100.0f;  // sees all
+    auto made = draw_heads(heads, {from, far_away}, size);
     EXPECT_TRUE(made) << made.error().to_string();
     return made ? std::move(made->image) : Image{};
   };
@@ -162,6 +164,32 @@ TEST(TileRenderer, OfSeveralHeadsTheNearerIsInFrontAndOneIsAsByItself) {
   const Image reverse = picture({{first->get(), &far}, {second->get(), &near}}, behind);
   EXPECT_GT(count_like(reverse, behind, {first->get(), &far}),
             count_like(reverse, behind, {second->get(), &near}));
+}
+
+// A head that nothing moves stands where it began while the other one is on a stage: both are seen.
+TEST(TileRenderer, HeadsThatStandFarApartAreInThePictureAll) {
+  const RenderSize size{640, 360};
+  const PosedStrands low{}, high{.world_from_head = {{0.6, 1.6, -0.4}, {1, 0, 0, 0}}, .position_m = {}};
+  const std::vector<PlacedHead> heads{{nullptr, &low}, {nullptr, &high}};
+  for (const glm::vec3& offset_m : {glm::vec3(0.1f, 0.05f, 1.35f), glm::vec3(-1.0f, 0.3f, 0.0f),
+                                    glm::vec3(0.0f, 1.0f, 0.0f), glm::vec3(0.0f, 0.02f, 9.0f)}) {
+    CameraDesc camera;
+    camera.offset_m = offset_m;
+    const double factor = room_factor(heads, camera, size);
+    const bool sees_all = glm::length(offset_m) > 5.0f;
+    EXPECT_EQ(factor == 1.0, sees_all) << factor;
+    camera.offset_m *= static_cast<float>(factor);
+    const auto view = make_view(camera, {1.0, 0.0, 0.0, 0.0}, {size.width, size.height});
+    ASSERT_TRUE(view);
+    for (const PlacedHead& head : heads) {
+      const glm::dvec3 seen_m = head.strands->world_from_head.position_m - middle_of(heads);
+      const glm::vec4 clip = view->clip_from_head * glm::vec4(glm::vec3(seen_m), 1.0f);
+      EXPECT_LT(std::abs(clip.x / clip.w), 1.0f);
+      EXPECT_LT(std::abs(clip.y / clip.w), 1.0f);
+      EXPECT_GT(clip.w, 0.0f);
+    }
+  }
+  EXPECT_EQ(room_factor(std::span(heads).first(1), {}, size), 1.0) << "one is followed as ever";
 }
 
 // What the codec's bound does to a picture: every vertex a tenth of a millimetre off.
