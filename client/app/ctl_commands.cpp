@@ -23,6 +23,7 @@
 #include "client/net/datagram_sender.h"
 #include "client/net/http_get.h"
 #include "common/base/text.h"
+#include "common/client/client_token.h"
 #include "common/motion/wind_csv.h"
 #include "common/scene/scene_file.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "client/app/feed.h"
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 #include "common/motion/motion_file.h"
 #include "common/wire/messages.h"
 

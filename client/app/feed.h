@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "client/net/viewer_client.h"
 #include "common/base/result.h"
+#include "common/client/viewer_client.h"
 #include "common/math/pose.h"
 
 namespace strandcast {

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "client/app/viewer_session.h"
-#include "client/net/reconnect_policy.h"
+#include "common/client/reconnect_policy.h"
 
 namespace strandcast {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 #include "common/wire/messages.h"
 
 namespace strandcast {

@@ -9,8 +9,8 @@
 #include <optional>
 #include <string>
 
-#include "client/net/viewer_client.h"
 #include "common/base/result.h"
+#include "common/client/viewer_client.h"
 
 namespace strandcast {
 

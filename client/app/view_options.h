@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "client/net/viewer_client.h"
 #include "common/base/result.h"
+#include "common/client/viewer_client.h"
 #include "common/render/render_device.h"
 #include "common/replay/strand_replay.h"
 
@@ -67,10 +67,6 @@ ViewCommandLine read_view_command_line(int argc, const char* const* argv);
 Result<RenderSize> parse_size(const std::string& text);
 /// "strands", "frames" or "auto".
 Result<StreamMode> parse_mode(const std::string& text);
-/// The token for this role from a file of at most 4 KiB: a token alone in the first line, or lines
-/// "role token" as the server makes them, of which the least that serves is taken. NotFound when there is
-/// none.
-Result<std::string> load_token(const std::filesystem::path& path, Role role);
 
 /// A viewer when no steering can come from it.
 Role role_of(const ViewOptions& options);

@@ -1,6 +1,6 @@
 #include "client/app/way_out.h"
 
-#include "client/net/reconnect_policy.h"
+#include "common/client/reconnect_policy.h"
 
 namespace strandcast {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 
 namespace strandcast {
 

@@ -7,7 +7,7 @@
 #include <boost/beast/http.hpp>
 #include <optional>
 
-#include "client/net/connection_error_private.h"
+#include "common/client/connection_error_private.h"
 #include "common/net/net_stream_private.h"
 
 namespace strandcast {
@@ -23,8 +23,8 @@ using boost::system::error_code;
 class Exchange {
  public:
   Exchange(const Address& address, const std::string& target, TlsContextPtr tls, const std::string& token)
-      : host_(address.host), tls_(std::move(tls)), request_(http::verb::get, target, 11) {
-    request_.set(http::field::host, address.to_string());
+      : host_(address.host), tls_(std::move(tls)), request_(http::verb::get, address.folder() + target, 11) {
+    request_.set(http::field::host, address.authority());
     request_.set(http::field::user_agent, "strandcast");
     if (!token.empty()) request_.set(http::field::authorization, "Bearer " + token);
     parser_.body_limit(kMaxHttpBodyBytes);

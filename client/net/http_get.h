@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <string>
 
-#include "client/net/address.h"
 #include "common/base/result.h"
+#include "common/client/address.h"
 
 namespace strandcast {
 

@@ -1,5 +1,5 @@
 // libFuzzer entry: HOST:PORT as typed. What is read must come back equal from its own text.
-#include "client/net/address.h"
+#include "common/client/address.h"
 
 #include "common/base/check.h"
 #include "tests/fuzz/fuzz_input.h"

@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "client/net/http_get.h"
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 #include "common/wire/close_code.h"
 #include "tests/support/client_config.h"
 #include "tests/support/eventually.h"

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "client/app/view_options.h"
+#include "common/client/client_token.h"
 #include "tests/support/temporary_folder.h"
 
 namespace strandcast {

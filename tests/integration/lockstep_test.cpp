@@ -5,7 +5,7 @@
 #include <atomic>
 #include <thread>
 
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 #include "tests/support/server_fixture.h"
 
 namespace strandcast {

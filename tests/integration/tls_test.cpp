@@ -8,8 +8,8 @@
 #include <unistd.h>
 
 #include "client/net/http_get.h"
-#include "client/net/reconnect_policy.h"
-#include "client/net/viewer_client.h"
+#include "common/client/reconnect_policy.h"
+#include "common/client/viewer_client.h"
 #include "common/net/tls_private.h"
 #include "tests/support/proxy_header.h"
 #include "tests/support/server_net_fixture.h"

@@ -1,7 +1,7 @@
 // What tests of the client connect with.
 #pragma once
 
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 
 namespace strandcast::test {
 

@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "client/app/stop_signal.h"
-#include "client/net/address.h"
 #include "common/base/profile.h"
 #include "common/chaos/chaos_relay.h"
+#include "common/client/address.h"
 
 namespace {
 

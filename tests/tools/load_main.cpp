@@ -13,6 +13,7 @@
 #include "common/base/profile.h"
 #include "common/base/quantile.h"
 #include "common/base/text.h"
+#include "common/client/client_token.h"
 #include "tests/tools/load_viewers.h"
 
 namespace {

@@ -5,11 +5,11 @@
 #include <sstream>
 #include <thread>
 
-#include "client/net/address.h"
-#include "client/net/mailbox.h"
-#include "client/net/outbox.h"
-#include "client/net/reconnect_policy.h"
 #include "common/base/file.h"
+#include "common/client/address.h"
+#include "common/client/mailbox.h"
+#include "common/client/outbox.h"
+#include "common/client/reconnect_policy.h"
 #include "common/wire/close_code.h"
 
 namespace strandcast {
@@ -324,9 +324,22 @@ TEST(Address, ReadsWhatPeopleType) {
   EXPECT_EQ((Address{"::1", 82}).to_string(), "[::1]:82");
 }
 
+TEST(Address, ASessionBehindAProxyHasAFolder) {
+  const auto session = parse_address("wss://studio:83/s/anna-2.b");
+  ASSERT_TRUE(session) << session.error().to_string();
+  EXPECT_EQ(*session, (Address{"studio", 83, true, "anna-2.b"}));
+  EXPECT_EQ(session->to_string(), "studio:83/s/anna-2.b");
+  EXPECT_EQ(session->authority(), "studio:83");
+  EXPECT_EQ(session->folder(), "/s/anna-2.b");
+  EXPECT_EQ(*parse_address("studio:83/s/anna/"), (Address{"studio", 83, false, "anna"}));
+  EXPECT_EQ(*parse_address("ws://studio:83/"), (Address{"studio", 83}));
+  EXPECT_EQ((Address{"studio", 83}).folder(), "");
+}
+
 TEST(Address, RefusesTheRestAndNamesIt) {
   for (const char* text : {"host:", "host:0", "host:65536", "host:-1", "host:80x", "::1", "[::1", "[::1]80",
-                           "[::1]:", "a:b:c"}) {
+                           "[::1]:", "a:b:c", "host:80/v1", "host:80/s/", "host:80/s/../v1", "host/s/a b",
+                           "host:80/s/a/b"}) {
     const auto parsed = parse_address(text);
     ASSERT_FALSE(parsed) << text;
     EXPECT_EQ(parsed.error().code, ErrorCode::BadInput);

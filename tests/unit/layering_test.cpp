@@ -53,6 +53,7 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
       {"common/wire", kWire},
       {"common/record", kWire},
       {"common/net", kBase},
+      {"common/client", with({"common/net", "common/replay"}, kWire)},
       {"common/gl", kGl},
       {"common/render", kRender},
       {"server/input", kWire},
@@ -67,19 +68,21 @@ const std::map<std::string, std::set<std::string>>& allowed_folders() {
             with(kRender, kWire))},
       {"server/record", with({"server/input", "server/source", "server/stream", "common/record"}, kWire)},
       {"server/app", with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode",
-                           "server/net", "server/stream", "server/source", "server/record"},
+                           "server/net", "server/stream", "server/source", "server/record", "common/client"},
                           kAll)},
+      {"server/relay", with({"server/app", "server/net", "common/client"}, kWire)},
       {"server/report", with({"server/input", "server/sim", "server/scene", "server/publish", "server/encode",
                               "server/stream", "server/net", "server/source", "server/app"},
                              kAll)},
-      {"server", with({"server/app", "server/net", "server/record"}, kAll)},
-      {"client/net", with({"common/net", "common/replay"}, kWire)},
+      {"server", with({"server/app", "server/net", "server/record", "server/relay", "common/client"}, kAll)},
+      {"client/net", with({"common/client", "common/net"}, kWire)},
       // No protobuf, no network, no OpenGL: the page has its own.
       {"client/web", with({"common/replay", "common/simd", "common/render", "common/scene"}, kStrands)},
       {"client/window", kAll},
       {"client/export", with({"common/replay", "common/log"}, kStrands)},
-      {"client/app",
-       with({"client/net", "client/window", "client/export", "common/chaos", "common/record"}, kAll)},
+      {"client/app", with({"client/net", "client/window", "client/export", "common/chaos", "common/client",
+                           "common/record"},
+                          kAll)},
       {"client", with({"client/app"}, kAll)},
   };
   return kAllowed;
@@ -94,7 +97,7 @@ struct LibraryRule {
 
 const std::vector<LibraryRule>& library_rules() {
   static const std::set<std::string> kProto = {"common/scene", "common/wire"};
-  static const std::set<std::string> kNet = {"server/net", "client/net", "common/net"};
+  static const std::set<std::string> kNet = {"server/net", "client/net", "common/client", "common/net"};
   static const std::set<std::string> kGl = {"common/gl", "common/render", "server/sim", "server/publish",
                                             "client/window"};
   static const std::set<std::string> kApp = {"server/app", "server/report", "client/app", "server", "client"};
@@ -118,7 +121,7 @@ const std::vector<LibraryRule>& library_rules() {
       {"imgui", {"client/window"}},
       {"CLI/", kApp},
       // The stream knows what is decided about sessions, and no socket.
-      {"server/net/net_", {"server/net", "server/app"}},
+      {"server/net/net_", {"server/net", "server/app", "server/relay"}},
       {"meshoptimizer", {"server/report"}},
       {"draco/", {"server/report"}},
       {"zfp", {"server/report"}},
@@ -146,8 +149,10 @@ std::string check_include(const std::string& path, const std::string& included) 
   const std::string top = included.substr(0, included.find('/'));
   if (top != "common" && top != "server" && top != "client" && top != "shaders") return "";
   const std::string target = folder_of(included);
-  // The stream that both sides of the network share is private to the net folders.
-  const bool is_shared = target == "common/net" && (folder == "server/net" || folder == "client/net");
+  // The stream that both sides of the network share is private to those who open one.
+  const bool is_shared = (target == "common/net" &&
+                          (folder == "server/net" || folder == "client/net" || folder == "common/client")) ||
+                         (target == "common/client" && folder == "client/net");
   if (included.ends_with("_private.h") && target != folder && !is_shared)
     return fmt::format("{}: {} is private to {}", path, included, target);
   if (target == folder) return "";

@@ -12,8 +12,8 @@
 
 #include "client/app/live_connection.h"
 #include "client/app/viewer_session.h"
-#include "client/net/viewer_client.h"
 #include "common/chaos/chaos_relay.h"
+#include "common/client/viewer_client.h"
 #include "common/scene/scenario.h"
 
 namespace strandcast {

@@ -1,4 +1,4 @@
-// When to come back after a connection ended, as client/net/reconnect_policy.h, and what close codes mean
+// When to come back after a connection ended, as common/client/reconnect_policy.h, and what close codes mean
 // (proto/WIRE.md, section 9).
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;

@@ -1,4 +1,4 @@
-#include "client/net/reconnect_policy.h"
+#include "common/client/reconnect_policy.h"
 
 #include <algorithm>
 

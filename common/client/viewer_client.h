@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "client/net/address.h"
-#include "client/net/mailbox.h"
-#include "client/net/outbox.h"
 #include "common/base/result.h"
+#include "common/client/address.h"
+#include "common/client/mailbox.h"
+#include "common/client/outbox.h"
 #include "common/replay/clock_offset.h"
 #include "common/wire/messages.h"
 

@@ -1,4 +1,4 @@
-// Why a connection to a server could not be made, for a person. Private to client/net.
+// Why a connection to a server could not be made, for a person. Private to common/client and client/net.
 #pragma once
 
 #include <string>

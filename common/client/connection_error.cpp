@@ -1,7 +1,7 @@
 #include <boost/asio/error.hpp>
 #include <boost/beast/http/error.hpp>
 
-#include "client/net/connection_error_private.h"
+#include "common/client/connection_error_private.h"
 
 #include "common/base/text.h"
 

@@ -1,4 +1,4 @@
-#include "client/net/outbox.h"
+#include "common/client/outbox.h"
 
 #include <utility>
 

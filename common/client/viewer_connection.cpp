@@ -4,10 +4,10 @@
 #include <string_view>
 #include <utility>
 
-#include "client/net/connection_error_private.h"
-#include "client/net/reconnect_policy.h"
-#include "client/net/viewer_connection_private.h"
 #include "common/base/profile.h"
+#include "common/client/connection_error_private.h"
+#include "common/client/reconnect_policy.h"
+#include "common/client/viewer_connection_private.h"
 #include "common/log/log.h"
 
 namespace strandcast {
@@ -205,7 +205,8 @@ void ViewerClient::Connection::upgrade() {
   ws_.binary(true);
   // Header, body, trailer: whatever it consists of, the answer to the request is bounded.
   ws_.next_layer().limit_reading(kMaxUpgradeAnswerBytes);
-  ws_.async_handshake(response_, config_.address.to_string(), config_.path, [this](error_code failure) {
+  const std::string path = config_.address.folder() + config_.path;
+  ws_.async_handshake(response_, config_.address.authority(), path, [this](error_code failure) {
     if (is_finished_) return;
     ws_.next_layer().limit_reading(net::NetStream::kNoReadLimit);
     if (is_too_long(failure))

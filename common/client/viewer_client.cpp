@@ -1,8 +1,8 @@
-#include "client/net/viewer_client.h"
+#include "common/client/viewer_client.h"
 
 #include <utility>
 
-#include "client/net/viewer_connection_private.h"
+#include "common/client/viewer_connection_private.h"
 
 namespace strandcast {
 

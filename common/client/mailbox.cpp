@@ -1,4 +1,4 @@
-#include "client/net/mailbox.h"
+#include "common/client/mailbox.h"
 
 #include <algorithm>
 #include <iterator>

@@ -1,11 +1,21 @@
-#include "client/net/address.h"
+#include "common/client/address.h"
 
 #include <charconv>
 #include <string_view>
 
+#include "common/wire/session_path.h"
+
 namespace strandcast {
 
 std::string Address::to_string() const {
+  return authority() + folder();
+}
+
+std::string Address::folder() const {
+  return session.empty() ? std::string() : std::string(kSessionFolder) + session;
+}
+
+std::string Address::authority() const {
   const bool is_ipv6 = host.find(':') != std::string::npos;
   return is_ipv6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
 }
@@ -14,16 +24,23 @@ Result<Address> parse_address(const std::string& typed) {
   constexpr size_t kMaxHostLength = 253;  // of a DNS name
   constexpr std::string_view kPlainScheme = "ws://", kTlsScheme = "wss://";
   const bool is_tls = typed.starts_with(kTlsScheme);
-  const std::string text = typed.substr(is_tls                            ? kTlsScheme.size()
+  const std::string full = typed.substr(is_tls                            ? kTlsScheme.size()
                                         : typed.starts_with(kPlainScheme) ? kPlainScheme.size()
                                                                           : 0);
+  const std::string text = full.substr(0, full.find('/'));
   const auto bad = [&](const char* why) {
     return make_error(ErrorCode::BadInput,
                       "'{}' is not an address: {} (use HOST:PORT, for example 127.0.0.1:{})",
-                      text.substr(0, kMaxHostLength), why, kDefaultPort);
+                      full.substr(0, kMaxHostLength), why, kDefaultPort);
   };
   Address address;
   address.is_tls = is_tls;
+  if (std::string path = full.substr(text.size()); !path.empty() && path != "/") {
+    if (path.ends_with('/')) path.pop_back();
+    if (!path.starts_with(kSessionFolder) || !is_session_name(path.substr(kSessionFolder.size())))
+      return bad("behind the port may stand a session only, /s/NAME");
+    address.session = path.substr(kSessionFolder.size());
+  }
   std::string host = text;
   std::string port;
   if (text.starts_with('[')) {

@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "client/net/outbox.h"
-#include "client/net/viewer_client.h"
+#include "common/client/outbox.h"
+#include "common/client/viewer_client.h"
 #include "common/net/net_stream_private.h"
 
 namespace strandcast {

@@ -1,0 +1,32 @@
+// HOST:PORT as people type it, with wss:// in front for TLS, and /s/NAME behind it for a session behind a
+// proxy. Pure, any thread.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/wire/messages.h"
+
+namespace strandcast {
+
+struct Address {
+  std::string host = "127.0.0.1";
+  uint16_t port = kDefaultPort;
+  bool is_tls = false;
+  std::string session = {};  // empty: the server itself
+
+  bool operator==(const Address&) const = default;
+  /// HOST:PORT, or HOST:PORT/s/NAME.
+  std::string to_string() const;
+  /// HOST:PORT.
+  std::string authority() const;
+  /// What stands in front of every path: "", or "/s/NAME".
+  std::string folder() const;
+};
+
+/// Reads "host", "host:port", ":port", "[ipv6]" or "[ipv6]:port", after "ws://" or "wss://" if any and before
+/// "/s/NAME" if any; what is missing keeps its default. BadInput names the text.
+Result<Address> parse_address(const std::string& text);
+
+}  // namespace strandcast
