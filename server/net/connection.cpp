@@ -6,6 +6,7 @@
 
 #include "common/base/profile.h"
 #include "common/log/log.h"
+#include "common/wire/session_path.h"
 #include "server/net/access.h"
 #include "server/net/metrics.h"
 #include "server/net/proxy.h"
@@ -246,12 +247,13 @@ void Connection::answer(const Request& request) {
   if (!is_host_allowed(view(host), local_address_, is_loopback_, context_.config.allowed_hosts))
     return refuse(Refusal::Host, http::status::forbidden,
                   "This Host is not served here (--allow-host adds one).", quoted(view(host)));
-  const std::string_view path = view(request.target());
+  const std::string_view path = without_session(view(request.target()));
   if (websocket::is_upgrade(request) && path == kWebSocketPath) return answer_upgrade(request);
   const bool is_get = request.method() == http::verb::get;
   if (is_get && path == "/healthz") return respond(http::status::ok, "ok\n");
   if (is_get && path == "/readyz") return answer_readiness();
   if (is_get && path == "/metrics") return answer_metrics(request);
+  if (is_get && path.empty()) return redirect(std::string(view(request.target())) + '/');
   if (answer_page(request)) return;
   refuse(Refusal::Path, http::status::not_found,
          "Not found. Here are: / /healthz /readyz /metrics /v1 (WebSocket).",
@@ -264,6 +266,12 @@ void Connection::answer_readiness() {
                             : context_.readiness();
   if (status) return respond(http::status::ok, "ready\n");
   respond(http::status::service_unavailable, status.error().message + "\n");
+}
+
+/// The page's files lie beside it: its name must end in a slash.
+void Connection::redirect(const std::string& target) {
+  response_.set(http::field::location, target);
+  respond(http::status::permanent_redirect, "The page is at " + target + "\n");
 }
 
 /// What the server does is for those who may watch it: beyond trusted loopback any role's token is needed.

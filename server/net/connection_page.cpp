@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/wire/session_path.h"
 #include "server/net/connection_private.h"
 
 namespace strandcast::net {
@@ -18,7 +19,7 @@ constexpr const char* kAskEachTime = "no-cache";
 }  // namespace
 
 bool Connection::answer_page(const Request& request) {
-  const std::string_view path = path_of_target(view(request.target()));
+  const std::string_view path = path_of_target(without_session(view(request.target())));
   const PageFile* file = find_page_file(context_.config.page, path);
   if (file == nullptr) {
     if (path != "/" || !context_.config.page.empty()) return false;

@@ -53,6 +53,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   bool may_be_plain();
   void answer(const Request& request);
   void answer_readiness();
+  void redirect(const std::string& target);
   void answer_metrics(const Request& request);
   void answer_upgrade(const Request& request);
   bool answer_page(const Request& request);

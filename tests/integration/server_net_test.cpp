@@ -27,6 +27,7 @@ TEST_F(ServerNet, ServesHealthMetricsAndNothingElse) {
   EXPECT_NE(test::http_get(server_->port(), "/healthz").find("200 OK"), std::string::npos);
   EXPECT_NE(test::http_get(server_->port(), "/metrics").find("strandcast_net_connections_total"),
             std::string::npos);
+  EXPECT_NE(test::http_get(server_->port(), "/s/anna/healthz").find("200 OK"), std::string::npos);
   EXPECT_NE(test::http_get(server_->port(), "/").find("404"), std::string::npos);
   EXPECT_NE(test::http_get(server_->port(), "/../etc/passwd").find("404"), std::string::npos);
   EXPECT_NE(test::http_get(server_->port(), "/healthz", "evil.example").find("403"), std::string::npos);
@@ -154,6 +155,10 @@ TEST_F(ServerNet, HandshakeNeedsPathProtocolHostAndOrigin) {
   const uint16_t port = server_->port();
   EXPECT_TRUE(RawClient(port).handshake());
   EXPECT_FALSE(RawClient(port).handshake({.path = "/v2", .host = {}, .origin = {}}));
+  EXPECT_TRUE(RawClient(port).handshake({.path = "/s/anna/v1", .host = {}, .origin = {}}))
+      << "a session behind a proxy has a folder of its own";
+  EXPECT_FALSE(RawClient(port).handshake({.path = "/s/../v1", .host = {}, .origin = {}}));
+  EXPECT_FALSE(RawClient(port).handshake({.path = "/s//v1", .host = {}, .origin = {}}));
   EXPECT_FALSE(RawClient(port).handshake({.path = "/v1", .host = {}, .origin = {}, .protocol = "other.v1"}));
   EXPECT_FALSE(RawClient(port).handshake({.path = "/v1", .host = "evil.example", .origin = {}}));
   EXPECT_FALSE(RawClient(port).handshake({.path = "/v1", .host = {}, .origin = "http://evil.example"}));

@@ -57,6 +57,16 @@ class ServerPage : public test::ServerNet {
   test::LogCapture log_;
 };
 
+TEST_F(ServerPage, ASessionBehindAProxyHasItsPageInItsFolder) {
+  start(with_page());
+  EXPECT_EQ(body_of(ask(with_host("GET /s/anna/"))), kPage);
+  EXPECT_EQ(body_of(ask(with_host("GET /s/anna/core.bb.wasm"))), "wasm");
+  const std::string moved = ask(with_host("GET /s/anna"));
+  EXPECT_THAT(moved, StartsWith("HTTP/1.1 308"));
+  EXPECT_THAT(moved, HasSubstr("Location: /s/anna/\r\n"));
+  EXPECT_THAT(ask(with_host("GET /s/an%20na/")), StartsWith("HTTP/1.1 404"));
+}
+
 TEST_F(ServerPage, ThePageIsAskedForEachTimeAndComesWithItsPolicy) {
   start(with_page());
   const std::string answer = ask(with_host("GET /", kGzip));
