@@ -2,7 +2,10 @@
 // the network sends a frame on to those whom it concerns. Any thread.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "common/base/profile.h"
@@ -14,8 +17,10 @@ namespace strandcast {
 
 class NetworkReader : public StreamReader {
  public:
-  /// `head`: of those of the network, that the stream is of.
-  NetworkReader(NetServer& net, FrameStages& stages, size_t head) : net_(net), stages_(stages), head_(head) {}
+  using OnClasses = std::function<void(const std::vector<StrandClass>&, const std::string& reason)>;
+  /// `head`: of those of the network, that the stream is of. `on_classes`: told before any viewer is.
+  NetworkReader(NetServer& net, FrameStages& stages, size_t head, OnClasses on_classes)
+      : net_(net), stages_(stages), head_(head), on_classes_(std::move(on_classes)) {}
 
   void on_strands(const EncodedFramePtr& frame) override {
     stages_.note_encoded(frame->header.sim_time_ns, now_ns());
@@ -40,14 +45,17 @@ class NetworkReader : public StreamReader {
   }
   /// The network thread tells every viewer first.
   void on_stream_change(const std::vector<StrandClass>& classes, std::shared_ptr<void> until_told) override {
+    constexpr const char* kReason = "the stream was changed";
+    on_classes_(classes, kReason);
     net_.set_strand_classes(
-        classes, "the stream was changed", [until_told] {}, head_);
+        classes, kReason, [until_told] {}, head_);
   }
 
  private:
   NetServer& net_;
   FrameStages& stages_;
   const size_t head_;
+  const OnClasses on_classes_;
 };
 
 }  // namespace strandcast

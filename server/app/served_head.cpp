@@ -186,6 +186,7 @@ void ServedHead::tell_status() {
   if (recorder_ != nullptr) recorder_->add(status);
   net_->broadcast(status, number_);
   desk_->tell_state_times();
+  desk_->tell_streams();
 }
 
 void ServedHead::watch_speed(const ServerCounters& now) {

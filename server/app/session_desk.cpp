@@ -10,6 +10,7 @@
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
 #include "server/app/mode_facts.h"
+#include "server/net/stream_list.h"
 
 namespace strandcast {
 namespace {
@@ -28,19 +29,36 @@ const char* name_of(LiveAction action) {
   return kNames[static_cast<size_t>(action)];
 }
 
-std::string make_session_id() {
-  std::random_device random;
-  return fmt::format("{:08x}{:08x}", random(), random());
+SimulatedModel model_of(const SimStats& stats) {
+  return {stats.solver_name, stats.step_cost, std::max<uint32_t>(stats.substeps, 1), stats.is_paused,
+          stats.realtime_factor};
 }
 
 }  // namespace
 
+std::string make_start_id() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
 SessionDesk::SessionDesk(Parts parts)
-    : parts_(std::move(parts)), session_id_(make_session_id()), viewers_(parts_.scene, parts_.hub) {}
+    : parts_(std::move(parts)),
+      session_id_(make_start_id()),
+      viewers_(parts_.scene, parts_.hub),
+      codecs_({parts_.codecs, parts_.source.asset()->rest_position_m.size(), parts_.scene.step_rate_hz}) {}
 
 void SessionDesk::connect(NetServer& net) {
   net_ = &net;
-  reader_ = std::make_unique<NetworkReader>(net, parts_.stages, parts_.head);
+  teller_.connect(net);
+  const auto tell_classes = [this](const std::vector<StrandClass>& classes, const std::string& reason) {
+    teller_.change([&](StreamList& list) {
+      list.classes = listed_classes(classes);
+      list.reason = reason;
+    });
+  };
+  tell_classes(parts_.hub.strand_classes(), {});
+  tell_streams();
+  reader_ = std::make_unique<NetworkReader>(net, parts_.stages, parts_.head, tell_classes);
   // It hears of changes of the stream while no session is there, too.
   (void)parts_.hub.add(*reader_);
 }
@@ -50,59 +68,28 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
     if (const std::optional<Error> error = parts_.hub.picture_failure())
       return make_error(ErrorCode::Unsupported, "no frames can be drawn here: {}", error->to_string());
   const bool is_controller = hello.role == Role::Controller || hello.role == Role::Admin;
-  // Nothing is known of its link yet.
-  const ViewerCodecFacts facts = codec_facts(hello.codec_wish, hello.step_ns, parts_.source.stats());
-  const ViewerCodec codec = choose_viewer_codec(parts_.codecs, facts);
+  const bool is_relay = !hello.relay_id.empty();
+  if (is_relay && hello.strand_class >= parts_.hub.strand_classes().size())
+    return make_error(ErrorCode::Unavailable, "There is no class {} of strands now.", hello.strand_class);
+  const ViewerCodec codec = codecs_.admit(visitor.session, hello, model_of(parts_.source.stats()));
   visitor.subscription.strands.codec = codec.codec;
+  if (is_relay) visitor.subscription.strands.strand_class = hello.strand_class;
   const ReaderId reader = parts_.hub.add(*reader_, {visitor.peer, is_controller});
   viewers_.set_scene_camera(parts_.hub.look().camera);
   const Result<Viewers::Place> place = viewers_.add(visitor.session, reader, visitor.subscription, hello);
   if (!place) {
     parts_.hub.remove(reader);
+    codecs_.remove(visitor.session);
     return place.error();
   }
   viewers_.note_address(visitor.session, visitor.address);
-  if (parts_.codecs.size() > 1 && !visitor.subscription.is_empty())
-    codec_watches_.insert_or_assign(visitor.session, ViewerCodecWatch(facts, codec.codec));
+  if (is_relay) teller_.add(visitor.session);
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = parts_.asset;
   if (const auto pictures = viewers_.pictures(visitor.session))
     tell_quality(visitor.session, *pictures, "to begin with");
   return admission;
-}
-
-ViewerCodecFacts SessionDesk::codec_facts(const std::string& wish, double step_ns,
-                                          const SimStats& simulated) const {
-  ViewerCodecFacts facts;
-  facts.wish = wish;
-  facts.step_ns = step_ns;
-  facts.vertices = parts_.source.asset()->rest_position_m.size();
-  facts.states_hz = parts_.scene.step_rate_hz;
-  facts.solver = simulated.solver_name;
-  facts.solver_cost = simulated.step_cost;
-  facts.substeps = std::max<uint32_t>(simulated.substeps, 1);
-  return facts;
-}
-
-/// Looks whether this session can still afford its codec.
-std::optional<CodecAnswer> SessionDesk::consider_codec(SessionId session, const LinkState& link,
-                                                       int64_t time_ns) {
-  const auto found = codec_watches_.find(session);
-  if (found == codec_watches_.end()) return std::nullopt;
-  ViewerCodecWatch& watch = found->second;
-  const SimStats simulated = parts_.source.stats();
-  const ViewerReport report = viewers_.report(session);
-  DecodeLoad load;
-  load.decode_ms = report.decode_ms;
-  const std::vector<StrandClass> classes = parts_.hub.strand_classes();
-  if (link.mode == StreamMode::Strands && !simulated.is_paused && link.strand_class < classes.size())
-    load.states_hz = classes[link.strand_class].frame_rate_hz * std::min(simulated.realtime_factor, 1.0);
-  const double step_ns = report.step_ns > 0.0 ? report.step_ns : watch.facts().step_ns;
-  const ViewerCodecFacts facts = codec_facts(watch.facts().wish, step_ns, simulated);
-  const std::optional<ViewerCodec> chosen = watch.look(parts_.codecs, facts, load, time_ns);
-  if (!chosen) return std::nullopt;
-  return CodecAnswer{chosen->codec, parts_.codecs[chosen->codec].name, chosen->reason};
 }
 
 Welcome SessionDesk::make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const {
@@ -229,6 +216,17 @@ void SessionDesk::tell_state_times() {
   for (const SessionId session : times_readers_) net_->send(session, times);
 }
 
+void SessionDesk::tell_streams() {
+  const SimulatedModel model = model_of(parts_.source.stats());
+  teller_.change([&](StreamList& list) {
+    list.codecs.clear();
+    for (const StrandCodecInfo& codec : parts_.codecs) list.codecs.push_back(codec.name);
+    list.solver = model.solver;
+    list.solver_cost = model.solver_cost;
+    list.substeps = model.substeps;
+  });
+}
+
 /// What was refused is on record, too.
 StateSource::Reply SessionDesk::reply_to(SessionId session, const std::string& what) {
   return [this, session, who = viewers_.describe(session),
@@ -300,7 +298,10 @@ LinkAnswer SessionDesk::on_link(SessionId session, const LinkState& link, int64_
   LinkAnswer answer;
   if (auto change = viewers_.consider(session, gather_mode_facts(sources), time_ns))
     answer.mode = ModeAnswer{std::move(*change), parts_.asset};
-  answer.codec = consider_codec(session, link, time_ns);
+  const double states_hz =
+      link.strand_class < classes.size() ? classes[link.strand_class].frame_rate_hz : 0.0;
+  answer.codec =
+      codecs_.consider(session, {link, sources.report, model_of(parts_.source.stats()), states_hz}, time_ns);
   answer.is_request_waiting = viewers_.has_request(session);
   return answer;
 }
@@ -327,7 +328,8 @@ void SessionDesk::on_left(SessionId session) {
   parameter_budget_.remove(session);
   on_state_times_request(session, {false});
   parameter_watch_.remove(session);
-  codec_watches_.erase(session);
+  codecs_.remove(session);
+  teller_.remove(session);
   parts_.inputs.remove_source(session);
   parts_.hub.remove(viewers_.remove(session));
 }

@@ -13,11 +13,12 @@
 #include <string_view>
 #include <vector>
 
+#include "server/app/codec_desk.h"
 #include "server/app/control_budget.h"
 #include "server/app/live_desk.h"
 #include "server/app/network_reader.h"
 #include "server/app/parameter_watch.h"
-#include "server/app/viewer_codec.h"
+#include "server/app/stream_teller.h"
 #include "server/app/viewers.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
@@ -25,6 +26,9 @@
 #include "server/stream/stream_hub.h"
 
 namespace strandcast {
+
+/// 16 hex digits, others at every start of a server or a relay.
+std::string make_start_id();
 
 class SessionDesk : public NetHandler {
  public:
@@ -56,6 +60,8 @@ class SessionDesk : public NetHandler {
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
   /// To those who asked for them; call about twice a second.
   void tell_state_times();
+  /// To relays, where something else is simulated; call about twice a second.
+  void tell_streams();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
   void on_motion(SessionId session, const MotionSamples& samples, int64_t arrival_ns) override;
@@ -88,8 +94,6 @@ class SessionDesk : public NetHandler {
   std::string metrics() override { return metrics_ ? metrics_() : std::string(); }
 
  private:
-  ViewerCodecFacts codec_facts(const std::string& wish, double step_ns, const SimStats& simulated) const;
-  std::optional<CodecAnswer> consider_codec(SessionId session, const LinkState& link, int64_t time_ns);
   Welcome make_welcome(const Viewers::Place& place, const ViewerCodec& codec) const;
   bool may_control(SessionId session, std::string_view what);
   StateSource::Reply reply_to(SessionId session, const std::string& what);
@@ -99,7 +103,8 @@ class SessionDesk : public NetHandler {
   const Parts parts_;
   const std::string session_id_;
   Viewers viewers_;
-  std::map<SessionId, ViewerCodecWatch> codec_watches_;  // of who may get another
+  CodecDesk codecs_;
+  StreamTeller teller_;
   ControlBudget control_budget_;
   ControlBudget parameter_budget_;  // of requests for parameters
   ParameterWatch parameter_watch_;

@@ -131,7 +131,7 @@ std::optional<std::string> Context::key_of(SessionId id) const {
 }
 
 Result<size_t> Context::find_head(const std::string& name) const {
-  if (name.empty()) return size_t{0};
+  if (name.empty() || (heads.size() == 1 && heads.front().name.empty())) return size_t{0};
   std::string known;
   for (size_t i = 0; i < heads.size(); ++i) {
     if (heads[i].name == name) return i;

@@ -67,14 +67,10 @@ struct Peer {
 /// What sessions of one head share.
 struct Head {
   explicit Head(const NetHead& head)
-      : name(head.name),
-        handler(*head.handler),
-        codecs(head.strand_codecs),
-        strands(head.strand_classes, head.strand_codecs) {}
+      : name(head.name), handler(*head.handler), strands(head.strand_classes, head.strand_codecs) {}
 
   const std::string name;
   NetHandler& handler;
-  const std::vector<StrandByteModel> codecs;
   StrandCosts strands;
   PictureCosts pictures;
 };
@@ -107,7 +103,8 @@ struct Context {
   bool kick(SessionId id);
   /// What counts as the address of a session; none when there is none of this number.
   std::optional<std::string> key_of(SessionId id) const;
-  /// Number of the head of this name, or of the first where the name is empty; NotFound says which there are.
+  /// Number of the head of this name, or of the first where the name is empty or the only head has none;
+  /// NotFound says which there are.
   Result<size_t> find_head(const std::string& name) const;
   /// All of them are stepping, or why not.
   Status readiness();
@@ -125,8 +122,9 @@ struct Context {
   AddressGuard guard;
   LogBudget refusal_lines;
   LogBudget session_lines;
-  Histogram queue_delays;  // of all viewers, as often as their links are looked at
-  TlsContextPtr tls;       // null: no TLS
+  Histogram queue_delays;       // of all viewers, as often as their links are looked at
+  TlsContextPtr tls;            // null: no TLS
+  int64_t clock_offset_ns = 0;  // of the clock that frames are stamped with, against ours
 
  private:
   mutable std::mutex mutex;

@@ -86,6 +86,10 @@ class NetHandler {
   /// The session waits for a keyframe of this stream of strands given to publish_strands(). Repeated until
   /// one comes.
   virtual void on_keyframe_request(SessionId session, uint16_t stream_id) = 0;
+  /// A relay, which follows the chain, wants one for those who join there.
+  virtual void on_anchor_request(SessionId session, uint16_t stream_id) {
+    on_keyframe_request(session, stream_id);
+  }
   /// The session waits for a whole picture of its class: publish_picture() with the newest one, changed or
   /// not. Repeated until one comes.
   virtual void on_picture_request(SessionId, PictureClass /*picture_class*/) {}

@@ -294,10 +294,27 @@ void NetServer::set_strand_classes(std::vector<StrandClass> classes, std::string
                                        reason = std::move(reason), then = std::move(then), head] {
     net::Head& changed = state->context.heads[head];
     // What was measured of the old ones is forgotten.
-    changed.strands = StrandCosts(classes, changed.codecs);
+    changed.strands = StrandCosts(classes, changed.strands.codecs());
     state->for_head(head, [&](net::Session& session) { session.follow_strand_classes(reason); });
     then();
   });
+}
+
+void NetServer::begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs,
+                           std::string reason, std::function<void()> then, size_t head) {
+  CHECK(!classes.empty() && !codecs.empty());
+  net::asio::post(
+      state_->context.io, [state = state_.get(), classes = std::move(classes), codecs = std::move(codecs),
+                           reason = std::move(reason), then = std::move(then), head] {
+        state->for_head(head, [&](net::Session& session) { session.close(CloseCode::GoingAway, reason); });
+        state->context.heads[head].strands = StrandCosts(classes, codecs);
+        then();
+      });
+}
+
+void NetServer::set_clock_offset(int64_t offset_ns) {
+  net::asio::post(state_->context.io,
+                  [state = state_.get(), offset_ns] { state->context.clock_offset_ns = offset_ns; });
 }
 
 void NetServer::broadcast(ServerMessage message, size_t head) {
@@ -317,6 +334,15 @@ void NetServer::send_to_class(PictureClass picture_class, ServerMessage message,
 
 void NetServer::send(SessionId session, ServerMessage message) {
   state_->post_to(session, [message = std::move(message)](net::Session& one) { one.send(message); });
+}
+
+void NetServer::send_chain(SessionId session, std::vector<EncodedFramePtr> chain) {
+  state_->post_to(session, [chain = std::move(chain)](net::Session& one) { one.deliver_chain(chain); });
+}
+
+void NetServer::close(SessionId session, CloseCode code, std::string reason) {
+  state_->post_to(session,
+                  [code, reason = std::move(reason)](net::Session& one) { one.close(code, reason); });
 }
 
 NetCounters NetServer::counters() const {

@@ -51,7 +51,8 @@ struct NetCounters {
 /// One of the heads that a server has: what a session is about from its Hello on. Its strands and its classes
 /// of pictures are numbered by themselves.
 struct NetHead {
-  std::string name;                                                  // that a Hello asks for
+  std::string
+      name;  // that a Hello asks for; an only head without one is asked for by any, its handler judges
   NetHandler* handler = nullptr;                                     // outlives the server
   std::vector<StrandClass> strand_classes = {StrandClass{}};         // at first; best first
   std::vector<StrandByteModel> strand_codecs = {StrandByteModel{}};  // that each of them is served by
@@ -83,6 +84,9 @@ class NetServer {
   /// Strand frames of one stream (a class by a codec) in the order of their chain. A delta goes to sessions
   /// of the stream whose last frame it builds on, a keyframe to those that wait for one.
   void publish_strands(EncodedFramePtr frame, size_t head = 0);
+  /// Of the stream that a session gets: a keyframe and the deltas after it, oldest first, if it waits for a
+  /// keyframe. Frames published before are not among those that go on from there.
+  void send_chain(SessionId session, std::vector<EncodedFramePtr> chain);
   /// The newest picture for the viewers of one class; replaces one not yet being sent. Each viewer gets what
   /// takes it there from the last one it was sent.
   void publish_picture(PictureClass picture_class, PicturePtr picture, size_t head = 0);
@@ -90,12 +94,19 @@ class NetServer {
   /// gone. `then` runs on the network thread after that, before any frame published later.
   void set_strand_classes(std::vector<StrandClass> classes, std::string reason, std::function<void()> then,
                           size_t head = 0);
+  /// Another stream begins: all who are there go with this sentence, to come back. `then` as above.
+  void begin_anew(std::vector<StrandClass> classes, std::vector<StrandByteModel> codecs, std::string reason,
+                  std::function<void()> then, size_t head = 0);
+  /// Of the clock that frames are stamped with against this machine's, for those who measure it.
+  void set_clock_offset(int64_t offset_ns);
   /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
   void broadcast(ServerMessage message, size_t head = 0);
   /// To those who watch the pictures of one class.
   void send_to_class(PictureClass picture_class, ServerMessage message, size_t head = 0);
   /// Ignored when the session is gone.
   void send(SessionId session, ServerMessage message);
+  /// Goodbye with one sentence. Ignored when the session is gone.
+  void close(SessionId session, CloseCode code, std::string reason);
 
   NetCounters counters() const;
 

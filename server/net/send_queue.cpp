@@ -25,6 +25,7 @@ void SendQueue::start_strands() {
 bool SendQueue::stop_strands() {
   chain_ = Chain::None;
   pending_ = nullptr;
+  behind_.clear();
   return !std::exchange(is_pending_asset_, false);
 }
 
@@ -33,21 +34,46 @@ SendQueue::Offer SendQueue::offer_strands(const EncodedFramePtr& frame) {
   if (chain_ == Chain::None) return Offer::Ignored;
   if (header.opcode == Opcode::StrandKeyframe) {
     // A viewer that follows the chain already has the state a late joiner's keyframe repeats.
-    if (chain_ == Chain::Following && header.sequence == chain_sequence_) return Offer::Ignored;
+    if (chain_ == Chain::Following && header.sequence == chain_sequence_)
+      return takes_all_ && put_behind(frame) ? Offer::Queued : Offer::Ignored;
     if (chain_ == Chain::Waiting && !needs_keyframe()) return Offer::Ignored;
     if (pending_ != nullptr) drop_pending();
   } else {
     if (chain_ != Chain::Following) return Offer::Ignored;
-    if (pending_ != nullptr || header.base_sequence != chain_sequence_) {
+    if (header.base_sequence != chain_sequence_ || !put_behind(frame)) {
       ++dropped_frames_;
       lose_chain();
       return Offer::LostChain;
     }
+    chain_sequence_ = header.sequence;
+    return Offer::Queued;
   }
   pending_ = frame;
   chain_ = Chain::Following;
   chain_sequence_ = header.sequence;
   return Offer::Queued;
+}
+
+SendQueue::Offer SendQueue::offer_chain(std::span<const EncodedFramePtr> chain) {
+  if (chain.empty() || !needs_keyframe()) return Offer::Ignored;
+  pending_ = chain.front();
+  behind_.assign(chain.begin() + 1, chain.end());
+  catch_up_room_ = kCatchUpShare * behind_.size();
+  chain_ = Chain::Following;
+  chain_sequence_ = chain.back()->header.sequence;
+  return Offer::Queued;
+}
+
+/// Behind what waits already; false when there is no room.
+bool SendQueue::put_behind(const EncodedFramePtr& frame) {
+  if (pending_ == nullptr) {
+    pending_ = frame;
+    return true;
+  }
+  if (takes_all_ ? behind_.size() >= kMaxRelayFrames : catch_up_room_ == 0) return false;
+  if (!takes_all_) --catch_up_room_;
+  behind_.push_back(frame);
+  return true;
 }
 
 void SendQueue::stop_pictures() {
@@ -119,7 +145,14 @@ std::optional<SendQueue::Item> SendQueue::take_next(Media media) {
   if (pending_ == nullptr) return std::nullopt;
   is_writing_media_ = true;
   is_pending_asset_ = false;
-  return Item(std::exchange(pending_, nullptr));
+  EncodedFramePtr frame = std::exchange(pending_, nullptr);
+  if (behind_.empty()) {
+    catch_up_room_ = 0;
+  } else {
+    pending_ = std::move(behind_.front());
+    behind_.pop_front();
+  }
+  return Item(std::move(frame));
 }
 
 void SendQueue::written() {
@@ -129,6 +162,7 @@ void SendQueue::written() {
 void SendQueue::clear() {
   control_.clear();
   pending_ = nullptr;
+  behind_.clear();
   is_pending_asset_ = false;
   chain_ = Chain::None;
   pending_picture_ = nullptr;
@@ -137,7 +171,9 @@ void SendQueue::clear() {
 
 void SendQueue::drop_pending() {
   pending_ = nullptr;
-  ++dropped_frames_;
+  dropped_frames_ += 1 + behind_.size();
+  behind_.clear();
+  catch_up_room_ = 0;
 }
 
 }  // namespace strandcast

@@ -1,11 +1,13 @@
 // SendQueue: what one session sends next. Control messages in a bounded queue ahead of media; one media frame
 // being written and at most one pending strand frame and one picture; a strand session that missed a delta
-// waits for the next keyframe. Plain logic without I/O or clock, network thread.
+// waits for the next keyframe. More wait only behind a chain that a joiner is given, and for a relay, and not
+// for long. Plain logic without I/O or clock, network thread.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <span>
 #include <variant>
 
 #include "common/pictures/picture.h"
@@ -17,6 +19,11 @@ namespace strandcast {
 inline constexpr size_t kMaxQueuedControl = 64;
 /// A session is not read while so many wait: what it asked for before still finds room.
 inline constexpr size_t kMostUnreadAnswers = kMaxQueuedControl / 4;
+/// Strand frames that may wait for a relay: a second of them.
+inline constexpr size_t kMaxRelayFrames = 60;
+/// While a chain is given, so many new frames may go behind it for each of its own; then it must have gone
+/// out.
+inline constexpr size_t kCatchUpShare = 2;
 
 class SendQueue {
  public:
@@ -35,6 +42,10 @@ class SendQueue {
   /// From now on the session wants strand frames, beginning with a keyframe.
   void start_strands();
   Offer offer_strands(const EncodedFramePtr& frame);
+  /// A keyframe and the deltas after it, oldest first, for one that needs a keyframe; else ignored.
+  Offer offer_chain(std::span<const EncodedFramePtr> chain);
+  /// For a relay: all frames of the chain, and each keyframe that is made for others.
+  void take_all() { takes_all_ = true; }
   /// No more strand frames, and none that waits. False when the asset waited: it will not be sent.
   bool stop_strands();
   /// From now on the session wants pictures, beginning with a whole one; again when those of another class
@@ -70,9 +81,13 @@ class SendQueue {
  private:
   enum class Chain { None, Waiting, Following };
   void drop_pending();
+  bool put_behind(const EncodedFramePtr& frame);
 
   std::deque<ServerMessage> control_;
-  EncodedFramePtr pending_;  // asset or strands
+  EncodedFramePtr pending_;             // asset or strands
+  std::deque<EncodedFramePtr> behind_;  // strands that follow it
+  size_t catch_up_room_ = 0;            // new frames that may still go behind a chain
+  bool takes_all_ = false;
   bool is_pending_asset_ = false;
   bool is_writing_media_ = false;
   Chain chain_ = Chain::None;

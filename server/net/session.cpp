@@ -173,7 +173,7 @@ void Session::pump() {
   }
   if (auto* message = std::get_if<ServerMessage>(&*item)) {
     // Stamped as late as possible, so that the time in the queue does not blur the client's clock.
-    if (auto* pong = std::get_if<Pong>(message)) pong->server_send_ns = now_ns();
+    if (auto* pong = std::get_if<Pong>(message)) pong->server_send_ns = now_ns() + context_.clock_offset_ns;
     control_bytes_ = encode(*message);
     unwritten_ = control_bytes_;
   } else {

@@ -17,6 +17,7 @@ constexpr int64_t kNsPerUs = 1'000;
 void Session::begin_media(const Hello& hello, const EncodedFramePtr& asset) {
   queue_.set_asset(asset);
   has_asset_ = asset != nullptr;
+  if (is_relay()) queue_.take_all();
   if (subscription_.mode() == StreamMode::Strands) queue_.start_strands();
   if (subscription_.mode() == StreamMode::Frames) {
     queue_.start_pictures();
@@ -38,6 +39,28 @@ void Session::start_again(int64_t time_ns) {
   flow_.forget_in_flight();
   account_drops();
   ask_for_keyframe(time_ns);
+}
+
+/// A relay keeps what it had: the keyframe is for those who join there.
+void Session::ask_for_anchor(int64_t time_ns) {
+  const int64_t interval_ns = context_.config.limits.keyframe_interval_ms * kNsPerMs;
+  if (!subscription_.gets(StreamMode::Strands) ||
+      (anchor_asked_ns_ != 0 && time_ns - anchor_asked_ns_ < interval_ns))
+    return;
+  anchor_asked_ns_ = time_ns;
+  context_.count(&NetCounters::keyframe_requests);
+  head().handler.on_anchor_request(id_, stream_id_of(subscription_.strands));
+}
+
+void Session::deliver_chain(const std::vector<EncodedFramePtr>& chain) {
+  if (state_ != State::Joined || chain.empty() ||
+      chain.front()->header.stream_id != stream_id_of(subscription_.strands))
+    return;
+  guarded([&] {
+    if (queue_.offer_chain(chain) == SendQueue::Offer::Queued) finish_mode_switch();
+    account_drops();
+    pump();
+  });
 }
 
 void Session::deliver_strands(const EncodedFramePtr& frame) {
@@ -135,8 +158,9 @@ void Session::adapt_pictures(int64_t time_ns) {
   follow_picture_class(before);
 }
 
-/// Moves to another strand class when the link says so.
+/// Moves to another strand class when the link says so. A relay has asked for the one that it needs.
 void Session::adapt(int64_t time_ns) {
+  if (is_relay()) return;
   if (subscription_.mode() == StreamMode::Frames) return adapt_pictures(time_ns);
   if (state_ != State::Joined || subscription_.mode() != StreamMode::Strands || !flow_.expects_acks()) return;
   const std::vector<double> costs = head().strands.bytes_per_s(subscription_.strands.codec);

@@ -132,10 +132,15 @@ void Session::dispatch(const ClientMessage& message, int64_t arrival_ns) {
                  [&](const MotionSamples& samples) { handler.on_motion(id_, samples, arrival_ns); },
                  [&](const WindSamples& samples) { handler.on_wind(id_, samples, arrival_ns); },
                  [&](const CameraChange& camera) { move_camera(camera); },
-                 [&](const KeyframeRequest&) { start_again(arrival_ns); },
+                 [&](const KeyframeRequest&) {
+                   if (is_relay())
+                     ask_for_anchor(arrival_ns);
+                   else
+                     start_again(arrival_ns);
+                 },
                  [&](const FrameAck& ack) { on_ack(ack, arrival_ns); },
                  [&](const Ping& ping) {
-                   queue_control(Pong{ping.client_time_ns, arrival_ns, 0});
+                   queue_control(Pong{ping.client_time_ns, arrival_ns + context_.clock_offset_ns, 0});
                  },
                  [&](const ControlCommand& command) { handler.on_command(id_, command); },
                  [&](const SetParameter& parameter) { handler.on_parameter(id_, parameter); },

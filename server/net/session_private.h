@@ -28,6 +28,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void start(http::request<http::empty_body> request, bool has_room);
 
   void deliver_strands(const EncodedFramePtr& frame);
+  /// As SendQueue::offer_chain().
+  void deliver_chain(const std::vector<EncodedFramePtr>& chain);
   /// The strand classes are others now: announces what this session gets.
   void follow_strand_classes(const std::string& reason);
   /// Whether pictures of this class are for this session.
@@ -53,6 +55,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
  private:
   Head& head() const { return context_.heads[head_]; }
+  bool is_relay() const { return !hello_.relay_id.empty(); }
   template <class Work>
   void guarded(Work&& work);
   void on_open(bool has_room);
@@ -64,6 +67,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void join(const Hello& hello);
   void begin_media(const Hello& hello, const EncodedFramePtr& asset);
   void start_again(int64_t time_ns);
+  void ask_for_anchor(int64_t time_ns);
   void dispatch(const ClientMessage& message, int64_t arrival_ns);
   void obey(const AdminCommand& command, int64_t time_ns);
   void move_camera(const CameraChange& camera);
@@ -129,6 +133,7 @@ class Session : public std::enable_shared_from_this<Session> {
   int64_t progress_ns_ = 0;   // of the write under way
   size_t untaken_bytes_ = 0;  // when it was looked at last
   int64_t keyframe_asked_ns_ = 0;
+  int64_t anchor_asked_ns_ = 0;
   int64_t link_reported_ns_ = 0;
   int64_t received_ns_ = 0;          // the newest message
   int64_t probe_sent_ns_ = 0;        // the newest WebSocket ping of ours

@@ -21,6 +21,7 @@ class StrandCosts {
 
   /// Best first.
   const std::vector<StrandClass>& classes() const { return classes_; }
+  const std::vector<StrandByteModel>& codecs() const { return codecs_; }
   /// Keyframes and frames of no class are left out.
   void note_frame(const FrameHeader& header, size_t bytes, int64_t time_ns);
   /// Of every class by this codec, as measured, or estimated from the one measured last; empty at first.

@@ -77,6 +77,65 @@ TEST(SendQueue, KeyframeForAnotherViewerIsIgnoredByAViewerWithThatState) {
   EXPECT_EQ(queue.offer_strands(delta(5)), SendQueue::Offer::Queued);
 }
 
+TEST(SendQueue, AChainGoesOutWholeAndWhatComesMeanwhileBehindIt) {
+  SendQueue queue;
+  queue.start_strands();
+  const std::vector<EncodedFramePtr> chain = {keyframe(1), delta(2), delta(3)};
+  ASSERT_EQ(queue.offer_chain(chain), SendQueue::Offer::Queued);
+  EXPECT_EQ(queue.offer_strands(delta(4)), SendQueue::Offer::Queued);
+  for (uint32_t sequence = 1; sequence <= 4; ++sequence) {
+    const auto item = queue.take_next();
+    ASSERT_TRUE(item);
+    EXPECT_EQ(std::get<EncodedFramePtr>(*item)->header.sequence, sequence);
+    queue.written();
+  }
+  // From here on one may wait, as ever.
+  EXPECT_EQ(queue.offer_strands(delta(5)), SendQueue::Offer::Queued);
+  EXPECT_EQ(queue.offer_strands(delta(6)), SendQueue::Offer::LostChain);
+}
+
+TEST(SendQueue, WhoDoesNotCatchUpWithAChainLosesIt) {
+  SendQueue queue;
+  queue.start_strands();
+  const std::vector<EncodedFramePtr> chain = {keyframe(1), delta(2), delta(3)};
+  ASSERT_EQ(queue.offer_chain(chain), SendQueue::Offer::Queued);
+  uint32_t sequence = 4;
+  while (queue.offer_strands(delta(sequence)) == SendQueue::Offer::Queued) ++sequence;
+  EXPECT_EQ(sequence, 4 + 2 * kCatchUpShare) << "so many for each delta of the chain";
+  EXPECT_FALSE(queue.take_next().has_value()) << "nothing of the broken chain may follow";
+  EXPECT_TRUE(queue.needs_keyframe());
+}
+
+TEST(SendQueue, AChainIsForOneThatWaitsForAKeyframe) {
+  SendQueue queue;
+  const std::vector<EncodedFramePtr> chain = {keyframe(1), delta(2)};
+  EXPECT_EQ(queue.offer_chain(chain), SendQueue::Offer::Ignored) << "no strands are wanted";
+  queue.start_strands();
+  EXPECT_EQ(queue.offer_chain({}), SendQueue::Offer::Ignored);
+  ASSERT_EQ(queue.offer_strands(keyframe(7)), SendQueue::Offer::Queued);
+  EXPECT_EQ(queue.offer_chain(chain), SendQueue::Offer::Ignored) << "it has one";
+}
+
+TEST(SendQueue, ARelayGetsKeyframesForOthersToo) {
+  SendQueue queue;
+  queue.take_all();
+  queue.start_strands();
+  ASSERT_EQ(queue.offer_strands(keyframe(1)), SendQueue::Offer::Queued);
+  ASSERT_EQ(queue.offer_strands(delta(2)), SendQueue::Offer::Queued);
+  ASSERT_EQ(queue.offer_strands(keyframe(2)), SendQueue::Offer::Queued) << "for who joins there";
+  ASSERT_EQ(queue.offer_strands(delta(3)), SendQueue::Offer::Queued);
+  for (const Opcode opcode :
+       {Opcode::StrandKeyframe, Opcode::StrandDelta, Opcode::StrandKeyframe, Opcode::StrandDelta}) {
+    EXPECT_EQ(taken_opcode(queue), opcode);
+    queue.written();
+  }
+  // It is not waited for without end.
+  uint32_t sequence = 4;
+  while (queue.offer_strands(delta(sequence)) == SendQueue::Offer::Queued) ++sequence;
+  EXPECT_EQ(sequence, 4 + 1 + kMaxRelayFrames);
+  EXPECT_TRUE(queue.needs_keyframe());
+}
+
 TEST(SendQueue, WhateverIsOfferedTheViewerCanDecodeWhatItGets) {
   std::mt19937 random(7);
   for (int round = 0; round < 200; ++round) {

@@ -1,0 +1,53 @@
+// CodecDesk: by which of the codecs that are served each session gets its strands, when it joins and when
+// that turns out wrong. Network thread.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/app/viewer_codec.h"
+#include "server/net/net_handler.h"
+
+namespace strandcast {
+
+/// What is simulated, as far as it decides who can predict it.
+struct SimulatedModel {
+  std::string solver;
+  double solver_cost = 1.0;  // as ViewerCodecFacts
+  uint32_t substeps = 1;
+  bool is_paused = false;
+  double realtime_factor = 1.0;
+};
+
+class CodecDesk {
+ public:
+  struct Served {
+    std::vector<StrandCodecInfo> codecs;  // as served_codecs()
+    size_t vertices = 0;                  // of all strands
+    double states_hz = 60.0;              // steps of the simulation
+  };
+  explicit CodecDesk(Served served) : served_(std::move(served)) {}
+
+  /// What a session that joins gets. One that gets strands and may get another codec later is remembered; a
+  /// relay gets what it asks for.
+  ViewerCodec admit(SessionId session, const Hello& hello, const SimulatedModel& model);
+  /// Call often: looks whether this session can still afford its codec.
+  struct Look {
+    const LinkState& link;
+    const ViewerReport& report;
+    const SimulatedModel& model;
+    double states_hz = 0.0;  // of its strand class
+  };
+  std::optional<CodecAnswer> consider(SessionId session, const Look& look, int64_t time_ns);
+  void remove(SessionId session) { watches_.erase(session); }
+
+ private:
+  ViewerCodecFacts facts(const std::string& wish, double step_ns, const SimulatedModel& model) const;
+
+  Served served_;
+  std::map<SessionId, ViewerCodecWatch> watches_;  // of who may get another
+};
+
+}  // namespace strandcast

@@ -1,0 +1,32 @@
+#include "server/app/stream_teller.h"
+
+#include <utility>
+
+namespace strandcast {
+
+StreamList StreamTeller::list() const {
+  const std::lock_guard lock(mutex_);
+  return list_;
+}
+
+void StreamTeller::change(const std::function<void(StreamList&)>& edit) {
+  const std::lock_guard lock(mutex_);
+  StreamList list = list_;
+  edit(list);
+  if (list == list_) return;
+  list_ = std::move(list);
+  for (const SessionId relay : relays_) net_->send(relay, list_);
+}
+
+void StreamTeller::add(SessionId session) {
+  const std::lock_guard lock(mutex_);
+  relays_.insert(session);
+  net_->send(session, list_);
+}
+
+void StreamTeller::remove(SessionId session) {
+  const std::lock_guard lock(mutex_);
+  relays_.erase(session);
+}
+
+}  // namespace strandcast
