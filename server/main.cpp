@@ -10,6 +10,7 @@
 
 #include "common/base/file.h"
 #include "common/base/profile.h"
+#include "common/client/client_token.h"
 #include "common/groom/groom_asset.h"
 #include "common/log/line_writer.h"
 #include "common/log/log.h"
@@ -24,6 +25,7 @@
 #include "server/app/viewer_codec.h"
 #include "server/net/token_file.h"
 #include "server/record/replay.h"
+#include "server/relay/relay.h"
 
 namespace strandcast {
 namespace {
@@ -162,7 +164,8 @@ Result<std::vector<AccessToken>> load_tokens(const ServerOptions& options) {
   return std::move(file.tokens);
 }
 
-void reload_tokens(Server& server, const std::filesystem::path& path) {
+template <class Served>
+void reload_tokens(Served& server, const std::filesystem::path& path) {
   std::error_code failure;
   // Tokens that nobody saw would be made anew where the file is gone.
   if (!std::filesystem::exists(path, failure))
@@ -173,33 +176,48 @@ void reload_tokens(Server& server, const std::filesystem::path& path) {
   log_info("app", "tokens read again: who joins needs one of them, and sessions without one end");
 }
 
-void reload_certificate(Server& server) {
+template <class Served>
+void reload_certificate(Served& server) {
   if (const Status status = server.reload_tls(); !status)
     return log_error("app", "the old certificate stays: {}", status.error().to_string());
   log_info("app", "certificate read again");
 }
 
-void reload(Server& server, const ServerOptions& options, const NetConfig& net) {
+template <class Served>
+void reload(Served& server, const ServerOptions& options, const NetConfig& net) {
   if (!options.token_path.empty()) reload_tokens(server, options.token_path);
   if (net.tls) reload_certificate(server);
   if (!net.tls && options.token_path.empty())
     log_info("app", "SIGHUP: there is no certificate and no token file that could be read again");
 }
 
-std::string service_status(const Server& server, const ServerConfig& config, uint32_t viewers) {
-  return fmt::format("Serving '{}' on {} port {}, {} viewer{}", config.scene.name, config.net.address,
-                     server.port(), viewers, viewers == 1 ? "" : "s");
+/// What a service manager is told.
+struct ServiceState {
+  uint32_t viewers = 0;
+  int64_t busy_ns = 0;
+};
+ServiceState state_of(const Server& server) {
+  const ServerCounters counters = server.counters();
+  return {counters.viewers, counters.sim.busy_ns};
+}
+/// A relay that waits for its server does well.
+ServiceState state_of(const Relay& relay) {
+  return {relay.viewer_count(), 0};
+}
+
+std::string service_status(const std::string& title, uint32_t viewers) {
+  return fmt::format("{}, {} viewer{}", title, viewers, viewers == 1 ? "" : "s");
 }
 
 /// Tells the service manager how it goes, now and again.
-void tell_service(ServiceManager& service, const Server& server, const ServerConfig& config,
-                  int64_t& told_ns) {
+template <class Served>
+void tell_service(ServiceManager& service, const Served& server, const std::string& title, int64_t& told_ns) {
   const int64_t time_ns = now_ns();
   if (!service.is_there() || time_ns - told_ns < kServiceNs) return;
   told_ns = time_ns;
-  const ServerCounters counters = server.counters();
-  service.tell_status(service_status(server, config, counters.viewers));
-  service.beat(time_ns, counters.sim.busy_ns);
+  const ServiceState state = state_of(server);
+  service.tell_status(service_status(title, state.viewers));
+  service.beat(time_ns, state.busy_ns);
 }
 
 /// A port that was opened for the server goes before the one of the command line.
@@ -212,30 +230,24 @@ Status use_passed_socket(NetConfig& net) {
   return {};
 }
 
-/// Serves until a signal, the end of the time or a failure. The signals are blocked in every thread.
-int serve(const ServerOptions& options, ServerConfig config) {
-  ServiceManager service = ServiceManager::of_environment();
-  if (const Status status = use_passed_socket(config.net); !status) return fail(status.error());
-  auto tokens = load_tokens(options);
-  if (!tokens) return fail(tokens.error());
-  config.net.tokens = std::move(tokens).value();
+/// Runs what has started until a signal, the end of the time or a failure. `what`: for people, and whose.
+template <class Served>
+int run_until_end(Served& server, const ServerOptions& options, const NetConfig& net, const std::string& what,
+                  ServiceManager& service) {
   const sigset_t signals = handled_signals();
-  std::signal(SIGXFSZ, SIG_IGN);  // a recording that may not grow any more ends, and the server goes on
-  auto server = Server::start(config);
-  if (!server) return fail(server.error());
-  if (const Status status = write_port(options.port_path, (*server)->port()); !status)
+  if (const Status status = write_port(options.port_path, server.port()); !status)
     return fail(status.error());
-  fmt::print("Serving '{}' on {} port {}\n", names_of_heads(config.scene), config.net.address,
-             (*server)->port());
+  const std::string title = fmt::format("{} on {} port {}", what, net.address, server.port());
+  fmt::print("{}\n", title);
   std::fflush(stdout);
-  service.tell_ready(service_status(**server, config, 0));
+  service.tell_ready(service_status(title, 0));
   int64_t told_ns = 0;
   const int64_t begin_ns = now_ns();
   const timespec poll{0, kPollNs};
-  while (!(*server)->failure() && !(*server)->is_shut_down_wanted()) {
+  while (!server.failure() && !server.is_shut_down_wanted()) {
     const int signal = sigtimedwait(&signals, nullptr, &poll);
-    if (signal == SIGHUP) reload(**server, options, config.net);
-    tell_service(service, **server, config, told_ns);
+    if (signal == SIGHUP) reload(server, options, net);
+    tell_service(service, server, title, told_ns);
     if (signal > 0 && signal != SIGHUP) break;
     if (options.run_s > 0.0 && static_cast<double>(now_ns() - begin_ns) / kNsPerS >= options.run_s) break;
   }
@@ -244,14 +256,48 @@ int serve(const ServerOptions& options, ServerConfig config) {
   std::signal(SIGTERM, SIG_DFL);
   std::signal(SIGHUP, SIG_IGN);
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
-  const std::optional<Error> failure = (*server)->failure();
+  const std::optional<Error> failure = server.failure();
   service.tell_stopping();
-  (*server)->stop();
+  server.stop();
   if (failure) {
     tell(failure->to_string());
     return kExitFailure;
   }
   return 0;
+}
+
+/// What a server and a relay have in common before they start.
+Status prepare(const ServerOptions& options, NetConfig& net) {
+  RETURN_IF_ERROR(use_passed_socket(net));
+  ASSIGN_OR_RETURN(net.tokens, load_tokens(options));
+  std::signal(SIGXFSZ, SIG_IGN);  // a recording that may not grow any more ends, and the server goes on
+  return {};
+}
+
+/// The signals are blocked in every thread.
+int serve(const ServerOptions& options, ServerConfig config) {
+  ServiceManager service = ServiceManager::of_environment();
+  if (const Status status = prepare(options, config.net); !status) return fail(status.error());
+  auto server = Server::start(config);
+  if (!server) return fail(server.error());
+  return run_until_end(**server, options, config.net,
+                       fmt::format("Serving '{}'", names_of_heads(config.scene)), service);
+}
+
+int relay(const ServerOptions& options) {
+  ServiceManager service = ServiceManager::of_environment();
+  RelayConfig config{options.config.net, {}};
+  const UpstreamOptions& upstream = *options.upstream;
+  config.upstream = {upstream.address, upstream.tls_authorities, {}, upstream.head};
+  if (!upstream.token_path.empty()) {
+    auto token = load_token(upstream.token_path, Role::Viewer);
+    if (!token) return fail(token.error());
+    config.upstream.token = std::move(token).value();
+  }
+  if (const Status status = prepare(options, config.net); !status) return fail(status.error());
+  auto relay = Relay::start(config);
+  if (!relay) return fail(relay.error());
+  return run_until_end(**relay, options, config.net, "Relaying " + upstream.address.to_string(), service);
 }
 
 int run(int argc, const char* const* argv) {
@@ -265,6 +311,7 @@ int run(int argc, const char* const* argv) {
   const bool is_serving = !options->is_printing_scene && !options->is_explaining && !options->is_checking;
   const sigset_t signals = handled_signals();
   if (is_serving) pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  if (options->upstream) return relay(*options);
   const Result<ServerConfig> config = load_config(*options);
   if (!config) return fail(config.error());
   if (options->is_printing_scene) return fmt::print("{}", to_text(config->scene)), 0;

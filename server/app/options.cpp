@@ -141,7 +141,48 @@ struct RawRunOptions {
   bool replaces_recording = false;
   bool is_replayed_in_real_time = false;
   std::string log_format = "text";
+  std::string upstream;
+  UpstreamOptions of_upstream;
 };
+
+/// What a relay leaves to the server that it stands in for.
+constexpr const char* kNotForRelays[] = {"--scene",        "--set",        "--groom",       "--check",
+                                         "--list-solvers", "--explain",    "--print-scene", "--mocap",
+                                         "--record",       "--replay",     "--sim-device",  "--renderer",
+                                         "--gl-device",    "--shader-dir", "--trace",       "--lockstep"};
+
+void add_relay_options(CLI::App& app, RawRunOptions& raw) {
+  constexpr const char* kGroup = "Relay";
+  auto* upstream =
+      app.add_option("--upstream", raw.upstream,
+                     "pass on the stream of this server, or relay, and simulate nothing: HOST:PORT, with "
+                     "wss:// in front for TLS");
+  upstream->group(kGroup);
+  const auto add = [&](const char* name, auto& value, const char* help) {
+    app.add_option(name, value, help)->needs(upstream)->group(kGroup);
+  };
+  add("--upstream-token-file", raw.of_upstream.token_path,
+      "file with the token that this relay gives there: the token alone, or lines 'role token'");
+  add("--upstream-tls-ca", raw.of_upstream.tls_authorities,
+      "certificates (PEM) to trust there; default: the system's");
+  add("--upstream-head", raw.of_upstream.head, "which of the heads there, by its name; default: the first");
+}
+
+Result<std::optional<UpstreamOptions>> upstream_of(const CLI::App& app, const RawRunOptions& raw) {
+  if (raw.upstream.empty()) return std::optional<UpstreamOptions>();
+  std::string wrong;
+  for (const char* name : kNotForRelays)
+    if (app.count(name) > 0) wrong += fmt::format("{}{}", wrong.empty() ? "" : ", ", name);
+  if (!wrong.empty())
+    return make_error(ErrorCode::BadInput,
+                      "--upstream passes on what another server simulates: leave out {}, or give it there",
+                      wrong);
+  UpstreamOptions upstream = raw.of_upstream;
+  const auto address = parse_address(raw.upstream);
+  if (!address) return at("--upstream", address.error());
+  upstream.address = *address;
+  return std::optional(upstream);
+}
 
 void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
   constexpr const char* kGroup = "Live motion capture";
@@ -163,8 +204,9 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
          "how its numbers are meant, where senders disagree; a wrong name is answered with those there are")
       ->needs(inputs)
       ->group(kGroup);
-  app.add_option("--mocap-scale", options.mocap.scale,
-                 "its places times this, for senders of another unit or size: 0.01 makes metres of centimetres")
+  app.add_option(
+         "--mocap-scale", options.mocap.scale,
+         "its places times this, for senders of another unit or size: 0.01 makes metres of centimetres")
       ->check(in_range(kMinLiveScale, kMaxLiveScale))
       ->capture_default_str()
       ->needs(inputs)
@@ -259,6 +301,7 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
   add_proxy_options(app, raw);
   add_mocap_options(app, options, raw);
   add_record_options(app, options, raw);
+  add_relay_options(app, raw);
   add_limit_options(app, net.limits);
 }
 
@@ -295,6 +338,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
     if (!range) return at("--mocap-allow", range.error());
     options.config.live_allowed.push_back(*range);
   }
+  ASSIGN_OR_RETURN(options.upstream, upstream_of(app, raw));
   if (raw.has_proxy_protocol) options.config.net.proxy_protocol = ProxyProtocol::Version2;
   if (!raw.record_path.empty())
     options.config.record =

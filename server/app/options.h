@@ -8,11 +8,20 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/client/address.h"
 #include "server/app/mocap_option.h"
 #include "server/app/server.h"
 #include "server/record/replay.h"
 
 namespace strandcast {
+
+/// Another server whose stream is passed on.
+struct UpstreamOptions {
+  Address address;
+  std::filesystem::path token_path;       // of the relay's own token; empty: none
+  std::filesystem::path tls_authorities;  // empty: the system's
+  std::string head;                       // of those there; empty: the first
+};
 
 struct ServerOptions {
   std::filesystem::path scene_path;  // empty: the built-in scene
@@ -31,8 +40,9 @@ struct ServerOptions {
   std::filesystem::path check_folder = "check";  // for its pictures
   std::filesystem::path replay_path;             // a recording to simulate again; empty: none
   ReplayPace replay_pace = ReplayPace::AsFastAsItGoes;
-  std::string help;     // not empty: print and leave
-  ServerConfig config;  // all but scene and tokens
+  std::optional<UpstreamOptions> upstream;  // a relay, no scene
+  std::string help;                         // not empty: print and leave
+  ServerConfig config;                      // all but scene and tokens
 };
 
 /// BadInput names the option; `help` is set for --help and --version.

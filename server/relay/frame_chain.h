@@ -1,0 +1,38 @@
+// FrameChain: of one stream of strands the newest keyframe and the deltas since, for those who join a relay.
+// Bounded. Plain logic on given times, any one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "common/strands/frame_header.h"
+
+namespace strandcast {
+
+/// A chain wants a fresh keyframe after so long, once its deltas have as many bytes as its keyframe, so that
+/// keyframes take no more of the link than deltas;
+inline constexpr int64_t kChainNs = 1'000'000'000;
+/// after so long in any case.
+inline constexpr int64_t kLongestChainNs = 2'000'000'000;
+/// One that does not get it in so many frames or bytes of deltas is of no use any more.
+inline constexpr size_t kMaxChainFrames = 240;
+inline constexpr size_t kMaxChainBytes = 16u << 20;
+
+class FrameChain {
+ public:
+  /// In the order of the stream; a delta that does not follow ends the chain.
+  void add(const EncodedFramePtr& frame, int64_t time_ns);
+  void clear();
+  /// A keyframe and what follows it; empty while there is no keyframe.
+  const std::vector<EncodedFramePtr>& frames() const { return frames_; }
+  bool wants_keyframe() const;
+
+ private:
+  std::vector<EncodedFramePtr> frames_;
+  size_t delta_bytes_ = 0;
+  int64_t keyframe_ns_ = 0;
+  int64_t newest_ns_ = 0;
+};
+
+}  // namespace strandcast

@@ -1,0 +1,205 @@
+#include "server/relay/relay_desk.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/version.h"
+#include "common/strands/strand_codec.h"
+#include "server/app/process_metrics.h"
+#include "server/net/metrics.h"
+
+namespace strandcast {
+namespace {
+
+/// A codec that this build does not know is passed on like any other.
+std::vector<StrandCodecInfo> codecs_of(const StreamList& streams) {
+  std::vector<StrandCodecInfo> codecs;
+  for (const std::string& name : streams.codecs) {
+    Result<StrandCodecInfo> info = strand_codec_info(name);
+    codecs.push_back(info ? std::move(info).value() : StrandCodecInfo{name, {}});
+  }
+  return codecs;
+}
+
+}  // namespace
+
+void RelayDesk::connect(NetServer& net) {
+  net_ = &net;
+  teller_.connect(net);
+}
+
+void RelayDesk::set_relayed(RelayedPtr relayed) {
+  teller_.change([&](StreamList& list) { list = relayed->streams; });
+  const std::lock_guard lock(mutex_);
+  relayed_ = std::move(relayed);
+}
+
+RelayedPtr RelayDesk::relayed() const {
+  const std::lock_guard lock(mutex_);
+  return relayed_;
+}
+
+void RelayDesk::move_views(const CameraChange& camera) {
+  const std::lock_guard lock(mutex_);
+  for (const SessionId session : movable_) net_->send(session, camera);
+}
+
+Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
+  const auto& relays = relayed.welcome.relays;
+  if (!hello.relay_id.empty() && std::find(relays.begin(), relays.end(), hello.relay_id) != relays.end())
+    return make_error(ErrorCode::BadInput,
+                      "This relay stands behind yours: relays must not stand in a ring.");
+  if (!hello.relay_id.empty() && hello.strand_class >= relayed.streams.classes.size())
+    return make_error(ErrorCode::Unavailable, "There is no class {} of strands now.", hello.strand_class);
+  if (!hello.head.empty() && hello.head != relayed.welcome.scene_name)
+    return make_error(ErrorCode::BadInput, "There is no head called '{}' here: this relay passes on '{}'.",
+                      hello.head, relayed.welcome.scene_name);
+  return {};
+}
+
+SimulatedModel RelayDesk::model(const Relayed& relayed) const {
+  const ServerStatus status = upstream_.status();
+  return {relayed.streams.solver, relayed.streams.solver_cost, relayed.streams.substeps, status.is_paused,
+          status.realtime_factor};
+}
+
+Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello) {
+  if (hello.relay_id == id_)
+    return make_error(ErrorCode::BadInput,
+                      "This relay stands behind itself: its --upstream must be another server.");
+  RETURN_IF_ERROR(upstream_.connected());
+  const RelayedPtr relayed = this->relayed();
+  if (relayed == nullptr) return make_error(ErrorCode::Unavailable, "This relay has just begun: try again.");
+  RETURN_IF_ERROR(check(hello, *relayed));
+  if (std::exchange(codecs_of_, relayed->welcome.session_id) != relayed->welcome.session_id)
+    codecs_.emplace(
+        CodecDesk::Served{codecs_of(relayed->streams),
+                          size_t{relayed->welcome.strand_count} * size_t{relayed->welcome.vertex_count},
+                          relayed->welcome.step_rate_hz});
+  Subscription& subscription = visitor.subscription;
+  const ViewerCodec codec = codecs_->admit(visitor.session, hello, model(*relayed));
+  subscription.strands.codec = codec.codec;
+  Admission admission{relayed->welcome, nullptr};
+  Welcome& welcome = admission.welcome;
+  welcome.relays.push_back(id_);
+  welcome.heads.clear();
+  welcome.codec = relayed->streams.codecs[codec.codec];
+  welcome.codec_reason = codec.reason;
+  welcome.mode_reason = "strands: a relay passes them on to everybody";
+  if (subscription.is_empty()) {
+    welcome.mode_reason = "no stream was asked for";
+  } else if (hello.mode == StreamMode::Frames) {
+    subscription.start_with(StreamMode::Frames);
+    subscription.pictures.picture_class = static_cast<PictureClass>(visitor.session);
+    if (hello.frame_width > 0) welcome.frame_width = hello.frame_width;
+    if (hello.frame_height > 0) welcome.frame_height = hello.frame_height;
+    welcome.mode_reason = "frames were asked for, and come through a relay";
+    voices_.open_pictures(visitor.session, hello);
+  } else {
+    admission.asset = relayed->asset;
+  }
+  if (!hello.relay_id.empty()) {
+    subscription.strands.strand_class = hello.strand_class;
+    teller_.add(visitor.session);
+  }
+  leaves_[visitor.session] = {hello, &subscription, {}, false};
+  follow_demand();
+  if (!hello.keeps_camera && subscription.gets(StreamMode::Strands)) {
+    const std::lock_guard lock(mutex_);
+    movable_.insert(visitor.session);
+  }
+  return admission;
+}
+
+void RelayDesk::say(SessionId session, const ClientMessage& message) {
+  const auto found = leaves_.find(session);
+  if (found != leaves_.end()) voices_.say(session, found->second.hello, message);
+}
+
+/// Of viewers of pictures; the others draw by themselves.
+void RelayDesk::on_camera(SessionId session, const CameraChange& camera) {
+  const auto found = leaves_.find(session);
+  if (found != leaves_.end() && found->second.subscription->gets(StreamMode::Frames)) say(session, camera);
+}
+
+void RelayDesk::on_report(SessionId session, const ViewerReport& report) {
+  if (const auto found = leaves_.find(session); found != leaves_.end()) found->second.report = report;
+}
+
+void RelayDesk::on_mode_request(SessionId session, const ModeRequest&) {
+  if (const auto found = leaves_.find(session); found != leaves_.end()) found->second.is_answer_due = true;
+}
+
+LinkAnswer RelayDesk::on_link(SessionId session, const LinkState& link, int64_t time_ns) {
+  LinkAnswer answer;
+  const auto found = leaves_.find(session);
+  const RelayedPtr relayed = this->relayed();
+  if (found == leaves_.end() || relayed == nullptr) return answer;
+  Leaf& leaf = found->second;
+  if (std::exchange(leaf.is_answer_due, false))
+    answer.mode = ModeAnswer{
+        {link.mode, "behind a relay the mode is that of the beginning: join again for the other one",
+         leaf.hello.frame_width, leaf.hello.frame_height},
+        nullptr};
+  const auto& classes = relayed->streams.classes;
+  const double states_hz =
+      link.strand_class < classes.size() ? classes[link.strand_class].frame_rate_hz : 0.0;
+  const SimulatedModel model_now = model(*relayed);
+  answer.codec = codecs_->consider(session, {link, leaf.report, model_now, states_hz}, time_ns);
+  return answer;
+}
+
+/// What anybody needs is got once for all of them.
+void RelayDesk::follow_demand() {
+  std::set<uint16_t> streams;
+  uint32_t viewers = 0;
+  for (const auto& [session, leaf] : leaves_) {
+    if (leaf.subscription->gets(StreamMode::Strands))
+      streams.insert(stream_id_of(leaf.subscription->strands));
+    viewers += leaf.subscription->is_empty() ? 0 : 1;
+  }
+  viewer_count_ = viewers;
+  upstream_.set_demand(std::move(streams));
+}
+
+void RelayDesk::on_left(SessionId session) {
+  {
+    const std::lock_guard lock(mutex_);
+    movable_.erase(session);
+  }
+  leaves_.erase(session);
+  teller_.remove(session);
+  if (codecs_) codecs_->remove(session);
+  voices_.leave(session);
+  follow_demand();
+}
+
+std::string RelayDesk::metrics() {
+  const UpstreamCounters counters = upstream_.counters();
+  const auto total = [](std::string_view name, const char* help, uint64_t value) {
+    return format_metric(name, "counter", help, static_cast<double>(value));
+  };
+  const auto now = [](std::string_view name, const char* help, double value) {
+    return format_metric(name, "gauge", help, value);
+  };
+  return format_build_info(version()) +
+         now("relay_upstream_connected", "1 while the server above answers.",
+             upstream_.connected() ? 1.0 : 0.0) +
+         now("relay_upstream_streams", "Streams of strands that this relay gets.",
+             static_cast<double>(counters.streams)) +
+         now("relay_upstream_sessions",
+             "Its sessions at the server above: those, and one for each viewer "
+             "that says something or gets pictures.",
+             static_cast<double>(counters.streams + voices_.count())) +
+         total("relay_received_bytes_total", "Payload of the streams.", counters.received_bytes) +
+         total("relay_frames_total", "Strand frames passed on.", counters.frames) +
+         total("relay_keyframes_asked_total", "Keyframes asked of the server above.",
+               counters.keyframes_asked) +
+         total("relay_joins_from_chain_total", "Viewers that began with what the relay had.",
+               counters.joins_from_chain) +
+         total("relay_reconnects_total", "Times that the server above was found again.",
+               counters.reconnects) +
+         format_process_metrics();
+}
+
+}  // namespace strandcast

@@ -1,0 +1,93 @@
+// RelayDesk: what a relay does with its sessions: lets them in as the server above would, says which streams
+// they need, and passes on what they say. Network thread, unless said otherwise.
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "server/app/codec_desk.h"
+#include "server/app/stream_teller.h"
+#include "server/net/net_server.h"
+#include "server/relay/upstream.h"
+#include "server/relay/voices.h"
+
+namespace strandcast {
+
+class RelayDesk : public NetHandler {
+ public:
+  /// `id`: the relay's own. The others outlive the sessions.
+  RelayDesk(std::string id, Upstream& upstream, Voices& voices)
+      : id_(std::move(id)), upstream_(upstream), voices_(voices) {}
+
+  /// Before `net` starts; it outlives the sessions.
+  void connect(NetServer& net);
+  // From any thread.
+  void set_relayed(RelayedPtr relayed);
+  /// All look from there who let others move their view.
+  void move_views(const CameraChange& camera);
+  uint32_t viewer_count() const { return viewer_count_; }
+  bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
+
+  Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
+  void on_motion(SessionId session, const MotionSamples& samples, int64_t) override { say(session, samples); }
+  void on_wind(SessionId session, const WindSamples& samples, int64_t) override { say(session, samples); }
+  void on_command(SessionId session, const ControlCommand& command) override { say(session, command); }
+  void on_parameter(SessionId session, const SetParameter& parameter) override { say(session, parameter); }
+  void on_scene_request(SessionId session) override { say(session, SceneRequest{}); }
+  void on_live_command(SessionId session, const LiveCommand& command) override { say(session, command); }
+  void on_parameter_request(SessionId session, const ParameterRequest& request) override {
+    say(session, request);
+  }
+  void on_camera_command(SessionId session, const CameraCommand& command) override { say(session, command); }
+  void on_state_times_request(SessionId session, const StateTimesRequest& request) override {
+    say(session, request);
+  }
+  void on_record_command(SessionId session, const RecordCommand& command) override { say(session, command); }
+  void on_camera(SessionId session, const CameraChange& camera) override;
+  void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
+  void on_keyframe_request(SessionId session, uint16_t stream_id) override {
+    upstream_.join(session, stream_id);
+  }
+  void on_anchor_request(SessionId, uint16_t stream_id) override { upstream_.request_keyframe(stream_id); }
+  void on_picture_request(SessionId session, PictureClass) override { voices_.request_picture(session); }
+  void on_strand_class(SessionId) override { follow_demand(); }
+  void on_report(SessionId session, const ViewerReport& report) override;
+  void on_mode_request(SessionId session, const ModeRequest&) override;
+  LinkAnswer on_link(SessionId session, const LinkState& link, int64_t time_ns) override;
+  void on_left(SessionId session) override;
+  Status readiness() override { return upstream_.readiness(); }
+  std::string metrics() override;
+
+ private:
+  struct Leaf {
+    Hello hello;
+    const Subscription* subscription = nullptr;
+    ViewerReport report;
+    bool is_answer_due = false;  // to a ModeRequest
+  };
+  RelayedPtr relayed() const;
+  Status check(const Hello& hello, const Relayed& relayed) const;
+  SimulatedModel model(const Relayed& relayed) const;
+  void say(SessionId session, const ClientMessage& message);
+  void follow_demand();
+
+  const std::string id_;
+  Upstream& upstream_;
+  Voices& voices_;
+  NetServer* net_ = nullptr;
+  StreamTeller teller_;
+  std::map<SessionId, Leaf> leaves_;
+  std::optional<CodecDesk> codecs_;  // of the server above as it is now
+  std::string codecs_of_;            // its session_id
+  mutable std::mutex mutex_;         // guards the two below
+  RelayedPtr relayed_;
+  std::set<SessionId> movable_;
+  std::atomic<uint32_t> viewer_count_{0};
+  std::atomic<bool> is_shut_down_wanted_{false};
+};
+
+}  // namespace strandcast

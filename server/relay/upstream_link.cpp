@@ -1,0 +1,126 @@
+#include "server/relay/upstream_link.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/profile.h"
+#include "common/base/thread_name.h"
+#include "common/client/reconnect_policy.h"
+#include "common/log/log.h"
+
+namespace strandcast {
+namespace {
+
+/// How often a thread that hears nothing looks whether it is to end.
+constexpr std::chrono::milliseconds kLookInterval{200};
+
+}  // namespace
+
+ClientConfig client_config_for(const UpstreamConfig& config, const Hello& hello) {
+  ClientConfig client;
+  client.address = config.address;
+  client.tls_authorities = config.tls_authorities;
+  client.hello = hello;
+  client.hello.head = config.head;
+  return client;
+}
+
+bool is_final(const Error& error) {
+  return error.code == ErrorCode::Unauthorized || error.code == ErrorCode::BadInput ||
+         error.code == ErrorCode::Unsupported;
+}
+
+EncodedFramePtr frame_of(MediaEvent media) {
+  return std::make_shared<EncodedFrame>(EncodedFrame{media.header, std::move(media.message)});
+}
+
+UpstreamLink::UpstreamLink(ClientConfig config, Hooks hooks)
+    : config_(std::move(config)), hooks_(std::move(hooks)) {
+  config_.cancel = [this]() -> std::optional<Error> {
+    if (!is_stopping_) return std::nullopt;
+    return make_error(ErrorCode::Unavailable, "the relay ends this session");
+  };
+  thread_ = std::thread([this] { run(); });
+}
+
+UpstreamLink::~UpstreamLink() {
+  begin_stop();
+  thread_.join();
+}
+
+void UpstreamLink::begin_stop() {
+  const std::lock_guard lock(mutex_);
+  is_stopping_ = true;
+  stopped_.notify_all();
+}
+
+void UpstreamLink::send(const ClientMessage& message) {
+  const std::lock_guard lock(mutex_);
+  if (client_ == nullptr) {
+    if (waiting_.size() < kMaxWaitingMessages) waiting_.push_back(message);
+    return;
+  }
+  // What does not fit is lost like on a link that is cut; the session's end is told by itself.
+  if (const Status sent = client_->send(message); !sent)
+    log_debug("relay", "not sent on: {}", sent.error().to_string());
+}
+
+void UpstreamLink::request_keyframe() {
+  const std::lock_guard lock(mutex_);
+  if (client_ != nullptr) client_->request_keyframe();
+}
+
+ClockOffset UpstreamLink::clock() const {
+  const std::lock_guard lock(mutex_);
+  return client_ != nullptr ? client_->clock() : ClockOffset();
+}
+
+uint64_t UpstreamLink::received_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return earlier_bytes_ + (client_ != nullptr ? client_->counters().received_bytes : 0);
+}
+
+void UpstreamLink::run() {
+  name_thread("upstream");
+  ReconnectPolicy policy(static_cast<uint32_t>(now_ns()));
+  while (!is_stopping_) {
+    const auto begin = std::chrono::steady_clock::now();
+    const Error error = serve();
+    if (is_stopping_ || !hooks_.on_lost(error)) return;
+    const auto lived = std::chrono::steady_clock::now() - begin;
+    const auto delay = policy.next_delay(error, std::chrono::duration_cast<std::chrono::milliseconds>(lived));
+    std::unique_lock lock(mutex_);
+    stopped_.wait_for(lock, std::min(delay.value_or(kLongestReconnectDelay), kLongestRelayDelay),
+                      [this] { return is_stopping_.load(); });
+  }
+}
+
+/// One session, from the connection to its end.
+Error UpstreamLink::serve() {
+  const auto client = ViewerClient::connect(config_);
+  if (!client) return client.error();
+  if (const Status welcome = hooks_.on_welcome((*client)->welcome()); !welcome)
+    return at(config_.address.to_string(), welcome.error());
+  {
+    const std::lock_guard lock(mutex_);
+    client_ = client->get();
+    for (const ClientMessage& message : std::exchange(waiting_, {})) (void)client_->send(message);
+  }
+  Error error = hear(**client);
+  const std::lock_guard lock(mutex_);
+  earlier_bytes_ += client_->counters().received_bytes;
+  client_ = nullptr;
+  return error;
+}
+
+Error UpstreamLink::hear(ViewerClient& client) {
+  while (!is_stopping_) {
+    std::optional<ClientEvent> event = client.next(kLookInterval);
+    if (!event) continue;
+    if (const auto* closed = std::get_if<ClosedEvent>(&*event)) return closed->error;
+    hooks_.on_event(std::move(*event));
+  }
+  return make_error(ErrorCode::Unavailable, "the relay ended this session");
+}
+
+}  // namespace strandcast

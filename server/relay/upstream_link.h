@@ -1,0 +1,79 @@
+// UpstreamLink: one session of a relay at the server that it stands in for, on a thread of its own. What is
+// sent before the Welcome waits, within bounds; a link that is lost is opened again if its owner wants that.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "common/base/result.h"
+#include "common/client/viewer_client.h"
+
+namespace strandcast {
+
+/// Where a relay gets what it passes on.
+struct UpstreamConfig {
+  Address address;
+  std::filesystem::path tls_authorities;  // as in ClientConfig
+  std::string token;                      // of the relay itself
+  std::string head;                       // of those there; empty = the first
+};
+ClientConfig client_config_for(const UpstreamConfig& config, const Hello& hello);
+/// Whether the server will say the same whenever it is asked.
+bool is_final(const Error& error);
+/// As it came, with the time that it was sent.
+EncodedFramePtr frame_of(MediaEvent media);
+
+/// A server that is away is tried again at least this often: many viewers wait for it.
+inline constexpr std::chrono::milliseconds kLongestRelayDelay{1'000};
+/// Messages that wait for the Welcome; more are left out.
+inline constexpr size_t kMaxWaitingMessages = 256;
+
+class UpstreamLink {
+ public:
+  /// Called on the link's thread, without any lock.
+  struct Hooks {
+    std::function<Status(const Welcome&)> on_welcome;  // an error ends the session
+    std::function<void(ClientEvent)> on_event;         // but the last
+    /// The session is over, or none could be had; whether to try again.
+    std::function<bool(const Error&)> on_lost;
+  };
+  UpstreamLink(ClientConfig config, Hooks hooks);
+  /// Waits for the thread, a fraction of a second.
+  ~UpstreamLink();
+  UpstreamLink(const UpstreamLink&) = delete;
+  UpstreamLink& operator=(const UpstreamLink&) = delete;
+
+  // From any thread.
+  /// The thread ends soon; the destructor then waits for less.
+  void begin_stop();
+  void send(const ClientMessage& message);
+  void request_keyframe();
+  /// Of the present session.
+  ClockOffset clock() const;
+  /// Payload of all sessions.
+  uint64_t received_bytes() const;
+
+ private:
+  void run();
+  Error serve();
+  Error hear(ViewerClient& client);
+
+  ClientConfig config_;
+  const Hooks hooks_;
+  std::atomic<bool> is_stopping_{false};
+  mutable std::mutex mutex_;  // guards the block below
+  std::condition_variable stopped_;
+  ViewerClient* client_ = nullptr;  // of the thread, while it has said Welcome
+  std::deque<ClientMessage> waiting_;
+  uint64_t earlier_bytes_ = 0;
+  std::thread thread_;  // last: starts when everything else is there
+};
+
+}  // namespace strandcast

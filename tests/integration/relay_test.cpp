@@ -1,0 +1,373 @@
+// Relays: viewers behind one or two of them get what viewers of the server get, and cost it nothing; what
+// they say is judged by the server; and nothing hangs when the server is not what it should be.
+#include "server/relay/relay.h"
+
+#include <gmock/gmock.h>
+
+#include <map>
+#include <mutex>
+
+#include "client/app/live_connection.h"
+#include "tests/support/fake_server.h"
+#include "tests/support/metrics_text.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/server_fixture.h"
+
+namespace strandcast {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+constexpr const char* kViewersToken = "viewers-0123456789";
+constexpr const char* kControllersToken = "controllers-0123456789";
+
+using HashOfTick = std::map<uint64_t, uint64_t>;
+
+class Relays : public test::ServerFixture {
+ protected:
+  [[nodiscard]] bool begin(SceneDesc scene = test::bald_scene(), uint16_t port = 0) {
+    ServerConfig config;
+    config.scene = std::move(scene);
+    // What is decoded is what was published, bit for bit, unless the test is about another codec.
+    if (!config.scene.stream.has_codec) config.scene.stream.codec = "delta";
+    config.scene.stream.has_codec = true;
+    config.sim_device = "lanes";
+    config.net.tokens = tokens_;
+    config.net.port = port;
+    config.on_publish = [this](const auto& state) {
+      const std::lock_guard lock(mutex_);
+      published_[state->tick] = state_hash(*state);
+    };
+    if (port == 0) return start(std::move(config));
+    auto server = Server::start(config);
+    EXPECT_TRUE(server) << server.error().to_string();
+    if (server) server_ = std::move(server).value();
+    return server_ != nullptr;
+  }
+  /// Once it has its server, unless that is not there.
+  std::unique_ptr<Relay> relay_of(uint16_t upstream, const std::string& token = {}, bool waits = true) {
+    RelayConfig config;
+    config.net.port = 0;
+    config.upstream.address = {"127.0.0.1", upstream};
+    config.upstream.token = token;
+    auto relay = Relay::start(config);
+    if (!relay) {
+      ADD_FAILURE() << relay.error().to_string();
+      return nullptr;
+    }
+    if (waits) {
+      EXPECT_TRUE(eventually([&] { return (*relay)->readiness().ok(); }));
+    }
+    return std::move(relay).value();
+  }
+  /// A viewer whose states are kept.
+  struct Leaf {
+    std::unique_ptr<ViewerSession> session;
+    HashOfTick seen;
+  };
+  std::unique_ptr<Leaf> leaf_of(const ClientConfig& config) {
+    auto leaf = std::make_unique<Leaf>();
+    leaf->session = open(config);
+    if (leaf->session == nullptr) return nullptr;
+    leaf->session->set_snapshot_listener(
+        [seen = &leaf->seen](const auto& state) { (*seen)[state->tick] = state_hash(*state); });
+    return leaf;
+  }
+  std::unique_ptr<Leaf> leaf_of(uint16_t port) { return leaf_of(at_port(port)); }
+  ClientConfig at_port(uint16_t port, Role role = Role::Viewer) const {
+    return client_config(StreamMode::Strands, role, port);
+  }
+  HashOfTick published() {
+    const std::lock_guard lock(mutex_);
+    return published_;
+  }
+  uint64_t keyframes_made() const { return server_->counters().encode.keyframes; }
+
+  std::vector<AccessToken> tokens_;
+
+ private:
+  std::mutex mutex_;
+  HashOfTick published_;
+};
+
+/// States of `seen` that were published with another hash, or not at all.
+size_t count_wrong(const HashOfTick& seen, const HashOfTick& published) {
+  size_t wrong = 0;
+  for (const auto& [tick, hash] : seen) {
+    const auto found = published.find(tick);
+    wrong += found == published.end() || found->second != hash ? 1 : 0;
+  }
+  return wrong;
+}
+
+/// States that both have, with one hash or with two.
+size_t count_equal(const HashOfTick& a, const HashOfTick& b) {
+  return static_cast<size_t>(std::count_if(a.begin(), a.end(), [&](const auto& state) {
+    const auto found = b.find(state.first);
+    return found != b.end() && found->second == state.second;
+  }));
+}
+size_t count_other(const HashOfTick& a, const HashOfTick& b) {
+  return static_cast<size_t>(std::count_if(a.begin(), a.end(), [&](const auto& state) {
+    const auto found = b.find(state.first);
+    return found != b.end() && found->second != state.second;
+  }));
+}
+
+TEST_F(Relays, LeavesBehindOneAndTwoHaveTheBitsOfTheServer) {
+  if (!begin()) return;
+  const auto near = relay_of(server_->port());
+  ASSERT_NE(near, nullptr);
+  const auto far = relay_of(near->port());
+  ASSERT_NE(far, nullptr);
+  const auto direct = leaf_of(server_->port());
+  const auto one = leaf_of(near->port());
+  const auto two = leaf_of(far->port());
+  ASSERT_TRUE(direct && one && two);
+  EXPECT_THAT(direct->session->welcome().relays, SizeIs(0));
+  EXPECT_THAT(one->session->welcome().relays, SizeIs(1));
+  EXPECT_THAT(two->session->welcome().relays, SizeIs(2));
+  EXPECT_EQ(two->session->welcome().session_id, direct->session->welcome().session_id);
+  constexpr size_t kStates = 60;
+  ASSERT_TRUE(pump_until({direct->session.get(), one->session.get(), two->session.get()}, [&] {
+    return direct->seen.size() >= kStates && one->seen.size() >= kStates && two->seen.size() >= kStates &&
+           two->session->has_status();
+  }));
+  const HashOfTick all = published();
+  EXPECT_EQ(count_wrong(direct->seen, all), 0u);
+  EXPECT_EQ(count_wrong(one->seen, all), 0u);
+  EXPECT_EQ(count_wrong(two->seen, all), 0u);
+  // The clock that frames are stamped with is the server's, and here all clocks are one.
+  ASSERT_TRUE(two->session->client().clock().has_value());
+  const int64_t error_ns = std::abs(two->session->client().clock().offset_ns());
+  EXPECT_LT(error_ns, 50'000'000) << "half the round trips of three links";
+}
+
+TEST_F(Relays, AStreamIsGotOnceForAllWhoNeedIt) {
+  SceneDesc scene = test::bald_scene();
+  scene.stream.codec = "step";
+  scene.stream.has_codec = true;
+  if (!begin(scene)) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  EXPECT_EQ(relay->counters().streams, 1u);
+  ClientConfig predicting = at_port(relay->port());
+  predicting.hello.step_ns = 1.0;
+  ClientConfig direct = at_port(server_->port());
+  direct.hello.step_ns = 1.0;
+  const auto reference = leaf_of(direct);
+  const auto able = leaf_of(predicting);
+  const auto one = leaf_of(relay->port());
+  const auto other = leaf_of(relay->port());
+  ASSERT_TRUE(reference && able && one && other);
+  EXPECT_EQ(able->session->welcome().codec, "step");
+  EXPECT_EQ(one->session->welcome().codec, "tangent") << "it cannot predict";
+  ASSERT_TRUE(pump_until(
+      {reference->session.get(), able->session.get(), one->session.get(), other->session.get()}, [&] {
+        return std::min({reference->seen.size(), able->seen.size(), one->seen.size(), other->seen.size()}) >
+               60;
+      }));
+  EXPECT_EQ(relay->counters().streams, 2u);
+  EXPECT_GT(count_equal(able->seen, reference->seen), 20u);
+  EXPECT_EQ(count_other(able->seen, reference->seen), 0u) << "the bits of the server's own viewer";
+  EXPECT_GT(count_equal(one->seen, other->seen), 20u);
+  EXPECT_EQ(count_other(one->seen, other->seen), 0u);
+}
+
+TEST_F(Relays, WhoJoinsCostsTheServerNothing) {
+  if (!begin()) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  const auto first = leaf_of(relay->port());
+  ASSERT_NE(first, nullptr);
+  ASSERT_TRUE(pump_until({first->session.get()}, [&] { return first->seen.size() > 5; }));
+  const uint64_t frames_before = server_->counters().net.joined_sessions;
+  std::vector<std::unique_ptr<Leaf>> crowd;
+  std::vector<ViewerSession*> sessions = {first->session.get()};
+  const int64_t begin_ns = now_ns();
+  const uint64_t asked_before = relay->counters().keyframes_asked;
+  for (int i = 0; i < 20; ++i) {
+    crowd.push_back(leaf_of(relay->port()));
+    ASSERT_NE(crowd.back(), nullptr);
+    sessions.push_back(crowd.back()->session.get());
+  }
+  ASSERT_TRUE(pump_until(sessions, [&] {
+    return std::all_of(crowd.begin(), crowd.end(), [](const auto& leaf) { return leaf->seen.size() > 5; });
+  }));
+  const double took_s = static_cast<double>(now_ns() - begin_ns) * 1e-9;
+  EXPECT_GE(relay->counters().joins_from_chain, 20u);
+  EXPECT_EQ(server_->counters().net.joined_sessions, frames_before) << "no session of theirs at the server";
+  // One in a second is asked for, whoever joins.
+  EXPECT_LE(static_cast<double>(relay->counters().keyframes_asked - asked_before), took_s + 1.0);
+  const HashOfTick all = published();
+  for (const auto& leaf : crowd) EXPECT_EQ(count_wrong(leaf->seen, all), 0u);
+}
+
+TEST_F(Relays, TheServerJudgesWhatIsSaid) {
+  tokens_ = {{kViewersToken, Grant::Viewer}, {kControllersToken, Grant::Controller}};
+  if (!begin()) return;
+  const auto relay = relay_of(server_->port(), kViewersToken);
+  ASSERT_NE(relay, nullptr);
+  const auto ask = [&](Role role, const std::string& token, const ClientMessage& message) {
+    ClientConfig config = at_port(relay->port(), role);
+    config.hello.token = token;
+    config.hello.gets_no_stream = true;
+    const auto client = ViewerClient::connect(config);
+    EXPECT_TRUE(client) << client.error().to_string();
+    Notice notice{true, "no notice came"};
+    if (!client || !(*client)->send(message)) return notice;
+    EXPECT_TRUE(eventually([&] {
+      while (const auto event = (*client)->next(milliseconds(5)))
+        if (const auto* found = std::get_if<Notice>(&*event)) return notice = *found, true;
+      return false;
+    }));
+    return notice;
+  };
+  const SetParameter change{"look.hair_color=red"};
+  EXPECT_FALSE(ask(Role::Controller, kControllersToken, change).is_error);
+  EXPECT_EQ(server_->hub().look().look.hair_color, "red");
+  // The relay lets anybody in; the server does not.
+  const Notice wrong = ask(Role::Controller, "wrong-0123456789abc", SetParameter{"look.hair_color=blond"});
+  EXPECT_TRUE(wrong.is_error);
+  const Notice lesser = ask(Role::Controller, kViewersToken, SetParameter{"look.hair_color=blond"});
+  EXPECT_THAT(lesser.text, HasSubstr("controller")) << "a viewer's token controls nothing";
+  EXPECT_EQ(server_->hub().look().look.hair_color, "red");
+  // And who joins later is told the newest look.
+  const auto leaf = leaf_of(relay->port());
+  ASSERT_NE(leaf, nullptr);
+  ASSERT_TRUE(
+      pump_until({leaf->session.get()}, [&] { return leaf->session->look().look.hair_color == "red"; }));
+}
+
+TEST_F(Relays, AServerThatWasStartedAnewIsFoundAgain) {
+  if (!begin()) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  auto leaf = LiveConnection::open(at_port(relay->port()));
+  ASSERT_TRUE(leaf) << leaf.error().to_string();
+  const std::string before = (*leaf)->session().welcome().session_id;
+  ASSERT_TRUE(eventually([&] {
+    (*leaf)->pump(milliseconds(5));
+    return (*leaf)->session().has_picture();
+  }));
+  const uint16_t port = server_->port();
+  server_->stop();
+  server_.reset();
+  ASSERT_TRUE(eventually([&] { return !relay->readiness().ok(); }));
+  // With other hair, which the viewer must be told.
+  if (!begin(test::bald_scene(200, 10), port)) return;
+  ASSERT_TRUE(eventually([&] {
+    (*leaf)->pump(milliseconds(5));
+    return (*leaf)->is_connected() && (*leaf)->session().welcome().session_id != before &&
+           (*leaf)->session().has_picture();
+  }));
+  EXPECT_EQ((*leaf)->session().welcome().strand_count, 200u);
+  EXPECT_EQ(relay->counters().reconnects, 1u);
+}
+
+TEST_F(Relays, ViewersOfOneThatComesLateWait) {
+  test::FakeServer silent([](test::FakePeer& peer) { peer.wait_for_test_end(); });
+  const auto relay = relay_of(silent.port(), {}, false);
+  ASSERT_NE(relay, nullptr);
+  const auto session = ViewerClient::connect(at_port(relay->port()));
+  ASSERT_FALSE(session);
+  EXPECT_EQ(session.error().code, ErrorCode::Unavailable) << "a viewer comes back by itself";
+  EXPECT_THAT(session.error().to_string(), HasSubstr("has no connection to its server"));
+  EXPECT_THAT(test::http_get(relay->port(), "/readyz"), AllOf(HasSubstr("503"), HasSubstr("its server")));
+  EXPECT_FALSE(relay->failure());
+}
+
+TEST_F(Relays, ARingIsRefused) {
+  // Whoever is asked says that this relay stands before it already.
+  test::FakeServer ring([](test::FakePeer& peer) {
+    if (!peer.upgrade()) return;
+    const auto hello = peer.read_until<Hello>();
+    if (!hello) return;
+    Welcome welcome = test::make_welcome(1, 2);
+    welcome.relays = {"0123456789abcdef", hello->relay_id};
+    (void)peer.send(welcome);
+    peer.wait_for_test_end();
+  });
+  const auto relay = relay_of(ring.port(), {}, false);
+  ASSERT_NE(relay, nullptr);
+  ASSERT_TRUE(eventually([&] { return relay->failure().has_value(); }));
+  EXPECT_THAT(relay->failure()->to_string(), HasSubstr("stands behind itself"));
+}
+
+TEST_F(Relays, TooLongARowIsRefused) {
+  test::FakeServer last([](test::FakePeer& peer) {
+    Welcome welcome = test::make_welcome(1, 2);
+    welcome.relays.assign(kMaxRelays, "0123456789abcdef");
+    (void)peer.welcome(welcome);
+    peer.wait_for_test_end();
+  });
+  const auto relay = relay_of(last.port(), {}, false);
+  ASSERT_NE(relay, nullptr);
+  ASSERT_TRUE(eventually([&] { return relay->failure().has_value(); }));
+  EXPECT_THAT(relay->failure()->to_string(), HasSubstr("one behind another"));
+}
+
+TEST_F(Relays, AWrongTokenOrAnswerEndsItWithASentence) {
+  tokens_ = {{kViewersToken, Grant::Viewer}};
+  if (!begin()) return;
+  const auto stranger = relay_of(server_->port(), "wrong-0123456789abc", false);
+  ASSERT_NE(stranger, nullptr);
+  ASSERT_TRUE(eventually([&] { return stranger->failure().has_value(); }));
+  EXPECT_EQ(stranger->failure()->code, ErrorCode::Unauthorized);
+  test::FakeServer garbage([](test::FakePeer& peer) { (void)peer.send_raw("220 mail.example\r\n"); });
+  const auto lost = relay_of(garbage.port(), {}, false);
+  ASSERT_NE(lost, nullptr);
+  ASSERT_TRUE(eventually([&] { return lost->failure().has_value(); }));
+  EXPECT_THAT(lost->failure()->to_string(), HasSubstr("handshake"));
+}
+
+TEST_F(Relays, ASlowLeafChangesNothingForOthers) {
+  if (!begin()) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  const auto leaf = leaf_of(relay->port());
+  ASSERT_NE(leaf, nullptr);
+  test::RawClient slow(relay->port(), 4096);
+  ASSERT_TRUE(slow.handshake());
+  Hello hello;
+  hello.name = "slow";
+  hello.acknowledges = true;
+  slow.send(hello);  // and reads nothing
+  ASSERT_TRUE(pump_until({leaf->session.get()}, [&] { return leaf->seen.size() >= 120; }));
+  EXPECT_EQ(count_wrong(leaf->seen, published()), 0u);
+  EXPECT_EQ(leaf->session->replay().stats().missed_frames, 0u);
+}
+
+TEST_F(Relays, PicturesComeThroughToTheOneWhoAsked) {
+  if (!begin(test::small_scene())) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  ClientConfig config = at_port(relay->port());
+  config.hello.mode = StreamMode::Frames;
+  const auto session = open(config);
+  ASSERT_NE(session, nullptr);
+  EXPECT_EQ(session->welcome().mode, StreamMode::Frames);
+  ASSERT_TRUE(pump_until({session.get()}, [&] { return session->image_count() > 5; }));
+  EXPECT_EQ(session->image()->width, 64u);
+  EXPECT_EQ(session->picture_stats().rejected_frames, 0u);
+}
+
+TEST_F(Relays, ItSaysHowItGoes) {
+  if (!begin()) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  const std::string answer = test::http_get(relay->port(), "/metrics");
+  std::vector<std::string> faults;
+  const auto families = test::read_metrics(answer.substr(answer.find("\r\n\r\n") + 4), faults);
+  test::check_metrics(families, faults);
+  EXPECT_THAT(faults, testing::IsEmpty());
+  ASSERT_TRUE(families.contains("strandcast_relay_upstream_connected"));
+  EXPECT_EQ(families.at("strandcast_relay_upstream_connected").samples.front().second, 1.0);
+  EXPECT_GT(families.at("strandcast_relay_received_bytes_total").samples.front().second, 0.0);
+}
+
+}  // namespace
+}  // namespace strandcast
