@@ -193,6 +193,7 @@ std::string RelayDesk::metrics() {
              static_cast<double>(counters.streams + voices_.count())) +
          total("relay_received_bytes_total", "Payload of the streams.", counters.received_bytes) +
          total("relay_frames_total", "Strand frames passed on.", counters.frames) +
+         total("relay_keyframes_total", "Keyframes among them.", counters.keyframes) +
          total("relay_keyframes_asked_total", "Keyframes asked of the server above.",
                counters.keyframes_asked) +
          total("relay_joins_from_chain_total", "Viewers that began with what the relay had.",

@@ -231,6 +231,7 @@ void Upstream::on_frame(Stream& stream, MediaEvent media) {
   const int64_t time_ns = now_ns();
   const EncodedFramePtr frame = frame_of(std::move(media));
   ++counters_.frames;
+  if (frame->header.opcode == Opcode::StrandKeyframe) ++counters_.keyframes;
   stream.chain.add(frame, time_ns);
   if (stream.chain.wants_keyframe()) ask(stream);
   if (!is_of_now(stream)) return;

@@ -39,7 +39,8 @@ struct UpstreamCounters {
   uint64_t joins_from_chain = 0;
   uint64_t reconnects = 0;  // of class 0
   uint64_t received_bytes = 0;
-  uint64_t frames = 0;  // of strands
+  uint64_t frames = 0;  // of strands, keyframes too
+  uint64_t keyframes = 0;
 };
 
 class Upstream {

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Prints what relays cost and save, on one machine: a server without and with relays, each with its viewers.
-#   server_percent   processor time of the server, percent of one core, and what its encoders and network take
+#   server_percent   processor time of the server, percent of one core
 #   streams          sessions of strands that it serves
 #   latency_ms       median, from the server's send time to a viewer's reading, at the server and behind 1 and 2 relays
-#   join_ms          median, from a viewer's connection to its first keyframe
-#   keyframes        made by the server while so many viewers joined at the relays
+#   keyframes        made by the server while so many viewers joined at the relays, and asked for by those
+#   chain_errors     deltas that a viewer had no base for: 0
 #   relay_rss_mb     memory of the largest relay
 # usage: bash tests/bench/relay.sh [--bin DIR] [--relays N] [--viewers N] [--seconds N] [server options]
 set -euo pipefail
@@ -55,7 +55,7 @@ before=$(ticks root)
 load root 1 "$work/direct"
 alone=$(percent $(($(ticks root) - before)))
 
-for i in $(seq "$relays"); do start "relay$i" --upstream "127.0.0.1:$(cat "$work/root.port")"; done
+for i in $(seq "$relays"); do start "relay$i" --max-sessions-per-address 256 --upstream "127.0.0.1:$(cat "$work/root.port")"; done
 start far --upstream "127.0.0.1:$(cat "$work/relay1.port")"
 keyframes=$(metric root encode_keyframes_total)
 asked=0
@@ -69,16 +69,17 @@ for pid in "${loads[@]}"; do wait "$pid"; done
 with=$(percent $(($(ticks root) - before)))
 largest=0
 for i in $(seq "$relays"); do
-  largest=$(awk -v a="$largest" -v b="$(rss_mb "relay$i")" 'BEGIN {printf "%.0f", a > b ? a : b}')
+  largest=$(awk -v a="$largest" -v b="$(rss_mb "relay$i")" 'BEGIN {printf "%.0f", (a > b ? a : b)}')
   asked=$((asked + $(metric "relay$i" relay_keyframes_asked_total | cut -d. -f1)))
 done
 echo "viewers_in_all=$((relays * viewers + 1))"
 echo "server_percent_one_viewer=$alone"
 echo "server_percent_with_relays=$with"
 echo "server_sessions=$streams"
-echo "latency_ms_direct=$(value "$work/direct" latency_median_ms)"
-echo "latency_ms_one_relay=$(value "$work/load1" latency_median_ms)"
-echo "latency_ms_two_relays=$(value "$work/far" latency_median_ms)"
+echo "latency_ms_direct=$(value "$work/direct" latency_ms_p50)"
+echo "latency_ms_one_relay=$(value "$work/load1" latency_ms_p50)"
+echo "latency_ms_two_relays=$(value "$work/far" latency_ms_p50)"
+echo "chain_errors=$(cat "$work"/load* | awk -F= '$1 == "chain_errors" {sum += $2} END {print sum + 0}')"
 echo "server_keyframes=$(($(metric root encode_keyframes_total | cut -d. -f1) - ${keyframes%.*}))"
 echo "relay_keyframes_asked=$asked"
 echo "relay_rss_mb=$largest"

@@ -665,6 +665,20 @@ TEST(ServerOptions, ReadsWhatTheCommandLineSays) {
   EXPECT_EQ(parse({"--version"})->help, fmt::format("strandcast-server {}\n", version()));
 }
 
+TEST(ServerOptions, ARelayHasNoSceneOfItsOwn) {
+  const auto relay = parse({"--upstream", "wss://studio:83/s/anna", "--upstream-head", "ben", "--port", "0"});
+  ASSERT_TRUE(relay) << relay.error().to_string();
+  ASSERT_TRUE(relay->upstream.has_value());
+  EXPECT_EQ(relay->upstream->address, (Address{"studio", 83, true, "anna"}));
+  EXPECT_EQ(relay->upstream->head, "ben");
+  EXPECT_FALSE(parse({})->upstream.has_value());
+  const auto both = parse({"--upstream", "studio", "--scene", "x.textproto", "--lockstep"});
+  ASSERT_FALSE(both);
+  EXPECT_THAT(both.error().message, testing::HasSubstr("leave out --scene, --lockstep"));
+  EXPECT_FALSE(parse({"--upstream", "studio:0"}));
+  EXPECT_FALSE(parse({"--upstream-head", "ben"})) << "of which server?";
+}
+
 TEST(ServerOptions, NamesWhatIsWrong) {
   for (const std::vector<const char*>& arguments : {std::vector<const char*>{"--nonsense"},
                                                     {"--port", "70000"},
