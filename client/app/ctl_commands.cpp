@@ -148,12 +148,13 @@ std::string some(uint64_t count, const std::string& things) {
 std::string to_line(const ServerStatus& status) {
   return fmt::format(
       "tick {:8} | step {:6.2f} ms | encode {:5.2f} ms | render {:6.2f} ms | x{:.2f} real time | {} "
-      "viewer{}{}{}{}{}{}",
+      "viewer{}{}{}{}{}{}{}",
       status.tick, status.sim_ms, status.encode_ms, status.render_ms, status.realtime_factor,
       status.viewer_count, status.viewer_count == 1 ? "" : "s", status.is_paused ? " | paused" : "",
       status.is_motion_stale ? " | no motion" : "", some(status.rejected_samples, "samples rejected"),
       some(status.quarantined_strands, "strands broken"),
-      some(status.overstretched_strands, "strands over-stretched"));
+      some(status.overstretched_strands, "strands over-stretched"),
+      status.recording.empty() ? "" : " | recording " + status.recording);
 }
 
 /// A live input in a few lines: how it comes, what went wrong, and the newest packet as it was sent.

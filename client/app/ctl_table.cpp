@@ -131,6 +131,11 @@ void declare_check(CLI::App& app, CtlCommandLine& line) {
       ->capture_default_str();
 }
 
+void declare_record_start(CLI::App& app, CtlCommandLine& line) {
+  app.add_option("name", line.recording_name,
+                 "Of the file, in the folder of the server's --record-dir (default: scene, date and time)");
+}
+
 void declare_kick(CLI::App& app, CtlCommandLine& line) {
   app.add_option("session", line.session, "Its number, as listed by sessions")->required();
   app.add_option("--ban", line.ban_s, "And let nobody of its address in for so many seconds")
@@ -181,6 +186,11 @@ int live(const Line& line, const Stop&) {
   return run_command(line.target, LiveCommand{kAction, line.subject});
 }
 
+template <bool kIsWanted>
+int record(const Line& line, const Stop&) {
+  return run_command(line.target, RecordCommand{kIsWanted, line.recording_name});
+}
+
 template <AdminAction kAction>
 int admin(const Line& line, const Stop&) {
   return run_admin(line.target, {kAction, line.session, line.ban_s});
@@ -204,6 +214,9 @@ constexpr CtlCommand kCommands[] = {
     {"mocap calibrate", "What is seen now is the head at rest: look straight ahead", nullptr,
      live<LiveAction::Calibrate>},
     {"mocap reset", "Undo calibrate", nullptr, live<LiveAction::Reset>},
+    {"record", "Begin and end a recording while the server runs (it was started with --record-dir)", nullptr, nullptr},
+    {"record start", "Begin one: what is simulated, said and streamed from now on", declare_record_start, record<true>},
+    {"record stop", "End it, and say what is in it", nullptr, record<false>},
     {"params", "List the scene's parameters: value, unit, range, default, and what can be set", declare_params,
      [](const Line& line, const Stop& stop) { return run_params(line.target, line.params, stop); }},
     {"save", "Keep the scene as it runs, look and all, as a scene file", declare_save,

@@ -31,6 +31,7 @@ struct CtlCommandLine {
   ExportCommand exported;
   std::string recording;
   std::string other_recording;
+  std::string recording_name;
   uint32_t step_count = 0;
   TestOptions test;
   ParameterOptions params;

@@ -127,6 +127,7 @@ std::vector<std::string> HudWriter::warnings(const ViewerState& now, const ViewF
   else if (time_ns - real_time_ns_ >= kSlowMotionNs)
     all.push_back(
         fmt::format("slow motion: x{:.2f} of real time; fewer strands or a cheaper solver help", factor));
+  if (now.has_status && !now.status.recording.empty()) all.push_back("recording " + now.status.recording);
   if (!facts.message.empty()) all.push_back(facts.message);
   return all;
 }

@@ -209,8 +209,9 @@ class WindowedView {
     act(actions.form);
 
     if (actions.wants_pause_toggle)
-      send(ControlCommand{state_->status.is_paused ? Command::Resume : Command::Pause});
-    if (actions.wants_step) send(ControlCommand{Command::StepOnce});
+      steer(ControlCommand{state_->status.is_paused ? Command::Resume : Command::Pause});
+    if (actions.wants_step) steer(ControlCommand{Command::StepOnce});
+    if (actions.wants_record_toggle) steer(RecordCommand{state_->status.recording.empty(), {}});
     if (actions.wants_mode_toggle) change_mode();
     if (actions.wants_playout_toggle) {
       playout_ = playout_ == Playout::Smooth ? Playout::LowLatency : Playout::Smooth;
@@ -309,6 +310,13 @@ class WindowedView {
     const auto sent = viewer_->send(message);
     if (!sent) show_message(sent.error().to_string());
     return sent.ok();
+  }
+
+  /// What a viewer may not send would end the session.
+  void steer(const ClientMessage& message) {
+    if (state_->is_connected && !look_.is_steering())
+      return show_message("this window only looks on: its role on the server is that of a viewer");
+    (void)send(message);
   }
 
   /// The server's picture in frames mode, else what was drawn here; one of them goes on being shown while the

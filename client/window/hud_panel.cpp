@@ -168,12 +168,13 @@ PanelSize draw_help_panel(HelpTopic topic) {
       {"wheel", "closer, farther"},
       {"R", "back to the first view"},
   }};
-  static constexpr std::array<Row, 5> kServer{{
+  static constexpr std::array<Row, 6> kServer{{
       {"Space", "pause or resume the server"},
       {"N", "one simulation step"},
       {"P", "newest state or smooth playout"},
       {"M", "auto, strands drawn here, or the server's pictures"},
       {"L", "look of the hair: colours, style, light; save it as a scene"},
+      {"F9", "begin a recording on the server, or end it"},
   }};
   static constexpr std::array<Row, 5> kRecording{{
       {"Space", "play or pause"},

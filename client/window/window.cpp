@@ -100,6 +100,9 @@ struct Window::State {
       case GLFW_KEY_V:
         actions.wants_debug_view = true;
         break;
+      case GLFW_KEY_F9:
+        actions.wants_record_toggle = true;
+        break;
       case GLFW_KEY_RIGHT:
         ++actions.state_steps;
         break;

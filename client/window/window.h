@@ -28,6 +28,7 @@ struct WindowActions {
   bool wants_mode_toggle = false;     // M: strands, frames or auto
   bool wants_playout_toggle = false;  // P: low latency or smooth
   bool wants_debug_view = false;      // V: the next one
+  bool wants_record_toggle = false;   // F9: begin a recording, or end it
   int state_steps = 0;                // right less left arrow
   int speed_steps = 0;                // up less down arrow
   bool wants_beginning = false;       // Home

@@ -138,6 +138,7 @@ struct RawRunOptions {
   bool has_proxy_protocol = false;
   std::vector<std::string> mocap_allowed;
   std::string record_path;
+  std::string record_folder;
   bool replaces_recording = false;
   bool is_replayed_in_real_time = false;
   std::string log_format = "text";
@@ -223,11 +224,14 @@ void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& ra
                               "record inputs, states and strands into this MCAP file, a new one");
   app.add_flag("--record-replace", raw.replaces_recording, "the file of --record may be there: replace it")
       ->needs(path);
+  auto* folder = app.add_option("--record-dir", raw.record_folder,
+                                "who controls may begin and end recordings in this folder (strandcast-ctl "
+                                "record start NAME, record stop), one at a time");
   auto* replay =
       app.add_option("--replay", options.replay_path,
                      "simulate this recording again, compare the hash of every state, and leave: exit "
                      "code 0 when all are equal, 1 when not");
-  replay->excludes(path);
+  replay->excludes(path)->excludes(folder);
   app.add_flag("--replay-realtime", raw.is_replayed_in_real_time,
                "with --replay: no faster than it was recorded")
       ->needs(replay);
@@ -343,6 +347,7 @@ Result<ServerOptions> parse_options(int argc, const char* const* argv) {
   if (!raw.record_path.empty())
     options.config.record =
         RecordConfig{raw.record_path, raw.replaces_recording ? IfPresent::Replace : IfPresent::Refuse};
+  if (!raw.record_folder.empty()) options.config.record_folder = RecordFolder{raw.record_folder};
   if (raw.is_replayed_in_real_time) options.replay_pace = ReplayPace::RealTime;
   if (!options.replay_path.empty() && app.count("--scene") + app.count("--set") + app.count("--groom") > 0)
     return make_error(

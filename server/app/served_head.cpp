@@ -48,9 +48,9 @@ Status ServedHead::load(OtherHeads others) {
   // A wrong codec, or a file that cannot be written, is told before anything is loaded.
   RETURN_IF_ERROR(make_strand_encoder(scene.stream.codec));
   RETURN_IF_ERROR(check_live(scene.live));
-  if (config_.record) {
-    ASSIGN_OR_RETURN(recorder_, Recorder::make(*config_.record));
-    config_.tap = recorder_.get();
+  if (config_.record || config_.record_folder) {
+    ASSIGN_OR_RETURN(records_, RecordDesk::make(config_.record, config_.record_folder));
+    config_.tap = records_->first_tap();
   }
   ASSIGN_OR_RETURN(source_, config_.make_source(config_, inputs_));
   const std::shared_ptr<const SceneAsset> asset = source_->asset();
@@ -122,9 +122,10 @@ LiveDesk::Target ServedHead::live_target() {
 
 NetHead ServedHead::admit(Whole whole) {
   live_ = whole.live;
-  desk_ = std::make_unique<SessionDesk>(SessionDesk::Parts{
-      config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_, is_drawn_by_processors_,
-      config_.scene.live.empty() ? nullptr : live_, number_, std::move(whole.heads), std::move(whole.scene)});
+  desk_ = std::make_unique<SessionDesk>(
+      SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_,
+                         is_drawn_by_processors_, config_.scene.live.empty() ? nullptr : live_, number_,
+                         std::move(whole.heads), std::move(whole.scene), records_.get()});
   desk_->set_metrics(std::move(whole.metrics));
   NetHead head{name(), desk_.get(), hub_->strand_classes(), {}};
   for (const StrandCodecInfo& codec : codecs_) head.strand_codecs.push_back(codec.bytes);
@@ -134,33 +135,37 @@ NetHead ServedHead::admit(Whole whole) {
 Status ServedHead::start(NetServer& net) {
   net_ = &net;
   desk_->connect(net);
-  if (recorder_ != nullptr) RETURN_IF_ERROR(recorder_->attach(*hub_));
+  if (records_ != nullptr)
+    RETURN_IF_ERROR(records_->attach(
+        {*hub_, *source_, [this] { return describe_recording(); }, asset_frame_, config_.scene.name}));
   stages_.set_source_times([this](int64_t arrival_ns) { return inputs_.source_time_ns(arrival_ns); });
   if (!config_.trace_path.empty()) RETURN_IF_ERROR(stages_.open_trace(config_.trace_path));
   stage_sink_.emplace(*hub_, stages_);
   RETURN_IF_ERROR(source_->start(*stage_sink_, config_.scene.stream));
-  if (recorder_ != nullptr) begin_recording();
+  if (records_ != nullptr) records_->begin();
   hub_->set_picture_budget(is_drawn_by_processors_ ? kSoftwareBudget : kHardwareBudget);
   hub_->set_source([source = source_.get()](const SourceDemand& demand) { source->set_demand(demand); });
   return {};
 }
 
-/// What the file says first.
-void ServedHead::begin_recording() {
+/// What a file says first.
+RecordingStart ServedHead::describe_recording() const {
   const SimStats simulated = source_->stats();
   RecordingStart start;
   start.server_version = version();
   start.sim_device = simulated.sim_device;
   start.sim_device_name = simulated.sim_device_name;
-  SceneDesc scene = with_absolute_paths(config_.scene);
-  start.scene_text = to_line(scene);
-  recorder_->begin(std::move(start), std::move(asset_frame_));
+  SceneDesc scene = source_->scene().value_or(config_.scene);
+  scene.stream.codec = config_.scene.stream.codec;
+  scene.stream.has_codec = true;
+  start.scene_text = to_line(with_absolute_paths(std::move(scene)));
+  return start;
 }
 
 void ServedHead::stop() {
   if (source_ != nullptr) source_->stop();
   if (hub_ != nullptr) hub_->stop();
-  if (recorder_ != nullptr) recorder_->stop();
+  if (records_ != nullptr) records_->stop();
 }
 
 void ServedHead::tell_status() {
@@ -183,7 +188,8 @@ void ServedHead::tell_status() {
     status.detail = fmt::format("{}: {}", to_string(now.sim.detail), now.sim.detail_reason);
   status.picture_motions = hub_->take_picture_motions();
   status.live_inputs = now.live_inputs;
-  if (recorder_ != nullptr) recorder_->add(status);
+  if (records_ != nullptr) records_->add(status);
+  if (records_ != nullptr) status.recording = records_->text();
   net_->broadcast(status, number_);
   desk_->tell_state_times();
   desk_->tell_streams();
@@ -227,7 +233,7 @@ ServerCounters ServedHead::counters() const {
   count_strands(counters);
   counters.frames = hub_->frame_counters();
   if (live_ != nullptr) counters.live_inputs = live_->status(number_);
-  if (recorder_ != nullptr) counters.record = recorder_->counters();
+  if (records_ != nullptr) counters.record = records_->counters();
   return counters;
 }
 

@@ -14,6 +14,7 @@
 #include "server/app/frame_stages.h"
 #include "server/app/heads_painter.h"
 #include "server/app/live_desk.h"
+#include "server/app/record_desk.h"
 #include "server/app/server.h"
 #include "server/app/session_desk.h"
 #include "server/app/slow_motion.h"
@@ -70,7 +71,7 @@ class ServedHead {
   MakePicturePainter make_painter(const PainterConfig& painter, OtherHeads others);
   Status choose_stream();
   Status choose_codecs();
-  void begin_recording();
+  RecordingStart describe_recording() const;
   void watch_speed(const ServerCounters& now);
   void count_strands(ServerCounters& counters) const;
   gl::PassReports idle_picture_passes() const;
@@ -79,7 +80,7 @@ class ServedHead {
   const size_t number_;
   bool is_drawn_by_processors_ = true;  // pictures, whatever simulates
   InputHub inputs_;
-  std::unique_ptr<Recorder> recorder_;  // null: nothing is recorded
+  std::unique_ptr<RecordDesk> records_;  // null: nothing is recorded, nor can be
   FrameStages stages_;
   std::vector<StrandCodecInfo> codecs_;  // that strands are served by, the scene's first
   EncodedFramePtr asset_frame_;

@@ -89,10 +89,12 @@ class Server::State {
 
 Status Server::State::start() {
   shared_workers();  // no nicer than this thread, as the one that draws is
-  if (!config_.scene.heads.empty() && (config_.record || !config_.trace_path.empty()))
-    return make_error(ErrorCode::Unsupported,
-                      "--record and --trace take scenes of one head for now, and this one has {}",
-                      config_.scene.heads.size() + 1);
+  if (!config_.scene.heads.empty() &&
+      (config_.record || config_.record_folder || !config_.trace_path.empty()))
+    return make_error(
+        ErrorCode::Unsupported,
+        "--record, --record-dir and --trace take scenes of one head for now, and this one has {}",
+        config_.scene.heads.size() + 1);
   for (const ServerConfig& config : configs_of_heads(config_)) {
     ServedHead::OtherHeads others;
     if (!config_.scene.heads.empty()) others = [this, own = heads_.size()] { return other_heads(own); };

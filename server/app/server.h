@@ -12,10 +12,10 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene_desc.h"
+#include "server/app/record_desk.h"
 #include "server/encode/picture_painter.h"
 #include "server/input/input_hub.h"
 #include "server/net/net_server.h"
-#include "server/record/recorder.h"
 #include "server/source/simulation_source.h"
 #include "server/stream/stream_hub.h"
 
@@ -50,8 +50,9 @@ struct ServerConfig {
   std::optional<std::string> fallback_codec;
   /// Who may send to the scene's live inputs besides this machine.
   std::vector<AddressRange> live_allowed;
-  std::optional<RecordConfig> record;  // from the first state on
-  StepTap* tap = nullptr;              // of the simulation; set by the server where it records
+  std::optional<RecordConfig> record;         // from the first state on
+  std::optional<RecordFolder> record_folder;  // who controls may record into it
+  StepTap* tap = nullptr;  // of the simulation from the first step on; set by the server where it records
 };
 
 struct ServerCounters {

@@ -200,6 +200,13 @@ void SessionDesk::on_camera_command(SessionId session, const CameraCommand& comm
   net_->send(session, Notice{aimed->movable.empty(), std::move(said)});
 }
 
+void SessionDesk::on_record_command(SessionId session, const RecordCommand& command) {
+  const std::string what = command.is_wanted ? "record start " + command.name : "record stop";
+  if (!may_control(session, what)) return;
+  if (parts_.records != nullptr) return parts_.records->obey(command, reply_to(session, what));
+  net_->send(session, Notice{true, std::string(kNoRecordings)});
+}
+
 void SessionDesk::on_state_times_request(SessionId session, const StateTimesRequest& request) {
   const std::lock_guard lock(times_mutex_);
   if (request.is_wanted)

@@ -18,6 +18,7 @@
 #include "server/app/live_desk.h"
 #include "server/app/network_reader.h"
 #include "server/app/parameter_watch.h"
+#include "server/app/record_desk.h"
 #include "server/app/stream_teller.h"
 #include "server/app/viewers.h"
 #include "server/input/input_hub.h"
@@ -47,6 +48,7 @@ class SessionDesk : public NetHandler {
     std::vector<std::string> heads = {};  // names of all where there are several
     /// The scene with all heads, as it runs; nothing where it is none.
     std::function<std::optional<SceneDesc>()> whole_scene = {};
+    RecordDesk* records = nullptr;  // null: nothing is recorded here
   };
   explicit SessionDesk(Parts parts);
 
@@ -73,6 +75,7 @@ class SessionDesk : public NetHandler {
   void on_parameter_request(SessionId session, const ParameterRequest& request) override;
   void on_camera_command(SessionId session, const CameraCommand& command) override;
   void on_state_times_request(SessionId session, const StateTimesRequest& request) override;
+  void on_record_command(SessionId session, const RecordCommand& command) override;
   void on_camera(SessionId session, const CameraChange& camera) override;
   void on_shut_down(SessionId) override { is_shut_down_wanted_ = true; }
   void on_keyframe_request(SessionId, uint16_t stream_id) override { parts_.hub.request_keyframe(stream_id); }

@@ -130,7 +130,7 @@ void Recorder::push(Item item) {
   if (is_frame) bytes = std::get<EncodedFramePtr>(item.what)->message.size();
   {
     const std::lock_guard lock(mutex_);
-    if (is_stopping_ || is_ended_) return;
+    if (is_refusing_ || is_ended_) return;
     const bool is_full = bytes > 0 ? waiting_bytes_ + bytes > kMaxRecorderBytes && !waiting_.empty()
                                    : waiting_.size() >= kMaxRecorderItems;
     if (is_full) {
@@ -189,12 +189,14 @@ void Recorder::write(const Item& item) {
   if (const auto* state = std::get_if<StatePtr>(&item.what)) {
     const Snapshot& snapshot = **state;
     sim_time_ns_ = snapshot.sim_time_ns;
-    last_tick_ = snapshot.tick;
+    if (!first_sim_ns_) first_sim_ns_ = sim_time_ns_;
     vertex_count_ = snapshot.plane_size();
     writer_->add(item.time_ns, sim_time_ns_,
                  RecordedState{snapshot.tick, snapshot.sim_time_ns, state_hash(snapshot)});
     const std::lock_guard lock(mutex_);
     ++counters_.states;
+    counters_.last_tick = snapshot.tick;
+    counters_.length_s = static_cast<double>(sim_time_ns_ - *first_sim_ns_) / kNsPerS;
   } else if (const auto* frame = std::get_if<EncodedFramePtr>(&item.what)) {
     write_frame(item.time_ns, *frame);
   } else {
@@ -255,19 +257,26 @@ void Recorder::watch_losses() {
 
 std::string Recorder::summary() const {
   const RecordCounters counts = counters();
-  std::string text = fmt::format("{}: {:.1f} MB, {} states up to step {}, {} frames", config_.path.string(),
+  std::string text = fmt::format("{:.1f} MB, {} states up to step {}, {} frames",
                                  static_cast<double>(counts.written_bytes) / kBytesPerMb, counts.states,
-                                 last_tick_, counts.frames);
+                                 counts.last_tick, counts.frames);
   if (counts.lost_frames + counts.lost_messages == 0) return text + ", nothing lost";
   return text + fmt::format("; lost: {} frames and {} messages", counts.lost_frames, counts.lost_messages);
+}
+
+void Recorder::refuse() {
+  const std::lock_guard lock(mutex_);
+  is_refusing_ = true;
 }
 
 void Recorder::stop() {
   {
     const std::lock_guard lock(mutex_);
+    is_refusing_ = true;
     if (std::exchange(is_stopping_, true)) return;
   }
   changed_.notify_one();
+  if (hub_ != nullptr) hub_->remove(reader_);
   if (!thread_.joinable()) return;
   thread_.join();
   if (is_ended_) return;
@@ -277,7 +286,7 @@ void Recorder::stop() {
   if (const std::optional<Error> failure = file_->failure())
     log_error("record", "{}: the end of the recording is missing: {}", config_.path.string(),
               failure->to_string());
-  log_info("record", "{}", summary());
+  log_info("record", "{}: {}", config_.path.string(), summary());
 }
 
 RecordCounters Recorder::counters() const {

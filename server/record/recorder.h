@@ -45,9 +45,11 @@ struct RecordCounters {
   uint64_t frame_bytes = 0;    // of strands as they were encoded
   uint64_t frames = 0;
   uint64_t states = 0;
+  uint64_t last_tick = 0;  // of a state
   uint64_t lost_frames = 0;
   uint64_t lost_messages = 0;
-  double lag_ms = 0.0;  // of the newest that became part of a chunk behind when it came
+  double length_s = 0.0;  // of simulation
+  double lag_ms = 0.0;    // of the newest that became part of a chunk behind when it came
   bool has_failed = false;
 };
 
@@ -61,16 +63,22 @@ class Recorder : public StreamReader, public StepTap {
   Recorder& operator=(const Recorder&) = delete;
 
   /// Reads all states, inputs and strands of the scene's codec from now on; what comes waits for begin().
-  /// The hub outlives it, or its stop().
+  /// The hub outlives its stop(), or it.
   Status attach(StreamHub& hub);
   /// The start says what it is of; times and codec are filled in here.
   void begin(RecordingStart start, EncodedFramePtr asset);
   void add(const ServerStatus& status);
-  /// Closes the file and says what is in it. Call when nothing comes any more.
+  /// Takes nothing more, from whomever: what is in it goes up to one moment. Any thread.
+  void refuse();
+  /// Reads no more, closes the file and says what is in it; no longer the tap of anything.
   void stop();
 
   RecordCounters counters() const;
   const std::filesystem::path& path() const { return config_.path; }
+  /// What is in the file: "3.2 MB, 750 states up to step 812, 748 frames, nothing lost".
+  std::string summary() const;
+  /// Why it ended by itself; nothing while all is well.
+  std::optional<Error> failure() const { return file_->failure(); }
 
   void on_strands(const EncodedFramePtr& frame) override;
   void on_state(const std::shared_ptr<const Snapshot>& state) override;
@@ -100,7 +108,6 @@ class Recorder : public StreamReader, public StepTap {
   bool is_keyframe_due(const FrameHeader& delta) const;
   void watch_losses();
   void end_early();
-  std::string summary() const;
 
   const RecordConfig config_;
   std::unique_ptr<RecordFile> file_;
@@ -119,6 +126,7 @@ class Recorder : public StreamReader, public StepTap {
   std::deque<Item> waiting_;
   uint64_t waiting_bytes_ = 0;
   RecordedLoss refused_;  // that found no place there
+  bool is_refusing_ = false;
   bool is_stopping_ = false;
   bool is_ended_ = false;  // the file takes nothing any more
   RecordCounters counters_;
@@ -132,7 +140,7 @@ class Recorder : public StreamReader, public StepTap {
   uint64_t vertices_since_keyframe_ = 0;  // of all deltas
   uint64_t vertex_count_ = 0;             // of the newest state
   int64_t sim_time_ns_ = 0;
-  uint64_t last_tick_ = 0;
+  std::optional<int64_t> first_sim_ns_;
 
   std::thread thread_;
 };

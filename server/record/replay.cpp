@@ -209,6 +209,13 @@ Result<std::unique_ptr<StateSource>> make_replayed(const ReplayConfig& config, R
 
 Result<ReplayResult> replay_recording(const ReplayConfig& config) {
   ASSIGN_OR_RETURN(const auto reader, RecordingReader::open(config.recording, RecordedPart::Messages));
+  if (const auto tick = first_recorded_tick(config.recording); tick && *tick > 0)
+    return at(
+        config.recording.string(),
+        make_error(ErrorCode::Unsupported,
+                   "it began while the simulation ran, at step {}: it can be played, scrubbed and exported, "
+                   "but not simulated again; strandcast-server --record makes one that can",
+                   *tick));
   ReplayScript script(*reader, config);
   InputHub inputs;
   auto source = make_replayed(config, *reader, script, inputs);

@@ -48,7 +48,8 @@ struct ReplayResult {
   bool is_equal() const { return compared > 0 && equal == compared && !difference && early_end.empty(); }
 };
 
-/// NotFound, BadInput or Unsupported where the recording, its scene or its hair cannot be had.
+/// NotFound, BadInput or Unsupported where the recording, its scene or its hair cannot be had, or where it
+/// did not begin with the simulation.
 Result<ReplayResult> replay_recording(const ReplayConfig& config);
 
 /// "3600 of 3600 state hashes are equal", or where they first differ.

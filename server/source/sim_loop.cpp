@@ -181,10 +181,10 @@ std::deque<SimLoop::Job> SimLoop::wait_for_jobs() {
   // when there are several, by the next ones, which then must not sleep.
   std::unique_lock lock(mutex_);
   const auto is_awake = [this] {
-    const auto is_demand = [](const Job& job) { return std::holds_alternative<SourceDemand>(job.what); };
+    const auto is_at_once = [](const Job& job) { return !job.is_command(); };
     const bool has_turn = !jobs_.empty() && !is_preparing_ && !is_counting() && now_ns() >= jobs_rest_ns_;
     return is_stopping_ || has_turn || clock_->has_single_steps() ||
-           std::any_of(jobs_.begin(), jobs_.end(), is_demand);
+           std::any_of(jobs_.begin(), jobs_.end(), is_at_once);
   };
   std::optional<int64_t> wake_ns = clock_->next_due_ns();
   if (is_asleep()) wake_ns = now_ns() + kAsleepNs;
@@ -206,8 +206,7 @@ std::deque<SimLoop::Job> SimLoop::take_jobs() {
   std::deque<Job> taken;
   bool has_command = is_preparing_ || is_counting() || now_ns() < jobs_rest_ns_;
   for (auto job = jobs_.begin(); job != jobs_.end();) {
-    const bool is_command = !std::holds_alternative<SourceDemand>(job->what);
-    if (is_command && std::exchange(has_command, true)) {
+    if (job->is_command() && std::exchange(has_command, true)) {
       ++job;
       continue;
     }
@@ -223,7 +222,7 @@ void SimLoop::carry_out_in_turn(const Job& job) {
   const int64_t begin_ns = now_ns();
   carry_out(job);
   // On demand there is no hair that would have to go on meanwhile.
-  if (std::holds_alternative<SourceDemand>(job.what) || config_.is_lockstep) return;
+  if (!job.is_command() || config_.is_lockstep) return;
   const int64_t end_ns = now_ns();
   const double rest_ns = static_cast<double>(end_ns - begin_ns) * (1.0 / kJobShare - 1.0);
   jobs_rest_ns_ = end_ns + static_cast<int64_t>(rest_ns);
@@ -266,7 +265,7 @@ void SimLoop::push(Job job) {
     // Of the demands only the newest counts.
     if (is_demand)
       std::erase_if(jobs_, [](const Job& old) { return std::holds_alternative<SourceDemand>(old.what); });
-    is_full = !is_demand && jobs_.size() >= kMaxPendingJobs;
+    is_full = job.is_command() && jobs_.size() >= kMaxPendingJobs;
     if (!is_full) jobs_.push_back(std::move(job));
   }
   if (!is_full)
@@ -284,9 +283,13 @@ void SimLoop::post(const SetParameter& parameter, Reply reply, const std::string
 void SimLoop::set_demand(const SourceDemand& demand) {
   push({demand, {}, {}});
 }
+void SimLoop::set_tap(StepTap* tap, StateSource::OnTapped on_tapped) {
+  push({TapChange{tap, std::move(on_tapped)}, {}, {}});
+}
 
 void SimLoop::carry_out(const Job& job) {
   if (const auto* demand = std::get_if<SourceDemand>(&job.what)) return apply_demand(*demand);
+  if (const auto* tap = std::get_if<TapChange>(&job.what)) return apply_tap(*tap);
   const auto* control = std::get_if<ControlCommand>(&job.what);
   const auto* parameter = std::get_if<SetParameter>(&job.what);
   PostedChange posted{tick_, {}, job.who};
@@ -472,6 +475,14 @@ void SimLoop::apply_demand(const SourceDemand& demand) {
   follow_detail();
   // The first viewer sees the present state at once, also while paused.
   if (!was_watched && is_watched() && published_tick_ != tick_) publish();
+}
+
+/// Between two steps, and never between a change and its answer.
+void SimLoop::apply_tap(const TapChange& change) {
+  config_.tap = change.tap;
+  // What stands still is there once more, for whoever begins with it.
+  if (config_.tap != nullptr && clock_->is_paused()) publish();
+  change.on_tapped(tick_);
 }
 
 void SimLoop::apply_facts(const RuntimeFacts& facts) {

@@ -48,7 +48,7 @@ struct SimLoopConfig {
   ExecutorConfig device;        // what simulates
   SnapshotObserver on_publish;  // may be empty; on the simulation thread
   // Both outlive the loop. With either every step is published, and nothing is left out for want of readers.
-  StepTap* tap = nullptr;
+  StepTap* tap = nullptr;  // from the first step on; the loop puts set_tap()'s in its place
   StepScript* script = nullptr;
   bool is_lockstep = false;  // simulated time goes on by commands only
 };
@@ -86,6 +86,8 @@ class SimLoop {
   void post(const SetParameter& parameter, Reply reply, const std::string& who = {});
   /// What is wanted; has_wind_stream is found by the loop itself.
   void set_demand(const SourceDemand& demand);
+  /// As StateSource::set_tap(); `tap` outlives the loop, or on_tapped of the next one.
+  void set_tap(StepTap* tap, StateSource::OnTapped on_tapped);
   SimStats stats() const;
   /// As it runs now.
   SceneDesc scene() const;
@@ -95,11 +97,20 @@ class SimLoop {
   std::optional<Error> failure() const;
 
  private:
+  struct TapChange {
+    StepTap* tap = nullptr;
+    StateSource::OnTapped on_tapped;
+  };
   struct Job {
-    std::variant<ControlCommand, SetParameter, SourceDemand> what;
+    std::variant<ControlCommand, SetParameter, SourceDemand, TapChange> what;
     Reply reply;
     std::string who = {};      // asked for it
     bool is_prepared = false;  // what takes long of it is done
+
+    /// What waits for its turn; all else is carried out before the next step.
+    bool is_command() const {
+      return std::holds_alternative<ControlCommand>(what) || std::holds_alternative<SetParameter>(what);
+    }
   };
 
   SimLoop(SimLoopConfig config, InputHub& hub, StateSink& sink);
@@ -125,6 +136,7 @@ class SimLoop {
   bool has_other_look() const { return wanted_look() != look_; }
   Status rebuild_solver(const SceneDesc& scene, const SceneFeatures& features);
   void apply_demand(const SourceDemand& demand);
+  void apply_tap(const TapChange& change);
   void apply_facts(const RuntimeFacts& facts);
   bool is_recorded() const { return config_.tap != nullptr || config_.script != nullptr; }
   bool is_watched() const { return SourceDemand{facts_, has_state_readers_, hair_px_}.is_watched(); }

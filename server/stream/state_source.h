@@ -63,10 +63,14 @@ class StateSink {
   virtual void change_look(const LookChange& look) = 0;
 };
 
+class StepTap;
+
 class StateSource {
  public:
   /// Answer to a command, on any thread.
   using Reply = std::function<void(Notice)>;
+  /// What is told of a tap that is there, or gone, from the state of this step on.
+  using OnTapped = std::function<void(uint64_t tick)>;
 
   virtual ~StateSource() = default;
   /// The strands at rest and what else viewers draw; the same all the time.
@@ -82,6 +86,9 @@ class StateSource {
   // `who` asked for it, for people who look at a recording.
   virtual void post(const ControlCommand& command, Reply reply, const std::string& who) = 0;
   virtual void post(const SetParameter& parameter, Reply reply, const std::string& who) = 0;
+  /// Whoever hears of every step from now on (null: nobody), in place of who did; `on_tapped` comes on any
+  /// thread, never once the source has stopped or failed. One that takes no steps has nothing to tell.
+  virtual void set_tap(StepTap* /*tap*/, OnTapped on_tapped) { on_tapped(stats().tick); }
   virtual SimStats stats() const = 0;
   /// The scene as it runs, to be run again elsewhere on this machine; nothing where there is none.
   virtual std::optional<SceneDesc> scene() const { return std::nullopt; }

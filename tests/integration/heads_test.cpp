@@ -279,8 +279,14 @@ TEST_F(Heads, WhatTakesOneHeadSaysSo) {
   config.record = RecordConfig{folder.path() / "run.mcap", IfPresent::Refuse};
   const auto server = Server::start(config);
   ASSERT_FALSE(server);
-  EXPECT_THAT(server.error().to_string(), HasSubstr("--record and --trace take scenes of one head"));
+  EXPECT_THAT(server.error().to_string(),
+              HasSubstr("--record, --record-dir and --trace take scenes of one head"));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "run.mcap"));
+  config.record.reset();
+  config.record_folder = RecordFolder{folder.path()};
+  const auto other = Server::start(config);
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().to_string(), HasSubstr("--record-dir"));
 }
 
 /// The picture of a server that a viewer without a window leaves.

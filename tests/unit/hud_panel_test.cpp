@@ -193,6 +193,10 @@ TEST(ViewHud, SaysWhatAPersonShouldKnow) {
   EXPECT_THAT(writer.write(state, facts, kS).warnings,
               AllOf(Contains(HasSubstr("paused")), Contains(HasSubstr("no head motion"))));
   state.status.is_paused = state.status.is_motion_stale = false;
+  state.status.recording = "take 5.mcap: 12.5 s, 3.2 MB";
+  EXPECT_THAT(writer.write(state, facts, kS).warnings,
+              testing::ElementsAre("recording take 5.mcap: 12.5 s, 3.2 MB"));
+  state.status.recording.clear();
   state.status.realtime_factor = 0.6;
   EXPECT_TRUE(writer.write(state, facts, kS + kSlowMotionNs - 1).warnings.empty()) << "not for long enough";
   EXPECT_THAT(writer.write(state, facts, kS + kSlowMotionNs).warnings, Contains(HasSubstr("x0.60")));

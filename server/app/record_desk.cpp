@@ -1,0 +1,328 @@
+#include "server/app/record_desk.h"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <utility>
+
+#include "common/base/thread_name.h"
+#include "common/log/log.h"
+
+namespace strandcast {
+namespace {
+
+constexpr double kBytesPerMb = 1e6;
+constexpr double kBytesPerGb = 1e9;
+constexpr const char* kEnding = ".mcap";
+/// Of one name that was not given, within a second.
+constexpr int kMaxAlike = 10;
+constexpr std::chrono::seconds kRoomInterval{1};
+constexpr std::chrono::milliseconds kTapPoll{50};
+
+/// Whatever the locale says.
+bool is_letter_or_digit(char character) {
+  const char lower = static_cast<char>(character | 0x20);
+  return (lower >= 'a' && lower <= 'z') || (character >= '0' && character <= '9');
+}
+
+bool may_be_in_name(char character) {
+  return is_letter_or_digit(character) || std::string_view(" ._-+").find(character) != std::string_view::npos;
+}
+
+/// `end`: why it ended by itself; empty = it goes on.
+std::string text_of(const Recorder& recorder, const std::string& end) {
+  const RecordCounters counts = recorder.counters();
+  const std::string text =
+      fmt::format("{}: {:.1f} s, {:.1f} MB", recorder.path().filename().string(), counts.length_s,
+                  static_cast<double>(counts.written_bytes) / kBytesPerMb);
+  return end.empty() ? text : text + "; it ended by itself: " + end;
+}
+
+int64_t unix_time_s() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+/// What a tap was told, for a thread that waits for it.
+struct Tapped {
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::optional<uint64_t> tick;
+};
+
+}  // namespace
+
+std::optional<uint64_t> free_bytes_of(const std::filesystem::path& folder) {
+  std::error_code failure;
+  const std::filesystem::space_info space = std::filesystem::space(folder, failure);
+  if (failure) return std::nullopt;
+  return space.available;
+}
+
+Result<std::string> recording_file_name(const std::string& name) {
+  std::string_view stem = name;
+  if (stem.ends_with(kEnding)) stem.remove_suffix(std::string_view(kEnding).size());
+  const bool has_good_ends =
+      !stem.empty() && is_letter_or_digit(stem.front()) && stem.back() != '.' && stem.back() != ' ';
+  if (!has_good_ends || stem.size() > kMaxRecordingNameChars || stem.find("..") != std::string_view::npos ||
+      !std::all_of(stem.begin(), stem.end(), may_be_in_name))
+    return make_error(
+        ErrorCode::BadInput,
+        "A recording cannot be called so: its name is at most {} letters, digits, spaces and . _ - +, "
+        "without a folder, and begins with a letter or digit.",
+        kMaxRecordingNameChars);
+  return std::string(stem) + kEnding;
+}
+
+std::string recording_file_name(const std::string& scene, int64_t unix_time_s) {
+  std::string stem = scene.substr(0, kMaxRecordingNameChars / 2);
+  std::replace_if(
+      stem.begin(), stem.end(),
+      [](char character) { return !may_be_in_name(character) || character == '.' || character == ' '; }, '_');
+  if (stem.empty() || !is_letter_or_digit(stem.front())) stem.insert(0, "run");
+  const auto seconds = static_cast<std::time_t>(unix_time_s);
+  std::tm parts{};
+  char time[32] = "";
+  if (::gmtime_r(&seconds, &parts) != nullptr) std::strftime(time, sizeof(time), "-%Y%m%dT%H%M%SZ", &parts);
+  return stem + time + kEnding;
+}
+
+Result<std::unique_ptr<RecordDesk>> RecordDesk::make(const std::optional<RecordConfig>& first,
+                                                     const std::optional<RecordFolder>& folder) {
+  std::optional<RecordFolder> whole = folder;
+  if (whole) {
+    std::error_code failure;
+    whole->path = std::filesystem::absolute(whole->path, failure);
+    if (failure || !std::filesystem::is_directory(whole->path, failure))
+      return at(folder->path.string(),
+                make_error(ErrorCode::NotFound, "there is no such folder for recordings (--record-dir)"));
+  }
+  std::unique_ptr<RecordDesk> desk(new RecordDesk(std::move(whole)));
+  if (first) {
+    ASSIGN_OR_RETURN(desk->recorder_, Recorder::make(*first));
+  }
+  return desk;
+}
+
+RecordDesk::~RecordDesk() {
+  stop();
+}
+
+Status RecordDesk::attach(Stream stream) {
+  stream_.emplace(std::move(stream));
+  return recorder_ != nullptr ? recorder_->attach(stream_->hub) : Status();
+}
+
+void RecordDesk::begin() {
+  if (recorder_ != nullptr) recorder_->begin(stream_->describe(), stream_->asset);
+  if (!folder_) return;
+  log_info("record", "who controls may record into {}", folder_->path.string());
+  thread_ = std::thread([this] {
+    name_thread("record/desk");
+    run();
+  });
+}
+
+void RecordDesk::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+  if (const auto recorder = this->recorder()) recorder->stop();
+}
+
+std::shared_ptr<Recorder> RecordDesk::recorder() const {
+  const std::lock_guard lock(mutex_);
+  return recorder_;
+}
+
+void RecordDesk::obey(const RecordCommand& command, Reply reply) {
+  if (!folder_) return reply(Notice{true, kNoRecordings});
+  {
+    const std::lock_guard lock(mutex_);
+    if (!order_ && !is_stopping_) {
+      order_ = Order{command, std::move(reply)};
+      reply = nullptr;
+    }
+  }
+  if (reply) return reply(Notice{true, "A recording is being begun or ended just now: try again."});
+  changed_.notify_all();
+}
+
+void RecordDesk::run() {
+  std::unique_lock lock(mutex_);
+  while (!is_stopping_) {
+    const auto has_news = [this] { return is_stopping_ || order_.has_value(); };
+    if (recorder_ != nullptr)
+      changed_.wait_for(lock, kRoomInterval, has_news);
+    else
+      changed_.wait(lock, has_news);
+    if (is_stopping_) return;
+    const std::optional<Order> order = order_;
+    lock.unlock();
+    if (order)
+      answer(*order);
+    else
+      watch();
+    lock.lock();
+  }
+}
+
+void RecordDesk::answer(const Order& order) {
+  const Notice said = carry_out(order.command);
+  {
+    // Whoever has the answer may ask for more.
+    const std::lock_guard lock(mutex_);
+    order_.reset();
+  }
+  order.reply(said);
+}
+
+Notice RecordDesk::carry_out(const RecordCommand& command) {
+  if (command.is_wanted) {
+    const Result<std::string> begun = start_recording(command.name);
+    return begun ? Notice{false, *begun} : Notice{true, begun.error().to_string()};
+  }
+  if (recorder() != nullptr) return Notice{false, end()};
+  const std::lock_guard lock(mutex_);
+  if (!ended_.empty()) return Notice{true, std::exchange(ended_, {})};
+  return Notice{true, "Nothing is being recorded: record start begins it."};
+}
+
+Status RecordDesk::check_room() const {
+  const std::string path = folder_->path.string();
+  const auto free_bytes = folder_->free_bytes(folder_->path);
+  if (free_bytes && *free_bytes < kMinFreeRecordBytes)
+    return at(path,
+              make_error(ErrorCode::LimitExceeded,
+                         "{:.1f} GB are free on its disk, and a recording begins with {:.1f} GB at least",
+                         static_cast<double>(*free_bytes) / kBytesPerGb,
+                         static_cast<double>(kMinFreeRecordBytes) / kBytesPerGb));
+  size_t count = 0;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator entry(folder_->path, failure), end; !failure && entry != end;
+       entry.increment(failure))
+    count += entry->path().extension() == kEnding;
+  if (failure) return at(path, make_error(ErrorCode::Unavailable, "cannot be read: {}", failure.message()));
+  if (count >= kMaxRecordings)
+    return at(path, make_error(ErrorCode::LimitExceeded,
+                               "{} recordings are there, and no more may be: move some away", count));
+  return {};
+}
+
+/// Of a file that is not there.
+Result<std::filesystem::path> RecordDesk::choose_path(const std::string& name) const {
+  const auto is_there = [](const std::filesystem::path& path) {
+    std::error_code failure;
+    return std::filesystem::symlink_status(path, failure).type() != std::filesystem::file_type::not_found;
+  };
+  if (!name.empty()) {
+    ASSIGN_OR_RETURN(const std::string file, recording_file_name(name));
+    const std::filesystem::path path = folder_->path / file;
+    if (!is_there(path)) return path;
+    return make_error(ErrorCode::BadInput, "{} is there already: name another one.", path.string());
+  }
+  const std::filesystem::path own = folder_->path / recording_file_name(stream_->scene_name, unix_time_s());
+  std::filesystem::path path = own;
+  for (int number = 2; is_there(path) && number <= kMaxAlike; ++number)
+    path.replace_filename(fmt::format("{}-{}{}", own.stem().string(), number, kEnding));
+  return path;
+}
+
+/// Gives the step from which on it is so; `at_change` is called there, between two steps. Waits for the
+/// source, and only as long as that can answer.
+Result<uint64_t> RecordDesk::change_tap(StepTap* tap, std::function<void()> at_change) {
+  const auto tapped = std::make_shared<Tapped>();
+  stream_->source.set_tap(tap, [tapped, at_change = std::move(at_change)](uint64_t tick) {
+    if (at_change) at_change();
+    const std::lock_guard lock(tapped->mutex);
+    tapped->tick = tick;
+    tapped->changed.notify_all();
+  });
+  const auto is_over = [this] {
+    if (stream_->source.failure()) return true;
+    const std::lock_guard lock(mutex_);
+    return is_stopping_;
+  };
+  std::unique_lock lock(tapped->mutex);
+  while (!tapped->tick) {
+    if (is_over()) return make_error(ErrorCode::Unavailable, "The server is ending.");
+    tapped->changed.wait_for(lock, kTapPoll);
+  }
+  return *tapped->tick;
+}
+
+/// One sentence of where it is.
+Result<std::string> RecordDesk::start_recording(const std::string& name) {
+  const std::shared_ptr<Recorder> present = recorder();
+  if (present != nullptr && !present->failure())
+    return make_error(ErrorCode::BadInput, "{} is being recorded already: record stop ends it.",
+                      present->path().filename().string());
+  if (present != nullptr) end();
+  ASSIGN_OR_RETURN(const std::filesystem::path path, choose_path(name));
+  RETURN_IF_ERROR(check_room());
+  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, Recorder::make({path, IfPresent::Refuse}));
+  RETURN_IF_ERROR(recorder->attach(stream_->hub));
+  ASSIGN_OR_RETURN(const uint64_t tick, change_tap(recorder.get()));
+  recorder->begin(stream_->describe(), stream_->asset);
+  const std::lock_guard lock(mutex_);
+  recorder_ = std::move(recorder);
+  ended_.clear();
+  return fmt::format("Recording {} from step {} on.", path.string(), tick);
+}
+
+/// One sentence of what was recorded.
+std::string RecordDesk::end() {
+  const std::shared_ptr<Recorder> recorder = this->recorder();
+  // Steps and states end together. Without an answer the source has stopped, and tells nobody anything.
+  static_cast<void>(change_tap(nullptr, [recorder] { recorder->refuse(); }));
+  recorder->stop();
+  {
+    const std::lock_guard lock(mutex_);
+    recorder_.reset();
+  }
+  const std::string what = fmt::format("{}: {:.1f} s, {}", recorder->path().string(),
+                                       recorder->counters().length_s, recorder->summary());
+  const std::optional<Error> failure = recorder->failure();
+  return failure ? fmt::format("{}; it ended by itself: {}", what, failure->to_string()) : what + ".";
+}
+
+/// A disk that somebody's recording fills up is no use to anybody.
+std::string RecordDesk::reason_to_end(const Recorder& recorder) const {
+  if (const std::optional<Error> failure = recorder.failure()) return failure->to_string();
+  // The one of --record is the owner's.
+  if (recorder.path().parent_path() != folder_->path) return {};
+  const auto free_bytes = folder_->free_bytes(folder_->path);
+  if (!free_bytes || *free_bytes >= kMinFreeRecordBytes / 2) return {};
+  return fmt::format("{:.1f} GB are free on its disk", static_cast<double>(*free_bytes) / kBytesPerGb);
+}
+
+void RecordDesk::watch() {
+  const std::shared_ptr<Recorder> recorder = this->recorder();
+  const std::string reason = recorder != nullptr ? reason_to_end(*recorder) : std::string();
+  if (reason.empty()) return;
+  log_warn("record", "{}: the recording ends: {}", recorder->path().string(), reason);
+  end();
+  const std::lock_guard lock(mutex_);
+  ended_ = text_of(*recorder, reason);
+}
+
+std::string RecordDesk::text() const {
+  const std::lock_guard lock(mutex_);
+  if (recorder_ == nullptr) return ended_;
+  const std::optional<Error> failure = recorder_->failure();
+  return text_of(*recorder_, failure ? failure->to_string() : std::string());
+}
+
+void RecordDesk::add(const ServerStatus& status) {
+  if (const auto recorder = this->recorder()) recorder->add(status);
+}
+
+std::optional<RecordCounters> RecordDesk::counters() const {
+  const auto recorder = this->recorder();
+  return recorder != nullptr ? std::optional(recorder->counters()) : std::nullopt;
+}
+
+}  // namespace strandcast
