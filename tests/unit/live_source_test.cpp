@@ -269,5 +269,72 @@ TEST(LiveSource, WrongInputsAreToldWithTheirField) {
   EXPECT_EQ(sentence({.protocol = "vmc"}), "no error");
 }
 
+/// What comes of a head that goes along x by so many of the sender's centimetres every 10 ms.
+struct Walk {
+  glm::dvec3 end_m{0.0};
+  LiveInputStatus status;
+};
+Walk walk(double scale, double step_cm, int steps) {
+  const auto source = make({.protocol = "opentrack", .scale = scale});
+  Walk walk;
+  for (int i = 0; i <= steps; ++i) {
+    EXPECT_TRUE(source->take(kFirst, at_x(step_cm * i), kStart + i * 10 * kMs));
+    for (const glm::dvec3& place_m : places(source->advance(kStart + i * 10 * kMs))) walk.end_m = place_m;
+  }
+  walk.status = source->status(kStart + steps * 10 * kMs);
+  return walk;
+}
+
+TEST(LiveSource, PlacesAreScaledBeforeTheirSpeedIsJudged) {
+  constexpr int kSteps = 20;
+  // 5 m/s as it comes. The same at a quarter of the numbers, were it 20 m/s.
+  const Walk as_it_comes = walk(1.0, 5.0, kSteps);
+  EXPECT_NEAR(as_it_comes.end_m.x, 0.05 * kSteps, 1e-9);
+  EXPECT_EQ(as_it_comes.status.clamped, 0u);
+  const Walk smaller = walk(0.25, 20.0, kSteps);
+  EXPECT_NEAR(smaller.end_m.x, 0.05 * kSteps, 1e-9);
+  EXPECT_EQ(smaller.status.clamped, 0u) << "20 m/s are 5";
+  // Four times as large it is 20 m/s, of which a head gets 10 m/s and the burst of the window.
+  const Walk larger = walk(4.0, 5.0, kSteps);
+  const double most_m = kMaxLiveSpeedMps * (kSteps * 10 * kMs + kClampWindowNs) * 1e-9;
+  EXPECT_GT(larger.status.clamped, 10u);
+  EXPECT_LE(larger.end_m.x, most_m + 1e-9);
+  EXPECT_GT(larger.end_m.x, most_m - kMaxLiveSpeedMps * kClampWindowNs * 1e-9 - 1e-9);
+}
+
+TEST(LiveSource, PlacesAreScaledBeforeTheyAreBelieved) {
+  // One pose 1 m away by the sender's numbers, which is beyond the gate.
+  EXPECT_EQ(walk(1.0, 100.0, 1).status.gated, 1u);
+  EXPECT_EQ(walk(0.5, 100.0, 1).status.gated, 0u) << "half a metre";
+  EXPECT_EQ(walk(1.0, 25.0, 1).status.gated, 0u);
+  EXPECT_EQ(walk(4.0, 25.0, 1).status.gated, 1u) << "a metre";
+  // What only the scale takes out of the world is as impossible as what came so.
+  const double too_far_cm = 1.001 * kMaxHeadDistanceM * 100.0 / kMaxLiveScale;
+  EXPECT_EQ(walk(kMaxLiveScale, too_far_cm, 1).status.impossible, 1u);
+  EXPECT_EQ(walk(1.0, too_far_cm, 1).status.impossible, 0u);
+}
+
+TEST(LiveSource, JointsAreScaledWithTheHead) {
+  constexpr test::Quad kUnturned = {0, 0, 0, 1};
+  const auto body = [&] {
+    return test::osc_bundle({test::vmc_bone("Hips", {0, 1, 0}, kUnturned),
+                             test::vmc_bone("Chest", {0, 0.25f, 0}, kUnturned),
+                             test::vmc_bone("Head", {0, 0.25f, 0}, kUnturned),
+                             test::vmc_bone("LeftUpperArm", {-0.2f, 0.125f, 0}, kUnturned)});
+  };
+  for (const double scale : {1.0, 0.5, 3.0}) {
+    const auto source = make({.protocol = "vmc", .scale = scale});
+    ASSERT_TRUE(source->take(kFirst, body(), kStart));
+    const LiveSource::Due due = source->advance(kStart);
+    ASSERT_EQ(due.motion.size(), 1u);
+    const auto& sample = due.motion[0].samples.front();
+    EXPECT_LT(glm::distance(sample.world_from_head.position_m, glm::dvec3(0, 1.5 * scale, 0)), 1e-6);
+    ASSERT_EQ(due.motion[0].joint_names, (std::vector<std::string>{"chest", "left_shoulder"}));
+    EXPECT_LT(glm::distance(glm::dvec3(sample.joint_m[0]), scale * glm::dvec3(0, -0.25, 0)), 1e-6);
+    EXPECT_LT(glm::distance(glm::dvec3(sample.joint_m[1]), scale * glm::dvec3(0.2, -0.125, 0)), 1e-6)
+        << "to the left, which is +X";
+  }
+}
+
 }  // namespace
 }  // namespace strandcast

@@ -7,6 +7,7 @@
 #include "common/scene/scene_file.h"
 #include "server/app/codec_choice.h"
 #include "server/app/control_budget.h"
+#include "server/app/live_desk.h"
 #include "server/app/options.h"
 #include "server/app/server_metrics.h"
 #include "server/app/slow_motion.h"
@@ -388,6 +389,10 @@ TEST(MocapOptions, AreInputsOfTheScene) {
   // Those of the command line are instead of the scene's, and what is set is set of them.
   EXPECT_EQ(live_of({"--set", "live.0.turns_only=true", "--mocap", "opentrack"}).value(),
             (Inputs{{.protocol = "opentrack", .turns_only = true}}));
+  EXPECT_EQ(
+      live_of({"--mocap", "vmc", "--mocap", "freed", "--mocap-scale", "0.01", "--set", "live.1.scale=2"})
+          .value(),
+      (Inputs{{.protocol = "vmc", .scale = 0.01}, {.protocol = "freed", .scale = 2.0}}));
   EXPECT_EQ(parse_mocap("natnet://10.0.0.5").value(), (LiveDesc{.protocol = "natnet", .host = "10.0.0.5"}));
   EXPECT_EQ(parse_mocap("vrpn://[fd00::2]:3884").value(),
             (LiveDesc{.protocol = "vrpn", .host = "fd00::2", .port = 3884}));
@@ -409,9 +414,28 @@ TEST(MocapOptions, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(sentence({"--mocap", "vmc", "--mocap-allow", "10.0.0.0/33"}), HasSubstr("--mocap-allow"));
   EXPECT_THAT(sentence({"--set", "live.0.delay_ms=5"}), HasSubstr("live.0.protocol"));
   EXPECT_THAT(sentence({"--mocap", "vmc", "--set", "live.0.delay_ms=500"}), HasSubstr("0 .. 200"));
+  for (const char* scale : {"0", "-1", "0.0009", "1001", "nan", "inf", "two"}) {
+    EXPECT_THAT(sentence({"--mocap", "vmc", "--mocap-scale", scale}),
+                testing::AllOf(HasSubstr("--mocap-scale"), HasSubstr("0.001")))
+        << scale;
+    const std::string assignment = std::string("live.0.scale=") + scale;
+    EXPECT_THAT(sentence({"--mocap", "vmc", "--set", assignment.c_str()}), HasSubstr("scale")) << scale;
+  }
+  EXPECT_THAT(sentence({"--mocap", "vmc", "--set", "live.0.scale=1001"}), HasSubstr("0.001 .. 1000"));
+  EXPECT_EQ(sentence({"--mocap", "vmc", "--mocap-scale", "1000"}), "no error");
+  EXPECT_EQ(sentence({"--mocap", "vmc", "--mocap-scale", "0.001"}), "no error");
+  EXPECT_THAT(sentence({"--mocap-scale", "2"}), HasSubstr("--mocap"));
   const std::vector<const char*> many = {"--mocap", "vmc",     "--mocap", "vmc:1",   "--mocap",
                                          "vmc:2",   "--mocap", "vmc:3",   "--mocap", "vmc:4"};
   EXPECT_THAT(sentence(many), HasSubstr("the limit is 4"));
+}
+
+TEST(MocapOptions, AreExplained) {
+  const auto lines = explain_live({{.protocol = "opentrack"}, {.protocol = "freed", .scale = 0.01}}, {});
+  ASSERT_TRUE(lines) << lines.error().to_string();
+  ASSERT_EQ(lines->size(), 2u);
+  EXPECT_THAT((*lines)[0], testing::Not(HasSubstr("times")));
+  EXPECT_THAT((*lines)[1], HasSubstr("places times 0.01"));
 }
 
 TEST(MocapOptions, WhoMaySendIsAListOfRanges) {
