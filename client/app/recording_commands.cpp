@@ -100,9 +100,13 @@ int run_recording_info(const std::filesystem::path& path) {
   const auto scene = parse_scene(start.scene_text, "the recording's scene", {});
   std::cout << fmt::format("{}: a recording of scene '{}'\n", path.string(),
                            scene ? scene->name : scene.error().to_string());
+  const int64_t length_ns = std::max<int64_t>(0, info.last_sim_time_ns - info.first_sim_time_ns);
   print_line("recorded", fmt::format("{} by {} {}, {:.1f} s of simulation", date_text(start.unix_time_ns),
                                      "strandcast-server", start.server_version,
-                                     static_cast<double>(info.last_sim_time_ns) / kNsPerS));
+                                     static_cast<double>(length_ns) / kNsPerS));
+  if (const auto tick = first_recorded_tick(path); tick && *tick > 0)
+    print_line("began",
+               fmt::format("at step {}, while the simulation ran: --replay cannot simulate it again", *tick));
   print_line("simulated", start.sim_device_name);
   if (scene)
     print_line("scene", fmt::format("solver {}, {:g} steps/s of {} substeps, within {:g} mm",
@@ -122,7 +126,12 @@ int run_recording_check(const std::filesystem::path& path) {
   if (!check) return fail(check.error());
   std::cout << fmt::format("{}: {}\n", path.string(), check_text(*check));
   print_problems(*check);
-  std::cout << (check->is_sound() ? "sound\n" : "not sound; strandcast-ctl recover keeps what is\n");
+  if (check->is_sound())
+    std::cout << "sound\n";
+  else if (check->is_sound_so_far())
+    std::cout << "sound so far: cut off, or still being written; strandcast-ctl recover makes it whole\n";
+  else
+    std::cout << "not sound; strandcast-ctl recover keeps what is\n";
   return check->is_sound() ? kDoneExit : kRefusedExit;
 }
 

@@ -44,6 +44,7 @@ Status check_file(ByteSource& source, RecordingCheck& check) {
   ASSIGN_OR_RETURN(const ChunkList listed, list_chunks(source));
   check.chunks = walked.chunks.size();
   check.is_whole = listed.is_indexed;
+  check.is_cut_off = !walked.has_end;
   if (walked.cut_bytes > 0)
     add_problem(check,
                 fmt::format("it is cut off: {} bytes at its end are no whole record", walked.cut_bytes));
@@ -169,6 +170,11 @@ Result<std::optional<RecordedState>> next_state(RecordingReader& reader) {
   }
 }
 
+struct StatePair {
+  std::optional<RecordedState> a;
+  std::optional<RecordedState> b;
+};
+
 void add_note(RecordingComparison& result, std::string_view sentence) {
   result.notes.emplace_back(sentence);
 }
@@ -180,27 +186,50 @@ Status differ(RecordingComparison& result, uint64_t tick, std::string what) {
   return {};
 }
 
+Result<StatePair> next_states(RecordingReader& a, RecordingReader& b) {
+  StatePair next;
+  ASSIGN_OR_RETURN(next.a, next_state(a));
+  ASSIGN_OR_RETURN(next.b, next_state(b));
+  return next;
+}
+
+/// The first states that both have, where one began later than the other.
+Result<StatePair> first_states(RecordingReader& a, RecordingReader& b, RecordingComparison& result) {
+  ASSIGN_OR_RETURN(StatePair first, next_states(a, b));
+  if (!first.a || !first.b || first.a->tick == first.b->tick) return first;
+  const bool is_a_later = first.a->tick > first.b->tick;
+  const uint64_t begin = std::max(first.a->tick, first.b->tick);
+  add_note(result, fmt::format("the {} one begins at step {}", is_a_later ? "first" : "second", begin));
+  std::optional<RecordedState>& earlier = is_a_later ? first.b : first.a;
+  while (earlier && earlier->tick < begin) {
+    ASSIGN_OR_RETURN(earlier, next_state(is_a_later ? b : a));
+  }
+  return first;
+}
+
 Status compare_states(RecordingReader& a, RecordingReader& b, RecordingComparison& result) {
+  ASSIGN_OR_RETURN(StatePair now, first_states(a, b, result));
+  if (!now.a || !now.b) {
+    add_note(result, "they have no step in common");
+    return {};
+  }
   uint64_t tick = 0;
-  while (true) {
-    ASSIGN_OR_RETURN(const auto in_a, next_state(a));
-    ASSIGN_OR_RETURN(const auto in_b, next_state(b));
-    if (!in_a && !in_b) return {};
-    if (!in_a || !in_b) {
-      // One that is longer is no other run: what both have is equal.
-      add_note(result, fmt::format("the {} one goes on behind step {}", in_a ? "first" : "second", tick));
-      return {};
-    }
-    tick = std::min(in_a->tick, in_b->tick);
-    if (in_a->tick != in_b->tick)
+  while (now.a && now.b) {
+    tick = std::min(now.a->tick, now.b->tick);
+    if (now.a->tick != now.b->tick)
       return differ(
           result, tick,
-          fmt::format("the first one has step {} there, the second one {}", in_a->tick, in_b->tick));
-    if (in_a->state_hash != in_b->state_hash)
+          fmt::format("the first one has step {} there, the second one {}", now.a->tick, now.b->tick));
+    if (now.a->state_hash != now.b->state_hash)
       return differ(result, tick,
-                    fmt::format("the hashes are {:016x} and {:016x}", in_a->state_hash, in_b->state_hash));
+                    fmt::format("the hashes are {:016x} and {:016x}", now.a->state_hash, now.b->state_hash));
     ++result.equal_states;
+    ASSIGN_OR_RETURN(now, next_states(a, b));
   }
+  // One that is longer is no other run: what both have is equal.
+  if (now.a || now.b)
+    add_note(result, fmt::format("the {} one goes on behind step {}", now.a ? "first" : "second", tick));
+  return {};
 }
 
 void note_distance(const Snapshot& a, const Snapshot& b, RecordingComparison& result) {

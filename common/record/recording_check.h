@@ -24,11 +24,14 @@ struct RecordingCheck {
   uint64_t equal_states = 0;    // of these, that are the published ones bit for bit; 0: the codec rounds
   uint64_t lost_frames = 0;     // that the recorder said
   uint64_t lost_messages = 0;
-  bool is_whole = false;  // it was closed
+  bool is_whole = false;    // it was closed
+  bool is_cut_off = false;  // it ends before its end, as one does that is being written
   uint64_t problem_count = 0;
   std::vector<std::string> problems;  // sentences
 
   bool is_sound() const { return problem_count == 0; }
+  /// All that is there is sound, and only the end is missing.
+  bool is_sound_so_far() const { return is_cut_off && problem_count == 1; }
 };
 
 /// CRCs, order, index against contents, and the strands decoded. An error where there is no recording to look

@@ -294,6 +294,8 @@ Status RecordingReader::State::seek(int64_t sim_time_ns) {
     messages_.go_to(0);
     return {};
   }
+  // A state that stands still may be in it several times: from its first keyframe on all is read.
+  if (place->sim_time_ns == keyframes_.front().sim_time_ns) place = &keyframes_.front();
   frames_.go_to(place->chunk);
   // Messages are in chunks that begin before; what of them is older than the keyframe is passed over.
   size_t chunk = 0;
@@ -348,6 +350,16 @@ Result<std::optional<RecordedItem>> RecordingReader::next() {
 }
 Status RecordingReader::seek(int64_t sim_time_ns) {
   return state_->seek(sim_time_ns);
+}
+
+std::optional<uint64_t> first_recorded_tick(const std::filesystem::path& path) {
+  const auto reader = RecordingReader::open(path, RecordedPart::Messages);
+  if (!reader) return std::nullopt;
+  // What is damaged before it says nothing.
+  for (auto item = (*reader)->next(); item && *item; item = (*reader)->next())
+    if (const auto* state = std::get_if<RecordedState>(&std::get<RecordedMessage>((*item)->what)))
+      return state->tick;
+  return std::nullopt;
 }
 
 }  // namespace strandcast

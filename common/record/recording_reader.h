@@ -95,4 +95,8 @@ class RecordingReader {
   std::unique_ptr<State> state_;
 };
 
+/// Step of the first state in it: 0 where it began with the simulation, more where that ran already; nothing
+/// where no state is found.
+std::optional<uint64_t> first_recorded_tick(const std::filesystem::path& path);
+
 }  // namespace strandcast

@@ -40,7 +40,9 @@ int run(const char* path) {
   if (!decoder) return fmt::print(stderr, "{}\n", decoder.error().to_string()), 2;
   const double open_ms = static_cast<double>(now_ns() - begin_ns) * kMsPerNs;
   std::vector<int64_t> seconds;
-  for (int64_t s = 0; s * kNsPerS <= (*reader)->info().last_sim_time_ns; ++s) seconds.push_back(s);
+  const RecordingInfo& info = (*reader)->info();
+  for (int64_t s = info.first_sim_time_ns / kNsPerS; s * kNsPerS <= info.last_sim_time_ns; ++s)
+    seconds.push_back(s);
   std::shuffle(seconds.begin(), seconds.end(), std::mt19937(1));
   std::vector<double> times_ms;
   std::pair<double, int64_t> slowest;

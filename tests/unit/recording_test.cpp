@@ -427,6 +427,25 @@ TEST(RecordingReader, RefusesWhatIsNoRecordingOfOursInOneSentence) {
   EXPECT_THAT(sentence(other_hair.all), HasSubstr("is not what its beginning says"));
 }
 
+// As of a simulation that stands still while somebody joins.
+TEST(RecordingReader, BeginsWithTheFirstOfKeyframesOfOneState) {
+  test::MemorySink sink;
+  RecordingWriter writer(sink, sample_start(), *sample_asset_frame());
+  const int64_t time_ns = sample_start().server_time_ns;
+  writer.add(time_ns, 0, RecordedState{0, 0, 7});
+  writer.add(time_ns, test::sample_frame(1, true, 0));
+  writer.add(time_ns, test::sample_frame(2, true, 0));
+  writer.add(time_ns, test::sample_frame(3, false, 10));
+  writer.finish();
+  const auto reader = open_bytes(sink.all);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  const std::vector<std::string> all = read_all(**reader);
+  ASSERT_EQ(all.size(), 4u);
+  EXPECT_EQ(all[1], "frame 1");
+  ASSERT_TRUE((*reader)->seek(5));
+  EXPECT_EQ(read_all(**reader), all);
+}
+
 TEST(RecordingWriter, SaysInTheFileWhatFoundNoRoom) {
   test::MemorySink sink;
   RecordingWriter writer(sink, sample_start(), *sample_asset_frame());
@@ -481,6 +500,33 @@ TEST(RecordingCheck, FindsEveryByteThatIsWrong) {
     const auto check = check_recording(*source);
     EXPECT_FALSE(check && check->is_sound()) << "byte " << i << " of " << whole.size();
   }
+}
+
+TEST(RecordingCheck, TellsAnEndThatIsMissingFromDamage) {
+  const mcap::Bytes whole = test::moving_recording(25);
+  const auto source = memory_byte_source(whole);
+  const auto walked = walk_chunks(*source);
+  ASSERT_TRUE(walked);
+  const uint64_t last = walked->chunks.back().offset;
+  const auto check_first = [](mcap::Bytes bytes, uint64_t size) {
+    bytes.resize(static_cast<size_t>(size));
+    const auto part = memory_byte_source(std::move(bytes));
+    const auto check = check_recording(*part);
+    EXPECT_TRUE(check) << check.error().to_string();
+    return check ? *check : RecordingCheck{};
+  };
+  // As a file is while it is written, between two records or within one.
+  for (const uint64_t size : {last, last + 1, last + 30, whole.size() - 1}) {
+    const RecordingCheck check = check_first(whole, size);
+    EXPECT_FALSE(check.is_sound()) << size;
+    EXPECT_EQ(check.is_sound_so_far(), size < whole.size() - 1)
+        << size << testing::PrintToString(check.problems);
+  }
+  EXPECT_FALSE(check_first(whole, whole.size()).is_sound_so_far()) << "it is whole";
+  mcap::Bytes damaged = whole;
+  const ChunkPlace chunk = chunk_of(damaged, 4);
+  put_at(damaged, chunk.offset + chunk.size_bytes - 3, uint8_t{0x5A});
+  EXPECT_FALSE(check_first(damaged, last).is_sound_so_far());
 }
 
 TEST(RecordingRecover, MakesAWholeFileOfOneThatWasCutOff) {
