@@ -48,6 +48,8 @@ struct ScenarioView {
   double delay_ms = 0.0;
   uint32_t width = 320, height = 240;
   std::string codec;
+  std::string draws;     // what it says of itself: hardware, software, none; empty = nothing
+  double draw_ms = 0.0;  // likewise; 0 = nothing
 };
 struct ScenarioLeave {
   std::string viewer;
@@ -86,6 +88,7 @@ struct ScenarioExpect {
   std::optional<double> realtime_below, feed_pace_within, head_mps_below;
   std::optional<bool> is_slow;
   std::string mode;
+  std::string because;    // part of the reason for the mode
   double within_s = 0.0;  // is_slow and mode are waited for so long
   std::optional<ScenarioMetric> metric;
 };

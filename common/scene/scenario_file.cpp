@@ -36,6 +36,7 @@ constexpr Range kWind{-200.0, 200.0, "m/s"};
 constexpr Range kShare{0.0, 2.0, ""};
 constexpr Range kLink{0.01, 10'000.0, "Mbit/s"};
 constexpr Range kDelay{0.0, 5'000.0, "ms"};
+constexpr Range kDrawing{0.0, 60'000.0, "ms"};
 constexpr Range kSide{16, 4'096, "pixels"};
 constexpr Range kStretch{1e-6, 100.0, ""};
 constexpr Range kDecibel{1.0, 99.0, "dB"};
@@ -235,6 +236,8 @@ ScenarioView ScenarioReader::read_view(const Part& part) {
   view.width = part.count("width", view.width, kSide);
   view.height = part.count("height", view.height, kSide);
   view.codec = part.text("codec", "", kMaxWordBytes);
+  if (part.has("draws")) view.draws = part.word("draws", "", {"hardware", "software", "none"});
+  view.draw_ms = part.number("draw_ms", view.draw_ms, kDrawing);
   return view;
 }
 
@@ -255,6 +258,8 @@ ScenarioExpect ScenarioReader::read_expect(const Part& part) const {
   expect.within_s = part.number("within_s", expect.within_s, kSeconds);
   if (part.has("slow_motion")) expect.is_slow = part.flag("slow_motion");
   if (part.has("mode")) expect.mode = part.word("mode", "", {"strands", "frames"});
+  expect.because = part.text("because", "", kMaxTextBytes);
+  if (!expect.because.empty() && expect.mode.empty()) part.fail("because", "is of a mode: say which");
   if (part.has("hash")) {
     const std::string text = part.text("hash", "", kMaxWordBytes);
     uint64_t hash = 0;

@@ -120,8 +120,8 @@ TEST_P(ShippedScenario, Holds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedScenario,
-                         testing::Values("bad_input", "calm_stream", "hostile", "look", "pace", "restart",
-                                         "same_bits", "shake", "slow_motion", "thin_line"),
+                         testing::Values("auto_mode", "bad_input", "calm_stream", "hostile", "look", "pace",
+                                         "restart", "same_bits", "shake", "slow_motion", "thin_line"),
                          [](const auto& one) { return std::string(one.param); });
 
 }  // namespace

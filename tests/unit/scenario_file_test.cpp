@@ -24,12 +24,14 @@ do { step: 240 }
 do { run_s: 0.5 }
 do { set: "look.hair_color=red" }
 do { command: RESTART }
-do { view { name: "thin" mode: "auto" link_mbit: 2 delay_ms: 20 width: 64 height: 48 codec: "step" } }
+do { view { name: "thin" mode: "auto" link_mbit: 2 delay_ms: 20 width: 64 height: 48 codec: "step"
+  draws: "software" draw_ms: 40 } }
 do { leave: "thin" }
 do { refuse { input: NOT_A_NUMBER says: "nan" } }
 do { remember: "here" }
 do { expect { viewer: "thin" stretch_below: 0.01 no_quarantine: true hash: "00ff" same_as: "here" kbit_below: 3
-  hz_above: 10 mode: "frames" back_within_s: 5 realtime_above: 0.95 bits_per_vertex_below: 2
+  hz_above: 10 mode: "frames" because: "slow" back_within_s: 5 realtime_above: 0.95
+  bits_per_vertex_below: 2
   picture { golden: "a.png" db_above: 30 } metric { name: "x" above: 1 within_s: 2 }
   slow_motion: false realtime_below: 0.5 feed_pace_within: 0.1 head_mps_below: 12 within_s: 3 } }
 do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 9 count: 3 rate_hz: 50 } }
@@ -41,7 +43,7 @@ do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 
   EXPECT_EQ(scenario->repeat, 2u);
   ASSERT_EQ(scenario->actions.size(), 12u);
   EXPECT_EQ(scenario->actions[0].line, 5);
-  EXPECT_EQ(scenario->actions[10].line, 15);
+  EXPECT_EQ(scenario->actions[10].line, 16);
   const auto& start = std::get<ScenarioStart>(scenario->actions[0].work);
   EXPECT_EQ(start.scene, "/scenes/minimal.textproto") << "from the scenario's folder";
   EXPECT_EQ(start.overrides, std::vector<std::string>{"substeps=2"});
@@ -60,6 +62,8 @@ do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 
   EXPECT_EQ(view.link_mbit, 2.0);
   EXPECT_EQ(view.codec, "step");
   EXPECT_EQ(view.height, 48u);
+  EXPECT_EQ(view.draws, "software");
+  EXPECT_EQ(view.draw_ms, 40.0);
   EXPECT_EQ(std::get<ScenarioLeave>(scenario->actions[7].work).viewer, "thin");
   EXPECT_EQ(std::get<ScenarioRefusal>(scenario->actions[8].work).input, ScenarioInput::NotANumber);
   EXPECT_EQ(std::get<ScenarioRemember>(scenario->actions[9].work).name, "here");
@@ -70,6 +74,7 @@ do { send { port: 39541 hex: "00 fF" hex: "7f" file: "packet.bin" random_bytes: 
   EXPECT_EQ(expect.metric->above, 1.0);
   EXPECT_FALSE(expect.metric->below);
   EXPECT_EQ(expect.mode, "frames");
+  EXPECT_EQ(expect.because, "slow");
   EXPECT_EQ(expect.is_slow, std::optional(false));
   EXPECT_EQ(expect.realtime_below, 0.5);
   EXPECT_EQ(expect.feed_pace_within, 0.1);
@@ -94,6 +99,9 @@ TEST(ScenarioFile, SaysWhereItIsWrong) {
       {head + "do { expect { stretch_under: 1 } }", "known: viewer, stretch_below"},
       {head + "do { view { mode: \"both\" } }", "must be one of strands, frames, auto"},
       {head + "do { view { link_mbit: -2 } }", "link_mbit is -2"},
+      {head + "do { view { draws: \"gpu\" } }", "must be one of hardware, software, none"},
+      {head + "do { view { draw_ms: -1 } }", "draw_ms is -1"},
+      {head + "do { expect { because: \"slow\" } }", "because is of a mode"},
       {head + "do { expect { hash: \"xyz\" } }", "16 hexadecimal digits"},
       {head + "do { expect { metric { name: \"a\" } } }", "below, above or equals"},
       {head + "do { expect { picture { db_above: 3 } } }", "golden"},
@@ -148,7 +156,7 @@ TEST(ScenarioFile, EveryShippedScenarioParses) {
       EXPECT_TRUE(std::filesystem::exists(expect->picture->golden)) << expect->picture->golden;
     }
   }
-  EXPECT_EQ(names.size(), 10u);
+  EXPECT_EQ(names.size(), 11u);
 }
 
 }  // namespace

@@ -193,9 +193,14 @@ void ScenarioRun::expect_slow_motion(const ScenarioExpect& expect) {
 
 void ScenarioRun::expect_mode(const ScenarioExpect& expect) {
   const ScenarioViewer& who = **viewer(expect.viewer);
-  const bool is_so = await(expect.within_s, [&] { return expect.mode == to_string(who.look().mode); });
+  const bool is_so = await(expect.within_s, [&] {
+    const ViewerLook look = who.look();
+    return expect.mode == to_string(look.mode) && look.mode_reason.find(expect.because) != std::string::npos;
+  });
   const ViewerLook look = who.look();
-  report("mode of " + who.view().name, expect.mode,
+  const std::string wanted =
+      expect.because.empty() ? expect.mode : fmt::format("{}, because '{}'", expect.mode, expect.because);
+  report("mode of " + who.view().name, wanted,
          fmt::format("it sees {} ({})", to_string(look.mode), look.mode_reason), is_so);
 }
 

@@ -30,6 +30,12 @@ Result<std::unique_ptr<chaos::ChaosRelay>> make_link(const ScenarioView& view, c
   return chaos::ChaosRelay::start(config);
 }
 
+DrawingDevice device_of(const std::string& draws) {
+  if (draws == "none") return DrawingDevice::None;
+  if (draws == "software") return DrawingDevice::Software;
+  return draws == "hardware" ? DrawingDevice::Hardware : DrawingDevice::Unknown;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<ScenarioViewer>> ScenarioViewer::join(const ScenarioView& view, ClientConfig config) {
@@ -74,6 +80,8 @@ void ScenarioViewer::run(LiveConnection& live) {
     ViewerReport report;
     report.decode_ms = std::min(live.session().replay().decode_timer().median_ms(), kMaxReportedMs);
     report.picture_decode_ms = std::min(live.session().picture_decode_timer().median_ms(), kMaxReportedMs);
+    report.draw_ms = view_.draw_ms;
+    report.device = device_of(view_.draws);
     // One that is lost is followed by the next.
     (void)live.session().client().send(report);
   }
