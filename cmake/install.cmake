@@ -12,6 +12,9 @@ install(DIRECTORY deploy/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast 
 install(DIRECTORY deploy/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/strandcast COMPONENT tools
   PATTERN README.md EXCLUDE)
 
+# strandcast-ctl fleet and grid start them.
+install(PROGRAMS deploy/fleet/strandcast-fleet deploy/fleet/strandcast-grid DESTINATION lib/strandcast COMPONENT tools)
+
 install(FILES deploy/strandcast-server.service deploy/strandcast-server.socket DESTINATION lib/systemd/system
   COMPONENT server)
 
@@ -28,6 +31,7 @@ install(FILES proto/WIRE.md proto/RECORDING.md DESTINATION ${documents}/proto CO
 install(FILES deploy/hair.png deploy/page.png deploy/streaming.png deploy/work_precision.png
   DESTINATION ${documents}/deploy COMPONENT doc)
 install(FILES deploy/scenarios/README.md DESTINATION ${documents}/deploy/scenarios COMPONENT doc)
+install(FILES deploy/fleet/README.md DESTINATION ${documents}/deploy/fleet COMPONENT doc)
 install(DIRECTORY examples DESTINATION ${documents} COMPONENT doc)
 install(DIRECTORY tests/conformance/vectors DESTINATION ${documents}/conformance COMPONENT doc)
 

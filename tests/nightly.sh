@@ -6,7 +6,7 @@
 # Parts: fuzz, grids (property and comparing tests), dev (address and undefined behaviour, all tests), tsan (threads, all
 # tests but those of grids), lto (do all files agree on every type, and does each include what it uses), arm (do the strand
 # kernels compile for NEON), packages (as root: do the Debian packages install, run and go in a clean Debian 12, and does the
-# container), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
+# container), fleet (sessions, relays and viewers with a Slurm and an HAProxy of their own: deploy/fleet/try.sh), wasm (does the strand core in WebAssembly decode what this one does, bit for bit, and does the page work in a browser). A part that fails
 # does not keep the others from running; a table of all stands at the end. A finding of a fuzzer stays under
 # build/fuzz/findings.
 set -euo pipefail
@@ -18,11 +18,11 @@ parts=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds="${2:?--seconds needs a number}"; shift 2 ;;
-    fuzz | grids | dev | tsan | lto | arm | packages | wasm) parts+=("$1"); shift ;;
-    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, wasm)" >&2; exit 2 ;;
+    fuzz | grids | dev | tsan | lto | arm | packages | fleet | wasm) parts+=("$1"); shift ;;
+    *) echo "unknown argument '$1' (known: --seconds N, fuzz, grids, dev, tsan, lto, arm, packages, fleet, wasm)" >&2; exit 2 ;;
   esac
 done
-[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages wasm)
+[ ${#parts[@]} -gt 0 ] || parts=(fuzz grids dev tsan lto arm packages fleet wasm)
 
 bash deploy/install_deps.sh clang libclang-rt-14-dev xvfb xauth glslang-tools glslc spirv-tools
 log="$(mktemp)"
@@ -48,6 +48,10 @@ run_part() {
       build release -DBUILD_TESTING=OFF && (cd build/release && rm -f packages/*.deb && cpack -G DEB >/dev/null) &&
         bash tests/packages/clean_root.sh build/release/packages build/packages &&
         bash tests/packages/container.sh build/release/packages build/packages
+      ;;
+    fleet)
+      bash deploy/install_deps.sh munge slurmctld slurmd slurm-client haproxy python3
+      build ci && bash deploy/fleet/try.sh --bin build/ci/bin
       ;;
     wasm)
       bash deploy/install_deps.sh emscripten esbuild nodejs dpkg-dev node-typescript chromium

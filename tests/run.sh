@@ -5,8 +5,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 # A display for the window test; checks of shaders; H.264, which only this build has (its x264 is GPL); what examples are
-# written in.
-bash deploy/install_deps.sh xvfb xauth glslang-tools glslc spirv-tools libavcodec-dev libavutil-dev python3 nodejs
+# written in; what leads viewers to sessions of a fleet.
+bash deploy/install_deps.sh xvfb xauth glslang-tools glslc spirv-tools libavcodec-dev libavutil-dev python3 nodejs haproxy
 cmake --preset ci >/dev/null
 cmake --build --preset ci
 echo "Grids of long tests: ${STRANDCAST_TEST_GRID:-small} (tests/support/test_grid.h)"

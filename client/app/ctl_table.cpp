@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/app/recording_commands.h"
+#include "client/app/script_command.h"
 
 namespace strandcast {
 namespace {
@@ -156,6 +157,13 @@ void declare_compare(CLI::App& app, CtlCommandLine& line) {
   app.add_option("other", line.other_recording, "And another")->required();
 }
 
+/// All that stands behind its name is the script's.
+void declare_script(CLI::App& app, CtlCommandLine& line) {
+  app.fallthrough(false);
+  app.prefix_command();
+  app.parse_complete_callback([&app, &line] { line.script_words = app.remaining(); });
+}
+
 // ---- functions ----
 
 int start_feed(const Line& line, const Stop& stop) {
@@ -237,6 +245,11 @@ constexpr CtlCommand kCommands[] = {
     {"latency", "Watch for a while, and say how long each part of the way takes", declare_latency,
      [](const Line& line, const Stop& stop) { return run_latency(line.target, line.latency, stop); }},
     {"test", "Carry out scenarios and check what they expect of a server", declare_test, start_test},
+    {"fleet", "Sessions on a cluster: fleet start NAME, list, stop NAME, drain NAME, tend, proxy-config", declare_script,
+     [](const Line& line, const Stop&) { return run_script("strandcast-fleet", line.script_words); }},
+    {"grid", "A report as an array of a cluster's jobs: grid work-precision --out FOLDER, grid stability --out FOLDER",
+     declare_script,
+     [](const Line& line, const Stop&) { return run_script("strandcast-grid", line.script_words); }},
     {"health", "Ask /healthz", nullptr,
      [](const Line& line, const Stop&) { return run_health(line.target); }},
 };

@@ -37,6 +37,7 @@ struct CtlCommandLine {
   ParameterOptions params;
   LatencyOptions latency;
   CameraOptions camera;
+  std::vector<std::string> script_words;  // of a command that is a script
 };
 
 struct CtlCommand {

@@ -145,7 +145,8 @@ Status run(CommandLine line) {
   const std::atomic<bool>& stop = catch_stop_signals();
   std::optional<Encryption> encryption;
   if (address.is_tls) encryption = Encryption{line.tls_authorities};
-  LoadViewers viewers({address.host, address.port, line.token, encryption, measured_step_ns()});
+  LoadViewers viewers(
+      {address.host, address.port, line.token, encryption, measured_step_ns(), address.folder()});
   RETURN_IF_ERROR(join_all(viewers, line));
   for (const int64_t begin_ns = now_ns();
        !stop && static_cast<double>(now_ns() - begin_ns) * 1e-9 < line.warm_up_s;)

@@ -52,7 +52,7 @@ class LoadViewers::State {
     Viewer viewer{.plan = plan,
                   .socket = std::move(socket),
                   .reader = {},
-                  .unsent = make_upgrade(config_.host, config_.port)};
+                  .unsent = make_upgrade(config_.host, config_.port, config_.folder)};
     viewers_.emplace(++last_number_, std::move(viewer));
     return last_number_;
   }

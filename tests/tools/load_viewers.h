@@ -38,7 +38,8 @@ struct LoadConfig {
   uint16_t port = 0;
   std::string token;
   std::optional<Encryption> encryption = std::nullopt;
-  double step_ns = 0.0;  // as in Hello; 0 = as viewers that cannot predict
+  double step_ns = 0.0;     // as in Hello; 0 = as viewers that cannot predict
+  std::string folder = {};  // as Address::folder()
 };
 
 /// Totals since the start or the last reset_measures(); the vectors hold one value per frame, within

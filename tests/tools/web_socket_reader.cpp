@@ -22,12 +22,12 @@ bool is_control_frame(uint8_t opcode) {
 
 }  // namespace
 
-std::vector<std::byte> make_upgrade(const std::string& host, uint16_t port) {
+std::vector<std::byte> make_upgrade(const std::string& host, uint16_t port, const std::string& folder) {
   const std::string request = fmt::format(
-      "GET /v1 HTTP/1.1\r\nHost: {}:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "GET {}/v1 HTTP/1.1\r\nHost: {}:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
       "Sec-WebSocket-Key: c3RyYW5kY2FzdC1sb2FkIQ==\r\nSec-WebSocket-Version: 13\r\n"
       "Sec-WebSocket-Protocol: {}\r\n\r\n",
-      host, port, kWebSocketProtocol);
+      folder, host, port, kWebSocketProtocol);
   const auto bytes = std::as_bytes(std::span(request));
   return {bytes.begin(), bytes.end()};
 }

@@ -15,7 +15,7 @@ namespace strandcast::load {
 enum class WebSocketOpcode : uint8_t { Binary = 0x2, Close = 0x8, Ping = 0x9, Pong = 0xa };
 
 /// The request to switch to WebSocket.
-std::vector<std::byte> make_upgrade(const std::string& host, uint16_t port);
+std::vector<std::byte> make_upgrade(const std::string& host, uint16_t port, const std::string& folder = {});
 
 /// A client's frame; the mask is zero, which the standard allows and which changes nothing.
 void append_frame(std::vector<std::byte>& out, WebSocketOpcode opcode, std::span<const std::byte> payload);
