@@ -1,5 +1,6 @@
 #include "server/relay/voices.h"
 
+#include <algorithm>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -69,6 +70,15 @@ UpstreamLink* Voices::find_or_open(SessionId session, const Hello& hello) {
   if (voice.link != nullptr) return voice.link.get();
   if (!is_new && now_ns() - voice.ended_ns < kSpeakAgainNs) return nullptr;
   const bool has_pictures = !hello.gets_no_stream;
+  if (count_open() >= kMaxVoices) {
+    voice.ended_ns = now_ns();
+    tell(session,
+         make_error(ErrorCode::Unavailable,
+                    "{} viewers of this relay say something or get pictures already: try again later",
+                    kMaxVoices),
+         has_pictures);
+    return nullptr;
+  }
   UpstreamLink::Hooks hooks;
   hooks.on_welcome = [](const Welcome&) { return Status(); };
   hooks.on_event = [this, session, has_pictures](ClientEvent event) {
@@ -117,9 +127,20 @@ void Voices::leave(SessionId session) {
 
 size_t Voices::count() const {
   const std::lock_guard lock(mutex_);
-  size_t count = 0;
-  for (const auto& [session, voice] : voices_) count += voice.link != nullptr ? 1 : 0;
-  return count;
+  return count_open();
+}
+
+size_t Voices::count_open() const {
+  return static_cast<size_t>(std::count_if(voices_.begin(), voices_.end(),
+                                           [](const auto& entry) { return entry.second.link != nullptr; }));
+}
+
+/// Who came for pictures has nothing else to stay for.
+void Voices::tell(SessionId session, const Error& error, bool has_pictures) {
+  if (has_pictures)
+    net_->close(session, close_code_for(error), error.to_string());
+  else
+    net_->send(session, Notice{true, error.to_string()});
 }
 
 void Voices::on_event(SessionId session, ClientEvent event) {
@@ -141,10 +162,7 @@ bool Voices::on_lost(SessionId session, const Error& error, bool has_pictures) {
   const auto found = voices_.find(session);
   if (found == voices_.end()) return false;
   end(found->second);
-  if (has_pictures)
-    net_->close(session, close_code_for(error), error.to_string());
-  else
-    net_->send(session, Notice{true, error.to_string()});
+  tell(session, error, has_pictures);
   return false;
 }
 

@@ -14,6 +14,8 @@
 
 namespace strandcast {
 
+/// At once: of the sessions that a server has for one address the relay's streams need some, too.
+inline constexpr size_t kMaxVoices = 40;
 /// After a refusal the next try for the same viewer comes no sooner.
 inline constexpr int64_t kSpeakAgainNs = 2'000'000'000;
 
@@ -47,6 +49,8 @@ class Voices {
   void on_event(SessionId session, ClientEvent event);
   bool on_lost(SessionId session, const Error& error, bool has_pictures);
   void end(Voice& voice);
+  size_t count_open() const;
+  void tell(SessionId session, const Error& error, bool has_pictures);
   void run();
 
   const UpstreamConfig config_;
