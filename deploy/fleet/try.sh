@@ -121,7 +121,7 @@ sleep $((seconds / 2 + 2))
 fleet list
 failed=
 for pid in "${loads[@]}"; do wait "$pid" || failed=1; done
-for name in one two; do echo "session $name:"; cat "$work/load_$name.log"; done
+for name in one two; do echo "session $name:"; grep -v '^server_' "$work/load_$name.log" || true; done
 echo "one is stopped, and the third gets its GPU:"
 fleet stop one
 for _ in $(seq 100); do fleet list | grep -q '^three .*ready$' && break; sleep 0.2; done
