@@ -32,6 +32,8 @@ pids=()
 stop_all() {
   trap - EXIT INT TERM
   for name in one two three; do fleet stop $name > /dev/null 2>&1 || true; done
+  # Slurm ends jobs; without it their last steps would wait for it.
+  for _ in $(seq 150); do [ -n "$(squeue --noheader 2> /dev/null)" ] || break; sleep 0.1; done
   for ((i = ${#pids[@]} - 1; i >= 0; --i)); do kill "${pids[i]}" 2> /dev/null || true; done
   for pid in "${pids[@]}"; do for _ in $(seq 100); do kill -0 "$pid" 2> /dev/null || break; sleep 0.1; done; done
   rm -rf "$work"
@@ -103,7 +105,7 @@ fleet proxy-config > "$work/haproxy.cfg"
 haproxy -db -f "$work/haproxy.cfg" > "$work/haproxy.log" 2>&1 &
 pids+=($!)
 wait_for HAProxy test -S "$work/haproxy.sock"
-fleet tend > "$work/tend.log" 2>&1 &
+python3 deploy/fleet/strandcast-fleet tend > "$work/tend.log" 2>&1 &
 pids+=($!)
 
 small=(--set groom.procedural.strand_count=500)
