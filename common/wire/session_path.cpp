@@ -14,9 +14,8 @@ bool is_letter_or_digit(char c) {
 
 bool is_session_name(std::string_view name) {
   return !name.empty() && name.size() <= kMaxSessionNameChars && is_letter_or_digit(name.front()) &&
-         std::all_of(name.begin(), name.end(), [](char c) {
-           return is_letter_or_digit(c) || c == '.' || c == '_' || c == '-';
-         });
+         std::all_of(name.begin(), name.end(),
+                     [](char c) { return is_letter_or_digit(c) || c == '.' || c == '_' || c == '-'; });
 }
 
 std::string_view without_session(std::string_view target) {

@@ -337,9 +337,9 @@ TEST(Address, ASessionBehindAProxyHasAFolder) {
 }
 
 TEST(Address, RefusesTheRestAndNamesIt) {
-  for (const char* text : {"host:", "host:0", "host:65536", "host:-1", "host:80x", "::1", "[::1", "[::1]80",
-                           "[::1]:", "a:b:c", "host:80/v1", "host:80/s/", "host:80/s/../v1", "host/s/a b",
-                           "host:80/s/a/b"}) {
+  for (const char* text :
+       {"host:", "host:0", "host:65536", "host:-1", "host:80x", "::1", "[::1", "[::1]80", "[::1]:", "a:b:c",
+        "host:80/v1", "host:80/s/", "host:80/s/../v1", "host/s/a b", "host:80/s/a/b"}) {
     const auto parsed = parse_address(text);
     ASSERT_FALSE(parsed) << text;
     EXPECT_EQ(parsed.error().code, ErrorCode::BadInput);
