@@ -90,7 +90,7 @@ def main():
     (work / "slurm/down").unlink()
     (work / "haproxy.cfg").write_text(fleet("proxy-config"))
     proxy = begin_proxy()
-    assert "run strandcast-fleet tend" in fleet("start", "early", *SMALL, expect=2)
+    assert "run strandcast-ctl fleet tend" in fleet("start", "early", *SMALL, expect=2)
     fleet("stop", "early")
     tender = begin([sys.executable, "-B", source / "deploy/fleet/strandcast-fleet", "tend"], "tend.log")
     until(lambda: "tending" in (work / "tend.log").read_text(), "one tends")
