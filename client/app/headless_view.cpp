@@ -165,10 +165,10 @@ class Collector {
   }
 
   /// Of every head.
-  bool has_pictures() {
-    return session().has_picture() && std::all_of(others_.begin(), others_.end(), [](const auto& other) {
-             return other->session().has_picture();
-           });
+  bool has_pictures() { return session().has_picture() && others_have_pictures(); }
+  bool others_have_pictures() {
+    return std::all_of(others_.begin(), others_.end(),
+                       [](const auto& other) { return other->session().has_picture(); });
   }
 
   bool is_complete() {
@@ -179,7 +179,9 @@ class Collector {
     return decoded_frames() >= options_.after_frames;
   }
 
+  /// States from before every head has come are passed over: a picture would lack one.
   void take(const std::shared_ptr<const Snapshot>& snapshot) {
+    if (!others_have_pictures()) return;
     if (!options_.clip.empty()) collected_.clip.add(snapshot);
     while (collected_.clip_others.size() < collected_.clip.snapshots().size())
       collected_.clip_others.push_back(newest_of_others());
