@@ -21,7 +21,7 @@ export PATH=$PATH:/usr/sbin:/sbin
 for program in munged slurmctld slurmd sbatch haproxy python3; do
   command -v $program > /dev/null || { echo "try.sh: $program is not installed: apt-get install munge slurmctld slurmd slurm-client haproxy python3" >&2; exit 2; }
 done
-for program in strandcast-server strandcast-ctl strandcast-load; do
+for program in strandcast-server strandcast-ctl strandcast-load strandcast-view; do
   [ -x "$bin/$program" ] || { echo "try.sh: no $program in $bin: build it, or say --bin FOLDER" >&2; exit 2; }
 done
 
@@ -124,6 +124,23 @@ fleet list
 failed=
 for pid in "${loads[@]}"; do wait "$pid" || failed=1; done
 for name in one two; do echo "session $name:"; grep -v '^server_' "$work/load_$name.log" || true; done
+echo "a relay of session two is killed, and its viewers come back by the other:"
+watches=()
+for number in 1 2; do
+  "$bin/strandcast-view" --connect "ws://127.0.0.1:$web/s/two" --token-file "$STRANDCAST_FLEET/sessions/two/viewer_token" \
+    --headless --mode strands --seconds 10 --trace "$work/seen_$number.csv" > "$work/view_$number.log" 2>&1 &
+  watches+=($!)
+done
+sleep 4
+scancel --full --signal=KILL "$(cat "$STRANDCAST_FLEET/sessions/two/relays/001/job")"
+for pid in "${watches[@]}"; do wait "$pid" || failed=1; done
+python3 - "$work"/seen_*.csv << 'PYTHON' || failed=1
+import csv, sys
+for path in sys.argv[1:]:
+    received = [int(row["received_ns"]) for row in csv.DictReader(open(path))]
+    waits = [(b - a) * 1e-9 for a, b in zip(received, received[1:])]
+    print(f"  {len(received)} frames of strands, at most {max(waits):.2f} s without one")
+PYTHON
 echo "one is stopped, and the third gets its GPU:"
 fleet stop one
 for _ in $(seq 100); do fleet list | grep -q '^three .*ready$' && break; sleep 0.2; done

@@ -2,6 +2,7 @@
 """The fleet (deploy/fleet) with real servers, a real HAProxy and a Slurm that is none: check.py SOURCE BIN.
 What a session goes through, and what is said where something is missing. nightly.sh fleet runs it with a real Slurm."""
 import contextlib
+import http.client
 import json
 import os
 import shutil
@@ -66,11 +67,14 @@ def until(is_so, what, seconds=30):
 
 
 def get(path):
+    """Status and text; status 0 where the connection ended without an answer, as when the server behind it has died."""
     try:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=5) as reply:
             return reply.status, reply.read().decode()
     except urllib.error.HTTPError as error:
         return error.code, error.read().decode()
+    except (OSError, http.client.HTTPException):
+        return 0, ""
 
 
 def row(name):
