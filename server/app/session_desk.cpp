@@ -10,7 +10,6 @@
 #include "common/log/log.h"
 #include "common/scene/scene_file.h"
 #include "server/app/mode_facts.h"
-#include "server/net/stream_list.h"
 
 namespace strandcast {
 namespace {
@@ -52,7 +51,8 @@ void SessionDesk::connect(NetServer& net) {
   teller_.connect(net);
   const auto tell_classes = [this](const std::vector<StrandClass>& classes, const std::string& reason) {
     teller_.change([&](StreamList& list) {
-      list.classes = listed_classes(classes);
+      list.classes = classes;
+      if (classes.size() > kMaxListedClasses) list.classes.resize(kMaxListedClasses);
       list.reason = reason;
     });
   };

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/wire/messages.h"
-
 namespace strandcast {
 namespace {
 

@@ -10,16 +10,12 @@
 
 #include "common/strands/frame_header.h"
 #include "common/strands/strand_codec.h"
+#include "common/wire/messages.h"
 
 namespace strandcast {
 
-struct StrandClass {
-  uint32_t rate_divisor = 1;  // every so many simulation steps
-  float strand_share = 1.0f;  // in (0, 1]: the first so many strands
-  uint32_t coarsening = 1;    // lattice steps per step of the published lattice
-  float bound_m = 1e-4f;      // announced Euclidean error
-  double frame_rate_hz = 60.0;
-};
+/// As relays are told of it.
+using StrandClass = StreamList::Class;
 
 /// Cheaper classes keep at least this rate,
 inline constexpr double kLeastFrameRateHz = 10.0;

@@ -7,7 +7,6 @@
 #include "common/base/thread_name.h"
 #include "common/log/log.h"
 #include "common/strands/strand_codec.h"
-#include "server/net/stream_list.h"
 
 namespace strandcast {
 namespace {
@@ -32,6 +31,11 @@ std::vector<StrandByteModel> byte_models(const std::vector<std::string>& codecs)
     models.push_back(info ? info->bytes : StrandByteModel{});
   }
   return models;
+}
+
+/// At least one, whatever the list says.
+std::vector<StrandClass> classes_of(const StreamList& list) {
+  return list.classes.empty() ? std::vector<StrandClass>(1) : list.classes;
 }
 
 }  // namespace
@@ -292,7 +296,7 @@ void Upstream::take_list(const StreamList& list) {
   const bool has_other_classes = list.classes != relayed_->streams.classes;
   next_.streams = list;
   tell_relayed();
-  if (has_other_classes) net_->set_strand_classes(strand_classes_of(list), list.reason, [] {});
+  if (has_other_classes) net_->set_strand_classes(classes_of(list), list.reason, [] {});
 }
 
 void Upstream::tell_relayed() {
@@ -328,7 +332,7 @@ void Upstream::begin_anew() {
   end_streams([](const Stream&) { return true; });
   demand_.clear();
   relayed_ = std::make_shared<const Relayed>(next_);
-  net_->begin_anew(strand_classes_of(next_.streams), byte_models(next_.streams.codecs),
+  net_->begin_anew(classes_of(next_.streams), byte_models(next_.streams.codecs),
                    "The server was started anew.",
                    [this, relayed = relayed_] { hooks_.on_relayed(relayed); });
 }
