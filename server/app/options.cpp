@@ -166,7 +166,8 @@ void add_relay_options(CLI::App& app, RawRunOptions& raw) {
       "file with the token that this relay gives there: the token alone, or lines 'role token'");
   add("--upstream-tls-ca", raw.of_upstream.tls_authorities,
       "certificates (PEM) to trust there; default: the system's");
-  add("--upstream-head", raw.of_upstream.head, "which of the heads there, by its name; default: the first");
+  add("--upstream-head", raw.of_upstream.head,
+      "pass on this head alone, by its name; default: all that are there");
 }
 
 Result<std::optional<UpstreamOptions>> upstream_of(const CLI::App& app, const RawRunOptions& raw) {

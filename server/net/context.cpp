@@ -131,10 +131,11 @@ std::optional<std::string> Context::key_of(SessionId id) const {
 }
 
 Result<size_t> Context::find_head(const std::string& name) const {
-  if (name.empty() || (heads.size() == 1 && heads.front().name.empty())) return size_t{0};
+  if (name.empty() || heads.front().name.empty()) return size_t{0};
   std::string known;
   for (size_t i = 0; i < heads.size(); ++i) {
     if (heads[i].name == name) return i;
+    if (heads[i].name.empty()) continue;
     known += (known.empty() ? "" : ", ") + heads[i].name;
   }
   return make_error(ErrorCode::NotFound, "There is no head called '{}' here (there are: {}).", name, known);
@@ -143,7 +144,7 @@ Result<size_t> Context::find_head(const std::string& name) const {
 Status Context::readiness() {
   for (Head& head : heads) {
     const Status status = head.handler.readiness();
-    if (!status) return heads.size() == 1 ? status : Status(at(head.name, status.error()));
+    if (!status) return heads.size() == 1 || head.name.empty() ? status : at(head.name, status.error());
   }
   return {};
 }

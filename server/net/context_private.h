@@ -69,7 +69,7 @@ struct Head {
   explicit Head(const NetHead& head)
       : name(head.name), handler(*head.handler), strands(head.strand_classes, head.strand_codecs) {}
 
-  const std::string name;
+  std::string name;
   NetHandler& handler;
   StrandCosts strands;
   PictureCosts pictures;
@@ -103,7 +103,7 @@ struct Context {
   bool kick(SessionId id);
   /// What counts as the address of a session; none when there is none of this number.
   std::optional<std::string> key_of(SessionId id) const;
-  /// Number of the head of this name, or of the first where the name is empty or the only head has none;
+  /// Number of the head of this name, or of the first where the name is empty or the first has none;
   /// NotFound says which there are.
   Result<size_t> find_head(const std::string& name) const;
   /// All of them are stepping, or why not.

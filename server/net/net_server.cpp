@@ -272,6 +272,12 @@ uint16_t NetServer::port() const {
   return state_->port;
 }
 
+void NetServer::name_head(size_t head, std::string name) {
+  net::asio::post(state_->context.io, [state = state_.get(), head, name = std::move(name)]() mutable {
+    state->context.heads[head].name = std::move(name);
+  });
+}
+
 void NetServer::publish_strands(EncodedFramePtr frame, size_t head) {
   net::asio::post(state_->context.io, [state = state_.get(), frame = std::move(frame), head] {
     state->context.heads[head].strands.note_frame(frame->header, frame->message.size(), now_ns());

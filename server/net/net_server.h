@@ -51,8 +51,7 @@ struct NetCounters {
 /// One of the heads that a server has: what a session is about from its Hello on. Its strands and its classes
 /// of pictures are numbered by themselves.
 struct NetHead {
-  std::string
-      name;  // that a Hello asks for; an only head without one is asked for by any, its handler judges
+  std::string name;  // that a Hello asks for; a first head without one is asked for by any, and judges itself
   NetHandler* handler = nullptr;                                     // outlives the server
   std::vector<StrandClass> strand_classes = {StrandClass{}};         // at first; best first
   std::vector<StrandByteModel> strand_codecs = {StrandByteModel{}};  // that each of them is served by
@@ -81,6 +80,8 @@ class NetServer {
   Status set_tokens(std::vector<AccessToken> tokens);
 
   // Each concerns the sessions of one head, by its number in `heads`.
+  /// Who joins from now on asks for it by this name; for one without a name, but the first, nobody can.
+  void name_head(size_t head, std::string name);
   /// Strand frames of one stream (a class by a codec) in the order of their chain. A delta goes to sessions
   /// of the stream whose last frame it builds on, a keyframe to those that wait for one.
   void publish_strands(EncodedFramePtr frame, size_t head = 0);

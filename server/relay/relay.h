@@ -1,11 +1,12 @@
-// Relay: passes the stream of another server, or relay, on to viewers of its own: no scene, no simulation.
-// Threads: the network's, one for what is got and one for who says something, and one for each session at the
-// server above. Several may live in one process.
+// Relay: passes the streams of another server, or relay, on to viewers of its own: no scene, no simulation.
+// Threads: the network's, for each head one for what is got, one for who says something, and one for each
+// session at the server above. Several may live in one process.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "server/relay/relay_desk.h"
 
@@ -27,29 +28,39 @@ class Relay {
   Relay& operator=(const Relay&) = delete;
 
   uint16_t port() const { return net_->port(); }
-  uint32_t viewer_count() const { return desk_.viewer_count(); }
-  UpstreamCounters counters() const { return upstream_.counters(); }
+  /// Of all heads, each counted.
+  uint32_t viewer_count() const;
+  UpstreamCounters counters() const;
   NetCounters net_counters() const { return net_->counters(); }
   /// As /readyz.
-  Status readiness() const { return upstream_.readiness(); }
+  Status readiness() const;
   /// As NetServer::reload_tls().
   Status reload_tls() { return net_->reload_tls(); }
   /// As NetServer::set_tokens().
   Status set_tokens(std::vector<AccessToken> tokens) { return net_->set_tokens(std::move(tokens)); }
   /// True once an admin has asked for the end.
-  bool is_shut_down_wanted() const { return desk_.is_shut_down_wanted(); }
+  bool is_shut_down_wanted() const;
   /// Why it cannot go on; nothing while all is well.
-  std::optional<Error> failure() const { return upstream_.failure(); }
+  std::optional<Error> failure() const { return heads_.front()->upstream.failure(); }
   void stop();
 
  private:
-  explicit Relay(const RelayConfig& config);
+  /// One head, or a place for one that the server above may have.
+  struct RelayedHead {
+    Upstream upstream;
+    RelayDesk desk;
 
-  const std::string id_;
+    RelayedHead(const UpstreamConfig& config, const RelayDeskParts& parts, size_t number)
+        : upstream(config, parts.id, number), desk(parts, upstream, number) {}
+  };
+
+  explicit Relay(const RelayConfig& config);
+  void follow_heads(const std::vector<std::string>& names);
+
+  const UpstreamConfig upstream_;
   // In the order in which each is used by those below it.
-  Upstream upstream_;
   Voices voices_;
-  RelayDesk desk_;
+  std::vector<std::unique_ptr<RelayedHead>> heads_;  // the first first
   std::unique_ptr<NetServer> net_;
 };
 

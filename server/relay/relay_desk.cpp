@@ -51,10 +51,12 @@ Status RelayDesk::check(const Hello& hello, const Relayed& relayed) const {
                       "This relay stands behind yours: relays must not stand in a ring.");
   if (!hello.relay_id.empty() && hello.strand_class >= relayed.streams.classes.size())
     return make_error(ErrorCode::Unavailable, "There is no class {} of strands now.", hello.strand_class);
-  if (!hello.head.empty() && hello.head != relayed.welcome.scene_name)
-    return make_error(ErrorCode::BadInput, "There is no head called '{}' here: this relay passes on '{}'.",
-                      hello.head, relayed.welcome.scene_name);
-  return {};
+  const auto& heads = relayed.welcome.heads;
+  if (hello.head.empty() || hello.head == relayed.welcome.scene_name) return {};
+  if (parts_.has_all_heads && std::find(heads.begin(), heads.end(), hello.head) != heads.end())
+    return make_error(ErrorCode::Unavailable, "Head '{}' has not come here yet: try again.", hello.head);
+  return make_error(ErrorCode::BadInput, "There is no head called '{}' here: this relay passes on '{}'.",
+                    hello.head, relayed.welcome.scene_name);
 }
 
 SimulatedModel RelayDesk::model(const Relayed& relayed) const {
@@ -64,7 +66,7 @@ SimulatedModel RelayDesk::model(const Relayed& relayed) const {
 }
 
 Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello) {
-  if (hello.relay_id == id_)
+  if (hello.relay_id == parts_.id)
     return make_error(ErrorCode::BadInput,
                       "This relay stands behind itself: its --upstream must be another server.");
   RETURN_IF_ERROR(upstream_.connected());
@@ -76,13 +78,15 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
         CodecDesk::Served{codecs_of(relayed->streams),
                           size_t{relayed->welcome.strand_count} * size_t{relayed->welcome.vertex_count},
                           relayed->welcome.step_rate_hz});
+  Hello viewer = hello;
+  viewer.head = upstream_.head();  // as the server above knows it
   Subscription& subscription = visitor.subscription;
   const ViewerCodec codec = codecs_->admit(visitor.session, hello, model(*relayed));
   subscription.strands.codec = codec.codec;
   Admission admission{relayed->welcome, nullptr};
   Welcome& welcome = admission.welcome;
-  welcome.relays.push_back(id_);
-  welcome.heads.clear();
+  welcome.relays.push_back(parts_.id);
+  if (!parts_.has_all_heads) welcome.heads.clear();
   welcome.codec = relayed->streams.codecs[codec.codec];
   welcome.codec_reason = codec.reason;
   welcome.mode_reason = "strands: a relay passes them on to everybody";
@@ -94,7 +98,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     if (hello.frame_width > 0) welcome.frame_width = hello.frame_width;
     if (hello.frame_height > 0) welcome.frame_height = hello.frame_height;
     welcome.mode_reason = "frames were asked for, and come through a relay";
-    voices_.open_pictures(visitor.session, hello);
+    parts_.voices.open_pictures(visitor.session, viewer, number_);
   } else {
     admission.asset = relayed->asset;
   }
@@ -102,7 +106,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
     subscription.strands.strand_class = hello.strand_class;
     teller_.add(visitor.session);
   }
-  leaves_[visitor.session] = {hello, &subscription, {}, false};
+  leaves_[visitor.session] = {viewer, &subscription, {}, false};
   follow_demand();
   if (!hello.keeps_camera && subscription.gets(StreamMode::Strands)) {
     const std::lock_guard lock(mutex_);
@@ -113,7 +117,7 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
 
 void RelayDesk::say(SessionId session, const ClientMessage& message) {
   const auto found = leaves_.find(session);
-  if (found != leaves_.end()) voices_.say(session, found->second.hello, message);
+  if (found != leaves_.end()) parts_.voices.say(session, found->second.hello, message);
 }
 
 /// Of viewers of pictures; the others draw by themselves.
@@ -170,12 +174,12 @@ void RelayDesk::on_left(SessionId session) {
   leaves_.erase(session);
   teller_.remove(session);
   if (codecs_) codecs_->remove(session);
-  voices_.leave(session);
+  parts_.voices.leave(session);
   follow_demand();
 }
 
 std::string RelayDesk::metrics() {
-  const UpstreamCounters counters = upstream_.counters();
+  const UpstreamCounters counters = parts_.counters();
   const auto total = [](std::string_view name, const char* help, uint64_t value) {
     return format_metric(name, "counter", help, static_cast<double>(value));
   };
@@ -190,7 +194,7 @@ std::string RelayDesk::metrics() {
          now("relay_upstream_sessions",
              "Its sessions at the server above: those, and one for each viewer "
              "that says something or gets pictures.",
-             static_cast<double>(counters.streams + voices_.count())) +
+             static_cast<double>(counters.streams + parts_.voices.count())) +
          total("relay_received_bytes_total", "Payload of the streams.", counters.received_bytes) +
          total("relay_frames_total", "Strand frames passed on.", counters.frames) +
          total("relay_keyframes_total", "Keyframes among them.", counters.keyframes) +

@@ -1,8 +1,9 @@
-// RelayDesk: what a relay does with its sessions: lets them in as the server above would, says which streams
-// they need, and passes on what they say. Network thread, unless said otherwise.
+// RelayDesk: what a relay does with the sessions of one head: lets them in as the server above would, says
+// which streams they need, and passes on what they say. Network thread, unless said otherwise.
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -17,11 +18,19 @@
 
 namespace strandcast {
 
+/// What the desks of one relay have in common; all outlives the sessions.
+struct RelayDeskParts {
+  std::string id;             // the relay's own
+  bool has_all_heads = true;  // or one alone
+  Voices& voices;
+  std::function<UpstreamCounters()> counters;  // of all heads
+};
+
 class RelayDesk : public NetHandler {
  public:
-  /// `id`: the relay's own. The others outlive the sessions.
-  RelayDesk(std::string id, Upstream& upstream, Voices& voices)
-      : id_(std::move(id)), upstream_(upstream), voices_(voices) {}
+  /// `number`: of the head, as NetServer has it. `upstream` outlives the sessions.
+  RelayDesk(RelayDeskParts parts, Upstream& upstream, size_t number)
+      : parts_(std::move(parts)), upstream_(upstream), number_(number) {}
 
   /// Before `net` starts; it outlives the sessions.
   void connect(NetServer& net);
@@ -53,7 +62,9 @@ class RelayDesk : public NetHandler {
     upstream_.join(session, stream_id);
   }
   void on_anchor_request(SessionId, uint16_t stream_id) override { upstream_.request_keyframe(stream_id); }
-  void on_picture_request(SessionId session, PictureClass) override { voices_.request_picture(session); }
+  void on_picture_request(SessionId session, PictureClass) override {
+    parts_.voices.request_picture(session);
+  }
   void on_strand_class(SessionId) override { follow_demand(); }
   void on_report(SessionId session, const ViewerReport& report) override;
   void on_mode_request(SessionId session, const ModeRequest&) override;
@@ -75,9 +86,9 @@ class RelayDesk : public NetHandler {
   void say(SessionId session, const ClientMessage& message);
   void follow_demand();
 
-  const std::string id_;
+  const RelayDeskParts parts_;
   Upstream& upstream_;
-  Voices& voices_;
+  const size_t number_;
   NetServer* net_ = nullptr;
   StreamTeller teller_;
   std::map<SessionId, Leaf> leaves_;

@@ -40,12 +40,18 @@ std::vector<StrandClass> classes_of(const StreamList& list) {
 
 }  // namespace
 
-void Upstream::start(NetServer& net, Hooks hooks) {
+UpstreamCounters& UpstreamCounters::operator+=(const UpstreamCounters& other) {
+  for (const auto field :
+       {&UpstreamCounters::streams, &UpstreamCounters::keyframes_asked, &UpstreamCounters::joins_from_chain,
+        &UpstreamCounters::reconnects, &UpstreamCounters::received_bytes, &UpstreamCounters::frames,
+        &UpstreamCounters::keyframes})
+    this->*field += other.*field;
+  return *this;
+}
+
+void Upstream::connect(NetServer& net, Hooks hooks) {
   net_ = &net;
   hooks_ = std::move(hooks);
-  const std::lock_guard lock(mutex_);
-  open_stream(kFirstStream);
-  thread_ = std::thread([this] { run(); });
 }
 
 void Upstream::stop() {
@@ -62,12 +68,12 @@ void Upstream::stop() {
   for (const auto& link : links) link->begin_stop();
 }
 
-/// Those of which this is true, but for the first; their threads are waited for later.
+/// Those of which this is true; their threads are waited for later.
 template <class IsOver>
 void Upstream::end_streams(IsOver is_over) {
   for (auto entry = streams_.begin(); entry != streams_.end();) {
     Stream& stream = entry->second;
-    if (entry->first == kFirstStream || !is_over(stream)) {
+    if (!is_over(*entry)) {
       ++entry;
       continue;
     }
@@ -76,6 +82,37 @@ void Upstream::end_streams(IsOver is_over) {
     ended_.push_back(std::move(stream.link));
     entry = streams_.erase(entry);
   }
+}
+
+// ---- of which head ----
+
+void Upstream::follow(const std::string& head) {
+  const std::lock_guard lock(mutex_);
+  if (is_stopping_ || (head_ == head && !failure_)) return;
+  leave_server();
+  failure_.reset();
+  head_ = head;
+  open_stream(kFirstStream);
+  if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+}
+
+void Upstream::rest() {
+  const std::lock_guard lock(mutex_);
+  if (!head_) return;
+  leave_server();
+  failure_.reset();
+  head_.reset();
+  net_->begin_anew(
+      std::vector<StrandClass>(1), std::vector<StrandByteModel>(1), "The server has no such head any more.",
+      [] {}, number_);
+}
+
+void Upstream::leave_server() {
+  end_streams([](const auto&) { return true; });
+  is_connected_ = false;
+  trouble_.reset();
+  welcome_ns_ = 0;
+  next_ = {};
 }
 
 // ---- what is needed ----
@@ -112,7 +149,9 @@ void Upstream::follow_demand(int64_t time_ns) {
     if (!streams_.contains(stream_id)) open_stream(stream_id);
     streams_[stream_id].needed_ns = time_ns;
   }
-  end_streams([&](const Stream& stream) { return time_ns - stream.needed_ns >= kUnneededStreamNs; });
+  end_streams([&](const auto& entry) {
+    return entry.first != kFirstStream && time_ns - entry.second.needed_ns >= kUnneededStreamNs;
+  });
 }
 
 /// Viewers measure the clock that frames are stamped with: that of the server above.
@@ -120,6 +159,7 @@ void Upstream::follow_clock() {
   const auto first = streams_.find(kFirstStream);
   if (first == streams_.end()) return;
   const ClockOffset clock = first->second.link->clock();
+  if (number_ > 0) return;  // all heads there have the clock of the first
   if (!clock.has_value() || clock.offset_ns() == clock_offset_ns_) return;
   clock_offset_ns_ = clock.offset_ns();
   net_->set_clock_offset(clock_offset_ns_);
@@ -142,6 +182,7 @@ Hello Upstream::hello_for(uint16_t stream_id) const {
   hello.name = "relay";
   hello.token = config_.token;
   hello.relay_id = id_;
+  hello.head = head_.value_or(std::string());
   hello.strand_class = static_cast<uint32_t>(stream.strand_class);
   if (stream.codec > 0) hello.codec_wish = relayed_->streams.codecs[stream.codec];
   return hello;
@@ -205,10 +246,12 @@ bool Upstream::on_lost(const StreamKey& key, const Error& error) {
     failure_ = error;
     return false;
   }
-  log_warn("relay", "{}; trying again", error.to_string());
+  // All heads have one server.
+  log_line(number_ == 0 ? LogLevel::Warn : LogLevel::Debug, "relay", error.to_string() + "; trying again");
   if (was_connected && !std::exchange(was_away_, true))
     net_->broadcast(
-        Notice{true, fmt::format("The server is away; this relay tries again: {}", error.to_string())});
+        Notice{true, fmt::format("The server is away; this relay tries again: {}", error.to_string())},
+        number_);
   return true;
 }
 
@@ -240,7 +283,7 @@ void Upstream::on_frame(Stream& stream, MediaEvent media) {
   if (stream.chain.wants_keyframe()) ask(stream);
   if (!is_of_now(stream)) return;
   newest_frame_ns_ = time_ns;
-  net_->publish_strands(frame);
+  net_->publish_strands(frame, number_);
 }
 
 void Upstream::ask(Stream& stream) {
@@ -278,14 +321,14 @@ void Upstream::on_first_event(ClientEvent event) {
     begin_if_complete();
   } else if (auto* status = std::get_if<ServerStatus>(&event)) {
     status_ = std::move(*status);
-    net_->broadcast(status_);
+    net_->broadcast(status_, number_);
   } else if (auto* look = std::get_if<LookChange>(&event)) {
     next_.welcome.look = look->look;
     next_.welcome.camera = look->camera;
     if (is_connected_) tell_relayed();
-    net_->broadcast(std::move(*look));
+    net_->broadcast(std::move(*look), number_);
   } else if (auto* notice = std::get_if<Notice>(&event)) {
-    net_->broadcast(std::move(*notice));
+    net_->broadcast(std::move(*notice), number_);
   } else if (const auto* camera = std::get_if<CameraChange>(&event)) {
     hooks_.on_camera(*camera);
   }
@@ -296,7 +339,9 @@ void Upstream::take_list(const StreamList& list) {
   const bool has_other_classes = list.classes != relayed_->streams.classes;
   next_.streams = list;
   tell_relayed();
-  if (has_other_classes) net_->set_strand_classes(classes_of(list), list.reason, [] {});
+  if (has_other_classes)
+    net_->set_strand_classes(
+        classes_of(list), list.reason, [] {}, number_);
 }
 
 void Upstream::tell_relayed() {
@@ -312,6 +357,7 @@ void Upstream::begin_if_complete() {
   if (is_connected_ || !is_complete) return;
   if (next_.streams.codecs.size() > kMaxServedCodecs) next_.streams.codecs.resize(kMaxServedCodecs);
   follow_clock();
+  hooks_.on_heads(next_.welcome.heads);
   is_connected_ = true;
   trouble_.reset();
   newest_frame_ns_ = now_ns();
@@ -320,7 +366,7 @@ void Upstream::begin_if_complete() {
   log_info("relay", "{} is back", server());
   take_list(next_.streams);
   tell_relayed();
-  if (std::exchange(was_away_, false)) net_->broadcast(Notice{false, "The server is back."});
+  if (std::exchange(was_away_, false)) net_->broadcast(Notice{false, "The server is back."}, number_);
 }
 
 /// Another server, or the same one started anew: nothing of before is of use to anybody.
@@ -329,12 +375,12 @@ void Upstream::begin_anew() {
   log_info("relay", "relaying '{}' of {}, {} strands by {}", next_.welcome.scene_name, server(),
            next_.welcome.strand_count, next_.welcome.codec);
   was_away_ = false;
-  end_streams([](const Stream&) { return true; });
+  end_streams([](const auto& entry) { return entry.first != kFirstStream; });
   demand_.clear();
   relayed_ = std::make_shared<const Relayed>(next_);
-  net_->begin_anew(classes_of(next_.streams), byte_models(next_.streams.codecs),
-                   "The server was started anew.",
-                   [this, relayed = relayed_] { hooks_.on_relayed(relayed); });
+  net_->begin_anew(
+      classes_of(next_.streams), byte_models(next_.streams.codecs), "The server was started anew.",
+      [this, relayed = relayed_] { hooks_.on_relayed(relayed); }, number_);
 }
 
 // ---- how it goes ----
@@ -352,6 +398,11 @@ UpstreamCounters Upstream::counters() const {
   return counters;
 }
 
+std::string Upstream::head() const {
+  const std::lock_guard lock(mutex_);
+  return head_.value_or(std::string());
+}
+
 Status Upstream::connected() const {
   const std::lock_guard lock(mutex_);
   if (is_connected_) return {};
@@ -361,6 +412,7 @@ Status Upstream::connected() const {
 Status Upstream::readiness() const {
   Status status = connected();
   const std::lock_guard lock(mutex_);
+  if (!head_) return {};
   if (!status && trouble_)
     return make_error(ErrorCode::Unavailable, "This relay has no connection to its server: {}",
                       trouble_->to_string());

@@ -1,6 +1,6 @@
-// Upstream: what a relay gets of the server that it stands in for, for all of its viewers: the streams of
-// strands that they need, each with its chain for those who join, and what all are told. Any thread; nothing
-// waits for the network.
+// Upstream: what a relay gets of one head of the server that it stands in for, for all of its viewers: the
+// streams of strands that they need, each with its chain for those who join, and what all are told. Any
+// thread; nothing waits for the network.
 #pragma once
 
 #include <condition_variable>
@@ -41,6 +41,8 @@ struct UpstreamCounters {
   uint64_t received_bytes = 0;
   uint64_t frames = 0;  // of strands, keyframes too
   uint64_t keyframes = 0;
+
+  UpstreamCounters& operator+=(const UpstreamCounters& other);
 };
 
 class Upstream {
@@ -48,16 +50,24 @@ class Upstream {
   struct Hooks {
     std::function<void(RelayedPtr)> on_relayed;          // what there is now
     std::function<void(const CameraChange&)> on_camera;  // where all viewers are to look from
+    /// The heads that there are, before a viewer is let in; under this one's lock.
+    std::function<void(const std::vector<std::string>&)> on_heads;
   };
-  /// `id`: the relay's own.
-  Upstream(UpstreamConfig config, std::string id) : config_(std::move(config)), id_(std::move(id)) {}
+  /// `id`: the relay's own; `number`: of the head that its viewers have joined.
+  Upstream(UpstreamConfig config, std::string id, size_t number)
+      : config_(std::move(config)), id_(std::move(id)), number_(number) {}
   /// stop(), if it was not called.
   ~Upstream() { stop(); }
   Upstream(const Upstream&) = delete;
   Upstream& operator=(const Upstream&) = delete;
 
-  /// Tries to connect, again and again. `net` outlives stop().
-  void start(NetServer& net, Hooks hooks);
+  /// Before follow(). `net` outlives stop().
+  void connect(NetServer& net, Hooks hooks);
+  /// Gets the head of this name there from now on, the first for an empty one: tries to connect, again and
+  /// again.
+  void follow(const std::string& head);
+  /// Gets nothing any more, and those who are there go.
+  void rest();
   /// Not on the network thread.
   void stop();
 
@@ -70,9 +80,11 @@ class Upstream {
   /// The newest; nothing before the first.
   ServerStatus status() const;
   UpstreamCounters counters() const;
+  /// What is followed, as follow() had it.
+  std::string head() const;
   /// Whether viewers can be let in, or why not.
   Status connected() const;
-  /// And frames come.
+  /// And frames come, where any are wanted.
   Status readiness() const;
   /// Why it gave up; nothing while all is well.
   std::optional<Error> failure() const;
@@ -106,6 +118,7 @@ class Upstream {
   void take_list(const StreamList& list);
   void begin_if_complete();
   void begin_anew();
+  void leave_server();
   void tell_relayed();
   void ask(Stream& stream);
   bool is_of_now(const Stream& stream) const;
@@ -118,14 +131,16 @@ class Upstream {
 
   const UpstreamConfig config_;
   const std::string id_;
+  const size_t number_;
   NetServer* net_ = nullptr;
   Hooks hooks_;
 
   mutable std::mutex mutex_;  // guards all below; never held while a link ends
   std::condition_variable changed_;
   bool is_stopping_ = false;
-  bool is_connected_ = false;  // class 0
-  bool was_away_ = false;      // and viewers were told
+  std::optional<std::string> head_;  // nothing: it rests
+  bool is_connected_ = false;        // class 0
+  bool was_away_ = false;            // and viewers were told
   std::optional<Error> trouble_;
   std::optional<Error> failure_;
   Relayed next_;        // as far as it has come

@@ -21,7 +21,6 @@ ClientConfig client_config_for(const UpstreamConfig& config, const Hello& hello)
   client.address = config.address;
   client.tls_authorities = config.tls_authorities;
   client.hello = hello;
-  client.hello.head = config.head;
   return client;
 }
 

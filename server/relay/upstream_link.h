@@ -22,7 +22,7 @@ struct UpstreamConfig {
   Address address;
   std::filesystem::path tls_authorities;  // as in ClientConfig
   std::string token;                      // of the relay itself
-  std::string head;                       // of those there; empty = the first
+  std::string head;                       // the only one that is passed on; empty = all that are there
 };
 ClientConfig client_config_for(const UpstreamConfig& config, const Hello& hello);
 /// Whether the server will say the same whenever it is asked.

@@ -63,7 +63,7 @@ void Voices::end(Voice& voice) {
 }
 
 /// Null while it is not tried again.
-UpstreamLink* Voices::find_or_open(SessionId session, const Hello& hello) {
+UpstreamLink* Voices::find_or_open(SessionId session, const Hello& hello, size_t head) {
   if (is_stopping_) return nullptr;
   const auto [found, is_new] = voices_.try_emplace(session);
   Voice& voice = found->second;
@@ -81,11 +81,11 @@ UpstreamLink* Voices::find_or_open(SessionId session, const Hello& hello) {
   }
   UpstreamLink::Hooks hooks;
   hooks.on_welcome = [](const Welcome&) { return Status(); };
-  hooks.on_event = [this, session, has_pictures](ClientEvent event) {
+  hooks.on_event = [this, session, head, has_pictures](ClientEvent event) {
     // When which sample could be seen in pictures stands in the status of their session.
     if (const auto* status = std::get_if<ServerStatus>(&event); status != nullptr && has_pictures)
       net_->send(session, *status);
-    on_event(session, std::move(event));
+    on_event(session, head, std::move(event));
   };
   hooks.on_lost = [this, session, has_pictures](const Error& error) {
     return on_lost(session, error, has_pictures);
@@ -99,16 +99,17 @@ void Voices::say(SessionId session, const Hello& viewer, const ClientMessage& me
   hello.role = viewer.role;
   hello.name = viewer.name;
   hello.token = viewer.token;
+  hello.head = viewer.head;
   hello.gets_no_stream = true;
   const std::lock_guard lock(mutex_);
-  if (UpstreamLink* link = find_or_open(session, hello)) link->send(message);
+  if (UpstreamLink* link = find_or_open(session, hello, 0)) link->send(message);
 }
 
-void Voices::open_pictures(SessionId session, const Hello& viewer) {
+void Voices::open_pictures(SessionId session, const Hello& viewer, size_t head) {
   Hello hello = viewer;
   hello.acknowledges = false;
   const std::lock_guard lock(mutex_);
-  (void)find_or_open(session, hello);
+  (void)find_or_open(session, hello, head);
 }
 
 void Voices::request_picture(SessionId session) {
@@ -143,11 +144,12 @@ void Voices::tell(SessionId session, const Error& error, bool has_pictures) {
     net_->send(session, Notice{true, error.to_string()});
 }
 
-void Voices::on_event(SessionId session, ClientEvent event) {
+void Voices::on_event(SessionId session, size_t head, ClientEvent event) {
   if (auto* media = std::get_if<MediaEvent>(&event)) {
     const Opcode opcode = media->header.opcode;
     if (is_chained_picture(opcode) || opcode == Opcode::JpegFrame)
-      net_->publish_picture(static_cast<PictureClass>(session), make_picture(frame_of(std::move(*media))));
+      net_->publish_picture(static_cast<PictureClass>(session), make_picture(frame_of(std::move(*media))),
+                            head);
     return;
   }
   std::visit(

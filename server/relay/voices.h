@@ -34,8 +34,8 @@ class Voices {
 
   /// What is answered goes to this viewer alone.
   void say(SessionId session, const Hello& viewer, const ClientMessage& message);
-  /// Pictures for this viewer, in the class that has its number.
-  void open_pictures(SessionId session, const Hello& viewer);
+  /// Pictures for this viewer, in the class that has its number; `head`: the number of the one it has joined.
+  void open_pictures(SessionId session, const Hello& viewer, size_t head);
   void request_picture(SessionId session);
   void leave(SessionId session);
   size_t count() const;
@@ -45,8 +45,8 @@ class Voices {
     std::unique_ptr<UpstreamLink> link;  // null: it was refused, or lost
     int64_t ended_ns = 0;
   };
-  UpstreamLink* find_or_open(SessionId session, const Hello& hello);
-  void on_event(SessionId session, ClientEvent event);
+  UpstreamLink* find_or_open(SessionId session, const Hello& hello, size_t head);
+  void on_event(SessionId session, size_t head, ClientEvent event);
   bool on_lost(SessionId session, const Error& error, bool has_pictures);
   void end(Voice& voice);
   size_t count_open() const;

@@ -51,8 +51,10 @@ class Relays : public test::ServerFixture {
     return server_ != nullptr;
   }
   /// Once it has its server, unless that is not there.
-  std::unique_ptr<Relay> relay_of(uint16_t upstream, const std::string& token = {}, bool waits = true) {
+  std::unique_ptr<Relay> relay_of(uint16_t upstream, const std::string& token = {}, bool waits = true,
+                                  const std::string& head = {}) {
     RelayConfig config;
+    config.upstream.head = head;
     config.net.port = 0;
     config.upstream.address = {"127.0.0.1", upstream};
     config.upstream.token = token;
@@ -82,6 +84,11 @@ class Relays : public test::ServerFixture {
   std::unique_ptr<Leaf> leaf_of(uint16_t port) { return leaf_of(at_port(port)); }
   ClientConfig at_port(uint16_t port, Role role = Role::Viewer) const {
     return client_config(StreamMode::Strands, role, port);
+  }
+  ClientConfig of_head(const std::string& head, uint16_t port, Role role = Role::Viewer) const {
+    ClientConfig config = at_port(port, role);
+    config.hello.head = head;
+    return config;
   }
   HashOfTick published() {
     const std::lock_guard lock(mutex_);
@@ -293,6 +300,102 @@ TEST_F(Relays, AServerThatWasStartedAnewIsFoundAgain) {
   }));
   EXPECT_EQ((*leaf)->session().welcome().strand_count, 200u);
   EXPECT_EQ(relay->counters().reconnects, 1u);
+}
+
+constexpr uint32_t kAnnasStrands = 120;
+constexpr uint32_t kBensStrands = 200;
+
+/// A head beside others, whose states are sent as they are published.
+SceneDesc head_called(const std::string& name, uint32_t strand_count) {
+  SceneDesc scene = test::bald_scene(strand_count, 10);
+  scene.name = name;
+  scene.stream.codec = "delta";
+  scene.stream.has_codec = true;
+  scene.stream.bound_m = kCoarsestBoundM;
+  return scene;
+}
+SceneDesc two_heads(const std::string& second = "ben") {
+  SceneDesc scene = head_called("anna", kAnnasStrands);
+  scene.heads = {head_called(second, kBensStrands)};
+  return scene;
+}
+
+TEST_F(Relays, AllHeadsComeThrough) {
+  if (!begin(two_heads())) return;
+  const auto relay = relay_of(server_->port());
+  ASSERT_NE(relay, nullptr);
+  const std::map<std::string, uint32_t> strands_of = {{"anna", kAnnasStrands}, {"ben", kBensStrands}};
+  for (const auto& [head, strands] : strands_of) {
+    const auto direct = leaf_of(of_head(head, server_->port()));
+    const auto relayed = leaf_of(of_head(head, relay->port()));
+    ASSERT_NE(direct, nullptr);
+    ASSERT_NE(relayed, nullptr);
+    const Welcome& welcome = relayed->session->welcome();
+    EXPECT_EQ(welcome.scene_name, head);
+    EXPECT_EQ(welcome.strand_count, strands);
+    EXPECT_THAT(welcome.heads, testing::ElementsAre("anna", "ben"));
+    ASSERT_TRUE(pump_until({direct->session.get(), relayed->session.get()},
+                           [&] { return count_equal(direct->seen, relayed->seen) >= 30; }));
+    EXPECT_EQ(count_other(direct->seen, relayed->seen), 0u) << head;
+  }
+  // What is said of one head is said to it, and its pictures come to whoever asked for them.
+  ClientConfig config = of_head("ben", relay->port(), Role::Controller);
+  config.hello.gets_no_stream = true;
+  const auto controller = ViewerClient::connect(config);
+  ASSERT_TRUE(controller) << controller.error().to_string();
+  ASSERT_TRUE((*controller)->send(SetParameter{"look.hair_color=red"}));
+  EXPECT_TRUE(eventually([&] { return server_->hub(1).look().look.hair_color == "red"; }));
+  EXPECT_NE(server_->hub(0).look().look.hair_color, "red");
+  ClientConfig of_pictures = of_head("ben", relay->port());
+  of_pictures.hello.mode = StreamMode::Frames;
+  const auto pictures = open(of_pictures);
+  ASSERT_NE(pictures, nullptr);
+  EXPECT_TRUE(pump_until({pictures.get()}, [&] { return pictures->image_count() > 2; }));
+  const auto stranger = ViewerClient::connect(of_head("carl", relay->port()));
+  ASSERT_FALSE(stranger);
+  EXPECT_THAT(stranger.error().to_string(),
+              AllOf(HasSubstr("no head called 'carl'"), HasSubstr("anna, ben")));
+}
+
+TEST_F(Relays, OneHeadAloneWhereOneWasNamed) {
+  if (!begin(two_heads())) return;
+  const auto relay = relay_of(server_->port(), {}, true, "ben");
+  ASSERT_NE(relay, nullptr);
+  const auto leaf = leaf_of(relay->port());
+  ASSERT_NE(leaf, nullptr);
+  EXPECT_EQ(leaf->session->welcome().strand_count, kBensStrands);
+  EXPECT_THAT(leaf->session->welcome().heads, testing::IsEmpty());
+  const auto stranger = ViewerClient::connect(of_head("anna", relay->port()));
+  ASSERT_FALSE(stranger);
+  EXPECT_THAT(stranger.error().to_string(), HasSubstr("this relay passes on 'ben'"));
+}
+
+TEST_F(Relays, HeadsThatComeAndGoAreFollowed) {
+  if (!begin(two_heads())) return;
+  const uint16_t port = server_->port();
+  const auto relay = relay_of(port);
+  ASSERT_NE(relay, nullptr);
+  auto of_ben = LiveConnection::open(of_head("ben", relay->port()));
+  ASSERT_TRUE(of_ben) << of_ben.error().to_string();
+  const auto start_anew = [&](SceneDesc scene) {
+    server_->stop();
+    server_.reset();
+    ASSERT_TRUE(eventually([&] { return !relay->readiness().ok(); }));
+    ASSERT_TRUE(begin(std::move(scene), port));
+    ASSERT_TRUE(eventually([&] { return relay->readiness().ok(); }));
+  };
+  start_anew(head_called("anna", kAnnasStrands));
+  // Who is there hears that the head is gone, and does not try for ever.
+  ASSERT_TRUE(eventually([&] {
+    (*of_ben)->pump(milliseconds(5));
+    return (*of_ben)->final_error().has_value();
+  }));
+  EXPECT_THAT((*of_ben)->final_error()->to_string(), HasSubstr("no head called 'ben'"));
+  start_anew(two_heads("carl"));
+  const auto of_carl = leaf_of(of_head("carl", relay->port()));
+  ASSERT_NE(of_carl, nullptr);
+  EXPECT_TRUE(pump_until({of_carl->session.get()}, [&] { return of_carl->seen.size() > 10; }));
+  EXPECT_EQ(of_carl->session->welcome().strand_count, kBensStrands);
 }
 
 TEST_F(Relays, ViewersOfOneThatComesLateWait) {
