@@ -281,6 +281,31 @@ check('tiles', () => {
   }
 });
 
+check('colours of tiles', () => {
+  // ITU-T T.871, 7; rounding twice may be one level away.
+  const [luma, blue, red] = [(x, y) => (7 * x + 3 * y) & 255, (x, y) => (40 + 11 * x + 5 * y) & 255, (x, y) => (200 + 3 * x + 13 * y) & 255];
+  for (const isHalved of [false, true]) {
+    const side = isHalved ? 32 : 64;
+    const chroma = side * 2 * side; // two tiles
+    const data = new Uint8Array(2 * 64 * 64 + 2 * chroma);
+    for (let y = 0; y < 128; ++y) for (let x = 0; x < 64; ++x) data[64 * y + x] = luma(x, y);
+    for (let y = 0; y < 2 * side; ++y) for (let x = 0; x < side; ++x) {
+      data[8192 + side * y + x] = blue(x, y);
+      data[8192 + chroma + side * y + x] = red(x, y);
+    }
+    const places = [{ offset: 0, stride: 64 }, { offset: 8192, stride: side }, { offset: 8192 + chroma, stride: side }];
+    const out = new Uint32Array(64 * 64);
+    page.rgbaOfTile({ data, places, isHalved }, 1, out);
+    const bytes = new Uint8Array(out.buffer);
+    for (let y = 0; y < 64; ++y) for (let x = 0; x < 64; ++x) {
+      const at = isHalved ? [x >> 1, (64 + y) >> 1] : [x, 64 + y];
+      const [light, cb, cr] = [luma(x, 64 + y), blue(...at) - 128, red(...at) - 128];
+      const expected = [light + 1.402 * cr, light - 0.344136 * cb - 0.714136 * cr, light + 1.772 * cb, 255];
+      expected.forEach((value, c) => assert.ok(Math.abs(Math.min(Math.max(value, 0), 255) - bytes[4 * (64 * y + x) + c]) <= 1, `${x} ${y} ${c}`));
+    }
+  }
+});
+
 check('shaders', () => {
   const text = page.shaderText('#include "render/tile_frame.glsl"\n#include "lib/hash.glsl"\nvoid main() {}\n');
   assert.ok(text.startsWith('#version 300 es\n'));

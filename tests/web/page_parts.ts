@@ -7,5 +7,6 @@ export * from '../../client/web/page/jpeg_tiles';
 export { lookNumbers } from '../../client/web/page/picture';
 export * from '../../client/web/page/reconnect';
 export * from '../../client/web/page/scene_text';
+export { rgbaOfTile } from '../../client/web/page/tile_planes';
 export { orbit, pan, zoom } from '../../client/web/page/ui/orbit';
 export * from '../../client/web/page/wire';

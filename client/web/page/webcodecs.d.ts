@@ -12,6 +12,15 @@ interface VideoFrame {
   readonly displayWidth: number;
   readonly displayHeight: number;
   readonly timestamp: number;
+  readonly format: string | null;
+  readonly colorSpace: { readonly matrix: string | null; readonly fullRange: boolean | null };
+  allocationSize(): number;
+  copyTo(destination: Uint8Array): Promise<{ offset: number; stride: number }[]>;
+  close(): void;
+}
+declare class ImageDecoder {
+  constructor(init: { type: string; data: BufferSource });
+  decode(): Promise<{ image: VideoFrame }>;
   close(): void;
 }
 declare class EncodedVideoChunk {
