@@ -45,9 +45,9 @@ export class Warnings {
     if (this.place.childElementCount > 5) this.place.firstElementChild?.remove();
     setTimeout(() => line.remove(), isError ? 9000 : 4500);
   }
-  /** Stay as long as they are told. */
+  /** Stay as long as they are told; of long ones the beginning, until all measurements are shown. */
   keep(texts: readonly string[]): void {
-    const text = texts.join('\n');
-    if (this.lasting.textContent !== text) this.lasting.textContent = text;
+    if ([...this.lasting.children].map((line) => line.textContent).join('\n') === texts.join('\n')) return;
+    this.lasting.replaceChildren(...texts.map((text) => Object.assign(document.createElement('p'), { textContent: text })));
   }
 }
