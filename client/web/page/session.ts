@@ -125,6 +125,7 @@ class Net {
       this.socket.onclose = undefined;
       this.socket.close(1000);
       this.connection?.end();
+      this.connection = undefined; // whoever asks it for a state meanwhile gets none
     }
     this.connect();
   }
@@ -165,6 +166,8 @@ class Net {
         if (this.noCore && message.mode !== Mode.frames)
           return post({ kind: 'notice', isError: true, text: `Strands cannot be drawn here: ${this.noCore}.` });
         this.asked.mode = message.mode;
+        // A relay has one mode for all of a session.
+        if (connection?.needsAnother(message.mode)) return this.reconnect(this.asked);
         return connection?.send({ mode_request: { mode: message.mode } });
       case 'camera':
         return connection?.lookFrom(message.camera);
@@ -515,6 +518,9 @@ class Connection {
     post({ kind: 'picture', picture, ...this.pictureSize }, [picture as unknown as Transferable]);
   }
 
+  needsAnother(mode: number): boolean {
+    return (this.welcome?.relays.length ?? 0) > 0 && (mode === Mode.frames) !== (this.welcome!.mode === Mode.frames);
+  }
   get showsStrands(): boolean {
     return this.shown === Mode.strands;
   }
