@@ -221,13 +221,15 @@ void add_mocap_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw
 }
 
 void add_record_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) {
-  auto* path = app.add_option("--record", raw.record_path,
-                              "record inputs, states and strands into this MCAP file, a new one");
+  auto* path =
+      app.add_option("--record", raw.record_path,
+                     "record inputs, states and strands into this MCAP file, a new one; several heads: each "
+                     "into its own, run.mcap and for a head ben run-ben.mcap");
   app.add_flag("--record-replace", raw.replaces_recording, "the file of --record may be there: replace it")
       ->needs(path);
   auto* folder = app.add_option("--record-dir", raw.record_folder,
                                 "who controls may begin and end recordings in this folder (strandcast-ctl "
-                                "record start NAME, record stop), one at a time");
+                                "record start NAME, record stop), of each head one at a time");
   auto* replay =
       app.add_option("--replay", options.replay_path,
                      "simulate this recording again, compare the hash of every state, and leave: exit "
@@ -299,7 +301,8 @@ void add_run_options(CLI::App& app, ServerOptions& options, RawRunOptions& raw) 
       ->capture_default_str();
   app.add_option(
       "--trace", options.config.trace_path,
-      "write a line per state to this file: when its motion came, when it was published and encoded");
+      "write a line per state to this file, of further heads to states-ben.csv and the like: when its motion "
+      "came, when it was published and encoded");
   app.add_flag("--lockstep", options.config.is_lockstep,
                "simulated time goes on by strandcast-ctl step N only, and inputs are for simulated times");
   app.add_option("--seconds", options.run_s, "stop after so many seconds")->check(in_range(0.0, kMaxRunS));

@@ -7,6 +7,7 @@
 
 #include "common/base/thread_name.h"
 #include "common/log/log.h"
+#include "server/app/head_files.h"
 
 namespace strandcast {
 namespace {
@@ -116,7 +117,8 @@ Status RecordDesk::attach(Stream stream) {
 void RecordDesk::begin() {
   if (recorder_ != nullptr) recorder_->begin(stream_->describe(), stream_->asset);
   if (!folder_) return;
-  log_info("record", "who controls may record into {}", folder_->path.string());
+  if (folder_->file_ending.empty())
+    log_info("record", "who controls may record into {}", folder_->path.string());
   thread_ = std::thread([this] {
     name_thread("record/desk");
     run();
@@ -220,7 +222,7 @@ Result<std::filesystem::path> RecordDesk::choose_path(const std::string& name) c
   };
   if (!name.empty()) {
     ASSIGN_OR_RETURN(const std::string file, recording_file_name(name));
-    const std::filesystem::path path = folder_->path / file;
+    const std::filesystem::path path = with_file_ending(folder_->path / file, folder_->file_ending);
     if (!is_there(path)) return path;
     return make_error(ErrorCode::BadInput, "{} is there already: name another one.", path.string());
   }
@@ -229,6 +231,14 @@ Result<std::filesystem::path> RecordDesk::choose_path(const std::string& name) c
   for (int number = 2; is_there(path) && number <= kMaxAlike; ++number)
     path.replace_filename(fmt::format("{}-{}{}", own.stem().string(), number, kEnding));
   return path;
+}
+
+/// A file that is there by then; all heads together keep the limits of the folder.
+Result<std::unique_ptr<Recorder>> RecordDesk::make_recorder(const std::string& name) const {
+  const std::lock_guard lock(*folder_->beginning);
+  ASSIGN_OR_RETURN(const std::filesystem::path path, choose_path(name));
+  RETURN_IF_ERROR(check_room());
+  return Recorder::make({path, IfPresent::Refuse});
 }
 
 /// Gives the step from which on it is so; `at_change` is called there, between two steps. Waits for the
@@ -261,16 +271,14 @@ Result<std::string> RecordDesk::start_recording(const std::string& name) {
     return make_error(ErrorCode::BadInput, "{} is being recorded already: record stop ends it.",
                       present->path().filename().string());
   if (present != nullptr) end();
-  ASSIGN_OR_RETURN(const std::filesystem::path path, choose_path(name));
-  RETURN_IF_ERROR(check_room());
-  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, Recorder::make({path, IfPresent::Refuse}));
+  ASSIGN_OR_RETURN(std::shared_ptr<Recorder> recorder, make_recorder(name));
   RETURN_IF_ERROR(recorder->attach(stream_->hub));
   ASSIGN_OR_RETURN(const uint64_t tick, change_tap(recorder.get()));
   recorder->begin(stream_->describe(), stream_->asset);
   const std::lock_guard lock(mutex_);
   recorder_ = std::move(recorder);
   ended_.clear();
-  return fmt::format("Recording {} from step {} on.", path.string(), tick);
+  return fmt::format("Recording {} from step {} on.", recorder_->path().string(), tick);
 }
 
 /// One sentence of what was recorded.

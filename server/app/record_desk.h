@@ -1,4 +1,4 @@
-// RecordDesk: the recording of a server: the one that --record begins with it, and those that who controls
+// RecordDesk: the recording of one head: the one that --record begins with it, and those that who controls
 // begins and ends in the folder of --record-dir, one at a time. What may wait for the disk is done by a
 // thread of its own, which is there with such a folder only.
 #pragma once
@@ -32,10 +32,13 @@ inline constexpr const char* kNoRecordings =
 /// On the disk of this folder; nothing where it cannot be said.
 std::optional<uint64_t> free_bytes_of(const std::filesystem::path& folder);
 
-/// Where recordings by command go.
+/// Where recordings by command go. Heads of one server have copies, and begin their files one behind the
+/// other, so that they keep its limits together.
 struct RecordFolder {
   std::filesystem::path path;
   std::function<std::optional<uint64_t>(const std::filesystem::path&)> free_bytes = free_bytes_of;
+  std::string file_ending = {};  // behind the name that somebody gave: head_file_endings()
+  std::shared_ptr<std::mutex> beginning = std::make_shared<std::mutex>();
 };
 
 /// The file of a recording that is called so: letters, digits, space and . _ - + as they are on every system,
@@ -95,6 +98,7 @@ class RecordDesk {
   Notice carry_out(const RecordCommand& command);
   Result<std::string> start_recording(const std::string& name);
   Result<std::filesystem::path> choose_path(const std::string& name) const;
+  Result<std::unique_ptr<Recorder>> make_recorder(const std::string& name) const;
   Status check_room() const;
   Result<uint64_t> change_tap(StepTap* tap, std::function<void()> at_change = {});
   std::string reason_to_end(const Recorder& recorder) const;

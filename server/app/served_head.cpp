@@ -125,7 +125,7 @@ NetHead ServedHead::admit(Whole whole) {
   desk_ = std::make_unique<SessionDesk>(
       SessionDesk::Parts{config_.scene, *hub_, *source_, inputs_, stages_, codecs_, asset_frame_,
                          is_drawn_by_processors_, config_.scene.live.empty() ? nullptr : live_, number_,
-                         std::move(whole.heads), std::move(whole.scene), records_.get()});
+                         std::move(whole.heads), std::move(whole.scene), records_.get(), whole.records});
   desk_->set_metrics(std::move(whole.metrics));
   NetHead head{name(), desk_.get(), hub_->strand_classes(), {}};
   for (const StrandCodecInfo& codec : codecs_) head.strand_codecs.push_back(codec.bytes);
@@ -189,8 +189,7 @@ void ServedHead::tell_status() {
   status.picture_motions = hub_->take_picture_motions();
   status.live_inputs = now.live_inputs;
   if (records_ != nullptr) records_->add(status);
-  if (records_ != nullptr) status.recording = records_->text();
-  net_->broadcast(status, number_);
+  desk_->tell_status(std::move(status));
   desk_->tell_state_times();
   desk_->tell_streams();
 }

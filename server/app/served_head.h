@@ -14,7 +14,6 @@
 #include "server/app/frame_stages.h"
 #include "server/app/heads_painter.h"
 #include "server/app/live_desk.h"
-#include "server/app/record_desk.h"
 #include "server/app/server.h"
 #include "server/app/session_desk.h"
 #include "server/app/slow_motion.h"
@@ -34,6 +33,8 @@ class ServedHead {
   ServedHead(const ServedHead&) = delete;
   ServedHead& operator=(const ServedHead&) = delete;
 
+  /// Null where nothing is recorded, nor can be.
+  RecordDesk* records() { return records_.get(); }
   /// What its live inputs move.
   LiveDesk::Target live_target();
   /// What the server knows that its heads do not.
@@ -42,6 +43,7 @@ class ServedHead {
     std::vector<std::string> heads;                   // names of all where there are several
     std::function<std::optional<SceneDesc>()> scene;  // with all heads, as it runs; from any thread
     std::function<std::string()> metrics;             // likewise
+    const RecordDesks* records = nullptr;             // of all heads, where there are several that record
   };
   /// Makes what its sessions speak to.
   NetHead admit(Whole whole);

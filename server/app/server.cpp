@@ -11,6 +11,7 @@
 #include "common/base/version.h"
 #include "common/base/worker_pool.h"
 #include "common/log/log.h"
+#include "server/app/head_files.h"
 #include "server/app/live_desk.h"
 #include "server/app/process_metrics.h"
 #include "server/app/served_head.h"
@@ -22,13 +23,21 @@ namespace {
 
 constexpr auto kStatusInterval = std::chrono::milliseconds(500);
 
-/// One for each head, with that alone.
+/// One for each head, with that and its files alone.
 std::vector<ServerConfig> configs_of_heads(const ServerConfig& config) {
-  std::vector<ServerConfig> configs(1, config);
-  configs.front().scene.heads.clear();
-  for (const SceneDesc& head : config.scene.heads) {
-    configs.push_back(configs.front());
-    configs.back().scene = head;
+  std::vector<SceneDesc> scenes = config.scene.heads;
+  scenes.insert(scenes.begin(), config.scene);
+  scenes.front().heads.clear();
+  std::vector<std::string> names;
+  for (const SceneDesc& scene : scenes) names.push_back(scene.name);
+  const std::vector<std::string> endings = head_file_endings(names);
+  std::vector<ServerConfig> configs(scenes.size(), config);
+  for (size_t i = 0; i < scenes.size(); ++i) {
+    ServerConfig& own = configs[i];
+    own.scene = std::move(scenes[i]);
+    if (own.record) own.record->path = with_file_ending(own.record->path, endings[i]);
+    if (own.record_folder) own.record_folder->file_ending = endings[i];
+    if (!own.trace_path.empty()) own.trace_path = with_file_ending(own.trace_path, endings[i]);
   }
   return configs;
 }
@@ -79,6 +88,7 @@ class Server::State {
   const ServerConfig config_;
   std::vector<std::unique_ptr<ServedHead>> heads_;  // the scene's own first
   std::unique_ptr<LiveDesk> live_;                  // null where the scene asks for none
+  std::unique_ptr<RecordDesks> records_;            // of several heads, where they may be recorded
   std::unique_ptr<NetServer> net_;
 
   std::mutex mutex_;  // guards has_stopped_
@@ -89,12 +99,6 @@ class Server::State {
 
 Status Server::State::start() {
   shared_workers();  // no nicer than this thread, as the one that draws is
-  if (!config_.scene.heads.empty() &&
-      (config_.record || config_.record_folder || !config_.trace_path.empty()))
-    return make_error(
-        ErrorCode::Unsupported,
-        "--record, --record-dir and --trace take scenes of one head for now, and this one has {}",
-        config_.scene.heads.size() + 1);
   for (const ServerConfig& config : configs_of_heads(config_)) {
     ServedHead::OtherHeads others;
     if (!config_.scene.heads.empty()) others = [this, own = heads_.size()] { return other_heads(own); };
@@ -143,6 +147,12 @@ Status Server::State::listen() {
   whole.metrics = [this] { return metrics(); };
   if (heads_.size() > 1)
     for (const auto& head : heads_) whole.heads.push_back(head->name());
+  if (heads_.size() > 1 && heads_.front()->records() != nullptr) {
+    std::vector<RecordDesks::Of> records;
+    for (const auto& head : heads_) records.push_back({head->name(), head->records()});
+    records_ = std::make_unique<RecordDesks>(std::move(records));
+  }
+  whole.records = records_.get();
   std::vector<NetHead> heads;
   for (const auto& head : heads_) heads.push_back(head->admit(whole));
   NetConfig net = config_.net;

@@ -84,6 +84,7 @@ Result<Admission> SessionDesk::on_hello(const Visitor& visitor, const Hello& hel
   }
   viewers_.note_address(visitor.session, visitor.address);
   if (is_relay) teller_.add(visitor.session);
+  if (parts_.all_records != nullptr && hello.head.empty()) whole_viewers_.insert(visitor.session);
   Admission admission;
   admission.welcome = make_welcome(*place, codec);
   if (visitor.subscription.gets(StreamMode::Strands)) admission.asset = parts_.asset;
@@ -203,6 +204,7 @@ void SessionDesk::on_camera_command(SessionId session, const CameraCommand& comm
 void SessionDesk::on_record_command(SessionId session, const RecordCommand& command) {
   const std::string what = command.is_wanted ? "record start " + command.name : "record stop";
   if (!may_control(session, what)) return;
+  if (whole_viewers_.contains(session)) return parts_.all_records->obey(command, reply_to(session, what));
   if (parts_.records != nullptr) return parts_.records->obey(command, reply_to(session, what));
   net_->send(session, Notice{true, std::string(kNoRecordings)});
 }
@@ -213,6 +215,18 @@ void SessionDesk::on_state_times_request(SessionId session, const StateTimesRequ
     times_readers_.insert(session);
   else
     times_readers_.erase(session);
+}
+
+void SessionDesk::tell_status(ServerStatus status) {
+  if (parts_.records != nullptr) status.recording = parts_.records->text();
+  if (parts_.all_records == nullptr) return net_->broadcast(std::move(status), parts_.head);
+  ServerStatus whole = status;
+  whole.recording = parts_.all_records->text();
+  net_->tell_each(
+      [this, status = std::move(status), whole = std::move(whole)](SessionId session) -> ServerMessage {
+        return whole_viewers_.contains(session) ? whole : status;
+      },
+      parts_.head);
 }
 
 void SessionDesk::tell_state_times() {
@@ -331,6 +345,7 @@ Status SessionDesk::readiness() {
 }
 
 void SessionDesk::on_left(SessionId session) {
+  whole_viewers_.erase(session);
   control_budget_.remove(session);
   parameter_budget_.remove(session);
   on_state_times_request(session, {false});

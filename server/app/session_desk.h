@@ -18,7 +18,7 @@
 #include "server/app/live_desk.h"
 #include "server/app/network_reader.h"
 #include "server/app/parameter_watch.h"
-#include "server/app/record_desk.h"
+#include "server/app/record_desks.h"
 #include "server/app/stream_teller.h"
 #include "server/app/viewers.h"
 #include "server/input/input_hub.h"
@@ -48,7 +48,8 @@ class SessionDesk : public NetHandler {
     std::vector<std::string> heads = {};  // names of all where there are several
     /// The scene with all heads, as it runs; nothing where it is none.
     std::function<std::optional<SceneDesc>()> whole_scene = {};
-    RecordDesk* records = nullptr;  // null: nothing is recorded here
+    RecordDesk* records = nullptr;             // null: nothing is recorded here
+    const RecordDesks* all_records = nullptr;  // of all heads, where there are several
   };
   explicit SessionDesk(Parts parts);
 
@@ -60,9 +61,11 @@ class SessionDesk : public NetHandler {
   // From any thread.
   uint32_t viewer_count() const { return viewers_.viewer_count(); }
   bool is_shut_down_wanted() const { return is_shut_down_wanted_; }
-  /// To those who asked for them; call about twice a second.
+  /// To every session, what it sees of what is recorded filled in; call about twice a second.
+  void tell_status(ServerStatus status);
+  /// To those who asked for them; likewise.
   void tell_state_times();
-  /// To relays, where something else is simulated; call about twice a second.
+  /// To relays, where something else is simulated; likewise.
   void tell_streams();
 
   Result<Admission> on_hello(const Visitor& visitor, const Hello& hello) override;
@@ -111,6 +114,7 @@ class SessionDesk : public NetHandler {
   ControlBudget control_budget_;
   ControlBudget parameter_budget_;  // of requests for parameters
   ParameterWatch parameter_watch_;
+  std::set<SessionId> whole_viewers_;  // who named no head of several, and so sees all
   NetServer* net_ = nullptr;
   std::unique_ptr<NetworkReader> reader_;  // of all sessions
   std::function<std::string()> metrics_;

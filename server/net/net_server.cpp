@@ -329,6 +329,14 @@ void NetServer::broadcast(ServerMessage message, size_t head) {
   });
 }
 
+void NetServer::tell_each(std::function<ServerMessage(SessionId)> of, size_t head) {
+  net::asio::post(state_->context.io, [state = state_.get(), of = std::move(of), head] {
+    const auto sessions = state->context.sessions;
+    for (const auto& [id, session] : sessions)
+      if (session->is_about(head)) session->send(of(id));
+  });
+}
+
 void NetServer::send_to_class(PictureClass picture_class, ServerMessage message, size_t head) {
   net::asio::post(state_->context.io,
                   [state = state_.get(), picture_class, message = std::move(message), head] {

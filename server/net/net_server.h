@@ -102,6 +102,8 @@ class NetServer {
   void set_clock_offset(int64_t offset_ns);
   /// To every joined session. In a ServerStatus dropped_frames is filled in per session.
   void broadcast(ServerMessage message, size_t head = 0);
+  /// Likewise, what `of` gives for each of them, on the network thread.
+  void tell_each(std::function<ServerMessage(SessionId)> of, size_t head = 0);
   /// To those who watch the pictures of one class.
   void send_to_class(PictureClass picture_class, ServerMessage message, size_t head = 0);
   /// Ignored when the session is gone.

@@ -6,8 +6,13 @@
 #include <mutex>
 
 #include "client/app/headless_view.h"
+#include "common/base/file.h"
 #include "common/pictures/image_codec.h"
+#include "common/record/recording_check.h"
+#include "common/record/recording_reader.h"
 #include "common/scene/scene_file.h"
+#include "server/app/head_files.h"
+#include "server/record/replay.h"
 #include "tests/support/live_packets.h"
 #include "tests/support/metrics_text.h"
 #include "tests/support/raw_client.h"
@@ -48,7 +53,7 @@ struct Published {
 class Heads : public test::ServerFixture {
  protected:
   [[nodiscard]] bool begin(SceneDesc scene = two_heads(), bool is_lockstep = false) {
-    ServerConfig config;
+    ServerConfig config = files_;
     config.scene = std::move(scene);
     config.sim_device = "lanes";
     config.is_lockstep = is_lockstep;
@@ -84,6 +89,8 @@ class Heads : public test::ServerFixture {
     target.token = kToken;
     return target;
   }
+
+  ServerConfig files_;  // recordings and traces of a server that begins
 
  private:
   std::mutex mutex_;
@@ -271,22 +278,207 @@ TEST_F(Heads, TheSceneIsSavedWithAllOfThem) {
   EXPECT_EQ(*saved, expected);
 }
 
-TEST_F(Heads, WhatTakesOneHeadSaysSo) {
-  ServerConfig config;
-  config.scene = two_heads();
-  config.net.port = 0;
+TEST(HeadFiles, AreCalledAsTheHeadsAreAndStayInTheirFolder) {
+  EXPECT_THAT(head_file_endings({"anna", "ben"}), ElementsAre("", "-ben"));
+  EXPECT_EQ(with_file_ending("takes.d/run.mcap", "-ben"), "takes.d/run-ben.mcap");
+  EXPECT_EQ(with_file_ending("takes.d/run", "-ben"), "takes.d/run-ben");
+  EXPECT_EQ(with_file_ending("run.1.csv", ""), "run.1.csv");
+  // Whatever a head is called, and where two of them would be called alike.
+  const std::vector<std::string> endings = head_file_endings(
+      {"../x", "../../etc/passwd", "Ben", "ben", "\xc3\xa4", "\xc3\xb6", "ben-4", "a b\\c"});
+  EXPECT_THAT(endings,
+              ElementsAre("", "-______etc_passwd", "-Ben", "-ben-4", "-__", "-__-6", "-ben-4-7", "-a_b_c"));
+  for (const std::string& ending : endings)
+    EXPECT_EQ(with_file_ending("takes/run.mcap", ending).parent_path(), "takes");
+  EXPECT_LT(head_file_endings({"anna", std::string(64, 'x')}).back().size(), 40u);
+}
+
+/// What a file holds of one head.
+void expect_recorded(const std::filesystem::path& path, const SceneDesc& scene, const Published& published) {
+  const auto check = check_recording(path);
+  ASSERT_TRUE(check) << check.error().to_string();
+  EXPECT_TRUE(check->is_sound()) << testing::PrintToString(check->problems);
+  const auto reader = RecordingReader::open(path, RecordedPart::Messages);
+  ASSERT_TRUE(reader) << reader.error().to_string();
+  const auto recorded = parse_scene((*reader)->start().scene_text, "test", {});
+  ASSERT_TRUE(recorded) << recorded.error().to_string();
+  EXPECT_EQ(recorded->name, scene.name);
+  EXPECT_THAT(recorded->heads, IsEmpty());
+  EXPECT_EQ(recorded->place_m, scene.place_m);
+  EXPECT_EQ(recorded->solver.name, scene.solver.name);
+  std::map<uint64_t, uint64_t> hash_of_tick;
+  for (auto item = (*reader)->next(); item && *item; item = (*reader)->next())
+    if (const auto* state = std::get_if<RecordedState>(&std::get<RecordedMessage>((*item)->what)))
+      hash_of_tick[state->tick] = state->state_hash;
+  EXPECT_EQ(hash_of_tick, published.hash_of_tick);
+  // From the file alone.
+  ReplayConfig config;
+  config.recording = path;
+  const auto replayed = replay_recording(config);
+  ASSERT_TRUE(replayed) << replayed.error().to_string();
+  EXPECT_TRUE(replayed->is_equal()) << to_sentence(*replayed);
+  EXPECT_EQ(replayed->compared, published.hash_of_tick.size());
+}
+
+std::vector<std::string> lines_of(const std::filesystem::path& path) {
+  const auto text = load_file(path, 1u << 20);
+  EXPECT_TRUE(text) << text.error().to_string();
+  std::vector<std::string> lines(1);
+  if (!text) return lines;
+  for (const std::byte byte : *text)
+    if (const char character = static_cast<char>(byte); character == '\n')
+      lines.emplace_back();
+    else
+      lines.back() += character;
+  lines.pop_back();
+  return lines;
+}
+
+TEST_F(Heads, EachIsRecordedAndTracedInAFileOfItsOwn) {
+  constexpr uint32_t kSteps = 30;
   const TemporaryFolder folder;
-  config.record = RecordConfig{folder.path() / "run.mcap", IfPresent::Refuse};
-  const auto server = Server::start(config);
-  ASSERT_FALSE(server);
-  EXPECT_THAT(server.error().to_string(),
-              HasSubstr("--record, --record-dir and --trace take scenes of one head"));
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "run.mcap"));
-  config.record.reset();
-  config.record_folder = RecordFolder{folder.path()};
-  const auto other = Server::start(config);
-  ASSERT_FALSE(other);
-  EXPECT_THAT(other.error().to_string(), HasSubstr("--record-dir"));
+  const auto file = [&](const char* name) { return folder.path() / name; };
+  files_.record = RecordConfig{file("run.mcap"), IfPresent::Refuse};
+  files_.trace_path = file("states.csv");
+  SceneDesc scene = two_heads();
+  std::get<ProceduralGroomDesc>(scene.heads[0].groom).strand_count = 60;
+  scene.heads[0].solver.name = "pbd";
+  if (!begin(scene, true)) return;
+  for (const char* head : {"anna", "ben"}) {
+    ClientConfig config = config_for(head, Role::Admin);
+    config.hello.gets_no_stream = true;
+    const auto client = ViewerClient::connect(config);
+    ASSERT_TRUE(client) << client.error().to_string();
+    MotionSamples swing;
+    for (int64_t tick = 0; tick <= kSteps; ++tick)
+      swing.samples.push_back(
+          {tick * 1'000'000'000 / 60,
+           {{0.05 * std::sin(0.2 * static_cast<double>(tick)), head[0] == 'b' ? 0.1 : 0.0, 0.0},
+            {1, 0, 0, 0}}});
+    EXPECT_TRUE((*client)->send(swing));
+    EXPECT_TRUE((*client)->send(SetParameter{"substeps=2"}));
+    EXPECT_TRUE((*client)->send(ControlCommand{Command::StepOnce, kSteps}));
+    EXPECT_TRUE(eventually([&] { return published(head).hash_of_tick.contains(kSteps); }));
+  }
+  EXPECT_NE(server_->counters(0).record, std::nullopt);
+  EXPECT_NE(server_->counters(1).record, std::nullopt);
+  server_->stop();
+  server_.reset();
+  expect_recorded(file("run.mcap"), scene, published("anna"));
+  expect_recorded(file("run-ben.mcap"), scene.heads[0], published("ben"));
+  // They are two runs: no state of one is of the other.
+  EXPECT_NE(published("anna").hash_of_tick, published("ben").hash_of_tick);
+  for (const char* name : {"states.csv", "states-ben.csv"}) {
+    const auto lines = lines_of(file(name));
+    ASSERT_EQ(lines.size(), 1 + published("ben").hash_of_tick.size()) << name;
+    EXPECT_THAT(lines[0], testing::StartsWith("tick,sim_time_ns,"));
+    EXPECT_THAT(lines.back(), testing::StartsWith(std::to_string(kSteps) + ",")) << name;
+  }
+  // No file is written over, whichever head's it is, and none is begun then.
+  std::filesystem::remove(file("run.mcap"));
+  files_.scene = scene;
+  files_.net.port = 0;
+  const auto refused = Server::start(files_);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().to_string(), HasSubstr("run-ben.mcap: the file is there already"));
+  EXPECT_FALSE(std::filesystem::exists(file("run.mcap")));
+}
+
+/// Recordings by command.
+class HeadRecords : public Heads {
+ protected:
+  HeadRecords() {
+    files_.record_folder = RecordFolder{folder_.path(), [](const auto&) { return kMuchSpace; }};
+  }
+  /// What a controller is told who names this head, or none.
+  Notice ask(const std::string& head, const RecordCommand& command) {
+    ClientConfig config = config_for(head, Role::Controller);
+    config.hello.gets_no_stream = true;
+    auto client = ViewerClient::connect(config);
+    Notice answer{true, "no answer"};
+    EXPECT_TRUE(client && (*client)->send(command));
+    if (!client) return answer;
+    EXPECT_TRUE(eventually([&] {
+      for (const ClientEvent& event : (*client)->wait(std::chrono::milliseconds(5)))
+        if (const auto* notice = std::get_if<Notice>(&event)) return answer = *notice, true;
+      return false;
+    }));
+    return answer;
+  }
+  void record_states(size_t head, uint64_t count) {
+    EXPECT_TRUE(eventually(
+        [&] { return server_->counters(head).record.value_or(RecordCounters{}).states >= count; }));
+  }
+  bool is_sound(const char* name) const {
+    const auto check = check_recording(folder_.path() / name);
+    return check && check->is_sound() && check->is_whole && check->states > 0;
+  }
+
+  static constexpr auto kMuchSpace = std::optional<uint64_t>(4 * kMinFreeRecordBytes);
+  TemporaryFolder folder_;
+};
+
+TEST_F(HeadRecords, WhoSeesAllRecordsAllAndWhoNamesOneThatOne) {
+  if (!begin()) return;
+  const auto whole = open(config_for(""));
+  const auto anna = open(config_for("anna"));
+  const auto ben = open(config_for("ben"));
+  ASSERT_TRUE(whole && anna && ben);
+  const std::vector<ViewerSession*> viewers = {whole.get(), anna.get(), ben.get()};
+  // The recordings that the three of them hear of.
+  const auto told = [&](const auto& of_whole, const auto& of_anna, const auto& of_ben) {
+    return pump_until(viewers, [&] {
+      return whole->has_status() && testing::Matches(of_whole)(whole->status().recording) &&
+             testing::Matches(of_anna)(anna->status().recording) &&
+             testing::Matches(of_ben)(ben->status().recording);
+    });
+  };
+  const auto is_of = [](const char* file) { return testing::StartsWith(std::string(file) + ": "); };
+  EXPECT_THAT(ask("", {false, {}}).text, HasSubstr("Nothing is being recorded"));
+
+  const Notice begun = ask("", {true, "take"});
+  EXPECT_FALSE(begun.is_error) << begun.text;
+  EXPECT_THAT(begun.text, AllOf(HasSubstr("/take.mcap from step"), HasSubstr("/take-ben.mcap from step")));
+  EXPECT_TRUE(told(AllOf(is_of("take.mcap"), HasSubstr(" | take-ben.mcap: ")),
+                   AllOf(is_of("take.mcap"), testing::Not(HasSubstr("ben"))), is_of("take-ben.mcap")));
+  record_states(0, 5);
+  record_states(1, 5);
+  // One of them, which the others notice.
+  const Notice ended = ask("ben", {false, {}});
+  EXPECT_FALSE(ended.is_error) << ended.text;
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("take-ben.mcap: "), testing::Not(HasSubstr("take.mcap"))));
+  EXPECT_TRUE(told(testing::EndsWith(" | not of ben"), is_of("take.mcap"), IsEmpty()));
+  EXPECT_FALSE(server_->counters(1).record);
+  EXPECT_THAT(ask("ben", {true, "take"}).text, HasSubstr("take-ben.mcap is there already"));
+  // All, of whom one is recorded: the other begins.
+  const Notice mixed = ask("", {true, "more"});
+  EXPECT_TRUE(mixed.is_error);
+  EXPECT_THAT(mixed.text, AllOf(testing::StartsWith("anna: take.mcap is being recorded already"),
+                                HasSubstr("/more-ben.mcap from step")));
+  record_states(1, 5);
+  const Notice all_ended = ask("", {false, {}});
+  EXPECT_FALSE(all_ended.is_error) << all_ended.text;
+  EXPECT_THAT(all_ended.text, AllOf(HasSubstr("take.mcap: "), HasSubstr("more-ben.mcap: ")));
+  EXPECT_TRUE(told(IsEmpty(), IsEmpty(), IsEmpty()));
+  for (const char* name : {"take.mcap", "take-ben.mcap", "more-ben.mcap"})
+    EXPECT_TRUE(is_sound(name)) << name;
+  // Without a name each has its head's, and what all say alike is said once.
+  EXPECT_THAT(ask("", {true, "../x"}).text,
+              AllOf(testing::StartsWith("A recording cannot be called so"), testing::Not(HasSubstr("ben"))));
+  EXPECT_THAT(ask("", {true, {}}).text,
+              testing::ContainsRegex("/anna-[0-9TZ]+\\.mcap from step .*/ben-[0-9TZ]+\\.mcap from step"));
+  EXPECT_FALSE(ask("", {false, {}}).is_error);
+}
+
+TEST_F(HeadRecords, KeepTheLimitsOfTheFolderTogether) {
+  for (size_t i = 1; i < kMaxRecordings; ++i) folder_.write(fmt::format("{}.mcap", i), "");
+  if (!begin()) return;
+  const Notice begun = ask("", {true, "take"});
+  EXPECT_TRUE(begun.is_error);
+  EXPECT_THAT(begun.text, AllOf(HasSubstr(" from step "),
+                                HasSubstr(fmt::format("{} recordings are there", kMaxRecordings))));
+  EXPECT_NE(std::filesystem::exists(folder_.path() / "take.mcap"),
+            std::filesystem::exists(folder_.path() / "take-ben.mcap"));
 }
 
 /// The picture of a server that a viewer without a window leaves.
