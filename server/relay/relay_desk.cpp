@@ -79,7 +79,8 @@ Result<Admission> RelayDesk::on_hello(const Visitor& visitor, const Hello& hello
                           size_t{relayed->welcome.strand_count} * size_t{relayed->welcome.vertex_count},
                           relayed->welcome.step_rate_hz});
   Hello viewer = hello;
-  viewer.head = upstream_.head();  // as the server above knows it
+  if (hello.head.empty())
+    viewer.head = upstream_.head();  // who named none is about all of them up there, too
   Subscription& subscription = visitor.subscription;
   const ViewerCodec codec = codecs_->admit(visitor.session, hello, model(*relayed));
   subscription.strands.codec = codec.codec;
