@@ -31,7 +31,7 @@ with contextlib.closing(socket.socket()) as probe:
     port = probe.getsockname()[1]
 (work / "fleet/fleet.json").write_text(json.dumps({
     "haproxy_socket": str(work / "socket"), "haproxy_bind": f"127.0.0.1:{port}", "public": f"ws://127.0.0.1:{port}",
-    "listen": "127.0.0.1", "server": str(programs / "strandcast-server"), "slots": 3, "tend_s": 0.2, "quiet_s": 1.0}))
+    "listen": "127.0.0.1", "server": str(programs / "strandcast-server"), "slots": 3, "quiet_s": 1.0}))
 SMALL = ["--", "--set", "groom.procedural.strand_count=50", "--set", "groom.procedural.vertex_count=8", "--sim-device", "lanes"]
 started = []
 
@@ -56,7 +56,7 @@ def begin_proxy():
     return child
 
 
-def until(is_so, what, seconds=30):
+def until(is_so, what, seconds=90):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if is_so():
