@@ -181,13 +181,14 @@ try {
   }
 } finally {
   await browser?.end();
+  // Who tends first, so that nothing is started any more.
+  await Promise.all(started.map((child) => child.exitCode ?? child.signalCode ?? new Promise((done) => child.once('exit', done).kill('SIGKILL'))));
   await fleet('stop', 'anna').catch(() => {});
-  for (const child of started) child.kill('SIGKILL');
   for (const job of fs.readdirSync(path.join(work, 'slurm'))) {
     try {
       process.kill(-Number(fs.readFileSync(path.join(work, 'slurm', job, 'pid'), 'utf8')), 'SIGKILL');
     } catch { /* it has ended, or is no job */ }
   }
-  fs.rmSync(work, { recursive: true, force: true });
+  fs.rmSync(work, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
 }
 process.exit(failed ? 1 : 0);
