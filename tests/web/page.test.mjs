@@ -197,6 +197,7 @@ check('a token leaves the address', () => {
   const rest = page.withoutToken('#token=secret&mode=strands&view-only');
   assert.equal(rest, '#mode=strands&view-only');
   const link = page.linkTo('http://h:1/', wishes.camera, 0);
+  assert.equal(page.readFragment(new URL(page.linkTo('http://h:1/', wishes.camera, 2, 'b & c')).hash).head, 'b & c');
   assert.deepEqual(page.readFragment(new URL(link).hash).camera, wishes.camera);
   assert.ok(!link.includes('token'));
   assert.equal(page.readFragment('#view=0,0,0,0,0,0,1').camera, undefined);

@@ -8,6 +8,7 @@ import fs from 'node:fs';
 import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
+import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
 import { Browser, findChromium, sleep } from './browser.mjs';
 
@@ -90,6 +91,21 @@ const all = {
     for (let i = 0; i < 5; ++i) await tab.press('ArrowLeft');
     await tab.until((now) => String(now.camera) !== String(dragged.camera), 'another camera by keys');
     await tab.close();
+  },
+  async 'of two heads the chosen one is drawn'() {
+    const scene = path.join(path.dirname(fileURLToPath(import.meta.url)), '../../deploy/scenes/two_heads.textproto');
+    const two = await Server.start(['--scene', scene, ...SMALL]);
+    const tab = await browser.open(`${two.url}#mode=strands`);
+    await tab.until((now) => now.mode === 'strands' && now.states > 3, 'strands');
+    const words = () => tab.evaluate('document.getElementById("hud-line").textContent');
+    assert.match(await words(), /strands of anna alone/);
+    assert.equal(await tab.evaluate('document.getElementById("head-choice").hidden'), false);
+    await tab.evaluate(`(() => { const head = document.getElementById('head'); head.value = 'ben'; head.dispatchEvent(new Event('change')); })()`);
+    await tab.until(async (now) => now.isConnected && now.hash_ok && /strands of ben alone/.test(await words()), 'the other head');
+    if (shots) await tab.screenshot(path.join(shots, 'other_head.png'));
+    assert.deepEqual(tab.errors, []);
+    await tab.close();
+    await two.end();
   },
   async 'a stream of another solver brings its kernel'() {
     const other = await Server.start([...SMALL, '--set', 'solver.name=direct_rod']);

@@ -40,8 +40,8 @@ export function withoutToken(fragment: string): string {
   return rest ? `#${rest}` : '';
 }
 
-export function linkTo(base: string, camera: Camera, mode: number): string {
+export function linkTo(base: string, camera: Camera, mode: number, head = ''): string {
   const view = [...camera.offset, ...camera.target, camera.fov].map((n) => Number(n.toFixed(DIGITS))).join(',');
   const name = Object.keys(MODES).find((one) => MODES[one] === mode);
-  return `${base}#view=${view}${name && name !== 'auto' ? `&mode=${name}` : ''}`;
+  return `${base}#view=${view}${name && name !== 'auto' ? `&mode=${name}` : ''}${head && `&head=${encodeURIComponent(head)}`}`;
 }

@@ -14,6 +14,7 @@ import {
 const MOST_PICTURE_SIDE = 1280; // of pictures that the server draws for this window
 const SAMPLES = 4;
 const FILLS_WITHIN = 0.05; // of a window's shape
+const QUIET_MS = 1500; // so long a picture may stand without a word about the connection
 
 // The token leaves the address before anything is asked for.
 const wishes = readFragment(location.hash);
@@ -95,6 +96,7 @@ class Viewer {
   private isConnected = false;
   private sentCamera = '';
   private retryAtMs = 0;
+  private lostAtMs = 0; // 0 while connected
   private readonly panel: Panel;
 
   constructor() {
@@ -222,11 +224,19 @@ class Viewer {
     at('simulation-tools').hidden = !this.isController;
     this.sceneLook(welcome.look, welcome.camera);
     this.panel.setRole(this.isController, this.shown !== Mode.frames);
+    at('head').replaceChildren(...welcome.heads.map((name) => new Option(name)));
+    at<HTMLSelectElement>('head').value = welcome.scene_name;
+    this.showHeads();
     if (this.panel.isOpen) this.askScene();
     this.sentCamera = '';
     this.lookFrom(this.camera);
     const isFull = welcome.look?.methods && Object.values(welcome.look.methods).some((name) => name && name !== 'main');
     if (isFull) warnings.say('This look asks for ways to draw that only the server has: strands are drawn here by the usual ones.');
+  }
+  /** Strands are those of one head; the server's pictures show all. */
+  private showHeads(): void {
+    const isAsked = (this.welcome?.heads.length ?? 0) > 1 && !this.welcome!.relays.length && this.shown !== Mode.frames;
+    at('head-choice').hidden = !isAsked;
   }
   private sceneLook(look: LookMessage | undefined, camera: CameraMessage | undefined): void {
     if (look) {
@@ -249,8 +259,8 @@ class Viewer {
     const box = at('trouble');
     const isTokenWanted = state === 'ended' && /token|role/i.test(reason);
     const wasAway = !box.hidden;
-    // What was seen stays seen for the moment that a reconnection takes.
-    box.hidden = state === 'open' || (state === 'connecting' && box.hidden && this.shown >= 0);
+    this.lostAtMs = state === 'open' ? 0 : this.lostAtMs || performance.now();
+    box.hidden = state === 'open' || (state !== 'ended' && box.hidden && this.isQuiet());
     at('trouble-title').textContent = state === 'ended' ? `No connection to ${location.host}`
       : this.welcome ? `Connection to ${location.host} lost` : `Connecting to ${location.host}`;
     if (reason || state === 'open') at('trouble-why').textContent = sentence(reason);
@@ -261,6 +271,10 @@ class Viewer {
     if (isTokenWanted) at('token').focus();
     if (state === 'open' && wasAway && this.shown >= 0) warnings.say('Connected again.');
     this.tick();
+  }
+  /** What was seen stays seen for the moment that a reconnection takes. */
+  private isQuiet(): boolean {
+    return this.shown >= 0 && performance.now() - this.lostAtMs < QUIET_MS;
   }
   private ended(reason: string): void {
     this.connection('ended', reason, 0);
@@ -291,6 +305,7 @@ class Viewer {
     strands.hidden = isFrames;
     this.toDraw({ kind: 'visible', isVisible: !isFrames });
     this.panel.setRole(this.isController, !isFrames);
+    this.showHeads();
     this.sentCamera = '';
     this.lookFrom(this.camera);
     this.tick();
@@ -401,7 +416,7 @@ class Viewer {
     warnings.say('Picture saved.');
   }
   private async copyLink(): Promise<void> {
-    const link = linkTo(location.origin + location.pathname, this.camera, this.asked.mode);
+    const link = linkTo(location.origin + location.pathname, this.camera, this.asked.mode, this.asked.head);
     history.replaceState(null, '', link);
     try {
       await navigator.clipboard.writeText(link);
@@ -428,6 +443,11 @@ class Viewer {
     const mode = at<HTMLSelectElement>('mode');
     mode.value = String(wishes.mode);
     mode.addEventListener('change', () => this.setMode(Number(mode.value)));
+    const head = at<HTMLSelectElement>('head');
+    head.addEventListener('change', () => {
+      this.asked = { ...this.asked, head: head.value };
+      this.toNet({ kind: 'reconnect', asked: this.asked });
+    });
     at('pause').addEventListener('click', () => this.togglePause());
     at('step').addEventListener('click', () => this.command(Command.stepOnce));
     at('reset').addEventListener('click', () => this.command(Command.reset));
@@ -474,6 +494,7 @@ class Viewer {
 
   private tick(): void {
     const now = performance.now();
+    if (this.lostAtMs && !this.isQuiet()) at('trouble').hidden = false;
     if (this.retryAtMs) {
       const seconds = Math.max(0, (this.retryAtMs - now) / 1000);
       at('trouble-next').textContent = `Trying again in ${seconds.toFixed(0)} s.`;
@@ -517,9 +538,8 @@ class Viewer {
     return this.figures!.motionMs ? this.figures!.motionMs + drawMs : 0;
   }
   private line(hz: number): string {
-    const heads = this.welcome?.heads ?? [];
-    // Of several heads strands are those of one; the server's pictures show all.
-    const of = heads.length > 1 ? ` of ${this.welcome!.scene_name} alone (${heads.join(', ')}: #head=NAME)` : '';
+    if (this.shown < 0) return this.isConnected ? 'Connected, the first picture is on its way' : 'not connected';
+    const of = (this.welcome?.heads.length ?? 0) > 1 ? ` of ${this.welcome!.scene_name} alone` : '';
     const what = this.shown === Mode.frames ? 'server’s pictures' : `strands${of}`;
     const parts = [hz > 0 ? `${hz >= 9.5 ? hz.toFixed(0) : hz.toFixed(1)} fps` : 'nothing moves', what, `${this.rate.kbits.toFixed(0)} kbit/s`];
     if (this.latencyMs()) parts.push(`${this.latencyMs().toFixed(0)} ms from motion`);
@@ -540,7 +560,7 @@ class Viewer {
     add('drawn by', isFrames ? 'the server' : `${this.drawnBy}: ${this.drawWhy}`);
     const drawn = this.drawFigures;
     if (!isFrames && drawn) {
-      add('drawn in', `${drawn.stepMs ? `${drawn.stepMs.toFixed(0)} ms, ` : ''}${(drawn.share * 100).toFixed(0)} % of the sides`);
+      add('drawn in', `${drawn.stepMs ? `${drawn.stepMs.toFixed(0)} ms, ` : ''}${drawn.share < 1 ? `at ${(drawn.share * 100).toFixed(0)} % of the window’s sides` : 'as large as the window'}`);
       if (drawn.segments) add('of', `${drawn.strands} strands, ${drawn.segments} segments`);
     }
     if (isFrames) {
@@ -551,7 +571,7 @@ class Viewer {
       const why = figures.codecReason.replace(new RegExp(`^${figures.codec}: `), '');
       add('strands by', figures.codec + (why && `: ${why}`));
       if (this.quality)
-        add('stream of', `${(this.quality.strand_share * 100).toFixed(0)} % of the strands every ${this.quality.rate_divisor} steps within ${(this.quality.bound_m * 1000).toPrecision(2)} mm: ${this.quality.reason}`);
+        add('stream of', `${this.quality.strand_share < 1 ? `${(this.quality.strand_share * 100).toFixed(0)} % of the` : 'all'} strands every ${this.quality.rate_divisor > 1 ? `${this.quality.rate_divisor} steps` : 'step'} within ${(this.quality.bound_m * 1000).toPrecision(2)} mm: ${this.quality.reason}`);
     }
     add('decoded in', `${figures.decodeMs.toFixed(2)} ms`);
     const status = this.status;
