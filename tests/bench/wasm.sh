@@ -27,5 +27,5 @@ for stream in "dftl step 2000x16" "dftl step 10000x16" "direct_rod step 2000x16"
   module=strand_core
   [ "${stream% *}" != "dftl step" ] || module=strand_step
   [ "${stream% *}" != "dftl tangent" ] || module=strand_page
-  node tests/web/play.mjs "$build/web/bin/$module.wasm" "$work/tape" | head -n 1
+  node tests/web/play.mjs "$build/web/bin/$module.wasm" --rounds 3 "$work/tape" | head -n 1
 done

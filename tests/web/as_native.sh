@@ -20,15 +20,15 @@ echo "$(wc -l <"$work/lanes") functions of lanes as native"
 for tape in kept hostile tiny; do
   "$build/bin/record_tapes" "$tape" "$work/$tape.tape"
 done
-sizes=(2000x16)
-[ "${STRANDCAST_TEST_GRID:-small}" != whole ] || sizes+=(10000x16)
+sizes=(2000x16); rounds=1
+[ "${STRANDCAST_TEST_GRID:-small}" != whole ] || { sizes+=(10000x16); rounds=3; }
 for size in "${sizes[@]}"; do
   for stream in "dftl step" "direct_rod step" "dftl tangent"; do
     # shellcheck disable=SC2086
     "$build/bin/record_tapes" stream "$work/${stream// /_}_$size.tape" $stream "$size" 300
   done
 done
-"$node" "$here/play.mjs" "$modules/strand_core.wasm" "$work"/*.tape
+"$node" "$here/play.mjs" "$modules/strand_core.wasm" --rounds "$rounds" "$work"/*.tape
 
 # What the page begins with, and what takes steps for it.
 "$node" "$here/play.mjs" "$modules/strand_page.wasm" --only "dftl tangent 2000 x 16" "$work"/*.tape

@@ -38,18 +38,31 @@ double cpu_ms() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
+constexpr int kMoreDecoders = 2;
+
 class Player {
  public:
   Player(Tape& tape, const std::string& codec, const StrandStreamLimits& limits,
          std::span<const glm::vec3> rest_in_head_m)
       : tape_(tape), decoder_(std::move(make_strand_decoder(codec, limits, workers_)).value()) {
     decoder_->set_rest_shape(rest_in_head_m);
+    for (int i = 0; i < kMoreDecoders; ++i) {
+      others_.push_back(std::move(make_strand_decoder(codec, limits, workers_)).value());
+      others_.back()->set_rest_shape(rest_in_head_m);
+    }
     tape_.add_decoder(codec, limits, rest_in_head_m);
   }
   bool play(std::span<const std::byte> message) {
     const double begin_ms = cpu_ms();
     const auto decoded = decoder_->decode(message);
-    tape_.add_message(message, decoded, cpu_ms() - begin_ms);
+    double least_ms = cpu_ms() - begin_ms;
+    // What else the machine does makes none of them shorter.
+    for (const auto& other : others_) {
+      const double again_ms = cpu_ms();
+      if (other->decode(message).ok() != decoded.ok()) return false;
+      least_ms = std::min(least_ms, cpu_ms() - again_ms);
+    }
+    tape_.add_message(message, decoded, least_ms);
     return decoded.ok();
   }
 
@@ -57,6 +70,7 @@ class Player {
   Tape& tape_;
   WorkerPool workers_{1};
   std::unique_ptr<StrandDecoder> decoder_;
+  std::vector<std::unique_ptr<StrandDecoder>> others_;  // that are only timed
 };
 
 /// As its first viewer sees a kept stream, and whoever joins.
