@@ -235,8 +235,7 @@ class Viewer {
   }
   /** Strands are those of one head; the server's pictures show all. */
   private showHeads(): void {
-    const isAsked = (this.welcome?.heads.length ?? 0) > 1 && !this.welcome!.relays.length && this.shown !== Mode.frames;
-    at('head-choice').hidden = !isAsked;
+    at('head-choice').hidden = (this.welcome?.heads.length ?? 0) < 2 || this.shown === Mode.frames;
   }
   private sceneLook(look: LookMessage | undefined, camera: CameraMessage | undefined): void {
     if (look) {
