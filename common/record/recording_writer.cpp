@@ -9,6 +9,9 @@ namespace strandcast {
 namespace {
 
 constexpr int kCompressionLevel = 3;
+/// Of messages, where a second of them is little: an eighth fewer bytes, for a millisecond or two.
+constexpr int kMessageLevel = 15;
+constexpr size_t kFewBytes = 64u << 10;
 
 std::string topic_of(uint16_t channel) {
   if (channel == kAssetChannel) return kAssetTopic;
@@ -85,7 +88,9 @@ bool RecordingWriter::close(Part& part, bool is_vital) {
   mcap::Bytes compressed;
   // Asset and keyframes are as small as they get; of deltas it takes what all of them say alike.
   const bool is_coded_already = part.batches.empty() && !is_vital;
-  if (!is_coded_already) compressor_.append(body.records, kCompressionLevel, compressed);
+  const bool is_small = is_vital && body.records.size() <= kFewBytes;
+  const int level = is_small ? kMessageLevel : kCompressionLevel;
+  if (!is_coded_already) compressor_.append(body.records, level, compressed);
   const bool is_smaller = !is_coded_already && compressed.size() < body.records.size();
   return file_.write(body, is_smaller ? compressed : body.records, is_smaller ? "zstd" : "", is_vital);
 }

@@ -325,7 +325,11 @@ std::string RecordDesk::text() const {
 }
 
 void RecordDesk::add(const ServerStatus& status) {
-  if (const auto recorder = this->recorder()) recorder->add(status);
+  const auto recorder = this->recorder();
+  if (recorder == nullptr) return;
+  const SimStats simulated = stream_->source.stats();
+  recorder->set_step_cost(simulated.step_cost * std::max<uint32_t>(simulated.substeps, 1));
+  recorder->add(status);
 }
 
 std::optional<RecordCounters> RecordDesk::counters() const {

@@ -8,6 +8,7 @@
 #include "common/base/profile.h"
 #include "common/base/thread_name.h"
 #include "common/log/log.h"
+#include "common/strands/strand_codec.h"
 #include "server/record/recorded_step.h"
 
 namespace strandcast {
@@ -62,6 +63,8 @@ void Recorder::begin(RecordingStart start, EncodedFramePtr asset) {
   start.codec = start_.codec;
   start.asset_hash = hash_bytes(std::span<const std::byte>(asset->message).subspan(kFrameHeaderBytes));
   start_ = std::move(start);
+  const auto codec = strand_codec_info(start_.codec);
+  is_predicted_ = codec && codec->predicts;
   asset_ = std::move(asset);
   file_->keep();
   log_info("record", "recording to {}: inputs, steps, states, and strands by {}", config_.path.string(),
@@ -191,6 +194,7 @@ void Recorder::write(const Item& item) {
     sim_time_ns_ = snapshot.sim_time_ns;
     if (!first_sim_ns_) first_sim_ns_ = sim_time_ns_;
     vertex_count_ = snapshot.plane_size();
+    tick_ = snapshot.tick;
     writer_->add(item.time_ns, sim_time_ns_,
                  RecordedState{snapshot.tick, snapshot.sim_time_ns, state_hash(snapshot)});
     const std::lock_guard lock(mutex_);
@@ -215,6 +219,7 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
     is_chain_broken_ = false;
     keyframe_sim_ns_ = header.sim_time_ns;
     vertices_since_keyframe_ = 0;
+    keyframe_tick_ = tick_;
     // Whoever begins here knows how it looks.
     writer_->add(time_ns, header.sim_time_ns, hub_->look());
   } else if (vertices_since_keyframe_ += vertex_count_; is_keyframe_due(header)) {
@@ -227,7 +232,13 @@ void Recorder::write_frame(int64_t time_ns, const EncodedFramePtr& frame) {
 
 bool Recorder::is_keyframe_due(const FrameHeader& delta) const {
   if (keyframe_sim_ns_ == kNever || delta.sim_time_ns - keyframe_sim_ns_ < kRecordKeyframeNs) return false;
-  return static_cast<double>(vertices_since_keyframe_) * kRecordDecodeNsPerVertex * kMsPerNs >= kRecordSeekMs;
+  const auto steps = static_cast<double>(tick_ - std::min(keyframe_tick_, tick_));
+  const auto frame_vertices = static_cast<double>(vertices_since_keyframe_);
+  const double stepped_vertices = step_cost_ * steps * static_cast<double>(vertex_count_);
+  const double decode_ns = is_predicted_
+                               ? kRecordPredictedNs * frame_vertices + kRecordStepNs * stepped_vertices
+                               : kRecordDecodeNs * frame_vertices;
+  return decode_ns * kMsPerNs >= kRecordSeekMs;
 }
 
 void Recorder::write_held_frame() {

@@ -2,6 +2,7 @@
 // calls it only hands over; a thread of its own makes chunks, and another one writes them (RecordFile).
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -27,11 +28,15 @@ inline constexpr uint64_t kMaxRecorderBytes = 64u << 20;
 inline constexpr size_t kMaxRecorderItems = 1u << 16;
 inline constexpr int64_t kRecordFlushNs = 1'000'000'000;
 /// Keyframes are so far apart at least, in time of the simulation, and no farther than that what may have to
-/// be decoded to see a moment takes about kRecordSeekMs: one takes as many bytes as many seconds of deltas.
+/// be decoded to see a moment takes about kRecordSeekMs of a processor: one takes as many bytes as many
+/// seconds of deltas.
 inline constexpr int64_t kRecordKeyframeNs = 2'000'000'000;
-inline constexpr double kRecordSeekMs = 150.0;
-/// Of processor time, by "step" with dftl, which is the dearest; scrub_bench says what it is.
-inline constexpr double kRecordDecodeNsPerVertex = 35.0;
+inline constexpr double kRecordSeekMs = 170.0;
+/// Of a vertex of a frame by codecs that do not predict, by one that does but for its steps, and of one in a
+/// step of dftl; scrub_bench says what they come to.
+inline constexpr double kRecordDecodeNs = 36.0;
+inline constexpr double kRecordPredictedNs = 21.0;
+inline constexpr double kRecordStepNs = 10.0;
 
 struct RecordConfig {
   std::filesystem::path path;
@@ -68,6 +73,8 @@ class Recorder : public StreamReader, public StepTap {
   /// The start says what it is of; times and codec are filled in here.
   void begin(RecordingStart start, EncodedFramePtr asset);
   void add(const ServerStatus& status);
+  /// What decoding a step takes, in steps of dftl; 1 to begin with. Any thread.
+  void set_step_cost(double steps) { step_cost_ = steps; }
   /// Takes nothing more, from whomever: what is in it goes up to one moment. Any thread.
   void refuse();
   /// Reads no more, closes the file and says what is in it; no longer the tap of anything.
@@ -136,12 +143,16 @@ class Recorder : public StreamReader, public StepTap {
   std::optional<Item> held_frame_;  // the newest delta: a keyframe of the same state takes its place
   uint64_t known_lost_frames_ = 0;
   bool is_chain_broken_ = true;
+  bool is_predicted_ = false;  // by the codec
   int64_t keyframe_sim_ns_ = 0;
   uint64_t vertices_since_keyframe_ = 0;  // of all deltas
-  uint64_t vertex_count_ = 0;             // of the newest state
+  uint64_t keyframe_tick_ = 0;
+  uint64_t vertex_count_ = 0;  // of the newest state
+  uint64_t tick_ = 0;          // likewise
   int64_t sim_time_ns_ = 0;
   std::optional<int64_t> first_sim_ns_;
 
+  std::atomic<double> step_cost_{1.0};
   std::thread thread_;
 };
 

@@ -66,10 +66,19 @@ measure "with --record"
 deltas=$(metric encode_delta_bytes_total); strands=$(metric record_strand_bytes_total); written=$(metric record_bytes_total)
 echo "lost: $(metric record_lost_frames_total) frames, $(metric record_lost_messages_total) messages; real time x $(metric sim_realtime_factor)"
 halt
-awk -v deltas="$deltas" -v strands="$strands" -v written="$written" 'BEGIN {
-  printf "file %.2f MB; strands in it %.2f MB, of a viewer that joined once %.2f MB: the file is %.3f times that\n",
-    written / 1e6, strands / 1e6, deltas / 1e6, written / deltas}'
-"$bin/strandcast-ctl" info "$work/run.mcap"
+"$bin/strandcast-ctl" info "$work/run.mcap" | tee "$work/info"
+# A viewer that joined at the start gets the asset, a keyframe and every delta; only what was written by then counts.
+awk -v deltas="$deltas" -v strands="$strands" -v written="$written" '
+  $2 == "MB" && $3 ~ /^\// {mb[$3] = $1; items[$3] = $4}
+  END {
+    keyframe = mb["/strands/keyframes"] / items["/strands/keyframes"]
+    viewer = deltas / 1e6 + mb["/asset"] + keyframe
+    printf "file %.2f MB: %.3f times the %.2f MB of a viewer (asset %.2f, a keyframe %.2f, deltas %.2f)\n",
+      written / 1e6, written / 1e6 / viewer, viewer, mb["/asset"], keyframe, deltas / 1e6
+    printf "  without the asset %.3f times; against its deltas alone %.3f times\n",
+      (written / 1e6 - mb["/asset"]) / (viewer - mb["/asset"]), written / deltas
+    for (topic in mb) printf "  %6.3f of the viewer: %s\n", mb[topic] / viewer, topic | "sort -r"
+  }' "$work/info"
 "$bin/strandcast-ctl" check "$work/run.mcap"
 for _ in 1 2 3; do "$bin/strandcast-server" --log-level warn --replay "$work/run.mcap" 2>/dev/null; done
 [ "$scrub_seconds" -gt 0 ] || exit 0

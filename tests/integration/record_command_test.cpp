@@ -305,5 +305,35 @@ TEST_F(RecordCommands, BeginWhereTimeStandsStill) {
   EXPECT_EQ(first_recorded_tick(file("later.mcap")), std::optional<uint64_t>(20));
 }
 
+TEST_F(RecordCommands, HaveKeyframesOftenerWhereStepsTakeLonger) {
+  // A second of these steps takes a processor as long as it may take to show a moment; of one substep, none
+  // of the seconds below.
+  ServerConfig costly = config();
+  costly.scene = test::bald_scene(500, 8);
+  costly.scene.substeps = 64;
+  costly.scene.stream.codec = "step";
+  costly.scene.stream.has_codec = true;
+  costly.is_lockstep = true;
+  if (!start(costly)) return;
+  const auto step = [&](uint32_t count) {
+    EXPECT_FALSE(ask(ControlCommand{Command::StepOnce, count}).is_error);
+  };
+  EXPECT_FALSE(start_recording("take").is_error);
+  step(60);
+  // What steps take is told with the server's status.
+  EXPECT_TRUE(eventually([&] {
+    for (const ClientEvent& event : controller_->wait(milliseconds(5)))
+      if (const auto* status = std::get_if<ServerStatus>(&event); status != nullptr && status->tick >= 60)
+        return true;
+    return false;
+  }));
+  const uint64_t before = server_->counters().encode.keyframes;
+  step(70);
+  step(5);
+  EXPECT_TRUE(eventually([&] { return server_->counters().encode.keyframes > before; }));
+  EXPECT_FALSE(stop_recording().is_error);
+  EXPECT_GT(check(file("take.mcap")).states, 130u);
+}
+
 }  // namespace
 }  // namespace strandcast
