@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/profile.h"
+#include "common/base/text.h"
 #include "common/client/connection_error_private.h"
 #include "common/client/reconnect_policy.h"
 #include "common/client/viewer_connection_private.h"
@@ -59,8 +60,9 @@ void clean(StreamList& streams) {
   streams.reason = one_line(streams.reason);
   streams.solver = one_line(streams.solver);
 }
+/// Whole: it may speak of several heads.
 void clean(Notice& notice) {
-  notice.text = one_line(notice.text);
+  notice.text = one_line(notice.text, kMaxTextChars);
 }
 void clean(ParameterList& list) {
   for (ParameterInfo& parameter : list.parameters)

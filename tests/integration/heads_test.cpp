@@ -458,7 +458,8 @@ TEST_F(HeadRecords, WhoSeesAllRecordsAllAndWhoNamesOneThatOne) {
   record_states(1, 5);
   const Notice all_ended = ask("", {false, {}});
   EXPECT_FALSE(all_ended.is_error) << all_ended.text;
-  EXPECT_THAT(all_ended.text, AllOf(HasSubstr("take.mcap: "), HasSubstr("more-ben.mcap: ")));
+  EXPECT_THAT(all_ended.text, AllOf(HasSubstr("take.mcap: "), HasSubstr("more-ben.mcap: "),
+                                    testing::EndsWith("nothing lost.")));
   EXPECT_TRUE(told(IsEmpty(), IsEmpty(), IsEmpty()));
   for (const char* name : {"take.mcap", "take-ben.mcap", "more-ben.mcap"})
     EXPECT_TRUE(is_sound(name)) << name;
