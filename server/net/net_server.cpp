@@ -324,9 +324,7 @@ void NetServer::set_clock_offset(int64_t offset_ns) {
 }
 
 void NetServer::broadcast(ServerMessage message, size_t head) {
-  net::asio::post(state_->context.io, [state = state_.get(), message = std::move(message), head] {
-    state->for_head(head, [&](net::Session& session) { session.send(message); });
-  });
+  tell_each([message = std::move(message)](SessionId) { return message; }, head);
 }
 
 void NetServer::tell_each(std::function<ServerMessage(SessionId)> of, size_t head) {

@@ -8,11 +8,11 @@
 
 namespace strandcast {
 
-Relay::Relay(const RelayConfig& config) : upstream_(config.upstream), voices_(config.upstream) {
-  const bool has_all_heads = upstream_.head.empty();
+Relay::Relay(const RelayConfig& config) : voices_(config.upstream) {
+  const bool has_all_heads = config.upstream.head.empty();
   const RelayDeskParts parts{make_start_id(), has_all_heads, voices_, [this] { return counters(); }};
   for (size_t i = 0; i < (has_all_heads ? kMaxHeads : 1); ++i)
-    heads_.push_back(std::make_unique<RelayedHead>(upstream_, parts, i));
+    heads_.push_back(std::make_unique<RelayedHead>(config.upstream, parts, i));
 }
 
 Result<std::unique_ptr<Relay>> Relay::start(const RelayConfig& config) {

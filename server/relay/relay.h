@@ -57,7 +57,6 @@ class Relay {
   explicit Relay(const RelayConfig& config);
   void follow_heads(const std::vector<std::string>& names);
 
-  const UpstreamConfig upstream_;
   // In the order in which each is used by those below it.
   Voices voices_;
   std::vector<std::unique_ptr<RelayedHead>> heads_;  // the first first
