@@ -3,7 +3,10 @@
 set(strandcast_usual_headers <algorithm> <array> <atomic> <bit> <charconv> <chrono> <cmath> <condition_variable>
   <cstddef> <cstdint> <cstring> <deque> <filesystem> <functional> <limits> <map> <memory> <mutex> <numbers> <numeric>
   <optional> <set> <span> <string> <string_view> <thread> <utility> <variant> <vector>
-  <fmt/format.h> <fmt/ranges.h> <glm/glm.hpp> <glm/gtc/quaternion.hpp>)
+  <fmt/format.h> <glm/glm.hpp> <glm/gtc/quaternion.hpp>)
+if(NOT EMSCRIPTEN)  # client/web/fmt has none
+  list(APPEND strandcast_usual_headers <fmt/ranges.h>)
+endif()
 
 # strandcast_precompile(NAME HEADERS <a> ... LIBS x ... [OPTIONS -O1]): a library that only carries precompiled headers.
 function(strandcast_precompile name)

@@ -46,6 +46,8 @@ target_compile_definitions(zstd PRIVATE ZSTD_DISABLE_ASM HUF_FORCE_DECOMPRESS_X1
 target_include_directories(zstd SYSTEM INTERFACE ${zstd_source}/lib)
 add_library(PkgConfig::ZSTD ALIAS zstd)
 
+# Files for size begin with the headers of the others: what is parsed is the same.
+add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-Xclang -fno-validate-pch>")
 include(cmake/precompiled.cmake)
 foreach(folder base simd math kernels strands)
   add_subdirectory(common/${folder})
@@ -58,6 +60,7 @@ foreach(part head_occupancy light_lattice look_lights rest_facts scalp_cover str
 endforeach()
 target_include_directories(strandcast_picture PRIVATE ${CMAKE_SOURCE_DIR}/shaders)  # the laws of shaders/lib
 target_link_libraries(strandcast_picture PUBLIC strandcast_strands strandcast_simd)
+target_precompile_headers(strandcast_picture REUSE_FROM strandcast_usual)
 
 # Small before quick, where no time of a state goes.
 function(strandcast_small folder)

@@ -40,13 +40,14 @@ class Manager:
     def wait_for(self, word, seconds, process=None):
         end = time.monotonic() + seconds
         while not any(word in lines for _, lines in self.told):
-            self.socket.settimeout(max(0.01, end - time.monotonic()))
+            self.socket.settimeout(0.5)
             try:
                 self.told.append((time.monotonic(), self.socket.recv(4096).decode().splitlines()))
             except TimeoutError:
-                fail(f"no {word} within {seconds} s, but {[lines for _, lines in self.told]}")
-            if process is not None and process.poll() is not None:
-                fail(f"the server has ended with {process.returncode}: {self.log.read_text()}")
+                if process is not None and process.poll() is not None:
+                    fail(f"the server has ended with {process.returncode}: {self.log.read_text()}")
+                if time.monotonic() > end:
+                    fail(f"no {word} within {seconds} s, but {[lines for _, lines in self.told]}: {self.log.read_text()}")
 
     def beats(self):
         return [when for when, lines in self.told if "WATCHDOG=1" in lines]
