@@ -35,9 +35,7 @@ add_library(threads INTERFACE)  # there are none
 add_library(Threads::Threads ALIAS threads)
 
 set(zstd_source ${CMAKE_BINARY_DIR}/zstd)
-if(NOT EXISTS ${zstd_source}/lib/zstd.h)
-  execute_process(COMMAND bash ${CMAKE_SOURCE_DIR}/client/web/fetch_zstd.sh ${zstd_source} COMMAND_ERROR_IS_FATAL ANY)
-endif()
+execute_process(COMMAND bash ${CMAKE_SOURCE_DIR}/client/web/fetch_zstd.sh ${zstd_source} COMMAND_ERROR_IS_FATAL ANY)
 file(GLOB zstd_files ${zstd_source}/lib/common/*.c ${zstd_source}/lib/decompress/*.c)
 add_library(zstd STATIC ${zstd_files})
 target_compile_options(zstd PRIVATE -Os)

@@ -14,11 +14,10 @@ ctest --preset "$preset" -j"$jobs" --output-junit "$results/first.junit" "$@" ||
 
 # Tests with sockets share a machine that may be busy: those that failed are tried once more, alone, and the summary
 # names them.
-shopt -s nullglob
-lists=("$folder"/test_lists/*.txt)
+ctest --preset "$preset" -N -L '^network$' | sed -n 's/^ *Test *#[0-9]*: //p' >"$results/network.names"
 again=()
-if [ ${#lists[@]} -gt 0 ] && [ -e "$results/first.junit" ]; then
-  mapfile -t again < <(awk -f tests/failed_tests.awk "${lists[@]}" "$results/first.junit")
+if [ -s "$results/network.names" ] && [ -e "$results/first.junit" ]; then
+  mapfile -t again < <(awk -f tests/failed_tests.awk "$results/network.names" "$results/first.junit")
 fi
 if [ ${#again[@]} -gt 0 ]; then
   echo "Trying once more: ${again[*]}"

@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# Fetches the source of Debian's zstd (by its BSD licence) for what is compiled for browsers, and leaves it in a folder:
+# Fetches the source of Debian's zstd (by its BSD licence) for what is compiled for browsers, and leaves it in a folder,
+# unless it is there:
 #   bash client/web/fetch_zstd.sh FOLDER
 set -euo pipefail
 folder="${1:?usage: fetch_zstd.sh FOLDER}"
+if [ -e "$folder/lib/zstd.h" ]; then exit 0; fi
 work="$(mktemp -d)"
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$work/lists/partial"

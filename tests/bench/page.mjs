@@ -8,10 +8,10 @@ import fs from 'node:fs';
 import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
-import { Browser, findChromium, sleep } from '../web/browser.mjs';
+import { Browser, sleep, whyNoBrowser } from '../web/browser.mjs';
 
 const [serverProgram, viewProgram, ctlProgram] = process.argv.slice(2);
-if (!ctlProgram || !findChromium()) {
+if (!ctlProgram || whyNoBrowser()) {
   console.error('usage: node page.mjs strandcast-server strandcast-view strandcast-ctl (needs chromium)');
   process.exit(2);
 }

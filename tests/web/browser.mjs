@@ -1,7 +1,7 @@
 // A browser for tests: headless Chromium over its own protocol on a pipe, without any package of Node.
 //   const browser = await Browser.start(); const tab = await browser.open('http://127.0.0.1:7878/');
 //   await tab.until('document.title === "Strandcast"'); await browser.end();
-import { spawn } from 'node:child_process';
+import { spawn, spawnSync } from 'node:child_process';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
@@ -9,11 +9,23 @@ import path from 'node:path';
 const USUAL_MS = 30_000;
 const POLL_MS = 50;
 
-export function findChromium() {
+function findChromium() {
   const names = ['chromium', 'chromium-browser', 'google-chrome'];
   const folders = (process.env.PATH ?? '').split(':');
   return folders.flatMap((folder) => names.map((name) => path.join(folder, name))).find((file) => fs.existsSync(file));
 }
+/** Why there is no browser to test with; undefined where there is one. */
+export function whyNoBrowser() {
+  const chromium = findChromium();
+  if (!chromium) return 'needs a browser (chromium)';
+  const profile = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-browser-'));
+  const options = ['--headless=new', `--user-data-dir=${profile}`, '--disable-dev-shm-usage', ...asRoot()];
+  const shown = spawnSync(chromium, [...options, '--dump-dom', 'data:text/html,<p>here</p>'], { encoding: 'utf8', timeout: 2 * USUAL_MS });
+  fs.rmSync(profile, { recursive: true, force: true, maxRetries: 50, retryDelay: 100 });
+  if (shown.stdout?.includes('<p>here</p>')) return undefined;
+  return `${chromium} shows no page here: ${shown.stderr?.trim().split('\n').pop() || shown.error || `status ${shown.status}`}`;
+}
+const asRoot = () => (process.getuid?.() === 0 ? ['--no-sandbox'] : []);
 export const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
 /** Its last files come late, from processes that outlive the first. What is left after that is the system's. */
@@ -36,7 +48,7 @@ export class Browser {
       '--headless=new', '--remote-debugging-pipe', `--user-data-dir=${profile}`, '--no-first-run', '--no-default-browser-check',
       '--disable-background-networking', '--disable-component-update', '--disable-extensions', '--disable-dev-shm-usage',
       '--hide-scrollbars', '--mute-audio', '--ignore-certificate-errors',
-      ...(process.getuid?.() === 0 ? ['--no-sandbox'] : []), ...graphics, 'about:blank',
+      ...asRoot(), ...graphics, 'about:blank',
     ], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
     return new Browser(child, profile);
   }

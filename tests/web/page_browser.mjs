@@ -10,15 +10,16 @@ import os from 'node:os';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
-import { Browser, findChromium, sleep } from './browser.mjs';
+import { Browser, sleep, whyNoBrowser } from './browser.mjs';
 
 const [program, shots] = process.argv.slice(2);
 if (!program) {
   console.error('usage: node page_browser.mjs strandcast-server [FOLDER]');
   process.exit(2);
 }
-if (!findChromium()) {
-  console.log('skipped: needs a browser (chromium)');
+const missing = whyNoBrowser();
+if (missing) {
+  console.log(`skipped: ${missing}`);
   process.exit(77);
 }
 const work = fs.mkdtempSync(path.join(os.tmpdir(), 'strandcast-page-'));

@@ -8,7 +8,7 @@ import fs from 'node:fs';
 import net from 'node:net';
 import os from 'node:os';
 import path from 'node:path';
-import { Browser, findChromium, sleep } from './browser.mjs';
+import { Browser, sleep, whyNoBrowser } from './browser.mjs';
 
 const [source, programs, shots] = process.argv.slice(2);
 if (!programs) {
@@ -17,9 +17,9 @@ if (!programs) {
 }
 const folders = [...(process.env.PATH ?? '').split(':'), '/usr/sbin'];
 const find = (name) => folders.map((folder) => path.join(folder, name)).find((file) => fs.existsSync(file));
-for (const [what, isThere] of [['a browser (chromium)', findChromium()], ['haproxy', find('haproxy')], ['python3', find('python3')]]) {
-  if (isThere) continue;
-  console.log(`skipped: needs ${what}`);
+const missing = ['haproxy', 'python3'].filter((name) => !find(name)).map((name) => `needs ${name}`)[0] ?? whyNoBrowser();
+if (missing) {
+  console.log(`skipped: ${missing}`);
   process.exit(77);
 }
 

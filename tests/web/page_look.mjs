@@ -6,12 +6,13 @@ import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
-import { Browser, findChromium, sleep } from './browser.mjs';
+import { Browser, sleep, whyNoBrowser } from './browser.mjs';
 import { psnr, readPng } from './png.mjs';
 
 const [serverProgram, viewProgram, ctlProgram, shots] = process.argv.slice(2);
-if (!findChromium()) {
-  console.log('skipped: needs a browser (chromium)');
+const missing = whyNoBrowser();
+if (missing) {
+  console.log(`skipped: ${missing}`);
   process.exit(77);
 }
 const LEAST_DB = 45;
