@@ -226,6 +226,20 @@ FeedListener progress_listener() {
   return isatty(STDERR_FILENO) != 0 ? FeedListener(print_progress) : FeedListener();
 }
 
+/// Of the head that is named; else of each that the server has.
+Result<std::vector<std::unique_ptr<ViewerClient>>> connect_sources(const CtlTarget& target) {
+  std::vector<std::unique_ptr<ViewerClient>> heads;
+  ASSIGN_OR_RETURN(heads.emplace_back(), connect(target, Role::Source));
+  if (!target.head.empty()) return heads;
+  const std::vector<std::string> names = heads.front()->welcome().heads;
+  for (size_t i = 1; i < names.size(); ++i) {
+    CtlTarget further = target;
+    further.head = names[i];
+    ASSIGN_OR_RETURN(heads.emplace_back(), connect(further, Role::Source));
+  }
+  return heads;
+}
+
 /// As a program of motion capture would.
 int run_mocap_feed(const FeedOptions& options, const FeedPlan& plan, const std::atomic<bool>& stop) {
   const auto encoding = find_mocap_encoding(options.as);
@@ -258,11 +272,13 @@ int run_feed(const CtlTarget& target, const FeedOptions& options, const std::ato
   if (options.rate_hz > kMaxFeedRateHz)
     return fail(make_error(ErrorCode::BadInput, "--rate {:g} is more than a server takes: {:g} at most",
                            options.rate_hz, kMaxFeedRateHz));
-  auto client = connect(target, Role::Source);
-  if (!client) return fail(client.error());
-  std::cerr << fmt::format("feeding {}: motion {}, wind {}, {} samples per second\n", target.connect,
+  const auto heads = connect_sources(target);
+  if (!heads) return fail(heads.error());
+  const std::vector<std::string>& names = heads->front()->welcome().heads;
+  std::cerr << fmt::format("feeding {}{}: motion {}, wind {}, {} samples per second\n", target.connect,
+                           heads->size() > 1 ? fmt::format(" ({})", fmt::join(names, ", ")) : "",
                            options.motion, options.wind, options.rate_hz);
-  const auto done = feed(**client, *plan, stop, progress_listener());
+  const auto done = feed(*heads, *plan, stop, progress_listener());
   if (isatty(STDERR_FILENO) != 0) std::cerr << '\n';
   if (!done) return fail(done.error(), kRefusedExit);
   if (done->motion_s < 0.99 * done->elapsed_s * plan->speed)

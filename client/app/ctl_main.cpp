@@ -24,8 +24,9 @@ void declare_target(CLI::App& app, CtlTarget& target) {
   app.add_option("--token", target.token, kTokenHelp)->envname(kTokenVariable);
   app.add_flag("--tls", target.is_tls, "Encrypt the connection, as an address with wss:// does");
   app.add_option("--tls-ca", target.tls_authorities, kTlsAuthoritiesHelp);
-  app.add_option("--head", target.head,
-                 "Of a server with several heads the one of this name (default: the first)");
+  app.add_option(
+      "--head", target.head,
+      "Of a server with several heads the one of this name (default: the first; feed and record: all)");
 }
 
 std::vector<DeclaredCommand> declare_commands(CLI::App& app, CtlCommandLine& line) {

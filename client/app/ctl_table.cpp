@@ -206,7 +206,7 @@ int admin(const Line& line, const Stop&) {
 
 // clang-format off
 constexpr CtlCommand kCommands[] = {
-    {"feed", "Send head motion and wind in real time", declare_feed, start_feed},
+    {"feed", "Send head motion and wind in real time, to all heads of a server or to --head", declare_feed, start_feed},
     {"monitor", "Print the server's status twice a second", declare_monitor,
      [](const Line& line, const Stop& stop) { return run_monitor(line.target, line.monitor_s, stop); }},
     {"pause", "Halt the simulation", nullptr, control<Command::Pause>},

@@ -75,10 +75,11 @@ void count(bool is_sent, uint64_t& counter, FeedProgress& progress) {
   ++(is_sent ? counter : progress.unsent_samples);
 }
 
-/// To a server, as a source of its own.
+/// To a server, as a source of its own for each head.
 class SessionWay {
  public:
-  explicit SessionWay(ViewerClient& client) : client_(client) {}
+  explicit SessionWay(std::span<const std::unique_ptr<ViewerClient>> heads)
+      : heads_(heads), told_(heads.size()) {}
 
   void send(const FeedPlan& plan, int64_t sample_ns, FeedProgress& progress) {
     if (plan.motion) {
@@ -88,33 +89,53 @@ class SessionWay {
         const std::vector<glm::dvec3> places = plan.joints(progress.motion_s);
         message.samples.front().joint_m.assign(places.begin(), places.end());
       }
-      count(client_.send(message).ok(), progress.motion_samples, progress);
+      for (const auto& head : heads_) count(head->send(message).ok(), progress.motion_samples, progress);
     }
     if (plan.wind) {
       const WindSamples message{{{sample_ns, plan.wind(progress.motion_s)}}};
-      count(client_.send(message).ok(), progress.wind_samples, progress);
+      for (const auto& head : heads_) count(head->send(message).ok(), progress.wind_samples, progress);
     }
   }
 
   Status read_events(const FeedPlan& plan, FeedProgress& progress) {
-    for (ClientEvent& event : client_.poll()) {
-      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
-      if (auto* notice = std::get_if<Notice>(&event)) progress.last_notice = std::move(notice->text);
-      if (const auto* status = std::get_if<ServerStatus>(&event)) {
-        progress.rejected_samples = status->rejected_samples;
-        if (!plan.is_live) progress.pace = follow_pace(progress.pace, *status);
-      }
+    for (size_t i = 0; i < heads_.size(); ++i) RETURN_IF_ERROR(read_events_of(i, plan, progress));
+    progress.rejected_samples = 0;
+    progress.pace = 1.0;
+    for (const Told& told : told_) {
+      progress.rejected_samples += told.rejected_samples;
+      progress.pace = std::min(progress.pace, told.pace);
     }
     return {};
   }
 
   void flush() {
     const int64_t end_ns = now_ns() + std::chrono::nanoseconds(kFlushWait).count();
-    while (client_.queued_messages() > 0 && now_ns() < end_ns) std::this_thread::sleep_for(milliseconds(1));
+    for (const auto& head : heads_)
+      while (head->queued_messages() > 0 && now_ns() < end_ns) std::this_thread::sleep_for(milliseconds(1));
   }
 
  private:
-  ViewerClient& client_;
+  /// What the server said last of a head.
+  struct Told {
+    double pace = 1.0;
+    uint64_t rejected_samples = 0;
+  };
+
+  Status read_events_of(size_t index, const FeedPlan& plan, FeedProgress& progress) {
+    Told& told = told_[index];
+    for (ClientEvent& event : heads_[index]->poll()) {
+      if (const auto* closed = std::get_if<ClosedEvent>(&event)) return closed->error;
+      if (auto* notice = std::get_if<Notice>(&event)) progress.last_notice = std::move(notice->text);
+      if (const auto* status = std::get_if<ServerStatus>(&event)) {
+        told.rejected_samples = status->rejected_samples;
+        if (!plan.is_live) told.pace = follow_pace(told.pace, *status);
+      }
+    }
+    return {};
+  }
+
+  std::span<const std::unique_ptr<ViewerClient>> heads_;
+  std::vector<Told> told_;
 };
 
 /// To who says nothing back.
@@ -143,9 +164,9 @@ double follow_pace(double present, const ServerStatus& status) {
   return next >= kSteadyPace ? 1.0 : next;
 }
 
-Result<FeedProgress> feed(ViewerClient& client, const FeedPlan& plan, const std::atomic<bool>& stop,
-                          const FeedListener& listener) {
-  SessionWay way(client);
+Result<FeedProgress> feed(std::span<const std::unique_ptr<ViewerClient>> heads, const FeedPlan& plan,
+                          const std::atomic<bool>& stop, const FeedListener& listener) {
+  SessionWay way(heads);
   return Feeder(way, plan).run(stop, listener);
 }
 

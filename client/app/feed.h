@@ -7,7 +7,9 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -43,7 +45,7 @@ inline constexpr double kMaxDatagramRateHz = 1000.0;  // of packets of motion ca
 struct FeedProgress {
   double elapsed_s = 0.0;  // real time
   double motion_s = 0.0;   // motion time
-  double pace = 1.0;       // of the simulation, as it is followed
+  double pace = 1.0;       // of the slowest simulation, as it is followed
   uint64_t motion_samples = 0;
   uint64_t wind_samples = 0;
   uint64_t skipped_samples = 0;    // their time had passed: this process was held up
@@ -59,9 +61,10 @@ using SendMoment = std::function<bool(double time_s, const Pose&, const std::opt
 /// Called about once a second.
 using FeedListener = std::function<void(const FeedProgress&)>;
 
-/// Runs until the plan's duration is over, `stop` is set or the connection ends (an error).
-Result<FeedProgress> feed(ViewerClient& client, const FeedPlan& plan, const std::atomic<bool>& stop,
-                          const FeedListener& listener);
+/// Feeds one head or several, each by a connection of its own, with the same samples. Runs until the plan's
+/// duration is over, `stop` is set or a connection ends (an error).
+Result<FeedProgress> feed(std::span<const std::unique_ptr<ViewerClient>> heads, const FeedPlan& plan,
+                          const std::atomic<bool>& stop, const FeedListener& listener);
 
 /// Likewise in real time to who says nothing back.
 FeedProgress feed_moments(const SendMoment& send, const FeedPlan& plan, const std::atomic<bool>& stop,

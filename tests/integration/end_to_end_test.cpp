@@ -132,7 +132,7 @@ class EndToEnd : public test::ServerFixture {
       ASSERT_TRUE(client) << client.error().to_string();
       FeedPlan plan;
       plan.motion = built_in_motion;
-      const auto fed = feed(**client, plan, stop_feeding_, {});
+      const auto fed = feed({&*client, 1}, plan, stop_feeding_, {});
       EXPECT_TRUE(fed) << fed.error().to_string();
     });
   }

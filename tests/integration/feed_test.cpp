@@ -63,7 +63,7 @@ Fed feed_to(const ServerStatus& status, const FeedPlan& plan) {
   auto client = ViewerClient::connect(config);
   EXPECT_TRUE(client) << client.error().to_string();
   if (!client) return fed;
-  const auto done = feed(**client, plan, stop, {});
+  const auto done = feed({&*client, 1}, plan, stop, {});
   EXPECT_TRUE(done) << done.error().to_string();
   if (done) fed.progress = *done;
   (*client).reset();
@@ -138,7 +138,7 @@ TEST(Feed, AFileEndsWithItsMotionHoweverSlowlyItIsPlayed) {
   auto client = ViewerClient::connect(config);
   ASSERT_TRUE(client) << client.error().to_string();
   const std::atomic<bool> stop = false;
-  const auto done = feed(**client, plan, stop, {});
+  const auto done = feed({&*client, 1}, plan, stop, {});
   ASSERT_TRUE(done) << done.error().to_string();
   EXPECT_GE(done->motion_s, 0.05);
   EXPECT_LT(done->motion_s, 0.05 + 2.0 / plan.rate_hz);

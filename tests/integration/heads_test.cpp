@@ -214,6 +214,30 @@ TEST_F(Heads, OneThatNobodyMovesAnyMoreIsStaleAndTheOtherIsNot) {
   EXPECT_TRUE(is_head_at("ben", kBensPlace + glm::dvec3(0.0, 0.125, 0.0))) << "it rests where it was";
 }
 
+TEST_F(Heads, AFeedThatNamesNoneMovesAllOfThemAlike) {
+  if (!begin()) return;
+  const std::atomic<bool> stop = false;
+  FeedOptions options;
+  options.wind = "none";
+  options.seconds = 0.5;
+  ASSERT_EQ(run_feed(target_of(""), options, stop), kDoneExit);
+  const auto moved_m = [&](const std::string& head, const glm::dvec3& place_m) {
+    return published(head).head.position_m - place_m;
+  };
+  // What one that is lost goes on by depends on when its own steps fall.
+  constexpr double kSameM = 0.002;
+  const auto apart_m = [&] {
+    return glm::distance(moved_m("anna", kAnnasPlace), moved_m("ben", kBensPlace));
+  };
+  EXPECT_TRUE(eventually([&] {
+    return glm::length(moved_m("anna", kAnnasPlace)) > 0.01 && apart_m() < kSameM;
+  })) << apart_m()
+      << " m apart";
+  options.seconds = 1.0;
+  ASSERT_EQ(run_feed(target_of("ben"), options, stop), kDoneExit);
+  EXPECT_GT(apart_m(), 2.0 * kSameM) << "ben alone goes on";
+}
+
 TEST_F(Heads, OnePortTellsOfSeveralSubjectsAndEachHeadFollowsItsOwn) {
   const uint16_t port = test::free_udp_port();
   SceneDesc scene = two_heads();

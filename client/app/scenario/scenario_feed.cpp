@@ -58,7 +58,7 @@ Result<std::unique_ptr<LiveFeed>> LiveFeed::start(FeedPlan plan, const ClientCon
   live->thread_ = std::thread([self = live.get()] {
     name_thread("feed");
     // The end of the connection shows in what is expected of the server.
-    (void)feed(*self->client_, self->plan_, self->stop_, [self](const FeedProgress& progress) {
+    (void)feed({&self->client_, 1}, self->plan_, self->stop_, [self](const FeedProgress& progress) {
       const std::lock_guard lock(self->mutex_);
       self->progress_ = progress;
     });
