@@ -44,8 +44,8 @@ run_part() {
     lto) build lto && echo "all files agree" ;;
     arm) bash tests/tools/compile_for_arm.sh ;;
     packages)
-      bash deploy/install_deps.sh debootstrap lintian desktop-file-utils dpkg-dev file buildah python3
-      build release -DBUILD_TESTING=OFF && (cd build/release && rm -f packages/*.deb && cpack -G DEB >/dev/null) &&
+      bash deploy/install_deps.sh debootstrap lintian desktop-file-utils dpkg-dev file buildah python3 emscripten esbuild nodejs
+      build release -DBUILD_TESTING=OFF -DSTRANDCAST_WEB=ON && (cd build/release && rm -f packages/*.deb && cpack -G DEB >/dev/null) &&
         bash tests/packages/clean_root.sh build/release/packages build/packages &&
         bash tests/packages/container.sh build/release/packages build/packages
       ;;

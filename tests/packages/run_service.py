@@ -2,12 +2,14 @@
 usage: run_service.py ROOT service|socket PICTURE       as root; leaves a picture that the packaged viewer made"""
 import os
 import pathlib
+import re
 import shlex
 import signal
 import socket
 import subprocess
 import sys
 import time
+import urllib.request
 
 NOBODY = 65534
 STATE = "/var/lib/strandcast"
@@ -110,6 +112,13 @@ def main(root, kind, picture):
         if data[:8] != b"\x89PNG\r\n\x1a\n" or len(data) < 10_000:
             fail(f"the viewer's picture has {len(data)} bytes, too few for hair")
         pathlib.Path(picture).write_bytes(data)
+        page = urllib.request.urlopen(f"http://{address}/", timeout=10).read().decode()
+        files = re.findall(r'(?:src|href)="([^":#]+\.(?:js|css|wasm))"', page)
+        if not files:
+            fail(f"the server has no page for browsers: {page[:200]}")
+        for name in files:
+            if len(urllib.request.urlopen(f"http://{address}/{name.lstrip('./')}", timeout=10).read()) < 1000:
+                fail(f"{name} of the page is not whole")
         manager.wait_for("WATCHDOG=1", 3 * WATCHDOG_S, process)
         process.send_signal(signal.SIGTERM)
         manager.wait_for("STOPPING=1", 20)
