@@ -46,10 +46,11 @@ class Manager:
             try:
                 self.told.append((time.monotonic(), self.socket.recv(4096).decode().splitlines()))
             except TimeoutError:
-                if process is not None and process.poll() is not None:
-                    fail(f"the server has ended with {process.returncode}: {self.log.read_text()}")
-                if time.monotonic() > end:
-                    fail(f"no {word} within {seconds} s, but {[lines for _, lines in self.told]}: {self.log.read_text()}")
+                pass  # whether it is over is asked below, however often the server speaks
+            if process is not None and process.poll() is not None:
+                fail(f"the server has ended with {process.returncode}: {self.log.read_text()}")
+            if time.monotonic() > end:
+                fail(f"no {word} within {seconds} s, but {[lines for _, lines in self.told]}: {self.log.read_text()}")
 
     def beats(self):
         return [when for when, lines in self.told if "WATCHDOG=1" in lines]
